@@ -1,4 +1,4 @@
-"""Studies of papers: shipped case files, one folder a paper."""
+"""Studies of papers: shipped case files, one folder per paper."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ _HERE = Path(__file__).parent
 
 
 def shipped_cases() -> dict[str, Path]:
-    """Case files that come with the package, by name ("herkal/case1")."""
+    """Shipped case files by name ("herkal/case1")."""
     found = {f"{path.parts[-3]}/{path.stem}": path for path in _HERE.glob("*/cases/*.toml")}
     return dict(sorted(found.items()))
 
 
 def find_case(name: str) -> Path:
-    """Path of a case file: a file as named, or a shipped one ("herkal/case1").
+    """Path of a case file, given as a file or as the name of a shipped one ("herkal/case1").
 
     Raises
     ------
     InputError
-        There is neither.
+        Neither exists.
     """
-    if os.path.exists(name):  # Path.exists raises where a name is too long
+    if os.path.exists(name):  # Path.exists raises if a name is too long
         return Path(name)
     known = shipped_cases()
     shipped = name.removesuffix(".toml")

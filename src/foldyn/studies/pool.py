@@ -1,4 +1,4 @@
-"""Tasks run in processes, each of which keeps its own result, so that they can be resumed."""
+"""Tasks run in processes; each keeps its own result, so that interrupted work resumes."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from foldyn.sweeps.pool import pool_of
 
 
 class Task(Protocol):
-    """Something to compute; it is hashable and can be sent to another process."""
+    """A computation; it is hashable and can be sent to another process."""
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Name of the task."""
         ...
 
     def there(self, folder: Path) -> bool:
@@ -33,19 +33,19 @@ class Task(Protocol):
 
 @dataclass(frozen=True)
 class Done:
-    """What became of a task.
+    """Outcome of a task.
 
     Attributes
     ----------
     task : Task
     seconds : float
-        That it took; 0 where it was skipped.
+        Computing time; 0 if skipped.
     skipped : bool
-        Whether its result was there already.
+        Whether its result already existed.
     failure : str
-        Why there is no result, or "".
+        Reason for a missing result, or "".
     warnings : tuple of str
-        What was warned of.
+        Warnings of the task.
     """
 
     task: Task
@@ -61,23 +61,23 @@ def run(
     tell: Callable[[Done], None] = lambda done: None,
     processes: int = 2,
 ) -> list[Done]:
-    """Run what is not yet in a folder.
+    """Run tasks whose results are not yet in a folder.
 
     Parameters
     ----------
     tasks : iterable of Task
         The longest first.
     folder : Path
-        Exists; gets the results.
+        Existing folder for the results.
     tell : callable
-        Called with each task that is done, skipped or failed.
+        Called with the outcome of each task.
     processes : int
-        How many tasks run at a time; 1: in this process.
+        Number of parallel processes; 1 means this process.
 
     Returns
     -------
     list of Done
-        Tasks fail one by one; the others are computed all the same.
+        A failing task does not stop the others.
     """
     ended: list[Done] = []
 

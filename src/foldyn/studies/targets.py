@@ -1,4 +1,4 @@
-"""Values and claims of a paper next to computed values: the rows of a study's `targets.toml`."""
+"""Values and claims of a paper and computed values: the rows of a study's `targets.toml`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from foldyn.errors import InputError
 
 @dataclass(frozen=True)
 class Target:
-    """A value that a paper gives, or a bound that says what one of its claims means in numbers.
+    """A value in a paper, or a bound that expresses one of its claims as a number.
 
     Attributes
     ----------
@@ -25,12 +25,12 @@ class Target:
         Section, table or figure.
     what : str
     tolerance : float or None
-        Largest deviation, as a fraction of the value, with which the computed value agrees; None
-        where the two are only shown beside each other.
+        Largest deviation, as a fraction of the value, that counts as agreement; None if the two are
+        only shown side by side.
     bound : {"least", "most"} or None
-        Of a claim: it holds where the computed value is at least, or at most, `value`.
+        For a claim: it holds if the computed value is at least, or at most, `value`.
     group : str
-        Which part of the study computes it.
+        Part of the study that computes it.
     """
 
     key: str
@@ -43,7 +43,7 @@ class Target:
     group: str = ""
 
     def __post_init__(self) -> None:
-        """Check that it is a value or a bound."""
+        """Check that it is either a value or a bound."""
         if self.bound not in (None, "least", "most"):
             raise InputError(f'{self.key}: bound = {self.bound!r}: give "least" or "most"')
         if self.bound is not None and self.tolerance is not None:
@@ -52,19 +52,19 @@ class Target:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A target with the computed value (nan where there is none)."""
+    """A target with the computed value (nan if missing)."""
 
     target: Target
     computed: float
 
     @property
     def deviation(self) -> float:
-        """Computed over given, less one."""
+        """Computed relative to given value, minus one."""
         return self.computed / self.target.value - 1.0
 
     @property
     def holds(self) -> bool | None:
-        """Whether they agree; None where neither tolerance nor bound is set."""
+        """Whether they agree; None if neither tolerance nor bound is set."""
         if self.target.bound == "least":
             return self.computed >= self.target.value
         if self.target.bound == "most":
@@ -74,7 +74,7 @@ class Verdict:
         return math.isfinite(self.computed) and abs(self.deviation) <= self.target.tolerance
 
     def line(self) -> str:
-        """One line for people."""
+        """One line of text."""
         return (
             f"{self.target.what}: {self.computed:.4g} {self.target.unit} beside "
             f"{self.asked} ({self.target.source}), {self.deviation:+.1%}: {self.word}"
@@ -82,18 +82,18 @@ class Verdict:
 
     @property
     def word(self) -> str:
-        """Whether they agree."""
+        """Agreement in a word."""
         return {True: "holds", False: "fails", None: "beside"}[self.holds]
 
     @property
     def asked(self) -> str:
-        """The target's number; of a claim, as a bound."""
+        """The target's number; for a claim, as a bound."""
         before = {"least": "at least ", "most": "at most ", None: ""}[self.target.bound]
         return f"{before}{self.target.value:.4g}"
 
 
 def read_targets(path: Path, group: str | None = None) -> Mapping[str, Target]:
-    """Targets of a file by their keys, one table each; of one group if it is given."""
+    """Targets of a file by key, one table each; of one group if given."""
     tables = tomllib.loads(path.read_text("utf-8"))
     targets = {key: Target(key=key, **table) for key, table in tables.items()}
     return {k: t for k, t in targets.items() if group is None or t.group == group}

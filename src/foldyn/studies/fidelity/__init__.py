@@ -1,1 +1,1 @@
-"""How well bars and hinges match the shell: a set of cases, their reference, and the errors."""
+"""How well bars and hinges match the shell: the cases, their references, and the errors."""

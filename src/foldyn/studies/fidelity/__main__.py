@@ -2,9 +2,9 @@
 
     python -m foldyn.studies.fidelity --out FOLDER
 
-writes documented.csv, drawn.csv and sheets.csv, and of the first two sets the first five modes of
-their cases with internal amplitudes, by default beside the stored ones, and prints their summaries
-(about ten minutes).
+writes documented.csv, drawn.csv and sheets.csv, and for the first two sets the first five modes of
+each case with internal amplitudes, by default into the folder of stored results, and prints
+summaries (about ten minutes).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from foldyn.studies.fidelity.stored import RESULTS, modes_below, table, write
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run what the command line says."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Bars and hinges beside the shell.")
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the tables")
     parser.add_argument("--seed", type=int, default=SEED, help="of the random cases")

@@ -1,8 +1,8 @@
-"""The cases of the fidelity study: what they are, and how both models hold them.
+"""Cases of the fidelity study, and their supports in both models.
 
-Both models get the same pattern, sheet and supports. Supports hold vertices; an edge that is held
-is held along its whole length in the shell, and by its two vertices with bars and hinges, which
-have no other nodes there.
+Both models get the same pattern, sheet and supports. Supports hold vertices. A held edge is held
+along its whole length in the shell, and at its two vertices with bars and hinges, which have no
+other nodes there.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ class Held:
     Attributes
     ----------
     points : mapping of str to tuple of int
-        Vertices held, by the axes along which they are.
+        Held vertices, by their held axes.
     edges : tuple of (int, int)
-        Edges of which every point is held along all axes.
+        Edges held at every point along all axes.
     """
 
     points: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
@@ -71,7 +71,7 @@ class FidelityCase:
 
     @property
     def name(self) -> str:
-        """What it is, in a line."""
+        """Description in one line."""
         shape = ", ".join(f"{key} {_short(value)}" for key, value in self.shape.items())
         return f"{self.kind}, {shape}, {self.support}, L* {self.sheet.length_scale_ratio:.3g}"
 
@@ -91,7 +91,7 @@ class FidelityCase:
 
     @property
     def options(self) -> Mapping[str, Any]:
-        """What `discretize` and `shell` are told of its supports."""
+        """Options of `discretize` and `shell` that follow from the supports."""
         return {}
 
 
@@ -113,7 +113,8 @@ def documented(path: Path = DOCUMENTED) -> list[FidelityCase]:
 def polygons(sides: int = 6, dihedral: float = 90.0, edge: float = 1.0) -> Pattern:
     """Two regular polygons with edges of length `edge` (m) that meet at a dihedral (degrees).
 
-    Vertices 0 and 1 end the crease; those of the first polygon follow, then the others.
+    Vertices 0 and 1 are the ends of the crease; the first polygon's vertices follow, then the
+    second's.
     """
     turn = 2.0 * np.pi * np.arange(sides) / sides
     steps = edge * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -150,12 +151,12 @@ def supports(kind: str, shape: Mapping[str, Any]) -> dict[str, Held]:
 
 
 def _sheet_supports(columns: int, rows: int) -> dict[str, Held]:
-    """Supports of a sheet of 2 columns x 2 rows parallelograms, numbered along y first."""
+    """Supports of a sheet with 2 columns x 2 rows of parallelograms, numbered along y first."""
     step = 2 * rows + 1
     corners = (0, step - 1, 2 * columns * step, (2 * columns + 1) * step - 1)
     side = tuple(range(step))
     return {
-        # as in case study 2: a side against a wall, the corners on the ground
+        # as in case study 2: one side against a wall, the corners on the ground
         "folding": Held({"x": side, "y": (rows,), "z": corners}),
         "edge": Held(edges=tuple(pairwise(side))),
         "corners": Held({"xyz": corners}),

@@ -1,4 +1,4 @@
-"""Frequencies and shapes of bars and hinges beside those of the shell."""
+"""Frequencies and shapes of bars and hinges compared with the shell."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
 """Options of `discretize`; all bends are linear. `circumcenter` is refused on many panels, and is
 `mixed_voronoi` on all others."""
 COMPARED = 8  # modes of the shell, at most
-FIRST = 5  # that are compared whatever their frequency
-REFERENCE = 10  # modes of the shell that are computed
+FIRST = 5  # that are compared at any frequency
+REFERENCE = 10  # computed modes of the shell
 
 
 class Row(NamedTuple):
@@ -47,9 +47,9 @@ class Row(NamedTuple):
     shell : float
         Its frequency, Hz.
     over_plate : float
-        The same over that of a free square plate whose side is the longest edge.
+        The same, relative to a free square plate with the longest edge as its side.
     error : float
-        Relative error of the model's frequency; nan where no mode has a MAC of 0.5 or more.
+        Relative error of the model's frequency; nan if no mode has a MAC of 0.5 or more.
     mac : float
     """
 
@@ -61,7 +61,7 @@ class Row(NamedTuple):
 
 
 def reference(case: FidelityCase) -> Reference:
-    """Modes of a case by the shell, frequencies extrapolated with the square of the mesh size."""
+    """Shell modes of a case, with frequencies extrapolated quadratically in the mesh size."""
     pattern, sheet = case.pattern(), case.sheet
     cases = [
         case.case(shell(pattern, sheet, divisions=n, mass="consistent"))
@@ -71,7 +71,7 @@ def reference(case: FidelityCase) -> Reference:
 
 
 def structure_of(case: FidelityCase, model: str) -> Structure:
-    """Bars and hinges of a case; edges that are held stay straight where edges may bow."""
+    """Bars and hinges of a case; held edges stay straight even if edges may bow."""
     options = {"bend_law": "linear", **case.options, **MODELS[model]}
     if resolved(**options).bowed:
         options["straight"] = case.held.edges
@@ -81,23 +81,23 @@ def structure_of(case: FidelityCase, model: str) -> Structure:
 
 
 def compare(case: FidelityCase, true: Reference, model: str) -> list[Row]:
-    """Modes of a case below the limit, by a model beside the shell."""
+    """Compare a model's modes below the limit with the shell's."""
     rows = all_rows(case, true, model)
     return [row for row in rows if row.over_plate < BELOW]
 
 
 def first_modes(case: FidelityCase, true: Reference, internal: int) -> list[Row]:
-    """The first modes of a case, by n5b8e with internal amplitudes beside the shell."""
+    """Compare the first modes by n5b8e with internal amplitudes with the shell's."""
     return all_rows(case, true, "n5b8e, condensed", FIRST, internal)
 
 
 def all_rows(
     case: FidelityCase, true: Shown, model: str, count: int = COMPARED, internal: int = 0
 ) -> list[Row]:
-    """The first modes of a case, by a model beside the shell."""
+    """Compare the first modes by a model with the shell's."""
     held = case.case(structure_of(case, model))
     limit = plate_frequency(case.pattern(), case.sheet)
-    if not len(held.free_dofs):  # triangles between edges that are held
+    if not len(held.free_dofs):  # triangles between held edges
         return [Row(k, f, f / limit, nan, 0.0) for k, f in enumerate(true.frequency[:count], 1)]
     found = matched(true, count, held, modes_at_rest(held, count + SPARE, internal=internal))
     rows = zip(true.frequency, found.error, found.mac, strict=False)

@@ -1,4 +1,4 @@
-"""Cycles of a vibration that is not a pure tone: where they begin and how long they last.
+"""Cycles of a vibration that is not a pure tone: their starts and durations.
 
 The record is demodulated at its fundamental frequency f under a sliding Hann window of two periods,
 
@@ -6,7 +6,7 @@ The record is demodulated at its fundamental frequency f under a sliding Hann wi
 
 whose spectrum is zero at f, 3 f/2, 2 f, ...: neither the mean, nor the image at -f, nor the
 harmonics of f leak into the phase. The phase of z exp(2 pi i f t) is that of the
-fundamental; a cycle ends when it has advanced by 2 pi, whatever the higher modes do in between.
+fundamental; a cycle ends when it has advanced by 2 pi, whatever the higher modes do.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 PERIODS = 2.0  # length of the window
-PADDED = 8  # times the record's length, for the spectrum in which the peak is sought
-SETTLED = 1e-6  # relative change of the frequency at which its iteration ends
+PADDED = 8  # multiple of the record's length, zero-padded for the spectrum of the peak search
+SETTLED = 1e-6  # relative change of the frequency at which its iteration stops
 ROUNDS = 30
 
 
@@ -34,11 +34,11 @@ class Cycles:
     Attributes
     ----------
     extreme : (2 k + 1,)
-        Times (s) of the fundamental's extremes, in which cycles begin, are half over, and end.
+        Times (s) of the fundamental's extremes: starts, middles and ends of cycles.
     period : (k,)
         Periods, s: from an extreme to the next but one.
     share : float
-        Part of the record's variance about its moving mean that is the fundamental's.
+        The fundamental's share of the record's variance about its moving mean.
     """
 
     extreme: NDArray
@@ -51,7 +51,7 @@ class Cycles:
 
 
 def fundamental(x: NDArray, dt: float, low: float, high: float) -> float:
-    """Frequency (Hz) of the highest peak of a record's spectrum (n,) between two frequencies."""
+    """Frequency (Hz) of the highest peak in the spectrum of a record (n,) within a band."""
     n = PADDED * len(x)
     height = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(len(x)), n))
     frequency = np.fft.rfftfreq(n, dt)
@@ -64,7 +64,8 @@ def fundamental(x: NDArray, dt: float, low: float, high: float) -> float:
 def demodulated(x: NDArray, dt: float, f: float) -> tuple[NDArray, NDArray]:
     """The fundamental z exp(2 pi i f t) of a record (n,), and its moving mean, (m,) each.
 
-    They belong to the samples whose windows lie within the record: all but as many at both ends.
+    They exist for samples whose windows lie within the record: all except equal numbers at both
+    ends.
     """
     half = int(PERIODS / (2.0 * f * dt))
     window = np.cos(np.pi * f * dt * np.arange(-half, half + 1) / PERIODS) ** 2
@@ -79,9 +80,9 @@ def demodulated(x: NDArray, dt: float, f: float) -> tuple[NDArray, NDArray]:
 
 
 def phase(x: NDArray, dt: float, low: float, high: float) -> tuple[NDArray, NDArray, float]:
-    """Times (m,) from the first sample, the fundamental's phase (m,) there, rad, and its share.
+    """Times (m,) from the first sample, the fundamental's phase (m,), rad, and its share.
 
-    The frequency of demodulation is the mean one of the phase it gives.
+    The demodulation frequency equals the mean frequency of the resulting phase.
 
     Parameters
     ----------
@@ -95,7 +96,7 @@ def phase(x: NDArray, dt: float, low: float, high: float) -> tuple[NDArray, NDAr
     Raises
     ------
     NoCyclesError
-        Nothing oscillates in the band, or not for long enough.
+        No oscillation in the band, or too short a one.
     """
     f = fundamental(x, dt, low, high)
     for _ in range(ROUNDS):
@@ -118,10 +119,10 @@ def cycles(x: NDArray, dt: float, low: float, high: float, released: bool = Fals
     Parameters
     ----------
     x, dt, low, high
-        As those of `phase`.
+        As in `phase`.
     released : bool
         The record starts from rest without loads, and nothing is damped: then it is even in time,
-        x(-t) = x(t), which shows the first cycles whole.
+        x(-t) = x(t), so that the first cycles are complete.
     """
     if released:
         time, angle, share = phase(np.concatenate([x[:0:-1], x]), dt, low, high)

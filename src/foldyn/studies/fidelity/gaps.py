@@ -1,6 +1,7 @@
-"""Sheets on which bars and hinges are less right than on others, or once were: one of each kind.
+"""Sheets on which bars and hinges are less accurate, or once were: one of each kind.
 
-They stand beside the mixed sets: `references` stores their shells, `mixed_models` compares models.
+They supplement the mixed sets: `references` stores their shell results, `mixed_models` compares
+models.
 """
 
 from __future__ import annotations
@@ -22,14 +23,14 @@ TOWER = {"sides": 6, "radius": 0.04, "height": 0.06, "twist": 30, "storeys": 1}
 
 @dataclass(frozen=True)
 class Gap(MixedCase):
-    """A case with a name of its own.
+    """A named case.
 
     Attributes
     ----------
     told : str
-        What it stands for.
+        What it represents.
     clamped : bool
-        Whether the edge that is held cannot turn.
+        Whether the held edge is clamped.
     """
 
     told: str = ""
@@ -37,7 +38,7 @@ class Gap(MixedCase):
 
     @property
     def name(self) -> str:
-        """What it stands for."""
+        """What it represents."""
         return self.told
 
     def pattern(self) -> Pattern:
@@ -57,7 +58,7 @@ class Gap(MixedCase):
 
 
 def gaps() -> list[Gap]:
-    """All of them: sheets of 0.3 mm and panels of 40 mm unless their names say otherwise."""
+    """All gap cases: sheets of 0.3 mm and panels of 40 mm unless their names say otherwise."""
     patched = replace(PLASTIC, panels=[PanelSheet(list(range(0, 16, 2)), thickness=1e-3)])
     cells = {"cells": (3, 3)}
     return [

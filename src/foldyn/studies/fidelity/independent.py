@@ -1,9 +1,9 @@
-"""The shell's frequencies beside those of OpenSees, which shares no code with it.
+"""The shell's frequencies compared with OpenSees, which shares no code with it.
 
     python -m foldyn.studies.fidelity.independent
 
-computes those documented cases that the model of the case studies takes (panels of four corners,
-supports of vertices, nothing free) and stores them; it needs the extra `opensees`.
+computes and stores the documented cases that the model of the case studies supports (panels of four
+corners, supports of vertices, nothing free); it needs the extra `opensees`.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ STORED = RESULTS / "opensees.csv"
 MESHES = (8, 16)  # divisions
 BESIDE = ("plate, consistent", "n5b8e, condensed")
 HELD = ("case 1", "panel", "folding")
-LINEAR = EnhancedLinear(5.0, 355.0)  # folds that are linear wherever they rest
+LINEAR = EnhancedLinear(5.0, 355.0)  # folds that are linear at any rest angle
 
 
 class Independent(NamedTuple):
-    """Frequencies (Hz) of a mode: of OpenSees, extrapolated, of the shell and of two models."""
+    """Frequencies (Hz) of a mode: by OpenSees, extrapolated, by the shell and by two models."""
 
     case: str
     mode: int
@@ -49,13 +49,13 @@ def frequencies(case: FidelityCase, count: int) -> NDArray:
 
 
 def taken(case: FidelityCase) -> bool:
-    """Whether OpenSees' model takes a case."""
+    """Whether OpenSees' model supports a case."""
     four = all(len(face) == 4 for face in case.pattern().faces)
     return four and case.support in HELD
 
 
 def computed() -> list[Independent]:
-    """All modes of the documented set that are stored and that OpenSees' model takes."""
+    """All stored modes of the documented set that OpenSees' model supports."""
     stored = {modes.case: modes.rows for modes in read(RESULTS / "documented.csv")}
     found = []
     for case in documented():

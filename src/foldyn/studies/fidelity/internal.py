@@ -18,7 +18,7 @@ RANGES = {"below 0.6": (0.0, BELOW), "0.6 to 1": (BELOW, 1.0), "above 1": (1.0, 
 
 
 def modes_first(case: FidelityCase, true: Reference) -> Modes:
-    """The first five modes of a case by n5b8e with internal amplitudes, beside the shell's."""
+    """Compare the first five modes by n5b8e with internal amplitudes with the shell's."""
     rows = {name: first_modes(case, true, count) for name, count in AMPLITUDES.items()}
     return Modes(case.name, rows)
 

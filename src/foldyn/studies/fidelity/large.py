@@ -1,4 +1,4 @@
-"""Large loads: the paper's case studies and single panels twisted far, with laws of the bends."""
+"""Large loads: the paper's case studies, and single panels twisted far, by laws of the bends."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ LAWS: Mapping[str, Mapping[str, Any]] = {
     "plate, plate_superlinear": {"preset": "plate", "bend_law": "plate_superlinear"},
 }
 """Options of `discretize`: the models of the large loads and of the large motions."""
-LOADS = (0.1, 1.0, 3.0)  # of the paper's
+LOADS = (0.1, 1.0, 3.0)  # multiples of the paper's loads
 TURNS = (1.0, 8.0, 35.0)  # lifts of a panel's corner over its thickness
 PANELS = {"1 x 1, 60 degrees": (60.0, 1.0), "1 x 1.5, 75 degrees": (75.0, 1.5)}
 SHEET = Sheet(1e6, 0.25, 0.01, density=1.0)
 DIVISIONS = {"study": 12, "panel": 10}
-NUDGE = 1e-6  # N on the center of a panel: which of its diagonals bends is not left to rounding
+NUDGE = 1e-6  # N on the center of a panel: decides which of its diagonals bends
 
 
 def under_loads(name: str, factors: Sequence[float] = LOADS) -> dict[str, NDArray]:
-    """Errors (k,) of the displacement of a case study under some times its loads, by law."""
+    """Errors (k,) of the displacement of a case study under multiples of its loads, by law."""
     given = read_case(find_case(f"herkal/{name}")).case("circumcenter")
     pattern, sheet = given.structure.pattern, given.structure.sheet
 
@@ -56,9 +56,9 @@ def twisted(angle: float, b: float, turns: Sequence[float] = TURNS) -> dict[str,
     Parameters
     ----------
     angle, b : float
-        Of a parallelogram with the edges 1 m and b; its acute angle in degrees.
+        Acute angle (degrees) and second edge (m) of a parallelogram with a first edge of 1 m.
     turns : sequence of float
-        Lifts of corner 2 over the thickness; the others stay on the ground.
+        Lifts of corner 2, relative to the thickness; the other corners stay on the ground.
     """
     c, s = b * np.cos(np.radians(angle)), b * np.sin(np.radians(angle))
     panel = Pattern([[0, 0], [1, 0], [1 + c, s], [c, s]], [[0, 1, 2, 3]])
@@ -83,7 +83,7 @@ def _paths(case: Case, factors: Sequence[float]) -> Any:
 
 
 def large_table() -> str:
-    """Both in Markdown."""
+    """Both tables in Markdown."""
     heads = f"| | {' | '.join(LAWS)} |\n|---|" + "---|" * len(LAWS)
     rows = [(name, under_loads(name)) for name in STUDIES]
     rows += [(name, twisted(*panel)) for name, panel in PANELS.items()]

@@ -1,7 +1,7 @@
-"""Three random sets of all patterns, sizes, supports and thicknesses, drawn from stored seeds.
+"""Three random sets of all patterns, sizes, supports and thicknesses, from stored seeds.
 
-Patterns and supports come in turn, in an order that is drawn anew for each turn, so that the first
-cases of a set are a sample of it.
+Patterns and supports rotate in an order that is redrawn for each round, so that the first cases of
+a set are a sample of it.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ SUPPORTS = ("free", "one edge", "two edges", "corners")
 GRIDS = (*PARALLELOGRAMS, "quads")  # numbered along y first
 CELLS = 8  # at most, along either direction
 FINE, USUAL = (8, 12, 16), (4, 8, 12)  # divisions of small and of large cases
-SMALL, LARGE = 60_000, 180_000  # triangles of the finest mesh: of 16 divisions, and of all
+SMALL, LARGE = 60_000, 180_000  # triangles of the finest mesh: with 16 divisions, and in general
 FLAT = 179.0  # degrees
-NARROW = 1.0 / 3.0  # least width of a panel over the shortest edge
+NARROW = 1.0 / 3.0  # least width of a panel, relative to the shortest edge
 
 
 @dataclass(frozen=True)
 class MixedCase(FidelityCase):
-    """A case whose rims are found from the outline of the flat pattern."""
+    """A case whose supported rims follow from the outline of the flat pattern."""
 
     def pattern(self) -> Pattern:
         """See `FidelityCase`."""
@@ -48,12 +48,12 @@ class MixedCase(FidelityCase):
             return Held()
         rings, corners = self._rims()
         if self.support == "corners":
-            return Held({"xyz": tuple(dict.fromkeys(corners))})  # a small Resch sheet has three
+            return Held({"xyz": tuple(dict.fromkeys(corners))})  # three on a small Resch sheet
         chosen = rings[:1] if self.support == "one edge" else rings
         return Held(edges=tuple(edge for ring in chosen for edge in pairwise(ring)))
 
     def _rims(self) -> tuple[list[list[int]], tuple[int, ...]]:
-        """Vertices along both ends, one after another, and the corners; of towers those below."""
+        """Vertices along both ends, in sequence, and the corners; for towers the lower ones."""
         if self.kind == "kresling":
             sides = int(self.shape["sides"])
             top = sides * int(self.shape["storeys"])
@@ -66,11 +66,11 @@ class MixedCase(FidelityCase):
 
     @property
     def divisions(self) -> tuple[int, int, int]:
-        """Of its three meshes."""
+        """Divisions of its three meshes."""
         return FINE if self.triangles(FINE[-1]) <= SMALL else USUAL
 
     def triangles(self, divisions: int) -> int:
-        """How many triangles a graded mesh has."""
+        """Number of triangles of a graded mesh."""
         pattern = self.pattern()
         mesh = grading(pattern, divisions, self.sheet.thickness)
         return 4 * mesh.rays * (mesh.arcs - 1) * sum(map(len, pattern.faces))
@@ -81,8 +81,9 @@ def mixed(name: str) -> list[MixedCase]:
 
     Sheets of 1 x 1 to 8 x 8 cells (small numbers as likely as large ones on a logarithmic scale;
     towers of 4 to 8 sides and 1 to 8 storeys), dihedrals of 20 to 179 degrees, sheets of 1/30 to
-    1/400 of the shortest edge. Drawn again: what generators refuse, such as sheets that roll up by
-    more than a turn, panels narrower than a third of the shortest edge, and cases too large.
+    1/400 of the shortest edge. Cases are redrawn if generators refuse them, such as sheets that
+    roll up by more than a turn, if panels are narrower than a third of the shortest edge, or if
+    they are too large.
     """
     seed, count = SETS[name]
     rng = np.random.default_rng(seed)
@@ -136,7 +137,7 @@ def quads(seed: int, **shape: Any) -> Pattern:
     Parameters
     ----------
     seed : int
-        Of the widths, which differ by up to a third, and of the perspective.
+        Random seed of the widths, which differ by up to a third, and of the perspective.
     **shape
         Arguments of `miura`.
     """
@@ -151,7 +152,7 @@ def quads(seed: int, **shape: Any) -> Pattern:
 
 
 def _uneven(rng: np.random.Generator, line: NDArray) -> NDArray[np.float64]:
-    """A polyline from the origin with segments of other lengths."""
+    """A polyline from the origin with perturbed segment lengths."""
     steps = np.diff(line, axis=0) * rng.uniform(0.75, 4.0 / 3.0, (len(line) - 1, 1))
     return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
 
@@ -170,7 +171,7 @@ def _sizes(pattern: Pattern) -> tuple[float, float]:
 
 
 def _outline(flat: Pattern) -> tuple[list[list[int]], tuple[int, ...]]:
-    """Vertices along the two ends of a sheet in x, one after another, and its four corners."""
+    """Vertices along the two ends of a sheet in x, in sequence, and its four corners."""
     sides = {(a, b) for face in flat.faces for a, b in pairwise((*face, face[0]))}
     after = {a: b for a, b in sides if (b, a) not in sides}
     ring = np.array(sorted(after))
@@ -182,7 +183,7 @@ def _outline(flat: Pattern) -> tuple[list[list[int]], tuple[int, ...]]:
 
 
 def _path(after: Mapping[int, int], ends: Sequence[int], corners: Sequence[int]) -> list[int]:
-    """Boundary between two neighbors among the corners."""
+    """Boundary between two neighboring corners."""
     for first, last in (ends, ends[::-1]):
         path = [first]
         while path[-1] == first or path[-1] not in corners:

@@ -1,9 +1,9 @@
-"""Models of bars and hinges beside the stored modes of the mixed sets.
+"""Models of bars and hinges compared with the stored modes of the mixed sets.
 
     python -m foldyn.studies.fidelity.mixed_models [--out FOLDER]
 
-compares models with what `references` has stored, computes no shell, writes a table for each set
-and prints what they say (a few minutes).
+compares models with the results stored by `references`, computes no shell, writes a table for each
+set and prints summaries (a few minutes).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ BESIDE = {
 
 
 def references(name: str, folder: Path = RESULTS) -> list[tuple[MixedCase, Stored]]:
-    """Cases of a set that are stored, with their modes."""
+    """Stored cases of a set, with their modes."""
     lines, cases = read_references(name, folder), case_sets()[name]
     return [(case, stored(case, lines[case.name])) for case in cases if case.name in lines]
 
@@ -94,12 +94,12 @@ def _span(rows: Sequence[Row], low: bool) -> str:
 
 
 def counts(row: Row, low: bool) -> bool:
-    """Whether a mode is a low one, or one of the first five."""
+    """Whether a mode counts: a low one, or one of the first five."""
     return row.over_plate < BELOW if low else row.mode <= FIRST
 
 
 def counted(folder: Path = RESULTS) -> list[tuple[MixedCase, Modes]]:
-    """Stored results of the mixed sets, of cases that are known well enough."""
+    """Stored results of the mixed sets for cases with reliable references."""
     found = []
     for name in SETS:
         modes = {one.case: one for one in read(folder / f"{name}.csv")}
@@ -109,7 +109,7 @@ def counted(folder: Path = RESULTS) -> list[tuple[MixedCase, Modes]]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run what the command line says."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Models beside the stored shells.")
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the files")
     given = parser.parse_args(arguments)

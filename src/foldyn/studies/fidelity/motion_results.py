@@ -1,4 +1,4 @@
-"""Results of the large motions as a CSV table, one row a run and model, and what they say."""
+"""Results of the large motions as a CSV table, one row per run and model, with summaries."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from foldyn.studies.fidelity.stored import ALIKE, NEAR, RESULTS
 STORED = RESULTS / "motions.csv"
 SHELL = "shell"
 PLATE, FINER = "plate, linear", "n5b8e, linear"
-RECOMMENDED = "n5b8e, linear; of triangles plate, linear"  # n5b8e has no inner node there
+RECOMMENDED = "n5b8e, linear; of triangles plate, linear"  # n5b8e has no inner node in triangles
 PULSE = "pulse"
-SHARE = 0.5  # of the shell's variance that is its fundamental's, at least, for a period to be told
-SCATTER = 0.1  # standard deviation of the shell's periods over their mean, at most
+SHARE = 0.5  # least share of the shell's variance in its fundamental for a period to be reported
+SCATTER = 0.1  # largest standard deviation of the shell's periods, relative to their mean
 FEWEST = 3  # cycles
 SIZES = {5.0: "to 5 degrees", 20.0: "to 20 degrees", 50.0: "to 50 degrees"}
 HEADS = ("case", "start", "model", "mesh", "share", "periods [s]", "mac", "note")
@@ -34,13 +34,13 @@ class Run(NamedTuple):
     mesh : float
         Frequency of the shell's mesh over the extrapolated one, for small vibrations.
     share : float
-        Part of the variance of the coordinate that is the fundamental's.
+        The fundamental's share of the coordinate's variance.
     period : tuple of float
-        Of each cycle, s.
+        Period of each cycle, s.
     alike : tuple of float
         MAC with the shell at the extremes of the fundamental, two in a cycle.
     note : str
-        Why there are no cycles.
+        Reason if there are no cycles.
     """
 
     case: str
@@ -54,13 +54,13 @@ class Run(NamedTuple):
 
 
 class Beside(NamedTuple):
-    """A model's motion beside the shell's.
+    """A model's motion compared with the shell's.
 
     Attributes
     ----------
     case, start : str
     error : float
-        Of the mean period over the cycles of both; infinite without any.
+        Error of the mean period over the common cycles; infinite without any.
     largest : float
         The largest magnitude of the error of a single cycle's period.
     mac : float
@@ -104,7 +104,7 @@ def _numbers(text: str) -> tuple[float, ...]:
 
 
 def told(run: Run) -> bool:
-    """Whether a run of the shell has a period."""
+    """Whether a run of the shell has a period to report."""
     period = np.array(run.period)
     if len(period) < FEWEST:
         return False
@@ -120,7 +120,7 @@ def grouped(found: Iterable[Run]) -> dict[tuple[str, str], dict[str, Run]]:
 
 
 def beside(true: Run, own: Run) -> Beside:
-    """A model's run beside the shell's, the shell's periods without the error of its mesh."""
+    """Compare a model's run with the shell's periods, corrected for the error of the mesh."""
     count = min(len(true.period), len(own.period))
     if not count:
         return Beside(true.case, true.start, np.inf, np.inf, 0.0)
@@ -133,7 +133,7 @@ def beside(true: Run, own: Run) -> Beside:
 
 
 def compared(found: Iterable[Run]) -> dict[str, list[Beside]]:
-    """All models beside the shell, where it has a period, and `RECOMMENDED`."""
+    """All models compared with the shell, where it has a period, and `RECOMMENDED`."""
     models: dict[str, list[Beside]] = {}
     triangles = _of_triangles()
     for (case, _), every in grouped(found).items():
@@ -147,18 +147,18 @@ def compared(found: Iterable[Run]) -> dict[str, list[Beside]]:
 
 
 def _of_triangles() -> set[str]:
-    """Names of documented cases whose panels are triangles."""
+    """Names of documented cases with triangular panels."""
     faces = {case.name: case.pattern().faces for case in documented()}
     return {name for name, panels in faces.items() if all(len(panel) == 3 for panel in panels)}
 
 
 def untold(found: Iterable[Run]) -> list[Run]:
-    """Runs of the shell without a period."""
+    """Runs of the shell without a period to report."""
     return [every[SHELL] for every in grouped(found).values() if not told(every[SHELL])]
 
 
 def size(start: str) -> str:
-    """The rows of the table by amplitude that a start belongs to."""
+    """Rows of the table by amplitude that a start belongs to."""
     if start == PULSE:
         return "the paper's pulses"
     return next(name for bound, name in SIZES.items() if float(start) <= bound)

@@ -1,8 +1,8 @@
-"""Large motions: sheets let go from a fold, and the paper's pulses, by the shell and the models.
+"""Large motions by the shell and the models: sheets released from a fold, the paper's pulses.
 
     python -m foldyn.studies.fidelity.motions --out FOLDER
 
-writes motions.csv, by default beside the other stored results, and prints its summaries.
+writes motions.csv, by default into the folder of stored results, and prints its summaries.
 """
 
 from __future__ import annotations
@@ -48,21 +48,21 @@ CASES: Mapping[int, tuple[float, ...]] = {
 }
 """Numbers in the documented set, from 0, and amplitudes: first modes that fold, in supports that
 hold the sheet. Beyond the last amplitude of the last three a motion of the shell takes minutes."""
-REACHED = 0.8  # of the largest fold of the shell's path: the last amplitude where 50 is beyond it
-APART = 1.25  # ratio of two amplitudes, at least
-PERIODS = 6.0  # of the linear shell: length of a free vibration
-STEPS = 100  # in such a period
-HALVINGS = 2  # of the step, where a motion becomes unstable
+REACHED = 0.8  # of the largest fold on the shell's path: last amplitude if below 50
+APART = 1.25  # least ratio of two amplitudes
+PERIODS = 6.0  # of the linear shell: length of a free vibration in periods
+STEPS = 100  # steps in such a period
+HALVINGS = 2  # of the step, if a motion becomes unstable
 METHOD = "generalized_alpha"
-PULSE_STEP, PULSE_LENGTH = 0.01, 16.0  # s: step and duration of a pulsed motion
-PULSE_END = 0.5  # s, of the paper's pulse
-BAND = (0.4, 2.5)  # of the shell's first frequency: where its fundamental is sought
+PULSE_STEP, PULSE_LENGTH = 0.01, 16.0  # s: time step and duration of a pulsed motion
+PULSE_END = 0.5  # s: end of the paper's pulse
+BAND = (0.4, 2.5)  # of the shell's first frequency: band of its fundamental
 PULSE_BAND = (0.5, 4.0)
-NEAR = (0.5, 2.0)  # of the shell's fundamental: where a model's is sought
+NEAR = (0.5, 2.0)  # of the shell's fundamental: band of a model's
 
 
 class Motion(NamedTuple):
-    """A motion: interval of its samples (s), a coordinate (n,) and the vertices (n, v, 3), m."""
+    """A motion: sampling interval (s), a coordinate (n,) and the vertices (n, v, 3), m."""
 
     dt: float
     coordinate: NDArray
@@ -71,7 +71,7 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Started:
-    """How a case moves, in any model.
+    """Start of a case's motion, for all models.
 
     Attributes
     ----------
@@ -81,11 +81,11 @@ class Started:
     mesh : float
         Frequency of the shell's mesh over the extrapolated one.
     band : (float, float)
-        Where the shell's fundamental is sought, Hz.
+        Band of the shell's fundamental, Hz.
     released : bool
         Whether it starts from rest and without loads, undamped.
     motion : mapping of str to callable
-        Of the shell and of each model; they raise `ComputationError` where there is none.
+        Computes the motion of the shell and of each model; raises `ComputationError` on failure.
     """
 
     case: str
@@ -98,7 +98,7 @@ class Started:
 
 
 def runs(started: Started) -> list[Run]:
-    """What the shell and all models do from a start."""
+    """Run the shell and all models from a start."""
     weight = vertex_mass(started.pattern)
     found = []
     true: tuple[Cycles, NDArray] | None = None
@@ -129,7 +129,7 @@ def runs(started: Started) -> list[Run]:
 
 
 def _at(motion: Motion, times: NDArray) -> NDArray:
-    """Displacements (k, v, 3) of the vertices at times (k,), s."""
+    """Displacements (k, v, 3) of the vertices, interpolated at times (k,), s."""
     place = np.clip(times / motion.dt, 0.0, len(motion.vertices) - 1.000001)
     before = place.astype(int)
     part = (place - before)[:, None, None]
@@ -137,7 +137,7 @@ def _at(motion: Motion, times: NDArray) -> NDArray:
 
 
 def _alike(true: NDArray, own: NDArray, weight: NDArray) -> NDArray:
-    """MAC (k,) of the shapes at the same extremes."""
+    """MAC (k,) of the shapes at corresponding extremes."""
     pairs = zip(true, own, strict=False)
     return np.array([mac(a[None], b[None], mass=weight)[0, 0] for a, b in pairs])
 
@@ -145,7 +145,7 @@ def _alike(true: NDArray, own: NDArray, weight: NDArray) -> NDArray:
 def structures(
     pattern: Pattern, sheet: Any, divisions: int, edges: Sequence[Edge] = (), **creases: Any
 ) -> dict[str, Any]:
-    """The shell and the models of a sheet, of which some edges are held along their length."""
+    """The shell and the models of a sheet, with some edges held along their length."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
         made: dict[str, Any] = {
@@ -187,7 +187,7 @@ def released(
 
 
 def _reachable(release: Release, structure: Shell, amplitudes: Sequence[float]) -> list[float]:
-    """Amplitudes (degrees), the last of them as far as the shell's path goes."""
+    """Amplitudes (degrees), the last one limited by the shell's path."""
     largest = REACHED * np.degrees(release.largest(structure, np.radians(amplitudes[-1])))
     if largest >= REACHED * amplitudes[-1]:
         return list(amplitudes)
@@ -222,9 +222,9 @@ def pulsed(name: str, divisions: int = DIVISIONS[0]) -> Started:
 
 
 def _motion(case: Case, duration: float, dt: float, start: State | None = None) -> Any:
-    """A motion, with shorter steps where it is unstable or panel passes through panel.
+    """Run a motion, with shorter steps if it is unstable or panels pass through each other.
 
-    Where that does not help a motion ends when panel passes through panel.
+    If that does not help, the motion ends where panels pass through each other.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
@@ -249,7 +249,7 @@ def every(cases: Iterable[int] = CASES, studies: Iterable[str] = STUDIES) -> Ite
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run what the command line says."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Large motions of bars and hinges and the shell.")
     parser.add_argument("--out", type=Path, default=STORED.parent, help="folder of the table")
     parser.add_argument(

@@ -1,11 +1,11 @@
-"""Modes of the shell for the mixed sets and known gaps, to compare models without it.
+"""Shell modes of the mixed sets and known gaps, stored to compare models without the shell.
 
     python -m foldyn.studies.fidelity.references [--out FOLDER] [--until HH:MM]
 
-computes what is not stored yet, in turn from all sets, and appends it case by case. Meshes are
-graded toward vertices, down to the thickness; a line of a file has the frequencies of three of
-them, and shapes at the vertices, in the middles of edges and of panels: bytes in base64, of which
-127 is the largest component.
+computes missing cases, alternating between sets, and appends them one by one. Meshes are graded
+toward vertices, down to the thickness. A line of a file has the frequencies of three meshes, and
+shapes at the vertices and at the middles of edges and panels, as bytes in base64, scaled to a
+largest component of 127.
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ from foldyn.studies.fidelity.gaps import gaps
 from foldyn.studies.fidelity.mixed import FINE, SETS, MixedCase, mixed
 from foldyn.studies.fidelity.stored import RESULTS
 
-STEPS = 127  # of a shape's largest component: what a byte takes
-CERTAIN = 0.015  # estimated error of a reference, at most
+STEPS = 127  # resolution of a byte, relative to a shape's largest component
+CERTAIN = 0.015  # largest estimated error of a reference
 
 
 @dataclass(frozen=True, eq=False)
 class Stored:
-    """Modes of a shell as they are stored.
+    """Stored modes of a shell.
 
     Attributes
     ----------
     divisions : (int, int, int)
-        Of the meshes.
+        Divisions of the three meshes.
     mesh_frequency : (3, k)
         Hz.
     shape : (k, p, 3)
@@ -55,7 +55,7 @@ class Stored:
     points : (p, 3)
         Vertices, means of panels' corners and middles of edges, m.
     size : float
-        Of the pattern, m.
+        Size of the pattern, m.
     """
 
     divisions: tuple[int, int, int]
@@ -66,12 +66,12 @@ class Stored:
 
     @property
     def frequency(self) -> NDArray[np.float64]:
-        """Extrapolated by the observed order (k,), Hz, increasing."""
+        """Frequencies (k,), Hz, extrapolated by the observed order, increasing."""
         return limits(self.mesh_frequency, self.divisions, observed=True)
 
     @property
     def doubt(self) -> NDArray[np.float64]:
-        """Estimated relative error (k,) of the frequencies; nan of modes that a mesh lacks."""
+        """Estimated relative error (k,) of the frequencies; nan for modes that a mesh lacks."""
         return doubt(self.mesh_frequency, self.divisions)
 
     def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
@@ -84,25 +84,25 @@ class Stored:
 
 
 def case_sets() -> dict[str, Sequence[MixedCase]]:
-    """Cases whose shells are stored, by the name of the file."""
+    """Sets of cases with stored shells, by file name."""
     return {**{name: mixed(name) for name in SETS}, "gaps": gaps()}
 
 
 def points_of(pattern: Pattern) -> NDArray[np.float64]:
-    """Where shapes are stored (p, 3)."""
+    """Points of stored shapes (p, 3)."""
     middles = [pattern.vertices[list(face)].mean(axis=0) for face in pattern.faces]
     return np.concatenate([pattern.vertices, middles, pattern.vertices[pattern.edges].mean(axis=1)])
 
 
 def certain(case: MixedCase, true: Stored) -> bool:
-    """Whether all modes of a case that count are known to 1.5 %: the first, and low ones."""
+    """Whether the modes that count, the first and low ones, are known to 1.5 %."""
     low = true.frequency < BELOW * plate_frequency(case.pattern(), case.sheet)
     counts = low | (np.arange(len(low)) < FIRST)
     return bool((true.doubt[counts] <= CERTAIN).all())  # nan is not
 
 
 def computed(case: MixedCase, divisions: tuple[int, int, int]) -> dict[str, Any]:
-    """What a line of a file has."""
+    """Compute the content of a file's line."""
     began = time.perf_counter()
     pattern, radius = case.pattern(), case.sheet.thickness
     with warnings.catch_warnings():
@@ -150,7 +150,7 @@ def stored(case: MixedCase, line: dict[str, Any]) -> Stored:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run what the command line says."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Shells of the mixed sets.")
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the files")
     parser.add_argument("--until", help="time of day (HH:MM) after which no case is begun")

@@ -1,12 +1,12 @@
-"""Sheets held folded by loads, from which they are let go: the same fold in every model.
+"""Sheets held folded by loads before their release, with the same fold in every model.
 
 The loads are the inertia forces of the shell's first mode, at the vertices,
 
     p_v = s m_v phi_v,  m_v the shares of the panels at vertex v,
 
-with s such that the fold of the reference crease, the one that folds most in that mode, has changed
-by the amplitude in an equilibrium of each model. Folds are angles between panels, of which only the
-vertices count: all models have those.
+with s such that in each model's equilibrium the fold of the reference crease, which folds most in
+that mode, has changed by the amplitude. Folds are angles between panels computed from the vertices,
+which all models have.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from foldyn.statics import Settings, trace
 from foldyn.structures.discretized import Discretized
 from foldyn.studies.fidelity.cases import FidelityCase
 
-FIRST_STEP = 0.1  # of the load under which a linear shell would have the largest amplitude
-STEPS = 80  # on the way there, at most
-EXACT = 1e-4  # relative error of the fold that is held
+FIRST_STEP = 0.1  # of the load that would fold a linear shell to the largest amplitude
+STEPS = 80  # most steps on the way there
+EXACT = 1e-4  # relative error of the held fold
 SECANTS = 8
 SETTINGS = Settings(stability=False, locate=False)
-MOVING = 0.3  # of the largest change of a fold: creases that count as moving
-SMALL = 1e-6  # of the pattern's size: displacement in which folds change linearly
+MOVING = 0.3  # of the largest change of a fold: smaller changes do not count as moving
+SMALL = 1e-6  # of the pattern's size: displacement within which folds change linearly
 
 
 class Held(NamedTuple):
@@ -46,12 +46,12 @@ class Held(NamedTuple):
 
 
 def fold_of(pattern: Pattern, crease: int, displacement: NDArray) -> NDArray:
-    """Angle (...) by which a crease is folded, rad: its dihedral less pi, in -pi to pi.
+    """Fold angle (...) of a crease, rad: its dihedral minus pi, in -pi to pi.
 
     Parameters
     ----------
     displacement : (..., n, 3)
-        Of the vertices, m.
+        Displacements of the vertices, m.
     """
     a, b = (int(v) for v in pattern.creases[crease])
     first, second = (face for face in pattern.faces if a in face and b in face)
@@ -82,7 +82,7 @@ def vertex_mass(pattern: Pattern) -> NDArray:
 
 @dataclass(frozen=True, eq=False)
 class Release:
-    """What holds a sheet folded.
+    """Loads that hold a sheet folded.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Release:
     sense : float
         1 where its fold angle grows, -1 where it falls.
     force : (n, 3)
-        At the vertices, N: with it a linear shell's fold would have changed by 1 rad.
+        Forces on the vertices, N, that would change a linear shell's fold by 1 rad.
     """
 
     case: FidelityCase
@@ -102,10 +102,10 @@ class Release:
 
     @classmethod
     def of(cls, case: FidelityCase, structure: Discretized, shape: NDArray) -> Release:
-        """By a mode of a structure, its shape (n, 3), and the linear equilibrium under its loads.
+        """Make a release from a mode of a structure, its shape (n, 3), and the linear equilibrium.
 
-        The tightest crease that moves opens if its panels are less than a right angle apart, else
-        it closes.
+        The tightest moving crease opens if its panels are less than a right angle apart, else it
+        closes.
         """
         pattern = case.pattern()
         n = len(pattern.vertices)
@@ -125,15 +125,15 @@ class Release:
         return cls(case, crease, sense, force * sense * small / turned[crease])
 
     def fold(self, displacement: NDArray) -> NDArray:
-        """Change (...) of the reference fold in its sense, rad."""
+        """Change (...) of the reference fold, positive in its sense, rad."""
         pattern = self.case.pattern()
         rest = fold_of(pattern, self.crease, np.zeros_like(pattern.vertices))
         return self.sense * (fold_of(pattern, self.crease, displacement) - rest)
 
     def held(self, structure: Discretized, amplitudes: Sequence[float]) -> list[Held]:
-        """Equilibria in which the reference fold has changed by amplitudes (rad, increasing).
+        """Equilibria at which the reference fold has changed by amplitudes (rad, increasing).
 
-        Those from the first on that is beyond the path's end, or not found near it, are left out.
+        The list ends before the first amplitude that the path does not reach or that is not found.
         """
         last = float(amplitudes[-1])
         case = self._loaded(structure, last)
@@ -152,7 +152,7 @@ class Release:
         return found
 
     def largest(self, structure: Discretized, last: float) -> float:
-        """Largest change of the fold (rad) until its path turns back, ends, or is beyond one."""
+        """Largest change of the fold (rad) until its path turns back, ends, or exceeds `last`."""
         displacement, _ = self._path(self._loaded(structure, last), last)
         return float(self.fold(displacement).max())
 
@@ -161,7 +161,7 @@ class Release:
         return replace(self.case.case(structure), loads=loads)
 
     def _path(self, case: Case, last: float) -> tuple[NDArray, NDArray]:
-        """Displacements (k, n, 3) and load factors (k,) while the fold grows, to the last one."""
+        """Displacements (k, n, 3) and load factors (k,) while the fold grows, up to `last`."""
         largest = 0.0
 
         def ended(u: NDArray, factor: float) -> bool:
@@ -186,7 +186,7 @@ class Release:
     def _exact(
         self, case: Case, u: NDArray, fold: NDArray, factor: NDArray, k: int, amplitude: float
     ) -> Held:
-        """The equilibrium of an amplitude between points k - 1 and k of a path, by secants."""
+        """Find the equilibrium of an amplitude between points k - 1 and k of a path by secants."""
         points = [(fold[k - 1], factor[k - 1], u[k - 1]), (fold[k], factor[k], u[k])]
         for _ in range(SECANTS):
             (f0, l0, u0), (f1, l1, u1) = points

@@ -23,11 +23,11 @@ from foldyn.studies import find_case
 
 STUDIES = ("case1", "case2", "case3", "case4")
 STEEL = Sheet(2e11, 0.3, 1e-4, density=7850.0)
-MESHES = {"studies": (8, 16), "steel": (4, 8)}  # divisions of the shells
+MESHES = {"studies": (8, 16), "steel": (4, 8)}  # divisions of the shell meshes
 
 
 class Softness(NamedTuple):
-    """Displacement under small loads, relative errors by model.
+    """Displacement under small loads, with relative errors by model.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ def study(name: str) -> Softness:
 
 
 def steel_case(structure: Discretized) -> Case:
-    """One side is held at its vertices; a force of 1 N, shared by those of the other, lifts it."""
+    """One side is held at its vertices; a force of 1 N, shared by the other side's, lifts it."""
     far = np.flatnonzero(
         structure.pattern.vertices[:, 0] > structure.pattern.vertices[:, 0].max() - 1e-6
     )
@@ -74,7 +74,7 @@ def steel() -> tuple[Softness, NDArray, Mapping[str, NDArray]]:
     Returns
     -------
     (Softness, ndarray, mapping)
-        At its tip; the first three frequencies of the shell (Hz), and those of each model.
+        Softness at its tip; the first three frequencies of the shell (Hz), and of each model.
     """
     pattern = miura((3, 5), a=0.025, b=0.025, panel_angle=60, dihedral=60)
 
@@ -94,7 +94,7 @@ def steel() -> tuple[Softness, NDArray, Mapping[str, NDArray]]:
 
 
 def statics_table() -> str:
-    """Both in Markdown."""
+    """Both tables in Markdown."""
     sheet, shell_frequency, frequency = steel()
     lines = [
         f"| | shell | {' | '.join(MODELS)} |",

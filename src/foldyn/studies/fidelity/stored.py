@@ -1,4 +1,4 @@
-"""Results of the study as CSV tables, one row a mode, and what they say in a line."""
+"""Results of the study as CSV tables, one row per mode, with summaries."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from foldyn.studies.fidelity.cases import FidelityCase
 from foldyn.studies.fidelity.compare import MODELS, Row, compare
 
 RESULTS = Path(__file__).parent / "results"
-NEAR, ALIKE = 0.05, 0.95  # error and MAC of a good mode
+NEAR, ALIKE = 0.05, 0.95  # largest error and least MAC of a good mode
 
 
 class Modes(NamedTuple):
-    """Modes of a case, by model; models have the same ones, in the same order."""
+    """Modes of a case by model; all models have the same modes in the same order."""
 
     case: str
     rows: Mapping[str, list[Row]]
@@ -36,12 +36,12 @@ class Summary(NamedTuple):
 
 
 def modes_below(case: FidelityCase, true: Reference) -> Modes:
-    """Modes of a case below the limit by every model, beside those of the shell."""
+    """Modes of a case below the limit by every model, compared with the shell's."""
     return Modes(case.name, {model: compare(case, true, model) for model in MODELS})
 
 
 def write(path: Path, results: Sequence[Modes]) -> None:
-    """Write a table: case, mode, frequency (Hz), the same over the plate's, errors and MAC."""
+    """Write a table: case, mode, frequency (Hz), frequency relative to the plate's, errors, MAC."""
     heads = [f"{what}: {model}" for model in results[0].rows for what in ("error", "mac")]
     with path.open("w", encoding="utf-8", newline="") as file:
         out = csv.writer(file, lineterminator="\n")
@@ -55,7 +55,7 @@ def write(path: Path, results: Sequence[Modes]) -> None:
 
 
 def read(path: Path) -> list[Modes]:
-    """A table that `write` wrote; cases without any mode in it are left out."""
+    """Read a table that `write` wrote; cases without any mode are missing."""
     found: dict[str, Modes] = {}
     with path.open(encoding="utf-8", newline="") as file:
         lines = csv.DictReader(file)
@@ -76,7 +76,7 @@ def summary(results: Iterable[Modes], model: str) -> Summary:
 
 
 def summary_of(rows: list[Row]) -> Summary:
-    """Errors of a model in some modes."""
+    """Summary of a model's errors in some modes."""
     error = np.array([np.inf if np.isnan(row.error) else abs(row.error) for row in rows])
     alike = np.array([row.mac > ALIKE for row in rows])
     median, ninetieth = np.percentile(error, [50, 90], method="higher")
@@ -98,7 +98,7 @@ def table(results: list[Modes]) -> str:
 
 
 def columns(s: Summary) -> str:
-    """Median, 90th percentile, shares and lost modes in a line of a table."""
+    """Median, 90th percentile, shares and lost modes as columns of a table."""
     errors = [_percent(s.median), _percent(s.ninetieth)]
     return " | ".join([*errors, f"{100 * s.near:.0f} %", f"{100 * s.alike:.0f} %", str(s.lost)])
 

@@ -1,9 +1,9 @@
-"""Sheets whose panels stretch: stiffness of held sheets, and a tower on its way to snap.
+"""Stretching panels: stiffness of held sheets, and a tower pressed to its snap-through.
 
     python -m foldyn.studies.fidelity.stretching
 
 prints both tables (about three minutes). Edges are held and moved along their whole length; the
-shell has a vertex radius of its thickness, and what two meshes give is extrapolated.
+shell has a vertex radius of its thickness, and results of two meshes are extrapolated.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ ENDS = {"x": "compressed", "y": "sheared", "z": "moved across"}
 
 
 class Held(NamedTuple):
-    """A sheet between two rims: the vertices of both, and along which axes the second is led."""
+    """A sheet between two rims: the vertices of both, and the guided axes of the second."""
 
     name: str
     pattern: Pattern
@@ -52,7 +52,7 @@ class Held(NamedTuple):
 
 
 def tower(thickness: float, meshes: tuple[int, int] = (8, 16)) -> Held:
-    """A cell of a Kresling tower, whose upper ring turns as it likes."""
+    """A cell of a Kresling tower whose upper ring is free to turn."""
     pattern = kresling(sides=6, radius=0.04, height=0.06, twist=30, storeys=1)
     name = f"Kresling cell, {1e3 * thickness:g} mm"
     own = replace(STEEL, thickness=thickness)
@@ -68,7 +68,7 @@ def sheet(cells: int = 6, meshes: tuple[int, int] = (4, 8)) -> Held:
 
 
 def moved(held: Held, structure: Discretized, axis: str, way: float) -> Case:
-    """One rim fixed, the other moved by a way (m) along an axis."""
+    """One rim fixed, the other moved by a distance (m) along an axis."""
     near, far = (list(rim) for rim in held.rims)
     along = [Impose(far, led, way if led == axis else 0.0, along=True) for led in held.led]
     return Case(structure, [Fix(near, along=True), *along])
@@ -85,7 +85,7 @@ def structures(held: Held) -> dict[str, Discretized]:
 
 
 def _errors(held: Held, measure: Callable[[Discretized], NDArray]) -> dict[str, NDArray]:
-    """What the shell has, and relative errors of the models, by name."""
+    """Value of the shell, and relative errors of the models by name."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
         coarse, fine = (
@@ -100,7 +100,7 @@ def _errors(held: Held, measure: Callable[[Discretized], NDArray]) -> dict[str, 
 
 
 def stiffness(held: Held, axis: str) -> dict[str, NDArray]:
-    """Stiffness (1,) of small displacements, N/m, of the shell, and errors of the models."""
+    """Stiffness (1,) for small displacements, N/m, of the shell, and errors of the models."""
 
     def measure(structure: Discretized) -> NDArray:
         path = trace(moved(held, structure, axis, SMALL), "displacement", steps=1)
@@ -111,7 +111,7 @@ def stiffness(held: Held, axis: str) -> dict[str, NDArray]:
 
 
 def pressed(held: Held, way: float = PRESSED, steps: int = STEPS) -> dict[str, NDArray]:
-    """Largest force (N), and energy at the end (J), of a tower that is pressed, likewise."""
+    """Largest force (N) and final energy (J) of a pressed tower, by the shell, and errors."""
 
     def measure(structure: Discretized) -> NDArray:
         path = trace(moved(held, structure, "z", -way), "displacement", steps=steps)
@@ -129,7 +129,7 @@ def _line(what: str, found: Mapping[str, NDArray], k: int, unit: str) -> str:
 
 
 def tables() -> str:
-    """Both in Markdown."""
+    """Both tables in Markdown."""
     lines = [f"| | shell | {' | '.join(MODELS)} |", "|---|---|" + "---|" * len(MODELS)]
     held = sheet()
     for axis, what in ENDS.items():

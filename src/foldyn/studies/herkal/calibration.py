@@ -1,8 +1,7 @@
-"""The paper specimen calibrated: folds from the static test, damping from the release.
+"""The paper's specimen calibrated: folds from the static test, damping from the release.
 
-The paper's raw data are not public: `static_data` and `release_data` are computed by the same
-model with the paper's parameters (no model error), to which `noisy` adds what a camera and scales
-would.
+The paper's raw data are not public: `static_data` and `release_data` are computed by the same model
+with the paper's parameters (no model error), and `noisy` adds errors of a camera and scales.
 `python -m foldyn.studies.herkal.calibration FOLDER` fits both and draws them (a few minutes).
 """
 
@@ -51,12 +50,12 @@ FRONT = tuple(7 * i + j for i in range(8) for j in (1, 3, 5))
 SYNTHETIC = "synthetic"
 FORCE_ERROR = 2e-4  # N: scales read to 0.02 g
 STATIC_ERROR = 5e-5  # m: a corner in a photograph
-FILM_ERROR = 1e-5  # m: 0.3 pixels, where 4032 of them see 0.13 m
+FILM_ERROR = 1e-5  # m: 0.3 pixels, if 4032 of them span 0.13 m
 RATE = 240.0  # frames per second
-BAND = (2.0, 40.0)  # Hz, in which spectra are compared
-TURNED = 0.05  # s after the release, at the first turning point
-SEEN = 0.6  # s of the free vibration, in which it dies away
-STEP = 0.001  # s, of the simulation
+BAND = (2.0, 40.0)  # Hz: band of compared spectra
+TURNED = 0.05  # s from the release to the first turning point
+SEEN = 0.6  # s: length of the decaying free vibration
+STEP = 0.001  # s: step of the simulation
 BOTTOM = list(range(56, 63))
 SUPPORTS: Mapping[str, list[dict[str, Any]]] = {
     "plate": [
@@ -99,7 +98,7 @@ def weighed(changes: Mapping[str, Any] | None = None) -> NDArray[np.float64]:
     """Load factors at which the specimen carries the three weights."""
     factors = np.linspace(0.0, 1.0, 29)
     found = np.interp(WEIGHTS, force_on_top(pressed(factors, changes)), factors)
-    for _ in range(3):  # secants
+    for _ in range(3):  # secant method
         near = force_on_top(pressed(np.sort([*found, *(found + 1e-3)]), changes))
         slope = (near[1::2] - near[::2]) / 1e-3
         found = found - (near[::2] - WEIGHTS) / slope
@@ -110,7 +109,7 @@ def static_data() -> list[experiment.Measurement]:
     """Forces at the displacements under the three weights, and the shapes of the front nodes."""
     factors = weighed()
     path = pressed(factors)
-    free = FRONT[3:]  # the top is imposed
+    free = FRONT[3:]  # the displacement of the top is imposed
     return [
         experiment.ForceDisplacement(
             nodes=TOP, displacement=FULL * factors, force=force_on_top(path),
@@ -131,14 +130,14 @@ def released_case(
     support: str = "plate",
     duration: float = SEEN,
 ) -> Path:
-    """Case file of the free vibration after the top was pressed down.
+    """Case file of the free vibration after the top was pressed down and released.
 
-    It starts from the equilibrium, on the smooth plate, under that displacement of the top.
+    It starts from the equilibrium on the smooth plate under this displacement of the top.
 
     Parameters
     ----------
     folder : Path
-        Gets the case file and the state that it starts from; made where it is missing.
+        Receives the case file and its initial state; created if missing.
     changes : mapping, optional
         Values of the static calibration, by key.
     step : float
@@ -190,7 +189,7 @@ def release_data(case: Path) -> list[experiment.Measurement]:
 def noisy(
     data: Sequence[experiment.Measurement], draw: np.random.Generator
 ) -> list[experiment.Measurement]:
-    """Measurements with random errors of the size that they state."""
+    """Add random errors to measurements, with their stated standard error."""
     result = []
     for one in data:
         field = "force" if isinstance(one, experiment.ForceDisplacement) else "values"
@@ -209,9 +208,9 @@ def peak(values: NDArray[np.float64], step: float = 1.0 / RATE) -> tuple[float, 
 
 
 def calibrate(folder: Path) -> tuple[experiment.Fit, experiment.Fit]:
-    """Fit the folds to the synthetic static test, then, with them, the damping to the release.
+    """Fit the folds to the synthetic static test, then the damping to the release.
 
-    The folder keeps the evaluations, and the case files of the release.
+    The folder keeps the evaluations and the release's case files.
     """
     kept, draw = folder / "evaluations", np.random.default_rng(1)
     folds = fit_folds(noisy(static_data(), draw), folder=kept)
@@ -228,7 +227,7 @@ def fit_folds(static: Sequence[experiment.Measurement], **options: Any) -> exper
 
 
 def changes_of(folds: experiment.Fit) -> dict[str, Any]:
-    """What a fit of the folds changes in a case file, by key."""
+    """Values that a fit of the folds changes in a case file, by key."""
     return folds.problem.space.changes([*folds.values.values()])
 
 
@@ -240,7 +239,7 @@ def fit_damping(
 
 
 def spectra_of(film: Sequence[experiment.Measurement]) -> list[experiment.Spectrum]:
-    """Spectra of the histories in which no sample is missing, held out."""
+    """Spectra of the histories without missing samples, held out."""
     return [
         experiment.Spectrum.of(replace(one, held_out=True, name=f"{one.name}, frequencies"), BAND)
         for one in film

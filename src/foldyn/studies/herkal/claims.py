@@ -1,4 +1,4 @@
-"""What the paper says of the case studies, as numbers: the rows of `targets.toml`."""
+"""The paper's claims on the case studies, as numbers: the rows of `targets.toml`."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from foldyn.studies.herkal.study import Study, mean_ranks
 from foldyn.studies.targets import Target, Verdict, read_targets, verdicts
 
 TARGETS = Path(__file__).with_name("targets.toml")
-BAND = (1.4, 2.4)  # Hz, where second peaks are sought
-PROMINENCE = 0.01  # of a peak, as a part of the highest amplitude
+BAND = (1.4, 2.4)  # Hz: band of second peaks
+PROMINENCE = 0.01  # of a peak, relative to the highest amplitude
 NO_VALUE = math.nan
 NO_MOTION = np.full((1, 2), math.nan)
 
@@ -72,7 +72,7 @@ def _mismatch(study: Study, places: list[int]) -> float:
 
 
 def softer_folds_move_more(study: Study) -> float:
-    """Displacement of node 7 of the shell, case 4 over case 2."""
+    """Displacement of node 7 of the shell, case 4 relative to case 2."""
     moved = []
     for case in ("case4", "case2"):
         path = study.result(case, REFERENCE, "path")
@@ -82,27 +82,27 @@ def softer_folds_move_more(study: Study) -> float:
 
 
 def softer_folds_err_less(study: Study) -> float:
-    """Largest of the five ratios of errors, case 4 over case 2."""
+    """Largest of the five ratios of errors, case 4 relative to case 2."""
     ratios = [study.error("case4", m) / study.error("case2", m) for m in paper_rules()]
     return float(np.max(ratios))
 
 
 def _over_best(study: Study, case: str, model: str) -> float:
-    """Error of a model over the smallest of the five: 1 if it is the best."""
+    """Error of a model relative to the smallest of the five: 1 if it is the best."""
     row = {m: study.error(case, m) for m in paper_rules()}
     known = all(0.0 < error < math.inf for error in row.values())
     return row[model] / min(row.values()) if known else NO_VALUE
 
 
 def best_overall(study: Study) -> float:
-    """Mean rank of circumcenter over the smallest of the five."""
+    """Mean rank of circumcenter relative to the smallest of the five."""
     means = mean_ranks(study.table(models=paper_rules()), paper_rules())
     known = len(study.plan.cases) == 4 and all(map(math.isfinite, means.values()))
     return means["circumcenter"] / min(means.values()) if known else NO_VALUE
 
 
 CLAIMS: Mapping[str, Callable[[Study], float]] = {
-    # how unlike the two nodes of the free edge move: two heavy corners lie across each panel
+    # how differently the two nodes of the free edge move: two heavy corners lie across each panel
     "asymmetry_equi_inertial": partial(_asymmetry, models=("equi_inertial",)),
     "asymmetry_others": partial(
         _asymmetry, models=[m for m in paper_rules() if m != "equi_inertial"]
@@ -110,7 +110,7 @@ CLAIMS: Mapping[str, Callable[[Study], float]] = {
     "second_peak_case1": second_peak_case1,
     "second_peak_case2": partial(_second_peak, case="case2"),
     "second_peak_case3": partial(_second_peak, case="case3"),
-    # in which the density plays no part
+    # the ratio is independent of the density
     "second_peaks_apart": lambda study: _second_peak(study, "case3") / _second_peak(study, "case2"),
     "mismatch_third_node": partial(_mismatch, places=[2]),  # node 8, the paper's node 3
     "match_other_nodes": partial(_mismatch, places=[0, 1]),  # nodes 6 and 7
@@ -126,7 +126,7 @@ CLAIMS: Mapping[str, Callable[[Study], float]] = {
 
 
 def claims(study: Study) -> list[Verdict]:
-    """The paper's claims next to what was computed; without those that could not be computed."""
+    """The paper's claims with computed values, where these exist."""
     return _known(study, "claims", {key: _value(claim, study) for key, claim in CLAIMS.items()})
 
 
@@ -145,12 +145,12 @@ def paper_table() -> dict[str, dict[str, float]]:
 
 
 def tolerance() -> float:
-    """Deviation, as a fraction, up to which a number of Table 1 counts as reproduced."""
+    """Relative deviation up to which a number of Table 1 counts as reproduced."""
     return max(target.tolerance or 0.0 for target in _table1().values())
 
 
 def table1(study: Study) -> list[Verdict]:
-    """The paper's Table 1 next to ours, one row for each number."""
+    """The paper's Table 1 with ours, one row per number."""
     computed = {
         f"{case}_{model}": study.error(case, model)
         for case in study.plan.cases
@@ -162,7 +162,7 @@ def table1(study: Study) -> list[Verdict]:
 def _value(claim: Callable[[Study], float], study: Study) -> float:
     try:
         return claim(study)
-    except InputError:  # a motion that is too short for it
+    except InputError:  # if the motion is too short for it
         return NO_VALUE
 
 

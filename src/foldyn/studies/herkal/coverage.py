@@ -1,10 +1,10 @@
-"""How often the intervals of a fit contain the truth, over draws of the noise.
+"""Coverage of a fit's intervals: how often they contain the truth, over draws of the noise.
 
 `python -m foldyn.studies.herkal.coverage [DRAWS] [FOLDER]` fits the folds and the damping of the
 paper specimen to synthetic data as `studies.herkal.calibration` makes them, each time with other
-noise, and writes coverage.json beside this file: every estimate with its interval. Each draw is
-fitted in full; evaluations of the model are shared where draws ask for the same one, as at the
-start of the search.
+noise, and writes coverage.json next to this module: every estimate with its interval. Each draw is
+fitted in full; draws share evaluations of the model at equal points, such as the start of the
+search.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ SEED = 20_000
 def summary(
     fitted: Callable[[np.random.Generator], Fit], draws: int, truth: Mapping[str, float]
 ) -> dict[str, Any]:
-    """How many intervals contain the truth, and how far off the estimates are.
+    """Number of intervals that contain the truth, and the errors of the estimates.
 
-    The data have the time step of the fit, whose error is therefore in both: what it adds to an
-    interval is left out here.
+    Data and fit use the same time step, so its error cancels; its contribution to intervals is left
+    out here.
     """
     fits = [fitted(np.random.default_rng(SEED + number)) for number in range(draws)]
     found = {}
@@ -65,7 +65,7 @@ def folds(draws: int, folder: Path) -> dict[str, Any]:
 
 
 def damping(draws: int, folder: Path) -> dict[str, Any]:
-    """Coverage of the fit of the damping to node 8 alone."""
+    """Coverage of the fit of the damping to node 8 only."""
     case, noisy = calibration.released_case(folder), calibration.noisy
     data = calibration.release_data(case)[:1]
     return summary(

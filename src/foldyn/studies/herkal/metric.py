@@ -1,4 +1,4 @@
-"""How far a model is from the shell: the paper's metric, and frequencies of like modes.
+"""Distance of a model from the shell: the paper's metric, and frequencies of similar modes.
 
 The metric, per node: the norm of the difference of the amplitude spectra up to a frequency, over
 the norm of the shell's spectrum; then the mean over the nodes that the case reports.
@@ -19,8 +19,8 @@ from foldyn.signals import find_peaks, sampling_interval, spectrum
 
 UP_TO = 5.0  # Hz
 AXES = ("x", "y", "z")
-LEAST_MAC = 0.5  # below which modes are no partners,
-FAR = 2.0  # nor where their frequencies are this many times apart
+LEAST_MAC = 0.5  # smaller values make no partners
+FAR = 2.0  # largest ratio of partners' frequencies
 
 
 def content(
@@ -51,7 +51,7 @@ def content(
 def content_of(
     time: NDArray[np.float64], record: NDArray[np.float64], up_to: float = UP_TO
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The same of a record (time, nodes) in m at evenly spaced times (s)."""
+    """Frequency content of a record (time, nodes) in m at evenly spaced times (s)."""
     frequency, amplitude = spectrum(record, sampling_interval(time))
     kept = frequency <= up_to * (1.0 + 1e-9)
     return frequency[kept], amplitude[kept]
@@ -63,7 +63,7 @@ def strongest_peak(
     band: tuple[float, float],
     prominence: float,
 ) -> float:
-    """Frequency (Hz) of the highest peak within a band; nan where there is none."""
+    """Frequency (Hz) of the highest peak within a band; nan if none."""
     peaks = find_peaks(frequency, amplitude, prominence=prominence)
     inside = (peaks.frequency > band[0]) & (peaks.frequency < band[1])
     if not inside.any():
@@ -72,7 +72,7 @@ def strongest_peak(
 
 
 def deviation(amplitude: ArrayLike, reference: ArrayLike) -> NDArray[np.float64]:
-    """Norm of the difference of two spectra over the norm of the second, per node.
+    """Norm of the difference of two spectra relative to the norm of the second, per node.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def errors(
     axis: str,
     up_to: float = UP_TO,
 ) -> NDArray[np.float64]:
-    """Deviation of the frequency content of a motion from that of a reference, per node.
+    """Deviation of a motion's frequency content from a reference's, per node.
 
     The paper's metric is the mean of these.
     """
@@ -119,7 +119,7 @@ def errors(
 
 
 def ranks(values: Mapping[str, float]) -> dict[str, int]:
-    """Rank of each model by its error: 1 for the smallest; models without an error have none."""
+    """Rank of each model by error, from 1 for the smallest; models without an error have none."""
     known = {name: value for name, value in values.items() if np.isfinite(value)}
     return {name: 1 + sum(v < value for v in known.values()) for name, value in known.items()}
 
@@ -132,14 +132,14 @@ def best(values: Mapping[str, float]) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Partners:
-    """Modes of the shell and their partners in a model; nan where there is none.
+    """Modes of the shell and their partners in a model; nan if none.
 
     Attributes
     ----------
     reference, frequency : (k,)
         Hz.
     mac : (k,)
-        How alike their shapes are at the pattern's vertices.
+        MAC of their shapes at the pattern's vertices.
     """
 
     reference: NDArray
@@ -148,22 +148,22 @@ class Partners:
 
     @property
     def deviation(self) -> NDArray:
-        """Frequency over that of the shell, less one."""
+        """Frequency relative to the shell's, minus one."""
         return self.frequency / self.reference - 1.0
 
     @property
     def mean_error(self) -> float:
-        """Mean size of the deviations of the modes that have a partner."""
+        """Mean absolute deviation of the modes with a partner."""
         known = self.deviation[np.isfinite(self.deviation)]
         return float(np.abs(known).mean()) if len(known) else float("nan")
 
 
 def partners(reference: xarray.Dataset, ours: xarray.Dataset) -> Partners:
-    """Modes of `ours` that belong to those of `reference`; both at the pattern's vertices."""
+    """Match modes of `ours` to those of `reference`; both at the pattern's vertices."""
     vertices = reference["node"].values.tolist()
     theirs = reference["frequency"].values
     ratio = ours["frequency"].values / theirs[:, None]
-    near = (ratio > 1.0 / FAR) & (ratio < FAR)  # few vertices cannot tell waves of any length
+    near = (ratio > 1.0 / FAR) & (ratio < FAR)  # few vertices cannot distinguish short waves
     pairs = pair_modes(np.where(near, mac(reference, ours, nodes=vertices), 0.0), LEAST_MAC)
     frequency, likeness = (np.full(len(theirs), np.nan) for _ in range(2))
     frequency[pairs.first] = ours["frequency"].values[pairs.second]

@@ -1,4 +1,4 @@
-"""The page of the study: figures and tables of the four cases, next to the paper's numbers."""
+"""The page of the study: figures and tables of the four cases, with the paper's numbers."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ from foldyn.studies.targets import Verdict
 from foldyn.viewer import Stage
 
 TITLE = "Dynamic behavior of origami structures: the case studies of Herkal et al."
-CHOSEN_BY = "case1_"  # rows of the targets by which assumptions were chosen
-SENSITIVITY = "sensitivity"  # folder of its tables in that of the study
+CHOSEN_BY = "case1_"  # rows of the targets that the assumptions were chosen to match
+SENSITIVITY = "sensitivity"  # folder of its tables within the study's folder
 
 
 def write(study: Study, call: Call | None = None) -> Path:
-    """Draw the figures of a study into its folder and write report.html; returns its path.
+    """Draw the figures of a study into its folder and write report.html; return its path.
 
-    call : how it was asked for, for the page.
+    call : the command or call, for the page.
     """
     album = Album(study.folder)
     stages = {case: shown for case in study.plan.cases if (shown := stage_of(study, case))}
@@ -69,7 +69,7 @@ def write(study: Study, call: Call | None = None) -> Path:
 
 
 def write_sensitivity(folder: Path, varied: Variations) -> Path:
-    """Write sensitivity.html, the page of the sensitivity alone; returns its path."""
+    """Write sensitivity.html, the page of the sensitivity only; return its path."""
     page = folder / "sensitivity.html"
     sections = sensitivity_page.sections(varied, Album(folder), tolerance())
     return write_report(page, f"{TITLE}: sensitivity", sections)
@@ -103,7 +103,7 @@ def _papers(study: Study) -> list[str]:
 
 
 def verdict(study: Study, varied: Variations | None = None) -> str:
-    """Say from the numbers what reproduces and what does not."""
+    """Say from the numbers what is reproduced and what is not."""
     rows, names, paper = table1(study), _papers(study), paper_table()
     coarse = "" if study.plan.numerics == FULL.numerics else "In this coarse run: "
     if not rows:
@@ -142,7 +142,7 @@ WIDER = {"a pulse half as long": {"pulse": 0.25}, "one twice as long": {"pulse":
 
 
 def _why_so_wide(varied: Variations | None) -> str:
-    """Why the tolerance is as it is: how far the numbers move with what the paper leaves open."""
+    """Explain the tolerance: how far the numbers move with what the paper leaves open."""
     if varied is None:
         return ""
     filed, names = varied.filed(), paper_rules()
@@ -234,7 +234,7 @@ def rank_table(study: Study) -> Table:
 
 
 def _frequency_error(study: Study, model: str, up_to: float) -> float:
-    """Mean over the cases; of modes up to some times the frequency of a free plate."""
+    """Mean error over the cases, for modes up to some multiple of a free plate's frequency."""
     errors = []
     for case in study.plan.cases:
         found, file = study.frequencies(case, model), case_study(case)
@@ -260,7 +260,7 @@ def _claims(study: Study) -> Table:
 
 
 def _computed(verdict: Verdict) -> str:
-    """What was computed, and by how much it fails or deviates."""
+    """Table of the computations, with errors or deviations."""
     found = f"{verdict.computed:.3g}"
     if verdict.target.bound is None or not verdict.holds:
         found += f" ({100.0 * verdict.deviation:+.1f} %)"
@@ -334,7 +334,7 @@ def _statics(found: Mapping[str, NDArray], nodes: list[int], force: float) -> Ta
 def _plot_statics(
     paths: Mapping[str, xarray.Dataset], nodes: Sequence[int], axis: str, force: float
 ) -> Figure:
-    """Draw the force (N at factor 1) on each loaded node over the displacement, a frame a node."""
+    """Draw the force (N at factor 1) on each loaded node over its displacement, a frame each."""
     figure = style.new_figure(9.0, 3.4)
     frames = figure.subplots(1, len(nodes), squeeze=False, sharey=True)[0]
     for frame, node in zip(frames, nodes, strict=True):

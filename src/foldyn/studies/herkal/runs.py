@@ -1,7 +1,7 @@
-"""The computations of the case studies, each kept in a file of its own.
+"""The computations of the case studies, each kept in its own file.
 
-So a study goes on where it was interrupted. A file holds what it was computed with, the program's
-sources among it: results of another program are computed again.
+So an interrupted study resumes. A file records its settings and a digest of the program's sources:
+results of another program are recomputed.
 """
 
 from __future__ import annotations
@@ -35,24 +35,24 @@ COMPUTING = tuple(
 )
 """Files that the results of the case studies depend on, besides the solvers."""
 SETTINGS = "study_settings"
-INTERVAL = 0.01  # s, between samples where the case file does not say
-STEPS = 10  # of the load of a path
-SHELL_MODES, RULE_MODES = 5, 12  # of the reference, and among how many their partners are sought
-SECANT = 1.0  # degrees, by which hinges turn: superlinear bends have no slope at rest
+INTERVAL = 0.01  # s, between samples, unless the case file sets it
+STEPS = 10  # steps of a path's load
+SHELL_MODES, RULE_MODES = 5, 12  # of the reference, and searched for partners
+SECANT = 1.0  # degrees, amplitude of the hinges: superlinear bends have no slope at rest
 
 
 @dataclass(frozen=True)
 class Numerics:
-    """How finely is computed.
+    """Numerical resolution.
 
     Attributes
     ----------
     divisions : int
-        Of the shell.
+        Divisions of the shell.
     dt : float
-        Step (s) of the motions of the shell and of other implicit models.
+        Time step (s) for the shell and other implicit models.
     duration : float
-        Of motions (s).
+        Duration of motions (s).
     """
 
     divisions: int = 16
@@ -83,7 +83,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Name of the computation."""
         return "-".join(filter(None, (self.case, self.model, self.kind, self.variant.name)))
 
     @property
@@ -92,9 +92,9 @@ class Job:
         return f"{self.name}.nc"
 
     def settings(self) -> dict[str, Any]:
-        """All that its result depends on."""
+        """Everything that its result depends on."""
         numerics = {} if self.kind != "motion" else {"duration": self.numerics.duration}
-        if self.model == REFERENCE:  # others have no mesh
+        if self.model == REFERENCE:  # other models have no mesh
             numerics["divisions"] = self.numerics.divisions
         if self.kind == "motion" and model_of(self.model).implicit:
             numerics["dt"] = self.numerics.dt
@@ -118,7 +118,7 @@ class Job:
 
 
 def program() -> str:
-    """Digest of what computes the case studies."""
+    """Digest of the program that computes the case studies."""
     return programs.program(*COMPUTING)
 
 
@@ -128,7 +128,7 @@ def case_file_digest(case: str) -> str:
 
 
 def reported(case: str) -> tuple[list[int], str, float]:
-    """Nodes and axis that a case study reports, and where its spectra end (Hz)."""
+    """Nodes and axis that a case study reports, and the upper end of its spectra (Hz)."""
     output = case_study(case).output
     return output.nodes.tolist(), output.axis or "x", output.max_frequency or UP_TO
 
@@ -169,5 +169,5 @@ KEPT: Store[xarray.Dataset] = Store(_read, _write)
 
 
 def stored(folder: Path, job: Job) -> xarray.Dataset | None:
-    """Result of a job in a folder; None if there is none, or one of other settings."""
+    """Result of a job in a folder; None if missing or computed with other settings."""
     return KEPT.find(folder / job.file, job.settings())

@@ -1,9 +1,9 @@
-"""How far the results of the case studies depend on what the paper leaves unsaid.
+"""How far the results of the case studies depend on settings that the paper does not state.
 
-All combinations of pulse, loaded nodes, law of the bends and calibration, each with every mass
-distribution. A task computes one motion of the shell and those that belong to it, and keeps only
-the errors. Density needs no motions of its own: it only rescales time, that of pulse, damping and
-record together.
+All combinations of pulse, loaded nodes, law of the bends and calibration are run with every mass
+distribution. A task computes one motion of the shell with all models' motions under the same load,
+and keeps only the errors. Density needs no motions of its own: it only rescales time for pulse,
+damping and record together.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def stiffnesses(load: Variant = AS_FILED) -> list[Variant]:
 
 
 def load_sets(case_file: CaseFile) -> tuple[str, ...]:
-    """Sets of loaded nodes; one where the case file loads the whole edge."""
+    """Sets of loaded nodes; a single one if the case file loads the whole edge."""
     loaded = {node for load in case_file.case().loads for node in getattr(load, "nodes", ())}
     return LOADS[:1] if loaded == set(case_file.output.nodes.tolist()) else LOADS
 
@@ -77,14 +77,15 @@ KEPT: Store[list[dict[str, Any]]] = Store(_read, _write)
 
 @dataclass(frozen=True)
 class Comparison:
-    """All models beside the shell, kept as rows of a JSON file with its settings.
+    """All models compared with the shell, kept as rows of a JSON file with its settings.
 
     Attributes
     ----------
     case : str
     numerics : Numerics
     load : Variant or None
-        Under which the frequency content of motions is compared; None: first frequencies are.
+        Load under which to compare the frequency content of motions; None compares first
+        frequencies.
     """
 
     case: str
@@ -93,12 +94,12 @@ class Comparison:
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Name of the task."""
         what = "frequencies" if self.load is None else f"motions-{self.load.name}"
         return f"{self.case}-{what}"
 
     def settings(self) -> dict[str, Any]:
-        """All that its result depends on."""
+        """Everything that its result depends on."""
         return {
             "task": self.name,
             "case_file": case_file_digest(self.case),
@@ -112,7 +113,7 @@ class Comparison:
         return self.result(folder) is not None
 
     def result(self, folder: Path) -> list[dict[str, Any]] | None:
-        """Rows in a folder; None if there are none, or some of other settings."""
+        """Rows in a folder; None if missing or computed with other settings."""
         return KEPT.find(folder / f"{self.name}.json", self.settings())
 
     def make(self, folder: Path) -> None:
@@ -132,7 +133,7 @@ class Comparison:
             yield row
 
     def _frequencies(self) -> Iterator[dict[str, Any]]:
-        """First frequencies beside those of the shell."""
+        """First frequencies compared with the shell's."""
         reference = compute(Job(self.case, REFERENCE, "modes", self.numerics))
         for variant, model in product(stiffnesses(), MODELS):
             ours = compute(Job(self.case, model, "modes", self.numerics, variant))
@@ -151,7 +152,7 @@ class Comparison:
 
 
 def tasks(cases: Iterable[str], numerics: Numerics) -> list[Comparison]:
-    """All that is to be computed, the longest first."""
+    """All tasks, the longest first."""
     names = list(cases)
     loads = [(case, loaded) for case in reversed(names) for loaded in load_sets(case_study(case))]
     found = [  # case 1 is the smallest
@@ -162,7 +163,7 @@ def tasks(cases: Iterable[str], numerics: Numerics) -> list[Comparison]:
 
 
 def variations(folder: Path, cases: Iterable[str], numerics: Numerics) -> Variations:
-    """Results of `tasks` that are in a folder."""
+    """Results of `tasks` in a folder."""
     motions: list[dict[str, Any]] = []
     frequencies: list[dict[str, Any]] = []
     for task in sorted(tasks(cases, numerics), key=lambda task: task.case):

@@ -1,4 +1,4 @@
-"""What the page says of the sensitivity: how far the ranking of the distributions reaches."""
+"""Page of the sensitivity: how robust the ranking of the distributions is."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ CHANGES: Mapping[str, Mapping[str, Any]] = {
 
 
 def sections(found: Variations, album: Album, tolerance: float) -> list[Section]:
-    """Text, tables and a figure; nothing where no case was computed as filed."""
+    """Text, tables and a figure; empty if no case was computed with its own settings."""
     if not found.filed():
         return []
     return [
@@ -75,7 +75,7 @@ def sections(found: Variations, album: Album, tolerance: float) -> list[Section]
 def plot_sensitivity(
     found: Variations, models: Sequence[str], paper: Mapping[str, Mapping[str, float]]
 ) -> Figure:
-    """Draw the errors under all combinations, a frame a case, a row a model.
+    """Draw the errors under all combinations, one frame per case, one row per model.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def plot_sensitivity(
 
 
 def opinion(found: Variations) -> str:
-    """Say from the numbers how far a ranking reaches."""
+    """Say from the numbers how robust a ranking is."""
     parts = []
     paper, names = paper_table(), paper_rules()
     for law in BEND_LAWS:
@@ -142,7 +142,7 @@ def opinion(found: Variations) -> str:
 
 
 def one_at_a_time(found: Variations, tolerance: float) -> Table:
-    """How near the table comes to the paper's, and how far it moves, with one thing changed."""
+    """Distance of the table from the paper's, and its change, as one setting varies at a time."""
     names, filed = paper_rules(), found.filed()
     rows: list[list[Any]] = []
     for what, change in CHANGES.items():
@@ -170,7 +170,7 @@ def one_at_a_time(found: Variations, tolerance: float) -> Table:
 def _best_table(
     found: Variations, titles: list[str], tables: Iterable[tuple[Any, Any, Errors]], caption: str
 ) -> Table:
-    """Which of the five is best, and its error, under two things by case."""
+    """Best of the five distributions and its error by case, for pairs of settings."""
     cases, rows = list(found.filed()), []
     for first, second, table in tables:
         row: list[Any] = [first, second]
@@ -183,7 +183,7 @@ def _best_table(
 
 
 def by_load(found: Variations) -> Table:
-    """Which of the five is best under which load, bars and hinges as filed."""
+    """Best of the five by load, with the files' bars and hinges."""
     tables: list[tuple[Any, Any, Errors]] = []
     for loads, pulse in product(LOADED, PULSES):
         rows = found.chosen(**{**FILED, "loads": loads, "pulse": pulse})
@@ -198,7 +198,7 @@ def by_load(found: Variations) -> Table:
 
 
 def by_stiffness(found: Variations) -> Table:
-    """Which of the five is best with which bends, load as filed."""
+    """Best of the five by law and calibration of bends, with the files' load."""
     return _best_table(
         found,
         ["bends", "calibration"],
@@ -209,7 +209,7 @@ def by_stiffness(found: Variations) -> Table:
 
 
 def over_all(found: Variations, law: str) -> Table:
-    """Standing of each distribution over all combinations with one law of the bends."""
+    """Ranks of each distribution over all combinations with one law of the bends."""
     chosen = found.chosen(bend_law=law)
     five, every = standings(chosen, paper_rules()), standings(chosen, rules())
     rows: list[list[Any]] = []
@@ -229,7 +229,7 @@ def over_all(found: Variations, law: str) -> Table:
 
 
 def orientations(found: Variations) -> Table:
-    """Equi-inertial both ways."""
+    """Equi-inertial masses in both orientations."""
     rows = []
     for case, filed in found.filed().items():
         every = found.chosen(case=case)
@@ -247,7 +247,7 @@ def orientations(found: Variations) -> Table:
 
 
 def frequencies(found: Variations) -> Table:
-    """Errors of the first frequencies, in which no load has a part."""
+    """Errors of the first frequencies, which do not depend on the load."""
     names = (*rules(), TURNED)
     columns = [
         frequency_errors(

@@ -1,4 +1,4 @@
-"""Models of the case studies: the rows of every table. A further model is one entry of `MODELS`."""
+"""Models of the case studies: the rows of every table. A new model is one entry of `MODELS`."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ LOADS = ("file", "edge")
 
 @dataclass(frozen=True)
 class Variant:
-    """What differs from the case file; by default nothing.
+    """Changes to the case file; by default none.
 
     Attributes
     ----------
     pulse : float or None
         Duration (s) of the half-sine pulse.
     loads : {"file", "edge"}
-        "edge": the file's force on each of the nodes that the case reports, the whole edge.
+        "edge" puts the file's force on each of the nodes that the case reports, the whole edge.
     bend_law : {"linear", "superlinear"} or None
     calibration : {"standard", "merlin2"} or None
     """
@@ -42,25 +42,25 @@ class Variant:
     calibration: str | None = None
 
     def __post_init__(self) -> None:
-        """Check what can be checked without a case."""
+        """Check the fields that need no case."""
         choice("loads", self.loads, LOADS)
 
     @property
     def name(self) -> str:
-        """Part of file names; empty for the case file as it is."""
+        """Part of file names; empty for the unchanged case file."""
         pulse = "" if self.pulse is None else f"pulse{self.pulse:g}"
         loads = "" if self.loads == "file" else self.loads
         return "-".join(filter(None, (pulse, loads, self.bend_law, self.calibration)))
 
     @property
     def options(self) -> dict[str, str]:
-        """Arguments of `discretize` that it changes."""
+        """Changed arguments of `discretize`."""
         given = {"bend_law": self.bend_law, "calibration": self.calibration}
         return {key: value for key, value in given.items() if value is not None}
 
     @property
     def of_shell(self) -> Variant:
-        """What of it applies to the shell, which has neither bends nor their calibration."""
+        """Changes that apply to the shell, which has neither bends nor their calibration."""
         return replace(self, bend_law=None, calibration=None)
 
 
@@ -75,16 +75,16 @@ class SheetModel:
     Attributes
     ----------
     name, label : str
-        In file names and in tables.
+        Names in files and in tables.
     structure : callable
-        Makes the structure of a case file: ``structure(case_file, options, divisions)``; options
+        Builds the structure of a case file: ``structure(case_file, options, divisions)``; options
         are changed arguments of `discretize`.
     statics : str
-        Models with the same name here differ in mass only and share their equilibria.
+        Models with the same value differ only in mass and share their equilibria.
     paper : bool
-        Whether it is one of the paper's.
+        Whether it is one of the paper's models.
     implicit : bool
-        Whether its motions are computed by Newmark's method, with the steps of the study.
+        Whether its motions use Newmark's method with the study's time step.
     """
 
     name: str
@@ -96,20 +96,20 @@ class SheetModel:
 
     @property
     def distribution(self) -> bool:
-        """Whether it is the case file's model with another distribution of the mass."""
+        """Whether it differs from the case file's model only in the distribution of mass."""
         return self.statics == BARS_AND_HINGES
 
 
 def _bars_and_hinges(
     own: Mapping[str, Any], case_file: CaseFile, options: Mapping[str, Any], divisions: int
 ) -> Any:
-    """Structure of the case file with options of its own; it has no use for `divisions`."""
+    """Structure of the case file with changed options; `divisions` is unused."""
     arguments = {**vars(case_file.case().structure.options), **options, **own}
     return discretize(case_file.pattern, case_file.sheet, **arguments)
 
 
 def _shell(case_file: CaseFile, options: Mapping[str, Any], divisions: int) -> Any:
-    """Shell with the creases of the case file; it has no use for `options`."""
+    """Shell with the creases of the case file; `options` is unused."""
     given = vars(case_file.case().structure.options)
     creases = {name: given[name] for name in ("fold_law", "crease_stiffness", "crease_rest")}
     return shell(case_file.pattern, case_file.sheet, divisions=divisions, **creases)
@@ -120,7 +120,7 @@ def _rule(name: str, label: str, paper: bool = False) -> SheetModel:
 
 
 def _stiffness(name: str, implicit: bool = False) -> SheetModel:
-    """One that `foldyn.fidelity` sets beside the shell, with bends and mass of its own."""
+    """A model that `foldyn.fidelity` compares with the shell, with its own bends and mass."""
     structure = partial(_bars_and_hinges, STIFFNESSES[name])
     return SheetModel(name, name, structure, statics=name, implicit=implicit)
 
@@ -155,12 +155,12 @@ def model_of(name: str) -> SheetModel:
 
 
 def compared() -> tuple[str, ...]:
-    """Names of the models that are compared with the reference."""
+    """Names of the models compared with the reference."""
     return tuple(name for name in MODELS if name != REFERENCE)
 
 
 def rules() -> tuple[str, ...]:
-    """Names of those that differ in the distribution of mass only."""
+    """Names of the models that differ only in the distribution of mass."""
     return tuple(name for name, model in MODELS.items() if model.distribution)
 
 
@@ -175,14 +175,14 @@ def case_study(name: str) -> CaseFile:
 
 
 def label(name: str) -> str:
-    """What tables call a model."""
+    """Label of a model in tables."""
     return model_of(name).label
 
 
 def case_with(
     case_file: CaseFile, model: str, variant: Variant = AS_FILED, divisions: int = 16
 ) -> Case:
-    """Case of a file with one of the models: same supports, loads and damping.
+    """Case of a file with one of the models; supports, loads and damping are the same.
 
     Raises
     ------

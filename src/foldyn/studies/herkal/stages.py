@@ -1,4 +1,4 @@
-"""What the page of the study shows of its cases in motion, and what they were computed from."""
+"""Stages of the cases in motion on the study's page, and their input files."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from foldyn.viewer import Stage, stage
 
 
 def stage_of(study: Study, case: str) -> Stage | None:
-    """The motions of a case with the shell and all models, in step; None where there are none.
+    """Stage of a case's motions with the shell and all models, in step; None if there are none.
 
-    They are known at the pattern's vertices, which are the nodes of the coarsest shell.
+    Motions are stored at the pattern's vertices, which are the nodes of the coarsest shell.
     """
     shown = {label(m): found[["displacement"]] for m, found in _motions(study, case).items()}
     if not shown:
@@ -26,7 +26,7 @@ def stage_of(study: Study, case: str) -> Stage | None:
 
 
 def inputs_of(study: Study, call: Call | None) -> list[Section]:
-    """What each case was computed from, and what all of it cost."""
+    """Inputs of each case, and the total computing time."""
     sections: list[Section] = []
     every: dict[str, xarray.Dataset] = {}
     for case in study.plan.cases:
@@ -41,6 +41,6 @@ def inputs_of(study: Study, call: Call | None) -> list[Section]:
 
 
 def _motions(study: Study, case: str) -> dict[str, xarray.Dataset]:
-    """The motions of a case that there are, by model, that of the shell first."""
+    """The stored motions of a case by model, starting with the shell."""
     motions = {m: study.result(case, m, "motion") for m in (REFERENCE, *study.plan.models)}
     return {m: motion for m, motion in motions.items() if motion is not None}

@@ -1,7 +1,7 @@
-"""What the case studies and the specimen are with other stiffnesses than the paper's.
+"""The case studies and the specimen with other stiffnesses than the paper's.
 
 Small loads on the case studies, and modes and peaks of the specimen, by the models that
-`foldyn.fidelity` sets beside the shell. Each computation is kept as rows of a JSON file.
+`foldyn.fidelity` compares with the shell. Each computation is kept as rows of a JSON file.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class Stiffness:
     ----------
     kind : {"small-loads", "modes", "peaks"}
     of : str
-        A case study of which small loads are computed, the specimen of which modes are, or a model
-        of `PEAKED` of which the specimen's peaks are.
+        A case study for small loads, the specimen for modes, or a model of `PEAKED` for the
+        specimen's peaks.
     divisions : tuple of int
         Of the specimen's shells.
     """
@@ -55,11 +55,11 @@ class Stiffness:
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Name of the computation."""
         return f"{self.of}-{self.kind}" if self.kind != "peaks" else f"specimen-{self.of}-peaks"
 
     def settings(self) -> dict[str, Any]:
-        """All that its result depends on."""
+        """Everything that its result depends on."""
         files = (self.of,) if self.kind == "small-loads" else SPECIMEN
         mesh = {"divisions": list(self.divisions)} if self.kind == "modes" else {}
         return {
@@ -74,7 +74,7 @@ class Stiffness:
         return self.result(folder) is not None
 
     def result(self, folder: Path) -> Rows | None:
-        """Rows in a folder; None if there are none, or some of other settings."""
+        """Rows in a folder; None if missing or computed with other settings."""
         return KEPT.find(folder / f"{self.name}.json", self.settings())
 
     def make(self, folder: Path) -> None:
@@ -83,32 +83,32 @@ class Stiffness:
 
 
 def tasks(cases: Sequence[str], divisions: tuple[int, int] = MESHES) -> list[Stiffness]:
-    """All that is to be computed, the longest first."""
+    """All computations, the longest first."""
     found = [Stiffness("modes", divisions=divisions)]
     found += [Stiffness("small-loads", case) for case in cases]
     return found + [Stiffness("peaks", model) for model in PEAKED]
 
 
 def _small_loads(asked: Stiffness) -> Rows:
-    """Displacement (m) of the shell and relative errors, as the fidelity study has them."""
+    """Displacement (m) of the shell and relative errors, as in the fidelity study."""
     found = statics.study(asked.of)
     return [{"shell": found.shell, **found.error}]
 
 
 def specimen_modes(divisions: tuple[int, int] = MESHES, **changes: Any) -> Rows:
-    """First modes of the specimen by every model beside the shell.
+    """First modes of the specimen by every model, compared with the shell.
 
     Parameters
     ----------
     divisions : tuple of int
         Of the shells.
     **changes
-        Other values of keys of [model], as fold_law="linear".
+        Changed keys of [model], such as fold_law="linear".
 
     Returns
     -------
     sequence of mappings
-        A mode of a model each: model, mode, frequencies `shell` and `frequency` (Hz, None without a
+        One per model and mode: model, mode, frequencies `shell` and `frequency` (Hz, None without a
         partner) and mac.
     """
     file = vibration.specimen("modes", changes={f"model.{k}": v for k, v in changes.items()})
@@ -130,12 +130,12 @@ def specimen_modes(divisions: tuple[int, int] = MESHES, **changes: Any) -> Rows:
 
 
 def specimen_peaks(model: str) -> Rows:
-    """Peaks of the specimen's frequency response, as the paper measured them.
+    """Peaks of the specimen's frequency response, determined as in the paper.
 
     Returns
     -------
     sequence of mappings
-        A peak each: frequency (Hz) and damping, None where it has no half-power points.
+        One per peak: frequency (Hz) and damping, None without half-power points.
     """
     own = {} if model == OWN else {k: v for k, v in MODELS[model].items() if k != "straight"}
     file = vibration.specimen("frf", changes={f"model.{key}": value for key, value in own.items()})

@@ -1,4 +1,4 @@
-"""What the page says of other stiffnesses than the paper's: static displacements, the specimen."""
+"""Page sections on other stiffnesses than the paper's: static displacements, the specimen."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LABELS = {OWN: "as filed (superlinear bends)", "standard": "standard, linear ben
 
 
 def sections(study: Study) -> list[Section]:
-    """What has been computed; nothing where nothing has."""
+    """Sections on the computed parts; empty if there are none."""
     found = [_statics(study), *specimen(study.rows("modes"), _peaks(study))]
     shown = [one for one in found if one is not None]
     if not shown:
@@ -90,7 +90,7 @@ def _peaks(study: Study) -> dict[str, Rows]:
 
 
 def specimen(modes: Rows | None, peaks: Mapping[str, Rows]) -> list[Section]:
-    """The paper specimen by these models: modes beside the shell's, peaks beside the paper's."""
+    """The paper's specimen by these models: modes with the shell's, peaks with the paper's."""
     found: list[Section] = [] if not modes else [_modes(modes)]
     return found if not peaks else [*found, _peak_table(peaks), Text(verdict(peaks))]
 
@@ -124,7 +124,7 @@ def _measured() -> list[float]:
 
 
 def _deviations(rows: Rows) -> list[float]:
-    """Deviations from the paper's peaks, in their order; fewer where the model has fewer."""
+    """Deviations from the paper's peaks, in order; fewer if the model has fewer peaks."""
     return [row["frequency"] / f - 1.0 for row, f in zip(rows, _measured(), strict=False)]
 
 
@@ -145,7 +145,7 @@ def _peak_table(peaks: Mapping[str, Rows]) -> Table:
 
 
 def verdict(peaks: Mapping[str, Rows]) -> str:
-    """Say which model is nearer to the experiment, and that none was fitted to it."""
+    """Say which model is closest to the experiment, and that none was fitted to it."""
     off = {
         model: float(np.abs(_deviations(rows)).mean())
         for model, rows in peaks.items()

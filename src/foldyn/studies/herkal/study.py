@@ -1,4 +1,4 @@
-"""The four case studies: what is computed, and the tables made from it."""
+"""The four case studies: their computations, and the tables made from them."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ from foldyn.studies.herkal.specimen.tasks import Part, parts
 from foldyn.studies.herkal.stiffnesses import MESHES, Rows, Stiffness
 from foldyn.studies.pool import Done, run
 
-RESULTS = "runs"  # folder of the results in that of the study
+RESULTS = "runs"  # folder of results within the study's folder
 LINEAR = Variant(bend_law="linear")
 
 
 @dataclass(frozen=True)
 class StudyPlan:
-    """What a study computes.
+    """Computations of a study.
 
     Attributes
     ----------
     numerics : Numerics
     cases : tuple of str
     models : tuple of str
-        Without the reference, which is always there.
+        Models besides the reference, which is always included.
     shot : Shot
-        How the synthetic film of the specimen is taken.
+        Settings of the synthetic film of the specimen.
     meshes : tuple of int
         Divisions of the specimen's shells.
     """
@@ -68,11 +68,11 @@ class StudyPlan:
         ]
 
     def stiffnesses(self) -> list[Stiffness]:
-        """Computations of the stiffnesses beyond the paper, besides jobs."""
+        """Computations with stiffnesses other than the paper's, in addition to jobs."""
         return stiffnesses.tasks(self.cases, self.meshes)
 
     def paths(self) -> dict[str, tuple[str, Variant]]:
-        """Model and variant of each stiffness, by label: mass plays no part in statics."""
+        """Model and variant of each stiffness, by label: mass does not matter in statics."""
         found: dict[str, tuple[str, Variant]] = {}
         for name in (REFERENCE, *self.models):
             stiffness = model_of(name).statics
@@ -84,7 +84,7 @@ class StudyPlan:
 
 FULL = StudyPlan()
 QUICK = StudyPlan(Numerics(divisions=8, dt=0.01), shot=COARSE, meshes=(3, 6))
-VARIED = Numerics(divisions=8, dt=0.01)  # of the sensitivity
+VARIED = Numerics(divisions=8, dt=0.01)  # the sensitivity's part
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ class Study:
     folder : Path
         Of the study; results are in its folder `runs`.
     data : Data or None
-        What was measured of the specimen; None leaves it out.
+        Measurements of the specimen; None leaves it out.
     """
 
     plan: StudyPlan
@@ -107,7 +107,7 @@ class Study:
 
     @property
     def parts(self) -> tuple[list[Part], list[Part]]:
-        """Computations of the specimen: the independent ones, and those that follow them."""
+        """Computations of the specimen: independent ones, and those that depend on them."""
         return ([], []) if self.data is None else parts(self.plan.shot, self.data)
 
     @property
@@ -119,7 +119,7 @@ class Study:
     def compute(
         self, tell: Callable[[Done], None] = lambda done: None, processes: int = 2
     ) -> list[Done]:
-        """Compute what is not there yet; see `foldyn.studies.pool.run`."""
+        """Compute missing results; see `foldyn.studies.pool.run`."""
         results = self.folder / RESULTS
         results.mkdir(parents=True, exist_ok=True)
         first, then = self.parts
@@ -129,14 +129,14 @@ class Study:
     def result(
         self, case: str, model: str, kind: str, variant: Variant = AS_FILED
     ) -> xarray.Dataset | None:
-        """Result of a computation, or None where there is none."""
+        """Result of a computation, or None if missing."""
         job = Job(case, model, kind, self.plan.numerics, variant)  # type: ignore[arg-type]
         if self._read.get(job) is None:
             self._read[job] = stored(self.folder / RESULTS, job)
         return self._read[job]
 
     def rows(self, kind: str, of: str = "specimen") -> Rows | None:
-        """Result of a computation of `stiffnesses`, or None where there is none."""
+        """Result of a computation of `stiffnesses`, or None if missing."""
         task = Stiffness(kind, of, self.plan.meshes)  # type: ignore[arg-type]
         return task.result(self.folder / RESULTS)
 
@@ -150,7 +150,7 @@ class Study:
         return metric.errors(motion, reference, *reported(case))
 
     def error(self, case: str, model: str, variant: Variant = AS_FILED) -> float:
-        """The paper's metric, nan where a motion is missing."""
+        """The paper's metric, nan if a motion is missing."""
         found = self.node_errors(case, model, variant)
         return float("nan") if found is None else float(found.mean())
 
@@ -176,7 +176,7 @@ class Study:
         return {label: path for label, path in found.items() if path is not None}
 
     def frequencies(self, case: str, model: str) -> metric.Partners | None:
-        """Modes of a model matched with those of the shell."""
+        """Modes of a model matched with the shell's."""
         reference = self.result(case, REFERENCE, "modes")
         ours = self.result(case, model, "modes")
         if reference is None or ours is None:
@@ -185,16 +185,16 @@ class Study:
 
 
 def mean_ranks(table: Mapping[str, Mapping[str, float]], models: Iterable[str]) -> dict[str, float]:
-    """Mean rank over the cases, each ranked among the given models alone."""
+    """Mean rank over the cases, each ranked only among the given models."""
     names = list(models)
     each = [metric.ranks({m: row[m] for m in names if m in row}) for row in table.values()]
     return {m: float(np.mean([r.get(m, np.nan) for r in each])) for m in names if each}
 
 
 def second_table(study: Study) -> dict[str, tuple[int, dict[str, float]]]:
-    """Divisions of the finest stored motion of OpenSees and the errors against it, by case.
+    """Divisions of OpenSees' finest stored motion, and errors against it, by case.
 
-    Cases without one, or with one of another length than the study's motions, are left out.
+    Cases without one, or with one of another duration than the study's motions, are left out.
     """
     found = {}
     for case in study.plan.cases:

@@ -1,4 +1,4 @@
-"""Tables of the sensitivity: kept as CSV, read again, and summarized."""
+"""Tables of the sensitivity: written as CSV, read, and summarized."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ Errors = Mapping[str, Mapping[str, Any]]
 
 @dataclass(frozen=True, eq=False)
 class Variations:
-    """What was found.
+    """Results of the sensitivity.
 
     Attributes
     ----------
     about : str
-        With what it was computed.
+        Settings of the computation.
     motions : sequence of mappings
-        A combination each: case, pulse (s), loads, bend_law, calibration, and by model the error
+        One per combination: case, pulse (s), loads, bend_law, calibration, and by model the error
         of the frequency content.
     frequencies : sequence of mappings
-        A mode each: case, bend_law, calibration, model, mode, frequencies `shell` and `frequency`
+        One per mode: case, bend_law, calibration, model, mode, frequencies `shell` and `frequency`
         (Hz, nan without a partner) and mac.
     """
 
@@ -57,9 +57,9 @@ class Variations:
         return [row for row in self.motions if all(row[k] == v for k, v in asked.items())]
 
     def filed(self, **changes: Any) -> dict[str, Row]:
-        """Motions by case: the case files but for some changes.
+        """Motions by case with the case files' settings, except for some changes.
 
-        A file that loads the whole edge already has no other set of loaded nodes.
+        A file that already loads the whole edge has no other set of loaded nodes.
         """
         found = {}
         for case in sorted({row["case"] for row in self.motions}):
@@ -72,7 +72,7 @@ class Variations:
 
 
 def write(folder: Path, variations: Variations) -> None:
-    """Write the tables into a folder; their first line says how they were computed."""
+    """Write the tables into a folder; their first line records how they were computed."""
     for name, rows in ((METRIC, variations.motions), (FREQUENCIES, variations.frequencies)):
         with whole(folder / name) as part, part.open("w", encoding="utf-8", newline="") as file:
             file.write(f"# {variations.about}\n")
@@ -83,7 +83,7 @@ def write(folder: Path, variations: Variations) -> None:
 
 
 def read(folder: Path) -> Variations | None:
-    """Read the tables of a folder; None where there are none, or damaged ones."""
+    """Read the tables of a folder; None if missing or damaged."""
     if not (folder / METRIC).is_file() or not (folder / FREQUENCIES).is_file():
         return None
     try:
@@ -123,16 +123,16 @@ def _text(value: Any) -> Any:
 # ---------------------------------------------------------------------- ranks
 @dataclass(frozen=True)
 class Standing:
-    """How a model does over many combinations.
+    """Rank of a model over many combinations.
 
     Attributes
     ----------
     mean_rank : float
-        Mean over the cases of the mean over the combinations of each.
+        Mean over the cases of the mean over each one's combinations.
     worst_rank, best : int
-        The worst rank, and in how many combinations it is the first.
+        The worst rank, and the number of combinations in which it is the best.
     median, largest : float
-        Of the errors.
+        Median and largest error.
     """
 
     mean_rank: float
@@ -143,7 +143,7 @@ class Standing:
 
 
 def standings(rows: Sequence[Row], models: Sequence[str]) -> dict[str, Standing]:
-    """Standing of each model among the given ones."""
+    """Ranks of each of the given models."""
     ranked = [ranks({m: row[m] for m in models}) for row in rows]
     cases = sorted({row["case"] for row in rows})
     found = {}
@@ -161,7 +161,7 @@ def standings(rows: Sequence[Row], models: Sequence[str]) -> dict[str, Standing]
 
 
 def rank_correlation(a: Mapping[str, float], b: Mapping[str, float]) -> float:
-    """Spearman's of two sets of errors: 1 for the same order of the models, -1 for the reverse."""
+    """Spearman's rank correlation of two sets of errors: 1 for equal, -1 for reverse order."""
     first, second = ranks(a), ranks({m: b[m] for m in a})
     n = len(first)
     apart = sum((first[m] - second[m]) ** 2 for m in first)
@@ -170,14 +170,14 @@ def rank_correlation(a: Mapping[str, float], b: Mapping[str, float]) -> float:
 
 @dataclass(frozen=True)
 class Likeness:
-    """How like one table of errors is to another.
+    """Similarity of one table of errors to another.
 
     Attributes
     ----------
     within : int
-        How many numbers differ by less than the tolerance, as a fraction of the other's,
+        Number of entries that differ by less than the tolerance, relative to the other's,
     of : int
-        of how many.
+        out of this many.
     median, largest : float
         Of the differences.
     same_best : int
@@ -195,7 +195,7 @@ class Likeness:
 
 
 def likeness(ours: Errors, theirs: Errors, models: Sequence[str], tolerance: float) -> Likeness:
-    """Compare two tables of errors by case and model; of cases and models that both have."""
+    """Compare two tables of errors by case and model, over their common entries."""
     cases = [c for c in ours if c in theirs]
     pairs = {c: ({m: ours[c][m] for m in models}, {m: theirs[c][m] for m in models}) for c in cases}
     off = np.array([abs(a[m] / b[m] - 1.0) for a, b in pairs.values() for m in models])
@@ -211,9 +211,9 @@ def likeness(ours: Errors, theirs: Errors, models: Sequence[str], tolerance: flo
 
 # ---------------------------------------------------------------------- frequencies
 def frequency_errors(rows: Iterable[Row], models: Sequence[str]) -> tuple[dict[str, float], int]:
-    """Mean size of the deviations of each model's frequencies, over modes that all models have.
+    """Mean absolute deviation of each model's frequencies, over modes that all models have.
 
-    Returns the errors by model, and how many modes these are.
+    Return the errors by model, and the number of modes.
     """
     off: dict[tuple[Any, ...], dict[str, float]] = {}
     for row in rows:

@@ -1,4 +1,4 @@
-"""The vibration of the paper specimen, computed from the shipped cases beside the paper's values.
+"""The vibration of the paper's specimen from the shipped cases, compared with the paper.
 
 `python -m foldyn.studies.herkal.vibration` prints the table (about a minute).
 """
@@ -21,9 +21,9 @@ from foldyn.studies.targets import Verdict, read_targets, verdicts
 
 TARGETS = Path(__file__).with_name("targets.toml")
 CORNER, TOP = 0, 3  # top nodes at a corner and in the middle
-HIGHEST = 22.0  # Hz, of the peaks that are told
-RELEASED = 2.0  # s, when the weight is taken away,
-SETTLED = 0.05  # and how long after it the first minimum is
+HIGHEST = 22.0  # Hz: upper limit of reported peaks
+RELEASED = 2.0  # s, at which the weight is removed,
+SETTLED = 0.05  # and time from there to the first minimum
 PAIR, ALONE = Rayleigh(14.4, 4.1e-4), Rayleigh(15.8)
 IN_AIR = {"air.density": 1.204}  # kg/m3
 ORDINALS = ("first", "second", "third")
@@ -38,7 +38,7 @@ class Response:
     frequencies : tuple of float
         Hz.
     damping : tuple of float
-        From the half-power points, textbook formula; nan where there are none.
+        From the half-power points, textbook formula; nan without them.
     """
 
     frequencies: tuple[float, ...]
@@ -55,15 +55,15 @@ class Response:
 def specimen(
     name: str, damping: Rayleigh | None = None, changes: Mapping[str, Any] | None = None
 ) -> CaseFile:
-    """Shipped case file of the specimen ("modes", "frf-published", ...), as it is or changed.
+    """Shipped case file of the specimen ("modes", "frf-published", ...), optionally changed.
 
     Parameters
     ----------
     name : str
     damping : Rayleigh, optional
-        Another damping.
+        Replaces the file's damping.
     changes : mapping, optional
-        Other values of some keys.
+        Changed values of keys.
     """
     own = {} if damping is None else asdict(damping)
     damped = {f"damping.{key}": value for key, value in own.items()}
@@ -83,7 +83,7 @@ def response(
     mass : str
     damping : Rayleigh
     air : bool
-        Whether the air around the specimen moves with it.
+        Whether to include the mass of the surrounding air.
     **changes
         Other arguments of `frf`.
     """
@@ -94,15 +94,15 @@ def response(
 
 @dataclass(frozen=True, eq=False)
 class Release:
-    """Free vibration of node 8 along x after the weight is taken away.
+    """Free vibration of node 8 along x after the weight is removed.
 
     Attributes
     ----------
     decrement : LogDecrement
-        From the maxima, as the paper has it; few of them are left above a tenth of the first.
+        From the maxima, as in the paper; few of them exceed a tenth of the first.
     frequency, damping_ratio : float
         Of the strongest decaying cosine between 7 and 12 Hz (Hz): the motion has several modes,
-        which maxima mix.
+        which maxima do not separate.
     motion : xarray.Dataset
     """
 
@@ -113,7 +113,7 @@ class Release:
 
 
 def released() -> Release:
-    """Free vibration of the specimen after its weight is taken away."""
+    """Free vibration of the specimen after its weight is removed."""
     motion = specimen("release").run()
     late = motion.sel(time=slice(RELEASED + SETTLED, None))
     x = late["displacement"].sel(node=WATCHED, axis="x").values
@@ -130,7 +130,7 @@ def shapes(published: bool = False, mass: str = "circumcenter") -> xarray.Datase
 
 
 def vibration() -> list[Verdict]:
-    """The paper's values beside ours: stress-free folds, circumcenter mass."""
+    """The paper's values and ours: stress-free folds, circumcenter mass."""
     pair = response()
     computed = {}
     for which, frequency, ratio in zip(ORDINALS, pair.frequencies, pair.damping, strict=False):

@@ -5,8 +5,8 @@ between rigid plates (Yasuda et al., Sci. Adv. 5, eaau2835, 2019). Here the plat
 a tower: three corners of each ring carry the others (`Link`), stiff springs keep them apart, and
 links along the axis keep them level, as the guide of a test rig does.
 
-The paper's dimensions, masses and stiffnesses were not at hand. Those of `Unit` are ours: a soft
-cell that softens in compression and stiffens in tension, as the paper's does.
+The paper's dimensions, masses and stiffnesses were not available. The values of `Unit` are ours: a
+soft cell that softens in compression and stiffens in tension, like the paper's.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from foldyn.signals import Pulse, pulse
 from foldyn.structures import Sheet, Structure, discretize
 
 SIDES = 6
-SUBSTEPS = 4  # of the critical step: cells stiffen in tension
+SUBSTEPS = 4  # per critical step, as cells stiffen in tension
 SAMPLES = 1e-3  # s, between samples of a motion
-UNTIL = 0.8  # of a chain: the cells that are judged, before waves come back from its end
-SHARE = 0.85  # of the largest strain of a cell: peaks that count
+UNTIL = 0.8  # of a chain: cells evaluated before waves return from its end
+SHARE = 0.85  # of the largest strain of a cell: smaller peaks do not count
 
 
 @dataclass(frozen=True)
@@ -43,18 +43,17 @@ class Unit:
     Attributes
     ----------
     radius, height : float
-        Of a ring, and of a cell (m).
+        Radius of a ring, height of a cell (m).
     twist : float
-        Of a cell (degrees).
+        Twist of a cell (degrees).
     youngs_modulus, thickness, density : float
-        Of the sheet (N/m2, m, kg/m3).
+        Properties of the sheet (N/m2, m, kg/m3).
     crease : float
-        Stiffness per length (N) of the mountains, which are the sides and the rings; the diagonals
-        have none.
+        Stiffness per length (N) of the mountains, the sides and the rings; diagonals have none.
     plate_mass : float
-        Of a plate, at the corners of its ring (kg).
+        Mass of a plate, at the corners of its ring (kg).
     plate_stiffness : float
-        Of the springs between three corners (N/m).
+        Stiffness of the springs between three corners (N/m).
     """
 
     radius: float = 0.05
@@ -102,15 +101,15 @@ class Unit:
 
     @property
     def cell(self) -> UnitCell:
-        """What the chain repeats: what is said of its lower ring holds for the upper one."""
+        """Unit cell of the chain; settings of its lower ring also apply to the upper one."""
         return UnitCell(self.case(self.structure(1), [0]))
 
     @property
     def two_dofs(self) -> LongWaves:
-        """Static stiffness of one cell against elongation and twist of rigid plates; and mass.
+        """Static stiffness of a cell against elongation and twist of rigid plates, and mass.
 
-        The lower plate stands still while the upper one moves; creases at the plates, between two
-        cells, have no part in it.
+        The lower plate is fixed while the upper one moves; creases at the plates, between two
+        cells, do not contribute.
         """
         structure = self.structure(1)
         x, y, _ = structure.nodes.T
@@ -129,15 +128,15 @@ class Unit:
 
 
 def two_dof_frequencies(unit: LongWaves, phases: NDArray) -> NDArray[np.float64]:
-    """omega = 2 |sin(kappa/2)| sqrt(eig(M^-1 K)), in Hz, (n, 2), of phases (n,), rad."""
+    """omega = 2 |sin(kappa/2)| sqrt(eig(M^-1 K)), in Hz, (n, 2), at phases (n,), rad."""
     values = eigh(unit.stiffness, unit.mass, eigvals_only=True)
     return 2.0 * np.abs(np.sin(0.5 * phases))[:, None] * np.sqrt(values) / (2.0 * np.pi)
 
 
 def guided(found: xarray.Dataset) -> NDArray[np.float64]:
-    """Frequencies (n, 2), Hz, of the bands in which plates move along the axis and turn about it.
+    """Frequencies (n, 2), Hz, of the bands in which plates move along the axis and rotate about it.
 
-    In the other ones plates slide sideways, and their corners have a mean motion along x or y.
+    In other bands plates slide sideways: their corners have a mean motion along x or y.
     """
     shapes = found["shape"].values[:, :, :SIDES]
     sideways = np.abs(shapes.mean(axis=2)[..., :2]).sum(axis=-1)
@@ -147,10 +146,10 @@ def guided(found: xarray.Dataset) -> NDArray[np.float64]:
 
 
 def dispersion(unit: Unit, count: int = 41) -> xarray.Dataset:
-    """Bands of the chain beside those of the two-dof unit.
+    """Bands of the chain and of the two-dof unit.
 
-    Variables over phase (0 to pi) and branch: `bands`, of the chain as it is; `two_dof`; `free`, of
-    the chain without creases, and `free_two_dof`; all in Hz.
+    Variables over phase (0 to pi) and branch: `bands` of the chain; `two_dof`; `free`, of the chain
+    without creases, and `free_two_dof`; all in Hz.
     """
     phases = np.linspace(0.0, np.pi, count)
     free = replace(unit, crease=0.0)
@@ -165,7 +164,7 @@ def dispersion(unit: Unit, count: int = 41) -> xarray.Dataset:
 
 
 def impact(unit: Unit, cells: int, velocity: float, duration: float) -> xarray.Dataset:
-    """Motion of each cell after the first plate of a free chain got a velocity (m/s).
+    """Motion of each cell after an initial velocity (m/s) of the free chain's first plate.
 
     Variables of `space_time`, the rotation of the plates (rad), and energies (J) and momentum
     (kg m/s) over time; attributes: the balance of energy, the speeds of long waves (cells per s).
@@ -198,18 +197,18 @@ def impact(unit: Unit, cells: int, velocity: float, duration: float) -> xarray.D
 
 @dataclass(frozen=True)
 class Overtaking:
-    """How a rarefaction passes a compression.
+    """A rarefaction that overtakes a compression.
 
     Attributes
     ----------
     compression, rarefaction : Pulse
-        Of the strain of the cells but for those at the end.
+        Pulses of strain in the cells, except those at the end.
     cell : int
-        Which parts those where compression peaks first from those where tension does, best.
+        Cell that best separates cells where compression peaks first from cells where tension does.
     share : float
-        Of the cells from there on in which tension does.
+        Share of cells from there on in which tension peaks first.
     before : float
-        Largest compression that a cell feels before its highest tension, over that tension: median
+        Largest compression of a cell before its highest tension, relative to that tension; median
         of the last third.
     """
 

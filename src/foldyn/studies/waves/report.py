@@ -19,16 +19,16 @@ from foldyn.studies.waves import kresling, sheets
 from foldyn.studies.waves.study import FULL, Study
 
 TITLE = "Waves in periodic origami"
-STATES = 4  # fold states whose bands are drawn
-FROM, TO = 0.3, 0.7  # of a chain: between these cells the pulse is followed
+STATES = 4  # number of fold states with drawn bands
+FROM, TO = 0.3, 0.7  # of a chain: range of cells in which the pulse is followed
 SHEETS = {"miura": "Miura", "eggbox": "eggbox"}
-FELT = 0.05  # of the highest tension: compression that counts before it
-KEPT = 0.2  # relative change of height and width of what keeps its form
-SPEEDS = 0.01  # relative difference of speeds that counts as none
+FELT = 0.05  # of the highest tension: smaller compression before it is ignored
+KEPT = 0.2  # largest relative change of height and width of a pulse that keeps its form
+SPEEDS = 0.01  # largest relative difference of equal speeds
 
 
 def write(study: Study) -> Path:
-    """Draw the figures of a study into its folder and write report.html; returns its path."""
+    """Draw the figures of a study into its folder and write report.html; return its path."""
     album = Album(study.folder)
     hit, small = study.result("impact"), study.result("small_impact")
     lines = study.result("dispersion")
@@ -66,7 +66,7 @@ def _opening(study: Study) -> str:
 
 # ---------------------------------------------------------------------- the chain
 def deviations(lines: xarray.Dataset, free: bool) -> tuple[float, float]:
-    """Largest relative deviations of the two bands from the two-dof unit (but for phase 0)."""
+    """Largest relative deviations of the two bands from the two-dof unit (except at phase 0)."""
     start = "free_" if free else ""
     ratio = lines[f"{start}bands"].values[1:] / lines[f"{start}two_dof"].values[1:] - 1.0
     slow, fast = np.abs(ratio).max(axis=0).tolist()
@@ -193,7 +193,7 @@ def _of(pulse: Pulse, cells: slice) -> tuple[float, float]:
 
 
 def verdict(hit: xarray.Dataset, passed: kresling.Overtaking) -> str:
-    """Say from the numbers what agrees with the paper, and what does not."""
+    """Say from the numbers what agrees with the paper and what does not."""
     slow = float(np.asarray(hit.attrs["long_waves"])[0])
     rare, press = passed.rarefaction, passed.compression
     momentum = hit["momentum"].values
@@ -224,7 +224,7 @@ def verdict(hit: xarray.Dataset, passed: kresling.Overtaking) -> str:
 
 
 def _first(passed: kresling.Overtaking) -> str:
-    """Whether the latter part of the chain feels tension first."""
+    """Whether the far part of the chain feels tension first."""
     does = "holds" if passed.before < FELT else "does not hold strictly"
     return (
         f"That the latter part of the chain feels tension first {does}: compression of "
@@ -235,7 +235,7 @@ def _first(passed: kresling.Overtaking) -> str:
 
 
 def _form(rare: Pulse) -> str:
-    """Whether the rarefaction keeps its form, as a solitary wave does."""
+    """Whether the rarefaction keeps its form, like a solitary wave."""
     count = len(rare.arrival) / kresling.UNTIL
     parts = [slice(int(a * count), int(b * count)) for a, b in ((0.3, 0.4), (0.65, 0.75))]
     (early, narrow), (late, wide) = (_of(rare, part) for part in parts)

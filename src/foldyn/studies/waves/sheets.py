@@ -1,8 +1,8 @@
-"""Bands of Miura and eggbox sheets against their fold state.
+"""Bands of Miura and eggbox sheets by fold state.
 
 Pratapa, Suryanarayana and Paulino (J. Mech. Phys. Solids 118, 2018) compute them with bars and
-hinges. Their dimensions and numbers were not at hand: panels here are those of the paper specimen
-of the other study (25 mm, Canson Mi-Teintes), on the scheme n4b5, with lumped masses.
+hinges. Their dimensions and numbers were not available: panels here are as in the paper specimen of
+the other study (25 mm, Canson Mi-Teintes), with the scheme n4b5 and lumped masses.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ PATTERNS = {"miura": (miura, 60.0), "eggbox": (eggbox, 60.0)}
 EDGE = 0.025  # m
 PAPER = Sheet(1.219e9, 0.2, 2.4e-4, 667.0, length_scale_ratio=2.7)
 PATH = "G-X-M-Y-G"
-COUNT = 12  # bands: three of each of four vertices
+COUNT = 12  # number of bands: three for each of four vertices
 
 
 def cell_of(kind: str, dihedral: float) -> UnitCell:
@@ -42,8 +42,8 @@ def fold_states(
     """Bands in fold states, and their gaps.
 
     Variables: `frequency` (dihedral, phase, band), Hz, along the edge of the zone; `bottom`, `top`
-    (direction, dihedral, below), Hz, of the gaps above so many bands, nan where there is none, for
-    waves along x alone and for all of the zone. Attributes: ticks of the path.
+    (direction, dihedral, below), Hz, of the gaps above `below` bands, nan if there is none, for
+    waves along x only and for the whole zone. Attributes: ticks of the path.
     """
     path = cell_of(kind, 90.0).path(PATH, count)
     frequency, edges = [], np.full((2, 2, len(dihedrals), COUNT), np.nan)
@@ -75,7 +75,7 @@ def fold_states(
 
 
 def widest(found: xarray.Dataset, direction: str) -> tuple[float, float, float]:
-    """Dihedral (degrees) and edges (Hz) of the gap that is widest by its middle; nan for none."""
+    """Dihedral (degrees) and edges (Hz) of the gap widest relative to its middle, or nan."""
     bottom, top = (found[name].sel(direction=direction).values for name in ("bottom", "top"))
     width = np.nan_to_num((top - bottom) / (top + bottom))
     k, below = np.unravel_index(width.argmax(), width.shape)

@@ -1,4 +1,4 @@
-"""What the study of waves computes, each part kept in a file of its own."""
+"""Computations of the study of waves, each kept in its own file."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ COMPUTING = tuple(f"studies/waves/{name}.py" for name in ("kresling", "sheets"))
 
 @dataclass(frozen=True)
 class Plan:
-    """How finely is computed.
+    """Resolution of the computations.
 
     Attributes
     ----------
     dihedrals : int
         Fold states of each sheet, from 20 to 170 degrees.
     phases : int
-        Along the edge of the zone of a sheet, and of the chain.
+        Number of phases along the zone's edge of a sheet, and of the chain.
     cells : int
         Of the chain.
     velocity : float
-        Of the first plate (m/s).
+        Initial velocity of the first plate (m/s).
     """
 
     dihedrals: int = 31
@@ -45,7 +45,7 @@ class Plan:
 
     @property
     def duration(self) -> float:
-        """Of a motion (s): until slow waves have nearly reached the end."""
+        """Duration of a motion (s): until slow waves have nearly reached the end."""
         slow = kresling.long_waves(self.unit.cell).speeds[0]
         return float(round(0.9 * self.cells / slow, 2))
 
@@ -56,22 +56,22 @@ QUICK = Plan(dihedrals=7, phases=31, cells=60)
 
 @dataclass(frozen=True)
 class Part:
-    """One computation: bands of a sheet, or of the chain, or its impact."""
+    """One computation: bands of a sheet or of the chain, or the chain's impact."""
 
     kind: Literal["miura", "eggbox", "dispersion", "impact", "small_impact"]
     plan: Plan
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Name of the computation."""
         return self.kind
 
     def settings(self) -> dict[str, Any]:
-        """All that its result depends on."""
+        """Everything that its result depends on."""
         return {"kind": self.kind, "program": program(*COMPUTING), **asdict(self.plan)}
 
     def result(self, folder: Path) -> xarray.Dataset | None:
-        """What a folder has of it; None if that is nothing, or of other settings."""
+        """Its result in a folder; None if missing or computed with other settings."""
         return KEPT.find(folder / f"{self.kind}.nc", self.settings())
 
     def there(self, folder: Path) -> bool:
@@ -83,7 +83,7 @@ class Part:
         KEPT.keep(folder / f"{self.kind}.nc", self.settings(), self.compute())
 
     def compute(self) -> xarray.Dataset:
-        """Its result."""
+        """Compute its result."""
         plan = self.plan
         if self.kind in sheets.PATTERNS:
             return sheets.fold_states(
@@ -130,11 +130,11 @@ class Study:
     def compute(
         self, tell: Callable[[Done], None] = lambda done: None, processes: int = 2
     ) -> list[Done]:
-        """Compute what is not there yet; see `foldyn.studies.pool.run`."""
+        """Compute missing results; see `foldyn.studies.pool.run`."""
         results = self.folder / RESULTS
         results.mkdir(parents=True, exist_ok=True)
         return run([Part(kind, self.plan) for kind in KINDS], results, tell, processes)
 
     def result(self, kind: Any) -> xarray.Dataset | None:
-        """Result of a computation, or None where there is none."""
+        """Result of a computation, or None if missing."""
         return Part(kind, self.plan).result(self.folder / RESULTS)

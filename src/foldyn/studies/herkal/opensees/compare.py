@@ -1,8 +1,8 @@
-"""Our shell beside the stored results of OpenSees, as tables in Markdown.
+"""Our shell compared with stored results of OpenSees, as tables in Markdown.
 
     python -m foldyn.studies.herkal.opensees.compare --divisions 16 32 64 [--motion 16 32 64]
 
-prints how the results of both converge, and how far ours are from those of OpenSees.
+prints the convergence of both, and how far our results are from those of OpenSees.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from foldyn.studies.herkal.opensees.run import DT, SAMPLES
 from foldyn.studies.herkal.runs import reported
 from foldyn.studies.herkal.sheet_models import CASES, REFERENCE, case_study, case_with
 
-COUNT = 5  # frequencies
+COUNT = 5  # number of frequencies
 
 
 def our_still(name: str, divisions: int) -> stored.Still:
@@ -43,9 +43,9 @@ def our_still(name: str, divisions: int) -> stored.Still:
 
 
 def our_motion(name: str, divisions: int, dt: float, duration: float | None = None) -> stored.Moved:
-    """Motion of a case study with our shell, sampled like those of OpenSees.
+    """Motion of a case study with our shell, sampled like the OpenSees motions.
 
-    Its duration (s) is by default that of the case file.
+    Its duration (s) is by default the case file's.
     """
     case_file = case_study(name)
     case = case_with(case_file, REFERENCE, divisions=divisions)
@@ -62,7 +62,7 @@ def our_motion(name: str, divisions: int, dt: float, duration: float | None = No
 def away(still: stored.Still, reference: stored.Still) -> tuple[float, NDArray]:
     """Relative differences of the static displacements at full load and of the frequencies.
 
-    The first is the largest of all nodes: distance over displacement.
+    The first is the largest over all nodes: distance relative to displacement.
     """
     moved, wanted = still.displacement[-1], reference.displacement[-1]
     apart = np.linalg.norm(moved - wanted, axis=1) / np.linalg.norm(wanted, axis=1)
@@ -87,17 +87,17 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 
 def percent(value: float) -> str:
-    """0.0123 as 1.23."""
+    """Format 0.0123 as 1.23."""
     return f"{100.0 * value:.2f}"
 
 
 def still_table(
     found: Iterable[Sequence[stored.Still]], references: Sequence[Sequence[stored.Still]]
 ) -> str:
-    """Results of each case from coarse to fine and, in percent, how far they are from references.
+    """Results of each case from coarse to fine and, in percent, their distance from references.
 
-    Of frequencies, that is the difference of the worst of the first three and of all. A list of
-    references has one for each case, in the same order.
+    For frequencies it is the worst of the first three, and of all. A list of references has one for
+    each case, in the same order.
     """
     head = ["case", "divisions", "displacement, m", "frequencies, Hz"]
     head += ["static, %", "f1 to f3, %", "f1 to f5, %"] * len(references)
@@ -120,7 +120,7 @@ def still_table(
 def motion_table(
     found: Iterable[Sequence[stored.Moved]], references: Sequence[Sequence[stored.Moved]]
 ) -> str:
-    """The same of motions."""
+    """Table of motions, in the layout of `still_table`."""
     head = ["case", "divisions", "step, s", *["off, %"] * len(references)]
     rows = []
     for number, motion in _numbered(found):
@@ -137,7 +137,7 @@ def _numbered(found: Iterable[Sequence[Any]]) -> Iterator[tuple[int, Any]]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Print what the command line asks for."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Our shell beside OpenSees.")
     parser.add_argument("--cases", nargs="+", choices=CASES, default=CASES)
     parser.add_argument("--divisions", type=int, nargs="*", default=[16], help="of our shell")

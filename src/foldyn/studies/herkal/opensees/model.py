@@ -1,9 +1,9 @@
-"""A pattern in OpenSees: corotational shells of three nodes, joined by springs along creases.
+"""A pattern in OpenSees: corotational three-node shells, joined by springs along creases.
 
-Each panel has nodes of its own. Two nodes at one place of a crease are tied by stiff springs, and
-turn against each other about the crease with their share of its stiffness; `exports.opensees` gives
-the commands. Nothing of Foldyn's mechanics is used: geometry, supports, loads and damping come from
-the case, mesh and stiffness are made here.
+Each panel has its own nodes. Coincident nodes of a crease are tied by stiff springs, and rotate
+relative to each other about the crease against their share of its stiffness; `exports.opensees`
+provides the commands. None of Foldyn's mechanics is used: geometry, supports, loads and damping
+come from the case, mesh and stiffness are made here.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from foldyn.exports.opensees import TIE, TOLERANCE
 from foldyn.materials import MemoryLaw
 from foldyn.patterns import Pattern
 
-ALIKE = 1e-9  # relative difference below which diagonals are equal
+ALIKE = 1e-9  # relative difference below which diagonals count as equal
 
 
 @dataclass(frozen=True, eq=False)
 class Crease:
-    """Where two panels meet.
+    """A crease between two panels.
 
     Attributes
     ----------
     axis, length
         Unit vector from the lower to the higher vertex, and the distance between them (m).
     nodes : (n + 1, 2)
-        Pairs of nodes at one place, as those of a `Joint`.
+        Pairs of coincident nodes, as in `Joint`.
     """
 
     axis: NDArray
@@ -57,7 +57,7 @@ class PanelMesh:
     triangles : (nt, 3)
         Counter-clockwise from the front.
     corners : tuple of tuples of int
-        Nodes at each vertex of the pattern, one of every panel there.
+        Nodes at each vertex of the pattern, one for every panel there.
     creases : tuple of Crease
         In the order of `pattern.creases`.
     """
@@ -69,14 +69,14 @@ class PanelMesh:
 
 
 def panel_mesh(pattern: Pattern, divisions: int) -> PanelMesh:
-    """Cut panels of four corners into 2 `divisions`^2 triangles each.
+    """Cut panels with four corners into 2 `divisions`^2 triangles each.
 
-    Cells are cut along their shorter diagonal, alternately where both are alike.
+    Cells are cut along their shorter diagonal, alternately if both are equal.
 
     Raises
     ------
     InputError
-        A panel has not four corners.
+        A panel does not have four corners.
     """
     per_panel = (divisions + 1) ** 2
     points, triangles, sides = [], [], {}
@@ -138,7 +138,7 @@ class Answer:
     displacement : (m, v, 3)
         Of the pattern's vertices, m.
     iterations : int
-        Corrections in all steps.
+        Total number of corrections.
     seconds : float
         Processor time of the steps.
     """
@@ -151,15 +151,15 @@ class Answer:
 
 @dataclass(frozen=True, eq=False)
 class PanelShells:
-    """A case as shells of OpenSees.
+    """A case as OpenSees shells.
 
     Parameters
     ----------
     case : Case
-        Of its structure, the pattern, the sheet and the law of the folds are taken. Supports are
-        `Fix` and loads `Force`, both on vertices of the pattern.
+        Provides the pattern, the sheet and the law of the folds. Supports must be `Fix` and loads
+        `Force`, both on vertices of the pattern.
     divisions : int
-        Pieces of each edge of a panel.
+        Divisions of each edge of a panel.
     tie : float
         Stiffness of the springs that tie nodes, in units of E t.
     tolerance : float
@@ -168,7 +168,7 @@ class PanelShells:
     Raises
     ------
     InputError
-        The case has what this model does not know.
+        The case has features that this model does not support.
     """
 
     case: Case
@@ -206,7 +206,7 @@ class PanelShells:
 
     @cached_property
     def linear_range(self) -> NDArray:
-        """Least and largest change of each dihedral (nc, 2), rad, up to which folds are linear."""
+        """Least and largest change of each dihedral (nc, 2), rad, for which folds are linear."""
         structure = self.case.structure
         law, rest = structure.fold_law, structure.pattern.dihedrals
         if law.linear_between is not None and not isinstance(law, MemoryLaw):
@@ -217,7 +217,7 @@ class PanelShells:
 
     @cached_property
     def shell(self) -> CreasedShell:
-        """What OpenSees gets."""
+        """Creased shell for OpenSees."""
         mesh, sheet, count = self.mesh, self.case.structure.sheet, len(self.mesh.points)
         held = np.zeros((count, 3), bool)
         forces = [np.zeros((count, 3)) for _ in self.case.load_terms]
@@ -259,9 +259,9 @@ class PanelShells:
         return np.sqrt(np.array(domain.eigen(opensees.EIGEN, count))) / (2.0 * np.pi)
 
     def motion(self, duration: float, dt: float, every: int = 1) -> Answer:
-        """Motion from rest with Newmark's average acceleration, sampled at each `every`-th step.
+        """Motion from rest by Newmark's average acceleration, sampled at each `every`-th step.
 
-        Histories act with their values at the ends of the steps.
+        Histories are evaluated at the ends of the steps.
         """
         domain, steps = self._domain(), round(duration / dt)
         times = dt * np.arange(steps + 1)
@@ -272,7 +272,7 @@ class PanelShells:
             opensees.run(domain, opensees.load(number, force, *series))
         self._prepare(
             domain, "ModifiedNewton"
-        )  # a tangent a step: the same result in half the time
+        )  # one tangent per step: the same result in half the time
         domain.rayleigh(self.case.rayleigh.alpha, 0.0, 0.0, 0.0)
         domain.integrator("Newmark", 0.5, 0.25)
         domain.analysis("Transient")
@@ -300,7 +300,7 @@ class PanelShells:
         return Answer(at[::every], np.array(moved), iterations, spent)
 
     def _moved(self, domain: Any) -> NDArray:
-        """Displacements (v, 3) of the vertices, the means of their nodes."""
+        """Displacements (v, 3) of the vertices, averaged over their nodes."""
         return np.array(
             [
                 np.mean([domain.nodeDisp(node + 1)[:3] for node in nodes], axis=0)
@@ -309,7 +309,7 @@ class PanelShells:
         )
 
     def _check_folds(self, domain: Any, at: float) -> None:
-        """Refuse a state in which a fold has left the range of its linear law."""
+        """Refuse a state in which a fold is outside the range of its linear law."""
         first = opensees.first_springs(self.shell)
         for number, (low, high) in enumerate(self.linear_range):
             for place in range(self.divisions + 1):
@@ -324,7 +324,7 @@ class PanelShells:
 def crease_stiffness(length: float, sheet: Any) -> float:
     """Stiffness (N m/rad) of a whole crease: 1/k = Ls/G + 1/(0.55 G (L/t)^(1/3)).
 
-    With G = E t^3 / 12 (1 - nu^2) and Ls the length-scale ratio; computed here anew, so that the
+    With G = E t^3 / 12 (1 - nu^2) and Ls the length-scale ratio; reimplemented here, so that the
     check is independent.
     """
     E, nu, t = sheet.youngs_modulus, sheet.poissons_ratio, sheet.thickness

@@ -1,4 +1,4 @@
-"""Run cases with OpenSees and store what comes out.
+"""Run cases with OpenSees and store the results.
 
     python -m foldyn.studies.herkal.opensees.run case1 case2 --divisions 16 --motion --dt 0.005
 
@@ -22,7 +22,7 @@ from foldyn.studies.herkal.opensees.model import PanelShells
 from foldyn.studies.herkal.sheet_models import CASES, case_study
 
 DT = 0.005  # s
-SAMPLES = 0.01  # s, between those that are stored
+SAMPLES = 0.01  # s: interval of stored samples
 
 
 def still(name: str, divisions: int) -> stored.Still:
@@ -39,7 +39,7 @@ def still(name: str, divisions: int) -> stored.Still:
 
 
 def motion(name: str, divisions: int, dt: float) -> stored.Moved:
-    """Motion of a case for as long as its file says."""
+    """Motion of a case over the duration in its file."""
     case_file, shells = _shells(name, divisions)
     duration, node = case_file.analysis.arguments["duration"], case_file.output.nodes
     found = shells.motion(duration, dt, every=max(1, round(SAMPLES / dt)))
@@ -68,7 +68,7 @@ def _about(name: str, shells: PanelShells) -> dict[str, Any]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run what the command line says."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Run cases with OpenSees.")
     parser.add_argument("cases", nargs="+", choices=CASES)
     parser.add_argument("--divisions", type=int, nargs="+", default=[16])

@@ -1,4 +1,4 @@
-"""What OpenSees computed: files of `results`, written by `run`.
+"""Stored results of OpenSees: files in `results`, written by `run`.
 
 `<case>-d<divisions>.json` has statics and frequencies, `<case>-d<divisions>-dt<step>.npz` a motion.
 """
@@ -60,7 +60,7 @@ class Moved:
 
 
 def write_still(folder: Path, result: Still) -> Path:
-    """Write statics and frequencies; the file is returned."""
+    """Write statics and frequencies; return the file."""
     about = result.about
     path = folder / f"{about['case']}-d{about['divisions']}.json"
     arrays = {name: value.tolist() for name, value in vars(result).items() if name != "about"}
@@ -76,7 +76,7 @@ def read_still(case: str, divisions: int, folder: Path = RESULTS) -> Still:
 
 
 def write_motion(folder: Path, result: Moved) -> Path:
-    """Write a motion, in single precision; the file is returned."""
+    """Write a motion, in single precision; return the file."""
     about = result.about
     path = folder / f"{about['case']}-d{about['divisions']}-dt{about['dt']:g}.npz"
     single = result.displacement.astype(np.float32)
@@ -93,12 +93,12 @@ def read_motion(case: str, divisions: int, dt: float, folder: Path = RESULTS) ->
 
 
 def stored_divisions(case: str, folder: Path = RESULTS) -> list[int]:
-    """Meshes of which there are statics and frequencies, from coarse to fine."""
+    """Meshes with stored statics and frequencies, from coarse to fine."""
     return sorted(int(path.stem.rpartition("-d")[2]) for path in folder.glob(f"{case}-d*.json"))
 
 
 def stored_motions(case: str, folder: Path = RESULTS) -> list[tuple[int, float]]:
-    """Divisions and time step of the motions there are, from coarse to fine."""
+    """Divisions and time steps of the stored motions, from coarse to fine."""
     found = []
     for path in folder.glob(f"{case}-d*-dt*.npz"):
         divisions, dt = path.stem.removeprefix(f"{case}-d").split("-dt")

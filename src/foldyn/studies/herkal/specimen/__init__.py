@@ -1,1 +1,1 @@
-"""The paper specimen: from photographs and a film to a calibrated model."""
+"""The paper's specimen: from photographs and a film to a calibrated model."""

@@ -1,4 +1,4 @@
-"""From measurements of the specimen to its parameters, and back to the predictions of the model."""
+"""From measurements of the specimen to its parameters, and back to predictions of the model."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from foldyn.studies.herkal.specimen.prepared import FreeVibration, prepare
 from foldyn.writing import write_text
 
 FILM_SUPPORT = "glued"
-PROMINENCE = 0.05  # of a peak, as a part of the highest amplitude
-NEAR = (4.0, 14.0)  # Hz, where the axial vibration is sought
-FINER = 8  # times by which the grid of frequencies is finer than the resolution
-UNLIKE = 0.2  # part of their displacement by which nodes may differ from a state of the model
+PROMINENCE = 0.05  # of a peak, relative to the highest amplitude
+NEAR = (4.0, 14.0)  # Hz: band of the axial vibration
+FINER = 8  # refinement of the frequency grid relative to the resolution
+UNLIKE = 0.2  # share of their displacement by which nodes may differ from a state of the model
 SAME = 1e-4  # m, by which positions at rest may differ
-FACTORS = np.linspace(0.0, 1.1, 34)  # of the path on which measured shapes are sought
+FACTORS = np.linspace(0.0, 1.1, 34)  # of the path that is searched for measured shapes
 
 
 def load_factor(path: xr.Dataset, nodes: Sequence[int], moved: NDArray[np.float64]) -> float:
-    """Where on a path nodes have moved along x as they were measured to.
+    """Load factor on a path at which nodes have moved along x as measured.
 
     Parameters
     ----------
@@ -45,12 +45,12 @@ def load_factor(path: xr.Dataset, nodes: Sequence[int], moved: NDArray[np.float6
         Of `foldyn.studies.herkal.calibration.pressed`.
     nodes : sequence of int
     moved : ndarray, shape (m,)
-        Displacement along x (m), NaN of nodes that were not seen.
+        Displacement along x (m), NaN for nodes not seen.
 
     Raises
     ------
     InputError
-        No node was seen, or they have moved as on no state of the path.
+        No node was seen, or their displacements match no state of the path.
     """
     known = np.isfinite(moved)
     if not known.any():
@@ -84,7 +84,7 @@ def load_factor(path: xr.Dataset, nodes: Sequence[int], moved: NDArray[np.float6
 
 
 def _along(path: xr.Dataset, nodes: Sequence[int]) -> CubicSpline:
-    """Displacements of nodes, shape (m, 3), by the load factor."""
+    """Displacements of nodes, shape (m, 3), interpolated at a load factor."""
     moved = path["displacement"].sel(node=list(nodes)).transpose("step", "node", "axis").values
     return CubicSpline(path["load_factor"].values, moved)
 
@@ -94,23 +94,23 @@ def static_test(
 ) -> list[Measurement]:
     """Forces over displacements of the top, and shapes of the front, from tracked photographs.
 
-    The straight edge of the top has no corners once it is loaded: its displacement is that of the
-    model's state in which the corners below fit best. The specimen is not glued: where it slid
-    along y counts for nothing.
+    The straight edge of the top shows no corners once loaded: its displacement is taken from the
+    model's state that best fits the corners below. The specimen is not glued: sliding along y is
+    ignored.
 
     Parameters
     ----------
     photos : xarray.Dataset
         Of `foldyn.experiment.track_photos`, with the coordinate `load` (N).
     label : str
-        What the data are called.
+        Label of the data.
     changes : mapping, optional
-        Values of the model, by key, whose states are compared.
+        Values of the model, by key, for the compared states.
 
     Raises
     ------
     InputError
-        No loads, or nodes that have moved as no state of the model.
+        No loads, or displacements that match no state of the model.
     """
     check_tracks(photos)
     loads = photos["load"].values if "load" in photos.coords else np.zeros(photos.sizes["photo"])
@@ -143,7 +143,7 @@ def static_test(
 
 
 def check_tracks(tracks: xr.Dataset) -> None:
-    """Refuse tracks that are not of the specimen, seen from the front.
+    """Refuse tracks that are not of the specimen seen from the front.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def check_tracks(tracks: xr.Dataset) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Released:
-    """A release as it was filmed, and the damping that was found in it.
+    """A filmed release, and the damping fitted to it.
 
     Attributes
     ----------
@@ -195,16 +195,16 @@ def fit_release(
     step: float = calibration.STEP,
     **options: Any,
 ) -> Released:
-    """Fit the damping to node 8 alone, on the plate with node 59 glued and without the glue.
+    """Fit the damping to node 8 only, on the plate with node 59 glued and without glue.
 
     Parameters
     ----------
     measured : TimeHistory
-        Of the tracked nodes along x, from before the release on.
+        Histories of the tracked nodes along x, beginning before the release.
     models : Path
-        Gets the case files of the models, a folder for each support.
+        Receives the case files of the models, a folder for each support.
     changes : mapping
-        What the static test has changed in the case, by key.
+        Values that the static test has changed in the case, by key.
     step : float
         Of the simulations (s).
     **options
@@ -228,19 +228,19 @@ def fit_release(
 
 
 def press_of(free: FreeVibration, changes: Mapping[str, Any] | None = None) -> float:
-    """Displacement of the top (m) before a release, from that of the front nodes.
+    """Displacement of the top (m) before a release, from the front nodes.
 
     Raises
     ------
     InputError
-        They have moved as in no state of the model.
+        Their displacements match no state of the model.
     """
     front = np.where(np.isin(free.nodes, FRONT), free.before, np.nan)
     return FULL * load_factor(calibration.pressed(FACTORS, changes), free.nodes, front)
 
 
 def motions(released: Released) -> dict[str, xr.Dataset]:
-    """What the model does with every support; the damping is that of the film's where no other is.
+    """Motions of the model with every support; damping not fitted is taken from the film's support.
 
     Returns
     -------
@@ -259,22 +259,22 @@ def motions(released: Released) -> dict[str, xr.Dataset]:
 def compared(
     released: Released, motions: Mapping[str, xr.Dataset], truth: xr.Dataset | None = None
 ) -> xr.Dataset:
-    """Front nodes of the film and of the models at the same times, without trend.
+    """Front nodes of the film and of the models at the same times, detrended.
 
     Parameters
     ----------
     released : Released
     motions : mapping of str to xarray.Dataset
-        By the names of supports.
+        Motions by the names of supports.
     truth : xarray.Dataset, optional
-        Of a synthetic film: positions at the times of its frames.
+        True positions of a synthetic film at the times of its frames.
 
     Returns
     -------
     xarray.Dataset
-        In m: `measured` (time, node), NaN where a node was lost; `whole` (time, node), short gaps
-        filled and NaN throughout where there are longer ones; `model` (support, time, node); and
-        `true` (time, node) where it is known.
+        In m: `measured` (time, node), NaN while a node was lost; `whole` (time, node), with short
+        gaps filled, and NaN throughout for nodes with longer ones; `model` (support, time, node);
+        and `true` (time, node) if known.
     """
     front = [node for node in released.free.nodes if node in FRONT]
     one = released.free.of(front, "front nodes")
@@ -311,7 +311,7 @@ def content(x: NDArray[np.float64], step: float) -> tuple[NDArray, NDArray] | No
 
 @dataclass(frozen=True)
 class Vibration:
-    """Axial vibration of a record; nan where there is none.
+    """Axial vibration of a record; nan if there is none.
 
     Attributes
     ----------
@@ -336,13 +336,13 @@ def vibration_of(x: NDArray[np.float64], step: float) -> Vibration:
         return Vibration()
     try:
         maxima = log_decrement(x, step, rest=0.0, frequency=peak)
-    except InputError:  # fewer than two
+    except InputError:  # fewer than two maxima
         return Vibration(peak)
     return Vibration(peak, maxima.damped_frequency, maxima.damping_ratio)
 
 
 def misfit(film: NDArray[np.float64], model: NDArray[np.float64]) -> float:
-    """Root mean square of the difference, relative to that of the measured samples."""
+    """Root mean square of the difference, relative to the measured samples."""
     known = np.isfinite(film)
     return float(np.linalg.norm((model - film)[known]) / np.linalg.norm(film[known]))
 

@@ -17,7 +17,7 @@ from foldyn.studies.herkal.specimen.evaluation import content
 from foldyn.studies.herkal.vibration import CORNER, Response
 
 WIDTH = 9.0  # inches
-COLUMNS = 3  # front nodes of a row of the pattern
+COLUMNS = 3  # front nodes per row of the pattern
 SUPPORT_NAMES = {
     "glued": "plate, node 59 glued",
     "plate": "plate alone (ideal)",
@@ -26,7 +26,7 @@ SUPPORT_NAMES = {
 
 
 def plot_front(front: xarray.Dataset, support: str, label: str, note: str) -> Figure:
-    """Draw all front nodes of the film and of the model over time, a frame each."""
+    """Draw all front nodes of the film and of the model over time, one frame each."""
     measured, model = front["measured"], front["model"].sel(support=support)
     curves = {
         node: (front["time"].values, measured.sel(node=node).values, model.sel(node=node).values)
@@ -36,7 +36,7 @@ def plot_front(front: xarray.Dataset, support: str, label: str, note: str) -> Fi
 
 
 def plot_front_content(front: xarray.Dataset, support: str, label: str, note: str) -> Figure:
-    """Draw amplitude spectra of all front nodes of the film and of the model, a frame each."""
+    """Draw amplitude spectra of all front nodes of the film and of the model, one frame each."""
     step = sampling_interval(front["time"].values)
     curves = {}
     for node in front["node"].values.tolist():
@@ -104,7 +104,7 @@ def _plot_content(axes: Axes, x: NDArray[np.float64], step: float, look: Mapping
 def plot_responses(
     responses: Mapping[str, xarray.Dataset], peaks: Sequence[float], note: str
 ) -> Figure:
-    """Draw the size of responses of a corner of the top along x, and the paper's peaks."""
+    """Draw the magnitude of responses of a corner of the top along x, and the paper's peaks."""
     figure = style.new_figure(7.0, 3.8, note)
     axes = figure.subplots()
     style.frame(axes, "frequency (Hz)", "receptance (mm/N)", f"node {CORNER} along x")

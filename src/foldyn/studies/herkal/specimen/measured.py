@@ -1,4 +1,4 @@
-"""Data for the study of the specimen: measured files or, without any, synthetic data."""
+"""Data for the study of the specimen: measured files, or synthetic data without any."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ AXIS = "x"
 
 @dataclass(frozen=True)
 class Data:
-    """Measured files; synthetic ones where there is none at all.
+    """Measured files; synthetic data if there are none.
 
     Attributes
     ----------
@@ -36,39 +36,39 @@ class Data:
 
     @property
     def synthetic(self) -> bool:
-        """Whether nothing was measured."""
+        """Whether the data are synthetic."""
         return self.static is None and self.release is None
 
     @property
     def film(self) -> Path | None:
-        """The release, if it is a film that must still be tracked."""
+        """The release, if it is a film still to be tracked."""
         is_film = self.release is not None and self.release.suffix.lower() not in (".nc", ".csv")
         return self.release if is_film else None
 
     @property
     def label(self) -> str:
-        """What figures call the data."""
+        """Label of the data in figures."""
         return SYNTHETIC if self.synthetic else "measured"
 
     @property
     def files(self) -> dict[str, Path]:
-        """The files by what they are."""
+        """The files by kind."""
         files = {"static": self.static, "release": self.release}
         return {what: file for what, file in files.items() if file is not None}
 
     def digests(self) -> dict[str, str]:
-        """Digests of the files, by what they are."""
+        """Digests of the files by kind."""
         return {what: _digest(file) for what, file in self.files.items()}
 
 
 def data_of(names: Sequence[str]) -> Data:
-    """Sort files by what is in them.
+    """Sort files by their content.
 
     Raises
     ------
     InputError
-        A file cannot be read, holds nothing of a static test or of a release, or there are two of
-        a kind.
+        A file cannot be read, is of neither a static test nor a release, or there are two of a
+        kind.
     """
     found: dict[str, Path] = {}
     for name in names:
@@ -86,14 +86,14 @@ def data_of(names: Sequence[str]) -> Data:
 
 
 def measurement(file: Path, label: str) -> Measurement:
-    """Measurement in a file, along the axis of the specimen."""
+    """Measurement in a file along the specimen's axis."""
     return recognize(file, AXIS, label=label, name=file.stem)
 
 
 def _kind(file: Path) -> str:
-    """Whether a file is of a static test ("static") or of a release ("release").
+    """Kind of a file: of a static test ("static") or of a release ("release").
 
-    All that can be said against it is said here, before anything is computed.
+    All errors in the file are reported here, before anything is computed.
     """
     suffix = file.suffix.lower()
     if suffix in PHOTOS:
@@ -124,7 +124,7 @@ def _kind(file: Path) -> str:
 
 
 def _check_forces(given: ForceDisplacement) -> None:
-    """Refuse points from which the folds cannot be determined."""
+    """Refuse points that do not determine the folds."""
     moved, most = given.displacement, FULL * evaluation.FACTORS[-1]
     if len(moved) < len(FOLD_RANGES):
         raise InputError(f"{len(moved)} force cannot give {len(FOLD_RANGES)} parameters")
@@ -144,5 +144,5 @@ def _digest(file: Path) -> str:
 
 @cache
 def _digest_of(file: Path, size: int, changed: int) -> str:
-    """Digest of a file of this size and time; for a long film it takes seconds."""
+    """Digest of a file with this size and time, cached, as a long film takes seconds."""
     return file_digest(file)

@@ -35,7 +35,7 @@ from foldyn.studies.targets import Target, read_targets
 TITLE = "The paper specimen: from photographs and a film to a calibrated model"
 NO_BREAK = "\N{NO-BREAK SPACE}"
 ALONE = "glue alone"
-POOR = 0.3  # misfit, as a part of what was measured, above which a fit is none
+POOR = 0.3  # misfit, relative to the data, above which a fit is rejected
 SYMBOLS = {
     "sheet.length_scale_ratio": "length-scale ratio",
     "model.fold_law.theta1": "theta1 (degrees)",
@@ -45,16 +45,16 @@ SYMBOLS = {
 
 
 def sections(folder: Path, parts: Sequence[Part], album: Album) -> list[Section]:
-    """What has been computed of the specimen; nothing where nothing has.
+    """Sections on the computed parts of the specimen; empty if there are none.
 
     Parameters
     ----------
     folder : Path
-        Of the results.
+        Folder of the results.
     parts : sequence of Part
         The fit, and the response after it.
     album : Album
-        Gets the figures.
+        Receives the figures.
     """
     fit, response = parts
     if not fit.there(folder):
@@ -115,13 +115,13 @@ def _static(folder: Path, found: dict[str, Any], data: Data) -> list[Section]:
         _estimates({"": found["folds"]}, FOLDS, data),
         *_doubt(found["folds"], "weights"),
         Picture(folder / "folds" / "data-0.png", "Forces, and the fitted model."),
-        *([corners] if shapes.is_file() else []),  # the folder is made anew by each fit
+        *([corners] if shapes.is_file() else []),  # each fit recreates the folder
         *([softer] if data.synthetic else []),
     ]  # fmt: skip
 
 
 def _estimates(fits: Mapping[str, dict[str, Any]], truth: Mapping[str, float], data: Data) -> Table:
-    """Fitted parameters with their intervals, next to the paper's; by support, if it has a name."""
+    """Fitted parameters with intervals and the paper's values, by support if it has a name."""
     rows = [
         [*filter(None, [SUPPORT_NAMES.get(support)]), SYMBOLS[one["key"]], one["value"],
          one["lower"], one["upper"], truth[one["key"]], one["note"]]
@@ -135,7 +135,7 @@ def _estimates(fits: Mapping[str, dict[str, Any]], truth: Mapping[str, float], d
 
 
 def _doubt(fit: dict[str, Any], what: str) -> list[Section]:
-    """Say in words why a fit must not be used."""
+    """Explain in words why a fit must not be used."""
     doubts = [
         f"the misfit is {one['relative']:.0%} of what was measured"
         for one in fit["measurements"]
@@ -197,7 +197,7 @@ def _release(folder: Path, found: dict[str, Any], fit: Part, album: Album) -> li
 
 
 def _vibrations(front: xr.Dataset, data: Data) -> list[Section]:
-    """How the watched node vibrates, how well it was tracked, and what the supports do to it."""
+    """Vibration of the watched node, quality of its track, and the effect of the supports."""
     step, at = sampling_interval(front["time"].values), front.sel(node=WATCHED)
     curves = {f"{data.label}, as filmed": at["whole"]}
     if "true" in front:
@@ -226,7 +226,7 @@ def _vibrations(front: xr.Dataset, data: Data) -> list[Section]:
 
 
 def _tracked(front: xr.Dataset) -> list[Section]:
-    """How far the tracks are from the true motion, if it is known."""
+    """Error of the tracks relative to the true motion, if known."""
     if "true" not in front:
         return []
     off = (front["measured"] - front["true"]).values
@@ -240,7 +240,7 @@ def _tracked(front: xr.Dataset) -> list[Section]:
 
 
 def _glue(held: float, alone: float, paper: float) -> str:
-    """How the supports change the frequency (Hz), and whether that tells them apart."""
+    """Effect of the supports on the frequency (Hz), and whether it distinguishes them."""
     if not math.isfinite(held) or not math.isfinite(alone):
         return "With one of the supports the model has no peak where it is sought."
     text = (

@@ -1,7 +1,7 @@
-"""From tracked histories to the free vibration that a model is held against.
+"""From tracked histories to the free vibration to which a model is fitted.
 
-The steps are the paper's: the window, the start at the first turning point, the final position
-taken off, and the trend.
+The steps are the paper's: cut the window, start at the first turning point, subtract the final
+position, and remove the trend.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from foldyn.errors import InputError
 from foldyn.experiment import TimeHistory
 from foldyn.studies.herkal.calibration import SEEN, WATCHED
 
-GAP = 1 / 30  # s, of a gap that is filled: a third of a period
-SLOWEST = 60.0  # frames per second
-SLACK = 0.015  # s, by which the instant of the release may be wrong
-SETTLED = 0.1  # part of the record over which the final position is averaged
-ROUNDED = 0.01  # part of an interval by which a time may be rounded
-FEWEST = 0.5  # part of the frames in which a node must have been measured
-HELD = 0.0125  # s, for which it must have been still before
+GAP = 1 / 30  # s, longest gap that is filled: a third of a period
+SLOWEST = 60.0  # least frames per second
+SLACK = 0.015  # s, largest error of the instant of the release
+SETTLED = 0.1  # share of the record over which the final position is averaged
+ROUNDED = 0.01  # share of an interval by which times may be rounded
+FEWEST = 0.5  # least share of frames in which a node must be measured
+HELD = 0.0125  # s, for which it must be still before the release
 AVERAGED = 0.05  # s, over which the held position is averaged
-STILL = 0.05  # part of its way by which it may wander while it is held
-SLOW = 0.1  # part of its largest speed below which it has not been let go yet
-ENOUGH = 8  # frames in which the watched node must have been measured
+STILL = 0.05  # share of its motion by which it may drift while held
+SLOW = 0.1  # share of its largest speed below which it is still held
+ENOUGH = 8  # least number of frames with the watched node
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,14 +37,14 @@ class FreeVibration:
     Attributes
     ----------
     history : TimeHistory
-        All nodes relative to their final positions, NaN where they were lost; time is 0 at the
-        release, as far as it is known.
+        All nodes relative to their final positions, NaN while lost; time is 0 at the release, as
+        far as known.
     whole : ndarray, shape (t, m)
-        The same with short gaps filled; NaN throughout where a node was lost for longer.
+        The same with short gaps filled; NaN throughout for nodes lost for longer.
     before : ndarray, shape (m,)
-        Displacement of the same nodes before the release (m), relative to the final position.
+        Displacement of these nodes before the release (m), relative to the final position.
     released : float
-        Time of the record that counts as that of the release (s).
+        Time of the release in the record (s).
     steps : mapping of str to (time, values)
         The watched node after each step (s, m).
     """
@@ -66,9 +66,9 @@ class FreeVibration:
         return replace(self.history, nodes=nodes, values=self.history.values[:, columns], name=name)
 
     def whole_of(self, one: TimeHistory) -> TimeHistory | None:
-        """The nodes of a history that were never lost for long, gaps filled; None: there are none.
+        """The history of nodes never lost for long, with gaps filled; None if there are none.
 
-        The model is not moved in time to fit it: spectra do not depend on that.
+        The model is not shifted in time to fit it, as spectra do not depend on that.
         """
         columns = [self.nodes.index(node) for node in numbers_of(one)]
         kept = [k for k in columns if np.isfinite(self.whole[:, k]).all()]
@@ -84,22 +84,21 @@ def numbers_of(history: TimeHistory) -> list[int]:
 
 
 def _release_of(x: NDArray[np.float64], step: float, name: str) -> tuple[int, int]:
-    """Find the release: where the fastest motion of a record begins.
+    """Find the release, where the fastest motion of a record begins.
 
     Parameters
     ----------
     x : ndarray, shape (n,)
-        Record of a node, NaN where it was lost.
+        Record of a node, NaN while lost.
     step : float
         Sampling interval (s).
     name : str
-        Of the record, for messages.
+        Name of the record, for messages.
 
     Returns
     -------
     first, released : int
-        Samples between which the node is held: since when it has been still, and the last one
-        before it is let go.
+        Samples between which the node is held still, up to the last one before the release.
 
     Raises
     ------
@@ -128,7 +127,7 @@ def _release_of(x: NDArray[np.float64], step: float, name: str) -> tuple[int, in
 
 
 def _filled(x: NDArray[np.float64], start: int, stop: int, gap: int) -> NDArray[np.float64]:
-    """Part of a record with short gaps filled; NaN where it was lost for longer."""
+    """Part of a record with short gaps filled; NaN throughout if it was lost for longer."""
     known = np.flatnonzero(np.isfinite(x))
     before, after = known[known <= start], known[known >= stop - 1]
     if not before.size or not after.size:
@@ -146,8 +145,7 @@ def prepare(measured: TimeHistory) -> FreeVibration:
     Parameters
     ----------
     measured : TimeHistory
-        Of all nodes that were tracked, along the axis; `WATCHED`, by which the release is found,
-        among them.
+        Histories of all tracked nodes along the axis, including `WATCHED`, which marks the release.
 
     Raises
     ------
@@ -201,10 +199,10 @@ def prepare(measured: TimeHistory) -> FreeVibration:
 
 
 def _even(time: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Evenly spaced times, provided that they differ from them only by the rounding of tables."""
+    """Evenly spaced times, if the given ones differ from them only by rounding."""
     even = np.linspace(time[0], time[-1], len(time))
     if np.abs(time - even).max() > ROUNDED * (even[1] - even[0]):
-        signals.sampling_interval(time)  # says what is wrong
+        signals.sampling_interval(time)  # reports the error
     return even
 
 

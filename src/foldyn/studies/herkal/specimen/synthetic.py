@@ -1,7 +1,7 @@
-"""A synthetic test of the paper specimen, whose raw data are not public.
+"""Synthetic data of the paper's specimen, whose raw data are not public.
 
-The sheet that is photographed and filmed is not the model that is fitted to it: it is softer, its
-mass is distributed otherwise, and its creases relax, so that after the release it drifts back.
+The photographed and filmed sheet differs from the fitted model: it is softer, its mass is
+distributed differently, and its creases relax, so that it drifts back after the release.
 
 `python -m foldyn.studies.herkal.specimen.synthetic FOLDER` writes photographs and the film.
 """
@@ -25,7 +25,7 @@ from foldyn.studies import find_case
 from foldyn.studies.herkal import calibration
 
 SOFTER = {"sheet.youngs_modulus": 0.97 * 1.219e9}  # Pa: 3 % softer than the model
-RATIO, TIME = 0.05, 0.5  # of a creases' branch: stiffness over the lasting one; relaxation time (s)
+RATIO, TIME = 0.05, 0.5  # of the creases' branch: relative stiffness, relaxation time (s)
 RELAXING: Mapping[str, Any] = {
     "model.fold_law": {
         "kind": "prony",
@@ -45,20 +45,20 @@ TRACKED = "film.mkv"
 
 @dataclass(frozen=True)
 class Shot:
-    """How the specimen is photographed and filmed.
+    """Settings of the camera.
 
     Attributes
     ----------
     size : tuple of int
         Width and height (pixels); the paper's by default.
     metres_per_pixel : float
-        In the plane through the front of the specimen.
+        Scale in the plane through the front of the specimen.
     distance : float
-        Of the camera from that plane (m).
+        Distance of the camera from that plane (m).
     rate : float
         Frames per second.
     held, free : float
-        Time before and after the release (s).
+        Time filmed before and after the release (s).
     seed : int
     """
 
@@ -71,7 +71,7 @@ class Shot:
     seed: int = 7
 
     def camera(self, rest: NDArray[np.float64]) -> experiment.Camera:
-        """Camera in front of the specimen's middle, slightly turned, with a distorting lens."""
+        """Camera in front of the specimen's middle, slightly rotated, with lens distortion."""
         middle = 0.5 * (rest.min(axis=0) + rest.max(axis=0))
         middle[2] = rest[:, 2].max()
         return experiment.Camera.looking_at(
@@ -85,7 +85,7 @@ class Shot:
 
 
 PAPERS, COARSE = Shot(), Shot(size=(1010, 1070), metres_per_pixel=1.2e-4, free=0.6)
-EXPOSURE = 1 / 2000  # s, of a frame
+EXPOSURE = 1 / 2000  # s, exposure of a frame
 
 
 def photograph(folder: Path, shot: Shot) -> list[Path]:
@@ -111,9 +111,9 @@ def photograph(folder: Path, shot: Shot) -> list[Path]:
 def film(
     folder: Path, shot: Shot, changes: Mapping[str, Any] = OTHERWISE
 ) -> experiment.SyntheticFilm:
-    """Film of a sheet, held and released; its case file is written to the folder.
+    """Film a sheet that is held and released; write its case file to the folder.
 
-    changes : what it has other than the model, by key.
+    changes : its differences from the model, by key.
     """
     moved = released(folder, shot, changes)
     return experiment.film_of(
@@ -129,7 +129,7 @@ def released(folder: Path, shot: Shot, changes: Mapping[str, Any] = OTHERWISE) -
 
 
 def held(motion: xarray.Dataset, duration: float) -> xarray.Dataset:
-    """A motion before whose start the sheet is held for some time (s)."""
+    """Motion preceded by some time (s) in which the sheet is held."""
     u, time = motion["displacement"].values, motion["time"].values
     step = time[1] - time[0]
     count = round(duration / step)

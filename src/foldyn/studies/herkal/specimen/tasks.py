@@ -1,4 +1,4 @@
-"""The computations of the specimen's study, each kept, so that it resumes where it was stopped."""
+"""Computations of the specimen's study, each kept, so that an interrupted study resumes."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Part:
     part : str
         One of `PARTS`.
     shot : Shot
-        How the synthetic film is taken; photographs are always the paper's.
+        Settings of the synthetic film; photographs always have the paper's.
     data : Data
     """
 
@@ -63,11 +63,11 @@ class Part:
 
     @property
     def note(self) -> str:
-        """What is said on every figure."""
+        """Note on every figure."""
         return NOTE if self.data.synthetic else ""
 
     def settings(self) -> dict[str, Any]:
-        """All that its result depends on."""
+        """Everything that its result depends on."""
         shot = asdict(self.shot) if self.data.synthetic else {}
         data = self.data.digests()
         if self.part == "film":
@@ -91,7 +91,7 @@ class Part:
         Raises
         ------
         ComputationError
-            What it needs has not been computed.
+            A part that it needs has not been computed.
         """
         inside = folder / FOLDER
         inside.mkdir(parents=True, exist_ok=True)
@@ -121,12 +121,12 @@ def _write_stamp(file: Path, stamp: str, files: dict[str, str]) -> None:
     write_text(file, f"{stamp}\n{json.dumps(files)}\n")
 
 
-# what a part has written, with digests; damage is told of by name in `there`
+# a part's files with digests; `there` reports damage by file name
 STAMPS: Store[dict[str, str]] = Store(_read, _write_stamp, warns=False)
 
 
 def parts(shot: Shot, data: Data) -> tuple[list[Part], list[Part]]:
-    """What needs nothing else, and what comes after it, in order."""
+    """Independent parts, and the parts that depend on them, in order."""
     first = ["photographs"] if data.synthetic else []
     first += ["film"] if data.synthetic or data.film is not None else []
     return [Part(p, shot, data) for p in first], [Part(p, shot, data) for p in ("fit", "response")]
@@ -200,7 +200,7 @@ def _fit(part: Part, folder: Path) -> None:
     static = _static(part, folder)
     if static:
         folds = calibration.fit_folds(static, **kept)
-        if len(static) > 1:  # the displacements are of states of the model: again, with its folds
+        if len(static) > 1:  # displacements assumed other folds: redo them
             static = _static(part, folder, calibration.changes_of(folds))
             folds = calibration.fit_folds(static, **kept)
         changes = calibration.changes_of(folds)
@@ -258,7 +258,7 @@ PARTS: Mapping[str, tuple[Callable[[Part, Path], None], tuple[str, ...]]] = {
 
 
 def read_found(folder: Path) -> dict[str, Any]:
-    """What the fits have found."""
+    """Read the results of the fits."""
     file = folder / FOUND
     try:
         found = from_json(read_text(file, "what a fit has found", 64, "compute it again"))
@@ -269,7 +269,7 @@ def read_found(folder: Path) -> dict[str, Any]:
 
 
 def _digest(file: Path) -> str:
-    """Digest of a file; "" where there is none that can be read."""
+    """Digest of a file; "" if it cannot be read."""
     try:
         return file_digest(file) if file.is_file() else ""
     except OSError:
