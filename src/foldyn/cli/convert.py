@@ -21,7 +21,7 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 PATTERNS_ONLY = ("check", "unit", "tolerance", "flat_foldable")
 RESULTS_ONLY = ("format", "every", "frames", "seconds", "rows", "fields", "nodes")
 DECKS_ONLY = ("divisions", "modes", "element")
-"""Options that belong to one kind of files."""
+"""Options that apply to one kind of files only."""
 
 
 def add_convert(commands: Any) -> None:

@@ -235,8 +235,8 @@ STAGES: Sequence[Uses] = (
         ],
     },
 )
-"""Computations by what they compile, in stages: those of one need little of each other's kernels,
-and all of them those of the stages before."""
+"""Computations by what they compile, in stages. Within a stage they share few kernels; each stage
+needs kernels of the stages before."""
 
 
 @contextmanager

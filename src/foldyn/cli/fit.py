@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 WRITTEN = ("fit.json", "fit.nc", "fitted.toml")
 KEPT = "evaluations"
 NOTED = 0.05
-"""Part of an interval that stands for the discretization, from which on it is told."""
+"""Share of an interval due to the discretization, from which on it is reported."""
 DRAWN = [
     "report.html",
     *(f"{n}.{form}" for n in ("correlation", "data-[0-9]", "data-[0-9][0-9]") for form in FIGURES),

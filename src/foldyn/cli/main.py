@@ -39,9 +39,9 @@ OTHERS = {
     "convert": convert, "design": run_design, "fit": run_fit, "fold": run_fold, "study": study,
     "sweep": run_sweep, "track": track, "view": run_view, "warm-up": run_warm_up,
 }  # fmt: skip
-"""Commands that do not take just a case file."""
+"""Commands that take something other than a case file."""
 SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
-"""Environment of OpenCV: we report a broken film ourselves, and its decoders keep quiet."""
+"""Environment of OpenCV, which silences its decoders: we report broken films ourselves."""
 
 
 class _Parser(argparse.ArgumentParser):

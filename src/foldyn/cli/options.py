@@ -60,7 +60,7 @@ def frame_of(given: str | None) -> int | str | None:
 
 
 BOTH = "--figures: draws figures; leave out --no-figures"
-"""Message where both are given."""
+"""Message if both options are given."""
 
 
 def add_figures(command: argparse.ArgumentParser) -> None:

@@ -33,13 +33,13 @@ PARTS: Mapping[str, tuple[str, ...]] = {
     "bars_and_hinges": ("nodes", "bars", "folds", "bends"),
     "shell": ("nodes", "triangles", "folds"),
 }
-"""What is counted in the structure of each model."""
+"""What to count in the structure of each model."""
 FILES = ["structure", "laws", *(name for kind in ANALYSES.values() for name in kind.files)]
 DRAWN = [
     "report.html", *(name for name in FILES if "." in name),
     *(f"{name}.{form}" for name in FILES if "." not in name for form in FIGURES),
 ]  # fmt: skip
-"""Files of all pages."""
+"""Patterns of the files of all pages."""
 
 
 def run(given: Namespace) -> Path:

@@ -88,4 +88,4 @@ def _forget_interrupt() -> None:
 
 
 ENDINGS = Endings()
-"""Those of this process."""
+"""The signals of this process."""

@@ -29,9 +29,9 @@ DRAWN = [
     *(f"{name}-*.{form}" for name in ("map", "lines", "effects", "indices") for form in FIGURES),
 ]
 OFTEN = 30.0
-"""Seconds between lines that tell how far a sweep is, where nobody watches a bar."""
+"""Seconds between lines of progress when output is not a terminal."""
 MOST_NAMED = 5
-"""Reasons for missing values that are printed."""
+"""Most reasons for missing values that are printed."""
 
 
 def add_sweep(commands: Any) -> None:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from foldyn.experiment.tracking.tracks_page import Footage
 
 QUALITY = 75
-"""Of the pictures in a page, in percent."""
+"""JPEG quality of pictures in a page, in percent."""
 _KEPT = "\nfoldyn: kept what was computed: "
 
 

@@ -29,7 +29,7 @@ from foldyn.sweeps.measure import Asked
 from foldyn.values import choice, show
 
 COMPUTING = ("analyses", "results", "sweeps", "gradients", "designs")
-"""Folders that evaluations depend on, besides the solvers."""
+"""Folders that evaluations depend on, in addition to the solvers."""
 VALUES, JACOBIAN = "value", "jacobian"
 Point = tuple[float, ...]
 Source = Callable[..., Case] | str | os.PathLike[str]

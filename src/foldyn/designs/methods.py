@@ -199,7 +199,7 @@ METHODS: Mapping[str, Method] = {
     "mma": Method(_mma, True, "method of moving asymptotes (NLopt)", "nlopt"),
     "cma": Method(_cma, False, "CMA-ES, without derivatives", "cma"),
 }
-"""By name."""
+"""Methods by name."""
 
 
 def searched(method: str, search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:

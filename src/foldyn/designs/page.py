@@ -26,9 +26,9 @@ from foldyn.viewer import Stage, stage
 from foldyn.writing import whole
 
 MOST_ROWS = 200
-"""Entries of parameters that a table lists."""
+"""Most entries of parameters in a table."""
 SHOWN = ("modes", "dynamics", "statics")
-"""Kinds whose results a page shows in motion."""
+"""Kinds of analysis whose results a page shows in motion."""
 
 
 def write_design(

@@ -24,7 +24,7 @@ from foldyn.values import show, suggest
 from foldyn.writing import plain, write_json, write_text
 
 PARAMETER, GRADIENT = "parameter_", "gradient_"
-"""What stands before the names of parameters in datasets."""
+"""Prefixes of parameter names in datasets."""
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,9 @@ from foldyn.sweeps.pool import Here
 from foldyn.values import MOST, choice, number, whole
 
 FLAT = 1e-12
-"""Change of the objective over its size, across the bounds, that counts as none."""
+"""Relative change of the objective across the bounds that counts as none."""
 MOST_DRAWN = 20
-"""Designs that are drawn for a start until one can be computed."""
+"""Most designs drawn for a start before one can be computed."""
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,13 @@ from foldyn.errors import FoldynError
 from foldyn.sweeps.evaluations import Evaluations
 
 BAD = 1e6
-"""Objective of a design that cannot be computed, over the size of the objective."""
+"""Objective of a design that cannot be computed, relative to the objective's size."""
 MOST_FAILED = 20, 200
-"""Designs in a row that cannot be computed, after which a search is given up: of a method with
-gradients, and of one that draws designs."""
+"""Failed designs in a row after which a search is given up: for methods with gradients, and for
+stochastic ones."""
 NEAR, STILL = 1e-7, 20
-"""Of the width of the bounds: designs that are one; how many in a row end a search by gradients."""
+"""Relative to the width of the bounds: distance of equal designs; their number in a row that ends a
+search by gradients."""
 
 
 class Ended(Exception):  # noqa: N818

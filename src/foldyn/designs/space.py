@@ -13,7 +13,7 @@ from foldyn.errors import InputError, within
 from foldyn.values import numbers, show
 
 Values = Mapping[str, float | NDArray]
-"""Of parameters by name."""
+"""Values of parameters by name."""
 
 
 @dataclass(frozen=True, eq=False)

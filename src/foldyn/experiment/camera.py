@@ -25,7 +25,7 @@ DIRECTIONS = {
     for k, axis in enumerate("xyz")
     for sign in ("", "+", "-")
 }
-"""Unit vectors by the names that a user types: "x", "-x", "+z"."""
+"""Unit vectors by name: "x", "-x", "+z"."""
 
 
 def opencv() -> Any:

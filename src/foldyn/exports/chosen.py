@@ -27,7 +27,7 @@ ALONG = {
 }
 """The dimension along which a kind of results runs."""
 TABLES = "tables_"
-"""Beginning of the names of arrays that the text of a case refers to."""
+"""Prefixes of array names that the text of a case refers to."""
 
 
 def quantities_of(result: xr.Dataset) -> list[str]:

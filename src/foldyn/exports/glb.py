@@ -26,11 +26,11 @@ from foldyn.viewer.sheet import KINDS, edge_pieces
 from foldyn.writing import write_bytes
 
 MOST_KEYS = 120
-"""Keys of a motion or a path, unless another number is asked for."""
+"""Default largest number of keys of a motion or a path."""
 PATH_SECONDS, SWING_SECONDS = 8.0, 2.0
-"""How long a path takes, and a mode for one swing, unless told otherwise."""
+"""Default length (s) of a path, and of one period of a mode."""
 SHORTEST, LONGEST = 1e-3, 1e6
-"""Bounds of what may be asked for, s."""
+"""Bounds of the length of an animation, s."""
 SWING_KEYS = 32
 UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
 """Quaternion of the rotation that turns z up into y up."""

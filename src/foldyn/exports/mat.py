@@ -24,9 +24,9 @@ from foldyn.results.frames import chosen_samples
 from foldyn.writing import whole
 
 MOST = 2**31 - 1
-"""Bytes of a variable of version 5."""
+"""Most bytes of a variable in version 5."""
 LONGEST = 63
-"""Letters of a name in MATLAB."""
+"""Most letters of a name in MATLAB."""
 KEYWORDS = frozenset({
     "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function",
     "global", "if", "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",

@@ -64,9 +64,9 @@ class Export:
 
 
 SHAPES = ("trajectory", "path", "modes", "folding")
-"""Kinds of results that go through shapes."""
+"""Kinds of results with shapes."""
 OF_SHEETS = tuple(kind for kind in ALONG if kind != "folding")
-"""Kinds of results that have a case; a folding is of a pattern alone."""
+"""Kinds of results with a case; a folding only has a pattern."""
 
 _EXPORTS = (
     Export("glb", (".glb",), SHAPES, glb.write, "an animation for Blender and browsers"),

@@ -48,7 +48,7 @@ FUNCTIONS = {
 }
 ABSCISSAE = {"trajectory": ("time", 17, "Time", "s"), "frf": ("frequency", 18, "Frequency", "Hz")}
 USUAL = ("displacement", "receptance", "transmissibility")
-"""Variables that are written if none are named."""
+"""Variables written by default."""
 
 
 def write(

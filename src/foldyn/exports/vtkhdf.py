@@ -31,15 +31,15 @@ from foldyn.viewer.sheet import KINDS, edge_pieces
 from foldyn.writing import whole
 
 VERSION = (2, 0)
-"""Of the format, the first with samples in time."""
+"""Version of the format, the first with samples in time."""
 CELLS = ("Vertices", "Lines", "Polygons", "Strips")
 """Kinds of cells, in the order of their fields."""
 BAR, PANEL = len(KINDS), len(KINDS) + 1
-"""Kinds of cells besides edges, which have the number of their letter in `KINDS`."""
+"""Kinds of cells other than edges, whose kind is the index of their letter in `KINDS`."""
 NAMES = {"bar_strain": "strain", "fold_moment": "moment"}
-"""Fields of cells that have another name in the file."""
+"""Names of cell fields that differ in the file."""
 ROWS = 1 << 14
-"""Rows of a piece of an array that is compressed, at least those of one sample."""
+"""Rows of a compressed chunk of an array, at least one sample."""
 
 
 class Mesh(NamedTuple):

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 CHORD = 1e-3
-"""Distance of a curve from its chords, over the size of the drawing."""
+"""Distance of a curve from its chords, relative to the size of the drawing."""
 MOST = 1000
-"""Chords of one piece of a curve."""
+"""Most chords of one piece of a curve."""
 
 
 def bezier(control: ArrayLike, tolerance: float) -> NDArray[np.float64]:

@@ -11,11 +11,11 @@ from foldyn.patterns.flat_foldability import FlatFoldability
 from foldyn.patterns.topology import Edge
 
 ROUNDING = np.radians(0.1)
-"""Departure of angles (rad) that the digits of a file leave."""
+"""Error of angles (rad) due to the digits of a file."""
 MOST_ROWS = 30
 MOST_MOVED = 10
 LISTED = 1e-9
-"""Least move of a vertex (m) that is told."""
+"""Least move of a vertex (m) that is reported."""
 
 
 @dataclass(frozen=True, eq=False)

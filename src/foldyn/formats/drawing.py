@@ -25,7 +25,7 @@ METERS = {
     "pt": 0.0254 / 72,
     "px": 0.0254 / 96,
 }
-"""Units of length that pattern files name (m)."""
+"""Units of length in pattern files (m)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,7 +44,7 @@ _MOST_INSERTED = 10_000
 _UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 12: "nm", 13: "um", 21: "ft"}
 """Units by their number in $INSUNITS (DXF reference, header section)."""
 _COLOR_NUMBERS = {"B": 7, "M": 1, "V": 5, "F": 2, "U": 6, "C": 3}
-"""Of AutoCAD, for each layer that is written: black or white, red, blue, yellow, magenta, green."""
+"""AutoCAD color number of each written layer: black or white, red, blue, yellow, magenta, green."""
 
 
 def read(text: str) -> Drawing:

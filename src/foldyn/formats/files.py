@@ -26,9 +26,9 @@ from foldyn.values import choice, flag, length, listed, number, of_kind
 from foldyn.writing import write_bytes
 
 MOST = 32
-"""Size of a pattern file (MiB)."""
+"""Largest pattern file (MiB)."""
 SAME = 1e-4
-"""Difference of fold angles (rad) that are one, with the digits of a file."""
+"""Difference of fold angles (rad) that count as equal, given the digits of a file."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
 FAMILIES = "foldyn:families"
 """Key of the families of creases, as lists of vertex pairs by name."""
 WELDS = "foldyn:welds"
-"""Key of the flat edges that are no hinges, as vertex pairs; the other flat ones are."""
+"""Key of flat edges that are welds, as vertex pairs; other flat edges are hinges."""
 _OLD = {"edges_foldAngles": "edges_foldAngle", "edges_lengths": "edges_length"}  # spec 1.0
 _COMMA = re.compile(r'("(?:[^"\\]|\\.)*+")|,(?=\s*+[\]}])')
 _OF_ELEMENTS = re.compile(r"(?:vertices|edges|faces)_")
@@ -265,7 +265,7 @@ def _edges(
     give = "degrees from -180 (a closed mountain) to 180 (a closed valley), or null"
     _check("edges_foldAngle", given, _is_angle, give)
     angles = np.array([np.nan if angle is None else angle for angle in given], np.float64)
-    if "edges_assignment" not in fields:  # of faces: they get the letter of the dihedral
+    if "edges_assignment" not in fields:  # edges of faces get the letter of the dihedral
         letters = ["V" if a > 0 else "M" if a < 0 else "" if with_faces else "U" for a in angles]
     told = [e for e, letter in enumerate(letters) if letter]
     ends = np.array(pairs, dtype=np.int64).reshape(-1, 2)

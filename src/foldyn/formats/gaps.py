@@ -12,7 +12,7 @@ from foldyn.formats.lines import Lines, single, without_points
 from foldyn.formats.planar import joined, renumbered, segments, split
 
 GAP = 5e-3
-"""Distance that an open end may miss its target by, over the drawing's size."""
+"""Largest distance by which an open end may miss its target, relative to the drawing's size."""
 
 
 def closed(lines: Lines, tolerance: float) -> tuple[Lines, int, float]:

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 
 MOST_LINES = 50_000
-"""Lines of a drawing, and pieces that they may be split into."""
+"""Most lines of a drawing, and most pieces after splitting."""
 MOST_PAIRS = 4_000_000
-"""Pairs of lines that are near each other."""
+"""Most pairs of lines that are near each other."""
 _RANKS = {letter: rank for rank, letter in enumerate("CMVUFJB")}
 
 

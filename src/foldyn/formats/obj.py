@@ -29,7 +29,7 @@ FREEFORM = ("B", "F", "V", "M", "U", "C")
 ORIPA = ("U", "B", "M", "V", "F")
 GROUPS = {"mountain": "M", "valley": "V", "boundary": "B", "border": "B", "facet": "F",
           "flat": "F", "cut": "C"}  # fmt: skip
-"""Letters of lines by the beginning of the name of their group."""
+"""Letters of lines by the first letters of their group's name."""
 _UNIT = re.compile(r"#.*\bunits?\b\s*[:=]?\s*([a-z]+)", re.IGNORECASE)
 _COMMENT = re.compile(r"(?<=[^\s#])\s+#.*")  # not one that is a line of its own, which may be #e
 _NAMES = {"meters": "m", "millimeters": "mm", "centimeters": "cm", "inches": "in", "feet": "ft"}

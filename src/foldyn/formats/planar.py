@@ -17,7 +17,7 @@ from foldyn.errors import InputError
 from foldyn.formats.lines import MOST_LINES, MOST_PAIRS, Lines, single, too_many, without_points
 
 FINEST, COARSEST = 1e-6, 5e-4
-"""Tolerance within which two points are one, over the drawing's size (its diagonal)."""
+"""Tolerance within which two points are merged, relative to the drawing's size (its diagonal)."""
 _SHARE = 0.1  # of the lengths: a tenth of the shortest twentieth
 _ROUNDS = 12
 _SOME = 500

@@ -24,9 +24,9 @@ PROPERTIES = (
 _MOVING = ("translate", "rotate", "scale", "zoom")
 _UNMOVED = ("none", "auto", "normal", "1", "100%")
 _SHAPING = ("d", "x", "y", "width", "height", "cx", "cy", "r", "rx", "ry")
-"""What CSS may say of elements, but is read from attributes alone."""
+"""CSS properties that are only read as attributes."""
 ASSIGNMENT, ANGLE = "data-assignment", "data-foldangle"
-"""Attributes by which programs for FOLD files say what a line is."""
+"""Attributes in which programs for FOLD files store the kind of a line."""
 _SELECTOR = re.compile(r"(\*|[A-Za-z][\w-]*)?((?:[.#][\w-]+)*)")
 _HEX = re.compile(r"#(?:[0-9a-f]{3,4}|[0-9a-f]{6}|[0-9a-f]{8})")
 _LONGEST = 200  # letters of a value

@@ -27,7 +27,7 @@ NAMES = {
     "C": "cut",
 }
 FAINTEST = 1e-6
-"""Opacity of a crease to be folded by nothing: a line without any is not drawn."""
+"""Opacity of a crease with fold angle 0, as a line without opacity is invisible."""
 _DARKER = {"F": "#b8a000", "C": "#00a000"}  # of words, which must be read on white
 
 

@@ -19,9 +19,9 @@ from foldyn.formats.panels import Panels
 from foldyn.patterns.topology import around, edge_of
 
 ON_EDGE = 1e-5
-"""Distance of a vertex from an edge that it lies in, over the size: digits of a file."""
+"""Distance of a vertex from an edge that it lies on, relative to the size: digits of a file."""
 UPON = 1e-2
-"""Angle (rad) between panels below which they lie upon each other: digits of a file too."""
+"""Angle (rad) below which panels coincide: digits of a file too."""
 
 
 def with_corners_on_edges(

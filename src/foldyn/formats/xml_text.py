@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
 DEEPEST = 100
-"""Levels of nested elements."""
+"""Most levels of nested elements."""
 _FIRST, _MOST, _LARGEST = 20_000, 50, 1 << 26  # letters, entities, letters
 _SUBSET = re.compile(r"<!DOCTYPE[^\[>]{0,500}\[([^\]]*)\]\s{0,9}>")
 _ENTITY = re.compile(

@@ -22,14 +22,14 @@ ANGLES: Mapping[str, tuple[float, float]] = {
     "dihedral": (1.0, 179.0), "panel_angle": (1.0, 89.0), "second_angle": (1.0, 89.0),
     "twist": (0.0, 120.0), "arc": (1.0, 360.0),
 }  # fmt: skip
-"""Arguments of patterns in degrees, and how far sliders take them; other ones are lengths (m)."""
+"""Arguments of patterns in degrees, with the ranges of their sliders; others are lengths (m)."""
 SPAN: Mapping[str, float] = {"pattern": 4.0, "sheet": 10.0, "damping": 10.0}
 """Factor by which a positive number can be changed, either way."""
 UNDAMPED: Mapping[str, float] = {"alpha": 10.0, "beta": 0.01}
-"""Where sliders of damping end that begin at 0."""
+"""Upper ends of damping sliders that begin at 0."""
 MOST_COUNT, MOST_PARTS = 12, 1000
-"""Where sliders of small whole numbers end, and how many cells, sides or the like a pattern has
-at most in all: it is to be computed anew for each picture."""
+"""Most of a small whole number on a slider, and most cells, sides or the like of a pattern in all,
+as it is recomputed for each picture."""
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ TITLES: Mapping[str, str] = {
     "folding": "Folding", "bands": "Bands", "response_curve": "Response curve",
     "backbone": "Backbone", "periodic_motion": "Periodic motion",
 }  # fmt: skip
-"""What results are called, by their kind."""
+"""Titles of results by kind."""
 MOVING = (
     "a motion, a path, modes, a frequency response, bands, a folding, a response curve, a backbone "
     "or a periodic motion"

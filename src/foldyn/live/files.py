@@ -25,7 +25,7 @@ from foldyn.viewer import Stage, rest_stage, scripts
 
 CASE, RESULT = ".toml", ".nc"
 MOST_FOLDED = 300
-"""Panels of a pattern that is folded when it is looked at; larger ones are shown as they are."""
+"""Most panels of a pattern that is folded for viewing; larger ones are shown at rest."""
 
 
 def served(paths: Sequence[Path], port: int = 0) -> tuple[Server, str]:

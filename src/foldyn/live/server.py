@@ -19,11 +19,11 @@ from typing import Any
 
 HOST = "127.0.0.1"
 MOST_BYTES = 100_000
-"""Size of a request's body: a table of numbers needs a hundredth of it."""
+"""Largest body of a request; a table of numbers needs a hundredth of it."""
 MOST_CONNECTIONS = 32
-"""Connections at a time, each with its thread: a browser has six for a page."""
+"""Most simultaneous connections, each with its thread; a browser uses six for a page."""
 PATIENCE = 30.0
-"""Seconds after which a connection that says nothing is closed."""
+"""Seconds after which a silent connection is closed."""
 KEY_HEADER = "X-Foldyn-Key"
 HEADERS: Mapping[str, str] = {
     "Cache-Control": "no-store",

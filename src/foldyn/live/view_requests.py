@@ -26,16 +26,18 @@ KINDS: Mapping[str, str] = {
     "bands": "Bands",
     "response": "Response curve",
 }
-"""What can be computed, by the kind of analysis, as the page calls it."""
+"""Analyses that can be computed, with their names on the page."""
 STEPS, PERIODS, FREQUENCIES, COUNT = 10, 10.0, 200, 6
 """Of analyses that the file does not ask for: steps of a static curve, periods of the first mode
 that a motion lasts, frequencies of a response, modes."""
 SAMPLES, STEPS_A_SAMPLE = 250, 4
 """Samples of a motion, and steps between them where they are ours: a hundred in a period."""
 MOST_WORK = 1e7
-"""Steps times dofs of a motion with fixed steps: a second or some. Longer ones are cut."""
+"""Most steps times dofs of a motion with fixed steps, about a second of computing; longer motions
+are cut."""
 MOST_FREE, MODES = 60, 6
-"""Free dofs of a response curve: some 0.1 s a point. Larger sheets move in the span of modes."""
+"""Most free dofs of a response curve, about 0.1 s per point, and the number of modes that larger
+sheets are reduced to."""
 
 Document = dict[str, Any]
 

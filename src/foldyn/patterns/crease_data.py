@@ -15,7 +15,7 @@ from foldyn.values import listed, show, single, suggest
 ASSIGNED: Mapping[str, str] = {
     "all": "MVU", "mountain": "M", "valley": "V", "flat": "F", "unassigned": "U",
 }  # fmt: skip
-"""Words that stand for creases of every pattern, and the letters that each means."""
+"""Words for creases of every pattern, and the letters that each selects."""
 
 
 class Named(NamedTuple):

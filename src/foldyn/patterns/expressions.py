@@ -11,9 +11,9 @@ from foldyn.values import shortened
 
 _UNDERSCORED = re.compile(r"(?<![\w.])\d[\d.]*_")
 LONGEST = 1000
-"""Characters of an expression."""
+"""Most characters of an expression."""
 DEEPEST = 50
-"""Nested operations."""
+"""Most nested operations."""
 
 
 def parse(text: str) -> ast.expr:

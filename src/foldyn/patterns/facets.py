@@ -21,7 +21,7 @@ from foldyn.patterns.topology import Edge, around, edge_lookup, vertex_pair
 from foldyn.values import flag, listed
 
 WELD, LINE, HINGE = FACETS = ("weld", "line", "hinge")
-"""What facets become: nothing, where panels can be joined, or welds; welds; creases."""
+"""Fates of facets: removed where panels can be joined, or else welds; welds; creases."""
 COPLANAR = 1e-3  # rad: panels within this angle are coplanar, as coordinates in a file allow
 STRAIGHT = np.radians(15.0)  # smaller turns do not count as corners
 

@@ -144,5 +144,5 @@ def _alternating(angles: NDArray[np.float64], folds: NDArray[np.bool_]) -> float
         return 0.0
     if count % 2:
         return np.nan
-    sector = (np.cumsum(folds) - 1) % count  # before the first fold: the last sector
+    sector = (np.cumsum(folds) - 1) % count  # sector 0 starts at the first fold
     return abs(float(np.sum(np.where(sector % 2 == 0, angles, -angles))))

@@ -25,13 +25,13 @@ from foldyn.patterns.pattern import Pattern, pattern_of
 from foldyn.patterns.topology import Edge, around, edge_of
 
 NEARLY = np.radians(2.0)
-"""Kawasaki's sum (rad) up to which a vertex counts as one that is to fold flat."""
+"""Kawasaki's sum (rad) up to which a vertex is meant to fold flat."""
 NEARLY_PLANE = 0.1
-"""The same of the sum of logarithms about a panel that is to stay plane."""
+"""The same for the sum of logarithms about a panel that is meant to stay planar."""
 EXACT = 1e-6
-"""Kawasaki's sum (rad) below which there is nothing to mend, and that mending may leave."""
+"""Kawasaki's sum (rad) that counts as zero, before and after a repair."""
 FARTHEST = 0.01
-"""Most that a vertex is moved, over its shortest edge."""
+"""Largest move of a vertex, relative to its shortest edge."""
 _STEPS = 20
 _CONVERGED = 1e-12  # rad
 _LEAST = 1e-13  # relative to the diagonal: smaller ones are redundant conditions

@@ -14,11 +14,11 @@ from foldyn.patterns.palette import CREASES, PAPER
 WIDTH, HEIGHT, MARGIN = 520.0, 300.0, 8.0
 """Pixels."""
 VIEW = (28.0, -60.0)
-"""Elevation above the xy plane and azimuth around z (degrees) from which sheets are looked at."""
+"""Elevation above the xy plane and azimuth around z (degrees) of the view."""
 MOST_PANELS = 600
-"""Beyond, the picture would be too large for a notebook; there is none."""
+"""Most panels of a picture in a notebook; larger patterns have none."""
 MOST_WORDS = 200
-"""Letters below it."""
+"""Most letters of the caption."""
 FRONT, BACK = bytes.fromhex(PAPER[1:]), (217, 195, 154)
 LINES = {
     "M": (CREASES["M"], "1.6", ""), "V": (CREASES["V"], "1.6", "5 3"),

@@ -16,7 +16,7 @@ from foldyn.patterns.topology import Faces, around, edge_lookup, edge_of
 
 PARALLEL = 1e-3  # rad: periods within this angle count as one direction
 MOST_EDGES = 600
-"""Boundary edges among which periods are looked for."""
+"""Most boundary edges in a search for periods."""
 
 
 class Glued(NamedTuple):

@@ -21,7 +21,7 @@ from foldyn.values import number, numbers, show, vector, whole
 FLAT = 1e-6  # rad from pi: a crease between copies that gets no letter from its dihedral
 TURNED = {"M": "V", "V": "M"}
 FACE_ORDERS = "faceOrders"
-"""Key of a pattern's custom data that holds the order of its layers, as FOLD has it."""
+"""Key of a pattern's custom data with the order of its layers, as in FOLD."""
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 

@@ -18,7 +18,7 @@ from foldyn.values import choice
 
 AXES = ("x", "y", "z")
 CRITICAL = {"limit": "limit point", "bifurcation": "bifurcation"}
-"""Kinds of points that figures mark, and their names."""
+"""Kinds of points marked in figures, and their names."""
 
 
 def check_nodes_of(

@@ -22,7 +22,7 @@ _WAYS: dict[str, dict[str, Any]] = {
     "up": {"color": style.BLUE, "linestyle": style.DASHES[0]},
     "down": {"color": style.VERMILLION, "linestyle": style.DASHES[1]},
 }
-"""Looks of both sweeps."""
+"""Looks of both sweep directions."""
 _MOST = 8  # attractors named in the legend
 _PALE = 0.55  # share of white in the color of a basin
 

@@ -15,7 +15,7 @@ from foldyn.plots.charts import Chart, Curve
 
 TIME = "time (s)"
 FEW = 60
-"""Points of a line that have marks, where no other curve has dots; more dots are smaller."""
+"""Most points of a line with markers, if no other curve has dots; more dots are drawn smaller."""
 
 
 def figure_of(

@@ -14,7 +14,7 @@ from foldyn.errors import InputError
 DIGITS = 5
 """Significant digits of the numbers in a page."""
 MOST_POINTS = 2000
-"""Points of a curve in a page at most; of longer ones every k-th."""
+"""Most points of a curve in a page; of more, every k-th."""
 
 
 @dataclass(frozen=True)

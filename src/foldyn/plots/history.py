@@ -18,7 +18,7 @@ from foldyn.signals import sampling_interval, spectrum
 from foldyn.values import number
 
 VISIBLE = 0.02
-"""Part of a curve's height that can be seen."""
+"""Share of a curve's height that is visible."""
 ROUND = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 

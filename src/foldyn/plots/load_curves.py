@@ -17,10 +17,10 @@ from foldyn.plots.following import Share, moments, on_panels
 
 K = TypeVar("K")
 POINTS = 1001
-"""Of a curve."""
+"""Points of a curve."""
 _LISTED = 3
 _MOST_CURVES = 4
-"""Curves of one history at most; imposed displacements and rest angles may differ at each place."""
+"""Most curves of one history; imposed displacements and rest angles may differ everywhere."""
 
 
 def load_charts(case: Case, start: float, duration: float) -> list[Chart]:

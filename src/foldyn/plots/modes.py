@@ -23,7 +23,7 @@ from foldyn.plots.sheet import rest_keys, side_by_side
 from foldyn.structures import Structure
 from foldyn.values import length, numbers
 
-"""Modes that one figure shows at most."""
+"""Most modes in one figure."""
 _AMPLITUDE = 0.12  # largest displacement, relative to the sheet's size
 _STRETCH = 0.4  # largest relative displacement of a bar's ends, relative to its length
 _SHADES = LinearSegmentedColormap.from_list("mac", ["#FFFFFF", "#9CC7E4", style.BLUE, "#00304A"])

@@ -32,7 +32,7 @@ STRAIN: Mapping[str, str] = {
 """Names of strain energies, stacked in this order from the bottom up: folds on top."""
 MOST_MODES = 12
 NEEDED = ("frequency", "eigenvalue", "shape", "rigid", "displacement")
-"""What figures need of modes."""
+"""Variables of modes that figures need."""
 _NONE = 1e-9  # of the largest energy: smaller energies have no shares
 
 

@@ -27,9 +27,9 @@ from foldyn.values import show
 Points = NDArray[np.float64]
 """Points or vectors, shape (..., 3), or (..., 2) as seen on the screen."""
 Indices = NDArray[np.int64]
-"""Numbers of nodes: an edge or a triangle in each row."""
+"""Node numbers: an edge or a triangle per row."""
 PAPERS = ("#CFB387", "#B9CBB0", "#C9B4C6", "#A9BFCC")
-"""Colors of panels that differ from the rest of the sheet, by turns."""
+"""Colors of panels that differ from the sheet, in turn."""
 WIDTH = 7.0
 """Width of a figure, in inches."""
 # Margins around the box seen, and its largest height, in inches.

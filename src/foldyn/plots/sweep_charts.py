@@ -23,9 +23,9 @@ from foldyn.results.sweep_dataset import (
 from foldyn.values import choice
 
 MOST_LINES = 12
-"""Curves in one chart."""
+"""Most curves in one chart."""
 RATIO = 30.0
-"""Ratio of the largest to the smallest value from which evenly spaced ratios have such an axis."""
+"""Least ratio of the largest to the smallest value for a logarithmic axis."""
 
 
 def line_chart(

@@ -23,7 +23,7 @@ from foldyn.values import whole as whole_number
 from foldyn.writing import whole
 
 DPI = {".gif": 100, ".mp4": 200}
-"""Dots per inch of an animation by the end of the file's name."""
+"""Dots per inch of an animation by the file's suffix."""
 _FASTEST = {".gif": 50, ".mp4": 60}  # viewers slow down GIFs with shorter frames
 _COLORS = 128  # for all pictures of a GIF: 256 per picture would take three times the space
 _SAMPLES = 8  # number of pictures that these colors are taken from
@@ -101,7 +101,7 @@ class Mp4Writer(FFMpegWriter):
 
 
 WRITERS = dict(zip((f".{kind}" for kind in ANIMATIONS), (GifWriter, Mp4Writer), strict=True))
-"""Writers of an animation by the end of the file's name."""
+"""Writers of an animation by the file's suffix."""
 
 
 def checked_file(path: str | PathLike[str], frames: int, fps: int) -> Path:

@@ -21,9 +21,9 @@ ByRule = Mapping[str, xarray.Dataset]
 """Results by mass rule."""
 DPI = 150
 MOST_NODES = 12
-"""Nodes that one figure shows at most."""
+"""Most nodes in one figure."""
 MOST_PAIRS = 24
-"""Pairs of panels that a table shows at most."""
+"""Most pairs of panels in a table."""
 
 
 class Album:

@@ -11,7 +11,7 @@ import numpy as np
 from foldyn import __version__
 
 FORMAT = 1
-"""Number of the layout of results, raised when older programs could not read a new one."""
+"""Version of the layout of results, raised when older programs could not read a new one."""
 
 OWN = ("foldyn_result", "foldyn_format", "foldyn_version", "rerunnable", "not_rerunnable_because")
 

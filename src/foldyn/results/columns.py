@@ -18,9 +18,9 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 PIECE = 2**23
-"""Bytes that are held at a time of what may be larger than memory."""
+"""Bytes held at a time of data that may exceed the memory."""
 SUMMED = 2**18
-"""Bytes that are read at a time for a checksum: what the processor's cache holds."""
+"""Bytes read at a time for a checksum, so that they fit in the processor's cache."""
 NUMBER = np.dtype("<f8")
 
 

@@ -53,8 +53,8 @@ DOCUMENT: Mapping[str, tuple[str, ...]] = {
     "tables_crease_stiffness": ("crease",),
     "tables_crease_rest": ("crease",),
 }
-"""Variables of the case, which every result has, with their dimensions; other tables have one of
-their own."""
+"""Variables of the case, which every result has, with their dimensions; other tables have their
+own."""
 TAKEN = frozenset(
     {*MOTION, *CROSSINGS, *DOCUMENT, "time", "node", "axis", *CONTINUATIONS, *ORIGIN}
     | {"support", "support_node", "support_axis"}

@@ -20,12 +20,12 @@ ALONG = {
     "modes": ("mode", "frequency", "shape", "{:.6g} Hz"),
     "folding": ("step", "share", "displacement", "{:.4g} of the way"),
 }
-"""Kinds of results that have shapes: their dimension, what counts them, what moves, and titles."""
+"""Kinds of results with shapes: their dimension, coordinate, displacement variable, and titles."""
 SWING = 0.12
-"""Largest displacement of a mode that is shown, in sizes of the pattern."""
+"""Largest displacement of a displayed mode, in sizes of the pattern."""
 
 LARGEST = 1e6
-"""Factor on displacements: beyond it, they would leave the range of single precision."""
+"""Largest factor on displacements; beyond it they would exceed single precision."""
 
 
 class Shapes(NamedTuple):

@@ -43,15 +43,15 @@ OTHERS = (
 _PARTS = ("real", "imag")
 _WHOLE = "part_of_complex"  # attribute of both parts: the name of the complex variable
 MOST_PACKED = 1100
-"""Bytes that one byte of a file may stand for: deflate packs no more than 1032."""
+"""Bytes that one byte of a file may expand to: deflate packs at most 1032."""
 ALONG = "time"
 """The dimension that may be long."""
 CHUNK = 2**20
-"""Bytes of a chunk of a variable, which is what is read at least."""
+"""Bytes of a chunk of a variable, the least that is read at once."""
 LEAST_MEMORY = 2**29
-"""Bytes that a file without a seal may take besides its content."""
+"""Bytes that reading a file without a seal may take in addition to its content."""
 LEAST_SECONDS, PER_SECOND = 2, 50_000
-"""Computing time that a file without a seal may take, and the bytes that take a second more."""
+"""Computing time (s) for reading a file without a seal, and the bytes per further second."""
 
 
 def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:

@@ -33,7 +33,7 @@ POINTS: Mapping[str, Quantity] = {
     "energy": Quantity("J", "energy above that at rest"),
     "energy_drift": Quantity("1", "largest change of the energy along the motion"),
 }
-"""What points of a curve or of a backbone may have, along the dimension point."""
+"""Possible variables of points of a curve or a backbone, along the dimension point."""
 
 
 def periodic_dataset(

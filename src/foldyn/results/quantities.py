@@ -52,7 +52,7 @@ CONTACT = {
         "N", "force of each plane on the sheet, without friction", ("plane", "axis")
     ),
 }
-"""What motions and paths have where a case has contact, the second one if it has planes."""
+"""Variables of motions and paths with contact; the second one only with planes."""
 MOTION: Mapping[str, Quantity] = STATE | {
     "velocity": Quantity("m/s", "velocity", PLACE),
     "kinetic": Quantity("J", "kinetic energy"),
@@ -65,7 +65,7 @@ CONTINUATIONS: Mapping[str, str] = {
     "continuation": "what the method needs beside to go on from the last sample",
     "continued_from": "with what the method went on from another motion at the first sample",
 }
-"""What motions of implicit methods have besides, along the dimension continued."""
+"""Further variables of motions by implicit methods, along the dimension continued."""
 ORIGIN: Mapping[str, Quantity] = {
     "origin": Quantity("m", "displacement about which damping has its start", PLACE),
     "origin_time": Quantity("s", "when the motion was there; nan: under the constant loads alone"),
@@ -73,7 +73,7 @@ ORIGIN: Mapping[str, Quantity] = {
     "flow_time": Quantity("s", "time at which the motion has that flow"),
     "flow_looked": Quantity(text="steps until then since that flow was checked"),
 }
-"""What motions have besides whose damping or added mass depends on where they began."""
+"""Further variables of motions whose damping or added mass depends on the initial state."""
 SINCE = "since rest, or since the state from which a path was started"
 PATH: Mapping[str, Quantity] = {
     **STATE,
@@ -100,7 +100,7 @@ CROSSINGS: Mapping[str, Quantity] = {
     "crossing_panels": Quantity(text="panels that pass through each other", dims=("two",)),
     "crossing_first": Quantity(text="first sample (from 0) at which they were seen to"),
 }
-"""What motions and paths have besides where panels cross, along the dimension crossing."""
+"""Further variables of motions and paths with crossing panels, along the dimension crossing."""
 MODES: Mapping[str, Quantity] = {
     "frequency": Quantity("Hz", "frequency"),
     "eigenvalue": Quantity("rad2/s2", "square of the angular frequency (negative: unstable)"),
@@ -116,7 +116,7 @@ INTERNAL: Mapping[str, Quantity] = {
     "internal_share": Quantity("1", "share of the strain energy in internal amplitudes of panels"),
     "between_shape": Quantity("m", "mode shape between nodes", ("between", "axis")),
 }
-"""What modes have besides where panels have internal amplitudes: `between` counts the middles of
+"""Further variables of modes if panels have internal amplitudes: `between` counts the middles of
 edges and spokes, panel by panel."""
 RESPONSES: Mapping[str, Quantity] = {
     "receptance": Quantity("m/N", "displacement per force", PLACE),
@@ -124,13 +124,13 @@ RESPONSES: Mapping[str, Quantity] = {
     "accelerance": Quantity("m/(N s2)", "acceleration per force", PLACE),
     "transmissibility": Quantity("1", "displacement per displacement of the base", PLACE),
 }
-"""What a frequency response may hold, one of these,"""
+"""Variables of a frequency response, one of these,"""
 ESTIMATES: Mapping[str, Quantity] = {
     "coherence": Quantity("1", "coherence", PLACE),
     "swing": Quantity("rad", "largest amplitude of a superlinear hinge"),
     "unsteadiness": Quantity("1", "relative error that transients leave, estimated"),
 }
-"""and what its method adds to it."""
+"""and those that its method adds."""
 BANDS: Mapping[str, Quantity] = {
     "frequency": Quantity("Hz", "frequency", ("phase", "band")),
     "eigenvalue": Quantity(
@@ -156,7 +156,7 @@ BANDS: Mapping[str, Quantity] = {
     "attenuation": Quantity("Np", "attenuation from cell to cell", ("leg", "level")),
     "level_frequency": Quantity("Hz", "frequency of the attenuation", ("level",)),
 }
-"""What bands have, each along the dimension `state` too where they are of several states."""
+"""Variables of bands, with the dimension `state` too if there are several states."""
 GAPS: Mapping[str, Quantity] = {
     "gap_state": Quantity(text="number of the state, from 0"),
     "gap_direction": Quantity(text="all, or the part of the path along which no wave travels"),
@@ -166,7 +166,7 @@ GAPS: Mapping[str, Quantity] = {
     "gap_width": Quantity("Hz", "width of the gap"),
     "gap_relative_width": Quantity("1", "width of the gap over its middle"),
 }
-"""What they have besides along the dimension `gap`."""
+"""Further variables of bands along the dimension `gap`."""
 FIDELITY: Mapping[str, Quantity] = {
     "frequency": Quantity("Hz", "frequency of the shell, extrapolated from its meshes", ("mode",)),
     "mesh_error": Quantity("1", "error of the finest mesh (nan: not converged)", ("mode",)),
@@ -181,7 +181,7 @@ FIDELITY: Mapping[str, Quantity] = {
     "deflection_mesh_error": Quantity("1", "error of the finest mesh (nan: not converged)"),
     "deflection_error": Quantity("1", "error of the displacement (infinite: soft)", ("model",)),
 }
-"""What a comparison of models with the shell holds, the last three where forces act on it."""
+"""Variables of a comparison of models with the shell; the last three only with forces."""
 
 
 def variables(
@@ -219,7 +219,7 @@ REASONS: Mapping[str, str] = {
     "mesh_error": "the meshes of the shell have not converged",
     "deflection_mesh_error": "the meshes of the shell have not converged",
 }
-"""Variables that may lack values, and why."""
+"""Variables that may lack values, and the reasons."""
 UNEXPECTED = "the computation was no longer finite"
 
 

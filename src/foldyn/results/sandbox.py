@@ -16,7 +16,7 @@ from foldyn.errors import FoldynError
 
 T = TypeVar("T")
 IDLE = 4
-"""How many times its computing time a call may take: the machine has other work."""
+"""Wall time allowed per computing time of a call, as the machine may be busy."""
 
 
 def apart(make: Callable[[], T], seconds: int, memory: int) -> T:

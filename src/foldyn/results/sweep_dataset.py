@@ -22,11 +22,11 @@ from foldyn.values import choice, number, whole
 POINT = "point"
 """Dimension of sampled points."""
 SALTELLI = "saltelli"
-"""Design from which Sobol indices are estimated."""
+"""Sampling design for Sobol indices."""
 FEWEST = 8
-"""Points of a design, of each kind, from which indices are estimated."""
+"""Least number of points of a design, of each kind, for estimating indices."""
 BINS = 8
-"""Ranges of equally many sampled points over which main effects are averaged."""
+"""Number of ranges with equally many sampled points, for main effects."""
 
 
 def sweep_dataset(

@@ -13,9 +13,9 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 PATIENCE = 30.0
-"""Seconds after which a scheduler that does not answer is given up."""
+"""Seconds to wait for an answer of the scheduler."""
 AT_LEAST = 16
-"""Items that are handed out at a time while it is not known how many workers there are."""
+"""Items submitted at a time while the number of workers is unknown."""
 
 
 class Cluster(Generic[Item, Result]):

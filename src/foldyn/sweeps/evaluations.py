@@ -142,4 +142,4 @@ def _write(file: Path, stamp: str, found: Evaluation) -> None:
 
 
 KEPT: Store[Evaluation] = Store(_read, _write, warns=False)
-"""Files have seals: what is damaged counts as not there."""
+"""Files with seals; damaged ones count as missing."""

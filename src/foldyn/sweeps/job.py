@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     import xarray
 
 COMPUTING = ("analyses", "results", "sweeps")
-"""Folders that measures depend on, besides the solvers."""
+"""Folders that measures depend on, in addition to the solvers."""
 ASIDE = ("design", "sweep", "title")
-"""Tables and keys of a case file that change no result."""
+"""Tables and keys of a case file that do not affect results."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,9 +22,9 @@ from foldyn.values import choice, number, show, suggest
 
 NODE, AXIS, MODE, BAND = "node", "axis", "mode", "band"
 WORDS = ("model", "point", "leg")
-"""Arguments that are names of the result,"""
+"""Arguments that are names in the result,"""
 REALS = {"time": "s", "displacement": "m", "frequency": "Hz"}
-"""and that are numbers, with their units."""
+"""and arguments that are numbers, with their units."""
 _ASKED = re.compile(r"([A-Za-z_]\w*)(?:\[([^\[\]]*)\])?\Z")
 _NAME = re.compile(r"[A-Za-z_]\w*\Z")
 _OWN = re.compile(r"(?:([A-Za-z_]\w*)=)?(.+):([A-Za-z_]\w*)\Z")

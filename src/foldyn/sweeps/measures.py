@@ -34,12 +34,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 MOTION, PATH, MODES, FRF, FIDELITY = "dynamics", "statics", "modes", "frf", "fidelity"
 BANDS = "bands"
 PROMINENT = 0.05
-"""Least prominence of a peak of a spectrum, as a part of its maximum."""
+"""Least prominence of a peak of a spectrum, relative to its maximum."""
 NEAR = 1e-5
-"""Width of an interval of load factors, as a part of these, that needs no mention."""
+"""Relative width of an interval of load factors below which it is not reported."""
 CURVES, MOVED = (FRF, MOTION), (MOTION, PATH)
 MEASURES: dict[str, Measure] = {}
-"""By name."""
+"""Measures by name."""
 
 
 def _measure(*kinds: str, **about: Any) -> Callable[[F], F]:

@@ -31,13 +31,13 @@ from foldyn.results.sweep_dataset import (
 )
 
 MOST_CURVES = 8
-"""Curves of a chart."""
+"""Most curves of a chart."""
 MOST_ROWS = 1000
-"""Points that a table lists."""
+"""Most points in a table."""
 MOST_REASONS = 50
-"""Points with missing values that a table lists."""
+"""Most points with missing values in a table."""
 MOST_COLUMNS = 6
-"""Values of one measure in a row."""
+"""Most values of one measure in a row."""
 
 
 def write_sweep(

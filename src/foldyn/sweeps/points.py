@@ -15,7 +15,7 @@ from foldyn.errors import InputError
 LATIN, SOBOL, SALTELLI = SAMPLINGS
 GRID = "grid"
 MOST_POINTS = 1_000_000
-"""Points of a sweep: more are a slip of the finger."""
+"""Most points of a sweep; a larger number is a typing error."""
 MOST_SOBOL = 21201
 """Dimensions of SciPy's Sobol sequence."""
 

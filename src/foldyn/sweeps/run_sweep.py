@@ -26,10 +26,10 @@ from foldyn.threads import processors
 from foldyn.values import show, whole
 
 MOST_PROCESSES = 1024
-"""Processes at a time: more are a slip of the finger."""
+"""Most parallel processes; a larger number is a typing error."""
 
 PREPARING = 0.05
-"""Seconds in which a core reads the file of a point, checks its motion and measures it."""
+"""Seconds in which a core reads a point's file, checks its motion and measures it."""
 
 Measures = Sequence[str | Measure | Callable[..., Any]] | Mapping[str, Callable[..., Any]]
 

@@ -13,9 +13,9 @@ from foldyn.sweeps.points import Point
 from foldyn.sweeps.pool import Here
 
 AT_ONCE = 512
-"""Motions, at most: a GPU is at full speed."""
+"""Most motions in a batch, enough for a GPU's full speed."""
 ROOM = 2.0**31
-"""Bytes of their samples."""
+"""Bytes for their samples."""
 
 
 class SideBySide(Here[Point, Evaluation]):

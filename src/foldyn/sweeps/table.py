@@ -27,7 +27,7 @@ ABOUT: Mapping[str, str] = {
     "warnings": "what was warned of",
     "seconds": "computing time",
 }
-"""What every point has."""
+"""Variables of every point."""
 
 
 def names_of(keys: Sequence[str], taken: Sequence[str]) -> list[str]:

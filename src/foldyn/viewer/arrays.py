@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _TYPES = {"i1": "i8", "i2": "i16", "u1": "u8", "u2": "u16", "u4": "u32", "f4": "f32"}
-"""Names of the page for kinds of numbers."""
+"""The page's names of number types."""
 
 
 LARGEST = 2**15 - 1

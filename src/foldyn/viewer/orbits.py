@@ -12,11 +12,11 @@ from foldyn.periodic.fourier import Fourier, values_of
 from foldyn.viewer.arrays import Arrays
 
 OF_MOTIONS = 1e-4
-"""Errors of Fourier coefficients over the largest displacement of their motion."""
+"""Error of Fourier coefficients, relative to the largest displacement of their motion."""
 MOST_NUMBERS = 10_000_000
-"""Numbers of all motions of a result: of more, every k-th point is left, and those with names."""
+"""Most numbers for all motions of a result; beyond, only every k-th point and named ones remain."""
 SAMPLES = 64
-"""Of a period, among which the largest displacement is sought."""
+"""Samples of a period for its largest displacement."""
 
 
 def orbits(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:

@@ -30,15 +30,15 @@ from foldyn.viewer.sheet import bare_sheet, sheet
 from foldyn.viewer.waves import about_waves, waves
 
 OF_SIZE, OF_LARGEST, OF_COLORS = 5e-5, 1e-3, 4e-3
-"""Errors of the page's displacements over the sheet's size and over the largest of them, of which
-the smaller one is allowed, and of values for colors over the largest."""
+"""Errors of the page's displacements relative to the sheet's size and to the largest of them, the
+smaller of which applies, and of values for colors relative to the largest."""
 MOST_LINES = 20_000
-"""Bars or creases that a page colors: of larger sheets they are too fine to be seen, and take most
-of its size."""
+"""Most bars or creases that a page colors: in larger sheets they are too fine to see and take most
+of the page's size."""
 MOST = 30_000_000
-"""Displacements of a result that are looked at; of longer ones every k-th sample."""
+"""Most displacements of a result that are used; of more, every k-th sample."""
 THIN = 1e-3
-"""Thickness of the sheet of a folding over the size of its pattern; it does not show."""
+"""Thickness of a folding's sheet relative to the pattern's size; it has no visible effect."""
 
 Results = Mapping[str, xr.Dataset]
 

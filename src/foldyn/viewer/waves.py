@@ -14,15 +14,15 @@ from foldyn.patterns.screw import Screw
 from foldyn.viewer.arrays import Arrays
 
 OF_SHAPES = 4e-3
-"""Errors of Bloch modes over the largest displacement of each."""
+"""Error of Bloch modes, relative to the largest displacement of each."""
 OF_ZONE = 1e-3
-"""Errors of frequencies in the zone over the largest."""
+"""Error of frequencies in the zone, relative to the largest."""
 MOST_NUMBERS = 300_000
-"""Numbers of the Bloch modes of a page: of more, every k-th wave vector has them."""
+"""Most numbers for the Bloch modes of a page; beyond, only every k-th wave vector has modes."""
 MOST_TRIANGLES = 6_000
-"""Triangles of the cells shown together, unless a single cell has more."""
+"""Most triangles of the cells shown together, unless a single cell has more."""
 CELLS = {1: 8, 2: 4}
-"""Cells that are shown along each period, by how many periods there are."""
+"""Number of cells shown along each period, by the number of periods."""
 EDGES = ("below", "bottom", "top")
 PATH = "take phases of cell.path"
 

@@ -35,11 +35,11 @@ from foldyn.values import number, whole
 STEP = 1e-3
 """Change of a parameter, in its scale, for a difference quotient: well above the solvers' noise."""
 ENOUGH = 1e-5
-"""Change of the parameters, in themselves, at which a search ends."""
+"""Relative change of the parameters at which a search ends."""
 LEVEL = 1e-8
-"""Fall of the cost, in itself, at which a search ends."""
+"""Relative decrease of the cost at which a search ends."""
 TRIED = 60
-"""Steps after which a search is given up."""
+"""Most steps of a search."""
 WHY = {
     0: f"given up after {TRIED} steps",
     1: "the cost has no slope left",
@@ -47,15 +47,15 @@ WHY = {
     3: "the parameters move no more",
     4: "neither cost nor parameters move any more",
 }
-"""Why a search ended, by the status of `least_squares`."""
+"""Reasons for the end of a search, by the status of `least_squares`."""
 
 MOST_PROCESSES = 1024
-"""Processes at a time: more are a slip of the finger."""
+"""Most parallel processes; a larger number is a typing error."""
 
 COUNTED = ("computed", "found")
 """Counts of a `Course`."""
 Outcome = NDArray[np.float64] | str
-"""All predictions in a row, or why there are none."""
+"""All predictions in a row, or the reason for their absence."""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from foldyn.experiment.calibration.responses import FrequencyResponse
 from foldyn.plots.charts import Chart, Curve
 
 FLOOR = 1e-300
-"""Magnitude that stands for zero in decibels."""
+"""Magnitude that represents zero in decibels."""
 
 
 def charts_of(one: Measurement, result: Any, case: Case) -> list[Chart]:

@@ -12,9 +12,9 @@ from foldyn.experiment.calibration.fit_problem import Problem
 from foldyn.sweeps.evaluations import Evaluation
 
 PREDICTED = "predicted"
-"""Name of what an evaluation holds."""
+"""Name of an evaluation's predictions."""
 SLOPES = "slopes"
-"""Name of their derivatives by the parameters."""
+"""Name of their derivatives with respect to the parameters."""
 
 
 class Point(NamedTuple):

@@ -37,13 +37,13 @@ from foldyn.program import program
 from foldyn.values import listed, show
 
 ASIDE = ("name", "label", "sigma", "held_out", "case", "force")
-"""Fields of measurements that do not change what is predicted."""
+"""Fields of measurements that do not affect predictions."""
 STRUCTURAL = "pattern", "sheet", "model", "supports"
-"""Tables of a case file of which its structure is made."""
+"""Tables of a case file that define its structure."""
 VIBRATIONS = ("modes", "frf")
-"""Analyses whose results are looked at before a search."""
+"""Analyses whose results are examined before a search."""
 MESH_ORDER = 2
-"""Order of a shell's elements."""
+"""Order of convergence of a shell's elements."""
 Predicted = dict[int, NDArray[np.float64]]
 """Predictions by the number of the measurement."""
 

@@ -24,7 +24,7 @@ from foldyn.results import netcdf
 from foldyn.writing import plain, write_json, write_text
 
 RARE = 0.01
-"""Probability of a misfit by noise alone below which something else must have part in it."""
+"""Probability of a misfit by noise alone, below which there must be another cause."""
 
 
 @brief

@@ -21,7 +21,7 @@ from foldyn.values import choice, number, numbers, show
 
 DETRENDS = (None, "constant", "linear")
 REFINED = 8
-"""Steps by which the best place in time is refined: they converge quadratically."""
+"""Newton steps that refine the time shift: they converge quadratically."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -19,7 +19,7 @@ IMPOSED = "imposed"
 """Selects all nodes that supports of the case move along the axis."""
 QUANTITIES = ("displacement", "position")
 MOST = 8
-"""Nodes, and shapes, that pages and figures show at most."""
+"""Most nodes, and shapes, in pages and figures."""
 POINTS = 25
 """Points of the curve through measured forces."""
 

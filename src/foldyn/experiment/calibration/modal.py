@@ -24,11 +24,11 @@ from foldyn.linear import mac, pair_modes
 from foldyn.values import numbers, show
 
 LEAST = 0.5
-"""MAC of a partner."""
+"""Least MAC of a partner."""
 CLOSE = 0.1
-"""Difference of the MAC with two modes of the model from which on they can be told apart."""
+"""Least difference of the MAC with two modes of the model for a unique partner."""
 FEWEST = 2
-"""Components of a shape: a single one is like that of any other."""
+"""Least number of components of a shape: a single one resembles any other."""
 
 
 class Pairing(NamedTuple):

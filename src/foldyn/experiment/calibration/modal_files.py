@@ -31,14 +31,14 @@ from foldyn.results.quantities import RESPONSES
 from foldyn.values import choice, indices, show
 
 UNIT: Mapping[str, str] = {"frequency": "Hz", "damping_ratio": "-"}
-"""Unit that each number of a mode becomes."""
+"""Unit that each kind of modal value is converted to."""
 UNITS_OF: Mapping[str, Sequence[str]] = {
     **{name: tuple(UNITS[name]) for name in PER_FORCE},
     MOTION: tuple(UNITS["number without unit"]),
 }
 """Units of each quantity of a response in a CSV file."""
 PARTS = ("real", "imag", "magnitude", "sigma")
-"""What columns of a response hold, as "node 8 x real"."""
+"""Parts of a response in columns such as "node 8 x real"."""
 
 
 def frequencies(

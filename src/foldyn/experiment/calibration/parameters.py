@@ -17,16 +17,16 @@ from foldyn.errors import InputError
 from foldyn.values import number, show, suggest, whole
 
 NEAR = 1e-4
-"""Change of a parameter, in its scale, for a difference of neighbors."""
+"""Change of a scaled parameter for differences of neighboring solutions."""
 FIRST = ((0, -1.0), (1, 1.0)), ((0, 1.0), (-1, -1.0))
 SECOND = (
     ((1, 0.5), (-1, -0.5)),
     ((0, -1.5), (1, 2.0), (2, -0.5)),
     ((0, 1.5), (-1, -2.0), (-2, 0.5)),
 )
-"""Steps from a value and weights of differences by their order; the next where a bound is near."""
+"""Steps and weights of difference quotients by order; later ones apply if a bound is near."""
 MOST_STARTS = 100_000
-"""Searches: a larger number is a typing error."""
+"""Most searches; a larger number is a typing error."""
 
 
 @dataclass(frozen=True)

@@ -26,13 +26,14 @@ from foldyn.patterns import Pattern
 from foldyn.values import show
 
 STEADY = "generalized_alpha"
-"""Integrator of a fit where the case file leaves the choice open."""
+"""Integrator of a fit if the case file does not choose one."""
 SHARES = 1e-4, 1e-6
-"""Change of a difference of motions, in itself, at which it is found: in a search, at its end."""
+"""Relative change at which iterations for differences of motions end: in a search, at its end."""
 REFINED = "statics", "modes"
-"""Analyses whose neighbors are found with fewer errors than the result: it is one of them, too."""
+"""Analyses whose neighbors are computed more accurately than the result, so that it is recomputed
+as one."""
 MANY = 2000
-"""Coordinates of nodes beyond which modes are found as quickly as those of a neighbor."""
+"""Number of coordinates above which modes are as quick to compute as differences to neighbors."""
 
 
 @dataclass(frozen=True, eq=False)

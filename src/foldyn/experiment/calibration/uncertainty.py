@@ -12,9 +12,9 @@ from scipy.stats import t as student
 from foldyn.arguments import brief
 
 WEAK = 1e-5
-"""Singular value, relative to the largest, below which a direction is not seen at all."""
+"""Singular value, relative to the largest, below which a direction is not determined at all."""
 PART = 0.1
-"""Part of a parameter in such a direction from which on it counts as not determined."""
+"""Component of a parameter along such a direction above which it counts as not determined."""
 
 
 @dataclass(frozen=True)

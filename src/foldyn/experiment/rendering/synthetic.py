@@ -21,7 +21,7 @@ from foldyn.results import case_of
 from foldyn.values import number
 
 CODECS = {".mkv": "FFV1", ".avi": "FFV1", ".mp4": "mp4v"}
-"""Codec by the end of the file's name: FFV1 loses nothing, mp4v does."""
+"""Codec by the file's suffix: FFV1 is lossless, mp4v is lossy."""
 
 
 @brief

@@ -19,7 +19,7 @@ from foldyn.input_files import check_file
 from foldyn.values import number
 
 PHOTOS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp")
-"""Endings of photographs; all other files are films."""
+"""Suffixes of photographs; all other files are films."""
 
 Box = tuple[int, int, int, int]
 """Column and row of the first pixel, width and height."""

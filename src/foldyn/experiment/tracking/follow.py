@@ -30,9 +30,9 @@ _CLEAR = 0.55  # share of the allowed error for a corner of few edges to be foun
 _MOST_MISSES = 3  # frames after which a lost corner of two edges is found again only with a guide
 
 Guide = Callable[[Array], Array]
-"""From the places of points (p, 2), NaN where lost, to where each of them should be.
+"""Maps the positions of points (p, 2), NaN if lost, to their predicted positions.
 
-NaN where that is not known, infinite where the point cannot be seen.
+A prediction is NaN if unknown, infinite if the point is hidden.
 """
 
 

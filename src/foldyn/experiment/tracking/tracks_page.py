@@ -27,11 +27,11 @@ from foldyn.shells import shell
 from foldyn.viewer import Backdrop, Stage, projection, stage
 
 MOST = 3
-"""Nodes that charts show."""
+"""Most nodes in charts."""
 ROOM = 4_000_000
-"""Bytes that the pictures of a page may take."""
+"""Most bytes of the pictures of a page."""
 SEEN = 0.9
-"""Of the frames of the node that was measured most: who was measured in fewer is not shown."""
+"""Relative to the frames of the best-measured node: nodes with fewer are not shown."""
 FILLED = (
     "Dots are what was measured. The sheet in three dimensions is filled where nothing was: a node "
     "that was lost for some frames moves evenly between them, one that was never seen moves as its "

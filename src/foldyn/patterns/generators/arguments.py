@@ -11,7 +11,7 @@ from foldyn.ram_limit import check_memory
 from foldyn.values import length, number, show, whole
 
 PER_VERTEX = 2200.0
-"""Bytes a vertex of a pattern as it is made: 1800 measured with 10,000 and 40,000 vertices."""
+"""Bytes per vertex while a pattern is generated: 1800 measured with 10,000 and 40,000 vertices."""
 ROUND = 360.0 * (1.0 + 1e-12)  # degrees
 
 

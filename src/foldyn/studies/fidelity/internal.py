@@ -14,7 +14,7 @@ AMPLITUDES = {"none": 0, "1": 1, "3": 3}
 """Internal amplitudes of a panel, by their name in the table."""
 RANGES = {"below 0.6": (0.0, BELOW), "0.6 to 1": (BELOW, 1.0), "above 1": (1.0, inf),
           "all": (0.0, inf)}  # fmt: skip
-"""Of frequencies over that of the plate."""
+"""Ranges of frequencies relative to the plate's."""
 
 
 def modes_first(case: FidelityCase, true: Reference) -> Modes:

@@ -33,7 +33,7 @@ BESIDE = {
     "n5b8e, internal": ("n5b8e, condensed", 3),
     "n5b8e, bars": ("n5b8e, condensed, bars", 0),
 }
-"""Models that are compared and their internal amplitudes, by their name in the table."""
+"""Compared models and their internal amplitudes, by name in the table."""
 
 
 def references(name: str, folder: Path = RESULTS) -> list[tuple[MixedCase, Stored]]:

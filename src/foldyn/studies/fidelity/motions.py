@@ -48,7 +48,7 @@ CASES: Mapping[int, tuple[float, ...]] = {
 }
 """Numbers in the documented set, from 0, and amplitudes: first modes that fold, in supports that
 hold the sheet. Beyond the last amplitude of the last three a motion of the shell takes minutes."""
-REACHED = 0.8  # of the largest fold on the shell's path: last amplitude if below 50
+REACHED = 0.8  # of the shell's largest fold: the last amplitude if that is below 50
 APART = 1.25  # least ratio of two amplitudes
 PERIODS = 6.0  # of the linear shell: length of a free vibration in periods
 STEPS = 100  # steps in such a period

@@ -31,7 +31,7 @@ from foldyn.writing import write_text
 
 FOLDS = {"sheet.length_scale_ratio": 2.7, "model.fold_law.theta1": 75.0}
 DAMPING = {"damping.alpha": 14.4, "damping.beta": 4.1e-4}
-"""What the paper found, and the truth behind the synthetic data."""
+"""Damping found in the paper, and the truth behind the synthetic data."""
 MIRRORED = {"model.fold_law.theta2": "360 - model.fold_law.theta1"}
 FOLD_RANGES = (
     experiment.Parameter("sheet.length_scale_ratio", 2.0, 0.5, 10.0),
@@ -66,10 +66,10 @@ SUPPORTS: Mapping[str, list[dict[str, Any]]] = {
     "glued": [{"nodes": BOTTOM, "axes": "x"}, {"nodes": [59], "axes": "yz"}],
     "glue alone": [{"nodes": [59], "axes": "xyz"}],
 }
-"""How the bottom is held: by a smooth plate (the static test's, ideal); on the plate with node 59
-glued to it, as the paper's text has it; by the glue alone, as if there were no plate."""
+"""Supports of the bottom: a smooth plate (the static test's, ideal); the plate with node 59 glued
+to it, as in the paper's text; the glue alone, without a plate."""
 PRESSED = 0.005
-"""How far the top is pressed before the release (m).
+"""Displacement of the top before the release (m).
 
 From the 20 mm of the smallest weight this damping lets nothing swing: K0 stays what it was at
 rest, and resists the large turns of the panels.

@@ -33,11 +33,11 @@ from foldyn.studies.herkal.sheet_models import (
 COMPUTING = tuple(
     f"studies/herkal/{name}.py" for name in ("sheet_models", "runs", "metric", "sensitivity")
 )
-"""Files that the results of the case studies depend on, besides the solvers."""
+"""Files that the results of the case studies depend on, in addition to the solvers."""
 SETTINGS = "study_settings"
 INTERVAL = 0.01  # s, between samples, unless the case file sets it
 STEPS = 10  # steps of a path's load
-SHELL_MODES, RULE_MODES = 5, 12  # of the reference, and searched for partners
+SHELL_MODES, RULE_MODES = 5, 12  # modes of the reference; candidates for partners
 SECANT = 1.0  # degrees, amplitude of the hinges: superlinear bends have no slope at rest
 
 

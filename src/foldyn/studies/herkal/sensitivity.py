@@ -38,10 +38,10 @@ PULSES = (0.1, 0.25, 0.5, 1.0)  # s
 BEND_LAWS = ("superlinear", "linear")
 CALIBRATIONS = ("standard", "merlin2")
 MODELS = (*rules(), *OTHERS)
-"""What is compared with the shell: the distributions, and equi-inertial turned the other way."""
+"""Models compared with the shell: the distributions, and equi-inertial in the other orientation."""
 
 MOST = 64
-"""Size of a kept file (MiB)."""
+"""Largest stored file (MiB)."""
 
 
 def stiffnesses(load: Variant = AS_FILED) -> list[Variant]:

@@ -39,7 +39,7 @@ CHANGES: Mapping[str, Mapping[str, Any]] = {
     "linear bends": {"bend_law": "linear"},
     "calibration merlin2": {"calibration": "merlin2"},
 }
-"""One thing at a time."""
+"""Settings that are changed one at a time."""
 
 
 def sections(found: Variations, album: Album, tolerance: float) -> list[Section]:

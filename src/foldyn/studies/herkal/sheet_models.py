@@ -65,7 +65,7 @@ class Variant:
 
 
 AS_FILED = Variant()
-"""The case file as it is."""
+"""The unchanged case file."""
 
 
 @dataclass(frozen=True)
@@ -140,12 +140,12 @@ MODELS: Mapping[str, SheetModel] = {
         _stiffness("n5b8e", implicit=True),  # its edges have no mass of their own
     )
 }
-"""The reference and what is compared with it, in the order of the tables."""
+"""The reference and the models compared with it, in the order of the tables."""
 
 OTHERS: Mapping[str, SheetModel] = {
     "equi_inertial_acute": _rule("equi_inertial_acute", "equi-inertial, other corners"),
 }
-"""Models of the sensitivity alone."""
+"""Models used only for the sensitivity."""
 
 
 def model_of(name: str) -> SheetModel:

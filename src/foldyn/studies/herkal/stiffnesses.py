@@ -22,11 +22,11 @@ from foldyn.studies.herkal.sensitivity import KEPT
 COMPUTING = (
     "studies/fidelity/statics.py", "studies/herkal/stiffnesses.py", "studies/herkal/vibration.py",
 )  # fmt: skip
-"""Files that the results depend on, besides the solvers."""
+"""Files that the results depend on, in addition to the solvers."""
 OWN = "own"
 """The model of the specimen's case file."""
 BESIDE = ("standard", "plate", "n5b8e")
-"""Those beside it of which modes are computed."""
+"""Other models whose modes are computed."""
 PEAKED = (OWN, "plate", "n5b8e")
 SPECIMEN = ("specimen-modes", "specimen-frf")
 MODES = 5
@@ -151,4 +151,4 @@ ROWS: Mapping[str, Callable[[Stiffness], Rows]] = {
     "modes": lambda asked: specimen_modes(asked.divisions),
     "peaks": lambda asked: specimen_peaks(asked.of),
 }
-"""How each kind is computed."""
+"""Computation of each kind."""

@@ -21,11 +21,11 @@ STORED = Path(__file__).with_name("results")
 """Tables that come with the package."""
 METRIC, FREQUENCIES = "sensitivity.csv", "frequencies.csv"
 WORDS = ("case", "loads", "bend_law", "calibration", "model")
-"""Columns that hold no numbers."""
+"""Columns with text."""
 FILED = {
     "pulse": 0.5, "loads": "file", "bend_law": "superlinear", "calibration": "standard",
 }  # fmt: skip
-"""The case files as they are."""
+"""Settings of the case files."""
 
 Row = Mapping[str, Any]
 Errors = Mapping[str, Mapping[str, Any]]

@@ -30,7 +30,7 @@ COMPUTING = (
     "experiment", "studies/herkal/calibration.py", "studies/herkal/vibration.py",
     "studies/herkal/specimen", "studies/herkal/cases",
 )  # fmt: skip
-"""Files and folders that the results depend on, besides the solvers."""
+"""Files and folders that the results depend on, in addition to the solvers."""
 FOLDER = "specimen"
 NOTE = "synthetic data: the specimen's own are not public"
 PHOTOS, FILM, FOUND, COMPARED = "photographs.nc", "film.nc", "found.json", "front.nc"
@@ -254,7 +254,7 @@ PARTS: Mapping[str, tuple[Callable[[Part, Path], None], tuple[str, ...]]] = {
     "fit": (_fit, (FOUND, COMPARED)),
     "response": (_response, (*RESPONSES.values(), MODES, IN_AIR)),
 }
-"""How each part is computed, and which files it leaves for others or for the page."""
+"""Computation of each part, and the files that it leaves for other parts or for the page."""
 
 
 def read_found(folder: Path) -> dict[str, Any]:
