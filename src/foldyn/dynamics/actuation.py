@@ -1,10 +1,10 @@
-"""Hinges whose rest angle moves in time: they do work as they turn, though no force acts.
+"""Hinges whose rest angles move in time: they do work on the structure without a force on nodes.
 
-What turns one is the sum of all that acts on it, each with its own history. The power of one is
-k (dW/d rest) d rest/dt, W the energy of its law per unit stiffness: what the energy audit needs.
-Offsets, by which moments of creases alone turn the panels beside them (`materials.series`), may
-jump as the moments do: their work is the mean moment of a step times the change of the offset.
-Forces on dofs in balance may jump as well, and the dofs with them.
+The rest angle of a hinge is its start value plus the contributions of all actuators on it, each
+with its own history. The energy audit needs the power, k (dW/d rest) d rest/dt per hinge, with W
+the energy of its law per unit stiffness. Offsets, by which crease moments turn the adjacent panels
+(`materials.series`), may jump with the moments: their work is the mean moment over a step times the
+change of the offset. Forces on dofs in balance may jump as well, and the dofs with them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from foldyn.mechanics.assembly import Assembly
 
 
 class Actuators(NamedTuple):
-    """What turns: the rest angle of a hinge, or its offset.
+    """Actuators: what changes the rest angle of a hinge, or its offset.
 
     Its value is start[k] plus the sum over its parts, from part[k, 0] to part[k, 1], of span times
     the factor of history row, rad.
@@ -43,9 +43,9 @@ class Actuators(NamedTuple):
 def actuators(
     body: Assembly, numbers: NDArray, span: NDArray, row: NDArray
 ) -> tuple[Assembly, Actuators]:
-    """A body whose rest angles can be changed, and what turns.
+    """Return a body with rest angles that can change, and its actuators.
 
-    numbers, span, row : (p,) of its rest angles, how far each turns (rad), and its waveform.
+    numbers, span, row : (p,) index of each rest angle, its amplitude (rad), and its waveform.
     """
     order = np.argsort(numbers, kind="stable")
     turned, first, count = np.unique(numbers[order], return_index=True, return_counts=True)
@@ -80,7 +80,7 @@ def actuators(
 
 @inner_scalar
 def turned_by(actuators, factor, k, derivative):
-    """Sum of what turns one, from its start on, or a derivative of it."""
+    """Sum of the contributions to actuator k, its start value included, or its time derivative."""
     total = 0.0
     for i in range(actuators.part[k, 0], actuators.part[k, 1]):
         total += actuators.span[i] * factor[actuators.row[i], derivative]
@@ -89,13 +89,13 @@ def turned_by(actuators, factor, k, derivative):
 
 @kernel
 def turn(folds, actuators, factor):
-    """Set the rest angles for the factors (h, 3); one that leaves 0..2 pi becomes nan."""
+    """Set the rest angles for the factors (h, 3); one outside 0..2 pi becomes nan."""
     turn_part(folds, actuators, factor, 0, actuators.hinge.size)
 
 
 @inner
 def turn_part(folds, actuators, factor, first, last):
-    """The same for a part of what turns."""
+    """Set the rest angles of the actuators first to last - 1; see `turn`."""
     rest_angle, p = folds.rest, folds.parameters
     for k in range(first, last):
         e, value = actuators.hinge[k], actuators.start[k] + turned_by(actuators, factor, k, 0)
@@ -108,13 +108,13 @@ def turn_part(folds, actuators, factor, first, last):
 
 @inner
 def actuator_power(folds, actuators, factor, angle):
-    """Power (W) that turning folds with dihedrals `angle` (nh,) put into the structure."""
+    """Power (W) that the actuators put into the structure; `angle` (nh,) are the dihedrals, rad."""
     return power_of_part(folds, actuators, factor, angle, 0, actuators.hinge.size)
 
 
 @inner
 def power_of_part(folds, actuators, factor, angle, first, last):
-    """The same of a part of what turns, but for offsets; `angle` (nh,) are those of all."""
+    """Power (W) of the actuators first to last - 1, without offsets; `angle` (nh,): all hinges."""
     rest_angle, p, stiffness = folds.rest, folds.parameters, folds.stiffness
     power = 0.0
     for k in range(first, last):
@@ -131,15 +131,15 @@ def power_of_part(folds, actuators, factor, angle, first, last):
 
 @kernel
 def note_offsets(folds, actuators, angle):
-    """Note where offsets stand after they have jumped, at dihedrals `angle` (nh,)."""
+    """Store the offsets after they have jumped, at dihedrals `angle` (nh,)."""
     offset_work(folds, actuators, angle, 0, actuators.hinge.size, True)
 
 
 @inner
 def offset_work(folds, actuators, angle, first, last, accepted):
-    """Work (J) of offsets since the last accepted step, of a part of what turns.
+    """Work (J) of offsets since the last accepted step, for the actuators first to last - 1.
 
-    accepted : whether the present state is that of one.
+    accepted : whether the step that ends in the present state is accepted.
     """
     rest_angle, p, stiffness = folds.rest, folds.parameters, folds.stiffness
     work, offset = 0.0, actuators.offset

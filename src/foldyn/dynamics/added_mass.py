@@ -1,22 +1,23 @@
-"""Mass of the fluid that moves with a sheet, in motions: T = w'F w / 2, w = B (v - U).
+"""Added mass: fluid that moves with a sheet, in motions: T = w'F w / 2, w = B (v - U).
 
 U(t) is the velocity of the wind, the same everywhere: the flow is what the sheet does to it. B(u)
-takes velocities of the nodes to the flux at the unknowns of the flow, by the area vectors
-of the panels' triangles, which follow the motion; F is the flow (`cases.added_mass`) in one state
-of folding. A sheet that turns as a whole keeps its F, so that nothing of its motion is lost; one
-that folds gets a new F when a hinge has turned by `TURN` (`renewed_flow`). With F constant
-Lagrange's equations are
+takes velocities of the nodes to the flux at the unknowns of the flow, by the area vectors of the
+panels' triangles, which follow the motion; F is the flow (`cases.added_mass`) in one state of
+folding. A rigid rotation leaves F unchanged, so it costs no accuracy; a sheet that folds gets a new
+F when a hinge has turned by `TURN` (`renewed_flow`). With F constant Lagrange's equations are
 
     (M + B'F B) a + B'F (B. (v - U) - B U.) + B.'F w - d(q.B (v - U))/du = p - F_int,   q = F w,
 
-B. and U. the changes of B and U, and q held in the last term. The accelerations follow from
+with B. and U. the time derivatives of B and U, and q held constant in the last term. The
+accelerations follow from
 
     (F^-1 + B M^-1 B') z = B M^-1 r,   a = M^-1 (r - B'z),
 
-by conjugate gradients; what they start from is the inverse of that matrix where F was made.
+solved by conjugate gradients; the initial guess uses the inverse of that matrix in the state where
+F was computed.
 
-The forces f of the fluid take f.U from the wind. Their sum is -P., P = sum of B'q its momentum: the
-air has got U.P and, as time goes on, -P.U. (the power).
+The forces f of the fluid take the power f.U from the wind. They add up to -P., with P = sum of B'q
+the momentum of the fluid: the air has received the energy U.P and receives the power -P.U.
 """
 
 from __future__ import annotations
@@ -41,16 +42,16 @@ from foldyn.mechanics.term import ADDRESS
 from foldyn.statics.rigid import free_rigid_motions
 from foldyn.structures.mesh import double_areas
 
-TURN = math.radians(3.0)  # of a hinge, after which the flow is found anew
-LOOK_EVERY = 16  # steps between two looks at that
+TURN = math.radians(3.0)  # turn of a hinge after which the flow is computed again
+LOOK_EVERY = 16  # steps between two checks of that turn
 MOST = 1500  # unknowns of the flow
 TOLERANCE = 1e-13  # of the accelerations' residual
 ITERATIONS = 200
-SCALED = 0.25, 4.0  # by how much a new flow may change the energy of deforming, least and most
+SCALED = 0.25, 4.0  # by how much a new flow may scale the deformation energy: at least, at most
 
 
 class AddedMass(NamedTuple):
-    """The flow about t triangles with u unknowns, and memory."""
+    """The flow about t triangles with u unknowns, and its work arrays."""
 
     triangles: NDArray  # (t, 3) nodes
     sides: NDArray  # (t, 2, 3) rest vectors from the first corner to the others, m
@@ -59,7 +60,7 @@ class AddedMass(NamedTuple):
     catch: NDArray  # (k,) times this
     flow: NDArray  # (u, u) F, kg/m4
     resistance: NDArray  # (u, u) its inverse
-    guess: NDArray  # (u, u) inverse of the matrix of the accelerations where F was made
+    guess: NDArray  # (u, u) inverse of the matrix of the accelerations where F was computed
     area: NDArray  # (t, 3) memory: area vectors, m2,
     rate: NDArray  # (t, 3) and their changes, m2/s
     through: NDArray  # (3 t,) memory of corners
@@ -67,7 +68,7 @@ class AddedMass(NamedTuple):
     nodal: NDArray  # (2, rows, 3) memory
     vectors: NDArray  # (4, 3) memory of one triangle
     angle: NDArray  # (nh,) dihedrals where F was made, rad
-    made: NDArray  # (2,) how often it was since the start, and the energies (J) left over then
+    made: NDArray  # (2,) number of flows since the start, and the sum of energies (J) left over
     wind: NDArray  # (3,) velocity of the air at factor 1, m/s
     gust: int  # row of the wind's history, -1 where it is steady
     blown: NDArray  # (2, 3) memory: the air's velocity, m/s, and acceleration, m/s2
@@ -75,7 +76,7 @@ class AddedMass(NamedTuple):
 
     @property
     def acts(self) -> bool:
-        """Whether there is any."""
+        """Whether the case has added mass."""
         return len(self.flow) > 0
 
 
@@ -83,11 +84,11 @@ def added_mass(
     case: Case, start: NDArray | None, rank: NDArray, rows: int, hinges: int,
     histories: Sequence[History],
 ) -> AddedMass:  # fmt: skip
-    """Added mass of a case whose nodes stand at the places rank (n,) of `rows`.
+    """Added mass of a case whose nodes are stored at the places rank (n,) of `rows`.
 
-    start : displacement (n, 3) where the motion began; rest by default. `begin_flow` finds the
+    start : displacement (n, 3) where the motion began; rest by default. `begin_flow` computes the
         flow.
-    histories : those of the case, the wind's among them.
+    histories : all histories of the case, including the wind's.
 
     Raises
     ------
@@ -122,7 +123,7 @@ def added_mass(
 def _with_memory(
     triangles: NDArray, nodes: NDArray, catch: sparse.csr_array, rows: int, hinges: int
 ) -> AddedMass:
-    """What catches (u, 3t) of triangles (t, 3) of nodes (n, 3) at rest, with memory."""
+    """Added mass of triangles (t, 3) on nodes (n, 3) with their matrix `catch` (u, 3t)."""
     unknown, count = catch.shape[0], len(triangles)
     corners = nodes[triangles.astype(np.int64)]
     flow, resistance, guess = np.zeros((3, unknown, unknown))
@@ -152,7 +153,7 @@ def _with_memory(
 
 
 def _catch(fluid: Fluid, x: NDArray) -> sparse.csr_array:
-    """What unknowns catch (u, 3t) of area vector . velocity of the triangles' corners."""
+    """Matrix (u, 3t) from area vector . velocity of the triangles' corners to the unknowns."""
     area = 0.5 * np.linalg.norm(double_areas(x, fluid.triangles), axis=1)
     elements = np.arange(len(fluid.under)).repeat(3)
     columns = (3 * fluid.under[:, None] + np.arange(3)).ravel()
@@ -162,7 +163,7 @@ def _catch(fluid: Fluid, x: NDArray) -> sparse.csr_array:
 
 
 def begin_flow(case: Case, packed: Any, course: Any, place: NDArray) -> None:
-    """Find the flow with which a motion starts, at `place` (n, 3)."""
+    """Compute the flow at the start of a motion, at `place` (n, 3)."""
     own, inward = packed.added, packed.numbering.inward(place)
     if own.acts:
         _find_flow(case, own, packed.mass, place, inward)
@@ -174,12 +175,11 @@ def begin_flow(case: Case, packed: Any, course: Any, place: NDArray) -> None:
 
 
 def renewed_flow(case: Case, packed: Any, course: Any) -> bool:
-    """Find the flow anew, and tell so, where a hinge has turned by `TURN` since it was found.
+    """Compute the flow again if a hinge has turned by `TURN` since the last time; return whether.
 
-    The momentum of sheet and fluid stays what it is, on every free dof, and so does their energy
-    beyond that of a wind without the sheet: the work of the flow's change is done along the
-    deforming part of the velocity, which keeps the momenta. What cannot be done there, the air has
-    given or taken.
+    The momentum of sheet and fluid is conserved on every free dof. Scaling the deforming part of
+    the velocity, which keeps the momenta, conserves their energy in excess of the undisturbed
+    wind, within the bounds `SCALED`. Any remainder is counted as exchanged with the air.
     """
     own, mass, v = packed.added, packed.mass, course.v
     if np.abs(course.angle - own.angle).max(initial=0.0) <= TURN:
@@ -207,18 +207,18 @@ def renewed_flow(case: Case, packed: Any, course: Any) -> bool:
 
 
 def _blow(case: Case, own: AddedMass, course: Any) -> None:
-    """Put the velocity of the air at the time of a motion."""
+    """Set the wind velocity at the current time of the motion."""
     for _, history in case.wind_terms:
         own.blown[0] = history(float(course.tally.time)) * own.wind
 
 
 def _conserved(own: AddedMass, mass: Inertia, v: NDArray) -> float:
-    """Energy (J) that a steady wind keeps: of sheet and flow, and U.P."""
+    """Energy (J) that a steady wind conserves: energy of sheet and flow, and U.P."""
     return whole_energy(own, mass, v) - energy_of_fluid(own, np.zeros_like(v) + own.blown[0])
 
 
 def _rigid_part(case: Case, packed: Any, course: Any) -> NDArray:
-    """The rigid motion (rows, 3) that supports permit, with the momenta of sheet and fluid."""
+    """Rigid motion (rows, 3), within the supports, with the momenta of sheet and fluid."""
     own, by, v = packed.added, packed.numbering, course.v
     place = case.structure.nodes + by.outward(course.u)
     free = free_rigid_motions(place, case.constraints).T
@@ -234,7 +234,7 @@ def _rigid_part(case: Case, packed: Any, course: Any) -> NDArray:
 
 
 def _find_flow(case: Case, own: AddedMass, mass: Inertia, outward: NDArray, u: NDArray) -> None:
-    """Find the flow at `outward` (n, 3) in the order of the case, u (rows, 3) in memory."""
+    """Compute the flow at `outward` (n, 3) in the order of the case, u (rows, 3) in memory."""
     flow: Any = fluid_at(case, outward).flow
     own.flow[:] = flow if isinstance(flow, np.ndarray) else flow.toarray()
     own.resistance[:] = inverse(own.flow.copy())
@@ -277,7 +277,7 @@ def put_areas(own, u):
 
 @inner
 def put_rates(own, u, v):
-    """Put the changes of the area vectors at velocities v (rows, 3)."""
+    """Put the rates of the area vectors at velocities v (rows, 3)."""
     turn, lean = own.vectors[2], own.vectors[3]
     for t in range(own.triangles.shape[0]):
         first, second, third = own.triangles[t, 0], own.triangles[t, 1], own.triangles[t, 2]
@@ -307,7 +307,7 @@ def flux(own, area, v, out):
 
 @inner
 def put_through(own, jump):
-    """Put what jumps (u,) press on corners, N/m2."""
+    """Put the forces on corners that unit area vectors get from jumps (u,), N/m2."""
     for e in range(own.through.size):
         own.through[e] = 0.0
     for i in range(jump.size):
@@ -317,7 +317,7 @@ def put_through(own, jump):
 
 @inner
 def add_push(own, area, jump, force):
-    """Add the forces of jumps (u,) through area vectors (t, 3) to those (rows, 3) of the nodes."""
+    """Add the nodal forces (rows, 3) of pressure jumps (u,) through area vectors (t, 3)."""
     put_through(own, jump)
     for t in range(area.shape[0]):
         for k in range(3):
@@ -327,10 +327,10 @@ def add_push(own, area, jump, force):
 
 @inner
 def times(matrix, x, out):
-    """A x of a symmetric matrix, to `out`, both (u,)."""
+    """out = A x for a symmetric matrix, both (u,)."""
     for i in range(x.size):
         out[i] = 0.0
-    for j in range(x.size):  # by columns, which need no sums in order
+    for j in range(x.size):  # by columns, so that sums need no fixed order
         row, factor = matrix[j], x[j]
         for i in range(x.size):
             out[i] += row[i] * factor
@@ -338,7 +338,7 @@ def times(matrix, x, out):
 
 @inner
 def dot(x, y):
-    """x . y."""
+    """Dot product of x and y."""
     total = 0.0
     for i in range(x.size):
         total += x[i] * y[i]
@@ -347,7 +347,7 @@ def dot(x, y):
 
 @inner
 def lighten(mass, force, out, line):
-    """M^-1 force on free dofs, to `out`, both (rows, 3); `line` is memory."""
+    """out = M^-1 force on free dofs, both (rows, 3); `line` is a work array."""
     if mass.lumped:
         inverse, given, found = flat(mass.inverse), flat(force), flat(out)
         for i in range(inverse.size):
@@ -358,7 +358,7 @@ def lighten(mass, force, out, line):
 
 @kernel
 def move(own, mass, jump, out, line):
-    """Add B M^-1 B' of a jump (u,) to `out` (u,); leaves M^-1 B' of it in the nodal memory."""
+    """Add B M^-1 B' jump to `out` (u,); M^-1 B' jump stays in the nodal work array."""
     force, moved, found = own.nodal[0], own.nodal[1], own.lines[5]
     pushed = flat(force)
     for i in range(pushed.size):
@@ -373,7 +373,7 @@ def move(own, mass, jump, out, line):
 # ------------------------------------------------------------------ parts of the equation of motion
 @addressed(ADDRESS, ADDRESS)
 def turn_flow(m, u, v):
-    """Add to the forces, N, what the turning of the area vectors takes, and the drag alpha M v.
+    """Add the forces, N, that turning area vectors need, and the drag alpha M v.
 
     Also what an air takes that accelerates. Returns the power of the drag, W. The fluid has none
     but what it takes from the wind.
@@ -430,19 +430,19 @@ def turn_flow(m, u, v):
 
 @addressed(ADDRESS)
 def solve_with_fluid(m, out):
-    """Solve with the mass and the added mass."""
+    """Solve for accelerations with the mass and the added mass."""
     solve(m.added, m.mass, m.s.force, rows_at(out, m.s.force.shape[0]), m.s.line)
 
 
 @kernel
 def press(own, jump, force):
-    """Add the forces B' jump, N, to those (rows, 3) of the nodes."""
+    """Add the nodal forces B' jump (rows, 3), N."""
     add_push(own, own.area, jump, force)
 
 
 @kernel
 def solve(own, mass, force, a, line):
-    """Accelerations a (rows, 3) by forces, m/s2, with the area vectors as put."""
+    """Accelerations a (rows, 3), m/s2, due to forces, with the stored area vectors."""
     lines = own.lines
     z, left, along, better, moved = lines[0], lines[1], lines[2], lines[3], lines[4]
     lighten(mass, force, a, line)
@@ -476,7 +476,7 @@ def solve(own, mass, force, a, line):
 
 @kernel
 def energy_of_fluid(own, v):
-    """Kinetic energy (J) of fluid at rest for velocities v (rows, 3), with the areas as put."""
+    """Kinetic energy (J) of fluid at rest for velocities v (rows, 3) with the stored areas."""
     flux(own, own.area, v, own.lines[0])
     times(own.flow, own.lines[0], own.lines[1])
     return 0.5 * dot(own.lines[0], own.lines[1])
@@ -484,7 +484,7 @@ def energy_of_fluid(own, v):
 
 @inner
 def put_uniform(velocity, out):
-    """Put one velocity (3,) of all nodes."""
+    """Give all nodes one velocity (3,)."""
     for i in range(out.shape[0]):
         for c in range(3):
             out[i, c] = velocity[c]
@@ -492,7 +492,7 @@ def put_uniform(velocity, out):
 
 @inner
 def put_relative(own, v):
-    """Put velocities (rows, 3) relative to the air into the first nodal memory."""
+    """Put velocities (rows, 3) relative to the air into the first nodal work array."""
     for i in range(v.shape[0]):
         for c in range(3):
             own.nodal[0, i, c] = v[i, c] - own.blown[0, c]
@@ -500,7 +500,7 @@ def put_relative(own, v):
 
 @kernel
 def energy_of_flow(own, v):
-    """Kinetic energy (J) of the flow for velocities v (rows, 3) of the sheet; keeps U.P."""
+    """Kinetic energy (J) of the flow for sheet velocities v (rows, 3); stores U.P."""
     put_relative(own, v)
     energy = energy_of_fluid(own, own.nodal[0])
     put_uniform(own.blown[0], own.nodal[0])
@@ -511,13 +511,13 @@ def energy_of_flow(own, v):
 
 @kernel
 def whole_energy(own, mass, v):
-    """The same of the sheet and of the fluid."""
+    """Kinetic energy (J) of the sheet and of the fluid."""
     return kinetic_energy(mass, v, (0, v.shape[0])) + energy_of_fluid(own, v)
 
 
 @addressed(ADDRESS, ADDRESS)
 def observe_fluid(m, v, a):
-    """Add to the forces, N, what the fluid resists, and take the drag, for reactions.
+    """Add the inertial force of the fluid, N, and remove the drag, for reactions.
 
     Returns the energy of the flow, J.
     """

@@ -1,4 +1,4 @@
-"""What discrete adjoints of motions share: derivatives by what a motion has beside its terms."""
+"""Base of discrete adjoints: gradients with respect to loads, support motion, mass and alpha."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from foldyn.mechanics.pullback import Pullback, arrays_of_body, pull_all, refuse
 
 
 class ByMotion(NamedTuple):
-    """Derivatives by what a motion has beside its terms."""
+    """Gradients with respect to loads, support motion, mass and alpha."""
 
     loads: NDArray  # (l,) by `System.loads`
     moved: NDArray  # (s,) by `System.moved`
-    mass: NDArray  # (entries,) by those of the nodal mass matrix
+    mass: NDArray  # (entries,) by the entries of the nodal mass matrix
     alpha: NDArray  # (1,)
 
 
 class Adjoint(ABC):
-    """Backward through a motion, from derivatives of a number by its samples.
+    """Backward pass through a motion, from the derivatives of a scalar with respect to its samples.
 
     Parameters
     ----------
     motion : Motion
-        Ready to be computed, by `dynamics.driver.prepare`.
+        As `dynamics.driver.prepare` returns it.
     """
 
     def __init__(self, motion: Any) -> None:
@@ -44,7 +44,7 @@ class Adjoint(ABC):
         self._weight, self._product, self._rate = np.zeros((3, packed.system.rows, 3))
 
     def add_supports(self, t: float, by_u: NDArray, by_v: NDArray) -> None:
-        """Add what a number with these derivatives by a sample at t (s) has by supports."""
+        """Add the derivatives with respect to support motion, from those by a sample at t (s)."""
         self._evaluate(t)
         moved, factor = self._system.moved, self._scratch.factor
         rate = factor[moved.row]
@@ -53,32 +53,32 @@ class Adjoint(ABC):
 
     @abstractmethod
     def backward(self, first: int, last: int, by_u: NDArray, by_v: NDArray) -> None:
-        """Go back over the steps from number `first` to `last`.
+        """Step backward from step number `last` to step number `first`.
 
-        by_u, by_v : derivatives (n, 3) of the number by the state at the last; they become, in
-            place, those by the state at the first.
+        by_u, by_v : derivatives (n, 3) of the scalar with respect to the state at the last;
+        overwritten with the derivatives with respect to the state at the first.
         """
 
     def gradient(self, by_u: NDArray, by_v: NDArray) -> dict[str, NDArray]:
-        """Derivatives of the number, from those by the state at the start, where it goes back to.
+        """Complete the gradient, from the derivatives with respect to the initial state.
 
-        By the arrays of the terms (`pullback.arrays_of_body`), by "loads", "moved", "mass" and
-        "alpha" as `ByMotion` says, and by "start.displacement" and "start.velocity".
+        Keys: the arrays of the terms (`pullback.arrays_of_body`), the fields "loads", "moved",
+        "mass" and "alpha" of `ByMotion`, and "start.displacement" and "start.velocity".
         """
         self._evaluate(self._plan.start)
         moved, outward = self._system.moved, self._packed.numbering.outward
-        # a base starts from where the state puts it
+        # a base moves from its initial displacement
         free = ~self._imposed.ravel()[moved.dof]
         factor = self._scratch.factor[moved.row, 0]
         self._by.moved[:] -= free * by_u.ravel()[moved.dof] * factor
-        # forces of terms resist: they stand with a minus in the acceleration
+        # internal forces enter the acceleration with a minus sign
         terms = {name: -out for name, out in self._pullback.gradient.items()}
         start = {"start.displacement": outward(by_u), "start.velocity": outward(by_v)}
         return terms | self._by._asdict() | start
 
     # ------------------------------------------------------------------ for steps in Python
     def _whole(self, t: float, q: NDArray, w: NDArray) -> tuple[NDArray, NDArray]:
-        """Displacement and velocity (n, 3) at a time (s) with those of supports."""
+        """Displacement and velocity (n, 3) at time t (s), support motion included."""
         self._evaluate(t)
         moved, factor = self._system.moved, self._scratch.factor
         return carried(moved, factor[:, 0], q), carried(moved, factor[:, 1], w)
@@ -87,27 +87,27 @@ class Adjoint(ABC):
         self._weight, self._product, self._rate = np.zeros((3, *self._product.shape))
 
     def _pull(self, u: NDArray, v: NDArray, weight: NDArray) -> None:
-        """Add the derivatives of weight . b at the time evaluated last, since `_forget`."""
+        """Add the derivatives of weight . b, as evaluated last, to the sums since `_forget`."""
         self._weight += weight
         time = float(self._scratch.time[0])
         pull_all(self._pullback.terms, u, v, time, weight, self._product, self._rate)
 
     def _add_supports(self) -> None:
-        """Add what loads and supports that move have of what was pulled since `_forget`."""
+        """Add the derivatives by loads and support motion of all pulls since `_forget`."""
         loads, moved, factor = self._system.loads, self._system.moved, self._scratch.factor
         self._by.loads[:] += self._weight.ravel()[loads.dof] * factor[loads.row, 0]
         self._by.moved[:] -= self._product.ravel()[moved.dof] * factor[moved.row, 0]
         self._by.moved[:] -= self._rate.ravel()[moved.dof] * factor[moved.row, 1]
 
     def _add_mass(self, push: NDArray, a: NDArray, w: NDArray) -> None:
-        """Add the derivatives of -push . M (a + alpha w) by the mass and by alpha."""
+        """Add the derivatives of -push . M (a + alpha w) with respect to the mass and alpha."""
         mass, alpha = self._mass, self._system.alpha
         pushed = push[self._rows]
         self._by.mass[:] -= np.einsum("ea,ea->e", pushed, (a + alpha * w)[mass.indices])
         self._by.alpha[0] -= mass.data @ np.einsum("ea,ea->e", pushed, w[mass.indices])
 
     def _push(self, by_a: NDArray) -> NDArray:
-        """Weights (n, 3) of b in a number that has these derivatives by -M^-1 b: less M^-1 them."""
+        """Return M^-1 by_a (n, 3): minus the derivatives by b, given those by a = -M^-1 b."""
         if self._mass.lumped:
             return self._mass.inverse * by_a
         out = np.zeros_like(by_a)
@@ -117,7 +117,7 @@ class Adjoint(ABC):
     def _add_acceleration(
         self, a: NDArray, w: NDArray, by_a: NDArray, by_u: NDArray, by_v: NDArray
     ) -> None:  # fmt: skip
-        """Add what derivatives by a = -M^-1 b - alpha w are by all else, after `_pull`."""
+        """Propagate derivatives by a = -M^-1 b - alpha w to all its arguments, after `_pull`."""
         self._add_supports()
         self._add_mass(self._push(by_a), a, w)
         by_u -= self._product
@@ -130,9 +130,9 @@ class Adjoint(ABC):
 
 
 def refuse(motion: Any) -> None:
-    """Refuse motions that have no adjoint yet, with a remedy."""
+    """Refuse motions without an adjoint, with a remedy."""
     packed, system = motion.packed, motion.packed.system
-    arrays_of_body(packed.body)  # which refuses terms
+    arrays_of_body(packed.body)  # refuses terms without gradients
     lacks = {
         "contact, which switches on and off": system.touches,
         "air": motion.case.air is not None,

@@ -1,12 +1,12 @@
-"""Energy audit: kinetic + strain + air + dissipated - work stays what it was at the start.
+"""Energy audit: kinetic + strain + air + dissipated - work keeps its initial value.
 
-Air is what a sheet in air has lost to it. Heat acts by forces whose work a free sheet stores and
-gives back (`mechanics.heat`): strain energies and work both leave that out, but it is at play, and
-the error is measured by it as well.
+"Air" is the energy that the sheet has lost to the air. Heat acts by forces whose work a free sheet
+stores and returns (`mechanics.heat`): strain energies and work both exclude it, but the energy at
+play, which the error is relative to, includes it.
 
-The audit says nothing where the energies at play are no larger than rounding errors: those of the
-energies themselves, of the bars' forces at displacements of that size, and of the dihedrals, which
-are computed from positions. All of these follow from the motion; none is a fixed number.
+The audit makes no statement if the energies at play do not exceed rounding errors, which have three
+sources: the energies themselves, the bar forces at displacements of that size, and the dihedrals,
+which are computed from positions. All follow from the motion; none is a fixed number.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from foldyn.mechanics.assembly import Assembly
 
 EPS = float(np.finfo(float).eps)
-MARGIN = 16.0  # times the rounding errors of single operations: what they add up to
+MARGIN = 16.0  # times the rounding error of a single operation: bound for their sum
 ANGLE = 16.0 * EPS  # rad: rounding of a dihedral
-BEGUN = 1e-6  # of the longest bar: a motion with smaller displacements has not become unbounded
+BEGUN = 1e-6  # of the longest bar: motions with smaller displacements are not judged unbounded
 
 AIR = "air"
 AUDITED = ("kinetic", "dissipated", "work")
@@ -51,7 +51,7 @@ def energy_scale(energy: NDArray, air: bool) -> float:
 
 
 class Balance:
-    """What the samples of a motion, seen piece by piece, say of its energies.
+    """Energy statistics of a motion, updated sample by sample.
 
     Parameters
     ----------
@@ -61,11 +61,11 @@ class Balance:
     Attributes
     ----------
     start : ndarray, shape (1, columns)
-        Energies (J) of the first sample, as audited; none (0, columns) before it.
+        Energies (J) of the first sample, as audited; shape (0, columns) before it.
     count : int
         Samples seen.
     error, scale, largest, farthest : float
-        Largest energy error (J), energy at play (J), energy of all (J), and displacement (m).
+        Largest energy error (J), energy at play (J), single energy (J), and displacement (m).
     """
 
     NUMBERS = ("error", "scale", "largest", "farthest")
@@ -77,7 +77,7 @@ class Balance:
         self.error = self.scale = self.largest = self.farthest = 0.0
 
     def add(self, energy: NDArray, displacement: NDArray) -> None:
-        """See further samples: energies (k, columns), displacements (k, n, 3)."""
+        """Update with further samples: energies (k, columns), displacements (k, n, 3)."""
         if not len(energy):
             return
         if not self.count:
@@ -91,24 +91,24 @@ class Balance:
 
     @property
     def relative(self) -> float:
-        """Largest energy error over the energies at play; 0 where nothing is at play."""
+        """Largest energy error relative to the energies at play; 0 if nothing is at play."""
         return self.error / self.scale if self.scale > 0.0 else 0.0
 
     def off(self, energy: NDArray, limit: float) -> NDArray:
-        """Which of some samples have an error above a limit times the energies at play."""
+        """Whether each of the samples has an error above `limit` times the energies at play."""
         seen = np.concatenate([self.start, energy])
         return np.abs(energy_error(seen))[1:] > limit * self.scale
 
 
 class Rounding:
-    """What rounding hides in the motions of a body."""
+    """Rounding errors of the energies in motions of a body."""
 
     def __init__(self, body: Assembly) -> None:
         self.length = body.sheet.longest()
         self._force, self._moment = float(np.linalg.norm(body.scale())), body.turning_moments()
 
     def energy(self, energy: NDArray | float, moved: float) -> float:
-        """Energy (J) of the rounding errors in a motion with displacements up to `moved` (m).
+        """Bound (J) for rounding errors of the energies, with displacements up to `moved` (m).
 
         energy : (samples, columns), as audited, or the largest of them.
         """
@@ -118,14 +118,14 @@ class Rounding:
         return MARGIN * (EPS * (float(np.nanmax(np.abs(energy))) + bars) + turns)
 
     def reveals(self, balance: Balance) -> bool:
-        """Whether an error as large as the energies at play shows that a motion is unstable.
+        """Whether an error as large as the energies at play proves a motion unstable.
 
-        In the first steps under a load that begins slowly the little energy that there is may be
-        far off: implicit methods measure their errors against no less than `BEGUN`.
+        In the first steps under a load that begins slowly, the relative energy error may be large:
+        implicit methods measure their errors against displacements of at least `BEGUN`.
         """
         far = balance.farthest > BEGUN * self.length
         return far and balance.scale > self.energy(balance.largest, balance.farthest)
 
     def least_motion(self, accuracy: float) -> float:
-        """Displacement (m) below which dihedrals are less accurate than that; 0 without hinges."""
+        """Displacement (m) below which dihedrals miss `accuracy`; 0 without hinges."""
         return self.length * ANGLE / accuracy if self._moment > 0.0 else 0.0

@@ -17,12 +17,12 @@ from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics.contact.step_limit import RESOLVED
 
 ORDER = 2
-NEWTON = 4  # iterations: few, where c is small
+NEWTON = 4  # iterations: c is small, so that few suffice
 ROUNDING = 1e-15
 
 
 def growth(omega, damping, dt):
-    """Factor by which a step of dt multiplies a free vibration, at most, per frequency.
+    """Largest factor by which a step of dt multiplies a free vibration, per frequency.
 
     With u' = u + v + a/2, a' = -w^2 u' - c (v + a) and v' = v + (a + a')/2, in units of the step,
     the factors are the roots of z^3 + p z^2 + q z + c/2. The one near -c/2 is found by Newton's
@@ -41,7 +41,7 @@ def growth(omega, damping, dt):
     pair = np.sqrt(np.abs(product))
     pair = np.where(apart < 0.0, pair, np.abs(half) + np.sqrt(np.maximum(apart, 0.0)))
     out = np.maximum(np.abs(z), pair)
-    if not found.all():  # damped so strongly that roots come together
+    if not found.all():  # damping so strong that roots merge
         p, q, d = (each[~found] for each in (p, q, 0.5 * c))
         zero, one = np.zeros_like(p), np.ones_like(p)
         step = np.array([[-p, -q, -d], [one, zero, zero], [zero, one, zero]])
@@ -54,7 +54,7 @@ def advance(equation, course, plan, room, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
     `course.carry` is the acceleration, kept from one step and stretch to the next; the tally keeps
-    the powers beside the energies. Each thread of a team advances its own nodes.
+    powers and energies. Each thread of a team advances its own nodes.
     """
     course = borrowed(course)
     team, stage, a, powers = equation.team, equation.stage, course.carry, equation.before
@@ -64,11 +64,11 @@ def advance(equation, course, plan, room, stretch):
     begun = course.tally.steps
     end = min(begun + stretch, plan.steps)
     post_totals(team, 0.0, 0.0, 0.0, 0)
-    for step in range(begun + 1 if begun > 0 else 0, end + 1):  # step 0, of no length, is the start
+    for step in range(begun + 1 if begun > 0 else 0, end + 1):  # step 0 only records the start
         work_in, work_out, work_air, wrong = 0.0, 0.0, 0.0, 0
         span = plan.dt if step > 0 else 0.0
         left = span
-        while True:  # once, unless contact asks for shorter steps
+        while True:  # one pass, unless contact asks for shorter steps
             dt = 0.0
             if step > 0:
                 dt = longest_step(equation, course.u, course.v, a, left, RESOLVED)

@@ -1,11 +1,11 @@
-"""The discrete adjoint of central differences: exact gradients of what it computes.
+"""Discrete adjoint of central differences: exact gradients of the computed motion.
 
-A step takes displacement u, velocity v and the acceleration a that it keeps to
+A step maps displacement u, velocity v and the stored acceleration a to
 
     v' = v + dt/2 a,   u1 = u + dt v',   a1 = a(u1, v' + dt/2 a),   v1 = v' + dt/2 a1.
 
-Steps are taken again, to the bit, from states that are kept: of a segment where forces were
-evaluated, and the accelerations.
+Steps are recomputed, bit for bit, from stored states; for one segment at a time, the points of
+force evaluation and the accelerations are stored.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from foldyn.dynamics.adjoint import Adjoint
 from foldyn.dynamics.equation import EquationOfMotion, accelerate
 
-ROOM = 4e6  # bytes of the states of a segment
+ROOM = 4e6  # bytes for the states of a segment
 
 
 class Evaluated(NamedTuple):
-    """Where forces were evaluated in a step, and the acceleration there."""
+    """Point of a force evaluation in a step, and the acceleration there."""
 
     u: NDArray  # (n, 3) m
     ahead: NDArray  # m/s
@@ -30,7 +30,7 @@ class Evaluated(NamedTuple):
 
 
 class CentralDifferenceAdjoint(Adjoint):
-    """Backward through a motion by central differences; see `Adjoint`."""
+    """Backward pass through a motion by central differences; see `Adjoint`."""
 
     def __init__(self, motion: Any) -> None:
         super().__init__(motion)
@@ -46,7 +46,7 @@ class CentralDifferenceAdjoint(Adjoint):
             self._kept.append(self._taken(first, first + self._apart, *self._kept[-1])[0])
 
     def backward(self, first: int, last: int, by_u: NDArray, by_v: NDArray) -> None:
-        """See `Adjoint`."""
+        """Step backward from step number `last` to step number `first`; see `Adjoint`."""
         for step in range(last, first, -1):
             number, place = divmod(step - 1, self._apart)
             if number != self._number:
@@ -62,7 +62,7 @@ class CentralDifferenceAdjoint(Adjoint):
             self._by_a[:] = 0.0
 
     def _back(self, step: int, at: Evaluated, by_u: NDArray, by_v: NDArray) -> None:
-        """From the end of a step to its start."""
+        """Step backward from the end of one step to its start."""
         half, by_ahead = 0.5 * self._plan.dt, np.zeros_like(by_v)
         by_a = self._by_a + half * by_v
         self._through(self._plan.start + step * self._plan.dt, at, by_u, by_ahead, by_a)
@@ -72,7 +72,7 @@ class CentralDifferenceAdjoint(Adjoint):
     def _through(
         self, t: float, at: Evaluated, by_u: NDArray, by_v: NDArray, by_a: NDArray
     ) -> None:  # fmt: skip
-        """Add what derivatives by an acceleration are by its displacement and velocity."""
+        """Propagate derivatives by an acceleration to its displacement and velocity."""
         self._forget()
         self._pull(*self._whole(t, at.u, at.ahead), self._push(by_a))
         self._add_acceleration(at.a, at.ahead, by_a, by_u, by_v)
@@ -80,9 +80,9 @@ class CentralDifferenceAdjoint(Adjoint):
     def _taken(
         self, first: int, last: int, u: NDArray, v: NDArray, a: NDArray
     ) -> tuple[tuple[NDArray, NDArray, NDArray], list[Evaluated]]:
-        """The state after the steps from `first` to `last`, and where they evaluate forces.
+        """Repeat the steps `first` to `last`: the final state, and the points of force evaluation.
 
-        The arithmetic is that of the method itself, to the bit.
+        Reproduces the forward run bit for bit.
         """
         dt, taken = self._plan.dt, []
         for step in range(first + 1, last + 1):

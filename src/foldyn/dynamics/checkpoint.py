@@ -1,9 +1,9 @@
-"""Checkpoints: how an interrupted motion is stored on disk, and resumed.
+"""Checkpoints: how an interrupted motion is stored on disk and resumed.
 
-Beside the file of its result stands a folder with its samples, which only grow, and a checkpoint:
-what the motion is, how many samples count, their checksums, and a snapshot of all on which the next
-steps depend. The checkpoint is sealed and replaced whole, after its samples are on the disk. One
-process at a time keeps a motion in a file: it holds the lock beside it.
+Next to the result file, a folder holds the samples, which are only appended, and a checkpoint: the
+identity of the motion, the number of valid samples, their checksums, and a snapshot of everything
+that the next steps depend on. The checkpoint carries a checksum and is replaced atomically, after
+its samples are on disk. One process at a time may write a motion: it holds the lock file.
 """
 
 from __future__ import annotations
@@ -54,28 +54,28 @@ CONSTANT = ("team", "strips", "packed", "course", "_packed", "_course", "_plan",
 
 
 class Keeping:
-    """How a motion is kept.
+    """How a motion is stored on disk.
 
     Parameters
     ----------
     file : Path
         Of the result.
     seconds : float
-        Between checkpoints. A motion that ends before the first one, and whose samples take little
-        memory, leaves the disk alone.
+        Between checkpoints. A motion that ends before the first one, with few samples, writes
+        nothing to disk.
     resume : bool
-        Whether to go on with what was cut off.
+        Whether to continue an interrupted motion.
     anew : bool
-        Whether to give up what was cut off.
+        Whether to discard an interrupted motion.
     how : tuple of str
-        How the user asks for that, and for a new beginning, in messages.
+        How the user asks to resume, and to start over, for messages.
 
     Attributes
     ----------
     begun : bool
-        Whether there is something on the disk.
+        Whether there is anything on disk.
     columns : Columns
-        The samples there.
+        The samples on disk.
     """
 
     def __init__(
@@ -95,22 +95,22 @@ class Keeping:
 
     @property
     def room(self) -> float:
-        """Bytes that the samples may take on the disk, with those that are there already."""
+        """Bytes available for samples on disk, including those already written."""
         try:
             there = next(place for place in self.folder.absolute().parents if place.is_dir())
             own = [file.stat().st_size for file in self.folder.glob("*") if file.is_file()]
             return float(shutil.disk_usage(there).free + sum(own))
-        except OSError:  # a folder that is gone: writing will tell
+        except OSError:  # the folder is gone: writing will report it
             return math.inf
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Let no other process write to the file, or to what is kept beside it.
+        """Lock the file and its checkpoint folder against other processes.
 
         Raises
         ------
         InputError
-            Another process does, or nothing can be written there.
+            Another process holds the lock, or the folder is not writable.
         """
         lock = self.file.with_name(f".{self.file.name}.lock")
         with ExitStack() as stack:
@@ -129,7 +129,7 @@ class Keeping:
             yield
 
     def finished(self, key: str) -> xarray.Dataset | None:
-        """The result, if it is there whole, is that of a motion, and is to be gone on with."""
+        """Finished result of this motion if it exists and is to be resumed, else None."""
         if not self.resume or self.folder.exists() or not self.file.is_file():
             return None
         result = load(self.file, whole=False)
@@ -139,26 +139,27 @@ class Keeping:
         return result if same else None
 
     def keeps(self, about: Mapping[str, Any]) -> bool:
-        """Whether what is kept is this motion."""
+        """Whether the checkpoint belongs to this motion."""
         kept, now = self._read(), json.loads(json.dumps(about))
         return kept is not None and now.items() <= kept[_ABOUT]["motion"].items()
 
     def begin(
         self, about: Mapping[str, Any], rows: Mapping[str, tuple[int, ...]]
     ) -> dict[str, NDArray] | None:
-        """What was kept of the same motion, to go on from; None to begin anew.
+        """Return the checkpoint of the same motion to resume from; None for a fresh start.
 
         Parameters
         ----------
         about : mapping of str to str or number
-            All that decides what the motion is.
+            Everything that determines the motion.
         rows : mapping of str to tuple of int
             Shape of a row of each column.
 
         Raises
         ------
         InputError
-            There is something kept and it is not to go on, or it is of another motion, or damaged.
+            There is a checkpoint, but `resume` is off, or it belongs to another motion, or is
+            damaged.
         """
         self._about, self._rows, self._last = dict(about), dict(rows), time.monotonic()
         if self._anew:
@@ -194,7 +195,7 @@ class Keeping:
         return time.monotonic() - self._last >= self.seconds
 
     def append(self, rows: Mapping[str, NDArray]) -> None:
-        """Put samples on the disk; raises `ComputationError` where that fails."""
+        """Append samples on disk; raise `ComputationError` if that fails."""
         try:
             if not self.begun:
                 self.folder.mkdir(exist_ok=True)
@@ -204,7 +205,7 @@ class Keeping:
             self._fail(error)
 
     def checkpoint(self, arrays: Mapping[str, NDArray], reached: float) -> None:
-        """Make a checkpoint at the time (s) reached, after `append` of all samples until then."""
+        """Write a checkpoint at the time (s) reached, after `append` of all samples so far."""
         told = {
             "motion": self._about, "samples": self.columns.count, "sums": self.columns.sums,
             "reached": reached,
@@ -220,7 +221,7 @@ class Keeping:
         self._reached, self._last = reached, time.monotonic()
 
     def check(self) -> None:
-        """Raise `ComputationError` where samples are not those that were written."""
+        """Raise `ComputationError` if samples on disk differ from what was written."""
         if self.begun and (damaged := self.columns.damaged()):
             raise ComputationError(
                 f"{damaged}: was changed by something else while the motion ran, so the result "
@@ -229,18 +230,18 @@ class Keeping:
 
     @property
     def summary(self) -> str:
-        """What is kept, and how to go on, for the end of a message; empty where there is none."""
+        """End of a message: what is stored and how to resume; empty without a checkpoint."""
         if self._reached is None:
             return ""
         return f"; {self.folder} keeps it up to t = {self._reached:.6g} s: go on by {self.how[0]}"
 
     def remove(self) -> None:
-        """Remove what is kept: the result is in its file."""
+        """Remove the checkpoint folder, once the result is in its file."""
         shutil.rmtree(self.folder, ignore_errors=True)
         self.begun, self._reached = False, None
 
     def save_result(self, result: xarray.Dataset) -> xarray.Dataset:
-        """Write the result to its file, and remove what was kept; the result as it is there."""
+        """Write the result, remove the checkpoint folder, and return the result as stored."""
         try:
             save(result, self.file)
         except OSError as error:
@@ -250,7 +251,7 @@ class Keeping:
         return load(self.file, whole=False)
 
     def _read(self) -> dict[str, Any] | None:
-        """The checkpoint; None where the first one was never made."""
+        """Return the checkpoint; None if none has been written."""
         path = self.folder / CHECKPOINT
         if not path.exists():
             return None
@@ -261,7 +262,7 @@ class Keeping:
                 kept: dict[str, Any] = {name: stored[name] for name in stored.files}
             kept[_ABOUT] = json.loads(kept[_ABOUT].tobytes())
             float(kept[_ABOUT]["reached"])
-        except Exception:  # what readers raise on damaged files is of any kind
+        except Exception:  # readers raise any kind of exception on damaged files
             raise InputError(
                 f"{path}: is damaged, or was made by another version of Foldyn; {self.how[1]} to "
                 "begin anew"
@@ -269,7 +270,7 @@ class Keeping:
         return kept
 
     def _compare(self, before: Mapping[str, Any]) -> None:
-        """Refuse to go on with another motion, by the name of what has changed."""
+        """Refuse to resume another motion, and name what has changed."""
         now = self._about
         for name in dict.fromkeys([*now, *before]):
             if now.get(name) != before.get(name):
@@ -285,13 +286,13 @@ class Keeping:
 
 
 def _unwritable(error: OSError) -> str:
-    """Why something cannot be written, and what to do."""
+    """Reason why a write failed, and the remedy."""
     remedy = "make room" if error.errno in FULL else "see that nothing else moves or changes it"
     return f"cannot be written ({error.strerror or error}): {remedy}"
 
 
 def check_keeping(store: Any, checkpoint: Any, resume: Any) -> Keeping:
-    """How a motion is kept, from the arguments of `simulate`."""
+    """Check the arguments `store`, `checkpoint` and `resume` of `simulate`; see `Keeping`."""
     if not isinstance(store, str | os.PathLike):
         raise InputError(f" = {show(store)}: give the file of the result", "store")
     file = check_target(store)
@@ -302,9 +303,9 @@ def check_keeping(store: Any, checkpoint: Any, resume: Any) -> Keeping:
 def identity(
     case: Case, method: Any, plan: StepPlan, state: Iterable[Any], sampled: Iterable[str],
 ) -> dict[str, Any]:  # fmt: skip
-    """Numbers and texts by name, of a case file's keys where it has them.
+    """Identity of a motion: values by name, the case-file key where there is one.
 
-    Functions of the user's count by their places alone: their text is not known.
+    User functions count only by their position, as their source is unknown.
 
     Parameters
     ----------
@@ -312,9 +313,9 @@ def identity(
     method : Integrator
     plan : StepPlan
     state : iterable
-        What the motion starts from.
+        The initial state.
     sampled : iterable of str
-        Names of what the user samples.
+        Names of the user's sampled quantities.
     """
     document = to_document(case)
     options = getattr(method.scheme, "keywords", {})
@@ -342,7 +343,7 @@ def identity_digest(about: Mapping[str, Any]) -> str:
 
 
 def _flat(table: Mapping[str, Any], place: str = "") -> dict[str, Any]:
-    """Values of tables within tables, by their keys with dots."""
+    """Values of nested tables, with dotted keys."""
     found: dict[str, Any] = {}
     for key, value in table.items():
         if isinstance(value, Mapping):
@@ -356,7 +357,7 @@ def _flat(table: Mapping[str, Any], place: str = "") -> dict[str, Any]:
 
 
 def _digest(array: Any) -> str | None:
-    """Digest of the numbers of an array; None of none."""
+    """Digest of an array; None for None."""
     if array is None:
         return None
     values = np.ascontiguousarray(array)
@@ -365,7 +366,7 @@ def _digest(array: Any) -> str | None:
 
 
 def state_parts(packed: Packed, course: Course) -> dict[str, Any]:
-    """What changes in a case and its state, for all methods."""
+    """Mutable state of a case and its motion, the same for all methods."""
     memory = packed.body.find(HingeMemory)
     parts: dict[str, Any] = {"course": course}
     if memory is not None:
@@ -381,7 +382,7 @@ def state_parts(packed: Packed, course: Course) -> dict[str, Any]:
 
 
 class _Place(NamedTuple):
-    """Something that changes: an array or a record, in place, or a number of its owner."""
+    """Something mutable: an array or a record, changed in place, or a number of its owner."""
 
     name: str
     owner: Any
@@ -390,7 +391,7 @@ class _Place(NamedTuple):
 
 
 def snapshot(parts: Mapping[str, Any]) -> dict[str, NDArray]:
-    """Copy what changes in parts.
+    """Copy the mutable state in `parts`.
 
     Parameters
     ----------
@@ -415,12 +416,12 @@ def snapshot(parts: Mapping[str, Any]) -> dict[str, NDArray]:
 
 
 def restore(parts: Mapping[str, Any], kept: Mapping[str, NDArray]) -> None:
-    """Put a snapshot of such parts back.
+    """Restore a snapshot of such parts.
 
     Raises
     ------
     KeyError, ValueError
-        It is one of other parts.
+        The snapshot belongs to other parts.
     """
     for name, owner, field, value in list(_places(parts)):
         then = kept[name]
@@ -436,7 +437,7 @@ def restore(parts: Mapping[str, Any], kept: Mapping[str, NDArray]) -> None:
 
 
 def _places(parts: Mapping[str, Any]) -> Iterator[_Place]:
-    """Places in parts; an array that threads share is one."""
+    """Mutable places in parts; an array that threads share appears once."""
     seen: set[int] = set()
     for place in _all_places(parts):
         if isinstance(place.value, np.ndarray):

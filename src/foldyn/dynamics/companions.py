@@ -1,9 +1,9 @@
-"""Motions of cases that differ a little from one, along its implicit steps and with its matrices.
+"""Motions of slightly different cases, along the implicit steps of one motion and its matrices.
 
-The differences of a motion from one beside it are smooth: where a step of the one has ended, those
-of the others are near to what parabolas through their last differences say. From there Newton's
-steps with the factors that the one has anyway lead to where the residual of the other is that which
-the one was left with: both are then as near to their solutions, and the difference is that of the
+The difference between a companion and the main motion is smooth in time. After each step of the
+main motion, a parabola through the last differences predicts the companion. Newton iterations with
+the main motion's factors then bring the companion's residual to the residual that the main motion
+has left: both are equally close to their solutions, so their difference is the difference of the
 solutions.
 """
 
@@ -31,32 +31,32 @@ from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
 
 MOST = 20  # iterations
-FADED = 1e-2  # of the largest difference: how small one is that counts as if it were larger
-ROUNDING = 1e-13  # of the displacement in a step: a change that is none
-STALL, ENOUGH = 0.5, 1e-3  # of the last change, and of the difference: what rounding may leave
+FADED = 1e-2  # of the largest difference: smaller differences are measured against this
+ROUNDING = 1e-13  # of the displacement in a step: changes below this are zero
+STALL, ENOUGH = 0.5, 1e-3  # of the last change, and of the difference: stall at rounding
 
 
 class Companion(NamedTuple):
-    """A motion beside another one: its case, and where it stands."""
+    """A companion motion: its case, and its current state."""
 
     packed: Packed
     course: Course
 
 
 class Accompanied(Implicit):
-    """An implicit motion by fixed steps with others beside it; see `Implicit`.
+    """An implicit motion by fixed steps with companions; see `Implicit`.
 
     Parameters
     ----------
     others : sequence of Companion
         Cases with the same dofs, without contact and laws with memory.
     share : float
-        Change of a difference, in itself, at which it is found.
+        Relative change of a difference at which its iteration ends.
 
     Attributes
     ----------
     displacement : list of list of ndarray (n, 3)
-        That of each of the others at the samples, m.
+        Displacement of each companion at the samples, m.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Accompanied(Implicit):
                 other.scheme.begin(max(end, jump))
 
     def _factors(self, h: float) -> StepMatrix:
-        """Factors of the matrix of a step h (s), or of one beside it: those of the last one."""
+        """Factors of the matrix for a step h (s), or the last ones, for a nearby step."""
         made = self._newton.origin
         if self._matrix.factorized and len(made) and abs(h - made[0][0]) <= SAME_STEP * h:
             return self._matrix
@@ -105,16 +105,16 @@ class Accompanied(Implicit):
 
 
 class _Beside:
-    """Steps of one of the others."""
+    """Steps of one companion."""
 
     def __init__(self, scheme: Alpha, share: float) -> None:
         self.scheme, self._share = scheme, share
         shape = scheme.shift.shape
-        self._apart = np.zeros((3, *shape))  # differences of the last shifts, the last one first
+        self._apart = np.zeros((3, *shape))  # last three differences of shifts, newest first
         self._known, self._h, self._largest = 0, 0.0, 0.0
 
     def follow(self, one: Scheme, matrix: StepMatrix, h: float, t: float) -> None:
-        """Take the step h (s) to the time t (s) that the one has taken."""
+        """Take the same step h (s), to the time t (s), as the main motion."""
         scheme, apart = self.scheme, self._apart
         if abs(h - self._h) > SAME_STEP * h:
             self._known, self._h = 0, h
@@ -149,17 +149,17 @@ class _Beside:
 
 @kernel
 def _found(size, apart, whole, last, share):
-    """Whether a change of this size, after the `last` one, ends an iteration."""
+    """Whether a change of norm `size`, after the change `last`, ends the iteration."""
     stalled = size > STALL * last and size <= ENOUGH * apart
     return size <= max(share * apart, ROUNDING * whole) or stalled
 
 
 @kernel
 def follow(step, shift, target, h, t, band, free, least, share, most):
-    """Iterate from a step's shift to where its residual (n, 3), N, is a target.
+    """Iterate from a step's shift until its residual (n, 3), N, equals a target.
 
-    shift : (n, 3) of the motion beside it, m: the difference is found to a share of its norm, or
-        of the norm `least`.
+    shift : (n, 3) of the main motion, m: the difference is found to a share of its norm, or of the
+    norm `least`.
     """
     d, left, own, goal = flat(step.shift), flat(step.out), flat(shift), flat(target)
     change, ties, last = np.empty(free.size), step.setting.system.ties, np.inf

@@ -1,9 +1,9 @@
-"""What damps a case, as terms: dashpots, creases, strains, beta K0, modes; drag of the air.
+"""Damping of a case as terms: dashpots, creases, strains, beta K0, modes; air drag.
 
-The drag alpha M v is none of them: `dynamics.equation` has it.
+The drag alpha M v is not a term: `dynamics.equation` adds it.
 
-Dashpots with a direction of their own, and those that act in any direction from the ground, have a
-constant matrix. Dashpots along the line between their nodes and creases are `mechanics.viscous`.
+Dashpots with a fixed direction, and isotropic ones to ground, have a constant matrix. Dashpots
+along the line between their nodes and creases are `mechanics.viscous`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from foldyn.mechanics.viscous_panels import ViscousPanelsTerm, viscous_panels
 
 
 def damping_terms(case: Case, start: Origin | None, modal: ModalRows) -> list[Term]:
-    """All terms that damp a motion that began at `start`, or at rest; `modal` is its damping."""
+    """All damping terms of a motion that began at `start`, or at rest; `modal`: modal damping."""
     terms, rayleigh = dampers(case), case.rayleigh
     if rayleigh.beta > 0.0:
         state, body = about(case, start if rayleigh.state == "start" else None)
@@ -38,7 +38,7 @@ def damping_terms(case: Case, start: Origin | None, modal: ModalRows) -> list[Te
 
 
 def air_terms(case: Case, histories: Sequence[History]) -> list[Term]:
-    """Drag of the air around a case, in a wind that varies as one of its histories."""
+    """Air drag of a case, in a wind that follows one of its histories."""
     if case.air is None or not case.air.drag:
         return []
     structure, air = case.structure, case.air
@@ -51,9 +51,9 @@ def air_terms(case: Case, histories: Sequence[History]) -> list[Term]:
 
 
 def _tangent(body: Assembly, q: NDArray) -> sparse.csr_array:
-    """Tangent (m, m) at the dofs q (m,) with all places that the model couples.
+    """Tangent (m, m) at the dofs q (m,) with all entries that the model can couple.
 
-    Zeros among them stay, so that the places are the same for all numbers of the model.
+    Explicit zeros stay, so that the sparsity does not depend on the model's values.
     """
     parts = [term.tangent(q).tocoo() for term in body.terms]
     data, rows, columns = (
@@ -69,16 +69,16 @@ def damping_matrix(case: Case, q: NDArray, quasi_static: bool = False) -> sparse
 
 
 def dampers(case: Case, quasi_static: bool = False) -> list[Term]:
-    """Dashpots, damped creases and damped strains of a case, on its m dofs.
+    """Dashpots, damped creases and strain damping of a case, on its m dofs.
 
-    Those of creases between panels that give way are left out: the hinge remembers what they do
-    (`Case.remembering`). In slow motions it has the damping of its crease times the square of the
-    crease's share in its turn; `quasi_static` counts them so.
+    Dampers of creases between compliant panels are left out: the hinge has a memory instead
+    (`Case.remembering`). In slow motions such a hinge has the damping of its crease times the
+    square of the crease's share in its turn; with `quasi_static` it is included with that.
 
     Raises
     ------
     InputError
-        The structure does not say which hinges are those of a damped crease.
+        The structure does not list the hinges of a damped crease.
     """
     body, nodes = case.elastic_body, case.structure.nodes
     pairs, strength = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
@@ -110,7 +110,7 @@ def _elements(
     case: Case, body: Assembly, nodes: NDArray, pairs: NDArray, strength: list[NDArray],
     quasi_static: bool,
 ) -> Viscous:  # fmt: skip
-    """Axial dashpots between pairs (p, 2) of nodes, damped creases, and what strains a sheet."""
+    """Axial dashpots between pairs (p, 2) of nodes, damped creases, and strain damping."""
     damping = case.crease_damping
     hinges = body.sheet.fold_hinges() if damping.any() else no_fold_hinges()
     unknown = np.setdiff1d(np.flatnonzero(damping), hinges.fold)
@@ -125,7 +125,7 @@ def _elements(
     hidden_turn, turning = hinges.hidden_turn[damped], coefficient[damped]
     if beta := case.strain_damping:
         strains = body.strains()
-        assert strains is not None  # or the case would have refused it
+        assert strains is not None  # the case would have been refused
         stiff = strains.hinge_stiffness > 0.0
         none = np.full((int(stiff.sum()), 2), NO_DOF)
         alone = strains.bar_stiffness > 0.0

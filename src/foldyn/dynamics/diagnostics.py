@@ -1,21 +1,21 @@
-"""Warnings about motions that were computed but may not be what was meant."""
+"""Warnings about motions that finished but may be inaccurate."""
 
 from __future__ import annotations
 
 from foldyn.dynamics.audit import Balance, Rounding
 from foldyn.dynamics.motion_state import StepPlan
 
-INACCURATE = 1e-2  # relative energy error above which the user is warned
+INACCURATE = 1e-2  # relative energy error above which to warn
 
 
 def is_off(balance: Balance, rounding: Rounding) -> bool:
-    """Whether the energies of a motion do not balance, rounding apart."""
+    """Whether the energy balance of a motion is off by more than rounding."""
     hidden = rounding.energy(balance.largest, balance.farthest)
     return balance.relative > INACCURATE and balance.scale > hidden
 
 
 def doubts(balance: Balance, rounding: Rounding, plan: StepPlan, size: float, remedy: str) -> str:
-    """Warning about a motion; empty if there is none.
+    """Warning about the accuracy of a motion; empty if there is none.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def doubts(balance: Balance, rounding: Rounding, plan: StepPlan, size: float, re
     rounding : Rounding
     plan : StepPlan
     size : float
-        Largest displacement (m) that errors of steps were measured by; 0 with fixed steps.
+        Largest displacement (m), the scale of the step errors; 0 with fixed steps.
     remedy : str
         What makes the motion more accurate.
     """

@@ -60,13 +60,13 @@ P = np.array(
     ]
 )
 SMALLEST = 1e-13  # step relative to the end of the motion
-RESOLVED = 0.6  # radians of a contact's vibration that a step may take: its error is controlled
-EASED = 0.1  # of the tolerance: part of the energy that slow contacts may have unresolved
+RESOLVED = 0.6  # radians of a contact's vibration per step: the error control covers the rest
+EASED = 0.1  # of the tolerance: share of the energy that unresolved slow contacts may have
 ROUNDING = 1e-9  # of a step: how far a sample may lie beyond its end
 
 
 def growth(omega, damping, dt):
-    """Factor by which a step of dt multiplies a free vibration, at most, per frequency.
+    """Largest factor by which a step of dt multiplies a free vibration, per frequency.
 
     The exponential series to the fifth power, plus z^6 / 600.
     """
@@ -95,7 +95,7 @@ def _integral(start, slopes, h, weights, count):
 
 @inner
 def _keep(equation, powers, stage):
-    """Keep the powers of the last acceleration as those of a stage."""
+    """Store the powers of the last acceleration for a stage."""
     for k in range(3):
         powers[k, stage] = equation.powers[k]
 
@@ -110,7 +110,7 @@ def _largest(values):
 
 @inner
 def _error(slopes, h):
-    """Largest entry of h sum of E times slopes (7, n); nan where one is nan."""
+    """Largest entry of h sum of E times slopes (7, n); nan if one is nan."""
     out, wrong = 0.0, 0
     for i in range(slopes.shape[1]):
         total = 0.0
@@ -131,7 +131,7 @@ def _weights(theta, out):
 
 @inner
 def _longest(equation, q, w, a, plan, tally):
-    """See `longest_step`; slow contacts need not be resolved where they can be given inertia."""
+    """Longest step for contact; slow contacts that can get inertia need not be resolved."""
     tally.kinetic = max(tally.kinetic, slow_energy(equation, w))
     pace = Pace(RESOLVED, EASED * plan.tolerance * tally.kinetic)
     return longest_step(equation, q, w, a, plan.dt, pace)
@@ -141,9 +141,9 @@ def _longest(equation, q, w, a, plan, tally):
 def advance(equation, course, plan, room, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
-    The error of a step is that of the worst node, relative to the largest displacement and the
-    largest velocity that the motion has had so far. Steps end at the stops of the plan, where
-    loads may jump.
+    The error of a step is the worst node's, relative to the largest displacement and the largest
+    velocity that the motion has had so far. Steps end at the stops of the plan, where loads may
+    jump.
     """
     course = borrowed(course)
     tally, n = course.tally, course.u.size
@@ -152,7 +152,7 @@ def advance(equation, course, plan, room, stretch):
     powers, weights = np.empty((3, 7)), np.empty(7)
     ut, vt, a = np.empty_like(course.u), np.empty_like(course.u), np.empty_like(course.u)
     fut, fvt, fa = flat(ut), flat(vt), flat(a)
-    raw = flat(course.carry)  # the acceleration at the beginning of a step, without inertia
+    raw = flat(course.carry)  # acceleration at the step's start, without inertia of contacts
     if tally.steps == 0:
         acceleration(equation, course.u, course.v, plan.start, a)
         _keep(equation, powers, 0)
@@ -180,7 +180,7 @@ def advance(equation, course, plan, room, stretch):
         stops = stop < plan.stops.size
         goal = plan.stops[stop] if stops else plan.end
         h = min(wanted, goal - t)
-        if t + 1.01 * h >= goal:  # no tiny step before it
+        if t + 1.01 * h >= goal:  # no tiny last step
             h = goal - t
         stops = stops and h == goal - t
         if h < SMALLEST * max(abs(plan.end), abs(t)):
@@ -193,7 +193,7 @@ def advance(equation, course, plan, room, stretch):
             _combine(u, speeds, A[stage], h, stage, fut)
             _combine(v, accelerations, A[stage], h, stage, fvt)
             moment = t + C[stage] * h
-            if stops and C[stage] == 1.0:  # before what happens there
+            if stops and C[stage] == 1.0:  # just before a jump
                 moment = np.nextafter(goal, -np.inf)
             advance_clock(equation, C[stage] * h)
             acceleration(equation, ut, vt, moment, a)
@@ -208,7 +208,7 @@ def advance(equation, course, plan, room, stretch):
         error = step_error(equation, scale_u / plan.tolerance) / plan.tolerance
         if error_u > 0.0 or error_v > 0.0:
             error = max(error, error_u / scale_u, error_v / scale_v)
-        if not abs(error) < np.inf:  # too far: try less
+        if not abs(error) < np.inf:  # diverged: try a shorter step
             tally.wanted = 0.2 * h
             tally.refused += 1
             if tally.wanted < SMALLEST * max(abs(plan.end), abs(t)):
@@ -231,7 +231,7 @@ def advance(equation, course, plan, room, stretch):
         due = plan.start + tally.samples * plan.interval
         done, first = work_of_offsets(equation, True), tally.samples
         begun = tally.work + done, tally.dissipated, tally.air
-        near = after - ROUNDING * h if stops else after + ROUNDING * h  # after what happens there
+        near = after - ROUNDING * h if stops else after + ROUNDING * h  # just after a jump
         while plan.every == 0 and tally.samples < room and due <= near:
             _weights(min(1.0, (due - t) / h), weights)
             _combine(u, speeds, weights, h, 7, fut)
@@ -255,7 +255,7 @@ def advance(equation, course, plan, room, stretch):
             u[i], v[i] = fut[i], speeds[6, i]
             speeds[0, i] = speeds[6, i]
         jumps = stops and equation.spent != 0
-        if tally.samples > first and (equation.commit != 0 or jumps):  # terms were evaluated there
+        if tally.samples > first and (equation.commit != 0 or jumps):  # its terms
             advance_clock(equation, h)
             acceleration(equation, course.u, course.v, moment, a)
             tally.evaluations += 1
@@ -272,7 +272,7 @@ def advance(equation, course, plan, room, stretch):
             acceleration(equation, course.u, course.v, after, a)
             _keep(equation, powers, 0)
             tally.evaluations += 1
-            tally.work += spent(equation, course.u)  # by offsets that have jumped, of any law
+            tally.work += spent(equation, course.u)  # jumped offsets, of any law
             work_of_offsets(equation, True)
             for i in range(n):
                 raw[i] = fa[i]
@@ -280,7 +280,7 @@ def advance(equation, course, plan, room, stretch):
                 outcome = sample(equation, course.u, course.v, a, due)
                 if outcome != Outcome.DONE:
                     return outcome, -1
-            if equation.commit != 0:  # what jumped there took no time
+            if equation.commit != 0:  # a jump takes no time
                 run_at(equation.commit, (equation.setting,))
         tally.wanted = min(tally.wanted, longest)
         if plan.every > 0 and tally.steps % plan.every == 0:

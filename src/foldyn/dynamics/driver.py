@@ -1,4 +1,4 @@
-"""`simulate`: the motion of a case from an initial state, and `prepare`, which checks it first."""
+"""`simulate` integrates a motion from an initial state; `prepare` checks its input first."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ from foldyn.values import choice, flag, number, of_kind
 if TYPE_CHECKING:
     import xarray
 
-DAMPING_COST = 10.0  # by how much beta may shrink the critical step before the user is warned
-SHARPEST = 1e-9  # of the time at the start: shorter steps than that have lost their digits
+DAMPING_COST = 10.0  # factor by which beta may shrink the critical step without a warning
+SHARPEST = 1e-9  # of the start time: shorter steps are lost in rounding
 MANY_STEPS = 20_000_000  # beyond which the user is warned before the run
-TOLERANCE = 1e-6  # relative error of a step that is chosen by it
-IMPLICIT_TOLERANCE = 1e-5  # the same of methods of order 2: 130 steps in a vibration's period
-FLOOR = 1e-8  # of the longest bar: the least displacement that errors are measured by
-FINER = 4  # times shorter steps where those of central differences were too long
+TOLERANCE = 1e-6  # default relative error of adaptive steps
+IMPLICIT_TOLERANCE = 1e-5  # the same for methods of order 2: 130 steps per period
+FLOOR = 1e-8  # of the longest bar: least displacement that errors are measured against
+FINER = 4  # by how much to shorten steps of central differences that were too long
 
 
 def simulate(
@@ -76,9 +76,9 @@ def simulate(
     duration : float
         Simulated time (s). The last step is the last that does not go beyond it.
     method : str, default "auto"
-        Integrator, a name of `foldyn.dynamics.METHODS`, or "auto" for the one that should be
-        quickest, and another one where its energies do not balance: the documentation has a page on
-        them.
+        Integrator, a name of `foldyn.dynamics.METHODS`. "auto" picks the one expected to be
+        fastest, and switches to another if its energies do not balance; the documentation has a
+        page on integrators.
     dt : float, optional
         Time step (s). Explicit methods: without it half the critical step, shortened to divide
         `interval`. Implicit methods and `dormand_prince`, which choose their steps by their error:
@@ -88,75 +88,75 @@ def simulate(
     interval : float, optional
         Instead, the time between samples (s).
     initial : State, optional
-        Displacement and velocity at the start; rest by default. Supported nodes stay where it
-        puts them, base motions start from there, and imposed displacements must agree with it.
+        Displacement and velocity at the start; rest by default. Supported nodes stay at these
+        positions, base motions start from them, and imposed displacements must agree with them.
     force : bool, default False
         Integrate even with a step above the critical one.
     tolerance : float, optional
-        Relative error of a step that is chosen by it, by default 1e-6 with `dormand_prince`, 1e-5
-        with implicit methods: that of the worst node's displacement and velocity, relative to the
-        largest ones that the motion has had so far.
+        Relative error per step of adaptive methods, by default 1e-6 with `dormand_prince`, 1e-5
+        with implicit methods: error of the worst node's displacement and velocity, relative to the
+        largest ones so far in the motion.
     start : float, default 0.0
-        Time (s) at which the motion starts, that of the first sample: histories go on from there
-        when a stored motion is continued.
+        Time (s) of the first sample. Use it to continue a stored motion with its histories.
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress` several times a second.
     spectral_radius : float, optional
-        Of `generalized_alpha`: what a step leaves of the fastest vibrations, from 0 (nothing) to 1
-        (all); 0.8 by default.
+        Of `generalized_alpha`: factor by which a step multiplies the fastest vibrations, from 0
+        (removed) to 1 (kept); 0.8 by default.
     sample : mapping of str to callable or Quantity, optional
         Further variables of the result: functions of displacement (n, 3), m, velocity (n, 3),
         m/s, and time, s, which return a number or an array; as `fd.Quantity(units, text, dims,
         function)` with its unit, meaning and dimensions. They are evaluated at every sample.
     store : path, optional
-        File for the result, as "run.nc". Samples then go to the disk as the motion goes on, into
-        the folder "run.nc.unfinished", so that its length is not limited by memory.
+        File for the result, as "run.nc". Samples then go to disk as they are computed, into the
+        folder "run.nc.unfinished", so that its length is not limited by memory.
     checkpoint : float, default 60.0
-        With `store`: time (s) of computing between checkpoints, from which it can go on.
+        With `store`: computing time (s) between checkpoints, from which the motion can resume.
     resume : bool, default False
-        With `store`: go on with the same motion from the last checkpoint of a run that was cut off,
-        to the same bits; from the beginning where there is none. A finished one is only read.
+        With `store`: resume the same motion from the last checkpoint of an interrupted run, with
+        bit-identical results; without a checkpoint it starts from the beginning. A finished motion
+        is only read.
     device : {"cpu", "gpu"}
-        Where steps are computed; "gpu" needs a GPU of NVIDIA's and numba-cuda, an explicit method
-        with fixed steps, and bars and hinges: the documentation has a page on when it pays.
+        Where steps are computed; "gpu" needs an NVIDIA GPU and numba-cuda, an explicit method with
+        fixed steps, and bars and hinges. The documentation has a page on when it pays off.
 
     Returns
     -------
     xarray.Dataset
-        `displacement` (m) and `velocity` (m/s) with dimensions time, node, axis; `reaction` (N)
-        at supported dofs; energies (J): `kinetic`, `strain_bars`, `strain_folds`,
-        `strain_bends`, `dissipated`, `work` (of loads, moving supports and actuated folds). First
-        sample at the start. Attributes hold the statistics of the run; the case travels along
-        (`foldyn.case_of`). With `store` its variables are read from the file where they are used,
-        as by ``fd.load("run.nc", whole=False)``.
+        `displacement` (m) and `velocity` (m/s) with dimensions time, node, axis; `reaction` (N) at
+        supported dofs; energies (J): `kinetic`, `strain_bars`, `strain_folds`, `strain_bends`,
+        `dissipated`, `work` (of loads, moving supports and actuated folds). First sample at the
+        start. Attributes hold the statistics of the run; the dataset also contains the case
+        (`foldyn.case_of`). With `store` its variables are read from the file on first use, as by
+        ``fd.load("run.nc", whole=False)``.
 
     Raises
     ------
     InputError
-        An argument out of range, a step above the critical one, a free node without mass; a motion
-        to go on with that is not the one that was begun, by the name of what differs.
+        An argument out of range, a step above the critical one, a free node without mass, or an
+        interrupted motion that differs from this one; the message names what differs.
     ComputationError
-        A function of `sample` failed, or gave another shape or no finite numbers, after the start.
-        The disk is full: what was kept until then stays, to go on from.
+        A function of `sample` failed, changed its shape or returned a value that is not finite,
+        after the start. Or the disk is full: the last checkpoint remains to resume from.
     InstabilityError, PenetrationError
-        The motion grew without bound or became NaN; panel passed through panel. What was
-        computed until then is in the exception's `partial`.
+        The motion grew without bound or became NaN; panel passed through panel. The exception's
+        `partial` holds the samples computed so far.
 
     Warns
     -----
     FoldynWarning
-        The energy balance is off by more than 1 % of the energies at play; or was, and "auto"
-        has computed the motion anew.
+        The energy balance is off by more than 1 % of the energies at play; or it was, and "auto"
+        has repeated the motion with another method or step.
     CrossingWarning
-        Panels pass through each other at a sample that was looked at.
+        Panels pass through each other at one of the checked samples.
 
     Notes
     -----
     Histories are evaluated at every stage time t_n + c dt with t_n = start + n dt. The damping
-    matrices alpha M + beta K0 and of modes are constant: K0 the tangent, and the modes those, at
-    rest or, with the damping's state = "start", where the motion began: at the initial displacement
-    or, if `initial` is a sample of a motion, where that one began. Dashpots between nodes and
-    damped creases follow the motion.
+    matrices, alpha M + beta K0 and modal damping, are constant: K0 and the modes are taken at rest
+    or, with the damping's state = "start", in the state where the motion began: the initial
+    displacement or, if `initial` is a sample of a motion, the start of that motion. Dashpots
+    between nodes and damped creases follow the motion.
     """
     keeping = None if store is None else check_keeping(store, checkpoint, resume)
     if store is None and flag("resume", resume):
@@ -184,10 +184,10 @@ def prepare(
     kept: bool = False,
     device: str = "cpu",
 ) -> Motion:
-    """Check everything that `simulate` checks and choose the step, without computing a motion.
+    """Check all input of `simulate` and choose the step, without computing the motion.
 
-    Arguments and exceptions are those of `simulate`; the motion starts with `Motion.run`. One that
-    is `kept` on the disk may have more samples than memory holds.
+    Arguments and exceptions are those of `simulate`; `Motion.run` starts the motion. With `kept`,
+    samples go to disk and may exceed the memory.
     """
     of_kind("case", case, Case)
     choice("method", method, (*METHODS, AUTO))
@@ -287,7 +287,7 @@ def _plan(
     case: Case, method: Integrator, duration: float, dt: float | None, sampling: timing.Sampling,
     critical: float, force: bool, tolerance: float | None, start: float,
 ) -> StepPlan:  # fmt: skip
-    """Steps and samples that the arguments of `simulate` ask for."""
+    """Plan of steps and samples for the arguments of `simulate`."""
     if tolerance is not None:
         number("tolerance", tolerance, above=0.0)
         if not method.adaptive and not method.implicit:
@@ -307,7 +307,7 @@ def _plan(
 
 
 def _warn_of_damping(case: Case, method: Integrator, u: NDArray, critical: float) -> None:
-    """Say so where damping other than alpha makes an explicit step very small."""
+    """Warn if damping other than alpha makes the explicit step very small."""
     if not math.isfinite(critical) or not case.damped:
         return
     fast = [f"beta = {case.rayleigh.beta:g} s"] if case.rayleigh.beta > 0.0 else []

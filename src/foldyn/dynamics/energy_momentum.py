@@ -1,18 +1,19 @@
-"""The conserving method: midpoint rule with forces that do exactly the work of the strain energy.
+"""Conserving method: midpoint rule with forces that do exactly the work of the strain energy.
 
     (q1 - q0)/h = (w0 + w1)/2,   M (w1 - w0)/h + alpha M (w0 + w1)/2 + b = 0,
     b = F - (p0 + p1)/2,
 
 with F the mean forces of the terms (`mechanics.mean_forces`; damping at (u0 + u1)/2 and the
 velocity (u1 - u0)/h, so that a rigid motion dissipates nothing) and of contact
-(`implicit.contact_step`), and p at each end of the step those of all loads, also of those that
-depend on the displacement. Without damping and loads the energy of any structure and the momenta of
-a free one stay what they are, with any step, to the tolerance of the equations and to rounding;
-with them the energy balance closes as exactly. Of order 2 (Simo and Tarnow 1992, Gonzalez 1996).
-Nothing damps the vibrations that a step does not resolve.
+(`implicit.contact_step`), and p all loads at each end of the step, displacement-dependent ones
+included. Without damping and loads, the energy of any structure and the momenta of a free one are
+conserved with any step, to the tolerance of the equations and to rounding; with them the energy
+balance closes equally well. Of order 2 (Simo and Tarnow 1992, Gonzalez 1996). Vibrations that a
+step does not resolve are not damped.
 
-Dofs without mass obey F = p in the mean of the step: what is left at its end is less what was left
-at its start, but for what a law that is not linear adds. It is small, and part of what is kept.
+Massless dofs satisfy F = p in the mean of the step: the residual at its end is minus the residual
+at its start, plus a small contribution of nonlinear laws. This residual is part of what the method
+conserves.
 """
 
 from __future__ import annotations
@@ -46,14 +47,14 @@ ORDER = 2
 
 
 class Step(NamedTuple):
-    """What compiled functions of a step work with."""
+    """Data that the compiled functions of a step need."""
 
     setting: Setting
     terms: NDArray  # (k,) contexts of all but contact,
-    forces: NDArray  # (k,) their mean forces,
-    powers: NDArray  # (3,) and what these put in, take and lose to air beside energy, W
-    context: int  # of the setting
-    histories: int  # evaluates them; 0 where they are constant
+    forces: NDArray  # (k,) their mean-force kernels,
+    powers: NDArray  # (3,) powers that they put in, dissipate and lose to air, W
+    context: int  # of the `Setting`
+    histories: int  # address of the kernel that evaluates them; 0 if constant
     old: Phase
     new: Phase
     mean: NDArray  # (h, 3) factors of the histories
@@ -67,7 +68,7 @@ class EnergyMomentum(Scheme):
     """Steps of the method; see `Scheme`."""
 
     symmetric = False
-    tolerance = 1e-11  # what is left of the residual is energy
+    tolerance = 1e-11  # the remaining residual is an energy error
 
     def __init__(self, packed: Packed, course: Course) -> None:
         super().__init__(packed, course)
@@ -86,33 +87,33 @@ class EnergyMomentum(Scheme):
                 self.out, course.angle, np.zeros((0, 3)) if touch is None else touch.force,
             )
         )  # fmt: skip
-        self._before = 0.0  # the last step, s
+        self._before = 0.0  # length of the last step, s
 
     def begin(self, t: float) -> None:
-        """See `Scheme`."""
+        """Make `old` the start of a motion; see `Scheme.begin`."""
         super().begin(t)
         self._before = 0.0
 
     def accept(self, h: float) -> None:
-        """See `Scheme`."""
+        """Accept a step h (s); see `Scheme.accept`."""
         super().accept(h)
         self._before = h
 
     def state(self) -> list[NDArray]:
-        """See `Scheme`."""
+        """State on which the next step depends; see `Scheme.state`."""
         return [*super().state(), np.array([self._before])]
 
     def resume(self, state: Sequence[NDArray]) -> None:
-        """See `Scheme`."""
+        """Resume from such a state; see `Scheme.resume`."""
         super().resume(state)
         self._before = float(state[-1][0])
 
     def weights(self, h: float) -> Weights:
-        """See `Scheme`."""
+        """Weights of the step matrix; see `Scheme.weights`."""
         return Weights(1.0, (2.0 / h + self.packed.system.alpha) / h, 1.0 / h)
 
     def residual(self, h: float, t: float) -> tuple[float, float]:
-        """See `Scheme`."""
+        """Residual of the step to time t; see `Scheme.residual`."""
         old, s = self.old, self.scratch
         if self._contact is not None:
             place(self.packed.system, old.q + self.shift, old.w, t, s)
@@ -124,7 +125,7 @@ class EnergyMomentum(Scheme):
         return residual(self._step, h, t)
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
-        """See `Scheme`."""
+        """Fill the stiffness blocks with the tangent of the mean forces; see `Scheme.tangent`."""
         body, pattern, u0, u1 = self.packed.body, matrix.pattern, self.displacement(), self.moved()
         start = u0, u1, self.course.angle
         matrix.blocks.put_mean(body, pattern, *start, before, again, matrix.stiffness)
@@ -132,22 +133,22 @@ class EnergyMomentum(Scheme):
         matrix.follow(0.5 * (u0 + u1), 1.0)
 
     def contact_tangent(self, contact: ContactTerm, memory: Memory) -> sparse.csr_array:
-        """See `Scheme`."""
+        """Derivative of the mean contact force; see `Scheme.contact_tangent`."""
         assert self._contact is not None
         return self._contact.tangent()
 
     def plane_push(self, before: NDArray, after: NDArray) -> NDArray:
-        """See `Scheme`."""
+        """Mean friction and normal force of the planes; see `Scheme.plane_push`."""
         assert self._contact is not None
         return self._contact.push
 
     def rub(self, before: NDArray, after: NDArray) -> NDArray:
-        """See `Scheme`."""
+        """Mean friction between panels; see `Scheme.rub`."""
         assert self._contact is not None
         return self._contact.rub
 
     def works(self, h: float) -> tuple[float, float, float]:
-        """See `Scheme`; exactly those of the step's forces."""
+        """Works of a step, exactly the works of its forces; see `Scheme.works`."""
         system = self.packed.system
         done, lost = _works(self._step, h)
         put_in, taken, to_air = (h * self._terms.powers).tolist()
@@ -156,13 +157,13 @@ class EnergyMomentum(Scheme):
         return done + put_in, lost + taken, to_air
 
     def change(self, h: float) -> NDArray:
-        """See `Scheme`: accelerations belong to the middle of the steps."""
+        """Error estimate of a step, with accelerations at midpoints; see `Scheme.change`."""
         return h**3 / (6.0 * (h + self._before)) * (self.new.a - self.old.a)
 
 
 @kernel
 def residual(step, h, t):
-    """Residual of a step into `out`; returns its norm and that of the forces at play, N."""
+    """Residual of a step into `out`; returns its norm and the norm of the forces at play, N."""
     old, new, out = step.old, step.new, step.out
     system, mass, s = step.setting.system, step.setting.mass, step.setting.s
     q0, w0, q1, w1, a1 = flat(old.q), flat(old.w), flat(new.q), flat(new.w), flat(new.a)
@@ -173,10 +174,10 @@ def residual(step, h, t):
         a1[i] = (w1[i] - w0[i]) / h
         x[i] = a1[i] + system.alpha * (0.5 * (w0[i] + w1[i]))
     for node in range(mass.diagonal.size):
-        if mass.diagonal[node] <= 0.0:  # no inertia: velocities would ring for ever
+        if mass.diagonal[node] <= 0.0:  # massless: velocities would ring forever
             for i in range(3 * node, 3 * node + 3):
                 a1[i], w1[i] = 0.0, d[i] / h
-    if system.ties.slave.size > 0:  # of which the masters may be such nodes
+    if system.ties.slave.size > 0:  # masters may be such nodes
         follow_masters(system.ties, a1)
         follow_masters(system.ties, w1)
     if step.histories != 0:
@@ -189,7 +190,7 @@ def residual(step, h, t):
     step.powers[:] = 0.0
     middle = t - 0.5 * h
     for k in range(step.terms.size):
-        if system.turns:  # what remembers the start of the step needs the end
+        if system.turns:  # terms that remember the step's start need the end
             turn(step.setting.terms.folds, system.actuators, mean if k == 0 else new.factor)
         ends = step.terms[k], s.displacement, s.velocity
         run_at(step.forces[k], (*ends, step.before, h, middle, new.force, step.powers))
@@ -217,7 +218,7 @@ def residual(step, h, t):
 
 @inner_scalar
 def mean_factors(step):
-    """Mean (h, 3) of the histories' factors at the ends of the step."""
+    """Mean (h, 3) of the histories' factors over the step."""
     mean, one, other = flat(step.mean), flat(step.old.factor), flat(step.new.factor)
     for k in range(mean.size):
         mean[k] = 0.5 * (one[k] + other[k])
@@ -226,7 +227,7 @@ def mean_factors(step):
 
 @kernel
 def _works(step, h):
-    """Work put in and energy dissipated in a step."""
+    """Work input (J) and dissipated energy (J) of a step."""
     system, mass, s = step.setting.system, step.setting.mass, step.setting.s
     old, new = step.old, step.new
     moved, bracket = system.moved, flat(new.force)
@@ -245,7 +246,7 @@ def _works(step, h):
 
 @kernel
 def _actuation(step, u0, u1):
-    """Work of the actuators in a step: what turning the rest angles at either end changes."""
+    """Work (J) of the actuators in a step: energy change as rest angles turn at its two ends."""
     terms, old, new = step.setting.terms, step.old, step.new
     done, mean, system, s = 0.0, mean_factors(step), step.setting.system, step.setting.s
     turn(terms.folds, system.actuators, old.factor)

@@ -1,4 +1,4 @@
-"""`simulate_many`: motions of many models of one topology in one call, side by side."""
+"""`simulate_many`: motions of many models of one topology in a single call."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from foldyn.structures.stretching import most, remedy, stretch
 from foldyn.values import choice, flag, of_kind, show, whole
 
 METHOD = "central_difference"
-LANES = 2.5  # how much quicker models are in lanes
+LANES = 2.5  # speedup of models in lanes
 COMMON = ("duration", "dt", "every_steps", "interval", "start", "method", "device")
 """Arguments that are those of all cases."""
 
@@ -54,19 +54,19 @@ def simulate_many(
 ) -> xarray.Dataset:
     """Integrate the motions of many models of one topology at once.
 
-    All have as many nodes and branches of laws with memory, and the same supported dofs and groups
-    of strain energy; all else may differ. Each motion is that of ``simulate(case, duration, method,
-    dt)``, but for rounding. By central differences, models with the same bars, hinges and kinds of
-    laws stand in the lanes of vectors, eight a vector, and the vectors are shared among threads:
-    two to three times quicker than one motion after the other for small models. On a GPU all take
-    their steps at once.
+    All models have the same number of nodes and memory branches, the same supported dofs and the
+    same strain energy groups; everything else may differ. Each motion equals ``simulate(case,
+    duration, method, dt)`` up to rounding. By central differences, models with the same bars,
+    hinges and kinds of laws run in SIMD lanes, eight per vector, and threads share the vectors: two
+    to three times faster than sequential runs for small models. On a GPU all models advance at
+    once.
 
     Parameters
     ----------
     cases : sequence of Case, m of them
         Lanes take bars and hinges with laws of the package, lumped mass, fixed supports, dead loads
-        and damping by alpha. Other cases are computed one after the other, as by `simulate`, and so
-        is once more a motion that ends before its time.
+        and damping by alpha. Other cases are computed one after the other, as by `simulate`; so is,
+        once more, a motion that ends early.
     duration, every_steps, interval, start, force :
         As of `simulate`.
     dt : float, optional
@@ -74,21 +74,21 @@ def simulate_many(
     initial : State, or a sequence of m of them, optional
         Displacement and velocity at the start, of all or of each; None is rest.
     threads : int, optional
-        As many as this process has processors by default.
+        All processors of this process by default.
     method : str, default "central_difference"
         An explicit method with fixed steps: this, or "rk4".
     device : {"auto", "cpu", "gpu"}
-        Where steps are computed; a GPU takes panels' membranes, springs and dampers, too. "auto"
-        takes a GPU where there is one, it has kernels for all, and it should be done sooner.
+        Where steps are computed; a GPU also supports panel membranes, springs and dampers. "auto"
+        chooses a GPU if one is present, has kernels for all terms, and is expected to be faster.
 
     Returns
     -------
     xarray.Dataset
         The variables of a motion with the dimension `model` before `time`: `displacement` (m) and
         `velocity` (m/s) over model, time, node, axis; `reaction` (N) and the energies (J).
-        `outcome` (model) is "done" or says, as `simulate` does, what ended a motion: what comes
-        after is nan. The case that it carries is the first one. Attributes say where steps were
-        computed (`device`), and of "auto" why (`device_reason`).
+        `outcome` (model) is "done" or, as in `simulate`, the reason why a motion ended early; later
+        samples are nan. The stored case is the first one. Attributes name the device (`device`)
+        and, with "auto", the reason for it (`device_reason`).
 
     Raises
     ------
@@ -98,7 +98,7 @@ def simulate_many(
     Warns
     -----
     FoldynWarning
-        Motions that ended before their time; what `simulate` warns of the accuracy of the worst.
+        Motions that ended early; the accuracy warnings of `simulate` for the worst motion.
     """
     if not isinstance(cases, Sequence) or not len(cases):
         raise InputError(f" = {show(cases)}: give a list of cases", "cases")
@@ -167,9 +167,9 @@ def simulate_many(
 
 
 def _origins(motions: Sequence[Motion], times: NDArray) -> dict[str, Any]:
-    """Where motions with samples at some times began, over the models, if anything depends on it.
+    """Origins of motions at sample times, per model; None unless something depends on them.
 
-    Their flow is that of the last sample if they end there.
+    The flow is valid for the last sample if they end there.
     """
     plan = motions[0].plan
     end = math.nan if plan.steps % plan.every else float(times[-1])
@@ -183,26 +183,26 @@ def _origins(motions: Sequence[Motion], times: NDArray) -> dict[str, Any]:
 def device_for(
     motions: Sequence[Motion], count: int, threads: int | None = None
 ) -> tuple[str, str]:
-    """The device that "auto" stands for, and why, for `count` motions of which these are some."""
+    """Device that "auto" resolves to, and the reason, for `count` motions like these."""
     lanes = motions[0].method.name == METHOD
     return choose(motions, count, LANES * _threads(threads, count) if lanes else 1.0)
 
 
 def _threads(threads: int | None, count: int) -> int:
-    """Threads for the lanes of so many models."""
+    """Number of threads for the lanes of `count` models."""
     most = int(config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
     threads = most if threads is None else whole("threads", threads, least=1)
     return min(threads, -(-count // WIDTH))
 
 
 def _takes_starts(motion: Motion, case: Case) -> bool:
-    """Whether what was prepared for a motion serves those of a case from any other start."""
+    """Whether the preparation of a motion also serves the case from any other start."""
     own = case.damped_at_start or motion.packed.added.acts or bool(case.remembering)
     return motion.case is case and not own
 
 
 def _from_start(like: Motion, initial: State | None) -> Motion:
-    """A motion as another one of the same case, from another start; they share their arrays."""
+    """Copy of a motion with another initial state; both share their arrays."""
     case, u_v = like.case, check_start(like.case, initial)
     check_touching(case, u_v[0], like.plan.start, like.plan.end)
     growth, critical, u = like.method.growth, like.critical, u_v[0]
@@ -219,7 +219,7 @@ def _from_start(like: Motion, initial: State | None) -> Motion:
 
 
 def _shape(case: Case) -> dict[str, Any]:
-    """What the results of all cases share."""
+    """Properties that the results of all cases must share."""
     supported, energies = case.reaction_dofs.tolist(), [*case.energy_groups]
     energies += ["air"] * (case.air is not None)
     branches = sum(part.count for part in case.remembering)
@@ -241,14 +241,15 @@ def _name(device: str) -> str:
 def _integrate(
     motions: Sequence[Motion], out: Samples, threads: int, device: str
 ) -> dict[int, str]:
-    """Integrate all; returns why some ended before their time.
+    """Integrate all motions; return reasons for those that ended early.
 
-    What lanes do not take is computed alone, and what goes wrong there, which then says why.
+    Motions that lanes do not support, and motions that fail in lanes, are computed alone, which
+    gives the reason.
     """
     side_by_side = _on_gpu if device == "gpu" else _in_lanes
     ended = dict[int, str]()
     for k in sorted(side_by_side(motions, out, threads)):
-        motions[k].device = "cpu"  # which says why
+        motions[k].device = "cpu"  # gives the reason
         try:
             motions[k].integrate()
         except ComputationError as error:
@@ -259,7 +260,7 @@ def _integrate(
 
 
 def _alike(keys: Iterable[Any], motions: Sequence[Motion]) -> dict[Any, list[tuple[int, Motion]]]:
-    """Motions with their numbers, by their keys."""
+    """Numbered motions, grouped by key."""
     found: dict[Any, list[tuple[int, Motion]]] = {}
     for (k, motion), key in zip(enumerate(motions), keys, strict=True):
         found.setdefault(key, []).append((k, motion))
@@ -267,7 +268,7 @@ def _alike(keys: Iterable[Any], motions: Sequence[Motion]) -> dict[Any, list[tup
 
 
 def _in_lanes(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]:
-    """Integrate what lanes take; numbers of what they do not, and of what goes wrong."""
+    """Integrate what lanes support; return numbers of the other motions and of failures."""
     lanes = motions[0].method.name == METHOD
     alike = _alike([topology(motion) if lanes else () for motion in motions], motions)
     alone = {k for k, _ in alike.pop((), ())}
@@ -277,19 +278,19 @@ def _in_lanes(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]
 
 
 def _on_gpu(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]:
-    """Integrate all on the card; numbers of those that go wrong."""
+    """Integrate all on the GPU; return numbers of motions that fail."""
     from foldyn.dynamics.gpu import many
 
     return many.integrate(motions)
 
 
 def _cases(numbers: Iterable[int]) -> str:
-    """Cases in a line, the first of many."""
+    """Cases on one line, truncated."""
     return listed([f"cases[{k}]" for k in numbers])
 
 
 def _warn(motions: Sequence[Motion], ended: Mapping[int, str], out: Samples) -> float:
-    """Warn of what went wrong, or is doubtful; the largest relative energy error."""
+    """Warn of failures and doubtful results; return the largest relative energy error."""
     if ended:
         warn(
             f"{len(ended)} of {len(motions)} motions ended before their time (see `outcome`): "

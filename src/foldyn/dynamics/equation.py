@@ -1,10 +1,10 @@
-"""The equation of motion behind a few addresses: what every integrator calls, compiled once.
+"""The equation of motion behind a few addresses, which every integrator calls; compiled once.
 
-With terms by address, what a case consists of has the same types in every motion. Loops get the
-addresses of the functions here, so that they hold nothing but their own arithmetic. What only some
-motions have (histories, supports and rest angles that move, contact, a mass matrix that is not
-diagonal) are parts of their own, which are compiled where they are used; elsewhere their
-address is 0. Dead loads, drag and a diagonal mass, which nearly all have, are no parts: calls cost.
+Terms are called by address, so every case has the same types. Loops receive the addresses of the
+functions here and contain only their own arithmetic. Optional parts (histories, moving supports and
+rest angles, contact, a mass matrix that is not diagonal) are compiled on first use; a motion
+without them has the address 0. Dead loads, drag and a diagonal mass, which nearly all motions have,
+are built in, because calls cost time.
 """
 
 from __future__ import annotations
@@ -56,56 +56,56 @@ PENETRATION = int(Outcome.PENETRATION)
 
 
 class Balance(NamedTuple):
-    """What every acceleration needs; what only some have are addresses, or 0."""
+    """Data for every acceleration; optional parts are addresses, or 0."""
 
     terms: Terms
     setting: int  # context of the parts
-    histories: int  # evaluates them
+    histories: int  # address of their evaluation
     turn: int  # moves rest angles,
-    carry: int  # supports,
-    presses: bool  # obstacles and air
+    carry: int  # moves supports
+    presses: bool  # whether obstacles or air move
     follow: int  # loads that depend on the displacement
-    turn_flow: int  # adds forces of fluid that turns, and drag beside added mass
-    solve: int  # M^-1, unless M is diagonal,
-    kinetic: int  # and the kinetic energy
-    moving_power: int  # of supports
-    turning_power: int  # of rest angles
+    turn_flow: int  # adds forces of added mass as it turns, and drag
+    solve: int  # M^-1, 0 if M is diagonal
+    kinetic: int  # kinetic energy, 0 likewise
+    moving_power: int  # power of moving supports
+    turning_power: int  # power of turning rest angles
     alpha: float
     diagonal: NDArray
     inverse: NDArray
     loads: Entries
-    loads_own: NDArray  # (2,) first and last + 1 of the thread's own
+    loads_own: NDArray  # (2,) first and last + 1 of the thread's loads
     factor: NDArray
     force: NDArray
     displacement: NDArray
     velocity: NDArray
     team: Team
-    own: NDArray  # (2,) first and last + 1 of the thread's own rows
+    own: NDArray  # (2,) first and last + 1 of the thread's rows
 
 
 class Recording(NamedTuple):
-    """A case on one thread, and where samples go."""
+    """A case on one thread, and the destination of its samples."""
 
     setting: Setting
     course: Course
     out: Samples
     whole: int  # context of the setting
     fluid: int  # adds what moves the fluid; 0 without added mass
-    warm: int  # evaluates what strain energies lack by heat; 0 without any,
+    warm: int  # evaluates the heat correction of the strain energies; 0 without heat,
     heat: int  # its context,
     lacking: NDArray  # (groups,) and its result, J
 
 
 class Equation(NamedTuple):
-    """What a loop gets: addresses, and its thread's share."""
+    """Addresses that a loop needs, and its thread's share."""
 
     acceleration: int
     contact: ContactParts
     clock: int  # 0 without memory
     commit: int  # 0 without memory
     step_error: int  # 0 without memory
-    offsets: int  # 0 where nothing turns,
-    spent: int  # and in methods whose steps end at jumps alone
+    offsets: int  # 0 if nothing turns
+    spent: int  # 0 likewise, or if steps end at jumps only
     sample: int
     balance: int  # contexts
     setting: int
@@ -114,7 +114,7 @@ class Equation(NamedTuple):
     before: NDArray  # (3,) and at the last step, for methods that keep them
     team: Team
     own: NDArray  # (2,)
-    stage: NDArray  # (3, n, 3) memory of methods with several stages
+    stage: NDArray  # (3, n, 3) work array of methods with several stages
     angle: NDArray  # (nh,) dihedrals at the last acceleration, rad
 
 
@@ -132,7 +132,7 @@ def _acceleration(m, q, w, t, out, powers):
         obstacles_to(m.terms, m.factor)
     u = m.displacement if m.carry != 0 else rows_at(q, rows)
     v = m.velocity if m.carry != 0 else rows_at(w, rows)
-    wait(m.team)  # for q and w of the others
+    wait(m.team)  # for q and w of the other threads
     power_in, power_out = forces_of(m.terms, u, v, t, m.force)
     force, speed, loads = flat(m.force), flat(v), m.loads
     for k in range(m.loads_own[0], m.loads_own[1]):
@@ -161,7 +161,7 @@ def _acceleration(m, q, w, t, out, powers):
             accelerated[i] = -bracket[i] * inverse[i] - m.alpha * relative[i]
     if m.alpha > 0.0:
         power_out += 2.0 * m.alpha * kinetic
-    if m.moving_power != 0:  # but for what changes the kinetic energy of S f'
+    if m.moving_power != 0:  # without the change of the kinetic energy of S f'
         power_in += value_at(m.moving_power, (m.setting,))
     if m.turning_power != 0:
         power_in += value_at(m.turning_power, (m.setting,))
@@ -190,7 +190,7 @@ def _sample(r, u, v, a, t):
         for g in range(r.lacking.size):
             out.energy[k, g] += r.lacking[g]
             total += r.lacking[g]
-        if course.tally.samples == 0:  # what is stored at the start is no work
+        if course.tally.samples == 0:  # energy stored at the start is not work
             course.tally.work -= total
             out.energy[k, last] -= total
         out.energy[k, last] += total
@@ -210,10 +210,10 @@ def acceleration(equation, q, w, t, a):
     """Acceleration q'' (n, 3) at time t, q and w the displacement and velocity without S f.
 
     q'' = - M^-1 (F_int + beta K0 v - p) - alpha w on free dofs. Returns the power of loads,
-    supports and actuators, and the power dissipated (W); the one that the air takes stays in
+    supports and actuators, and the power dissipated (W); the power lost to the air stays in
     `equation.powers`, and the bracket in `Scratch.force`.
 
-    A member of a team computes this for its own nodes, q and w changed there only.
+    A team member computes its own nodes only, and may have changed q and w only there.
     """
     run_at(equation.acceleration, (equation.balance, q, w, t, a, equation.powers))
     return equation.powers[0], equation.powers[1]
@@ -221,16 +221,16 @@ def acceleration(equation, q, w, t, a):
 
 @inner_scalar
 def advance_clock(equation, since):
-    """Tell laws with memory how long (s) after the last accepted step the next evaluation is."""
+    """Tell laws with memory the time (s) from the last accepted step to the next evaluation."""
     if equation.clock != 0:
         run_at(equation.clock, (equation.setting, since))
 
 
 @inner_scalar
 def step_error(equation, scale):
-    """How wrong these laws are if the step is accepted that ends where they were evaluated last.
+    """Error ratio of laws with memory if the step that ends at the last evaluation is accepted.
 
-    scale : displacement (m) that errors are measured by, if turns cause no larger ones.
+    scale : displacement (m) that errors are relative to, unless turns cause larger ones.
     """
     if equation.step_error == 0:
         return 0.0
@@ -247,7 +247,7 @@ def work_of_offsets(equation, accepted):
 
 @inner_scalar
 def spent(equation, q):
-    """Energy (J) that terms store, and have dissipated, after `acceleration` at q."""
+    """Energy (J) stored and dissipated by terms, after `acceleration` at q."""
     return value_at(equation.spent, (equation.setting, q)) if equation.spent != 0 else 0.0
 
 
@@ -259,14 +259,14 @@ def sample(equation, u, v, a, t):
 
 @inner_scalar
 def observe(equation, course, plan, a, step):
-    """What follows `acceleration` at the time of a fixed step; every member of a team calls it.
+    """Finish a fixed step after its `acceleration`; every team member calls it.
 
-    Adds up the work that the members have noted. The motion ends where it is no longer finite and
-    where panels pass through each other; every plan.every steps a sample is written. Returns
-    (outcome, hinge), the same to all.
+    Adds up the members' works. Ends the motion if it is no longer finite or if panels pass through
+    each other; writes a sample every plan.every steps. Returns (outcome, hinge), the same for all
+    members.
     """
     team, tally = equation.team, course.tally
-    wait(team)  # for the others' accelerations, dihedrals and notes
+    wait(team)  # for accelerations, dihedrals and notes of the other threads
     t = plan.start + step * plan.dt
     if equation.offsets != 0:
         team.note[team.number, WORK] += work_of_offsets(equation, True)
@@ -299,13 +299,13 @@ def observe(equation, course, plan, a, step):
 
 @kernel
 def accelerate(equation, q, w, t, out):
-    """See `acceleration`: for Python."""
+    """`acceleration` for calls from Python."""
     return acceleration(equation, q, w, t, out)
 
 
 @kernel
 def write(equation, q, w, t, a):
-    """Write the next sample at time t; a (n, 3) is memory."""
+    """Write the next sample at time t; a (n, 3) is a work array."""
     acceleration(equation, q, w, t, a)
     return sample(equation, q, w, a, t)
 
@@ -321,13 +321,13 @@ class EquationOfMotion:
     s : Scratch
     course : Course
     slows : bool, optional
-        Whether the method gives slow contacts inertia; None if contact does not limit its steps.
+        Whether the method gives inertia to slow contacts; None if contact does not limit its steps.
 
     Attributes
     ----------
     setting : Setting
     balance, still : Context
-        What accelerations need of the case, and the equation, for accelerations alone.
+        Data for accelerations, and the equation without samples.
     """
 
     def __init__(
@@ -368,8 +368,8 @@ class EquationOfMotion:
         self._out: Samples | None = None
 
     def sampled(self, out: Samples) -> Context:
-        """The equation with samples that go to `out`."""
-        if self._out is not out:  # contexts are filled by Python: once for each window of samples
+        """The equation with `out` as the destination of samples."""
+        if self._out is not out:  # Python fills contexts: once per window of samples
             whole, heat = self._whole, self._heat
             fluid = observe_fluid.at(whole) if self.setting.added.acts else 0
             lacks: tuple[int, int, NDArray] = 0, 0, np.zeros(0)
@@ -385,12 +385,12 @@ class EquationOfMotion:
 
 
 def _balance(setting: Setting, whole: Context) -> Balance:
-    """What accelerations need of a case; `whole` is the context of the setting."""
+    """Data for accelerations of a case; `whole` is the context of the setting."""
     terms, system, mass, share, s, added = setting
     solve = parts.solve_constrained if len(mass.ties.slave) else parts.solve
     solve = solve_with_fluid if added.acts else solve
     diagonal = mass.lumped and not added.acts
-    alpha = 0.0 if added.acts else system.alpha  # or it is that of the sheet's own mass
+    alpha = 0.0 if added.acts else system.alpha  # added mass handles the sheet's own drag
     return Balance(
         terms=terms,
         setting=whole.address,

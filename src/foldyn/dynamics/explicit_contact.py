@@ -1,6 +1,6 @@
-"""What contact asks of explicit steps: how long they may be, and inertia where it is slow.
+"""Contact in explicit steps: limits of their length, and inertia for slow contacts.
 
-Parts of the equation of motion (`equation`): their address is 0 where a motion has none.
+Optional parts of the equation of motion (`equation`): their address is 0 if unused.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from foldyn.mechanics.term import ADDRESS, NUMBER, limit_of
 
 
 class SlowContacts(NamedTuple):
-    """A case on one thread, and the contacts that have inertia in a step."""
+    """A case on one thread, and the contacts that get inertia in a step."""
 
     system: System
-    setting: int  # context of the parts of the equation,
-    solve: int  # of which this is M^-1, unless M is diagonal
+    setting: int  # context of the parts of the equation
+    solve: int  # M^-1 of that setting, 0 if M is diagonal
     inverse: NDArray
     s: Scratch
     tables: Tables
@@ -35,10 +35,10 @@ class SlowContacts(NamedTuple):
 
 
 class ContactParts(NamedTuple):
-    """Addresses of kernels, and of the context of slow contacts."""
+    """Addresses of contact kernels, and the context of slow contacts."""
 
     limit: int  # 0 without contact
-    gather: int  # 0 where slow contacts have no inertia,
+    gather: int  # 0 if slow contacts get no inertia
     slow_down: int
     kinetic: int
     slow: int
@@ -66,9 +66,9 @@ def _slow_down(m, w, a):
 
 @inner_scalar
 def longest_step(equation, q, w, a, dt, pace):
-    """The longest step (s), at most dt, that contact allows: after `acceleration` at q and w.
+    """Longest step (s), at most dt, that contact allows, after `acceleration` at q and w.
 
-    Once before each step, where the last one has ended.
+    Call it once before each step, at the end of the last one.
 
     a : the acceleration there; pace : see `contact.step_limit`.
     """
@@ -80,7 +80,7 @@ def longest_step(equation, q, w, a, dt, pace):
 
 @inner_scalar
 def slow_energy(equation, w):
-    """Kinetic energy (J) at velocities w where slow contacts are given inertia, else 0."""
+    """Kinetic energy (J) at velocities w if slow contacts get inertia, else 0."""
     if equation.contact.kinetic == 0:
         return 0.0
     return value_at(equation.contact.kinetic, (equation.setting, w))
@@ -88,7 +88,7 @@ def slow_energy(equation, w):
 
 @inner_scalar
 def gather_slow(equation, u, dt, beta):
-    """Find the contacts that a step of dt (s) from u does not resolve: for `slow_contacts_down`.
+    """Find the contacts that a step of dt (s) from u does not resolve, for `slow_contacts_down`.
 
     beta : radians of a contact's vibration that a step may take.
     """
@@ -98,15 +98,15 @@ def gather_slow(equation, u, dt, beta):
 
 @inner_scalar
 def slow_contacts_down(equation, w, a):
-    """Change accelerations a at velocities w to those with the inertia of slow contacts."""
+    """Modify accelerations a at velocities w for the inertia of slow contacts."""
     if equation.contact.slow_down != 0:
         run_at(equation.contact.slow_down, (equation.contact.slow, w, a))
 
 
 def slow_contacts(packed: Packed, work: Any, s: Scratch, balance: Any) -> Context | None:
-    """Context of slow contacts; none where their inertia would resist supports or planes.
+    """Context of slow contacts; None if their inertia would resist supports or planes.
 
-    Nor have boards any, whose contacts reach more nodes.
+    Boards have none either, as their contacts involve more nodes.
     """
     system, body, contact = packed.system, packed.body, packed.body.find(ContactTerm)
     if contact is None or not contact.eased or system.moves or system.presses:
@@ -117,7 +117,7 @@ def slow_contacts(packed: Packed, work: Any, s: Scratch, balance: Any) -> Contex
 
 
 def contact_parts(whole: Context, limited: bool, slow: Context | None) -> ContactParts:
-    """The parts of a motion; `whole` is the context of its setting."""
+    """Contact parts of a motion; `whole` is the context of its setting."""
     limit = _limit.at(whole) if limited else 0
     if slow is None:
         return ContactParts(limit, 0, 0, 0, 0)

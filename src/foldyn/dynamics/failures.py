@@ -1,4 +1,4 @@
-"""Why no further step of a motion can be taken, and what helps."""
+"""Reasons why a motion cannot continue, and remedies."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from foldyn.errors import InstabilityError, PenetrationError
 from foldyn.structures.condensed_plates import CondensedPlatesTerm
 from foldyn.structures.locking import kept_apart
 
-SWING = 0.5  # turn (rad) of a hinge in one step that is too much for any law
-MET = 1e-3  # rad from closed: panels that have met
+SWING = 0.5  # turn (rad) of a hinge per step, too large for any law
+MET = 1e-3  # rad from closed: panels that touch
 
 
 class Failed(Protocol):
-    """What is asked of a motion whose last step failed."""
+    """Properties of a motion whose last step failed."""
 
     case: Case
     method: Integrator
@@ -33,10 +33,10 @@ class Failed(Protocol):
 def failure(
     motion: Failed, code: int, hinge: int
 ) -> tuple[type[InstabilityError | PenetrationError], str]:
-    """Kind of error and its message, of a motion whose last step ended so.
+    """Exception class and message for a motion whose last step failed.
 
     code : an `Outcome`.
-    hinge : that whose dihedral jumped.
+    hinge : index of the hinge whose dihedral jumped.
     """
     plan, tally, order = motion.plan, motion.course.tally, motion.packed.numbering.order
     hinges = motion.packed.body.hinges
@@ -77,7 +77,7 @@ def failure(
 
 
 def smaller_step(motion: Failed) -> str:
-    """What makes a motion more accurate."""
+    """Remedy text: how to make the motion more accurate."""
     plan = motion.plan
     if not plan.steps:
         return f"use a tolerance below {plan.tolerance:.3g}"
@@ -87,7 +87,7 @@ def smaller_step(motion: Failed) -> str:
 
 
 def _apart(motion: Failed, hinge: int) -> str:
-    """How to keep the panels at a hinge apart; its dihedral is that of the last step."""
+    """How to keep the panels at a hinge apart; its dihedral is from the last step."""
     angle = motion.course.angle[hinge]
     if motion.plan.dt > motion.critical or _from_closed(angle) > SWING:
         return f"the hinge has turned too far within a step: {smaller_step(motion)}"
@@ -96,7 +96,7 @@ def _apart(motion: Failed, hinge: int) -> str:
 
 
 def _reason(motion: Failed, code: int) -> str:
-    """What has happened, where it is no single hinge's doing."""
+    """Reason for a failure that is not due to a single hinge."""
     plan, method = motion.plan, motion.method
     if code == Outcome.STUCK:
         return (
@@ -123,5 +123,5 @@ def _reason(motion: Failed, code: int) -> str:
 
 
 def _from_closed(angle: NDArray) -> NDArray:
-    """How far (rad) dihedrals are from 0 and 2 pi."""
+    """Distance (rad) of dihedrals from 0 and 2 pi."""
     return np.minimum(angle, 2.0 * np.pi - angle)

@@ -73,7 +73,7 @@ def parameters(spectral_radius: float) -> Parameters:
 
 
 class Step(NamedTuple):
-    """What compiled functions of a step work with."""
+    """Data that the compiled functions of a step need."""
 
     equation: Equation
     setting: Setting
@@ -83,12 +83,12 @@ class Step(NamedTuple):
     shift: NDArray
     out: NDArray
     earlier: NDArray
-    damping: NDArray  # (k,) numbers of the terms that damp,
-    drag: NDArray  # and of those of the air
+    damping: NDArray  # (k,) indices of the damping terms
+    drag: NDArray  # and of the air drag terms
 
 
 class Alpha(Scheme):
-    """A method of the family; see `Scheme`."""
+    """A method of the generalized-alpha family; see `Scheme`."""
 
     symmetric, tolerance = True, 1e-7
 
@@ -106,7 +106,7 @@ class Alpha(Scheme):
         )  # fmt: skip
 
     def begin(self, t: float) -> None:
-        """See `Scheme`."""
+        """Make `old` the start of a motion, or of its part after a jump; see `Scheme.begin`."""
         super().begin(t)
         if len(self.damping) or len(self.drag):
             for old, new in zip(self.old, self.new, strict=True):
@@ -115,34 +115,34 @@ class Alpha(Scheme):
             self.old.damped[:], self.old.resisted[:] = self.new.damped, self.new.resisted
 
     def weights(self, h: float) -> Weights:
-        """See `Scheme`; the mass carries what multiplies alpha M too."""
+        """Weights of the step matrix, alpha M included in the mass; see `Scheme.weights`."""
         am, af, beta, gamma = self.parameters
         rate = (1.0 - af) * gamma / (beta * h)
         mass = (1.0 - am) / (beta * h * h) + rate * self.packed.system.alpha
         return Weights(1.0 - af, mass, rate)
 
     def residual(self, h: float, t: float) -> tuple[float, float]:
-        """See `Scheme`."""
+        """Residual of the step to time t; see `Scheme.residual`."""
         return residual(self.context, h, t)
 
     def iterate(
         self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
         most: int,
     ) -> tuple[int, float, int]:  # fmt: skip
-        """See `Scheme`; with the factors of a band it is one compiled function."""
+        """Iterate, in a single compiled function if the matrix is a band; see `Scheme.iterate`."""
         if matrix.band is None:
             return super().iterate(matrix, goal, h, t, last, lowest, most)
         return _iterate(self.context, h, t, matrix.band, matrix.free, goal, last, lowest, most)
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
-        """See `Scheme`."""
+        """Fill the stiffness blocks with the tangent at the step's end; see `Scheme.tangent`."""
         body, u = self.packed.body, self.moved()
         matrix.blocks.put(body, matrix.pattern, u, before, again, matrix.stiffness)
         matrix.add_following(u, self.new.factor, 1.0)
         matrix.follow(u, 0.5)  # dofs without mass have the mean velocity of the step
 
     def works(self, h: float) -> tuple[float, float, float]:
-        """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""
+        """Works of a step with averaged forces, exact for linear systems; see `Scheme.works`."""
         system = self.packed.system
         done, lost = _works(self.context, h)
         to_air = 0.0
@@ -154,7 +154,7 @@ class Alpha(Scheme):
         return done, lost, to_air
 
     def change(self, h: float) -> NDArray:
-        """See `Scheme`.
+        """Estimate of the displacement error of a step; see `Scheme.change`.
 
         Since a stands for the acceleration at t + (am - af) h, the displacement's error is
         (am/2 - af/2 + beta - 1/6) h^3 times its third derivative: 1/12 for the trapezoidal rule.
@@ -180,7 +180,7 @@ def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[Packed, Course
 
 @inner
 def move(step, h):
-    """Make the end of a step what belongs to its shift: displacement, velocity, acceleration."""
+    """Set displacement, velocity and acceleration at the end of a step from its shift."""
     old, new, mass, ties = step.old, step.new, step.setting.mass, step.setting.system.ties
     beta, gamma = step.p.beta, step.p.gamma
     q0, w0, a0, d = flat(old.q), flat(old.w), flat(old.a), flat(step.shift)
@@ -191,17 +191,17 @@ def move(step, h):
         a1[i] = curvature * (d[i] - h * w0[i]) - (0.5 - beta) / beta * a0[i]
         w1[i] = w0[i] + h * ((1.0 - gamma) * a0[i] + gamma * a1[i])
     for node in range(mass.diagonal.size):
-        if mass.diagonal[node] <= 0.0:  # no inertia: velocities would ring for ever
+        if mass.diagonal[node] <= 0.0:  # massless: velocities would ring forever
             for i in range(3 * node, 3 * node + 3):
                 a1[i], w1[i] = 0.0, d[i] / h
-    if ties.slave.size > 0:  # of which the masters may be such nodes
+    if ties.slave.size > 0:  # masters may be such nodes
         follow_masters(ties, a1)
         follow_masters(ties, w1)
 
 
 @inner
 def slowed(step):
-    """Make `moving` what the mass resists in a step: acceleration, and velocity times alpha."""
+    """Put what the mass acts on in a step into `moving`: acceleration plus alpha times velocity."""
     old, new, am, af = step.old, step.new, step.p.am, step.p.af
     w0, a0, w1, a1 = flat(old.w), flat(old.a), flat(new.w), flat(new.a)
     alpha, x = step.setting.system.alpha, flat(step.setting.s.moving)
@@ -212,7 +212,7 @@ def slowed(step):
 
 @kernel
 def balanced(step, target, h):
-    """End a step at its shift, with the force there that leaves a residual (n, 3), N."""
+    """Finish a step whose residual is (n, 3), N, with the end force that leaves this residual."""
     af = step.p.af
     move(step, h)
     slowed(step)
@@ -224,7 +224,7 @@ def balanced(step, target, h):
 
 @kernel
 def residual(step, h, t):
-    """Residual of a step into `out`; returns its norm and that of the forces at play, N."""
+    """Residual of a step into `out`; returns its norm and the norm of the forces at play, N."""
     equation, old, new, out = step.equation, step.old, step.new, step.out
     system, mass, s = step.setting.system, step.setting.mass, step.setting.s
     af = step.p.af
@@ -246,7 +246,7 @@ def residual(step, h, t):
 
 @kernel
 def _iterate(step, h, t, band, free, goal, last, lowest, most):
-    """Iterate with the factors of a band; see `Scheme.iterate`."""
+    """Iterate with the factors of a band matrix; see `Scheme.iterate`."""
     d, left = flat(step.shift), flat(step.out)
     change, ties = np.empty(free.size), step.setting.system.ties
     norm = np.inf
@@ -288,7 +288,7 @@ def _works(step, h):
 
 @kernel
 def _taken(step):
-    """Energies that damping and the air take in a step, after `_works`."""
+    """Energies (J) dissipated by damping and lost to the air in a step, after `_works`."""
     old, new, moved, s = step.old, step.new, step.setting.system.moved, step.setting.s
     carry(moved, new.factor[:, 0], new.q, s.product)
     carry(moved, new.factor[:, 1], new.w, s.velocity)
@@ -298,7 +298,7 @@ def _taken(step):
 
 @inner
 def _taken_by(step, numbers, before, after):
-    """Energy that some terms take in a step: their mean force along it."""
+    """Energy (J) dissipated by some terms in a step: mean force times displacement."""
     terms, s = step.setting.terms, step.setting.s
     one, other, du, work = flat(before), flat(after), flat(s.displacement), 0.0
     for i in range(other.size):
@@ -313,7 +313,7 @@ def _taken_by(step, numbers, before, after):
 
 @kernel
 def _actuation(step, angle0, angle1):
-    """Work of the actuators in a step, from angles angle0 to angle1 of the folds."""
+    """Work (J) of the actuators in a step between the dihedrals angle0 and angle1."""
     folds, system, old, new = step.setting.terms.folds, step.setting.system, step.old, step.new
     change = np.zeros_like(new.factor)
     change[:, 1] = 0.5 * (new.factor[:, 0] - old.factor[:, 0])

@@ -1,4 +1,4 @@
-"""Laws with memory in a motion: the body that has them, its state, and what resists at once."""
+"""Laws with memory in a motion: the model with them, their state, and their instant stiffness."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from foldyn.structures.inelastic_hinges import memory
 
 
 def with_memory(case: Case, body: Assembly, by: Numbering) -> Assembly:
-    """The body of a motion, as it stands in memory, with the branches of its laws if it has any.
+    """Model of a motion, in memory order, with the branches of its laws with memory.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def memory_of_case(case: Case) -> HingeMemory:
 
 
 def instant_stiffness(case: Case, u: NDArray) -> sparse.csr_array | None:
-    """What branches add to the tangent (m, m) at u (n, 3) for turns in no time; None without."""
+    """Instant stiffness (m, m) of memory branches at u (n, 3); None without branches."""
     parts = case.remembering
     if not parts:
         return None

@@ -1,25 +1,28 @@
-"""The discrete adjoint of Newmark's and the generalized-alpha method.
+"""Discrete adjoint of Newmark's and the generalized-alpha method.
 
-A step of `dynamics.generalized_alpha` has as unknown the shift d = q1 - q0. With c = 1/(beta h^2),
+The unknown of a step of `dynamics.generalized_alpha` is the shift d = q1 - q0. With c = 1/(beta
+h^2),
 
     a1 = c (d - h w0) - (1/2 - beta)/beta a0,   w1 = w0 + h ((1 - gamma) a0 + gamma a1),
     M ((1 - am) a1 + am a0 + alpha ((1 - af) w1 + af w0)) + (1 - af) b1 + af b0 = 0
 
-on the free dofs. Backward, with the derivatives lq, lw, la of a number by the state at the end and
-the multipliers z' of the balance of the next step, which sees b1 too, those of this one solve
+on the free dofs. Backward, let lq, lw, la be the derivatives of a scalar with respect to the end
+state, and z' the multipliers of the next step's balance, which also contains b1. The multipliers z
+of this step solve
 
     A' z = lq - P' + c (la + h gamma (lw - R')),
 
-A the matrix of the step at its end, P' and R' the derivatives of af z' . b1 by q1 and w1: the
-pullback of the forces (`mechanics.pullback`) has the weights W = (1 - af) z + af z' in all. Factors
-of the matrix that steps use, which leaves out how dampers turn, serve to iterate, also those of an
-earlier step: what is left of the balance of z comes from the pullback itself, and so does the
-gradient.
+with A the matrix at the end of the step, and P' and R' the derivatives of af z' . b1 with respect
+to q1 and w1: the pullback of the forces (`mechanics.pullback`) has the total weights W = (1 - af) z
++ af z'. The equation is solved iteratively with the factors that the forward steps use, also with
+those from an earlier step, although they neglect the rotation of dampers: the pullback itself gives
+the residual of the balance of z, and the gradient.
 
-The gradient is that of steps which are solved exactly. Newton's method stops at a residual of
-`Scheme.tolerance`, mostly far below: so near is it to that of what was computed.
+The gradient is exact for steps that are solved exactly. Newton's method stops at a residual of
+`Scheme.tolerance`, mostly far below it, which bounds the difference to the computed motion.
 
-Steps are taken again, to the bit, from where an engine can go on; a segment of them is kept.
+Steps are recomputed, bit for bit, from states where an engine can resume; one segment of them is
+stored at a time.
 """
 
 from __future__ import annotations
@@ -46,35 +49,35 @@ from foldyn.errors import ComputationError, InputError
 from foldyn.threads import one_thread
 
 METHODS = ("newmark", "generalized_alpha")
-ROOM = 16e6  # bytes of the states of a segment
+ROOM = 16e6  # bytes for the states of a segment
 ITERATIONS = 30
-TOLERANCE = 1e-12  # of what is left of the balance of z
-ENOUGH = 1e-7  # the same where it falls no more
-FAST = 0.1  # share that an iteration leaves, above which an older matrix is made anew
-STALL = 0.5  # the same, above which it falls no more
+TOLERANCE = 1e-12  # of the residual of the balance of z
+ENOUGH = 1e-7  # the same if it has stalled
+FAST = 0.1  # residual reduction above which an old matrix is renewed
+STALL = 0.5  # residual reduction above which the iteration has stalled
 
 
 class State(NamedTuple):
-    """State at the end or the beginning of a step, without what supports move."""
+    """State at the start or end of a step, without support motion."""
 
-    t: float  # at which forces are evaluated, s
+    t: float  # time of the force evaluation, s
     q: NDArray  # (n, 3) m
     w: NDArray  # m/s
     a: NDArray  # m/s2
 
 
 class Taken(NamedTuple):
-    """A step, or a part of one, that was accepted."""
+    """An accepted step, or part of one."""
 
     number: int  # of the step, from 0
     h: float  # s
     start: State
     end: State
-    begins: bool  # whether its start was made by `Scheme.begin`
+    begins: bool  # whether `Scheme.begin` made its start
 
 
 class Place(NamedTuple):
-    """Where a segment of steps starts, and all that an engine needs to go on from there."""
+    """Start of a segment of steps, with everything that an engine needs to resume there."""
 
     number: int  # of the step
     state: State
@@ -83,7 +86,7 @@ class Place(NamedTuple):
 
 
 class Retraced(Implicit):
-    """A motion by fixed implicit steps, taken again: its steps, from the last one back."""
+    """A motion by fixed implicit steps, recomputed: yields its steps from last to first."""
 
     def __init__(self, motion: Any) -> None:
         _refuse(motion)
@@ -92,7 +95,7 @@ class Retraced(Implicit):
             1, len(packed.numbering.order), len(motion.case.reaction_dofs),
             motion.output.window.energy.shape[1],
         )  # fmt: skip
-        unseen = plan._replace(every=plan.steps + 1)  # but for the start
+        unseen = plan._replace(every=plan.steps + 1)  # records the start only
         given = packed, motion.beginning, unseen, jumps(motion.case)
         super().__init__(motion.method.scheme, *given)
         self.advance(self._room, 0)
@@ -109,11 +112,11 @@ class Retraced(Implicit):
 
     @property
     def scheme(self) -> Any:
-        """What it takes steps by."""
+        """Scheme of the steps."""
         return self._scheme
 
     def back(self, first: int, last: int) -> Iterator[Taken]:
-        """All steps from number `first` to `last`, the last one first."""
+        """Return the steps from number `first` to `last`, in reverse order."""
         for place, end in zip(reversed(self._places), reversed(self._ends), strict=True):
             if place.number < last and end > first:
                 if self._taken[0].number != place.number:
@@ -125,7 +128,7 @@ class Retraced(Implicit):
                 yield from reversed(self._taken[low:high])
 
     def _parts(self) -> dict[str, Any]:
-        """See `Implicit`, without its own: that counts, and what is kept here."""
+        """State to store; see `Implicit`. The engine's own counters are left out."""
         return {name: part for name, part in super()._parts().items() if name != "engine"}
 
     def _reached(self, t: float) -> State:
@@ -148,7 +151,7 @@ def _number(taken: Taken) -> int:
 
 
 class ImplicitAdjoint(Adjoint):
-    """Backward through a motion by Newmark's or the generalized-alpha method; see `Adjoint`.
+    """Backward pass through a motion by Newmark's or the generalized-alpha method; see `Adjoint`.
 
     Parameters
     ----------
@@ -164,15 +167,15 @@ class ImplicitAdjoint(Adjoint):
         shape = self._scheme.shift.shape
         free = np.zeros(shape, bool)
         free.ravel()[self._matrix.free] = True
-        free.ravel()[packed.system.ties.slave] = True  # their share reaches their masters
+        free.ravel()[packed.system.ties.slave] = True  # their masters get their share
         self._kinds = free, free & ~self._scheme.massless[:, None]  # and with mass
-        # derivatives by the acceleration where it has come to, and z of the step after that
+        # derivatives by the current acceleration, and z of the following step
         self._by_a, self._z = np.zeros(shape), np.zeros(shape)
-        self._made = 0.0  # step of the matrix that is factorized
+        self._made = 0.0  # step of the factorized matrix
         self._forget()
 
     def backward(self, first: int, last: int, by_u: NDArray, by_v: NDArray) -> None:
-        """See `Adjoint`."""
+        """Step backward from step number `last` to step number `first`; see `Adjoint`."""
         with one_thread():
             for taken in self._steps.back(first, last):
                 self._back(taken, by_u, by_v)
@@ -180,7 +183,7 @@ class ImplicitAdjoint(Adjoint):
                     self._back_to_begin(taken.start, by_u, by_v)
 
     def gradient(self, by_u: NDArray, by_v: NDArray) -> dict[str, NDArray]:
-        """See `Adjoint`; dofs beside displacements start where they are in balance."""
+        """Complete the gradient; massless dofs start in balance. See `Adjoint`."""
         body = self._packed.body
         if len(hidden := body.hidden):
             start = next(self._steps.back(0, 1)).start
@@ -196,7 +199,7 @@ class ImplicitAdjoint(Adjoint):
 
     # ------------------------------------------------------------------ a step
     def _back(self, taken: Taken, by_u: NDArray, by_v: NDArray) -> None:
-        """From the end of a step to its start; see the module's text."""
+        """Step backward from the end of one step to its start; see the module docstring."""
         (am, af, beta, gamma), h = self._scheme.parameters, taken.h
         (_, _, w0, a0), (t, q, w1, a1) = taken.start, taken.end
         curvature, alpha, free, heavy = 1.0 / (beta * h * h), self._system.alpha, *self._kinds
@@ -240,7 +243,7 @@ class ImplicitAdjoint(Adjoint):
         self._z = z
 
     def _back_to_begin(self, start: State, by_u: NDArray, by_v: NDArray) -> None:
-        """To before the acceleration -M^-1 b - alpha w with which a motion begins, or a part."""
+        """Step backward through the acceleration -M^-1 b - alpha w that begins a motion or part."""
         (_, af, _, _), (t, q, w, a) = self._scheme.parameters, start
         self._forget()
         self._pull(*self._whole(t, q, w), af * self._z + self._push(self._by_a))
@@ -250,7 +253,7 @@ class ImplicitAdjoint(Adjoint):
 
     # ------------------------------------------------------------------ parts
     def _factorize(self, u: NDArray, h: float) -> None:
-        """Factorize the matrix of a step that ends at u."""
+        """Factorize the matrix of a step h (s) that ends at u."""
         matrix = self._matrix
         matrix.blocks.put(self._packed.body, matrix.pattern, u, u, False, matrix.stiffness)
         matrix.follow(u, 0.5)
@@ -259,7 +262,7 @@ class ImplicitAdjoint(Adjoint):
 
 
 def _refuse(motion: Any) -> None:
-    """Refuse steps that have no adjoint, with a remedy."""
+    """Refuse steps without an adjoint, with a remedy."""
     if motion.method.name not in METHODS:
         raise InputError(
             f" = {motion.method.name!r}: motions by it have no gradients; take rk4, "

@@ -1,9 +1,9 @@
 """The mass matrix inside compiled loops: M v and the solution of M a = r on free dofs.
 
-A lumped matrix is a division. A consistent one is factored once per distinct set of supported
-nodes (axes with equal supports share it) and solved by sparse triangular substitution. Where
-constraints tie dofs together, the matrix of the free dofs of all axes, Z' M Z with v = Z v_free, is
-factored and a = Z (Z' M Z)^-1 Z' r, whether M is lumped or not.
+A lumped matrix is a division. A consistent one is factored once per distinct set of supported nodes
+(axes with equal supports share it) and solved by sparse triangular substitution. With constraints,
+the matrix of the free dofs of all axes, Z' M Z with v = Z v_free, is factored and a = Z (Z' M Z)^-1
+Z' r, whether M is lumped or not.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from foldyn.jit.intrinsics import flat
 
 
 class Inertia(NamedTuple):
-    """Mass matrix (nodal, CSR), its inverse where diagonal, its factors where not."""
+    """Mass matrix (nodal, CSR), its inverse if diagonal, otherwise its factors."""
 
-    lumped: bool  # and without constraints
-    diagonal: NDArray  # (n,) with constraints the least that the free dofs of a node feel
+    lumped: bool  # diagonal, and without constraints
+    diagonal: NDArray  # (n,) with constraints the least mass that the node's free dofs feel
     inverse: NDArray  # (n, 3) 1/m on free dofs, 0 on fixed ones; empty if not lumped
     indptr: NDArray
     indices: NDArray
     data: NDArray
     ties: Ties
-    factor_of_axis: NDArray  # (3,) which factor serves each axis
+    factor_of_axis: NDArray  # (3,) index of the factor for each axis
     start: NDArray  # (factors + 1,) first row of each factor in the arrays below
     nodes: NDArray  # free nodes of each factor; with constraints free dofs
     row_order: NDArray
@@ -47,7 +47,7 @@ class Inertia(NamedTuple):
 
 
 def check_mass(mass: sparse.csr_array, fixed: NDArray) -> None:
-    """Refuse a free node without mass."""
+    """Refuse free nodes without mass."""
     massless = np.flatnonzero((mass.diagonal() <= 0.0) & ~fixed.all(axis=1))
     if len(massless):
         shown = ", ".join(map(str, massless[:8])) + (", ..." if len(massless) > 8 else "")
@@ -96,7 +96,7 @@ def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties) -> Inertia:
 
 
 def lightness(mass: Inertia) -> NDArray:
-    """What the inverse (1/kg) of the mass of each node is at most."""
+    """Upper bound (n,), 1/kg, of the inverse mass of each node."""
     # a consistent matrix of triangles is at least half of its diagonal
     share = 1.0 if mass.lumped else 0.5
     own = share * mass.diagonal
@@ -104,14 +104,14 @@ def lightness(mass: Inertia) -> NDArray:
 
 
 def _least(diagonal: NDArray, ties: Ties, own: NDArray) -> NDArray:
-    """Least mass (n,) that the free dofs of each node feel; its own where a node has none."""
+    """Least mass (n,) that the free dofs of each node feel; `own` for nodes without free dofs."""
     least = np.full(len(own), np.inf)
     np.minimum.at(least, ties.free // 3, diagonal)
     return np.where(np.isfinite(least), least, own)
 
 
 def _factor(mass: sparse.csr_array, nodes: NDArray) -> tuple:
-    """Free nodes, orders, L and U without their diagonals, and pivots of their mass matrix."""
+    """Mass factors of `nodes`: free nodes, orders, L and U without diagonals, and pivots."""
     if not len(nodes):
         empty = sparse.csc_array((0, 0))
         return nodes, nodes, nodes, empty, empty, np.zeros(0)
@@ -123,7 +123,7 @@ def _factor(mass: sparse.csr_array, nodes: NDArray) -> tuple:
 
 
 def _join(factors: list[tuple]) -> tuple[NDArray, ...]:
-    """Arrays of all factors end to end, column pointers made absolute."""
+    """Concatenate the arrays of all factors, with absolute column pointers."""
 
     def column(parts: Iterable[NDArray], kind: type) -> NDArray:
         return np.concatenate([np.zeros(0, kind), *parts]).astype(kind)
@@ -133,7 +133,7 @@ def _join(factors: list[tuple]) -> tuple[NDArray, ...]:
     )
     joined = [column(parts, np.int64) for parts in (nodes, rows, columns)]
     for triangles in (lowers, uppers):
-        # every factor keeps its own closing pointer, so factor k's columns start at start[k] + k
+        # each factor has its own closing pointer, so factor k's columns start at start[k] + k
         base = np.cumsum([0, *(m.nnz for m in triangles)])
         joined += [
             column((m.indptr + b for m, b in zip(triangles, base[:-1], strict=True)), np.int64),
@@ -169,7 +169,7 @@ def substitute(m, r, a, scratch):
 
 @inner
 def solve_mass(m, r, a, scratch, member, members):
-    """The same without constraints, by one of several threads, which share the axes."""
+    """Solve without constraints; the threads of a team share the axes."""
     for c in range(member, 3, members):
         for i in range(a.shape[0]):
             a[i, c] = 0.0
@@ -194,7 +194,7 @@ def solve_mass(m, r, a, scratch, member, members):
 
 @inner
 def solve_tied(m, r, a, scratch):
-    """The same with constraints; r, a (3n,)."""
+    """Solve with constraints; r, a (3n,)."""
     for i in range(a.size):
         a[i] = r[i]
     hand_over(m.ties, a)
@@ -226,7 +226,7 @@ def _lumped_sum(diagonal, v):
 
 @kernel
 def moving_energy(mass, factor):
-    """Kinetic energy (J) of S f', `mass` the system's `moved_mass`, for factors (h, 3)."""
+    """Kinetic energy (J) of support motion S f'; `mass` is `moved_mass`, factors are (h, 3)."""
     total = 0.0
     for k in range(mass.shape[0]):
         for l in range(mass.shape[0]):  # noqa: E741
@@ -236,13 +236,13 @@ def moving_energy(mass, factor):
 
 @inner_scalar
 def lumped_energy(diagonal, v, own):
-    """The same for a diagonal matrix (n,)."""
+    """Kinetic energy (J) for a diagonal matrix (n,)."""
     return 0.5 * _lumped_sum(diagonal[own[0] : own[1]], v[own[0] : own[1]])
 
 
 @inner_scalar
 def kinetic_energy(m, v, own):
-    """v M v / 2 (J), the part of the nodes own[0] to own[1]; v (n, 3)."""
+    """Kinetic energy v M v / 2 (J) of the nodes own[0] to own[1] - 1; v (n, 3)."""
     if m.lumped:
         return lumped_energy(m.diagonal, v, own)
     total = 0.0

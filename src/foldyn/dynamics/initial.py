@@ -1,4 +1,4 @@
-"""How a motion starts: the state of a result, checked against the supports and their motions."""
+"""Initial state of a motion: from a result, checked against supports and their motions."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from foldyn.values import whole
 
 AXES = "xyz"
 FIRST = 0.15  # first step over the largest one, times the fifth root of the tolerance
-SLOW_WIND = 0.05  # of the speed at the start: its square, which pushes, does not matter
-LOOKS = 501  # times at which supports and planes are looked at, beside the corners of histories
-ZERO = 1e-10  # of the largest stiffness: eigenvalues of less are none
+SLOW_WIND = 0.05  # of the initial speed: a slower wind is negligible
+LOOKS = 501  # times at which supports and planes are checked, in addition to knots of histories
+ZERO = 1e-10  # of the largest stiffness: smaller eigenvalues count as zero
 
 
 def initial_state(result: Any, at: int = -1) -> State:
@@ -42,8 +42,8 @@ def initial_state(result: Any, at: int = -1) -> State:
     Parameters
     ----------
     result : xarray.Dataset
-        A trajectory or a path. Damping with ``state = "start"`` and added mass stay those of the
-        trajectory: `State` of its displacement and velocity alone begins anew.
+        A trajectory or a path. Damping with ``state = "start"`` and added mass keep their values
+        from the trajectory; a plain `State` of its displacement and velocity resets them.
     at : int, default -1
         Number of the sample; negative ones count from the end.
     """
@@ -75,7 +75,7 @@ def initial_state(result: Any, at: int = -1) -> State:
 
 
 def origin_of(sample: Any, place: str) -> Origin | None:
-    """Where the motion of a sample began, if its result says so."""
+    """Origin of the motion that a sample belongs to, if its result stores one."""
 
     def known(name: str) -> NDArray:
         return check_variable(sample, name, ORIGIN[name].dims, place=place).to_numpy()
@@ -90,7 +90,7 @@ def origin_of(sample: Any, place: str) -> Origin | None:
 
 
 def _continuation(sample: Any) -> Continuation | None:
-    """What an implicit method has stored with a sample, at either end of a motion."""
+    """Continuation data that an implicit method stored with the first or last sample, if any."""
     for name in CONTINUATIONS:
         if name in sample:
             found = check_variable(sample, name, ("continued",), place="initial_state: ")
@@ -101,7 +101,7 @@ def _continuation(sample: Any) -> Continuation | None:
 
 
 def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
-    """Displacement and velocity (n, 3) at the start, checked."""
+    """Check the initial state; return displacement and velocity (n, 3)."""
     if initial is not None and not isinstance(initial, State):
         raise InputError(
             f"initial: got {type(initial).__name__}; give a State: fd.State(displacement=..., "
@@ -120,7 +120,7 @@ def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
 
 
 def check_touching(case: Case, u: NDArray, start: float, end: float) -> None:
-    """Refuse contact that cannot be, in a motion from displacements u (n, 3) at `start` (s)."""
+    """Refuse impossible contact in a motion from displacements u (n, 3) at `start` (s)."""
     planes = () if case.contact is None else case.contact.planes
 
     def moved(factors: Iterable[float]) -> NDArray:
@@ -139,7 +139,7 @@ def check_touching(case: Case, u: NDArray, start: float, end: float) -> None:
     times = np.union1d(np.linspace(start, end, LOOKS), turns)
     try:
         factors = np.array([np.broadcast_to(history(times), times.shape) for history in given])
-    except InputError:  # a function that fails: the motion will stop there, and say why
+    except InputError:  # a failing function: the motion will stop there and say why
         return
     along, shapes = factors[len(obstacles) :], [shape for shape, _ in driven]
     check_driven(
@@ -156,12 +156,12 @@ def check_touching(case: Case, u: NDArray, start: float, end: float) -> None:
 
 
 def _check_tied_velocity(case: Case, velocity: NDArray) -> None:
-    """Refuse velocities (n, 3), m/s, that constraints do not allow."""
+    """Refuse velocities (n, 3), m/s, that violate constraints."""
     ties = case.constraints
     if not ties:
         return
     speed = np.abs(ties.values(velocity))
-    for vector, _ in (*case.imposed_terms, *case.base_terms):  # these move
+    for vector, _ in (*case.imposed_terms, *case.base_terms):  # supports that move
         speed[np.abs(ties.values(vector)) > AGREES * np.abs(vector).max()] = 0.0
     if speed.max() > AGREES * np.abs(velocity).max():
         worst = int(speed.argmax())
@@ -173,7 +173,7 @@ def _check_tied_velocity(case: Case, velocity: NDArray) -> None:
 
 
 def check_steady(case: Case, start: float, end: float) -> None:
-    """Refuse a support, plane or fold that would have to jump, and a wind that moves fluid."""
+    """Refuse jumps of supports, planes and folds, and of a wind with added mass."""
     for what, history in histories(case):
         times = [time for time in history.jumps() if start < time < end]
         drags = what == "the wind" and not (case.air and case.air.added_mass)
@@ -188,7 +188,7 @@ def check_steady(case: Case, start: float, end: float) -> None:
 
 
 def warn_of_unstable_damping(case: Case, start: Origin) -> None:
-    """Warn where damping follows the stiffness at a start, and this is not positive."""
+    """Warn if damping follows the stiffness of a start where it is not positive definite."""
     if case.rayleigh.beta == 0.0 or case.rayleigh.state != "start":
         return
     free = np.asarray(case.free_dofs)
@@ -212,7 +212,7 @@ def warn_of_unstable_damping(case: Case, start: Origin) -> None:
 
 
 def warn_of_standing_in_wind(case: Case, v: NDArray) -> None:
-    """Warn where the flow's change pushes, unless the sheet starts much faster than the wind.
+    """Warn of the moment that panels in a wind lack, unless the sheet starts much faster.
 
     v : (n, 3) velocities at the start, m/s.
     """
@@ -241,8 +241,8 @@ def begin(
 ) -> Course:  # fmt: skip
     """State of the integrators at the start of a motion with displacement u and velocity v.
 
-    remembered : that of hinges with memory, see `Memory.start`.
-    continued : where dofs beside displacements begin, if it is known.
+    remembered : state of hinges with memory, see `Memory.start`.
+    continued : initial values of massless dofs, if known.
     """
     body, system, mass, callbacks, by, *_ = packed
     s = scratch(system)
@@ -277,7 +277,7 @@ def begin(
         turn(body.sheet.folds, system.actuators, s.factor)
         system.actuators.offset[:, 2] = system.actuators.offset[:, 0]
         system.actuators.offset[:, 3] = np.nan  # no moment known yet
-    if len(body.hidden):  # they stand where they are in balance
+    if len(body.hidden):  # massless dofs start in balance
         push = following_force(system.following, inward.ravel(), s.factor)
         resists = memory if memory is not None and memory.resists(remembered) else None
         there = body.dofs(by.inward(u)[: len(u)], push, resists)

@@ -1,6 +1,6 @@
 """Central differences of up to WIDTH motions side by side, in the lanes of `mechanics.lanes`.
 
-All take the same steps, and each is looked at along the way as a motion alone is.
+All take the same steps; each is checked along the way like a single motion.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from foldyn.structures.bars_hinges import BarsHingesTerm
 
 
 class LaneState(NamedTuple):
-    """WIDTH models of d dofs on their way."""
+    """State of WIDTH models with d dofs."""
 
     dofs: NDArray  # (5, d WIDTH) displacement, velocity, acceleration, force, position (SI)
     angle: NDArray  # (nh WIDTH,) at the last step, rad
-    work: NDArray  # (4, WIDTH) work and energy dissipated, J, and their powers, W
-    wrong: NDArray  # (WIDTH,) not 0 once something is not finite, or a hinge has jumped by pi
+    work: NDArray  # (4, WIDTH) work and dissipated energy, J, and their powers, W
+    wrong: NDArray  # (WIDTH,) nonzero after a value that is not finite, or a hinge jump by pi
 
 
 class LaneLoads(NamedTuple):
-    """Loads on k dofs, in t terms with a history each; masses and drag."""
+    """Loads on k dofs, in t terms with one history each; masses and drag."""
 
     dof: NDArray  # (k,)
     value: NDArray  # (t, k WIDTH) N
@@ -42,11 +42,11 @@ class LaneLoads(NamedTuple):
 
 
 class LanePlaces(NamedTuple):
-    """Where numbers of the lanes stand in the results, n nodes, s supported dofs."""
+    """Destinations of lane data in the results: n nodes, s supported dofs."""
 
     motion: NDArray  # (models,) number of the motion in each lane
-    node: NDArray  # (n,) number of the node at each place in memory
-    supported: NDArray  # (s,) dofs, as they stand in memory
+    node: NDArray  # (n,) node number at each place in memory
+    supported: NDArray  # (s,) dofs, in memory order
 
 
 @inner
@@ -65,12 +65,12 @@ def write_samples(mass, state, strain, places, out, k):
             out.reaction[m, k, s] = force[places.supported[s] * WIDTH + q]
         energy[:-3] = strain[:, q]
         energy[-3], energy[-2], energy[-1] = kinetic, state.work[1, q], state.work[0, q]
-        state.wrong[q] += 0.0 * energy.sum()  # nan, if one is not finite
+        state.wrong[q] += 0.0 * energy.sum()  # nan if an energy is not finite
 
 
 @shared
 def advance_lanes(model, loads, factor, state, plan, places, out, first, last):
-    """Do the steps from the first to the last one of WIDTH models; step 0 is the start.
+    """Advance WIDTH models from step first to last; step 0 is the start.
 
     factor : (last - first + 1, t WIDTH) of the histories, at the ends of these steps.
     """
@@ -103,13 +103,13 @@ def advance_lanes(model, loads, factor, state, plan, places, out, first, last):
                 put(force, at, eight(force, at) - load)
                 power_in = power_in + load * (eight(v, at) + 0.5 * h * eight(a, at))
         for i in range(0, u.size, WIDTH):
-            ahead = eight(v, i) + 0.5 * h * eight(a, i)  # velocity that drag sees
+            ahead = eight(v, i) + 0.5 * h * eight(a, i)  # velocity for the drag
             new = -eight(force, i) * eight(loads.inverse, i) - slowed * ahead
             speed = eight(v, i) + 0.5 * h * new
             put(a, i, new)
             put(v, i, speed)
             drag = drag + eight(loads.mass, i) * ahead * ahead
-            wrong = wrong + zero * speed  # nan, once one of them is inf or nan
+            wrong = wrong + zero * speed  # nan after an inf or nan
         for row, power in enumerate((power_in, drag * slowed)):
             before = eight(work, (2 + row) * WIDTH)
             put(work, row * WIDTH, eight(work, row * WIDTH) + 0.5 * h * (before + power))
@@ -120,9 +120,9 @@ def advance_lanes(model, loads, factor, state, plan, places, out, first, last):
 
 
 def topology(motion: Motion) -> tuple[bytes, ...]:
-    """What motions side by side have in common; nothing of one that lanes do not take.
+    """Properties that motions in lanes must share; None for motions that lanes do not support.
 
-    They take bars and hinges with laws of the package, lumped masses, drag, and dead loads.
+    Supported are bars and hinges with the package's laws, lumped masses, drag, and dead loads.
     """
     packed, system = motion.packed, motion.packed.system
     drives = system.moves, system.turns, system.follows
@@ -135,10 +135,10 @@ def topology(motion: Motion) -> tuple[bytes, ...]:
 
 
 def integrate(motions: Sequence[tuple[int, Motion]], out: Samples) -> set[int]:
-    """Integrate up to WIDTH motions of one topology and plan; numbers of those that go wrong.
+    """Integrate up to WIDTH motions of one topology and plan; return numbers of failures.
 
     motions : with their numbers in `out`.
-    out : room for samples: times (k,), the others (m, k, ...).
+    out : sample arrays: times (k,), all others (m, k, ...).
     """
     numbers, own = zip(*motions, strict=True)
     plan, system = own[0].plan, own[0].packed.system
@@ -157,7 +157,7 @@ def integrate(motions: Sequence[tuple[int, Motion]], out: Samples) -> set[int]:
 
 
 def _is_sound(motion: Motion, lane: int, state: LaneState, step: int) -> bool:
-    """Whether a motion can go on after a step: it is audited as if it were alone."""
+    """Whether a motion may continue after a step: audited like a single motion."""
     if state.wrong[lane] != 0.0:
         return False
     motion.course.tally.samples = step // motion.plan.every + 1
@@ -171,7 +171,7 @@ def _is_sound(motion: Motion, lane: int, state: LaneState, step: int) -> bool:
 
 
 def _start(motions: Sequence[Motion]) -> LaneState:
-    """The models at their beginning."""
+    """Initial state of the models."""
     courses = [motion.course for motion in motions]
     dofs = side_by_side([np.stack([c.u, c.v, *np.zeros((3, *c.u.shape))]) for c in courses])
     angle = side_by_side([course.angle for course in courses])

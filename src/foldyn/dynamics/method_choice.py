@@ -1,9 +1,8 @@
 """The choice between explicit and implicit integration, with its reason in words.
 
-Both costs are estimated, as the steps that a method needs times what one of them takes. An explicit
-method takes steps of half its critical step, whatever moves. An implicit one takes steps that
-resolve the motion, whose pace is estimated here, with the tolerance asked for, and end at its
-samples.
+Both costs are estimated: number of steps times cost per step. An explicit method always takes half
+its critical step. An implicit method takes steps that resolve the motion, at a frequency estimated
+here, to the requested tolerance, and end at samples.
 """
 
 from __future__ import annotations
@@ -26,21 +25,21 @@ from foldyn.dynamics.timing import DEFAULT_FRACTION, histories
 from foldyn.mechanics.following import following_force
 
 AUTO = "auto"
-LONG = 30.0  # periods from which a motion that nothing damps calls for a method that conserves
-CONTENT = 2.0  # times the steps of the vibration itself: faster ones ride on it
+LONG = 30.0  # periods beyond which an undamped motion needs a conserving method
+CONTENT = 2.0  # times the steps for the vibration alone, as it carries faster ones
 FEWEST = 50.0  # steps of an implicit run
-MOST_TIMES = 4000  # at which loads are looked at
-AT_REST = 1e-6  # of the loads: out-of-balance forces below that set nothing in motion
-SMOOTH = 1e-3  # of a vibration: the least share that is assumed
-RESOLVED = 0.2  # rad that a vibration may turn in a step: RK4 loses 1 % of its energy in 11,000
+MOST_TIMES = 4000  # times at which loads are evaluated
+AT_REST = 1e-6  # of the loads: smaller out-of-balance forces set nothing in motion
+SMOOTH = 1e-3  # least share of a vibration that is assumed
+RESOLVED = 0.2  # rad per step of a vibration: RK4 loses 1 % of its energy in 11,000 steps
 ACCURATE = "dormand_prince"
-DEARER = 10.0  # times the cost of a motion: what another one may cost that is more accurate
+DEARER = 10.0  # times the cost of a motion: limit for a more accurate method
 
 
 class Choice(NamedTuple):
-    """A method, why it was chosen, and one for where its energies turn out not to balance.
+    """A method, the reason for it, and a fallback if its energies do not balance.
 
-    That one is the same method, with a shorter step, where its errors do not add up over time.
+    The fallback is the same method with a shorter step if its errors do not accumulate.
     """
 
     method: str
@@ -52,7 +51,7 @@ def choose(
     case: Case, u: NDArray, v: NDArray, start: float, duration: float, dt: float | None,
     interval: float, tolerance: float | None, default: float, modal: ModalRows,
 ) -> Choice:  # fmt: skip
-    """The method that should be quicker for a motion from u and v (n, 3) at `start`, and why.
+    """Choose the faster method for a motion from u and v (n, 3) at `start`, with the reason.
 
     dt and tolerance are arguments of `simulate`, default is the tolerance of implicit methods
     without one, interval is the time between samples (s), 0.0 where steps are counted, and modal
@@ -106,15 +105,15 @@ def choose(
 
 
 def _explicit_cost(case: Case, evaluations: int) -> float:
-    """Seconds of a step, as measured from 39 to 22,000 dofs."""
+    """Seconds per step, measured between 39 and 22,000 dofs."""
     substitution = 1.0 if is_lumped(case.mass) else 2.0
     return evaluations * (5e-7 + 2.5e-8 * substitution * case.structure.nodes.size)
 
 
 def _implicit_cost(case: Case, conserved: bool) -> float:
-    """Seconds of a step with its residuals, tangents and factorizations, as measured likewise.
+    """Seconds per step with residuals, tangents and factorizations, measured likewise.
 
-    The conserving method's forces and unsymmetric matrices cost more.
+    The conserving method costs more: discrete-gradient forces and unsymmetric matrices.
     """
     dofs = case.structure.nodes.size
     factorization = 6e-5 * (dofs / 333.0) ** 1.85
@@ -130,11 +129,11 @@ def _seconds(cost: float) -> str:
 
 
 def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
-    """Angular frequency (rad/s) of what loads, supports and the initial state set in motion.
+    """Angular frequency (rad/s) of the motion caused by loads, supports and the initial state.
 
-    Rayleigh's quotient of the displacements that they would cause if they acted slowly (over the
-    duration, for bodies that nothing holds) and of the deforming part of the initial velocity, or
-    the angular velocity of its rigid part. Hinges count with at least their nominal stiffness.
+    Rayleigh's quotients of the displacements under slow loads (as slow as the duration, for bodies
+    without supports) and of the deforming part of the initial velocity, or the angular velocity of
+    its rigid part. Hinges count with at least their nominal stiffness.
     """
     structure, free = case.structure, np.asarray(case.free_dofs)
     stiffness = case.elastic_body.tangent(u, 1.0)
@@ -158,7 +157,7 @@ def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
 
 
 def fast_share(case: Case, u: NDArray, v: NDArray, omega: float) -> float:
-    """Share of the kinetic energy of velocities v (n, 3) in vibrations about u above omega (rad/s).
+    """Share of the kinetic energy of v (n, 3) in vibrations about u faster than omega (rad/s).
 
     A vibration of w counts with (w^2 / (w^2 + omega^2))^2 of its energy; hinges have at least their
     nominal stiffness.
@@ -182,8 +181,8 @@ def vibrating_share(
 ) -> float:
     """Share of the displacement that vibrates: 1 after a release, less under slow loads.
 
-    For a motion from rest in balance it is how far the factors bend within half a period, relative
-    to their size.
+    For a motion from rest in balance it is the curvature of the load factors over half a period,
+    relative to their size.
     """
     if v.any() or _out_of_balance(case, u, start):
         return 1.0
@@ -204,7 +203,7 @@ def vibrating_share(
 
 
 def _applied(case: Case, u: NDArray) -> NDArray:
-    """Forces (3n,) at u that loads and actuated folds exert beside the internal ones, N."""
+    """Forces (3n,) at u by loads and actuated folds, without internal forces, N."""
     body = case.elastic_body
     force = -body.internal(u)
     for load, _ in case.load_terms:
@@ -229,7 +228,7 @@ def _imposed(case: Case) -> NDArray:
 
 
 def _out_of_balance(case: Case, u: NDArray, start: float) -> bool:
-    """Whether forces at the start set the structure in motion at once."""
+    """Whether forces at the start set the structure in motion immediately."""
     internal = case.elastic_body.internal(u).reshape(u.shape)
     force, size = -internal, float(np.abs(internal[case.fixed]).max(initial=0.0))
     for load, history in case.load_terms:
@@ -244,7 +243,7 @@ def _out_of_balance(case: Case, u: NDArray, start: float) -> bool:
 
 
 def _split(x: NDArray, v: NDArray) -> tuple[float, NDArray, NDArray]:
-    """Angular velocity (rad/s) of velocities v at x (n, 3), v less its rigid part and its mean."""
+    """Angular velocity (rad/s) of velocities v at x (n, 3); v without its rigid part; its mean."""
     arm, rest = x - x.mean(axis=0), v - v.mean(axis=0)
     inertia = (arm**2).sum() * np.eye(3) - arm.T @ arm
     spin = np.linalg.lstsq(inertia, np.cross(arm, rest).sum(axis=0), rcond=None)[0]

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 
 class Compiled:
-    """An explicit method, whose whole loop is compiled.
+    """An explicit method with a fully compiled loop.
 
     Parameters
     ----------
@@ -57,9 +57,9 @@ class Compiled:
     course : Course
     plan : StepPlan
     threads : int
-        On how many threads it shall run at most; fewer where elements reach too far.
+        Maximum number of threads; fewer if elements couple distant nodes.
     slows : bool
-        Whether it gives slow contacts inertia: on one thread only.
+        Whether slow contacts get inertia: on one thread only.
     further : tuple
         Further arguments of the loop.
     """
@@ -79,7 +79,7 @@ class Compiled:
         self.threads = len(self._works)
 
     def start_with(self, powers: NDArray) -> None:
-        """Take the powers (2,) in and out, W, at the last step from elsewhere."""
+        """Set the powers (2,) in and out, W, of the last step."""
         for memory in self._memories:
             memory.powers[:2] = powers if memory is self._memories[0] else 0.0
 
@@ -95,29 +95,29 @@ class Compiled:
         return run_together(self._loop, [work.team for work in self._works], arguments)[0]
 
     def accelerate(self) -> None:
-        """Find the acceleration anew where the motion stands, for methods that keep it."""
+        """Recompute the current acceleration, for methods that store it."""
         course, equation = self._course, self._equations[0].still
         accelerate(equation, course.u, course.v, float(course.tally.time), course.carry)
 
     def checkpoint_arrays(self) -> dict[str, NDArray]:
-        """All on which the next steps depend beside the case, between two stretches."""
+        """Everything that the next steps depend on, apart from the case, between two stretches."""
         return snapshot(self._parts())
 
     def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
-        """Go on as the engine that stood there; for as many threads."""
+        """Resume from the checkpoint arrays of an engine with the same number of threads."""
         restore(self._parts(), arrays)
 
     def _parts(self) -> dict[str, Any]:
         contact = [self._packed.body.kept(work, ContactTerm) or () for work in self._works]
         powers = [memory.powers for memory in self._memories]
         parts = state_parts(self._packed, self._course) | {"powers": powers, "contact": contact}
-        if self._packed.system.touches:  # a step's limit looks at the end of the one before
+        if self._packed.system.touches:  # the step limit uses the end of the last step
             whole = self._memories[0]
             parts["seen"] = [self._works[0].angle, whole.displacement, whole.velocity]
         return parts
 
     def facts(self) -> dict[str, Any]:
-        """Statistics of its own, for the result's attributes: what contact has cost."""
+        """Statistics for the result's attributes: contact lists, shortest contact step."""
         kept = self._packed.body.kept(self._works[0], ContactTerm)
         if kept is None:
             return {}
@@ -126,10 +126,10 @@ class Compiled:
 
 
 def threads_of(packed: Packed) -> int:
-    """Threads on which a motion of a case runs fastest.
+    """Fastest number of threads for a motion of a case.
 
-    One where something would have to be done by each of them: functions of the user, loads that
-    depend on the displacement, constraints, added mass, and terms that threads cannot share.
+    One if the case has parts that threads cannot share: user functions, displacement-dependent
+    loads, constraints, added mass, and some terms.
     """
     system = packed.system
     called = bool((system.waves.code == CALLED).any())
@@ -140,31 +140,32 @@ def threads_of(packed: Packed) -> int:
 
 @dataclass(frozen=True)
 class Integrator:
-    """An integrator.
+    """An integration method and its properties.
 
     Parameters
     ----------
     name : str
     order : int
-        What tests hold it to.
+        Order of convergence, checked by tests.
     loop : callable
-        The compiled function at its core: of an explicit method the loop over its steps, with
-        the arguments of `central_difference.advance`; of an implicit one the residual of a step.
+        Compiled core: the step loop of an explicit method, with the arguments of
+        `central_difference.advance`; the residual of a step of an implicit one.
     growth : callable, optional
         Of an explicit method: the largest factor by which a step multiplies a free vibration, as
         a function of omega, damping and dt.
     evaluations : int
-        Of an explicit method: how often a step evaluates the forces.
+        Of an explicit method: force evaluations per step.
     adaptive : bool
-        Whether it always chooses its steps by their error.
+        Whether it always controls its steps by their error.
     scheme : callable, optional
-        Of an implicit method: its `Scheme` from a case and a course.
+        Of an implicit method: creates its `Scheme` from a case and a course.
     massless : bool
-        Whether it takes dofs without mass beside the displacements, as those of a shell.
+        Whether it supports massless dofs, such as the edge rotations of a shell.
     looks : tuple of float
-        Where in a step, from 0 to 1, it looks at the loads.
+        Fractions of a step, from 0 to 1, at which it evaluates the loads.
     tableau : Tableau, optional
-        Of an explicit Runge-Kutta method of fixed step: its loop, `runge_kutta.advance`, takes it.
+        Of an explicit Runge-Kutta method of fixed step: last argument of its loop,
+        `runge_kutta.advance`.
     """
 
     name: str
@@ -179,7 +180,7 @@ class Integrator:
     tableau: Tableau | None = None
 
     def __post_init__(self) -> None:
-        """Refuse one without a limit of its step, or whose cost nobody knows."""
+        """Refuse an explicit method without step limit or cost."""
         if self.scheme is None and (self.growth is None or not self.evaluations):
             raise TypeError(
                 f"{self.name}: an explicit method needs growth, which limits its steps, and "
@@ -188,13 +189,13 @@ class Integrator:
 
     @property
     def implicit(self) -> bool:
-        """Whether a step solves equations: then nothing but accuracy limits it."""
+        """Whether a step solves equations, so that only accuracy limits it."""
         return self.scheme is not None
 
     def engine(
         self, case: Case, packed: Packed, course: Course, plan: StepPlan, device: str = "cpu"
     ) -> Compiled | Implicit | OnCard:
-        """The method with a case, its motion and the memory that it works with."""
+        """Create the engine for a case, with its motion and memory."""
         if device == "gpu":
             from foldyn.dynamics.gpu.engine import OnCard
 
@@ -211,7 +212,7 @@ class Integrator:
     def critical_step(
         self, case: Case, u: ArrayLike | None = None, modal: ModalRows | None = None
     ) -> float:
-        """See `critical_step`; `modal` is the modal damping of a motion from u, if it is known."""
+        """Critical step (s) about u; `modal` is the modal damping of a motion from u, if known."""
         if self.growth is None:
             return np.inf
         if modal is None:
@@ -222,13 +223,13 @@ class Integrator:
 
 
 def _explicit(module: Any, evaluations: int, **traits: Any) -> Integrator:
-    """The integrator of a file, which has its name."""
+    """Integrator of a module, with the module's name."""
     name = module.__name__.rpartition(".")[2]
     return Integrator(name, module.ORDER, module.advance, module.growth, evaluations, **traits)
 
 
 def runge_kutta(method: Tableau) -> Integrator:
-    """The explicit Runge-Kutta method of fixed step with a tableau."""
+    """Explicit Runge-Kutta method of fixed step for a tableau."""
     return Integrator(
         method.name, method.order, advance, method.growth, len(method.weights),
         looks=method.looks, tableau=method,
@@ -264,7 +265,7 @@ def method_of(name: str) -> Integrator:
 
 
 def suited(name: str, case: Case) -> Integrator:
-    """Integrator by its name, for a case."""
+    """Integrator by its name; refuses one that does not suit the case."""
     method = method_of(name)
     if lack := lacking(method, case):
         fit = ", ".join(other.name for other in METHODS.values() if not lacking(other, case))
@@ -276,12 +277,12 @@ def suited(name: str, case: Case) -> Integrator:
 
 
 def with_mass(method: Integrator, case: Case) -> Case:
-    """The case for a method: without dofs that have no mass where the method needs one."""
+    """The case, without massless dofs if the method needs mass."""
     return case if method.massless else massive(case)
 
 
 def lacking(method: Integrator, case: Case) -> str:
-    """What a method needs and a case lacks, in words; empty where nothing."""
+    """Reason why a method does not suit a case; empty if it does."""
     structure = case.structure
     if method.implicit and case.air is not None and case.air.added_mass:
         return "only explicit methods take the added mass of air (leave it out: added_mass = false)"
@@ -291,7 +292,7 @@ def lacking(method: Integrator, case: Case) -> str:
 
 
 def compiled(name: str) -> bool:
-    """Whether a method's kernels are kept on disk (else its first use compiles)."""
+    """Whether a method's kernels are cached on disk; otherwise its first use compiles."""
     return ready(method_of(name).loop)
 
 
@@ -302,17 +303,16 @@ def critical_step(case: Case, method: str = "rk4", *, u: ArrayLike | None = None
     ----------
     case : Case
     method : str
-        One of `foldyn.dynamics.METHODS`; nothing but accuracy limits the step of an implicit one:
-        inf.
+        One of `foldyn.dynamics.METHODS`; inf for an implicit one, whose step only accuracy limits.
     u : (n, 3), optional
         Displacement (m) about which the stiffness is taken; rest by default.
 
     Notes
     -----
     With the damped spectrum s^2 + (alpha + beta w^2 + r) s + w^2 = 0, the limit is the largest dt
-    with which no vibration grows, for all frequencies w up to the highest of the structure and all
-    r from 0 to the largest rate at which modal damping, dashpots and creases damp any motion: for
-    RK4 ``|R(s dt)| <= 1``.
+    for which no vibration grows, for all frequencies w up to the structure's highest and all r from
+    0 to the largest damping rate of modal damping, dashpots and creases: for RK4 ``|R(s dt)| <=
+    1``.
     """
     of_kind("case", case, Case)
     chosen, place = suited(method, case), checked_place(case, u)

@@ -1,13 +1,13 @@
-"""Damping ratios of modes as rows g_k of the dofs: C = sum of g_k' g_k.
+"""Modal damping as rows g_k of the dofs: C = sum of g_k' g_k.
 
 With M-orthonormal modes Phi on the free dofs f, C_ff = M Phi diag(2 zeta omega) Phi' M, a product
-with as many rows as there are modes (Wilson and Penzien, Int. J. Numer. Methods Eng. 4, 1972). What
-moves with the supports s is not damped: their motion brings the free dofs slowly to -K_ff^-1 K_fs
-u_s, and what is damped is the motion relative to that. Since Phi' K_ff = Lambda Phi' M_ff,
+with one row per mode (Wilson and Penzien, Int. J. Numer. Methods Eng. 4, 1972). The quasi-static
+motion with the supports s, -K_ff^-1 K_fs u_s at the free dofs, is not damped; only the motion
+relative to it is. Since Phi' K_ff = Lambda Phi' M_ff,
 
     g_k = sqrt(2 zeta_k omega_k) (phi_k' M_ff,  phi_k' K_fs / lambda_k),
 
-which vanishes in translations of the whole.
+which vanishes for rigid translations.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import following_tangent, joined
 from foldyn.statics.rigid import free_rigid_motions
 
-SOFT = 0.01  # of k: slope below which a superlinear hinge stands at its rest angle to rounding
+SOFT = 0.01  # of k: below this slope a superlinear hinge is at rest up to rounding
 # (4e-7 rad from it, which is what the tolerance of statics leaves undetermined)
-MOST_MODES = 2000  # free dofs of which all modes may be damped
-RIGID = 1.0 - 1e-6  # share of a shape in the space of rigid motions from which it is one,
-SLOW = 1e-6  # where its eigenvalue is less than that of the largest one found
-STILL = 1e-9  # of a hinge's gradient: what constraints leave of that of one that cannot turn
-ALIKE = 1e-6  # of a squared frequency: distance below which another is the same
-BEYOND = 6  # modes that are sought beyond those asked for: the rigid ones
+MOST_MODES = 2000  # largest number of free dofs with all modes damped
+RIGID = 1.0 - 1e-6  # share of a shape in the space of rigid motions above which it is rigid
+SLOW = 1e-6  # of the largest eigenvalue found: a rigid shape's eigenvalue is below
+STILL = 1e-9  # of a hinge's gradient: below this projection constraints prevent its turn
+ALIKE = 1e-6  # of a squared frequency: distance below which two are equal
+BEYOND = 6  # additional modes to compute: the rigid ones
 
 
 def soft_slopes(case: Case, body: Assembly, q: NDArray) -> tuple[sparse.csr_array | None, int]:
-    """What to add to the tangent (m, m) so that hinges at rest have no slope, and their number."""
+    """Tangent correction (m, m) that removes slopes of hinges at rest, and their number."""
     at_rest, slope = soft_at_rest(case, body, q)
     change = np.where(at_rest, -slope, 0.0)
     return (body.sheet.soft_tangent(q, change) if change.any() else None), int(at_rest.sum())
@@ -50,8 +50,8 @@ def soft_slopes(case: Case, body: Assembly, q: NDArray) -> tuple[sparse.csr_arra
 def soft_at_rest(case: Case, body: Assembly, q: NDArray) -> tuple[NDArray[np.bool_], NDArray]:
     """Whether superlinear hinges (h,) stand at their rest angle, and their slopes / k (h,).
 
-    There the slope is the root of rounding errors. Hinges that constraints keep from turning are
-    left alone.
+    Their slope is the root of rounding errors. Hinges that constraints keep from turning do not
+    count.
     """
     hinges = body.sheet.soft_hinges(q)
     slope = Superlinear().slope(hinges.offset, np.zeros(len(hinges.offset)))
@@ -59,7 +59,7 @@ def soft_at_rest(case: Case, body: Assembly, q: NDArray) -> tuple[NDArray[np.boo
 
 
 def _turns(case: Case, gradient: sparse.csr_array) -> NDArray[np.bool_]:
-    """Whether constraints let each hinge (h,) turn, by the gradients (h, m) of their angles."""
+    """Whether constraints let each hinge (h,) turn; gradient (h, m) of the angles."""
     ties = case.constraints
     if not ties:
         return np.ones(gradient.shape[0], bool)
@@ -73,11 +73,11 @@ class ModalRows(NamedTuple):
 
     rows: NDArray  # (r, m), sqrt(N s/m)
     rate: float  # 1/s, the largest 2 zeta omega
-    soft: int  # hinges that have no slope in the state, so that modes are left out
-    alike: int = 0  # modes of the same frequencies, which get a mean of different ratios
+    soft: int  # hinges without slope in the state: modes are left out
+    alike: int = 0  # modes of equal frequency with different ratios, which get the mean
 
     def warn(self) -> None:
-        """Warn where modes are left out, or are no modes by themselves."""
+        """Warn if modes are left out or share a mean ratio."""
         if self.alike:
             warn(
                 f"damping: {self.alike} modes have frequencies in common, but different ratios, or "
@@ -101,7 +101,7 @@ def modal_rows(case: Case, start: Origin | None = None) -> ModalRows:
     Raises
     ------
     InputError
-        The state is unstable; there are not as many modes.
+        The state is unstable, or there are fewer modes.
     """
     damping = case.modal_damping
     if damping is None:
@@ -120,21 +120,21 @@ def modal_rows(case: Case, start: Origin | None = None) -> ModalRows:
 
 
 def about(case: Case, start: Origin | None) -> tuple[NDArray, Assembly]:
-    """Displacement (n, 3) about which damping is, and the body there: at rest without a start."""
+    """Displacement (n, 3) that damping refers to, and the body there; rest without a start."""
     if start is None:
         return np.zeros_like(case.structure.nodes), case.elastic_body
     return start.displacement, case.elastic_body_at(start.time)
 
 
 def mass_of(case: Case) -> sparse.csr_array:
-    """Mass (m, m) of all dofs of a case: that of its nodes."""
+    """Mass (m, m) of all dofs of a case: its nodal mass, zero elsewhere."""
     mass = sparse.csr_array(sparse.kron(case.mass, sparse.eye_array(3), format="csr"))
     mass.resize((case.elastic_body.size, case.elastic_body.size))
     return mass
 
 
 def moving_mass(case: Case, displacement: NDArray) -> sparse.csr_array:
-    """The same with that of the fluid around the sheet at a displacement (n, 3)."""
+    """Mass (m, m), with the fluid around the sheet at a displacement (n, 3)."""
     mass, added = mass_of(case), added_mass_at(case, displacement)
     if added is None:
         return mass
@@ -148,7 +148,7 @@ def rows_of(
 ) -> ModalRows:  # fmt: skip
     """Modal damping for a stiffness and a mass (m, m) at a displacement (n, 3).
 
-    Dofs behind those of the case's body are free.
+    Additional dofs after the body's own are free.
     """
     ties, body = case.constraints, case.elastic_body
     more = np.arange(body.size, stiffness.shape[0])
@@ -170,10 +170,11 @@ def rows_of(
 
 
 def _canonical(rows: NDArray) -> NDArray:
-    """Rows (r, m) with the same C that change with a design as smoothly as C, as gradients need.
+    """Rows (r, m) with the same C that depend smoothly on the design, as gradients need.
 
-    Shapes have any sign, and those of one frequency are any sums. Orthogonal sums of rows keep C:
-    those whose products with r fixed vectors are an upper triangle with a positive diagonal.
+    The sign of a mode shape is arbitrary, and so is the basis of shapes of equal frequency.
+    Orthogonal combinations of rows keep C; the one chosen makes the products with r fixed vectors
+    upper triangular with a positive diagonal.
     """
     fixed = np.random.default_rng(0).standard_normal(rows.shape[::-1])
     sums, triangle = np.linalg.qr(rows @ fixed)
@@ -181,7 +182,7 @@ def _canonical(rows: NDArray) -> NDArray:
 
 
 def _ratios(damping: ModalDamping, values: NDArray) -> tuple[NDArray, int]:
-    """Ratios of modes of increasing eigenvalues, and how many are a mean of those of some."""
+    """Ratios of modes in order of eigenvalues, and the number of modes that get a mean ratio."""
     ratios = np.zeros(len(values))
     ratios[: damping.modes] = damping.ratios
     first = np.append(True, np.diff(values) > ALIKE * values[1:])
@@ -194,7 +195,7 @@ def _ratios(damping: ModalDamping, values: NDArray) -> tuple[NDArray, int]:
 def _swinging(
     pencil: Pencil, damping: ModalDamping, case: Case, state: NDArray, free: NDArray
 ) -> Spectrum:
-    """The lowest modes that swing, as many as are damped and others of the last one's frequency."""
+    """The lowest vibration modes: all damped ones, and others with the frequency of the last."""
     wanted = damping.modes
     if wanted is None and pencil.finite > MOST_MODES:
         inner = int((free >= case.elastic_body.size).sum())
@@ -229,14 +230,14 @@ def _swinging(
 
 
 def _apart(values: NDArray, wanted: int) -> bool:
-    """Whether a higher mode than those of the last wanted one's frequency is known."""
+    """Whether a mode above the last wanted frequency has been found."""
     return bool(values[-1] > values[wanted - 1] * (1.0 + ALIKE))
 
 
 def _rigid(
     pencil: Pencil, spectrum: Spectrum, case: Case, state: NDArray, free: NDArray
 ) -> NDArray:
-    """Which modes (k,) are rigid motions that next to nothing resists."""
+    """Which modes (k,) are rigid motions with almost no stiffness."""
     motions = free_rigid_motions(case.structure.nodes + state, case.constraints)
     space = np.zeros((pencil.size, motions.shape[1]))
     nodal = free < len(motions)

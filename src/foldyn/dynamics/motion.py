@@ -1,4 +1,4 @@
-"""`Motion`: a motion that is ready to be computed, in stretches of compiled steps."""
+"""`Motion`: a motion ready to be computed, in stretches of compiled steps."""
 
 from __future__ import annotations
 
@@ -53,20 +53,20 @@ if TYPE_CHECKING:
 
     from foldyn.dynamics.gpu.engine import InBlocks, OnCard
 
-RECHECKS = 20  # of the critical step during a motion
-CHUNK = 256  # steps of the first stretch; later ones take about REPORT_EVERY seconds
+RECHECKS = 20  # checks of the critical step during a motion
+CHUNK = 256  # steps in the first stretch; later ones last about REPORT_EVERY seconds
 REPORT_EVERY = 0.25
 BETWEEN = 0.382  # of the time between samples: no period has all its rest instants there
-EXPLODED = 1.0  # relative energy error above which the motion is stopped
-# Panels that cross are looked for at samples so far apart that it takes a small share of the time
-PER_LOOK = 500  # force evaluations of an explicit method from one to the next, at least
-IMPLICIT_WORK = 25  # how many of them one of an implicit method, with its solution, stands for
-LOOKS = 100  # samples at which panels that turn are looked at
-FEW = 1000  # triangles looked at that take no time to speak of
+EXPLODED = 1.0  # relative energy error at which the motion is stopped
+# Crossing panels are searched for at samples spaced so that the search takes little time
+PER_LOOK = 500  # force evaluations of an explicit method between two searches, at least
+IMPLICIT_WORK = 25  # force evaluations per evaluation of an implicit method, with its solution
+LOOKS = 100  # samples at which turning panels are checked
+FEW = 1000  # triangles whose check takes negligible time
 
 
 class Motion:
-    """A motion that is ready to be computed; made by `prepare`."""
+    """A motion that is ready to be computed; `prepare` creates it."""
 
     def __init__(
         self, case: Case, method: Integrator, plan: StepPlan, critical: float, force: bool,
@@ -88,22 +88,22 @@ class Motion:
 
     @property
     def start(self) -> tuple[NDArray, NDArray]:
-        """Displacement and velocity (n, 3) where it starts."""
+        """Displacement and velocity (n, 3) at the start."""
         return self._state[0], self._state[1]
 
     @property
     def beginning(self) -> Course:
-        """Where it starts, anew."""
+        """A new copy of the initial state of the integrators."""
         return begin(self.case, *self._state, self.plan, self.packed)
 
     @property
     def continues(self) -> bool:
-        """Whether it may go on with what a motion before it knew beside its state."""
+        """Whether the motion may continue an earlier one, with more than its state."""
         return self._state[3] is not None
 
     @property
     def expected_samples(self) -> int:
-        """Number of samples; where steps vary and are counted, the least."""
+        """Number of samples; a lower bound if steps vary and are counted."""
         return expected_samples(self.plan)
 
     @property
@@ -113,7 +113,7 @@ class Motion:
 
     @property
     def recheck_after(self) -> int:
-        """Steps after which it is looked at whether they are still stable."""
+        """Steps between checks of their stability."""
         return max(1000, -(-self.plan.steps // RECHECKS))
 
     def run(
@@ -121,8 +121,7 @@ class Motion:
     ) -> xarray.Dataset:
         """Integrate the motion; see `simulate`.
 
-        What is kept on the disk meanwhile stays there, with the samples of the result where there
-        are many, until the result is saved.
+        The checkpoint folder stays until the result is saved, with its samples if there are many.
         """
         again = keeping is not None and keeping.resume and self._other
         if keeping and again and keeping.keeps(again._identity()):
@@ -133,7 +132,7 @@ class Motion:
     def run_into_file(
         self, keeping: Keeping, progress: bool | Reporter | None = None
     ) -> xarray.Dataset:
-        """Integrate the motion into the file of its result; see `simulate`."""
+        """Integrate the motion and write its result to its file; see `simulate`."""
         if finished := self.finished(keeping):
             return finished
         with keeping.held():
@@ -147,15 +146,15 @@ class Motion:
             return keeping.save_result(result)
 
     def samples(self, progress: bool | Reporter | None = None) -> Samples:
-        """Integrate the motion; its samples alone, which do not carry the case."""
+        """Integrate the motion and return only its samples, without the case."""
         self.integrate(progress)
         self._judge()
         return self.output.written(self.stored)
 
     def result(self, progress: bool | Reporter | None = None) -> xarray.Dataset:
-        """What was integrated, with the warnings that it deserves.
+        """Result of the integrated motion; issues its warnings.
 
-        Where the energies do not balance and there is a better method, it is computed anew.
+        If the energies do not balance and a better method exists, the motion is repeated with it.
         """
         if self._better is not None and self.off():
             return self._run_anew(progress)
@@ -171,7 +170,7 @@ class Motion:
         return result
 
     def _stretch(self, result: xarray.Dataset) -> str:
-        """Warning where panels that stretch hold much of the strain energy; empty otherwise."""
+        """Warning if stretching panels hold much of the strain energy; otherwise empty."""
         names = audited(self.case.energy_groups, self.case.air is not None)
         energies = {name: result[name].values for name in names}
         found = stretch(self.case.structure, energies, result["displacement"])
@@ -185,7 +184,7 @@ class Motion:
 
     @cached_property
     def _other(self) -> Motion | None:
-        """The same motion by the better method, if there is one."""
+        """The motion by the better method, if there is one."""
         other = self._better() if self._better else None
         if other is not None:
             off = f"with {self._unlike(other)[0]} the energy balance was off by more than"
@@ -193,7 +192,7 @@ class Motion:
         return other
 
     def _unlike(self, other: Motion) -> tuple[str, str]:
-        """How it is computed, unlike another one: in words, and as an argument."""
+        """Difference of its method from another motion's: in words, and as an argument."""
         if self.method is other.method:
             return f"steps of {self.plan.dt:.3g} s", f"dt = {self.plan.dt:.6g}"
         return self.method.name, f'method = "{self.method.name}"'
@@ -207,7 +206,7 @@ class Motion:
             f"energies at play; {ask} saves the first attempt"
         )
         warn(text, "integrators.md#integrators")
-        self._start()  # gives its samples' memory back
+        self._start()  # frees the memory of its samples
         if self._keeping is not None:
             self._keeping.remove()
         return self._other.run(progress, self._keeping)
@@ -227,7 +226,7 @@ class Motion:
     ) -> None:  # fmt: skip
         """Integrate the motion; see `simulate`.
 
-        engine_of : makes what advances it, from where it starts; by default its method's engine.
+        engine_of : creates the engine, at the start of the motion; by default its method's engine.
         """
         self.make_room(keeping)
         report, close = reporter(progress)
@@ -249,7 +248,7 @@ class Motion:
             close()
 
     def make_room(self, keeping: Keeping | None = None) -> None:
-        """Go back to the start, with room for samples."""
+        """Return to the start, with room for samples."""
         self._keeping = keeping
         size = self.expected_samples, len(self.case.structure.nodes), len(self.case.reaction_dofs)
         if keeping is None:
@@ -260,23 +259,23 @@ class Motion:
         self.output.begin()
 
     def integrated_by(self, engine: InBlocks, seconds: float) -> None:
-        """Take over from what has integrated it beside others, in the room that it has made."""
+        """Take over the samples from an engine that integrated it along with others."""
         self._engine, self.seconds = engine, seconds
 
     @property
     def _origin(self) -> str:
-        """From what the motion started."""
+        """What the motion started from, in words."""
         continues = isinstance(self._engine, Implicit) and self._engine.continues
         return "end of a motion" if continues else "rest" if self.at_rest else "state"
 
     @property
     def _branches(self) -> int:
-        """Number of the branches of laws with memory."""
+        """Number of memory branches."""
         memory = self.packed.body.find(HingeMemory)
         return 0 if memory is None else len(memory.own.state)
 
     def _start(self) -> None:
-        """Go back to the start."""
+        """Return to the start."""
         self.course = self.beginning
         self._flow = self._state[0] if self.origin.flow is None else self.origin.flow
         self.packed = self.packed.begun()
@@ -284,12 +283,12 @@ class Motion:
         self.output, self._looked = Output(self.case, *given), False
 
     def _advance(self, engine: Compiled | Implicit | OnCard, report: Reporter) -> None:
-        """Advance to the end, in stretches; after each, report the progress, and audit."""
+        """Advance to the end, in stretches; after each, report progress and audit the energies."""
         system, callbacks, by = self.packed.system, self.packed.callbacks, self.packed.numbering
         plan, course, output = self.plan, self.course, self.output
         memory = scratch(system)
         earlier, began = self._resumed(engine), None
-        length = 0  # the first call only records the start: it may have to compile
+        length = 0  # the first call only records the start, as it may have to compile
         while True:
             done = int(course.tally.steps)
             clock = time.perf_counter()
@@ -326,11 +325,11 @@ class Motion:
             length = max(least, min(int(length * min(growth, 8.0)), 100_000))
 
     def _looked_at(self, step: int) -> int:
-        """Steps, at one of them, since it was looked at whether the flow of added mass holds."""
+        """Steps, at step number `step`, since the last check of the flow of added mass."""
         return (self.origin.looked + step) % LOOK_EVERY
 
     def _renew_flow(self, engine: Compiled | Implicit | OnCard) -> None:
-        """Find the flow of added mass anew, if the sheet has folded."""
+        """Recompute the flow of added mass if the sheet has folded."""
         try:
             found = renewed_flow(self.case, self.packed, self.course)
         except FoldynError as error:
@@ -343,7 +342,7 @@ class Motion:
 
     @property
     def end(self) -> State:
-        """The state at its last sample, with all that it takes to go on from there."""
+        """State at the last sample, with everything needed to continue from there."""
         last = self.output.written(self.stored)
         u, v, memory = (a[-1].copy() for a in (last.displacement, last.velocity, last.memory))
         _, continuation = self._continuations().get("continuation", (0.0, None))
@@ -351,7 +350,7 @@ class Motion:
 
     @property
     def reached(self) -> Origin | None:
-        """Where the motion began, with the flow at its end; None where nothing depends on it."""
+        """Origin of the motion, with the flow at its end; None if nothing depends on it."""
         acts, steps = self.packed.added.acts, int(self.course.tally.steps)
         if not acts and not self.case.damped_at_start:
             return None
@@ -359,9 +358,10 @@ class Motion:
         return replace(self.origin, flow=flow, looked=looked)
 
     def _continuations(self) -> dict[str, tuple[float, Continuation]]:
-        """What an implicit method went on from, and needs to go on if it stands at a sample.
+        """What an implicit method continued from, and its continuation at the last sample.
 
-        With contact a motion begins anew: what keeps the nodes on planes is not part of it.
+        With contact a motion always starts afresh: the state that ties nodes to planes is not
+        included.
         """
         engine, found = self._engine, {}
         if self.case.contact is not None:
@@ -382,14 +382,14 @@ class Motion:
         return identity(self.case, self.method, self.plan, state, self._sampler.rows)
 
     def finished(self, keeping: Keeping) -> xarray.Dataset | None:
-        """Its result, if it is finished and to be gone on with."""
+        """Stored result of the motion, if it is finished and to be resumed."""
         found = keeping.finished(identity_digest(self._identity()))
         if found is None and keeping.resume and self._other is not None:
             return self._other.finished(keeping)
         return found
 
     def _fits(self, length: int) -> int:
-        """Steps, at most `length`, for whose samples there is room."""
+        """Number of steps, at most `length`, whose samples fit into the room."""
         fits = self.output.fits(int(self.course.tally.steps), self.stored)
         if fits is not None and fits < 1 <= length:
             self.output.flush(self.stored)
@@ -397,7 +397,7 @@ class Motion:
         return length if fits is None else max(0, min(length, fits))
 
     def _checkpoint_if_due(self, engine: Compiled | Implicit | OnCard) -> None:
-        """Make a checkpoint, if it is time for one."""
+        """Write a checkpoint if one is due."""
         if self._keeping is None or not self._keeping.due:
             return
         self.output.flush(self.stored)
@@ -407,7 +407,7 @@ class Motion:
         self._keeping.checkpoint(arrays, float(self.course.tally.time))
 
     def _resumed(self, engine: Compiled | Implicit | OnCard) -> float:
-        """Go on from the last checkpoint, if there is one; seconds that were spent until then."""
+        """Resume from the last checkpoint, if any; returns the seconds spent until then."""
         if self._keeping is None:
             return 0.0
         about = self._identity() | {"threads": engine.threads}
@@ -423,18 +423,18 @@ class Motion:
         return float(kept["seconds"])
 
     def _sample(self) -> None:
-        """Evaluate what the user samples at the samples that are new."""
+        """Evaluate the user's quantities at new samples."""
         try:
             self.output.take(self.stored)
         except SamplingError as error:
             self._stop(str(error), ComputationError, error)
 
     def _stop(self, message: str, kind: type = InstabilityError, cause: Any = None) -> NoReturn:
-        """End the motion with an error, which carries what was computed until then."""
+        """End the motion with an error that carries the samples computed so far."""
         raise kind(message, self._dataset()) from cause
 
     def audit(self) -> float:
-        """Relative energy error so far; raises where the energy has exploded."""
+        """Relative energy error so far; raises if the energy has exploded."""
         balance = self.output.update_balance(self.stored)
         if balance.relative > EXPLODED and self._rounding.reveals(balance):
             self._look_between()
@@ -450,7 +450,7 @@ class Motion:
         return balance.relative
 
     def off(self) -> bool:
-        """Whether the energies do not balance, rounding apart."""
+        """Whether the energy balance is off by more than rounding."""
         if self.audit() > INACCURATE:
             self._look_between()
         return is_off(self.output.balance, self._rounding)
@@ -462,7 +462,7 @@ class Motion:
         return doubts(self.output.balance, self._rounding, self.plan, size, remedy)
 
     def _look_between(self) -> None:
-        """See the energies at play between the first two samples: at samples it may be at rest."""
+        """Add energies at play between the first two samples: at samples it may be at rest."""
         plan = self.plan
         if self._looked or plan.every == 1 or not (plan.steps or plan.interval):
             return
@@ -474,7 +474,7 @@ class Motion:
             length = BETWEEN * plan.interval
             plan = plan._replace(end=plan.start + length, interval=length)
         sampler = Sampler(self.case, {}, *self.start, plan.start)
-        # with memory of its own: this motion may go on
+        # with its own memory, as this motion may continue
         packed = pack(self.case, apart(plan, self.critical), self.origin)
         motion = Motion(
             self.case, self.method, plan, self.critical, True, self._state, self.origin, packed,
@@ -483,18 +483,18 @@ class Motion:
         motion._looked = True
         try:
             motion.integrate()
-        except ComputationError:  # what it tells of the whole motion has been told
+        except ComputationError:  # the main motion has reported this
             return
         balance = self.output.balance
         balance.scale = max(balance.scale, motion.output.balance.scale)
 
     def recheck(self, u: NDArray) -> None:
-        """Stop where the structure has stiffened so much that the step is above its limit."""
+        """Stop if the structure has stiffened so much that the step exceeds the stability limit."""
         growth, damping = self.method.growth, self.case.rayleigh
         if self.force or growth is None:
             return
         rate = damper_rate(self.case, u) + self.packed.modal.rate
-        for frequency in (frequency_bound, largest_frequency):  # the first costs less
+        for frequency in (frequency_bound, largest_frequency):  # the first is cheaper
             omega = frequency(self.case, u)
             if np.isfinite(omega) and is_stable(growth, omega, damping, self.plan.dt, rate):
                 return
@@ -516,7 +516,7 @@ class Motion:
         return crossings_of(self.case, self.output.displacement(self.stored), stride)
 
     def _dataset(self, crossings: Crossings | None = None) -> xarray.Dataset:
-        """Samples stored so far, with the case, the statistics and the panels that cross."""
+        """Dataset of the samples so far, with the case, the statistics and crossing panels."""
         crossings = crossings or self._crossings()
         out, sampled = self.output.first(self.stored)
         names = audited(self.case.energy_groups, self.case.air is not None)

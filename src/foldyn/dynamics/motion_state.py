@@ -20,16 +20,16 @@ class Outcome(IntEnum):
     NOT_FINITE = 1
     PENETRATION = 2
     FULL = 3  # no room for another sample
-    STUCK = 4  # the error asks for a step that time cannot resolve
-    NOT_CONVERGED = 5  # the equations of an implicit step were not solved, however small the step
+    STUCK = 4  # the error requires a step below the resolution of time
+    NOT_CONVERGED = 5  # an implicit step could not be solved, however small
 
 
-SHORTEST = 1e-6  # part of a fixed step: contact that asks for less is overrun
-WORK, DISSIPATED, AIR, WRONG, HINGE, OUTCOME = range(6)  # places of a member's notes to its team
+SHORTEST = 1e-6  # part of a fixed step: shorter contact steps are not taken
+WORK, DISSIPATED, AIR, WRONG, HINGE, OUTCOME = range(6)  # columns of a member's notes to its team
 
 
 class StepPlan(NamedTuple):
-    """Steps and samples. With a fixed step, step n is at start + n dt; `end` serves the others."""
+    """Steps and samples. A fixed step n is at start + n dt; variable steps use `end`."""
 
     start: float  # s
     end: float  # s
@@ -37,12 +37,12 @@ class StepPlan(NamedTuple):
     steps: int  # of a fixed step; else 0
     every: int  # steps between samples; 0: samples are `interval` apart
     interval: float  # s
-    tolerance: float  # relative error of a step; 0 with a fixed step
-    floor: float  # least displacement that errors are measured by, m
-    stops: NDArray  # times (s) in order at which steps that vary end: knots of the histories
+    tolerance: float  # relative error per step; 0 with a fixed step
+    floor: float  # least displacement that errors are relative to, m
+    stops: NDArray  # times (s) in order at which variable steps end: knots of the histories
 
 
-# What is counted along a motion: steps done, samples written, steps refused, force evaluations
+# counters of a motion: steps done, samples written, steps rejected, force evaluations
 COUNTED = ("steps", "samples", "refused", "evaluations")
 # What is measured: work of the loads, energy dissipated and lost to the air (J), their powers at
 # the last step (W); the time reached, and of steps that vary the next one wanted, the last,
@@ -58,17 +58,17 @@ TALLY = np.dtype(
 
 
 class Course(NamedTuple):
-    """State of a motion between two stretches of steps, changed in place."""
+    """State of a motion between two stretches of steps, updated in place."""
 
-    u: NDArray  # (n, 3) displacement without that of moving supports, m
+    u: NDArray  # (n, 3) displacement without support motion, m
     v: NDArray  # (n, 3) velocity likewise, m/s
-    carry: NDArray  # (n, 3) acceleration, for methods that keep it
+    carry: NDArray  # (n, 3) acceleration, for methods that store it
     tally: np.record  # `TALLY`
-    angle: NDArray  # (nh,) dihedrals at the last step seen, rad
+    angle: NDArray  # (nh,) dihedrals at the last checked step, rad
 
 
 class Samples(NamedTuple):
-    """Room for k samples from number `first` on, s supported dofs."""
+    """Room for k samples from number `first` on; s supported dofs."""
 
     time: NDArray  # (k,) s
     displacement: NDArray  # (k, n, 3)
@@ -76,20 +76,20 @@ class Samples(NamedTuple):
     reaction: NDArray  # (k, s)
     energy: NDArray  # (k, columns) as `audit.audited` names them
     memory: NDArray  # (k, b, 2) states of the b branches of laws with memory
-    first: int  # samples before these that are kept elsewhere
+    first: int  # number of earlier samples, stored elsewhere
 
     @property
     def end(self) -> int:
-        """Number of the sample for which there is no room any more."""
+        """Number of the first sample that no longer fits."""
         return self.first + len(self.time)
 
     def doubled(self) -> Samples:
-        """These, with room for as many again."""
+        """These samples, with twice the room."""
         arrays = (np.concatenate([array, np.empty_like(array)]) for array in self[:-1])
         return Samples._make((*arrays, self.first))
 
     def until(self, number: int) -> Samples:
-        """Those among them before this number."""
+        """The samples before this number."""
         arrays = (array[: number - self.first] for array in self[:-1])
         return Samples._make((*arrays, self.first))
 
@@ -109,9 +109,9 @@ def samples(count: int, nodes: int, supported: int, energies: int, branches: int
 
 @inner_scalar
 def passed_through(now, before, first, last):
-    """Hinge from first to last whose dihedral jumped by more than pi, or -1.
+    """Index of a hinge from first to last - 1 whose dihedral jumped by more than pi, or -1.
 
-    The dihedrals `before` (nh,) become those `now`.
+    Overwrites the dihedrals `before` (nh,) with `now`.
     """
     jumps = 0
     for e in range(first, last):
@@ -127,7 +127,7 @@ def passed_through(now, before, first, last):
 
 @inner_scalar
 def split_step(longest, left):
-    """Length (s) of the equal parts, none longer than `longest`, into which `left` is divided."""
+    """Length (s), at most `longest`, of the equal parts of the interval `left`."""
     if longest >= left:
         return left
     return left / math.ceil(min(left / max(longest, SHORTEST * left), 1.0 / SHORTEST))
@@ -135,6 +135,6 @@ def split_step(longest, left):
 
 @inner_scalar
 def post_totals(team, work_in, work_out, work_air, wrong):
-    """Note for the team the work, the energies lost (J), and how many values are not finite."""
+    """Note for the team the work, the energies lost (J), and the count of non-finite values."""
     note = team.note[team.number]
     note[WORK], note[DISSIPATED], note[AIR], note[WRONG] = work_in, work_out, work_air, wrong

@@ -1,4 +1,4 @@
-"""The samples of a motion: all of them in memory or, of one that is kept, the last of them."""
+"""The samples of a motion: all in memory or, if stored on disk, the last ones."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ from foldyn.results.columns import PIECE, Column, Columns, pieces
 if TYPE_CHECKING:
     import xarray
 
-LEAST = 16  # samples that a window holds at least
+LEAST = 16  # least number of samples in a window
 
 
 class Output:
-    """Room for the samples of a motion, and what is known of those that are written.
+    """Room for the samples of a motion, and statistics of the written ones.
 
     Parameters
     ----------
     case : Case
     plan : StepPlan
     sampler : Sampler
-        What the user samples.
+        The user's quantities.
     branches : int
-        Of laws with memory.
+        Branches of laws with memory.
     keeping : Keeping, optional
-        Where samples go when the memory for them is full.
+        Destination of samples once their memory is full.
     heat : Heat, optional
-        What it exchanges with the sheet is at play in the balance as well.
+        Its energy exchange with the sheet counts as at play in the balance.
 
     Attributes
     ----------
     window : Samples
         Room that compiled loops write to.
     balance : Balance
-        Of all samples that were seen.
+        Of all samples so far.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Output:
         self._case, self._plan, self._sampler, self._branches = case, plan, sampler, branches
         self._keeping, self._air = keeping, case.air is not None
         self._names = audited(case.energy_groups, self._air)
-        at_once = 1  # samples in a step, at most
+        at_once = 1  # most samples in a step
         if not plan.steps and not plan.every:
             at_once = math.floor(plan.dt / plan.interval) + 2
         self._at_once = at_once
@@ -73,7 +73,7 @@ class Output:
         )  # fmt: skip
 
     def begin(self) -> None:
-        """Make room for the samples that are expected, or for as many as memory is taken for."""
+        """Make room for the expected samples, or for as many as the memory limit allows."""
         count = expected_samples(self._plan)
         if self._keeping is not None:
             row = sum(array.nbytes for array in self._room(1)[:-1])
@@ -82,14 +82,14 @@ class Output:
 
     @property
     def rows(self) -> dict[str, tuple[int, ...]]:
-        """Shapes of what a sample consists of, by name."""
+        """Shapes of a sample's parts, by name."""
         own = self.window._asdict()
         del own["first"]
         return {name: array.shape[1:] for name, array in own.items()} | self._sampler.rows
 
     # ------------------------------------------------------------------ while it runs
     def fits(self, steps: int, stored: int) -> int | None:
-        """Steps for whose samples there is room, after as many; None: for all that come."""
+        """Number of steps whose samples fit after `stored` samples; None if all fit."""
         if self._keeping is None:
             return None
         if self._plan.steps:
@@ -97,11 +97,11 @@ class Output:
         return (self.window.end - stored) // self._at_once
 
     def take(self, stored: int) -> None:
-        """Evaluate what the user samples where it is new; raises `SamplingError`."""
+        """Evaluate the user's quantities at new samples; raises `SamplingError`."""
         self._sampler.take(self.window, stored)
 
     def update_balance(self, stored: int) -> Balance:
-        """The balance of energies with all samples that are new."""
+        """Energy balance, updated with all new samples."""
         new = self.written(stored)
         seen = self.balance.count - new.first
         self.balance.add(new.energy[seen:], new.displacement[seen:])
@@ -110,7 +110,7 @@ class Output:
         return self.balance
 
     def first_off(self, stored: int, limit: float) -> int:
-        """Number of the first sample whose energies are off by more than a limit."""
+        """Number of the first sample whose energy error exceeds a limit."""
         first = 0
         for energy, _ in self._energies(stored):
             off = self.balance.off(energy, limit)
@@ -120,7 +120,7 @@ class Output:
         return first
 
     def shorten(self, count: int) -> None:
-        """Leave out all samples after the first ones."""
+        """Drop all samples after the first `count`."""
         if self._keeping is not None and self._keeping.begun:
             self._keeping.columns.cut(min(count, self._keeping.columns.count))
         self.balance = Balance(self._air)
@@ -135,7 +135,7 @@ class Output:
             self.flush(stored)
 
     def flush(self, stored: int) -> None:
-        """Put the samples on the disk; the window is empty then."""
+        """Write the samples to disk, which empties the window."""
         assert self._keeping is not None
         out = self.written(stored)
         self.update_balance(stored)
@@ -146,7 +146,7 @@ class Output:
         self._sampler.drop(stored)
 
     def checkpoint_arrays(self) -> dict[str, NDArray]:
-        """What is known of the samples on the disk, to `resume_from`."""
+        """Statistics of the samples on disk, for `resume_from`."""
         own = self.balance
         return {
             "balance_start": own.start,
@@ -154,7 +154,7 @@ class Output:
         }
 
     def resume_from(self, arrays: Mapping[str, NDArray], count: int) -> None:
-        """Go on after the samples on the disk."""
+        """Continue after the samples on disk."""
         self.window = self.window._replace(first=count)
         self._sampler.drop(count)
         own = self.balance
@@ -168,7 +168,7 @@ class Output:
         return self.window.until(max(stored, self.window.first))
 
     def displacement(self, stored: int) -> NDArray | Column:
-        """Of all samples (stored, n, 3), m."""
+        """Displacement of all samples (stored, n, 3), m."""
         columns = self._on_disk(stored)
         return self.written(stored).displacement if columns is None else columns["displacement"]
 
@@ -190,7 +190,7 @@ class Output:
         return float(self._keeping.columns["time"][sample])
 
     def first(self, stored: int) -> tuple[Samples, dict[str, tuple[Quantity, NDArray]]]:
-        """Samples with what the user samples: all or, of what is on the disk, the first one."""
+        """Samples with the user's quantities: all of them or, with samples on disk, the first."""
         columns, known = self._on_disk(stored), self._sampler.known
         if columns is None:
             own = self._sampler.columns(stored)
@@ -202,7 +202,7 @@ class Output:
         )
 
     def whole(self, result: xarray.Dataset, stored: int) -> xarray.Dataset:
-        """The result with all samples, read from the disk where they are used, made of `first`."""
+        """Complete a result made of `first`: all samples, read from disk on first use."""
         columns = self._on_disk(stored)
         if columns is None:
             return result
@@ -226,7 +226,7 @@ class Output:
         return type(result)(kept, coordinates, result.attrs)
 
     def _on_disk(self, stored: int) -> Columns | None:
-        """Columns with all samples; None where these are in memory."""
+        """Columns on disk with all samples; None if samples are in memory."""
         keeping = self._keeping
         if keeping is None or not keeping.begun:
             return None
@@ -235,7 +235,7 @@ class Output:
         return keeping.columns
 
     def _energies(self, stored: int) -> Iterator[tuple[NDArray, NDArray]]:
-        """Energies and displacements of all samples, piece by piece."""
+        """Energies and displacements of all samples, in pieces."""
         if self.window.first:
             assert self._keeping is not None
             energy, moved = (self._keeping.columns[name] for name in ("energy", "displacement"))

@@ -1,7 +1,7 @@
-"""Parts of the equation of motion that only some motions have, as kernels called by address.
+"""Optional parts of the equation of motion, as kernels called by address.
 
-They are compiled where they are used: a motion without them has the address 0 in their place. What
-contact asks for is in `explicit_contact`.
+They are compiled on first use; a motion without them has the address 0 in their place. Parts for
+contact are in `explicit_contact`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from foldyn.mechanics.threads import wait
 
 
 class Setting(NamedTuple):
-    """A case on one thread: what parts work with."""
+    """A case on one thread: data of the parts."""
 
     terms: Terms
     system: System
@@ -44,7 +44,7 @@ class Setting(NamedTuple):
 
 @addressed(NUMBER)
 def histories(m, t):
-    """Evaluate the histories at t; two stages of a step may share their time."""
+    """Evaluate the histories at t, unless done: two stages of a step may share their time."""
     if t != m.s.time[0]:
         derive = m.system.moves or m.system.turns or m.system.presses
         evaluate(m.system.waves, t, derive, m.s.factor)
@@ -53,13 +53,13 @@ def histories(m, t):
 
 @addressed()
 def turn(m):
-    """Turn rest angles to where the histories say."""
+    """Set the rest angles from the histories."""
     turn_part(m.terms.folds, m.system.actuators, m.s.factor, m.s.turned[0], m.s.turned[1])
 
 
 @addressed(ADDRESS, ADDRESS)
 def carry(m, q, w):
-    """Displacement and velocity with those of the supports that move, from q and w."""
+    """Add support motion to q and w: displacement and velocity."""
     rows, own = m.s.force.shape[0], m.share.strips.own
     dofs, supports = (3 * own[0], 3 * own[1]), (m.s.moved[0], m.s.moved[1])
     here, there, moved = flat(m.s.displacement), flat(m.s.velocity), m.system.moved
@@ -69,7 +69,7 @@ def carry(m, q, w):
 
 @addressed(ADDRESS, ADDRESS)
 def follow(m, u, v):
-    """Add loads that depend on the displacement; returns their power, W. On one thread only."""
+    """Add displacement-dependent loads; returns their power, W. On one thread only."""
     rows, loads = m.s.force.shape[0], m.system.following
     moved, speed = rows_at(u, rows), rows_at(v, rows)
     return push_following(loads, moved, speed, m.s.factor, m.s.pushed, m.s.force)
@@ -79,27 +79,27 @@ def follow(m, u, v):
 def solve(m, out):
     """Solve with a mass matrix that is not diagonal."""
     rows, team = m.s.force.shape[0], m.share.team
-    wait(team)  # for the forces of the others, and their look at this member's velocities
+    wait(team)  # for the forces of the others, and until they have read this member's velocities
     solve_mass(m.mass, m.s.force, rows_at(out, rows), m.s.line, team.number, team.size)
-    wait(team)  # each has solved for its axes
+    wait(team)  # until each has solved for its axes
 
 
 @addressed(ADDRESS)
 def solve_constrained(m, out):
-    """The same where constraints tie dofs together. On one thread only."""
+    """Solve with constraints. On one thread only."""
     values = flat(rows_at(out, m.s.force.shape[0]))
     solve_tied(m.mass, flat(m.s.force), values, m.s.line)
 
 
 @addressed(ADDRESS)
 def kinetic(m, v):
-    """Kinetic energy (J) of a thread's nodes with such a matrix."""
+    """Kinetic energy (J) of a thread's nodes with a mass matrix that is not diagonal."""
     return kinetic_energy(m.mass, rows_at(v, m.s.force.shape[0]), m.share.strips.own)
 
 
 @addressed()
 def moving_power(m):
-    """Power (W) of supports that move, but for what changes the kinetic energy of S f'."""
+    """Power (W) of moving supports, without the change of the kinetic energy of S f'."""
     power = power_of_moved(m.system.moved, m.s.force, m.s.factor, m.s.moved[0], m.s.moved[1])
     if m.share.team.number == 0:
         power += 2.0 * m.system.alpha * moving_energy(m.system.moved_mass, m.s.factor)
@@ -108,7 +108,7 @@ def moving_power(m):
 
 @addressed()
 def turning_power(m):
-    """Power (W) of rest angles that turn."""
+    """Power (W) of turning rest angles."""
     return power_of_part(
         m.terms.folds, m.system.actuators, m.s.factor, m.share.fold_angle, m.s.turned[0],
         m.s.turned[1],
@@ -126,7 +126,7 @@ def offsets(m, accepted):
 
 @addressed(ADDRESS)
 def spent(m, q):
-    """Energy (J) that terms store, and have dissipated, where they were evaluated last, at q."""
+    """Energy (J) that terms store, and have dissipated, at their last evaluation, at q."""
     u = m.s.displacement if m.system.moves else rows_at(q, m.s.force.shape[0])
     energies_of(m.terms, u, m.s.energy)
     return m.s.energy.sum() + dissipated_by(m.terms)
@@ -134,17 +134,17 @@ def spent(m, q):
 
 @addressed(NUMBER)
 def clock(m, since):
-    """Say how long (s) after the last accepted step terms are evaluated next."""
+    """Set the time (s) from the last accepted step to the next evaluation."""
     clock_to(m.terms, since)
 
 
 @addressed()
 def commit(m):
-    """Accept the step that ends where terms were evaluated last."""
+    """Accept the step that ends at the last evaluation."""
     commit_all(m.terms)
 
 
 @addressed(NUMBER)
 def step_error(m, scale):
-    """How wrong laws with memory are if the step is accepted; see `mechanics.term`."""
+    """Error ratio of laws with memory if the step is accepted; see `mechanics.term`."""
     return step_error_of(m.terms, scale)

@@ -32,7 +32,7 @@ def reporter(choice: bool | Reporter | None) -> tuple[Reporter, Callable[[], Non
     from tqdm import tqdm
 
     layout = "{l_bar}{bar}| {n:.3g}/{total:.3g} s [{elapsed}<{remaining}{postfix}]"
-    first: list[float] = []  # when the first report came: compilation is over then
+    first: list[float] = []  # time of the first report: compilation is over then
     bar = tqdm(total=1.0, bar_format=layout, leave=False, mininterval=0.0)
 
     def show(state: Progress) -> None:

@@ -1,4 +1,4 @@
-"""One sample of a motion: what is kept of a state of the equation of motion."""
+"""One sample of a motion, from a state of the equation of motion."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from foldyn.mechanics.term import dissipated_by, energies_of
 def record(model, system, mass, q, w, a, tally, s, displacement, velocity, reaction, energy):
     """Write one sample after `acceleration`.
 
-    The reaction is what the supports exert: M (a + alpha v) + F_int + beta K0 v - p there. energy
-    gets the strain energies, what the air took where there is any, the kinetic energy, what was
-    dissipated and the work.
+    The reaction is the force of the supports: M (a + alpha v) + F_int + beta K0 v - p there.
+    `energy` receives the strain energies, the energy lost to air if there is any, the kinetic
+    energy, the dissipated energy and the work.
     """
     carry(system.moved, s.factor[:, 0], q, s.displacement)
     carry(system.moved, s.factor[:, 1], w, s.velocity)
@@ -40,5 +40,5 @@ def record(model, system, mass, q, w, a, tally, s, displacement, velocity, react
     if last - 2 > groups:
         energy[groups] = tally.air
     energy[last - 1] = tally.dissipated + dissipated_by(model)
-    # what brought the moving supports to their speed belongs to the work: it may come in jolts
+    # work includes the energy that accelerated moving supports, which may come in jolts
     energy[last] = tally.work + moving_energy(system.moved_mass, s.factor)

@@ -1,6 +1,6 @@
-"""Explicit Runge-Kutta methods of fixed step, in one compiled loop; a method is a `Tableau`.
+"""Explicit Runge-Kutta methods of fixed step, in one compiled loop for any `Tableau`.
 
-RK4 is the classic method of order 4, as the paper uses it.
+RK4 is the classic method of order 4, as used in the paper.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from foldyn.mechanics.contact.step_limit import RESOLVED
 
 
 class Coefficients(NamedTuple):
-    """A method of s stages as loops see it."""
+    """A method of s stages as compiled loops see it."""
 
-    time: NDArray  # (s,) of the stages, in steps
-    ahead: NDArray  # (s, s) shares of the slopes of earlier stages in a stage
-    mixed: int  # 1 where a stage takes other slopes than those of the last one, else 0
-    weight: NDArray  # (s,) of the slopes in the step, times `whole`
+    time: NDArray  # (s,) times of the stages, in steps
+    ahead: NDArray  # (s, s) weights of earlier stages' slopes in a stage
+    mixed: int  # 1 if a stage uses slopes other than the last one, else 0
+    weight: NDArray  # (s,) weights of the slopes in the step, times `whole`
     whole: float
 
 
@@ -36,11 +36,11 @@ class Tableau(NamedTuple):
     ----------
     name : str
     order : int
-        What tests hold it to.
+        Order of convergence, checked by tests.
     stages : tuple of tuples of float
-        Of each stage but the first, the shares of the slopes of those before it.
+        For each stage but the first, the weights of the slopes of all earlier stages.
     weights : tuple of float
-        Of the slopes of all stages in the step, up to a factor.
+        Weights of the slopes of all stages in the step, up to a common factor.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Tableau(NamedTuple):
 
     @property
     def coefficients(self) -> Coefficients:
-        """The same as arrays."""
+        """The tableau as arrays."""
         count = len(self.weights)
         if [*map(len, self.stages)] != [*range(1, count)]:
             raise TypeError(f"{self.name}: stages must have 1, 2, ..., {count - 1} shares")
@@ -63,11 +63,11 @@ class Tableau(NamedTuple):
 
     @property
     def looks(self) -> tuple[float, ...]:
-        """Where in a step, from 0 to 1, it looks at the loads."""
+        """Fractions of a step, from 0 to 1, at which it evaluates the loads."""
         return tuple(sorted({0.0, 1.0, *self.coefficients.time.tolist()}))
 
     def growth(self, omega: NDArray, damping: NDArray, dt: float) -> NDArray:
-        """Factor by which a step of dt multiplies a free vibration, at most, per frequency.
+        """Largest factor by which a step of dt multiplies a free vibration, per frequency.
 
         |R(s dt)| over both roots of s^2 + damping s + omega^2 = 0, R(z) the step of y' = z y.
         """
@@ -84,7 +84,7 @@ RK4 = Tableau("rk4", 4, ((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1.0, 2.0, 2.0, 1
 
 @inner_scalar
 def keep_slopes(method, k, dt, vt, fa, others):
-    """Add the slopes of stage k to what later ones but the next take, (s, 2, n)."""
+    """Add the slopes of stage k, weighted, to the later stages but the next, (s, 2, n)."""
     for later in range(k + 2, others.shape[0]):
         ahead = method.ahead[later, k] * dt
         if ahead != 0.0:
@@ -95,7 +95,7 @@ def keep_slopes(method, k, dt, vt, fa, others):
 
 @inner_scalar
 def add_kept(k, others, ut, vt):
-    """Add to stage k what it takes of slopes but the last, and forget that."""
+    """Add the stored slopes of earlier stages to stage k, and reset them."""
     for i in range(ut.size):
         ut[i] += others[k, 0, i]
         vt[i] += others[k, 1, i]
@@ -118,7 +118,7 @@ def advance(equation, course, plan, room, stretch, method):
     u, v = flat(course.u)[low:high], flat(course.v)[low:high]
     ut, vt, fa = flat(stage_u)[low:high], flat(stage_v)[low:high], flat(a)[low:high]
     stages = method.weight.size
-    du, dv = np.zeros_like(u), np.zeros_like(v)  # of the step, and of stages with other slopes
+    du, dv = np.zeros_like(u), np.zeros_like(v)  # slopes of the step, and for other stages
     mixed = method.mixed > 0
     others = np.zeros((stages * method.mixed, 2, u.size))
     for i in range(u.size):
@@ -128,7 +128,7 @@ def advance(equation, course, plan, room, stretch, method):
     post_totals(team, 0.0, 0.0, 0.0, 0)
     for step in range(begun, end + 1):
         work_in, work_out, work_air, wrong, left = 0.0, 0.0, 0.0, 0, plan.dt
-        while left > 0.0:  # once, unless contact asks for shorter steps
+        while left > 0.0:  # one pass, unless contact asks for shorter steps
             first = left == plan.dt
             now = plan.start + step * plan.dt + (plan.dt - left)
             part_in, part_out, part_air, dt = 0.0, 0.0, 0.0, left

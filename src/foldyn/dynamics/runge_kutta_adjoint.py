@@ -1,17 +1,17 @@
-"""The discrete adjoint of explicit Runge-Kutta methods: exact gradients of what they compute.
+"""Discrete adjoint of explicit Runge-Kutta methods: exact gradients of the computed motion.
 
 A step takes the state y = (u, v) to y + dt sum of w_s k_s, k_s = f(y_s) the slopes at its stages
-y_s = y + dt sum of c_sr k_r. Backward, with the derivatives l of a number by the state at its end,
-a stage gets
+y_s = y + dt sum of c_sr k_r. Backward, with the derivatives l of a scalar with respect to the end
+state, a stage gets
 
     l_s = dt (w_s l + sum of c_rs m_r),    m_s = (df/dy at y_s)' l_s,
 
-and the state at the start has l + the sum of all m_s. A parameter gets the sum of (df/dp)' l_s. Of
-forces that needs their pullback alone (`mechanics.pullback`), with the weights M^-1 times the part
-of l_s that belongs to the acceleration.
+and the derivatives with respect to the start state are l + the sum of all m_s. A parameter gets the
+sum of (df/dp)' l_s. Forces only need a pullback (`mechanics.pullback`), whose weights are M^-1
+times the acceleration part of l_s.
 
-Steps are taken again, some at a time, from states that are kept: of a segment of the motion the
-states at every stage (Griewank and Walther, Evaluating Derivatives, 2008, chapter 12).
+Steps are recomputed in segments from stored states, and the states at every stage of a segment are
+stored (Griewank and Walther, Evaluating Derivatives, 2008, chapter 12).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from foldyn.mechanics.pullback import pulled_back
 if TYPE_CHECKING:
     import xarray
 
-ROOM = 1e6, 4e6  # bytes of the states at the stages of a segment, and of the states that are kept
+ROOM = 1e6, 4e6  # bytes for the stage states of a segment, and for the stored states
 
 
 @inner_scalar
@@ -45,11 +45,11 @@ def _into(source, out):
 
 @kernel
 def retrace(equation, u, v, plan, method, first, count, stages):
-    """Take `count` steps from number `first` on; u and v change in place.
+    """Recompute `count` steps from number `first` on; u and v change in place.
 
     method : `Coefficients`.
     stages : (count, s, 3, n, 3) or (0, ...), displacement, velocity and acceleration at each
-        stage. The arithmetic is that of `runge_kutta.advance`, to the bit.
+        stage. Reproduces `runge_kutta.advance` bit for bit.
     """
     stage = equation.stage
     at_u, at_v, a = stage[0], stage[1], stage[2]
@@ -88,7 +88,7 @@ def retrace(equation, u, v, plan, method, first, count, stages):
 def pull_steps(
     balance, pulls, plan, method, first, stages, by_u, by_v, memory, by_slope, mass, moved, out
 ):
-    """Take the steps of `stages` backward; by_u and by_v (n, 3) change in place.
+    """Process the steps of `stages` backward; by_u and by_v (n, 3) change in place.
 
     memory : (7, n, 3). by_slope : (s, 2, n, 3), zeros, for the sums of m. mass : `Inertia`.
     moved : `System.moved`.
@@ -167,14 +167,14 @@ def pull_steps(
 
 
 class RungeKuttaAdjoint(Adjoint):
-    """Backward through a motion by an explicit Runge-Kutta method; see `Adjoint`.
+    """Backward pass through a motion by an explicit Runge-Kutta method; see `Adjoint`.
 
     Parameters
     ----------
     motion : Motion
-        Ready to be computed, by `dynamics.driver.prepare`.
+        As `dynamics.driver.prepare` returns it.
     samples : xarray.Dataset
-        Its result: where steps are taken again from.
+        Its result: states from which steps are recomputed.
     """
 
     def __init__(self, motion: Any, samples: xarray.Dataset) -> None:
@@ -197,11 +197,11 @@ class RungeKuttaAdjoint(Adjoint):
         self._stages = np.empty((steps_at_once(count, system.rows), *shape))
 
     def backward(self, first: int, last: int, by_u: NDArray, by_v: NDArray) -> None:
-        """See `Adjoint`; a sample is at the first."""
+        """Step backward from step number `last` to `first`, which has a sample; see `Adjoint`."""
         self._backward(first, last, *self._state(first // self._plan.every), by_u, by_v)
 
     def _state(self, k: int) -> tuple[NDArray, NDArray]:
-        """State (n, 3) at a sample without what supports move: as steps have it."""
+        """State (n, 3) at a sample without support motion, as steps use it."""
         self._evaluate(self._times[k])
         moved, factor = self._system.moved, self._scratch.factor
         u, v = (self._packed.numbering.inward(each[k]) for each in self._states)
@@ -211,7 +211,7 @@ class RungeKuttaAdjoint(Adjoint):
     def _backward(
         self, first: int, last: int, u: NDArray, v: NDArray, by_u: NDArray, by_v: NDArray
     ) -> None:
-        """The same from the state (n, 3) at the first."""
+        """Step backward from step number `last` to `first`, where the state is u and v (n, 3)."""
         count, most = last - first, len(self._stages)
         if count <= most:
             stages = self._stages[:count]
@@ -222,7 +222,7 @@ class RungeKuttaAdjoint(Adjoint):
                 self._out,
             )  # fmt: skip
             return
-        # states are kept as far apart as there is room for them: most often once through is enough
+        # states are stored as far apart as memory requires: mostly, one pass is enough
         apart = max(most, -(-count // max(2, int(ROOM[1] / (2 * 8 * u.size)))))
         kept, q, w = [], u.copy(), v.copy()
         for at in range(first, last, apart):
@@ -233,19 +233,20 @@ class RungeKuttaAdjoint(Adjoint):
             self._backward(at, min(at + apart, last), q, w, by_u, by_v)
 
     def _retrace(self, u: NDArray, v: NDArray, first: int, count: int, stages: NDArray) -> None:
-        """Take steps again; see `retrace`."""
+        """Recompute steps; see `retrace`."""
         retrace(self._equation.still, u, v, self._steps, self._method, first, count, stages)
 
 
 def steps_at_once(stages: int, rows: int) -> int:
-    """Steps whose stages are kept, of a motion with so many rows of three dofs."""
+    """Number of steps whose stages fit in memory, for `rows` rows of three dofs."""
     return max(1, int(ROOM[0] / (stages * 3 * rows * 3 * 8)))
 
 
 def segment(motion: Any) -> int:
-    """Steps between samples from which a motion goes back: those that are asked for, or fewer.
+    """Steps between stored samples of a motion for the backward pass: as asked for, or fewer.
 
-    So many that all can be kept at once, if there is room for so many samples.
+    Few enough that all stages between two samples fit in memory, if there is room for so many
+    samples.
     """
     plan, rows = motion.plan, motion.packed.system.rows
     at_once = steps_at_once(len(motion.method.tableau.weights), rows)

@@ -1,4 +1,4 @@
-"""Quantities sampled along a motion: those of the user, and the forces of contact."""
+"""Quantities sampled along a motion: the user's own, and contact forces."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CONTACT_FORCE, PLANE_FORCE = CONTACT
 
 
 class SamplingError(FoldynError):
-    """A function gave what cannot be stored, at a sample after the first."""
+    """A function returned a value that cannot be stored, at a sample after the first."""
 
 
 class Sampler:
@@ -33,15 +33,15 @@ class Sampler:
     given : mapping of str to callable or Quantity
         As of `simulate`.
     u, v : ndarray, shape (n, 3)
-        State at the start, at which each function is tried.
+        Initial state, at which each function is tested.
     start : float
-        Time there, s.
+        Initial time, s.
 
     Raises
     ------
     InputError
-        A name that results have already; a function that fails, or gives no finite number or
-        array of the dimensions that it names.
+        A name that results already use; a function that fails, or does not return a finite number
+        or array with the dimensions that it declares.
     """
 
     def __init__(self, case: Case, given: Any, u: NDArray, v: NDArray, start: float) -> None:
@@ -72,11 +72,11 @@ class Sampler:
         self.clear()
 
     def clear(self) -> None:
-        """Forget all values."""
+        """Drop all values."""
         self.drop(0)
 
     def drop(self, count: int) -> None:
-        """Forget the values at the first samples, `count` of them, and go on with the next one."""
+        """Drop the values of the first `count` samples and continue with the next one."""
         self._values: dict[str, list[NDArray]] = {name: [] for name in self._quantities}
         self._first = self._taken = count
 
@@ -91,7 +91,7 @@ class Sampler:
         return {name: quantity for name, (quantity, _) in self._quantities.items()}
 
     def take(self, samples: Samples, count: int) -> None:
-        """Evaluate at the samples up to `count` that are new; raises SamplingError."""
+        """Evaluate the quantities at new samples up to `count`; raises SamplingError."""
         for k in range(self._taken, count):
             i = k - samples.first
             state = samples.displacement[i], samples.velocity[i], float(samples.time[i])
@@ -107,7 +107,7 @@ class Sampler:
             self._taken = k + 1
 
     def columns(self, count: int) -> dict[str, NDArray]:
-        """Values at the samples up to `count` that are not forgotten, nan where there is none."""
+        """Values at the samples up to `count` that were not dropped, nan if missing."""
         columns, count = {}, count - self._first
         for name, (_, shape) in self._quantities.items():
             column, values = np.full((count, *shape), np.nan), self._values[name][:count]
@@ -117,7 +117,7 @@ class Sampler:
 
 
 def _value(quantity: Quantity, u: NDArray, v: NDArray, time: float) -> NDArray:
-    """Value at a state, which the function may not change."""
+    """Value at a state; the function gets copies and cannot change it."""
     if not callable(quantity.function):
         raise SamplingError("has no function: give one of (displacement, velocity, time)")
     try:
@@ -134,7 +134,7 @@ def _value(quantity: Quantity, u: NDArray, v: NDArray, time: float) -> NDArray:
 
 
 def _contact_quantities(case: Case) -> dict[str, Quantity]:
-    """What is sampled of a case with contact; nothing without."""
+    """Quantities sampled with contact; empty without contact."""
     if case.contact is None:
         return {}
     planes = case.contact.planes

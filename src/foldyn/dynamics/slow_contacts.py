@@ -1,11 +1,11 @@
-"""Accelerations where contacts that are slow have inertia; see `mechanics.contact.inertia`.
+"""Accelerations when slow contacts have inertia; see `mechanics.contact.inertia`.
 
-(M + sum g g' / e) a = F is solved for the forces y of the contacts by conjugate gradients,
+(M + sum g g' / e) a = F is solved for the contact forces y by conjugate gradients,
 
     (e + G M^-1 G') y = G (a0 + alpha w),    a = a0 - M^-1 G' y,
 
-with the accelerations a0 without that inertia, among them the drag -alpha w, and the rows g of G.
-That inertia is dragged as all mass is: else what vibrates in it would not come to rest.
+with a0 the accelerations without this inertia, including the drag -alpha w, and g the rows of G.
+The drag acts on this inertia as on all mass; otherwise its vibrations would never decay.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from foldyn.jit.compiled import inlined, inner
 from foldyn.jit.context import run_at
 from foldyn.jit.intrinsics import flat
 
-ACCURATE = 1e-10  # of the contacts' accelerations
+ACCURATE = 1e-10  # of the contact accelerations
 ITERATIONS = 200
 
 
 @inner
 def _pushed(m, y, out):
-    """M^-1 G' y to out (n, 3), by way of the forces."""
+    """out = M^-1 G' y (n, 3), via the nodal forces."""
     added, r = m.added, m.s.force
     for i in range(len(r)):
         for c in range(3):
@@ -39,7 +39,7 @@ def _pushed(m, y, out):
 
 @inner
 def _along(added, k, a):
-    """Acceleration of contact k at nodal ones (n, 3)."""
+    """Acceleration of contact k for nodal accelerations (n, 3)."""
     total = 0.0
     for i in range(4):
         for c in range(3):
@@ -49,7 +49,7 @@ def _along(added, k, a):
 
 @inlined
 def slow_down(m, w, a):
-    """Change accelerations a (n, 3) at velocities w to those with the inertia of contacts.
+    """Modify accelerations a (n, 3) at velocities w for the inertia of slow contacts.
 
     m : see `explicit_contact.SlowContacts`.
     """

@@ -1,9 +1,9 @@
-"""The largest stable time step of an explicit method, and the frequency that it depends on.
+"""Largest stable time step of an explicit method, and the frequency that determines it.
 
-A step is stable where the free vibrations of a damped linear system do not grow. Each of these has
-s^2 + c s + k = 0 with the quotients c = phi* C phi and k = phi* K phi of its complex shape, phi* M
-phi = 1, in which a method sees no more of it. So a step is stable if it is for all k between 0 and
-the largest eigenvalue, and all c that the parts of the damping may add up to.
+A step is stable where the free vibrations of a damped linear system do not grow. Each satisfies s^2
++ c s + k = 0 with the quotients c = phi* C phi and k = phi* K phi of its complex shape, phi* M phi
+= 1, and only these matter to a method. So a step is stable if it is stable for all k between 0 and
+the largest eigenvalue, and for all possible sums c of the damping parts.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import ComputationError, InputError
 from foldyn.values import numbers, of_kind
 
-MARGIN = 0.9  # of the stability limit: room for stiffening
-_DENSE = 60  # dofs below which a dense eigensolver is quicker and safer
-# of frequencies (n,), damping (n,) and a step: largest factor of a free vibration in a step (n,)
+MARGIN = 0.9  # of the stability limit, to allow for stiffening
+_DENSE = 60  # dofs below which a dense eigensolver is faster and safer
+# frequencies (n,), damping (n,), step -> largest factor of a free vibration per step (n,)
 Growth = Callable[[NDArray, NDArray, float], NDArray]
 _FRACTIONS = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 400)])
 _RATES = np.linspace(0.0, 1.0, 5)[:, None]
-ROUNDING = 1e-7  # of a factor of 1: the eigenvalues of a rigid motion are double
+ROUNDING = 1e-7  # tolerance of a factor of 1: eigenvalues of rigid motions are double
 
 
 def roots(omega: NDArray, damping: NDArray) -> NDArray:
-    """Both roots (2, n) of s^2 + damping s + omega^2 = 0, the small ones without cancellation."""
+    """Both roots (2, n) of s^2 + damping s + omega^2 = 0, without cancellation."""
     root = np.sqrt((damping**2 - 4.0 * omega**2).astype(complex))
     fast = -0.5 * (damping + root)
     slow = np.where(np.abs(fast) > 0.0, omega**2 / np.where(fast == 0.0, 1.0, fast), 0.0)
@@ -43,7 +43,7 @@ def roots(omega: NDArray, damping: NDArray) -> NDArray:
 def is_stable(
     growth: Growth, omega: float, damping: Rayleigh, dt: float, rate: float = 0.0
 ) -> bool:
-    """Whether no free vibration of a frequency up to `omega` (rad/s) grows with steps of dt.
+    """Whether no free vibration with a frequency up to `omega` (rad/s) grows for steps of dt.
 
     The spectrum is s^2 + c s + w^2 = 0, c the damping rate at w and up to `rate` (1/s) more, for
     all w from 0 to omega.
@@ -53,7 +53,7 @@ def is_stable(
 
 
 def _spectrum(omega: float, damping: Rayleigh, rate: float) -> tuple[NDArray, NDArray]:
-    """Frequencies (k,), rad/s, and damping (k,), 1/s, for which a step must be stable."""
+    """Frequencies (k,), rad/s, and damping rates (k,), 1/s, for which a step must be stable."""
     w = omega * _FRACTIONS
     if rate == 0.0:
         return w, damping.rate(w)
@@ -62,9 +62,9 @@ def _spectrum(omega: float, damping: Rayleigh, rate: float) -> tuple[NDArray, ND
 
 
 def stability_limit(growth: Growth, omega: float, damping: Rayleigh, rate: float = 0.0) -> float:
-    """Largest dt that is stable in the sense of `is_stable`.
+    """Largest stable dt, as `is_stable` defines it.
 
-    Infinite for a system that neither vibrates nor decays.
+    inf for a system that neither vibrates nor decays.
     """
     if omega <= 0.0 and damping.alpha <= 0.0 and rate <= 0.0:
         return np.inf
@@ -79,9 +79,8 @@ def stability_limit(growth: Growth, omega: float, damping: Rayleigh, rate: float
 def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     """Largest angular frequency (rad/s) of a case about displacement u (n, 3), rest by default.
 
-    Hinges count with at least their nominal stiffness, so that superlinear bends, which have
-    none at rest, cannot make the answer too small. Laws with memory count with what they resist at
-    once.
+    Hinges count with at least their nominal stiffness, so that superlinear bends, which have none
+    at rest, do not lower the result. Laws with memory count with their instant stiffness.
     """
     u = checked_place(of_kind("case", case, Case), u)
     case = massive(case)
@@ -89,7 +88,7 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
 
 
 def massive(case: Case) -> Case:
-    """The case without dofs that have no mass, if its structure can balance them."""
+    """The case without massless dofs, if its structure can condense them."""
     other = case.structure.condensed
     return case if other is None else case.altered(structure=other)
 
@@ -105,10 +104,10 @@ def checked_place(case: Case, u: ArrayLike | None) -> NDArray[np.float64] | None
 
 
 def frequency_bound(case: Case, u: ArrayLike | None = None) -> float:
-    """A frequency (rad/s) that the largest one does not exceed, at little cost.
+    """Upper bound (rad/s) for the largest frequency, at low cost.
 
-    By Gershgorin's theorem: the largest sum over a row of M^-1/2 K M^-1/2, in size. inf where the
-    mass is not lumped.
+    By Gershgorin's theorem: from the largest absolute row sum of M^-1/2 K M^-1/2. inf unless the
+    mass is lumped.
     """
     if not is_lumped(case.free_mass):
         return np.inf
@@ -119,7 +118,7 @@ def frequency_bound(case: Case, u: ArrayLike | None = None) -> float:
 
 
 def damper_rate(case: Case, u: ArrayLike | None = None) -> float:
-    """Largest rate (1/s) at which dashpots, creases and strains damp a motion about u (n, 3)."""
+    """Largest damping rate (1/s) of dashpots, creases and strains about u (n, 3)."""
     if not case.dashpots and not case.crease_damping.any() and not case.strain_damping:
         return 0.0
     return _largest_quotient(case, damping_matrix(case, case.body.dofs(_state(case, u))))
@@ -137,7 +136,7 @@ def _state(case: Case, u: ArrayLike | None) -> NDArray:
 
 
 def _largest_quotient(case: Case, matrix: sparse.csr_array) -> float:
-    """Largest eigenvalue of a matrix (m, m) over the mass, on the free dofs."""
+    """Largest eigenvalue of a matrix (m, m) relative to the mass, on the free dofs."""
     free = np.asarray(case.free_dofs)
     k = sparse.csr_array(case.constraints.matrix(matrix)[free][:, free])
     if not k.count_nonzero():
@@ -170,8 +169,8 @@ def _dense(k: NDArray, m: NDArray) -> float:
 def _largest(
     k: sparse.csr_array, m: sparse.csr_array | None = None, solve: object | None = None
 ) -> float:
-    start = np.random.default_rng(0).standard_normal(k.shape[0])  # same answer in every run
+    start = np.random.default_rng(0).standard_normal(k.shape[0])  # the same result in every run
     largest = linalg.eigsh(
         k, 1, m, which="LA", v0=start, tol=1e-4, Minv=solve, return_eigenvectors=False
     )
-    return 1.0002 * float(largest[0])  # Lanczos values come from below
+    return 1.0002 * float(largest[0])  # Lanczos values approach from below

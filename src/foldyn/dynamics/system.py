@@ -1,10 +1,10 @@
-"""A case as arrays: M a + C v + F_int(u, rest angles) = sum of load vectors times their factors.
+"""A case as arrays: M a + C v + F_int(u, rest angles) = sum of load vectors times factors.
 
-Where supports move, displacements follow u = q + S f(t) and velocities v = w + S f'(t), with f the
-factors of the histories and S their displacements: at the supports what is prescribed there, at the
-free nodes -M_ff^-1 M_fs times it (none with a lumped matrix). Then M_ff q'' = -(F_int + C v - p)_f
+With moving supports, displacements are u = q + S f(t) and velocities v = w + S f'(t), with f the
+factors of the histories and S their displacements: the prescribed ones at supports, and -M_ff^-1
+M_fs times these at free nodes (zero with a lumped matrix). Then M_ff q'' = -(F_int + C v - p)_f
 holds without an acceleration of the supports, even where their velocity jumps, and every integrator
-advances q and w as if the supports stood still.
+advances q and w as if the supports were fixed.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.following import Following, joined
 from foldyn.mechanics.heat import Heat
 
-ROUNDING = 1e-14  # of the motion of supports: motions of others that are none
+ROUNDING = 1e-14  # of support motion: smaller motions of other nodes are zero
 
 
 class Entries(NamedTuple):
-    """Nodal vectors times histories: value[k] stands at dof[k] and belongs to history row[k]."""
+    """Nodal vectors times histories: value[k] acts on dof[k] and belongs to history row[k]."""
 
     dof: NDArray  # (l,) 3 place + axis, in increasing order
     value: NDArray  # (l,)
@@ -52,18 +52,18 @@ class Entries(NamedTuple):
 
 
 class System(NamedTuple):
-    """What compiled integrators need beside the model: n nodes, h histories, s supported dofs."""
+    """Data for compiled integrators in addition to the model: n nodes, h histories, s supports."""
 
-    varies: bool  # whether there are histories that are not constant,
-    moves: bool  # supports that move,
+    varies: bool  # whether some histories are not constant
+    moves: bool  # whether supports move
     turns: bool  # rest angles that change
-    follows: bool  # loads that depend on the displacement
+    follows: bool  # whether loads depend on the displacement
     touches: bool  # contact
     presses: bool  # obstacles that move, or a wind that varies
-    rows: int  # of arrays: n, and those of the dofs beside displacements
-    energies: int  # groups of strain energy
+    rows: int  # rows of arrays: n, plus rows for hidden dofs
+    energies: int  # number of strain energy groups
     order: NDArray  # (n,) node number of each place in memory
-    supported: NDArray  # (s,) held dofs 3 place + axis, in the order of the case's
+    supported: NDArray  # (s,) held dofs 3 place + axis, in the case's order
     waves: Waveforms
     loads: Entries  # N
     moved: Entries  # S, m
@@ -76,47 +76,47 @@ class System(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Memory of one evaluation of the equation of motion.
+    """Work arrays for one evaluation of the equation of motion.
 
-    Threads share it but for the histories, the powers, `line`, and what is on their own nodes.
+    Threads share them, except for histories, powers, `line`, and the ranges of their own nodes.
     """
 
     force: NDArray  # (n, 3) F_int + beta K0 v - p
     product: NDArray  # (n, 3) the mass matrix times a vector
     line: NDArray  # (n,), or (3 n,) with constraints
     energy: NDArray  # (groups,) strain energies, J
-    time: NDArray  # (1,) when the histories were evaluated last, s
-    factor: NDArray  # (h, 3) factors of the histories and their two derivatives
-    displacement: NDArray  # (n, 3) u, where supports move at every evaluation
+    time: NDArray  # (1,) time of the last evaluation of the histories, s
+    factor: NDArray  # (h, 3) factors of the histories and their first two derivatives
+    displacement: NDArray  # (n, 3) u; updated at every evaluation if supports move
     velocity: NDArray  # (n, 3) v likewise
-    moving: NDArray  # (n, 3) acceleration with that of the supports, at samples
+    moving: NDArray  # (n, 3) acceleration including support motion, at samples
     stage: NDArray  # (3, n, 3) for methods of several stages
     loads: NDArray  # (2,) first and last + 1 of the loads on the thread's own nodes,
-    moved: NDArray  # (2,) of the supports that move there,
-    turned: NDArray  # (2,) and of what turns there
-    powers: NDArray  # (3,) in, out, to the air at the last step, for methods that keep them, W
-    pushed: NDArray  # (n, 3) forces of loads that depend on the displacement, N; or none (0, 3)
+    moved: NDArray  # (2,) of the moving supports there,
+    turned: NDArray  # (2,) and of the actuators there
+    powers: NDArray  # (3,) in, out, to the air at the last step, for methods that store them, W
+    pushed: NDArray  # (n, 3) displacement-dependent loads, N; or none (0, 3)
 
 
 class Packed(NamedTuple):
-    """A case for compiled integrators; `callbacks` must live as long as the others serve."""
+    """A case for compiled integrators; `callbacks` must outlive the other fields."""
 
     body: Assembly
     system: System
     mass: Inertia
     callbacks: Callbacks
     numbering: Numbering
-    modal: ModalRows  # in the case's own order
+    modal: ModalRows  # in the case's dof order
     added: AddedMass
     heat: Heat | None
 
     @property
     def model(self) -> Any:
-        """The arrays of the sheet."""
+        """Arrays of the sheet."""
         return self.body.sheet.model
 
     def begun(self) -> Packed:
-        """The same for a motion that begins, with its own memory of the heat at play."""
+        """Copy for a new motion, with its own record of the heat at play."""
         if self.heat is None:
             return self
         return self._replace(heat=self.heat._replace(seen=np.array([np.nan, 0.0])))
@@ -125,10 +125,10 @@ class Packed(NamedTuple):
 def pack(
     case: Case, span: float, start: Origin | None = None, modal: ModalRows | None = None
 ) -> Packed:
-    """Arrays of a case; `span` (s) is short against the variations of the loads.
+    """Pack a case into arrays; `span` (s) is short compared to variations of the loads.
 
-    start : where the motion began, about which damping may be; rest by default.
-    modal : the modal damping of a motion from there, if it is known.
+    start : origin of the motion, the reference state of damping; rest by default.
+    modal : modal damping of a motion from there, if known.
     """
     histories: list[History] = []
     forces, supports = (*case.load_terms, *case.following_terms), case.imposed_terms
@@ -184,7 +184,7 @@ def pack(
 
 
 def _driven(case: Case, histories: list[History]) -> Assembly:
-    """The body of a case, its obstacles driven by these histories."""
+    """Body of a case, with its obstacles driven by these histories."""
     if not case.obstacle_terms:
         return case.body
     rows = {plane: histories.index(history) for plane, history in case.obstacle_terms}
@@ -203,15 +203,15 @@ def _entries(terms, histories) -> Entries:
 
 
 def _ordered(entries: Entries) -> Entries:
-    """Entries by their dofs."""
+    """Entries sorted by dof."""
     order = np.argsort(entries.dof, kind="stable")
     return Entries(*(column[order] for column in entries))
 
 
 def carry_supports(mass: Inertia, shape: NDArray) -> NDArray:
-    """Motion (n, 3) of all nodes with supports that move by `shape`: S of the module's text.
+    """Motion (n, 3) of all nodes with supports that move by `shape`: S in the module docstring.
 
-    shape : (n, 3), with what constraints tie to the supports.
+    shape : (n, 3), including nodes tied to supports by constraints.
     """
     if mass.lumped or not shape.any():
         return shape
@@ -219,7 +219,7 @@ def carry_supports(mass: Inertia, shape: NDArray) -> NDArray:
     times_mass(mass, shape, product)
     substitute(mass, product, out, np.zeros(shape.size))
     moved = shape - out
-    moved[np.abs(moved) <= ROUNDING * np.abs(shape).max()] = 0.0  # or they would come and go
+    moved[np.abs(moved) <= ROUNDING * np.abs(shape).max()] = 0.0  # removes rounding noise
     return moved
 
 
@@ -233,7 +233,7 @@ def _moved_mass(mass: sparse.csr_array, moves, histories) -> NDArray:
 
 
 def scratch(system: System) -> Scratch:
-    """Memory for one thread that has all nodes."""
+    """Work arrays for a single thread."""
     nodes, histories = system.rows, len(system.waves.code)
     force, product, displacement, velocity, moving = np.zeros((5, nodes, 3))
     line = np.zeros(3 * nodes if len(system.ties.slave) else nodes)
@@ -250,7 +250,7 @@ def scratch(system: System) -> Scratch:
 
 
 def scratches(system: System, works: Sequence[Any]) -> list[Scratch]:
-    """Memory of each thread of a team."""
+    """Work arrays for each thread of a team."""
     whole = scratch(system)
     return [
         whole._replace(
@@ -276,7 +276,7 @@ def place(system: System, q: NDArray, w: NDArray, t: float, s: Scratch) -> None:
 
 
 def carried(moved: Entries, factor: NDArray, still: NDArray) -> NDArray:
-    """A motion (n, 3) with that of the supports, for factors (h,) or a derivative of them."""
+    """Motion (n, 3) plus support motion, for factors (h,) or one of their derivatives."""
     if not len(moved.dof):
         return still
     out = still.copy()
@@ -286,14 +286,14 @@ def carried(moved: Entries, factor: NDArray, still: NDArray) -> NDArray:
 
 @inner
 def carry(moved, factor, still, out):
-    """The same into `out`."""
+    """out = motion plus support motion; see `carried`."""
     values, rest = flat(out), flat(still)
     carry_part(moved, factor, rest, values, (0, values.size), (0, moved.dof.size))
 
 
 @inner
 def carry_part(moved, factor, rest, values, dofs, supports):
-    """The same for the dofs dofs[0] to dofs[1] with their supports."""
+    """Add support motion on the dofs dofs[0] to dofs[1] - 1, of the given range of supports."""
     for i in range(dofs[0], dofs[1]):
         values[i] = rest[i]
     for k in range(supports[0], supports[1]):
@@ -302,7 +302,7 @@ def carry_part(moved, factor, rest, values, dofs, supports):
 
 @inner
 def power_of_moved(moved, force, factor, first, last):
-    """Power (W) of some moving supports against the bracket of the forces."""
+    """Power (W) of some moving supports against the bracket of forces."""
     power, bracket = 0.0, flat(force)
     for k in range(first, last):
         power += bracket[moved.dof[k]] * moved.value[k] * factor[moved.row[k], 1]

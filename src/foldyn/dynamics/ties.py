@@ -1,8 +1,8 @@
-"""Constraints of a case in compiled loops: slaves follow their masters and hand them their forces.
+"""Constraints in compiled loops: slaves follow their masters and pass their forces to them.
 
-Motions less those of supports satisfy G v = 0. Of such a motion its free dofs say everything: each
-slave is a sum of some of them, its masters, times constant values. Forces on slaves act on the
-masters with the same values. See `cases.constraints`.
+Motions relative to the supports satisfy G v = 0. The free dofs determine such a motion: each slave
+is a linear combination of some of them, its masters, with constant coefficients. Forces on slaves
+act on the masters with the same coefficients. See `cases.constraints`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from foldyn.mechanics.assembly import Numbering
 
 
 class Rows(NamedTuple):
-    """Sums of values times dofs 3 place + axis: row k has entries start[k] to start[k + 1]."""
+    """Linear combinations of dofs 3 place + axis: row k has entries start[k] to start[k + 1]."""
 
     start: NDArray  # (k + 1,)
     dof: NDArray
@@ -30,13 +30,13 @@ class Ties(NamedTuple):
     """s slaves, dofs 3 place + axis; none where a case has no constraints."""
 
     slave: NDArray  # (s,)
-    masters: Rows  # of each slave
+    masters: Rows  # masters of each slave
     free: NDArray  # (f,) free dofs; none without constraints
-    reactions: Rows  # what the supports exert, by forces on all dofs, on `case.reaction_dofs`
+    reactions: Rows  # reactions of supports on `case.reaction_dofs`, from forces on all dofs
 
 
 def ties_of(constraints: Constraints, by: Numbering) -> Ties:
-    """Constraints as they stand in memory."""
+    """Constraints in memory order."""
     if not constraints:
         nothing, empty = np.zeros(0, np.int64), Rows(np.zeros(1, np.int64), *np.zeros((2, 0)))
         empty = empty._replace(dof=nothing)
@@ -56,7 +56,7 @@ def _rows(matrix: sparse.csr_array, by: Numbering) -> Rows:
 
 
 def reduced(matrix: sparse.csr_array, ties: Ties) -> sparse.csr_array:
-    """A matrix of all dofs (m, m) on the free ones (f, f)."""
+    """Reduce a matrix of all dofs (m, m) to the free dofs (f, f)."""
     size, count = matrix.shape[0], len(ties.free)
     place = np.full(size, -1)
     place[ties.free] = np.arange(count)
@@ -70,7 +70,7 @@ def reduced(matrix: sparse.csr_array, ties: Ties) -> sparse.csr_array:
 
 @kernel
 def follow_masters(ties, motion):
-    """Make slaves follow in a motion, flat, of which the free dofs are given."""
+    """Set the slaves of a flat motion from its free dofs."""
     masters = ties.masters
     for k in range(ties.slave.size):
         total = 0.0
@@ -81,7 +81,7 @@ def follow_masters(ties, motion):
 
 @kernel
 def hand_over(ties, force):
-    """Move the forces on slaves, flat, to their masters."""
+    """Move flat forces on slaves to their masters."""
     masters = ties.masters
     for k in range(ties.slave.size):
         own = force[ties.slave[k]]
@@ -92,7 +92,7 @@ def hand_over(ties, force):
 
 @inner
 def add_reactions(rows, force, factor, out):
-    """Add `factor` times what the supports exert on them, by a force on all dofs, flat."""
+    """Add `factor` times the reactions of the supports to a flat force on all dofs."""
     for k in range(out.size):
         for p in range(rows.start[k], rows.start[k + 1]):
             out[k] += factor * rows.value[p] * force[rows.dof[p]]

@@ -1,8 +1,8 @@
-"""Steps and samples: how duration, time step and output interval fit together and to the loads.
+"""Steps and samples: fit duration, time step and output interval to each other and to loads.
 
-Pulses that fall between the ends of steps would be lost silently. Methods that choose their steps
-end them at the knots of the histories and look between. With a fixed step the user is told
-beforehand how far what the method sees of a history lies from the history.
+Pulses between the ends of steps would be lost silently. Adaptive methods end steps at the knots of
+the histories and check between them. With a fixed step, the user is warned beforehand how much of a
+history the method misses.
 """
 
 from __future__ import annotations
@@ -21,33 +21,33 @@ from foldyn.errors import InputError, warn
 from foldyn.ram_limit import GIB, check_memory
 from foldyn.values import number, whole
 
-MOST_STEPS = 1e13  # years of computing, whatever the structure
-DEFAULT_FRACTION = 0.5  # of the critical step, where the user leaves the choice to us
-SAME_TIME = 1e-12  # of the largest time: stops that are closer are one
-NOTICED = 0.01  # part of a load that is not seen, above which the user is warned
-MOST_LOOKS = 20_000  # that are looked at; of longer motions, the steps about knots and some others
-MOST_CALLS = 500  # the same for functions of the user's, which are slow
+MOST_STEPS = 1e13  # years of computing for any structure
+DEFAULT_FRACTION = 0.5  # of the critical step, by default
+SAME_TIME = 1e-12  # of the largest time: stops closer than this are one
+NOTICED = 0.01  # share of a load that is missed, above which to warn
+MOST_LOOKS = 20_000  # times to evaluate; in longer motions, only steps near knots and some others
+MOST_CALLS = 500  # the same for user functions, which are slow
 MOST_PLACES = 100
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
-MEMORY, IMPLICIT_MEMORY = 200, 20  # steps in which a vibration moves on
-LARGEST_STEP = 1e-3  # of the largest step: one that is short against loads that steps resolve
-SPAN = 0.05  # of a step: distance of the points between which a user's history is differentiated
+MEMORY, IMPLICIT_MEMORY = 200, 20  # steps of a vibration's memory
+LARGEST_STEP = 1e-3  # of the largest step: short compared to loads that steps resolve
+SPAN = 0.05  # of a step: distance of the points for differentiating user histories
 
 
 def apart(plan: StepPlan, critical: float) -> float:
-    """How far apart (s) the points are between which a user's history is differentiated."""
+    """Distance (s) of the points for differentiating user histories."""
     return SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
 
 
 class Sampling(NamedTuple):
-    """How often the state of a motion is kept."""
+    """Sampling rule of a motion: a step count or a time interval."""
 
-    steps: int  # between samples; 0: they are `interval` apart
-    interval: float  # s; 0.0: counted in steps
+    steps: int  # between samples; 0: use `interval`
+    interval: float  # s; 0.0: use `steps`
 
 
 def sampling(duration: float, every_steps: int | None, interval: float | None) -> Sampling:
-    """The sampling that `simulate` is asked for: every step by default."""
+    """Sampling from the arguments of `simulate`: every step by default."""
     if interval is None:
         steps = 1 if every_steps is None else every_steps
         return Sampling(whole("every_steps", steps, least=1, what="steps"), 0.0)
@@ -100,10 +100,10 @@ def variable_steps(
     duration: float, dt: float | None, sampling: Sampling, largest: float, start: float,
     tolerance: float, floor: float, knots: NDArray,
 ) -> StepPlan:  # fmt: skip
-    """Plan of a motion whose steps follow their error; `dt` is the largest step.
+    """Plan of a motion with error-controlled steps; `dt` is the largest step.
 
-    Without `dt` it is `largest`, at most a tenth of the motion. Knots outside the motion are
-    dropped, and so are those that rounding cannot tell apart from the one before.
+    Without `dt` it is `largest`, at most a tenth of the motion. Drops knots outside the motion, and
+    knots that rounding cannot separate from the previous one.
     """
     dt = min(largest, 0.1 * duration) if dt is None else _given_step(duration, dt)
     _check_count(duration, dt)
@@ -114,7 +114,7 @@ def variable_steps(
 
 
 def expected_samples(plan: StepPlan) -> int:
-    """Number of samples, the first at the start; where steps vary and are counted, the least."""
+    """Number of samples including the start; a lower bound if steps vary and are counted."""
     if plan.steps:
         return plan.steps // plan.every + 1
     if plan.every:
@@ -148,7 +148,7 @@ def _given_step(duration: float, dt: float) -> float:
 
 
 def _check_count(duration: float, dt: float) -> None:
-    """Refuse a motion that no machine can finish, and that integers could not count."""
+    """Refuse a motion with more steps than a machine can finish or integers can count."""
     if duration / dt > MOST_STEPS:
         raise InputError(
             f" = {duration:g} s: takes {duration / dt:.3g} steps of {dt:.3g} s; shorten it",
@@ -157,7 +157,7 @@ def _check_count(duration: float, dt: float) -> None:
 
 
 def check_samples(samples: int, nodes: int, supported: int, motions: int = 1) -> None:
-    """Refuse an output that memory cannot hold, before anything is computed."""
+    """Refuse an output that exceeds memory, before anything is computed."""
     together = f" of {motions} mass rules" if motions > 1 else ""
     check_memory(
         "interval", f"{samples:.3g} samples of {nodes} nodes{together}",
@@ -166,7 +166,7 @@ def check_samples(samples: int, nodes: int, supported: int, motions: int = 1) ->
 
 
 def check_room(samples: int, nodes: int, supported: int, room: float) -> None:
-    """Refuse an output for which the disk has no room (bytes), before anything is computed."""
+    """Refuse an output that exceeds the free disk space (bytes), before anything is computed."""
     needed = 8.0 * samples * (6 * nodes + supported + 6)
     if needed > room:
         raise InputError(
@@ -178,7 +178,7 @@ def check_room(samples: int, nodes: int, supported: int, room: float) -> None:
 
 
 def histories(case: Case) -> Iterator[tuple[str, History]]:
-    """Histories of a case that vary, each with what it drives."""
+    """Varying histories of a case, each with the name of what it drives."""
     rest = (
         len(case.body.sheet.rest_angles) - case.body.sheet.offsets
     )  # moments of creases are loads
@@ -195,12 +195,12 @@ def histories(case: Case) -> Iterator[tuple[str, History]]:
 
 
 def knots(case: Case) -> NDArray[np.float64]:
-    """Times (s) at which loads, supports, planes, the wind or rest angles jump or turn a corner."""
+    """Times (s) of jumps or corners of loads, supports, planes, the wind or rest angles."""
     return np.unique([time for _, history in histories(case) for time in history.knots() or ()])
 
 
 def jumps(case: Case) -> tuple[float, ...]:
-    """Times (s) at which loads or wind jump, or may: those that the user names of a function."""
+    """Times (s) at which loads or wind jump or may jump, as declared for user functions."""
     times: set[float] = set()
     for _, history in (*case.load_terms, *case.following_terms, *case.wind_terms):
         called = history.code == CALLED
@@ -209,7 +209,7 @@ def jumps(case: Case) -> tuple[float, ...]:
 
 
 def warn_of_functions(case: Case) -> None:
-    """Warn of functions of time, which steps of variable length sample here and there only."""
+    """Warn of user functions of time, which variable steps sample only here and there."""
     for what, history in histories(case):
         if history.knots() is None:
             warn(
@@ -224,9 +224,9 @@ def warn_of_functions(case: Case) -> None:
 def warn_of_coarse_steps(
     case: Case, plan: StepPlan, looks: tuple[float, ...], implicit: bool
 ) -> None:
-    """Warn where steps of dt do not resolve a history.
+    """Warn if steps of dt do not resolve a history.
 
-    looks : where in a step a method looks at the loads, from 0 to 1.
+    looks : fractions of a step, from 0 to 1, at which the method evaluates loads.
     """
     memory = IMPLICIT_MEMORY if implicit else MEMORY
     for what, history in histories(case):
@@ -243,12 +243,12 @@ def warn_of_coarse_steps(
 def overlooked(
     history: History, plan: StepPlan, looks: tuple[float, ...], memory: int, jumps: bool
 ) -> float:
-    """Part of a history that fixed steps do not see; see `warn_of_coarse_steps`.
+    """Share of a history that fixed steps miss; see `warn_of_coarse_steps`.
 
-    The largest integral over `memory` steps of the distance between the history and the
-    polynomial through the points where it is looked at, over the largest one of the history.
+    The largest integral over `memory` steps of the distance between the history and the polynomial
+    through the evaluated points, relative to the largest integral of the history.
 
-    jumps : whether steps are divided where loads jump.
+    jumps : whether steps are divided at load jumps.
     """
     unseen, whole = 0.0, 0.0
     try:
@@ -259,13 +259,13 @@ def overlooked(
             gap, size = _integrals(history, ends, looks, jumps)
             unseen = max(unseen, _largest_sum(gap, memory))
             whole = max(whole, _largest_sum(size, memory))
-    except InputError:  # a function that fails: the motion will stop there, and say why
+    except InputError:  # a failing function: the motion will stop there and say why
         return 0.0
     return unseen / whole if whole > 0.0 else 0.0
 
 
 def _stretches(history: History, plan: StepPlan, memory: int) -> list[tuple[int, int]]:
-    """Stretches of steps (first, last) that are looked at: all, or those where most may happen."""
+    """Stretches of steps (first, last) to check: all, or those likely to matter most."""
     turns = history.knots()
     most = MOST_CALLS if turns is None else MOST_LOOKS
     if plan.steps <= most:
@@ -283,7 +283,7 @@ def _stretches(history: History, plan: StepPlan, memory: int) -> list[tuple[int,
 def _integrals(
     history: History, ends: NDArray, looks: tuple[float, ...], jumps: bool
 ) -> tuple[NDArray, NDArray]:
-    """Integrals over each step between `ends` of what is not seen of a history, and of its size."""
+    """Integrals over each step between `ends` of a history's missed part, and of its size."""
     turns = np.array([t for t in history.knots() or () if ends[0] < t < ends[-1]])
     pieces = np.union1d(ends, turns)
     length = 0.5 * np.diff(pieces)
@@ -291,12 +291,12 @@ def _integrals(
     step = np.searchsorted(ends, times[:, 0], side="right") - 1
     h = np.diff(ends)
     looked = ends[:-1, None] + h[:, None] * np.array(looks)
-    if jumps:  # the end of a step is before a jump there
+    if jumps:  # steps end before a jump
         looked[:, -1] = np.nextafter(ends[1:], -np.inf)
     values, seen = history(times), history(looked)
     place = (times - ends[step, None]) / h[step, None]
     line = np.zeros_like(values)
-    for k, at in enumerate(looks):  # Lagrange's polynomials
+    for k, at in enumerate(looks):  # Lagrange polynomials
         others = [x for x in looks if x != at]
         basis = np.prod([(place - x) / (at - x) for x in others], axis=0)
         line += seen[step, k, None] * basis
@@ -307,7 +307,7 @@ def _integrals(
 
 
 def _largest_sum(values: NDArray, count: int) -> float:
-    """Largest sum of `count` values in a row."""
+    """Largest sum of `count` consecutive values."""
     sums = np.concatenate([[0.0], np.cumsum(values)])
     count = min(count, len(values))
     return float((sums[count:] - sums[:-count]).max())

@@ -1,13 +1,14 @@
-"""What constant damping takes from panels that turn, though turning strains nothing.
+"""Energy that constant damping takes from turning panels, though rotation causes no strain.
 
-beta K0 and modal damping have the matrix C of a state in which panels stand as they did there. A
-panel that has turned by theta about an axis a, and turns on at the rate w, has in C the velocity
-w sin(theta) a x (a x x) of a strain beside that of a rotation, which takes w^2 sin^2(theta) kappa,
+beta K0 and modal damping use the matrix C of one state, with the panel orientations of that state.
+To C, a panel that has turned by theta about an axis a and keeps turning at the rate w appears to
+have, in addition to a rotation, the straining velocity w sin(theta) a x (a x x), which dissipates
+w^2 sin^2(theta) kappa,
 
     kappa = x' A C A x,    A = a a' - 1,
 
-and in all, up to theta, w kappa (theta / 2 - sin(2 theta) / 4). Of that each panel has the share of
-its area.
+in total, up to theta, w kappa (theta / 2 - sin(2 theta) / 4). Each panel takes a share proportional
+to its area.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.dynamics.system import Packed
 
-SHARE = 0.01  # of the energies at play: what is said
+SHARE = 0.01  # of the energies at play: threshold of the warning
 
 
 def resists_turns(case: Case, packed: Packed) -> bool:
-    """Whether a case has such damping, and panels."""
+    """Whether a case has panels and such damping."""
     constant = case.rayleigh.beta > 0.0 or len(packed.modal.rows) > 0
     return constant and len(case.structure.triangles) > 0
 
@@ -33,7 +34,7 @@ def turns_told(
     case: Case, packed: Packed, start: NDArray, displacement: NDArray, velocity: NDArray,
     scale: float,
 ) -> str:  # fmt: skip
-    """Warn of a motion in which panels turn far; empty where they do not.
+    """Warning about a motion in which panels turn far; empty otherwise.
 
     start : (n, 3) displacement at the start, m.
     displacement, velocity : (k, n, 3) at some samples, m and m/s.
@@ -59,7 +60,7 @@ def turns_told(
 def turned(
     case: Case, packed: Packed, start: NDArray, displacement: NDArray, velocity: NDArray
 ) -> tuple[float, float]:
-    """Farthest turn (rad) of a panel, and what is taken from all that turn (J)."""
+    """Largest turn (rad) of a panel, and the energy (J) taken from all turning panels."""
     nodes, tri = case.structure.nodes, case.structure.triangles
     modal = case.modal_damping
     states = {case.rayleigh.state if case.rayleigh.beta else "", modal.state if modal else ""}
@@ -97,7 +98,7 @@ def _strained(case: Case, packed: Packed, there: NDArray) -> NDArray:
 
 
 def _frames(corners: NDArray) -> tuple[NDArray, NDArray]:
-    """Directions (..., 3, 3) of triangles (..., 3, 3), in columns, and their areas (...)."""
+    """Direction columns (..., 3, 3) of triangles (..., 3, 3), and their areas (...)."""
     first, second = corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]
     normal = np.cross(first, second)
     double = np.linalg.norm(normal, axis=-1)
@@ -107,7 +108,7 @@ def _frames(corners: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _rates(corners: NDArray, velocity: NDArray) -> NDArray:
-    """Angular velocities (...), rad/s, of triangles (..., 3, 3), in size."""
+    """Magnitudes of the angular velocities (...), rad/s, of triangles (..., 3, 3)."""
     arm = corners - corners.mean(axis=-2, keepdims=True)
     moving = velocity - velocity.mean(axis=-2, keepdims=True)
     spin = np.cross(arm, moving).sum(axis=-2)

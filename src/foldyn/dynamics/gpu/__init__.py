@@ -1,1 +1,1 @@
-"""Motions on a GPU: the kernels of explicit methods, what they take, and what runs them."""
+"""Motions on a GPU: kernels of explicit methods, their inputs, and the code that runs them."""

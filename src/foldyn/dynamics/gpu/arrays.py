@@ -1,4 +1,4 @@
-"""Cases of one topology as arrays for the card: those of the CPU, of many models side by side."""
+"""Cases of one topology as arrays for the GPU: the CPU's arrays, stacked over the models."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class CaseArrays:
     ----------
     elements : Elements
     nodes : Nodes
-        But for the loads' rows, which `load_rows` (m, l) holds by history.
+        Except for the rows of the loads, which `load_rows` (m, l) holds by history.
     counts : Counts
     histories : list
         (case, row) of each row of the factors.
@@ -51,7 +51,7 @@ class CaseArrays:
         first, bodies = cases[0], [packed.body for packed in cases]
         models = [_with_force(packed.model) for packed in cases]
         model = models[0]
-        self._entries: list[tuple[NDArray, NDArray, NDArray]] = []  # nodes, slots, whether added
+        self._entries: list[tuple[NDArray, NDArray, NDArray]] = []  # nodes, slots, signs
         self._slots = 0
         self._add(model.bars[:, 1], 1)
         self._again(model.bars[:, 0], 0)
@@ -84,17 +84,17 @@ class CaseArrays:
 
     @staticmethod
     def _terms(bodies: Sequence[Any], kind: type) -> list[list[Any]]:
-        """Terms of a kind: of each, those of all models."""
+        """Terms of a kind: for each one, the list over all models."""
         rows = [[term for term in body.others if isinstance(term, kind)] for body in bodies]
         return [list(own) for own in zip(*rows, strict=True)]
 
     def _add(self, nodes: NDArray, plus: int) -> None:
-        """Slots of vectors that act on these nodes."""
+        """Reserve slots for vectors that act on these nodes."""
         self._again(nodes, plus, self._slots)
         self._slots += len(nodes)
 
     def _again(self, nodes: NDArray, plus: int, first: int = 0) -> None:
-        """The same slots for other nodes; those without one are negative."""
+        """Use the same slots for other nodes; negative nodes get none."""
         slots = first + np.arange(len(nodes))
         own = np.asarray(nodes).astype(np.int64)
         some = own >= 0
@@ -161,7 +161,7 @@ class CaseArrays:
 
 
 def topology(packed: Packed) -> tuple[Any, ...]:
-    """What cases of one launch have in common."""
+    """Properties that the cases of one launch share."""
     arrays = [getattr(packed.model, name) for name in TOPOLOGY]
     arrays += [packed.system.order, packed.system.supported]
     kinds = []
@@ -179,14 +179,14 @@ def topology(packed: Packed) -> tuple[Any, ...]:
 
 
 def _one_or_all(arrays: Sequence[NDArray]) -> NDArray:
-    """The arrays of all models, or of one if they are equal."""
+    """Arrays of all models stacked, or of one model if all are equal."""
     first = arrays[0]
     alike = all(array is first or np.array_equal(array, first) for array in arrays[1:])
     return np.ascontiguousarray(arrays[0][None] if alike else np.stack(arrays))
 
 
 def _stacked(own: Sequence[Any], same: Sequence[str]) -> Any:
-    """A tuple of arrays of one model, with those of all models but for what is the same."""
+    """A tuple of arrays, stacked over the models except for the names in `same`."""
     names = [name for name in own[0]._fields if name not in same]
     numbers = {name: _one_or_all([getattr(each, name) for each in own]) for name in names}
     kept = {name: np.ascontiguousarray(getattr(own[0], name)) for name in same}
@@ -194,14 +194,14 @@ def _stacked(own: Sequence[Any], same: Sequence[str]) -> Any:
 
 
 def _with_force(model: BarsHinges) -> BarsHinges:
-    """The model without bars of no run, in whose place membranes are."""
+    """The model without bars outside all runs, which membranes replace."""
     count = int(model.bar_runs[:, 1].max(initial=0))
     bars = ("bars", "bar_vector", "bar_per_length2", "bar_stiffness")
     return model._replace(**{name: getattr(model, name)[:count] for name in bars})
 
 
 def _codes(runs: NDArray, count: int) -> NDArray:
-    """The law (count,) of each element."""
+    """Law code (count,) of each element."""
     out = np.zeros(count, np.int64)
     for start, end, code, _ in runs:
         out[start:end] = code

@@ -1,4 +1,4 @@
-"""The card: its name, and memory on it."""
+"""The GPU: its name and its free memory."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from numba import config
 
 from foldyn.errors import InputError
 
-SHARED = 48 * 1024  # bytes of a block
+SHARED = 48 * 1024  # bytes per block
 GIB = 2.0**30
 
 
 def name() -> str:
-    """Name of the card."""
+    """Name of the GPU."""
     if config.ENABLE_CUDASIM:  # type: ignore[attr-defined]
         return "simulator"
     from numba import cuda
@@ -24,7 +24,7 @@ def name() -> str:
 
 
 def free_memory() -> float:
-    """Free memory of the card, bytes."""
+    """Free memory of the GPU, bytes."""
     if config.ENABLE_CUDASIM:  # type: ignore[attr-defined]
         return GIB
     from numba import cuda
@@ -33,7 +33,7 @@ def free_memory() -> float:
 
 
 def check_size(needed: float, what: str) -> None:
-    """Refuse what the card has no memory for (bytes)."""
+    """Refuse a case whose size (bytes) exceeds the free GPU memory."""
     free = free_memory()
     if needed > free:
         raise InputError(
@@ -44,22 +44,22 @@ def check_size(needed: float, what: str) -> None:
 
 
 def size_of(values: Any) -> int:
-    """Bytes of all arrays in tuples of tuples."""
+    """Bytes of all arrays in nested tuples."""
     if isinstance(values, np.ndarray):
         return values.nbytes
     return sum(map(size_of, values)) if isinstance(values, tuple) else 0
 
 
 def flat_strides(array: np.ndarray) -> np.ndarray:
-    """A contiguous array whose strides say so, also along axes of one.
+    """A contiguous array with contiguous strides, also along axes of length one.
 
-    Those that `None` has made have a stride of 0, and Numba goes through such arrays row by row.
+    Axes made by `None` have stride 0, and Numba processes such arrays row by row.
     """
     return np.ascontiguousarray(array).reshape(-1).reshape(array.shape)
 
 
 def put(values: Any) -> Any:
-    """The same arrays on the card."""
+    """Copy nested tuples of arrays to the GPU."""
     from numba import cuda
 
     if isinstance(values, np.ndarray):

@@ -1,4 +1,4 @@
-"""What can be computed on a GPU, and whether there is one: checked before anything is imported."""
+"""Check, before any import of CUDA, whether a case suits a GPU and whether there is one."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from foldyn.structures.bars_hinges import BarsHingesTerm
 
 FIELDS = "structure", "supports", "loads", "damping", "masses", "contact"  # of a case, looked at
 METHODS = "rk4", "central_difference"
-OLDEST = 12, 0  # version of CUDA that a driver must know
+OLDEST = 12, 0  # minimum CUDA version of the driver
 TERMS = MembranesTerm, SpringsTerm, DampingMatrix, ViscousTerm
 MOST_GROUPS, MOST_BARS, MOST_KINDS = 8, 16, 3  # of strain energy; of a panel; of panels
 
 
 def check_gpu(method: str) -> None:
-    """Refuse a method without GPU kernels, and a machine without a GPU, and say what is missing."""
+    """Refuse a method without GPU kernels, or a machine without a GPU; name what is missing."""
     if method not in METHODS:
         raise InputError(
             f' = "gpu": {method} has no GPU kernel; choose one of {", ".join(METHODS)}, or '
@@ -38,7 +38,7 @@ def check_gpu(method: str) -> None:
 
 
 def no_card() -> str:
-    """Why no GPU can be used here, in words, with what to do; empty where one can."""
+    """Reason why no GPU is usable here, with the remedy; empty if one is."""
     if config.ENABLE_CUDASIM:  # type: ignore[attr-defined]
         return ""
     if importlib.util.find_spec("numba_cuda") is None:
@@ -63,15 +63,15 @@ def no_card() -> str:
 
 
 def check_taken(case: Case, packed: Packed, place: str = "device") -> None:
-    """Refuse a case with something that has no GPU kernel, and name it."""
+    """Refuse a case that has a part without GPU kernel, and name the part."""
     if lack := lacking(case, packed):
         raise InputError(f' = "gpu": {lack} has no GPU kernel; use device = "cpu"', place)
 
 
 def lacking(case: Case, packed: Packed) -> str:
-    """What of a case has no GPU kernel, in words; empty where nothing.
+    """Name of a part of the case that has no GPU kernel; empty if all have one.
 
-    Fields of a case and terms are taken only if they are known here.
+    Only fields and terms listed here count as supported.
     """
     for field in fields(case):
         if field.name not in FIELDS and not _is_default(field, getattr(case, field.name)):
@@ -106,6 +106,6 @@ def lacking(case: Case, packed: Packed) -> str:
 
 
 def _is_default(field: Any, value: Any) -> bool:
-    """Whether a field of a case is as if it had not been given."""
+    """Whether a field of a case has its default value."""
     default = field.default if field.default_factory is MISSING else field.default_factory()
     return value is default or (value is not None and np.array_equal(value, default))

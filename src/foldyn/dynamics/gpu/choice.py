@@ -1,4 +1,4 @@
-"""Whether motions of many models are computed on a GPU where the user leaves that open."""
+"""The choice between CPU and GPU for many models where the user leaves it open."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from foldyn.dynamics.motion import Motion
 
 DEVICES = "auto", "cpu", "gpu"
 FEWEST = 10  # models
-LARGEST = 3000  # dofs: of larger ones a block of threads is too slow
-EVALUATION = 35e-9  # s of a dof's forces: of a processor's core, and of a block of threads
-ABREAST = 200  # blocks that are as quick as one
+LARGEST = 3000  # dofs: for larger models a block of threads is too slow
+EVALUATION = 35e-9  # s per dof of a force evaluation: on a CPU core, and in a block of threads
+ABREAST = 200  # blocks that run as fast as a single one
 COMPILING = 12.0  # s
 
 
 def choose(
     motions: Sequence[Motion], count: int, cores: float, preparing: float = 0.0
 ) -> tuple[str, str]:
-    """The device, "cpu" or "gpu", on which motions are done sooner, and why.
+    """Device, "cpu" or "gpu", on which the motions should finish sooner, and the reason.
 
-    count : how many there are; `motions` stand for them.
-    cores : as many processors compute instead, each one motion at a time.
-    preparing : what each takes beside its steps (s), for a GPU one after the other.
+    count : number of motions; `motions` are representative samples.
+    cores : number of CPU cores to compare with, each running one motion at a time.
+    preparing : time (s) to prepare each motion; sequential if a GPU runs them.
     """
     if count < FEWEST:
         return "cpu", f"a GPU pays from {FEWEST} models on"

@@ -1,6 +1,6 @@
-"""Elements on the card: each thread has some, and writes the forces on their corners to slots.
+"""Elements on the GPU: each thread handles some and writes their corner forces to slots.
 
-Elements and slots are those of one model; arrays of many have an axis for it in front.
+Elements and slots belong to one model; arrays of several models have a leading model axis.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ axial_extension, axial_pull = ported(springs.axial_extension), ported(springs.ax
 
 
 class Counts(NamedTuple):
-    """How many there are."""
+    """Numbers of elements, nodes and slots."""
 
     nodes: int
-    slots: int  # of vectors of force
+    slots: int  # of force vectors
     groups: int  # of strain energy
     spring_group: int
-    damped: int  # rows of the damping matrix: all nodes, or none
+    damped: int  # rows of the damping matrix: all nodes, or 0
 
 
 class Damping(NamedTuple):
@@ -42,7 +42,7 @@ class Damping(NamedTuple):
 
 
 class Elements(NamedTuple):
-    """The elements of m models; numbers have an axis of m, or of 1 where they are equal."""
+    """The elements of m models; arrays have a leading axis of m, or of 1 if all are equal."""
 
     model: BarsHinges
     bar_code: Any  # (nb,)
@@ -60,7 +60,7 @@ if SIMULATED:
         return array[first : first + 3 * rows].reshape(rows, 3)
 
     def at(array, m):  # type: ignore[no-redef]
-        """That of model m, or the one of all."""
+        """Array of model m, or the one that all models share."""
         return array[m if array.shape[0] > 1 else 0]
 
 else:
@@ -75,7 +75,7 @@ else:
 
     @intrinsic
     def rows_of(typing_context, array, first, rows):
-        """The same: NumPy's would call a function of the run-time library."""
+        """Intrinsic version of `rows_of`: NumPy's reshape would call the run-time library."""
         view = types.Array(array.dtype, 2, "C")
 
         def codegen(context, builder, signature, arguments):
@@ -92,7 +92,7 @@ else:
 
     @intrinsic
     def at(typing_context, array, m):
-        """The same: a device function may not return an array."""
+        """Intrinsic version of `at`: a device function may not return an array."""
         view = types.Array(array.dtype, array.ndim - 1, "C")
 
         def codegen(context, builder, signature, arguments):
@@ -114,13 +114,13 @@ else:
 
 @on_device
 def put(slot, size, s, x, y, z):
-    """Write a vector of force."""
+    """Write a force vector to slot s."""
     slot[s], slot[size + s], slot[2 * size + s] = x, y, z
 
 
 @on_device
 def bars_to(own, code, u, slot, size, who, crowd, sampled, strain):
-    """Forces of the bars, at their second ends; energies where this is a sample."""
+    """Write bar forces at their second ends; add energies at a sample."""
     for e in range(who, own.bars.shape[0], crowd):
         stretch = bar_extension(own, u, e)
         s = own.bar_stiffness[e] * bar_stress(code[e], stretch, 0)
@@ -138,7 +138,7 @@ def bars_to(own, code, u, slot, size, who, crowd, sampled, strain):
 
 @on_device
 def hinges_to(own, code, u, slot, size, at_slot, who, crowd, sampled, looks, angle, strain):
-    """Forces of the hinges; returns how many have passed through 0 or 360 degrees."""
+    """Write hinge forces; return the number of hinges that passed through 0 or 360 degrees."""
     count, p, jumped = own.hinges.shape[0], own.hinge_parameters, 0
     for e in range(who, count, crowd):
         found = hinge_dihedral(own, u, e)
@@ -169,7 +169,7 @@ def hinges_to(own, code, u, slot, size, at_slot, who, crowd, sampled, looks, ang
 
 @on_device
 def springs_to(all_springs, m, group, u, slot, size, at_slot, who, crowd, sampled, strain):
-    """Forces of springs, at the first ends of directed ones; returns the slot after theirs."""
+    """Write spring forces, directed ones at their first ends; return the next free slot."""
     own = Springs(
         all_springs.ends, at(all_springs.direction, m), at(all_springs.stiffness, m),
         all_springs.axial_ends, at(all_springs.vector, m), at(all_springs.length, m),
@@ -202,7 +202,7 @@ def springs_to(all_springs, m, group, u, slot, size, at_slot, who, crowd, sample
 
 @on_device
 def damping_to(damping, m, nodes, v, slot, size, at_slot, who, crowd):
-    """Forces of a constant matrix; returns what it dissipates, W."""
+    """Write forces of a constant damping matrix; return the dissipated power, W."""
     value, power = at(damping.value, m), 0.0
     for i in range(who, nodes, crowd):
         for c in range(3):

@@ -1,4 +1,4 @@
-"""The engine of one motion on a GPU, in the place of `methods.Compiled`; and of one of many."""
+"""GPU engines: of one motion, in place of `methods.Compiled`, and of one motion among many."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from foldyn.dynamics.system import Packed
 class OnCard:
     """An explicit method on the card, for one motion.
 
-    Where something goes wrong in a stretch, the CPU does it once more, and says what it was.
+    If a stretch fails, the CPU repeats it and reports the reason.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class OnCard:
     course : Course
     plan : StepPlan
     on_cpu : callable
-        Makes the same for the CPU, a `methods.Compiled`.
+        Returns the CPU engine, a `methods.Compiled`.
     """
 
     threads = 1
@@ -43,7 +43,7 @@ class OnCard:
         self._alone: Any = None
 
     def _launched(self) -> Launches:
-        """The motion on the card, where it is."""
+        """Launches of this motion on the GPU, from its current state."""
         course = self._course
         one = (course.u, course.v, course.carry, course.angle)
         u, v, carry, angle = (np.array(array)[None] for array in one)
@@ -55,7 +55,7 @@ class OnCard:
         plan, tally = self._plan, self._course.tally
         begun = int(tally.steps)
         end = min(begun + stretch, plan.steps)
-        keeps = self._method.name == "central_difference" and begun > 0  # the forces of its end
+        keeps = self._method.name == "central_difference" and begun > 0  # forces of its end
         while not keeps or tally.steps < end:
             first = int(tally.steps)
             last = min(end, first + int(self._launches.fits()[0]))
@@ -71,7 +71,7 @@ class OnCard:
         return int(Outcome.DONE), -1
 
     def _take(self, written: Any, out: Samples, sample: int, steps: int) -> None:
-        """Take over what a launch has done."""
+        """Copy the results of a launch to the course and the samples."""
         course, tally, plan = self._course, self._course.tally, self._plan
         count = written.u.shape[1]
         rows = slice(sample - out.first, sample - out.first + count)
@@ -90,7 +90,7 @@ class OnCard:
         course.angle[...], self._sums = places.angle[0], places.sums
 
     def _again(self, out: Samples, stretch: int) -> tuple[int, int]:
-        """Do a stretch on the CPU, from where the card began it."""
+        """Repeat a stretch on the CPU, from the state where the GPU began it."""
         if self._alone is None:
             self._alone = self._on_cpu()
         tally = self._course.tally
@@ -101,11 +101,11 @@ class OnCard:
         return result
 
     def checkpoint_arrays(self) -> dict[str, NDArray]:
-        """See `methods.Compiled`."""
+        """Everything that the next steps depend on; see `methods.Compiled`."""
         return snapshot(self._parts())
 
     def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
-        """See `methods.Compiled`."""
+        """Resume from such arrays; see `methods.Compiled`."""
         self._sums = np.array(arrays["card_sums"])
         restore(self._parts(), arrays)
         self._launches = self._launched()
@@ -114,15 +114,15 @@ class OnCard:
         return state_parts(self._packed, self._course) | {"card_sums": self._sums}
 
     def facts(self) -> dict[str, Any]:
-        """See `methods.Compiled`."""
+        """Statistics for the result's attributes: the device; see `methods.Compiled`."""
         return {"device": card.name()}
 
 
 class InBlocks:
-    """What a motion beside others has in the place of an engine of its own."""
+    """Engine placeholder of a motion that ran with others on the GPU."""
 
     threads = 1
 
     def facts(self) -> dict[str, Any]:
-        """See `methods.Compiled`."""
+        """Statistics for the result's attributes: the device; see `methods.Compiled`."""
         return {"device": card.name()}

@@ -1,11 +1,11 @@
-"""Explicit methods as CUDA kernels: a model for each block of threads, or one for the whole grid.
+"""Explicit methods as CUDA kernels: one model per block of threads, or one on the whole grid.
 
-A force evaluation has two halves, and every thread waits between them. In the first, threads share
-the elements: each writes the forces on its corners to slots of its own. In the second, threads
-share the nodes: each adds up the slots of its nodes, in an order that never changes, and moves
-them. Nothing is added atomically, so the same input gives the same bits on the same card.
+A force evaluation has two halves, separated by a barrier. First, threads share the elements: each
+writes its corner forces to its own slots. Then threads share the nodes: each adds up the slots of
+its nodes, in a fixed order, and moves them. Nothing is added atomically, so the same input gives
+the same bits on the same card.
 
-A model of a block lives in the block's shared memory; that of a grid in the card's memory.
+A model per block is stored in the block's shared memory; a model per grid in global memory.
 """
 
 from __future__ import annotations
@@ -34,32 +34,32 @@ from foldyn.mechanics.viscous import Viscous
 
 strain_of = ported(membranes.strain_of)
 viscous_gradient = ported(viscous.element_gradient)
-REGISTERS = 168  # of a thread of a grid with one model: with fewer, more threads run at once
+REGISTERS = 168  # per thread of a grid with one model: with fewer, more threads run at once
 
 
 class Nodes(NamedTuple):
-    """What nodes work with."""
+    """Arrays for the node half of an evaluation."""
 
-    start: Any  # (n + 1,) first of the entries of each node
+    start: Any  # (n + 1,) first entry of each node
     entry: Any  # slots, or -1 - slot where it is subtracted
     order: Any  # (n,) the structure's number of each node
     support: Any  # (3 n,) number of the supported dof, or -1
     mass: Any  # (m, n)
     inverse: Any  # (m, n, 3)
     alpha: Any  # (m,)
-    load_start: Any  # (m, 3 n + 1) first of the loads of each dof
+    load_start: Any  # (m, 3 n + 1) first load of each dof
     load: Any  # (m, l) N
     load_row: Any  # (m, l) rows of the factors
 
 
 class State(NamedTuple):
-    """Where m models are; rows of the threads of all blocks, in order, in `note` and `sums`."""
+    """State of m models; `note` and `sums` have a row per thread, block after block."""
 
     u: Any  # (m, n, 3)
     v: Any
     first: Any  # (m, n, 3) sums of the method, or its acceleration
     second: Any
-    ahead_u: Any  # (m, n, 3) where forces are evaluated, unless that is in shared memory
+    ahead_u: Any  # (m, n, 3) point of force evaluation, unless in shared memory
     ahead_v: Any
     slot: Any  # (m, 3 slots) likewise
     angle: Any  # (m, nh)
@@ -70,7 +70,7 @@ class State(NamedTuple):
 
 
 class Written(NamedTuple):
-    """Samples of one launch; the last row of the energies is that of its end."""
+    """Samples of one launch; the last row of the energies belongs to the end of the launch."""
 
     u: Any  # (m, k, n, 3)
     v: Any
@@ -79,18 +79,18 @@ class Written(NamedTuple):
 
 
 class Span(NamedTuple):
-    """Steps of a launch, of m models; none where the last one is before the first."""
+    """Steps of a launch, for m models; a last step before the first means none."""
 
     first: Any  # (m,)
     last: Any
     dt: Any
     every: Any
-    sample: Any  # (m,) number of the next sample, and of the first one in this launch
+    sample: Any  # (m,) number of the next sample, and of the launch's first
 
 
 @on_device
 def panels_to(kind, m, u, slot, size, at_slot, who, crowd, sampled, strain):
-    """Forces of the panels of one kind at their corners; returns the slot after theirs."""
+    """Write forces of the panels of one kind at their corners; return the next free slot."""
     own = Membranes(
         kind.nodes, kind.ends, at(kind.vector, m), at(kind.per_length2, m), at(kind.stiffness, m)
     )
@@ -118,7 +118,7 @@ def panels_to(kind, m, u, slot, size, at_slot, who, crowd, sampled, strain):
 
 @on_device
 def dampers_to(dampers, m, u, v, slot, size, at_slot, who, crowd):
-    """Forces of viscous elements, at four nodes each; returns what they dissipate, W."""
+    """Write forces of viscous elements at their four nodes; return the dissipated power, W."""
     own = Viscous(
         dampers.dofs, at(dampers.axial, m), at(dampers.corners, m), at(dampers.hidden_turn, m),
         at(dampers.coefficient, m), at(dampers.gradient, m),
@@ -143,7 +143,7 @@ def dampers_to(dampers, m, u, v, slot, size, at_slot, who, crowd):
 def forces_to(
     elements, counts, m, u, flat_u, flat_v, slot, angle, who, crowd, sampled, looks, strain
 ):
-    """The first half: forces of all elements; returns how many are wrong, and W dissipated."""
+    """First half: forces of all elements; returns the number of failures, and W dissipated."""
     model, size = elements.model, counts.slots
     own = BarsHinges(
         at(model.rest, m), model.bars, at(model.bar_vector, m), at(model.bar_per_length2, m),
@@ -157,7 +157,7 @@ def forces_to(
         own, elements.hinge_code, u, slot, size, s, who, crowd, sampled, looks, angle, strain
     )
     s += 4 * own.hinges.shape[0]
-    kinds = elements.membranes  # written out: Numba cannot loop over tuples on the card
+    kinds = elements.membranes  # unrolled: Numba cannot loop over tuples on the GPU
     s = panels_to(kinds[0], m, u, slot, size, s, who, crowd, sampled, strain)
     s = panels_to(kinds[1], m, u, slot, size, s, who, crowd, sampled, strain)
     s = panels_to(kinds[2], m, u, slot, size, s, who, crowd, sampled, strain)
@@ -172,7 +172,7 @@ def forces_to(
 
 @on_device
 def sum_to(nodes, slot, size, i, out):
-    """The force (3,) on a node, added up in the order of its entries."""
+    """Force (3,) on a node, summed in the order of its entries."""
     x, y, z = 0.0, 0.0, 0.0
     for k in range(nodes.start[i], nodes.start[i + 1]):
         s = nodes.entry[k]
@@ -195,7 +195,7 @@ def load_on(nodes, load_start, load, load_row, factor, time, dof):
 
 @on_device
 def meet(state, blocks, arrived):
-    """Wait for all threads of the grid; returns how often they have met."""
+    """Wait for all threads of the grid; return the number of such waits."""
     cuda.syncthreads()
     if cuda.threadIdx.x == 0:
         cuda.threadfence()
@@ -209,7 +209,7 @@ def meet(state, blocks, arrived):
 
 @on_device
 def note_down(state, thread, groups, strain, kinetic, work_out, work_in):
-    """What a thread knows of the energies, for the sum over its block."""
+    """Store a thread's share of the energies, for the sum over its block."""
     for g in range(groups):
         state.note[thread, g] = strain[g]
     state.note[thread, groups] = kinetic
@@ -219,7 +219,7 @@ def note_down(state, thread, groups, strain, kinetic, work_out, work_in):
 
 @on_device
 def add_notes(state, row, columns):
-    """Sums over the threads of a block, by its first threads."""
+    """Sum the notes over the threads of a block, with its first threads."""
     first, count = cuda.blockIdx.x * cuda.blockDim.x, cuda.blockDim.x
     for c in range(cuda.threadIdx.x, columns, count):
         total = 0.0
@@ -230,16 +230,16 @@ def add_notes(state, row, columns):
 
 @lru_cache
 def kernel(method: str, wide: bool, shared: bool) -> Any:
-    """The loop of a method.
+    """Compile the time loop of a method.
 
-    wide : whether the grid has one model, else each block has one.
-    shared : whether it lives in shared memory.
+    wide : whether the grid holds one model; otherwise each block holds one.
+    shared : whether the model is in shared memory.
     """
     runge = method == "rk4"
     stages, per_step = (4, 3) if runge else (1, 1)
 
     def advance(elements, nodes, counts, span, factor, state, out):
-        """The steps of a span."""
+        """Advance over a span of steps."""
         if wide:
             m, who, crowd = 0, cuda.grid(1), cuda.gridsize(1)
         else:
@@ -281,7 +281,7 @@ def kernel(method: str, wide: bool, shared: bool) -> Any:
             part_in, part_out, kinetic = 0.0, 0.0, 0.0
             for stage in range(stages):
                 h = dt
-                if not runge:  # kick and drift
+                if not runge:  # kick and drift of central differences
                     h = dt if step > 0 else 0.0
                     for i in range(who, n, crowd):
                         for c in range(3):
@@ -363,7 +363,7 @@ def kernel(method: str, wide: bool, shared: bool) -> Any:
                 work_in += dt / 6.0 * part_in
                 work_out += dt / 6.0 * part_out
         sums[0], sums[1], sums[2], sums[3] = before_in, before_out, work_in, work_out
-        cuda.syncthreads()  # the notes of a last sample are added up
+        cuda.syncthreads()  # notes of a last sample are complete
         note_down(state, thread, groups, strain, 0.0, work_out, work_in)
         cuda.syncthreads()
         add_notes(state, out.energy[out.energy.shape[0] - 1], groups + 3)

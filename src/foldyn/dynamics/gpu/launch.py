@@ -1,4 +1,4 @@
-"""Launches of a method's kernel: the models on the card, and their steps in pieces."""
+"""Launches of a method's kernel: models on the GPU, with their steps in pieces."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from foldyn.dynamics.gpu.ported import SIMULATED, cuda
 from foldyn.dynamics.motion_state import StepPlan
 from foldyn.dynamics.system import Packed
 
-BLOCK = 128  # threads of a block of a grid with one model
-FEWEST, MOST = 64, 256  # of a block with a model of its own: few, unless models are few
-WINDOW = 0.25  # of the free memory: samples of a launch,
-SAMPLES = 2.0**30  # bytes, and at most so many, which the processor holds too
-FACTORS = 2**28  # bytes: factors of a launch
+BLOCK = 128  # threads per block of a grid with one model
+FEWEST, MOST = 64, 256  # threads per block with one model each: few, unless there are few models
+WINDOW = 0.25  # of the free memory: samples of a launch
+SAMPLES = 2.0**30  # bytes: upper limit, as the host holds them too
+FACTORS = 2**28  # bytes: load factors of a launch
 LOOKS = {"rk4": (0.0, 0.5, 1.0), "central_difference": (0.0,)}  # in a step, at the loads
 
 
 class Places(NamedTuple):
-    """Where models stand between two launches: arrays of the host, m of them."""
+    """State of m models between two launches, as host arrays."""
 
     u: NDArray  # (m, n, 3)
     v: NDArray
     carry: NDArray  # (m, n, 3) acceleration, for methods that keep it
-    sums: NDArray  # (m, 4) of `State`, or (threads, 4) as the same launches had them
+    sums: NDArray  # (m, 4) as in `State`, or (threads, 4) with the same launch shape
     angle: NDArray  # (m, nh)
 
 
@@ -43,18 +43,18 @@ class Launches:
     ----------
     cases : sequence of Packed
     plans : sequence of StepPlan
-        Their steps, which may differ.
+        Their steps, which may differ between models.
     method : str
         One of `checks.METHODS`.
     places : Places
         Where they start.
     wide : bool
-        Whether one model has all of the card; else each has a block.
+        Whether one model uses the whole GPU; otherwise each has a block.
 
     Raises
     ------
     InputError
-        The card has no memory for them.
+        They exceed the GPU memory.
     """
 
     def __init__(
@@ -90,9 +90,9 @@ class Launches:
         self._start(places)
 
     def _histories(self) -> list[tuple[int, int] | None]:
-        """Distinct histories at distinct steps, as (case, row); None of constant ones.
+        """Distinct histories at distinct steps, as (case, row); None for constant ones.
 
-        `_of_case` gets their numbers by the rows of each case.
+        Sets `_of_case`, their numbers by the rows of each case.
         """
         numbers: dict[Any, int] = {}
         found: list[Any] = []
@@ -137,7 +137,7 @@ class Launches:
         self._set(places)
 
     def _set(self, places: Places) -> None:
-        """Put the models there."""
+        """Copy the state of the models to the GPU."""
         m, n = self._shape
         threads = self._blocks * self._threads
         sums = places.sums
@@ -155,7 +155,7 @@ class Launches:
         )  # fmt: skip
 
     def fits(self) -> NDArray:
-        """Steps (m,) of one launch, at most: samples and factors must have room on the card."""
+        """Largest number of steps (m,) per launch for which samples and factors have room."""
         (m, n), looks = self._shape, len(LOOKS[self._method])
         sample = 8.0 * m * (6 * n + self._supported) + 8.0 * self._blocks * 11
         samples = max(1, int(min(SAMPLES, WINDOW * card.free_memory()) / sample))
@@ -163,7 +163,7 @@ class Launches:
         return np.minimum(samples * self._every, factors)
 
     def _factors(self, first: NDArray, last: NDArray) -> NDArray:
-        """Factors of all histories (h, looks) of these steps."""
+        """Factors (h, looks) of all histories for these steps."""
         looks = np.array(LOOKS[self._method])
         out = np.ones((len(self._rows), len(looks) * max(1, int((last - first).max() + 1))))
         for own, found in zip(out, self._rows, strict=True):
@@ -177,11 +177,11 @@ class Launches:
         return out
 
     def run(self, first: NDArray, last: NDArray, sample: NDArray) -> tuple[Written, NDArray]:
-        """Do the steps (m,) from first to last; samples from number `sample` (m,) on.
+        """Advance models (m,) from step first to last; write samples from number `sample` (m,) on.
 
-        Returns the samples as arrays of the host, their energies (k + 1, m, columns), the last row
-        at the end of the launch; and which models (m,) went wrong. There is room for as many
-        samples of each model as one of them has.
+        Returns the samples as host arrays, their energies (k + 1, m, columns), the last row at the
+        end of the launch; and the failed models (m,). The arrays fit the model with the most
+        samples.
         """
         m, n = self._shape
         count = max(0, int((last // self._every + 1 - sample).max()))
@@ -217,7 +217,7 @@ class Launches:
         return cuda.to_device(np.zeros((count + 1, self._blocks, self._counts.groups + 3)))
 
     def _fit_grid(self, arguments: tuple[Any, ...]) -> None:
-        """Compile, and of one model take as many blocks as the card runs at once."""
+        """Compile; with one model, use as many blocks as the GPU runs at once."""
         self._compiled = self._kernel.specialize(*arguments)
         if self._wide:
             made: Any = next(iter(self._compiled.overloads.values()))
@@ -228,7 +228,7 @@ class Launches:
             self._set(self._from)
 
     def places(self) -> Places:
-        """Where the models are."""
+        """Copy the state of the models to the host."""
         state = self._state
         arrays = state.u, state.v, state.first, state.sums, state.angle
         return Places(*(array.copy_to_host() for array in arrays))

@@ -1,4 +1,4 @@
-"""Motions of many models on the card, each in a block of threads."""
+"""Motions of many models on the GPU, one block of threads each."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from foldyn.dynamics.gpu.launch import Launches, Places
 from foldyn.dynamics.motion import Motion
 from foldyn.errors import ComputationError, InputError
 
-AT_ONCE = 16384  # models: more are no quicker
+AT_ONCE = 16384  # models per launch: more are no faster
 
 
 def integrate(motions: Sequence[Motion]) -> set[int]:
-    """Integrate motions, which have room for their samples; numbers of those that go wrong.
+    """Integrate motions with room for their samples; return the numbers of failures.
 
-    Those with the same topology and method run at a time; their steps may differ.
+    Motions with the same topology and method run together; their steps may differ.
     """
     alike: dict[Any, list[int]] = {}
-    known: dict[int, Any] = {}  # of what several starts share
+    known: dict[int, Any] = {}  # preparation that several starts share
     for k, motion in enumerate(motions):
         packed = motion.packed
         if id(packed) not in known:
@@ -42,26 +42,26 @@ def integrate(motions: Sequence[Motion]) -> set[int]:
 
 
 def integrate_prepared(motions: Sequence[Motion]) -> set[int]:
-    """Integrate those of motions that have GPU kernels; numbers of those that went well."""
+    """Integrate the motions that have GPU kernels; return the numbers of successes."""
     taken = [k for k, motion in enumerate(motions) if _is_taken(motion)]
     wrong = integrate([motions[k] for k in taken])
-    for k in wrong:  # which the CPU shall name
+    for k in wrong:  # the CPU run will report the failure
         motions[taken[k]].device = "cpu"
     return {k for number, k in enumerate(taken) if number not in wrong}
 
 
 def _is_taken(motion: Motion) -> bool:
-    """Whether a motion has kernels, and room for its samples."""
+    """Whether a motion has GPU kernels, and room for its samples."""
     if motion.method.name not in METHODS or lacking(motion.case, motion.packed):
         return False
-    with suppress(InputError):  # which the CPU shall name
+    with suppress(InputError):  # the CPU run will report the reason
         motion.make_room()
         return True
     return False
 
 
 def _integrated(motions: Sequence[Motion]) -> NDArray:
-    """Integrate motions of one topology and method; which of them (m,) went well."""
+    """Integrate motions of one topology and method; return which (m,) succeeded."""
     clock = time.perf_counter()
     plans, method = [motion.plan for motion in motions], motions[0].method
     courses = [motion.course for motion in motions]
@@ -109,7 +109,7 @@ def _integrated(motions: Sequence[Motion]) -> NDArray:
 
 
 def _is_sound(motion: Motion, u: NDArray) -> bool:
-    """Whether a motion can go on: it is audited as if it were alone."""
+    """Whether a motion may continue: audited in the same way as a single motion."""
     with suppress(ComputationError):
         motion.audit()
         if motion.course.tally.steps < motion.plan.steps:

@@ -1,7 +1,7 @@
-"""Device functions made of the CPU's own: the same formulas, compiled once more for the GPU.
+"""Device functions ported from the CPU functions: the same formulas, compiled for the GPU.
 
-What only exists for the CPU is replaced: the vectors' `choose`, the guess of a cube root from a
-number's bits, and calls by address, which stand for laws of the user's own.
+CPU-only parts are replaced: the vectors' `choose`, the initial guess of a cube root from the bits
+of a number, and calls by address, which user laws need.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numba import cuda as _cuda
 
 from foldyn.jit import eights, intrinsics
 
-cuda: Any = _cuda  # whose types are unknown to checkers
+cuda: Any = _cuda  # types unknown to type checkers
 SIMULATED: bool = config.ENABLE_CUDASIM  # type: ignore[attr-defined]
 
 
@@ -39,7 +39,7 @@ def _unknown_law(*_):
 
 
 def on_device(function: Callable[..., Any]) -> Any:
-    """A function as kernels call it; the simulator calls it as it is."""
+    """Compile a function for the device; the simulator calls it unchanged."""
     return function if SIMULATED else cuda.jit(device=True)(function)
 
 
@@ -63,7 +63,7 @@ _made: dict[Any, Any] = {
 
 
 def ported(function: Any) -> Any:
-    """The device function with the formula of one that is compiled for the CPU."""
+    """Device version of a function that is compiled for the CPU."""
     if function not in _made:
         source = function.py_func
         code = list(dis.get_instructions(source))
@@ -81,7 +81,7 @@ def ported(function: Any) -> Any:
 
 
 def _replaced(value: Any, names: set[str]) -> Any:
-    """What a name of the CPU's function stands for on the device."""
+    """Replacement on the device for a name in the CPU function."""
     if isinstance(value, ModuleType):
         if value is not np and not value.__name__.startswith("foldyn"):
             return value

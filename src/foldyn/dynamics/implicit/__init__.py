@@ -1,1 +1,1 @@
-"""What implicit integrators share: Newton's method in each step, its matrix, the step control."""
+"""Parts shared by implicit integrators: Newton's method, its matrix, the step control."""

@@ -1,14 +1,15 @@
-"""Discrete gradients of what depends on the mutual distances of four points.
+"""Discrete gradients of functions of the mutual distances of four points.
 
 In a step the points move by dx about their mean positions x, and a measure e, such as a squared
-distance, goes from e0 to e1. With D the part of dx that is no rigid motion (least squares about x),
+distance, goes from e0 to e1. With D the deforming part of dx, i.e. without rigid motion (least
+squares about x),
 
     g = grad e(x) + (e1 - e0 - grad e(x) . dx) D / |D|^2
 
 does the work e1 - e0 exactly, and has neither a resultant nor a moment about x: the gradient of a
-measure has none, and what is orthogonal to all rigid motions has none (Gonzalez, J. Nonlinear Sci.
-6, 1996). What is missed is of the third order in the step. It vanishes for a squared distance of
-points that stay the closest ones.
+measure has none, and neither has a vector orthogonal to all rigid motions (Gonzalez, J. Nonlinear
+Sci. 6, 1996). The correction is of third order in the step. It vanishes for the squared distance of
+points that remain the closest ones.
 """
 
 from __future__ import annotations
@@ -21,29 +22,29 @@ from numpy.typing import NDArray
 from foldyn.jit.compiled import inner, inner_scalar
 from foldyn.jit.intrinsics import flat
 
-NOISE = 16.0 * float(np.finfo(float).eps)  # of positions: what a measure may miss by rounding
+NOISE = 16.0 * float(np.finfo(float).eps)  # of positions: rounding error of a measure
 
 
 class Move(NamedTuple):
-    """Four points in a step, and memory for a measure of theirs."""
+    """Motion of four points in a step, and work arrays for a measure."""
 
     start: NDArray  # (4, 3) m
     middle: NDArray  # (4, 3) m
     end: NDArray  # (4, 3) m
     motion: NDArray  # (4, 3) dx, m
     deform: NDArray  # (4, 3) D, m
-    by_end: NDArray  # (12, 12) derivative of D with respect to the end
-    slope: NDArray  # (12,) gradient of a measure in the middle,
-    second: NDArray  # (12, 12) its second derivative there,
-    after: NDArray  # (12,) its gradient at the end,
-    gradient: NDArray  # (12,) its discrete gradient
+    by_end: NDArray  # (12, 12) derivative of D by the end positions
+    slope: NDArray  # (12,) gradient of a measure at the midpoint
+    second: NDArray  # (12, 12) second derivative at the midpoint
+    after: NDArray  # (12,) gradient at the end
+    gradient: NDArray  # (12,) discrete gradient
     weights: NDArray  # (4,) of a distance; see `mechanics.contact.distance_hessian`
     moves: NDArray  # (2, 4)
     apart: NDArray  # (3,) m
 
 
 def new_move() -> Move:
-    """Memory for four points."""
+    """Work arrays for four points."""
     start, middle, end, motion, deform = np.zeros((5, 4, 3))
     slope, after, gradient = np.zeros((3, 12))
     by_end, second = np.zeros((2, 12, 12))
@@ -56,9 +57,9 @@ def new_move() -> Move:
 
 @inner
 def go(move, tangent):
-    """What follows from start and end; returns |D|^2 (m2) and the largest coordinate (m).
+    """Compute the move from start and end; return |D|^2 (m2) and the largest coordinate (m).
 
-    tangent : whether the derivative of D is asked for.
+    tangent : whether to compute the derivative of D.
     """
     r, d, farthest = np.empty((4, 3)), move.deform, 0.0
     for c in range(3):
@@ -73,7 +74,7 @@ def go(move, tangent):
             r[v, c], d[v, c] = move.middle[v, c] - middle, move.motion[v, c] - shift
     inverse = _inertia_inverse(r)
     w, size = (0.0, 0.0, 0.0), 0.0
-    for _ in range(2):  # once more for digits that narrow pairs lose in the inverse
+    for _ in range(2):  # twice, as narrow pairs lose digits in the inverse
         turn = _turned_by(inverse, *_moment(r, d))
         for v in range(4):
             d[v, 0] -= turn[1] * r[v, 2] - turn[2] * r[v, 1]
@@ -124,7 +125,7 @@ def _inertia_inverse(r):
 
 @inner_scalar
 def _turned_by(inverse, t0, t1, t2):
-    """Vector of the rotation that gives points with such an inertia some moment."""
+    """Rotation vector of points with this inverse inertia under some moment."""
     axx, ayy, azz, axy, axz, ayz = inverse
     return (
         axx * t0 + axy * t1 + axz * t2,
@@ -135,13 +136,13 @@ def _turned_by(inverse, t0, t1, t2):
 
 @inner
 def _by_end(move, r, w, inverse):
-    """The derivative of D = dx - w x r: of its turn w, and of r, half of what the end moves by."""
+    """Derivative of D = dx - w x r by the end, which moves r by half and w by its turn."""
     one, moved = np.zeros(3), np.zeros(3)
     for v in range(4):
         for c in range(3):
             one[:] = 0.0
             one[c] = 1.0
-            # the end's part in D, and in the moment of dx about x, is e - w x e / 2
+            # contribution of the end to D and to the moment of dx about x: e - w x e / 2
             moved[0] = one[0] - 0.5 * (w[1] * one[2] - w[2] * one[1])
             moved[1] = one[1] - 0.5 * (w[2] * one[0] - w[0] * one[2])
             moved[2] = one[2] - 0.5 * (w[0] * one[1] - w[1] * one[0])
@@ -163,13 +164,13 @@ def _by_end(move, r, w, inverse):
 
 @inner
 def add_measure(move, size, farthest, change, law, law_slope, tangent, force, block):
-    """Add the force (12,) of a measure, and its derivative (12, 12) with respect to the end.
+    """Add the force (12,) of a measure, and its derivative (12, 12) by the end positions.
 
-    size, farthest : of `go`.
-    change : of the measure in the step.
+    size, farthest : results of `go`.
+    change : change of the measure in the step.
     law, law_slope : the quotient of an energy and the measure, N per unit of its gradient, and its
         derivative with respect to the measure at the end.
-    tangent : whether the derivative is asked for.
+    tangent : whether to compute the derivative.
     """
     dx, deform = flat(move.motion), flat(move.deform)
     missed, rounding, share = change, 0.0, 0.0

@@ -1,19 +1,20 @@
-"""Newton's method for steps with contact: every iterate keeps parts apart.
+"""Newton's method for steps with contact: no iterate lets parts penetrate.
 
-The potential of contact has no value where something has passed another, and grows without bound
-before it. So the prediction of a step and every iteration are cut to the share in which no gap
-closes by more than a part of itself (`mechanics.contact.ccd`), and then to where the residual
-along the iteration is no longer large on the other side: there the energy has passed its least
-value. Where none of this leads to equilibrium the step is refused, and halved.
+The contact potential is undefined after penetration and grows without bound before it. So the
+prediction of a step and every iteration are limited to the share in which no gap closes by more
+than a fraction of itself (`mechanics.contact.ccd`), and then by a line search: the iteration is
+shortened until the residual along it no longer has a large opposite sign, which would mean that the
+energy has passed its minimum. If no equilibrium is found, the step is rejected and halved.
 
 Which nodes touch changes from one iteration to the next. The tangent of contact is a sparse matrix
 of its own, added to that of the structure before the factorization.
 
-Where nothing has touched, a step is first solved as if there were no contact, with a matrix that
-may serve several steps, and accepted if all stays apart on the straight way to its end.
+As long as nothing touches, a step is first solved without contact, with a matrix that may serve
+several steps, and accepted if the straight path to its end is free of contact.
 
-Friction takes the normal force of the end of the last step, so that within a step it has a
-potential. Anchors and ties follow what slips where a step is accepted, as in explicit methods.
+Friction uses the normal force at the end of the last step, so that it has a potential within a
+step. Anchors and ties of slipping contacts are updated when a step is accepted, as in explicit
+methods.
 """
 
 from __future__ import annotations
@@ -41,11 +42,11 @@ from foldyn.mechanics.contact.planes import move_planes, slip
 from foldyn.mechanics.contact.search import place as put_at
 from foldyn.mechanics.contact.term import ContactTerm
 
-MOST = 60  # iterations, many of which are cut
+MOST = 60  # iterations, many of them shortened
 CUTS = 12  # of one iteration by the residual along it
-OVERSHOT = 0.5  # of the residual along an iteration: what may be left of it on the other side
-SMALLEST, LARGEST = 0.1, 0.5  # share of an iteration that is tried after one that goes too far
-PREDICTIONS = (1.0, 0.5, 0.25, 0.0)  # shares of the predicted motion, where obstacles move
+OVERSHOT = 0.5  # of the residual along an iteration: allowed opposite value at its end
+SMALLEST, LARGEST = 0.1, 0.5  # factor by which an iteration that goes too far is shortened
+PREDICTIONS = (1.0, 0.5, 0.25, 0.0)  # shares of the predicted motion to try when obstacles move
 
 
 class TouchingNewton(Newton):
@@ -60,18 +61,18 @@ class TouchingNewton(Newton):
         self._memory.counts.lagged = 1
         self._free = np.zeros(3 * scheme.packed.system.rows, bool)
         self._free[matrix.free] = True
-        self._moved = np.zeros((len(self._tables.planes), 3))  # of planes at the start of the step
-        self._pushed = self._memory.friction.copy()  # and what they did to nodes there
-        self._rubbed = np.zeros_like(self._memory.x)  # and panels to each other
+        self._moved = np.zeros((len(self._tables.planes), 3))  # planes at the step's start
+        self._pushed = self._memory.friction.copy()  # and friction on nodes there
+        self._rubbed = np.zeros_like(self._memory.x)  # friction between panels there
         self._touched = False
 
     @property
     def memory(self) -> Memory:
-        """What contact keeps."""
+        """State of contact."""
         return self._memory
 
     def begin(self) -> None:
-        """Take the state where forces were evaluated last for the start of the next step."""
+        """Take the state of the last force evaluation as the start of the next step."""
         kept = self._memory
         self._moved[:], self._pushed[:] = kept.moved[:, :3], kept.friction
         self._touched = float(kept.facts.energy) > 0.0
@@ -81,7 +82,7 @@ class TouchingNewton(Newton):
             slip_pairs(self._tables, kept.x, kept)
 
     def works(self) -> tuple[float, float]:
-        """Work (J) of planes that move in a step that has been solved, and what friction took."""
+        """Work (J) of moving planes in a solved step, and energy dissipated by friction."""
         kept, scheme, done, lost = self._memory, self.scheme, 0.0, 0.0
         points = self._contact.points
         motion = points(scheme.moved()) - points(scheme.displacement())
@@ -96,13 +97,13 @@ class TouchingNewton(Newton):
         return done, lost
 
     def _rub(self) -> NDArray:
-        """Gradient (n, 3), N, of friction between panels where forces were evaluated last."""
+        """Gradient (n, 3), N, of friction between panels, at the last force evaluation."""
         force = np.zeros_like(self._memory.x)
         add_rubs(self._tables, self._memory, force)
         return force
 
     def solve(self, h: float, t: float) -> int:
-        """See `Newton`."""
+        """Move scheme.shift to equilibrium at the end t of a step h (s); see `Newton.solve`."""
         scheme, matrix = self.scheme, self.matrix
         if not self._predict(t):
             self._lasting = False
@@ -132,7 +133,7 @@ class TouchingNewton(Newton):
         return NOT_CONVERGED
 
     def _passes_by(self, h: float, t: float) -> bool:
-        """Solve a step as if there were no contact; tells whether there has been none."""
+        """Solve a step without contact; return whether the result is indeed free of contact."""
         scheme, kept, predicted = self.scheme, self._memory, self.scheme.shift.copy()
         start, self.matrix.added = scheme.displacement().copy(), None
         if super().solve(h, t) == SOLVED and float(kept.facts.energy) == 0.0:
@@ -150,12 +151,12 @@ class TouchingNewton(Newton):
         return self.scheme.residual(h, t)
 
     def _tangent(self) -> sparse.csr_array | None:
-        """That of contact where forces were evaluated last; None where nothing touches."""
+        """Contact tangent at the last force evaluation; None if nothing touches."""
         tangent = self.scheme.contact_tangent(self._contact, self._memory)
         return tangent if tangent.nnz else None
 
     def _along(self, h: float, t: float, step: NDArray) -> tuple[float, float]:
-        """Go on by as much of a step (rows, 3) as leads on; norms of the residual there."""
+        """Move along a step (rows, 3) as far as the line search allows; residual norms there."""
         scheme, start = self.scheme, self.scheme.shift.copy()
         slope = float((scheme.out * step).sum())
         share = self._clear(scheme.moved(), step, np.zeros_like(self._moved))
@@ -169,14 +170,14 @@ class TouchingNewton(Newton):
         return norm, reference
 
     def _clear(self, u: NDArray, step: NDArray, moves: NDArray, keep: float = KEEP) -> float:
-        """Share of a step from u, both (rows, 3), that crosses nothing, as planes move (q, 3)."""
+        """Share of a step from u, both (rows, 3), free of penetration, as planes move by (q, 3)."""
         return self._contact.clear_with(self._memory, u, step, moves, keep)
 
     def _predict(self, t: float) -> bool:
-        """Cut the predicted motion to where nothing crosses; tells whether there is such a one.
+        """Shorten the predicted motion until nothing penetrates; return whether that is possible.
 
-        Supports and planes are at the end of the step at once: nodes make way for planes, and where
-        this does not help the step is too long.
+        Supports and planes move to the end of the step at once: planes push nodes aside; if that
+        does not help, the step is too long.
         """
         scheme = self.scheme
         predicted, start = scheme.shift.copy(), scheme.displacement().copy()
@@ -194,12 +195,12 @@ class TouchingNewton(Newton):
         return False
 
     def _start(self, u: NDArray, step: NDArray, moves: NDArray) -> float:
-        """`_clear` from the start of the step, where planes are."""
+        """`_clear` from the start of the step, with planes at their start positions."""
         self._memory.moved[:, :3] = self._moved
         return self._clear(u, step, moves)
 
     def _at(self, t: float) -> tuple[NDArray, NDArray]:
-        """Displacement (rows, 3) at time t with the shift as it is, and motion of planes (q, 3)."""
+        """Displacement (rows, 3) at time t for the current shift, and motion of planes (q, 3)."""
         scheme, kept = self.scheme, self._memory
         s, old = scheme.scratch, scheme.old
         place(scheme.packed.system, old.q + scheme.shift, old.w, t, s)
@@ -207,7 +208,7 @@ class TouchingNewton(Newton):
         return s.displacement.copy(), kept.moved[:, :3] - self._moved
 
     def _give_way(self, u: NDArray, moves: NDArray) -> None:
-        """Push nodes before planes that would overtake them at u (rows, 3)."""
+        """Push nodes out of the way of planes that would overtake them at u (rows, 3)."""
         own, met = self._tables, self._tables.meeting
         points, nodes = self._contact.points, self._contact.nodes[met]
         start, ahead = points(self.scheme.displacement()), points(u)

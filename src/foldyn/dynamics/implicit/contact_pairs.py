@@ -1,9 +1,9 @@
-"""Pairs in contact in a step: forces that do exactly the work of their potential.
+"""Contact pairs in a step: forces that do exactly the work of their potential.
 
-The potential is a sum over distances d, and its quotient with respect to d^2 / 2 times the discrete
-gradient of that does the work of each (`contact_measure`), as with bars. That of two edges,
-V = m B, changes by mean(m) (B1 - B0) + mean(B) (m1 - m0), of which the second part is that of the
-squared vector product of the edges.
+The potential is a sum over distances d. As with bars, each term's difference quotient with respect
+to d^2 / 2, times the discrete gradient of d^2 / 2, does its work (`contact_measure`). The potential
+of two edges, V = m B, changes by mean(m) (B1 - B0) + mean(B) (m1 - m0); the second part depends on
+the squared cross product of the edges.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from foldyn.mechanics.contact.vertex_triangle import PARTS, share_of, weigh_tria
 
 @inner
 def _weigh(kind, which, corners, move):
-    """Weights and moves of a distance; how many are free, and whether a pair of edges counts."""
+    """Weights and moves of a distance; number of free weights, and whether an edge pair counts."""
     if kind == VERTEX:
         return weigh_triangle(corners, which, move.weights, move.moves), True
     return weigh_edges(corners, which, move.weights, move.moves)
@@ -32,9 +32,9 @@ def _weigh(kind, which, corners, move):
 
 @inner
 def _add_distance(kind, which, d0, k, move, size, tangent, force, block, push):
-    """Add force and tangent of k d0^2 f(d/d0); its energies (J) at both ends.
+    """Add force and tangent of the potential k d0^2 f(d/d0); return its energies (J) at both ends.
 
-    size : of `go`; push : (12,) gets the gradient of the energy at the end.
+    size : result of `go`; push : (12,) receives the energy gradient at the end.
     """
     _weigh(kind, which, move.start, move)
     x0 = math.sqrt(apart_of(move.start, move.weights, move.apart)) / d0
@@ -60,9 +60,9 @@ def _add_distance(kind, which, d0, k, move, size, tangent, force, block, push):
 
 @kernel
 def vertex_step(tables, t, d0, move, tangent, force, block):
-    """Add force (12,) and tangent (12, 12) of a vertex and triangle t in a step.
+    """Add force (12,) and tangent (12, 12) of a vertex and triangle t for a step.
 
-    The tangent is only made if asked for. Returns the energy (J) at the end.
+    Computes the tangent only if `tangent`. Returns the energy (J) at the end.
     """
     size, energy, push = go(move, tangent), 0.0, np.zeros(12)
     for which in range(PARTS):
@@ -73,7 +73,7 @@ def vertex_step(tables, t, d0, move, tangent, force, block):
 
 @kernel
 def edges_step(tables, i, j, d0, move, tangent, force, block):
-    """The same of the edges i and j, of which parts inside have to be the closest."""
+    """Add force and tangent of edges i and j, whose closest points must lie inside."""
     inside = _weigh(EDGES, 0, move.end, move)[1]
     if not inside and not _weigh(EDGES, 0, move.start, move)[1]:
         return 0.0
@@ -87,7 +87,7 @@ def edges_step(tables, i, j, d0, move, tangent, force, block):
         )
         before, after = before + one, after + other
     if not inside:
-        after = 0.0  # both distances are one, but for rounding
+        after = 0.0  # both distances agree up to rounding
     u0, u1 = _across(move.start, c0), _across(move.end, c0)
     m0, m1 = mollifier(u0, 1.0)[0], mollifier(u1, 1.0)[0]
     mean = 0.5 * (m0 + m1)
@@ -102,7 +102,7 @@ def edges_step(tables, i, j, d0, move, tangent, force, block):
 
 @inner
 def _across(corners, c0):
-    """Squared vector product of two edges over c0."""
+    """Squared cross product of two edges over c0."""
     n = cross(*_edges(corners))
     return dot(n, n) / c0
 
@@ -116,9 +116,9 @@ def _edges(corners):
 
 @inner
 def _mollified(u0, u1):
-    """Quotient of the differences of the mollifier m, and its derivative by u1.
+    """Difference quotient of the mollifier m, and its derivative by u1.
 
-    m = 1 - v^2, v = 1 - u where that is positive.
+    m = 1 - v^2, v = max(1 - u, 0).
     """
     v0, v1 = max(0.0, 1.0 - u0), max(0.0, 1.0 - u1)
     if u0 < 1.0 and u1 < 1.0:
@@ -134,7 +134,7 @@ def _mollified(u0, u1):
 def _add_mollifier(
     u0, u1, c0, before, after, move, size, tangent, inner, push, force, block
 ):  # fmt: skip
-    """Add what the mollifier of two nearly parallel edges exerts."""
+    """Add the contribution of the mollifier of two nearly parallel edges."""
     value, slope = _mollified(u0, u1)
     value, slope, energy = value / c0, slope / (c0 * c0), 0.5 * (before + after)
     e, g = _edges(move.end)

@@ -1,9 +1,9 @@
-"""Contact in a step of the conserving method: forces that do exactly the work of its potential.
+"""Contact in a step of the conserving method: forces that do exactly the potential's work.
 
-Pairs: `contact_pairs`. Hinges are guarded as they resist: the quotient of energy and dihedral times
-the discrete gradient of the dihedral. Planes: the quotient of energy and distance, along the
-normal. Friction: the spring halfway, with no more than what the normal force at the start of the
-step allows.
+Pairs: see `contact_pairs`. Guards of hinges: the difference quotient of energy over dihedral, times
+the discrete gradient of the dihedral, as for hinge moments. Planes: the difference quotient of
+energy over distance, along the normal. Friction: the spring at mid-step, limited by the normal
+force at the start of the step.
 """
 
 from __future__ import annotations
@@ -42,25 +42,24 @@ from foldyn.mechanics.discrete_gradient import discrete_gradient
 
 
 class StepContact:
-    """What touches in the steps of a motion.
+    """Contact forces in the steps of a motion.
 
     Parameters
     ----------
     contact : ContactTerm
     memory : Memory
-        Its positions, planes and energy become those at the end of a step.
+        Its positions, planes and energy are updated to the end of each step.
     rows : int
-        Of nodal arrays.
+        Rows of nodal arrays.
 
     Attributes
     ----------
     force : ndarray, shape (rows, 3)
         Mean gradient (N) of the potential in a step, and friction.
     push : ndarray, shape (q, m, 4)
-        Mean gradient (N) of friction of each plane at each point that touches, and the normal
-        force.
+        Mean friction gradient (N) of each plane at each contact point, and the normal force.
     rub : ndarray, shape (m, 3)
-        Mean gradient (N) of friction of panels on each other.
+        Mean gradient (N) of friction between panels.
     """
 
     def __init__(self, contact: ContactTerm, memory: Memory, rows: int) -> None:
@@ -76,7 +75,7 @@ class StepContact:
         self._move = new_move()
 
     def put(self, u0: NDArray, u1: NDArray, factor0: NDArray, factor1: NDArray) -> None:
-        """Make the force that of a step between displacements (rows, 3).
+        """Compute `force` for a step between displacements u0 and u1 (rows, 3).
 
         factor0, factor1 : (h, 3) of the histories at both ends.
         """
@@ -85,7 +84,7 @@ class StepContact:
             move_planes(self._tables, factor, kept)
             moved[:] = kept.moved[:, :3]
         for end, u in zip(self._ends, (u0, u1), strict=True):
-            end[:] = u  # which change in place
+            end[:] = u  # planes and factors change in place
         force = self._on_points
         p0, p1 = self._contact.points(u0), self._contact.points(u1)
         force[:] = 0.0
@@ -101,9 +100,9 @@ class StepContact:
         self.force[: len(back)] = back
 
     def _steps(self, tangent: bool, force: NDArray) -> tuple[NDArray, NDArray, float]:
-        """Add the forces of the pairs that touch; nodes (k, 4), tangents (k, 12, 12), energy (J).
+        """Add the forces of touching pairs; return nodes (k, 4), tangents (k, 12, 12), energy (J).
 
-        Tangents are zero if they are not asked for.
+        Tangents are zero unless `tangent`.
         """
         count = sum(self._counts)
         nodes, blocks = np.empty((count, 4), np.int64), np.zeros((count, 12, 12))
@@ -114,7 +113,7 @@ class StepContact:
         return nodes, blocks, energy
 
     def tangent(self) -> sparse.csr_array:
-        """Derivative (m, m), N/m, of the force of the last step with respect to its end."""
+        """Derivative (m, m), N/m, of the last step's force by the displacement at its end."""
         own, kept = self._tables, self._memory
         nodes, blocks, _ = self._steps(True, np.zeros_like(self._on_points))
         guards = np.zeros((len(own.hinge_limit), 4, 3, 4, 3))
@@ -135,9 +134,9 @@ class StepContact:
 
 @kernel
 def _find(tables, u0, u1, start, middle, memory, pairs):
-    """Positions of a step, and the pairs that touch, at its start or its end.
+    """Positions of a step, and the pairs that touch at its start or its end.
 
-    Their numbers go to `pairs`; returns how many there are of either kind.
+    Writes pair indices to `pairs`; returns the number of each kind.
     """
     place(tables, u0, memory)
     start[:] = memory.x
@@ -145,7 +144,7 @@ def _find(tables, u0, u1, start, middle, memory, pairs):
         _list(tables, u0, u1, memory)
     place(tables, u1, memory)
     middle[:] = 0.5 * (start + memory.x)
-    # by how much a distance in the middle and one at the ends may differ
+    # bound for the difference of a distance at the midpoint and at the ends
     reach, found = fastest(memory.x - start, len(start)), np.zeros(2, np.int64)
     triangles, edges = tables.triangles, tables.edges
     for kind in range(2):
@@ -164,7 +163,7 @@ def _find(tables, u0, u1, start, middle, memory, pairs):
 
 @inner
 def _list(tables, u0, u1, memory):
-    """Have all pairs listed that are near on the way from u0 to u1; none if that is too long."""
+    """List all pairs that come near between u0 and u1; none if the motion is too long."""
     far = math.inf
     if memory.counts.has_list == 1:
         far = max(farthest(u0, memory), farthest(u1, memory))
@@ -183,7 +182,7 @@ def _pair_steps(
 ):  # fmt: skip
     """Nodes (k, 4), tangents (k, 12, 12) and forces of the pairs that touch; their energy (J).
 
-    Those of either kind are `first` and `second` many.
+    first, second : number of pairs of each kind.
     """
     push, energy = np.empty(12), 0.0
     triangles, edges = tables.triangles, tables.edges
@@ -209,7 +208,7 @@ def _pair_steps(
 
 @kernel
 def _add_rubs(tables, middle, memory, pairs, first, second, rub, force):
-    """Add the friction of the pairs that touch, by their springs halfway; it goes to rub, too."""
+    """Add friction of the touching pairs, with their springs at mid-step, also to `rub`."""
     rub[:] = 0.0
     for k in range(first + second):
         kind = VERTEX if k < first else EDGES
@@ -225,7 +224,7 @@ def _add_rubs(tables, middle, memory, pairs, first, second, rub, force):
 
 @inner
 def _guard(tables, h, theta0, theta1):
-    """Mean moment (N m) of a guard, its slope by the dihedral at the end, its energy there (J)."""
+    """Mean moment (N m) of a guard, its slope by the end dihedral, and its end energy (J)."""
     limit, k = tables.hinge_limit[h], tables.hinge_stiffness[h]
     moment, slope, energy = 0.0, 0.0, 0.0
     for sign in (1.0, -1.0):
@@ -240,7 +239,7 @@ def _guard(tables, h, theta0, theta1):
 
 @inner
 def _turn(tables, h, start, end, move, points, plain, gradient):
-    """Discrete gradient of the dihedral of a guarded hinge; its dihedrals, the gradient at the end.
+    """Discrete gradient of a guarded hinge's dihedral; its dihedrals, and the end gradient.
 
     See `discrete_gradient`.
     """
@@ -257,7 +256,7 @@ def _turn(tables, h, start, end, move, points, plain, gradient):
 
 @inner
 def _add_guards(tables, start, memory, move, force):
-    """Add the moments of the guards; their energy at the end to that of contact."""
+    """Add the moments of the guards, and their end energy to the energy of contact."""
     points, plain, gradient = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
     for h in range(tables.hinge_limit.size):
         theta0 = gradient_at(tables, start, h)[0]
@@ -274,9 +273,9 @@ def _add_guards(tables, start, memory, move, force):
 
 @kernel
 def _guard_tangents(tables, start, end, move, blocks):
-    """Derivatives (h, 4, 3, 4, 3) of the guards, and which of them act (h,).
+    """Derivatives (h, 4, 3, 4, 3) of the guards, and whether each acts (h,).
 
-    Those of the gradients are of the first order in the step, as of other hinges.
+    The derivatives of the gradients are accurate to first order in the step, as for other hinges.
     """
     acts = np.zeros(tables.hinge_limit.size, np.bool_)
     points, plain, gradient = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
@@ -309,7 +308,7 @@ def _add_others(tables, start, middle, moved, memory, move, push, force):
 
 @inner
 def _plane_quotient(tables, start, moved, memory, p, i):
-    """Mean normal force over -k d0 and its slope, of node i at plane p; its energy (J) at the end.
+    """Mean normal force over -k d0 of node i at plane p, its slope, and its end energy (J).
 
     moved : (2, q, 3) displacements of the planes at both ends.
     """
@@ -323,7 +322,7 @@ def _plane_quotient(tables, start, moved, memory, p, i):
 
 @inner
 def _add_planes(tables, start, middle, moved, memory, push, force):
-    """Add the forces of the planes; they go to push (q, n, 4), too."""
+    """Add the forces of the planes, also to push (q, n, 4)."""
     k, halfway = tables.stiffness, 0.5 * (moved[0] + moved[1])
     push[:] = 0.0
     for p in range(len(tables.planes)):

@@ -1,7 +1,7 @@
-"""An implicit method at work: steps solved one after the other, samples, error control.
+"""Implicit engine: steps solved one after the other, samples, error control.
 
-The loop over the steps is Python. A step's tangent and its factorization cost far more than the
-interpreter; the force, the residual and the tangent are compiled.
+The step loop runs in Python: a step's tangent and factorization cost far more than the interpreter.
+Force, residual and tangent are compiled.
 """
 
 from __future__ import annotations
@@ -28,30 +28,30 @@ from foldyn.dynamics.system import Packed
 from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.threads import one_thread
 
-LEAST_STEP = 2.0**-20  # of the step wanted: where Newton's method fails with less, it fails
+LEAST_STEP = 2.0**-20  # of the wanted step: if Newton's method fails below, the motion fails
 LEAST_TIME = 1e-13  # step relative to the end of the motion
-TURN = math.pi  # by which no dihedral jumps in a step unless panels collide
-MEMORY = 0.9  # share of an error that counts a step later
-SAME_TIME = 1e-9  # of a step: times as near as that are one
-SAME_STATE = 1e-9  # relative difference of states and forces that are one
-# the control of the step by its error
+TURN = math.pi  # limit for a dihedral's change per step, unless panels collide
+MEMORY = 0.9  # decay per step of an earlier error that still counts
+SAME_TIME = 1e-9  # of a step: times closer than that are equal
+SAME_STATE = 1e-9  # relative difference below which states and forces are equal
+# step size control
 SAFETY = 0.9
-GROWTH = 2.0  # of a step at most
-WORTHWHILE = 1.25  # growth below which the step, and with it the matrix, is kept
-NEAR, CUT = 0.95, 0.85  # below which the error is about to be too large, and what is done then
-LEAST = 0.2  # share of a refused step that is tried next, at least
-# what is measured along a motion and counts for the next step
+GROWTH = 2.0  # largest growth of a step
+WORTHWHILE = 1.25  # growth below which the step is kept, and the matrix with it
+NEAR, CUT = 0.95, 0.85  # factor below which the step shrinks in advance, and by how much
+LEAST = 0.2  # least share of a rejected step to try next
+# measures of the motion that the next step depends on
 MEASURED = ("wanted", "last", "error", "farthest")
 OUTCOMES = {SOLVED: Outcome.DONE, NOT_FINITE: Outcome.NOT_FINITE}
 
 
 class Implicit:
-    """An implicit scheme that advances a motion.
+    """Implicit engine: advances a motion with a scheme.
 
     Parameters
     ----------
     make : callable
-        The scheme from a case and a course.
+        Creates the scheme from a case and a course.
     packed : Packed
     course : Course
     plan : StepPlan
@@ -61,7 +61,7 @@ class Implicit:
     Attributes
     ----------
     continues : bool
-        Whether it goes on from the end of another motion.
+        Whether it continues from the end of another motion.
     """
 
     threads = 1
@@ -77,7 +77,7 @@ class Implicit:
         self._touching = TouchingNewton(self._scheme, self._matrix) if touches else None
         self._newton = self._touching or Newton(self._scheme, self._matrix)
         self._halved = 0
-        self._horizon = 0.0  # s in which a vibration moves on
+        self._horizon = 0.0  # s, duration of an impulse's effect
         self._end: NDArray | None = None
         self.continues = False
 
@@ -96,21 +96,21 @@ class Implicit:
         }
 
     def continuation(self) -> NDArray:
-        """All numbers (k,) on which the next steps depend; see `continue_from`."""
+        """All numbers (k,) that the next steps depend on; see `continue_from`."""
         state = [*self._state(), self._acceleration()]
         return np.concatenate([array.ravel() for array in state])
 
     def continue_from(self, values: NDArray) -> None:
-        """Have the motion go on as that one did whose end has these numbers.
+        """Continue as the motion whose `continuation` was `values`.
 
-        Its displacement, its velocity and the acceleration that follows from them must be those of
-        that end: otherwise somebody has changed the state or the case, and it goes on from its own
-        start. `continues` tells which, after the first sample.
+        Displacement, velocity and the resulting acceleration must equal those stored: otherwise the
+        state or the case has been changed, and the motion begins at its own start. After the first
+        sample, `continues` says which.
         """
         self._end = values
 
     def _resume(self, values: NDArray) -> bool:
-        """See `continue_from`; tells whether it is the same motion."""
+        """Resume from the numbers of `continuation`; return whether the motion is the same."""
         scheme, old, tally = self._scheme, self._scheme.old, self._course.tally
         own = [*self._state(), old.a]
         if values.shape != (sum(array.size for array in own),) or not np.isfinite(values).all():
@@ -142,7 +142,7 @@ class Implicit:
         return True
 
     def _acceleration(self) -> NDArray:
-        """Acceleration (n, 3) where the motion stands, of nodes with mass."""
+        """Current acceleration (n, 3) of nodes with mass."""
         memory, out = self._memory, np.zeros_like(self._scheme.old.a)
         if memory is not None:
             memory.still()
@@ -153,7 +153,7 @@ class Implicit:
         return out
 
     def _state(self) -> list[NDArray]:
-        """What the next steps depend on, beside the case and the time."""
+        """State that the next steps depend on, apart from the case and the time."""
         measured = [float(self._course.tally[name]) for name in MEASURED]
         course = [self._course.angle.copy(), np.array([*measured, self._horizon])]
         return [*self._scheme.state(), *course, *self._newton.state()]
@@ -164,13 +164,13 @@ class Implicit:
         return {"contact_lists": int(self._touching.memory.counts.lists)}
 
     def checkpoint_arrays(self) -> dict[str, NDArray]:
-        """All on which the next steps depend beside the case, between two stretches."""
+        """Everything that the next steps depend on, apart from the case, between two stretches."""
         made = np.array([self._matrix.factorized, self._matrix.factorizations])
         origin = {f"origin.{k}": array for k, array in enumerate(self._newton.origin)}
         return snapshot(self._parts()) | {"factorized": made} | origin
 
     def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
-        """Go on as the engine that stood there."""
+        """Resume from checkpoint arrays."""
         restore(self._parts(), arrays)
         made, count = arrays["factorized"].tolist()
         if made:
@@ -229,7 +229,7 @@ class Implicit:
         return write(scheme.equation.sampled(out), course.u, course.v, t, scheme.out)
 
     def _fixed(self, out: Samples) -> tuple[int, int]:
-        """One step of dt, in parts where a load jumps or Newton's method fails."""
+        """Take one step of dt, subdivided at load jumps or if Newton's method fails."""
         plan, tally = self._plan, self._course.tally
         step = int(tally.steps) + 1
         t, end, h = float(tally.time), plan.start + step * plan.dt, plan.dt
@@ -238,7 +238,7 @@ class Implicit:
             goal, jump = self._next_jump(t, end, SAME_TIME * plan.dt)
             part, stop, jump = equal_step(t, goal, h, jump)
             if abs(part - plan.dt) <= SAME_TIME * plan.dt:
-                part = plan.dt  # without the rounding of the times
+                part = plan.dt  # free of rounding in times
             outcome, hinge = self._attempt(part, stop, jump)
             if outcome == Outcome.DONE:
                 self._accept(part, stop, jump)
@@ -255,7 +255,7 @@ class Implicit:
         return Outcome.DONE, -1
 
     def _adaptive(self, out: Samples) -> tuple[int, int]:
-        """One step whose error is within the tolerance."""
+        """Take one step with an error within the tolerance."""
         plan, tally = self._plan, self._course.tally
         t = float(tally.time)
         due, waits = self._due(out)
@@ -281,7 +281,7 @@ class Implicit:
         self._accept(h, end, jump)
         tally.steps += 1
         tally.time, tally.farthest = end, scale
-        # the error of a vibration vanishes twice in each period; the ones before still count then
+        # a vibration's error vanishes twice per period, so that earlier errors still count
         error = max(error, MEMORY * tally.error * (h / (tally.last or h)) ** 3)
         tally.error, tally.last = error, h
         tally.wanted = max(wanted if end == goal else 0.0, next_step(h, error))
@@ -291,7 +291,7 @@ class Implicit:
         return Outcome.DONE, -1
 
     def _due(self, out: Samples) -> tuple[float, bool]:
-        """Time (s) by which the next steps end, and whether a sample waits there."""
+        """Time (s) by which the next steps must end, and whether a sample is due there."""
         plan, number = self._plan, int(self._course.tally.samples)
         if plan.every or number == out.end:
             return plan.end, False
@@ -301,7 +301,7 @@ class Implicit:
         return plan.end, time < plan.end + SAME_TIME * plan.interval
 
     def _next_jump(self, t: float, end: float, near: float) -> tuple[float, float | None]:
-        """Where a step from t has to end at the latest, and the jump of a load there."""
+        """Latest end of a step from t, and the load jump there if any."""
         k = bisect_right(self._jumps, t + near)
         if k == len(self._jumps) or self._jumps[k] > end + near:
             return end, None
@@ -309,7 +309,7 @@ class Implicit:
         return (end if abs(jump - end) <= near else jump), jump
 
     def _attempt(self, h: float, end: float, jump: float | None) -> tuple[int, int]:
-        """Solve a step that ends before the jump, if there is one; returns (outcome, hinge)."""
+        """Solve a step that ends before the jump, if any; returns (outcome, hinge)."""
         self._scheme.predict(h)
         moment = end if jump is None else math.nextafter(min(end, jump), -math.inf)
         verdict = self._newton.solve(h, moment)
@@ -321,7 +321,7 @@ class Implicit:
         return OUTCOMES.get(verdict, Outcome.NOT_CONVERGED), -1
 
     def _hopeless(self, h: float) -> bool:
-        """Whether a smaller step would not help either."""
+        """Whether a smaller step would fail as well."""
         return h < LEAST_STEP * self._plan.dt or self._packed.callbacks.error is not None
 
     def _accept(self, h: float, end: float, jump: float | None) -> None:
@@ -343,7 +343,7 @@ class Implicit:
             course.tally.work += scheme.settle(max(end, jump))
             scheme.begin(max(end, jump))
             system = self._packed.system
-            if self._memory is not None:  # creases that turn in no time
+            if self._memory is not None:  # creases that turn instantly
                 self._memory.commit()
             if system.turns:
                 note_offsets(
@@ -355,13 +355,12 @@ class Implicit:
     def _error(self, t: float, h: float) -> tuple[float, float]:
         """Error of the worst node in a step from t, over the tolerance, and its new scale.
 
-        The scale is the largest displacement so far. The change of the acceleration goes through
-        the matrix of the step, which takes away what stiff bars add to it and displacements do not
-        feel. So does what loads do between the ends of the step and the method does not see. The
-        displacement of a slow motion errs by this at once, by the square of the step as the whole
-        motion does, and may do so by the tolerance to the power 2/3, which is the error of the
-        whole motion. In a step shorter than a vibration it is an impulse that lasts: its error is
-        the displacement that it leads to later.
+        The scale is the largest displacement so far. Solving with the step matrix turns the change
+        of the acceleration into a displacement, which filters out stiff bars. The load that the
+        method misses between the ends of the step is treated alike. In a slow motion it causes a
+        displacement error of order h^2 at once, like the error of the whole motion, and may reach
+        the tolerance to the power 2/3, which is that error. In a step shorter than a vibration it
+        acts as an impulse: its error is the displacement that it causes later.
         """
         scheme, matrix, plan = self._scheme, self._matrix, self._plan
         scale = max(float(self._course.tally.farthest), _largest(scheme.moved()))
@@ -389,7 +388,7 @@ def _largest(values: NDArray) -> float:
 
 
 def next_step(h: float, error: float) -> float:
-    """Step after an accepted one of h (s) with the error, relative to the tolerance."""
+    """Next step after an accepted one of h (s), with the error relative to the tolerance."""
     factor = GROWTH if error <= 0.0 else min(GROWTH, SAFETY * error ** (-1.0 / 3.0))
     if factor < NEAR:
         return h * CUT
@@ -397,12 +396,12 @@ def next_step(h: float, error: float) -> float:
 
 
 def smaller_step(h: float, error: float) -> float:
-    """Step after a refused one."""
+    """Next step after a rejected one of h (s)."""
     return h * min(0.9, max(LEAST, SAFETY * error ** (-1.0 / 3.0)))
 
 
 def next_stop(plan: StepPlan, t: float, end: float, near: float) -> float:
-    """Where a step from t has to end at the latest, for the knots of the histories."""
+    """Latest end of a step from t, given the knots of the histories."""
     k = int(np.searchsorted(plan.stops, t + near, side="right"))
     return plan.stops[k] if k < len(plan.stops) and plan.stops[k] < end - near else end
 
@@ -410,7 +409,7 @@ def next_stop(plan: StepPlan, t: float, end: float, near: float) -> float:
 def equal_step(
     t: float, goal: float, wanted: float, jump: float | None
 ) -> tuple[float, float, float | None]:
-    """Step from t, the first of equal ones to the goal, its end, and the jump if it is there."""
+    """First of equal steps from t to the goal, its end, and the jump if it ends there."""
     parts = max(1, math.ceil((goal - t) / wanted * (1.0 - SAME_TIME)))
     h = (goal - t) / parts
     return (h, goal, jump) if parts == 1 else (h, t + h, None)
@@ -420,8 +419,8 @@ def impulse_duration(scheme: Scheme, matrix: StepMatrix, packed: Packed, duratio
     """How long (s) an impulse acts on, in which a vibration moves on; at most a duration.
 
     1/omega of the vibration that the histories set in motion, with omega^2 Rayleigh's quotient of
-    the displacements that they would cause if they acted slowly: over the duration, for bodies
-    that nothing holds. Hinges count with their nominal stiffness.
+    the displacements under slow loads: as slow as the duration, for bodies without supports. Hinges
+    count with their nominal stiffness.
     """
     u = scheme.displacement()
     force = scheme.push(scheme.old, np.ones(len(scheme.old.factor)))

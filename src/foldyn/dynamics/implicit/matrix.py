@@ -1,11 +1,11 @@
-"""The matrix of one iteration: stiffness, mass and damping with the weights of a step.
+"""The matrix of a Newton iteration: weighted stiffness, mass and damping of a step.
 
-All three stand as 3x3 blocks of one pattern, so that a step's matrix is one pass over them, which
-puts the entries between free dofs straight into what is factorized: a band with the nodes numbered
-along the sheet or, where that would be too wide, a sparse matrix.
+All three are stored as 3x3 blocks with the same pattern. One pass over them writes the entries of
+the free dofs directly into the matrix to factorize: a band matrix with the nodes numbered along the
+sheet or, if the band would be too wide, a sparse matrix.
 
-Modal damping, a product with rows G of all dofs, would fill the matrix. It is added to what is
-factorized by Woodbury's formula.
+Modal damping, a product with rows G of all dofs, would fill the matrix. Woodbury's formula adds it
+to the factorization instead.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from foldyn.mechanics.constant_damping import DampingRows
 from foldyn.mechanics.following import following_places, put_following
 from foldyn.mechanics.tangent import Sparsity, block_keys, entry_slots, joined
 
-FULL = 200  # dofs up to which a full matrix takes what is added sooner than a sparse one
+FULL = 200  # dofs up to which a full matrix with added terms is faster than a sparse one
 
 
 class Weights(NamedTuple):
-    """Factors of the matrices in that of an iteration."""
+    """Weights of stiffness, mass and damping in an iteration matrix."""
 
     stiffness: float
     mass: float  # 1/s2
-    damping: float  # 1/s, of the damping but for alpha M
+    damping: float  # 1/s, of the damping except alpha M
 
 
 class Matrices(NamedTuple):
@@ -46,17 +46,17 @@ class Matrices(NamedTuple):
 
     stiffness: NDArray
     mass: NDArray
-    damping: NDArray  # that of terms
+    damping: NDArray  # damping of terms
 
 
 class StepMatrix:
-    """Matrix of the free dofs, made from blocks and factorized; alpha M is part of the mass.
+    """Matrix of the free dofs, assembled from blocks and factorized; the mass includes alpha M.
 
     Parameters
     ----------
     packed : Packed
     symmetric : bool
-        Whether the blocks of the stiffness will be.
+        Whether the stiffness blocks will be symmetric.
 
     Attributes
     ----------
@@ -67,9 +67,9 @@ class StepMatrix:
     free : ndarray of int
         Free dofs, 3 place + axis, in the order in which they are solved for.
     added : csr_array, shape (3 rows, 3 rows), or None
-        Further stiffness wherever it stands, N/m, with that of the body: of contact.
+        Additional stiffness outside the pattern, N/m, such as contact.
     solver : str
-        What factorizes.
+        Name of the factorization.
     """
 
     def __init__(self, packed: Packed, symmetric: bool) -> None:
@@ -120,7 +120,7 @@ class StepMatrix:
         self.factorizations = 0
 
     def add_following(self, u: NDArray, factor: NDArray, share: float) -> None:
-        """Add a share of the stiffness of loads that depend on the displacement u (n, 3).
+        """Add a share of the stiffness of displacement-dependent loads at u (n, 3).
 
         factor : (h, 3) of the histories. A symmetric matrix gets the symmetric part.
         """
@@ -131,12 +131,12 @@ class StepMatrix:
         np.add.at(self.stiffness.reshape(-1), self._follow, share * values)
 
     def factorize(self, weights: Weights) -> None:
-        """Make the matrix from the stiffness as it stands, and factorize it.
+        """Assemble the matrix from the current stiffness, and factorize it.
 
         Raises
         ------
         SingularTangentError
-            It is singular or not finite.
+            The matrix is singular or not finite.
         """
         self._factors = None
         self.factorizations += 1
@@ -155,13 +155,13 @@ class StepMatrix:
         if self._band is not None:
             try:
                 return self._band(weights, self._matrices)
-            except SingularTangentError:  # not definite: the motion leaves an unstable state
+            except SingularTangentError:  # indefinite: the motion leaves an unstable state
                 if not np.isfinite(self.stiffness).all():
                     raise
         return self._sparse(weights, self._matrices)
 
     def follow(self, u: NDArray, hidden: float) -> None:
-        """Make the damping what it is at u (n, 3); see `Term.damping_entries` for `hidden`."""
+        """Update the damping to its value at u (n, 3); see `Term.damping_entries` for `hidden`."""
         if len(self._damped):
             entries = [term.damping_entries(u, hidden) for term in self._damping]
             out = self._matrices.damping.reshape(-1)
@@ -173,21 +173,21 @@ class StepMatrix:
         return [self._matrices.stiffness, self._matrices.damping]
 
     def forget(self) -> None:
-        """Give up the factors."""
+        """Discard the factors."""
         self._factors = None
 
     @property
     def factorized(self) -> bool:
-        """Whether there is something to solve with."""
+        """Whether factors are available."""
         return self._factors is not None
 
     @property
     def band(self) -> NDArray | None:
-        """Columns of the factor of a symmetric band, if that is what there is."""
+        """Columns of a banded Cholesky factor; None for other factors."""
         return self._factors.columns if isinstance(self._factors, Cholesky) else None
 
     def solve(self, residual: NDArray, out: NDArray) -> NDArray:
-        """Solution of A x = residual at the free dofs of `out`; the others stay; all (n, 3).
+        """Solve A x = residual at the free dofs of `out`; other dofs keep their values; all (n, 3).
 
         Slaves of constraints follow.
         """
@@ -202,19 +202,20 @@ class StepMatrix:
 
 
 class _Entries(NamedTuple):
-    """Entries between free dofs: row, column, and what of the blocks goes there.
+    """Entries of the free dofs: row, column, and their sources in the blocks.
 
-    With constraints several times the same one, to be added, each times a value of its own.
+    With constraints an entry may occur several times: each is scaled by its value, and all are
+    added.
     """
 
     row: NDArray
     column: NDArray
     take: NDArray
-    value: NDArray  # none without constraints
+    value: NDArray  # empty without constraints
 
 
 class _Band:
-    """Puts entries into a band."""
+    """Writes entries into a band matrix."""
 
     def __init__(self, entries: _Entries, size: int, width: int, symmetric: bool) -> None:
         self._make: Callable[[NDArray], Any] = Cholesky if symmetric else BandLU
@@ -230,7 +231,7 @@ class _Band:
 
     @cached_property
     def _everywhere(self) -> NDArray:
-        """Places (n, n) of all entries of a full matrix, by columns."""
+        """Flat positions (n, n) in the band's memory of all entries, by columns."""
         size, rows = self._memory.T.shape
         number = np.arange(size)
         return (rows - 1) * number[:, None] + number + self._diagonal
@@ -248,12 +249,12 @@ class _Band:
 
 
 class _Sparse:
-    """Puts entries into a sparse matrix by columns."""
+    """Writes entries into a sparse matrix in CSC format."""
 
     def __init__(self, entries: _Entries, size: int, symmetric: bool) -> None:
         row, column, take, self._value = entries
         self._put = np.arange(len(take))
-        if len(self._value):  # to the same place several times
+        if len(self._value):  # several entries share a place
             place, self._put = np.unique(row + size * column, return_inverse=True)
             row, column, self._take = place % size, place // size, take
         numbered = sparse.csc_array((np.arange(1, len(row) + 1), (row, column)), (size, size))
@@ -277,7 +278,7 @@ class _Sparse:
 
 
 def _onto(free: NDArray, ties: Ties, dofs: int) -> sparse.csr_array:
-    """Motions (dofs, f) of all dofs by those of the free ones: slaves of constraints follow."""
+    """Map (dofs, f) from the free dofs to all dofs, constraint slaves included."""
     number = np.full(dofs, -1)
     number[free] = np.arange(len(free))
     start, master, value = _masters(number, free, ties)
@@ -285,7 +286,7 @@ def _onto(free: NDArray, ties: Ties, dofs: int) -> sparse.csr_array:
 
 
 def _entries(pattern: Sparsity, free: NDArray, filled: NDArray, ties: Ties) -> _Entries:
-    """The `filled` entries of the blocks between free dofs, and between slaves of constraints."""
+    """Entries of the `filled` blocks between free dofs, also through constraint slaves."""
     dofs = 3 * (len(pattern.indptr) - 1)
     number = np.full(dofs, -1)
     number[free] = np.arange(len(free))
@@ -302,7 +303,7 @@ def _entries(pattern: Sparsity, free: NDArray, filled: NDArray, ties: Ties) -> _
     start, master, value = _masters(number, free, ties)
     count = np.diff(start)
     one, other = (count[dof[kept]] for dof in (row, column))
-    first = np.repeat(np.arange(len(kept)), one * other)  # entry of the blocks of each product
+    first = np.repeat(np.arange(len(kept)), one * other)  # block entry of each product
     within = np.arange(len(first)) - np.repeat(np.cumsum(one * other) - one * other, one * other)
     a = start[row[kept]][first] + within // other[first]
     b = start[column[kept]][first] + within % other[first]
@@ -310,7 +311,7 @@ def _entries(pattern: Sparsity, free: NDArray, filled: NDArray, ties: Ties) -> _
 
 
 def _masters(number: NDArray, free: NDArray, ties: Ties) -> tuple[NDArray, NDArray, NDArray]:
-    """Of every dof the numbers of the free ones it consists of, with its values, by rows."""
+    """For every dof the free dofs it depends on, with their coefficients, in CSR format."""
     dof = np.concatenate([free, np.repeat(ties.slave, np.diff(ties.masters.start))])
     master = number[np.concatenate([free, ties.masters.dof])]
     value = np.concatenate([np.ones(len(free)), ties.masters.value])
@@ -321,7 +322,7 @@ def _masters(number: NDArray, free: NDArray, ties: Ties) -> tuple[NDArray, NDArr
 
 @kernel
 def _gather(weights, matrices, take, put, out):
-    """out[put] = the weighted sum of the matrices at `take`, all flat."""
+    """out[put] = weighted sum of the matrices at `take`, all flat."""
     stiffness, mass, damping = flat(matrices.stiffness), flat(matrices.mass), flat(matrices.damping)
     for k in range(take.size):
         e = take[k]
@@ -331,7 +332,7 @@ def _gather(weights, matrices, take, put, out):
 
 @kernel
 def _gather_tied(weights, matrices, take, value, put, out):
-    """Add to out[put] the weighted sum of the matrices at `take` times a value, all flat."""
+    """Add the weighted sum of the matrices at `take`, times `value`, to out[put], all flat."""
     stiffness, mass, damping = flat(matrices.stiffness), flat(matrices.mass), flat(matrices.damping)
     for k in range(take.size):
         e = take[k]

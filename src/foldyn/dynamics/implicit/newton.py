@@ -1,9 +1,9 @@
 """Newton's method for the end of a step.
 
-The matrix is made anew in each iteration, unless the residual falls fast with the last one: panels
-that turn within a step move the directions of their stiff bars, and with the old directions the
-iteration soon converges slowly or not at all. Iterations whose matrix is kept cost a force and a
-substitution each.
+The matrix is updated in each iteration unless the residual falls fast with the last one: panels
+that turn within a step change the directions of their stiff bars, and with outdated directions the
+iteration converges slowly or not at all. An iteration that reuses the matrix costs one force
+evaluation and one substitution.
 """
 
 from __future__ import annotations
@@ -22,27 +22,28 @@ SAME_STEP = 1e-3  # relative difference of steps that may share a matrix
 
 
 class Newton:
-    """Newton's method with the matrix that it keeps from one step to the next.
+    """Newton's method, with a matrix that it may reuse in later steps.
 
     Attributes
     ----------
     origin : tuple of ndarray
-        From what the matrix was made: its step, and what `Scheme.back` takes; empty without one.
+        State in which the matrix was made: the step, and the arguments of `Scheme.back`; empty
+        without a matrix.
     """
 
     def __init__(self, scheme: Scheme, matrix: StepMatrix) -> None:
         self.scheme, self.matrix = scheme, matrix
         self.iterations = 0
         self.evaluations = 0
-        self._h = 0.0  # of the last factorization
+        self._h = 0.0  # step of the last factorization
         self.origin: tuple[NDArray, ...] = ()
-        self._lasting = False  # whether a matrix served a whole step: the next one begins with it
+        self._lasting = False  # whether one matrix served a whole step: the next one starts with it
 
     def prepare(self, h: float, t: float) -> None:
-        """Have everything compiled that a step needs."""
+        """Compile everything that a step needs."""
         scheme = self.scheme
         offset = scheme.packed.system.actuators.offset
-        before = offset[:, 2:].copy()  # of the last accepted step
+        before = offset[:, 2:].copy()  # offsets of the last accepted step
         scheme.shift[:] = 0.0
         scheme.residual(h, t)
         scheme.tangent(self.matrix, scheme.displacement(), False)
@@ -50,7 +51,7 @@ class Newton:
         offset[:, 2:] = before
 
     def renew(self, h: float) -> bool:
-        """Make the matrix of a step h (s) from its start; tells whether it could be factorized."""
+        """Make the matrix of a step h (s) at its start; return whether it could be factorized."""
         try:
             self._make(h, self.scheme.displacement(), False)
         except SingularTangentError:
@@ -65,18 +66,18 @@ class Newton:
         self._h, self.origin = h, (np.array([h, again]), before.copy(), *self.scheme.origin())
 
     def remake(self) -> None:
-        """Factorize the matrix of the last step that was made anew, from its blocks."""
+        """Factorize the matrix of the last update again, from its blocks."""
         self.matrix.factorize(self.scheme.weights(self._h))
 
     def state(self) -> list[NDArray]:
-        """What the next step depends on: from what its first matrix was made, if that is kept."""
+        """State that the next step depends on: the origin of its first matrix, if reused."""
         kept = self._lasting and len(self.origin) > 0
         rest = (np.zeros(2), self.scheme.shift, *self.scheme.origin())
         origin = self.origin if kept else [np.zeros_like(array) for array in rest]
         return [np.array([float(kept)]), *origin]
 
     def resume(self, state: Sequence[NDArray]) -> None:
-        """Make the matrix of a state again, from what it was made: the scheme moves there."""
+        """Restore a state: move the scheme to where the matrix was made, and make it again."""
         (kept,), (h, again), before, *origin = state
         if kept:
             self.scheme.back(h, origin)
@@ -86,7 +87,7 @@ class Newton:
     def solve(self, h: float, t: float) -> int:
         """Move scheme.shift from its prediction to equilibrium at the end t of a step h (s).
 
-        Returns `SOLVED`, or why not.
+        Returns `SOLVED`, or the reason for failure.
         """
         scheme, matrix = self.scheme, self.matrix
         goal = scheme.goal(h)

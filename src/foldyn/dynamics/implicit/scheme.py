@@ -1,4 +1,4 @@
-"""What an implicit scheme provides, and how Newton's method judges what is left of a residual."""
+"""Base class of implicit schemes, and the convergence test of Newton's method."""
 
 from __future__ import annotations
 
@@ -29,32 +29,32 @@ from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.mechanics.viscous import ViscousTerm
 
 EPS = float(np.finfo(float).eps)
-FAST = 0.3  # share of the residual that an iteration leaves, below which its matrix is kept
-GROWTH = 1e8  # of the residual, at which the iteration has lost its way
-# what is left where the residual no longer falls: rounding, if it is below one of these
+FAST = 0.3  # residual reduction per iteration below which the matrix is reused
+GROWTH = 1e8  # growth of the residual at which the iteration has diverged
+# the residual has stalled at rounding if it is below one of these
 ENOUGH = 1e-8  # of the forces at play
-ROUNDING = 8.0  # times the rounding of forces
-OF_MOTION = 1e-5  # of the inertia that resists a step as it is predicted: residual at most
-STALL = 0.5  # share of the residual that an iteration leaves, above which it does not fall
+ROUNDING = 8.0  # times the rounding error of forces
+OF_MOTION = 1e-5  # of the inertial force of the predicted step: largest residual
+STALL = 0.5  # residual reduction per iteration above which it has stalled
 
 SOLVED, GO_ON, NEW_MATRIX, NOT_CONVERGED, NOT_FINITE = range(5)
 
 
 class Goal(NamedTuple):
-    """What the residual is judged by, N."""
+    """Convergence criteria for the residual, N."""
 
     tolerance: float  # relative to the forces at play
-    least: float  # forces at play at least
-    most: float  # residual at most: of small motions about a preload, whose forces are large
-    rounding: float  # of the bars' forces and, in a very short step, of the inertia
+    least: float  # lower bound for the forces at play
+    most: float  # upper bound for the residual: for small motions about a preload with large forces
+    rounding: float  # of the bar forces and, in a very short step, of the inertia
 
 
 @kernel
 def judge(goal, norm, reference, last, lowest):
-    """What to do next: the residual (N) is `norm`, it was `last`, and `lowest` at its best.
+    """Decide what to do next, given the residual norm (N) now, before (`last`) and at its lowest.
 
     reference : forces at play, N.
-    last : 0 where there is no matrix yet, inf before the first iteration with an old one.
+    last : 0 if there is no matrix yet, inf before the first iteration with an old one.
     """
     if not norm < np.inf:
         return NOT_FINITE
@@ -69,34 +69,34 @@ def judge(goal, norm, reference, last, lowest):
 
 
 class Phase(NamedTuple):
-    """State at one time: arrays (n, 3), those of q and w without the motion of the supports."""
+    """State at one time: arrays (n, 3); q and w exclude support motion."""
 
     q: NDArray  # m
     w: NDArray  # m/s
     a: NDArray  # m/s2
     force: NDArray  # F_int + beta K0 v - p, N
     factor: NDArray  # (h, 3) of the histories
-    pushed: NDArray  # forces of loads that depend on the displacement, N; or none (0, 3)
-    damped: NDArray  # those of damping, for methods that keep them, N; or none,
-    resisted: NDArray  # and those of the air
+    pushed: NDArray  # forces of displacement-dependent loads, N; or none (0, 3)
+    damped: NDArray  # forces of damping, for methods that need them, N; or none
+    resisted: NDArray  # forces of the air likewise
 
 
 class Scheme(ABC):
-    """Steps from `old` to `new`, whose unknown is the displacement in a step, `shift`.
+    """A time step from `old` to `new` whose unknown is its displacement increment `shift`.
 
     Parameters
     ----------
     packed : Packed
         The case.
     course : Course
-        Where the motion stands: q, w and a of `old` are its arrays.
+        Current state of the motion: q, w and a of `old` are its arrays.
 
     Attributes
     ----------
     symmetric : bool
-        Whether the tangent is.
+        Whether the tangent is symmetric.
     tolerance : float
-        Residual, relative to the forces at play, with which a step is accepted.
+        Residual, relative to the forces at play, at which a step is accepted.
     facts : mapping
         Parameters, for the result's attributes.
     """
@@ -112,7 +112,7 @@ class Scheme(ABC):
         self.equation = EquationOfMotion(packed, self.work, self.scratch, course, None)
         shape, histories = course.u.shape, self.scratch.factor.shape
         self.out, self.step = np.zeros(shape), np.zeros(shape)
-        self.shift = np.zeros(shape)  # new.q - old.q: their difference would lose digits
+        self.shift = np.zeros(shape)  # new.q - old.q, stored as the difference would lose digits
         self.earlier = np.zeros(shape)  # new.q before the last iteration
         self._gap, self._pushed = np.zeros(histories[0]), np.zeros(shape)
         self.air = packed.body.find(AirDragTerm)
@@ -123,22 +123,22 @@ class Scheme(ABC):
         rest = np.zeros(shape), np.zeros(histories), np.zeros_like(self.scratch.pushed), *kept
         self.old = Phase(course.u, course.v, course.carry, *rest)
         self.new = Phase(*map(np.zeros_like, self.old))
-        # mean velocity of the last step, and its change per time from the middle of one to another
+        # mean velocity of the last step, and its rate of change between midpoints
         self._speed, self._growth, self._last = course.v.copy(), np.zeros(shape), 0.0
         self.massless = packed.mass.diagonal <= 0.0
         self.rounding = EPS * float(np.linalg.norm(packed.body.scale()))
-        self.folds = np.zeros_like(self.work.fold_angle)  # at old.q, rad
+        self.folds = np.zeros_like(self.work.fold_angle)  # fold angles at old.q, rad
 
     @abstractmethod
     def weights(self, h: float) -> Weights:
-        """Factors of the matrices for a step h (s)."""
+        """Weights of the matrices for a step h (s)."""
 
     @abstractmethod
     def residual(self, h: float, t: float) -> tuple[float, float]:
-        """Out-of-balance force of the step to the time t (s), into `out`.
+        """Residual force of a step h (s) to the time t (s), into `out`.
 
-        Makes `new` what belongs to `shift`. Returns the norm of the force on the free dofs and that
-        of the forces at play, N.
+        Updates `new` from `shift`. Returns the norms of the residual on the free dofs and of the
+        forces at play, N.
         """
 
     @abstractmethod
@@ -147,27 +147,27 @@ class Scheme(ABC):
 
     @abstractmethod
     def works(self, h: float) -> tuple[float, float, float]:
-        """Work of loads, supports, actuators in a step, energy dissipated, and lost to air, J."""
+        """Work of loads, supports and actuators in a step, dissipated, and lost to the air, J."""
 
     @abstractmethod
     def change(self, h: float) -> NDArray:
-        """Estimate of h^2/12 times the change of the acceleration in the step (n, 3), m."""
+        """Estimate (n, 3), m, of h^2/12 times the change of the acceleration over the step."""
 
     def contact_tangent(self, contact: ContactTerm, memory: Memory) -> sparse.csr_array:
-        """Derivative (m, m), N/m, of the force of contact where it was evaluated last."""
+        """Derivative (m, m), N/m, of the contact force at its last evaluation."""
         return contact.tangent_at(self.moved(), memory)
 
     def plane_push(self, before: NDArray, after: NDArray) -> NDArray:
-        """Gradient of friction and normal force, both N, that do the work of planes in a step.
+        """Friction gradient and normal force of planes, N, whose work is exact over a step.
 
-        before, after : (q, n, 4) at its ends; see `mechanics.contact.contact_state`.
+        before, after : (q, n, 4) at the ends of the step; see `mechanics.contact.contact_state`.
         """
         return 0.5 * (before + after)
 
     def rub(self, before: NDArray, after: NDArray) -> NDArray:
-        """Gradient of friction between panels, N, that does its work in a step.
+        """Gradient of friction between panels, N, whose work is exact over a step.
 
-        before, after : (n, 3) at its ends.
+        before, after : (n, 3) at the ends of the step.
         """
         return 0.5 * (before + after)
 
@@ -175,7 +175,7 @@ class Scheme(ABC):
         self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
         most: int,
     ) -> tuple[int, float, int]:  # fmt: skip
-        """Iterate with the matrix as it is; returns what `judge` says, the residual, how often."""
+        """Iterate with the current matrix; return `judge`'s verdict, residual, iterations."""
         norm = np.inf
         for steps in range(most):
             norm, reference = self.residual(h, t)
@@ -188,7 +188,7 @@ class Scheme(ABC):
         return NOT_CONVERGED, norm, most
 
     def begin(self, t: float) -> None:
-        """Make `old` the beginning of a motion, or of its part after a jump, at t (s)."""
+        """Make `old` the start of a motion, or of its part after a jump, at t (s)."""
         old, s = self.old, self.scratch
         accelerate(self.equation.still, old.q, old.w, t, old.a)
         old.a[self.massless] = 0.0
@@ -198,10 +198,10 @@ class Scheme(ABC):
         self.folds[:] = self.work.fold_angle
 
     def settle(self, t: float) -> float:
-        """Have what has no mass follow loads that jump at t (s); returns the work done on it, J.
+        """Let massless parts follow loads that jump at t (s); returns the work on them, J.
 
-        Offsets do so at once, and dofs but for turns of damped creases; those of a matrix of
-        damping do not.
+        Offsets follow at once, and so do massless dofs, apart from turns of damped creases; dofs in
+        a damping matrix do not.
         """
         body, system, s = self.packed.body, self.packed.system, self.scratch
         matrix, viscous = body.find(DampingMatrix), body.find(ViscousTerm)
@@ -226,7 +226,7 @@ class Scheme(ABC):
         return stored if memory is None else stored + float(memory.own.lost[1])
 
     def goal(self, h: float) -> Goal:
-        """What the residual of a step h (s) is judged by."""
+        """Convergence criteria for a step h (s)."""
         mass = self.packed.mass.diagonal[:, None]
         inertia = self.weights(h).mass * float(np.linalg.norm(mass * self.shift))
         rounding = self.rounding + EPS * inertia
@@ -234,27 +234,27 @@ class Scheme(ABC):
         return Goal(self.tolerance, self.hinge_forces(), most, rounding)
 
     def hinge_forces(self) -> float:
-        """Norm of the hinges' forces at old.q, N: forces at play even where all is at rest."""
+        """Norm (N) of the hinge forces at old.q: at play even if everything is at rest."""
         forces = self.packed.body.hinge_forces(self.displacement())
         return float(np.linalg.norm(forces))
 
     def displacement(self) -> NDArray:
-        """Displacement (n, 3) of old.q with that of the supports."""
+        """Displacement (n, 3) at old.q, support motion included."""
         return self.carried(self.old.q, self.old.factor)
 
     def moved(self) -> NDArray:
-        """Displacement (n, 3) of new.q with that of the supports."""
+        """Displacement (n, 3) at new.q, support motion included."""
         return self.carried(self.new.q, self.new.factor)
 
     def carried(self, q: NDArray, factor: NDArray) -> NDArray:
-        """Displacement (n, 3) of q with that of the supports for factors (h, 3)."""
+        """Displacement (n, 3) for q plus support motion at the factors (h, 3)."""
         return carried(self.packed.system.moved, factor[:, 0], q)
 
     def unseen(self, first: float, last: float) -> NDArray | None:
-        """Force (n, 3) at the end of a step that what histories do within it would exert, N.
+        """Force (n, 3), N, that the histories' variation within a step would exert at its end.
 
-        None if they are straight lines there. The dihedrals of the last evaluation stay those of
-        the end.
+        None if the histories are linear there. The dihedrals of the last evaluation remain those of
+        the step's end.
         """
         packed, new = self.packed, self.new
         if not packed.system.varies:
@@ -263,10 +263,10 @@ class Scheme(ABC):
         return self.push(new, self._gap) if self._gap.any() else None
 
     def push(self, phase: Phase, change: NDArray) -> NDArray:
-        """Force (n, 3) that a change (h,) of the factors exerts at a phase, N; uses `out`."""
+        """Force (n, 3), N, due to a change (h,) of the factors at a phase; overwrites `out`."""
         s = self.scratch
         for moved, force in ((change, self._pushed), (np.zeros_like(change), self.out)):
-            s.factor[:], s.time[0] = phase.factor, 0.0  # evaluated as if for this time
+            s.factor[:], s.time[0] = phase.factor, 0.0  # evaluated as if at this time
             s.factor[:, 0] += moved
             accelerate(self.equation.still, phase.q, phase.w, 0.0, self.earlier)
             force[:] = s.force
@@ -275,15 +275,15 @@ class Scheme(ABC):
         return self._pushed
 
     def predict(self, h: float) -> None:
-        """Move on as the mean velocities of the last steps go on.
+        """Predict the shift by extrapolating the mean velocities of the last steps.
 
-        The velocities at the ends of steps that do not resolve a vibration ring; means do not.
+        If steps do not resolve a vibration, end velocities oscillate; mean velocities do not.
         """
         ahead = 0.5 * (h + self._last)
         self.shift[:] = h * (self._speed + ahead * self._growth)
 
     def state(self) -> list[NDArray]:
-        """What the next step depends on, beside the case and the time; q, w and a come first."""
+        """State that the next step depends on, apart from case and time; begins with q, w and a."""
         old = self.old
         return [
             array.copy()
@@ -291,32 +291,32 @@ class Scheme(ABC):
         ]
 
     def resume(self, state: Sequence[NDArray]) -> None:
-        """Go on from a state, after `begin` at its displacement and velocity."""
+        """Resume from a state, after `begin` at its displacement and velocity."""
         own = (self.old.q, self.old.w, self.old.a, self._speed, self._growth)
         for array, kept in zip(own, state, strict=False):
             array[:] = kept
         self._last = float(state[len(own)][0])
 
     def origin(self) -> tuple[NDArray, ...]:
-        """From what `tangent` makes the matrix after `residual`, beside the step and the case."""
+        """Arguments for `back`: the state in which `tangent` makes the matrix after `residual`."""
         own, memory = self, self.packed.body.find(HingeMemory)
         kept = () if memory is None else memory.snapshot()
         arrays = (own.old.q, own.old.factor, own.shift, own.new.factor, own.course.angle)
         return tuple(array.copy() for array in (*arrays, *kept))
 
     def back(self, h: float, origin: Sequence[NDArray]) -> None:
-        """Go back to where the matrix of a step h (s) was made; `resume` leads on from there."""
+        """Return to the state where the matrix of a step h (s) was made; go on with `resume`."""
         q, factor, shift, ahead, angle, *kept = origin
         old, memory, s = self.old, self.packed.body.find(HingeMemory), self.scratch
         if memory is not None:
             memory.recall(kept)
         old.q[:], old.factor[:], self.shift[:], self.course.angle[:] = q, factor, shift, angle
-        s.factor[:], s.time[0] = ahead, 0.0  # evaluated as if for this time
+        s.factor[:], s.time[0] = ahead, 0.0  # evaluated as if at this time
         self.residual(h, 0.0)
         s.time[0] = np.nan
 
     def accept(self, h: float) -> None:
-        """Make the end of a step h (s) the beginning of the next one."""
+        """Accept a step h (s): its end becomes the start of the next one."""
         speed = self.shift / h
         self._growth[:] = (speed - self._speed) / (0.5 * (h + self._last))
         self._speed[:], self._last = speed, h
@@ -327,7 +327,7 @@ class Scheme(ABC):
 
 @inner_scalar
 def copy(source, out):
-    """out = source, of one size: Numba's own check of sizes compiles the text of its message."""
+    """out = source, of equal size: Numba's own size check would compile its message."""
     values, given = flat(out), flat(source)
     for i in range(values.size):
         values[i] = given[i]
@@ -335,14 +335,14 @@ def copy(source, out):
 
 @inner
 def norms(system, force, inertia, factor, following):
-    """Norms of an out-of-balance force (n, 3) on the free dofs, N, and of the forces at play.
+    """Norms of a residual (n, 3) on the free dofs, and of the forces at play, N.
 
-    The force becomes zero at the supports, where it is a reaction, and at slaves of constraints,
-    which hand theirs over to their masters.
+    Sets the residual to zero at supports, where it is a reaction, and at constraint slaves, which
+    pass theirs on to their masters.
 
     inertia : sum of squares of the inertial forces, N2.
     factor : (h, 3) of the histories, for the loads.
-    following : forces of loads that depend on the displacement (n, 3), N; or none (0, 3).
+    following : forces of displacement-dependent loads (n, 3), N; or none (0, 3).
     """
     values, reactions, pushed, left = flat(force), 0.0, 0.0, 0.0
     for k in range(system.supported.size):
@@ -367,9 +367,9 @@ def norms(system, force, inertia, factor, following):
 
 @inner
 def drag_works(system, mass, h, before, after, velocity):
-    """Work of moving supports against drag in a step of h, and what drag takes in all, J.
+    """Work of moving supports against drag in a step h (s), and total energy lost to drag, J.
 
-    velocity : (n, 3), the mean in the step without that of supports.
+    velocity : (n, 3), mean over the step without support motion.
     before, after : (h, 3) factors of the histories at its ends.
     """
     if system.alpha == 0.0:
@@ -383,7 +383,7 @@ def drag_works(system, mass, h, before, after, velocity):
 
 @inner
 def add_load_work(loads, old, new, shift, work):
-    """`work` (J) and that of the loads along a shift (n, 3), between two phases."""
+    """Return `work` (J) plus the work of the loads along a shift (n, 3) between two phases."""
     along, before, after = flat(shift), old.factor, new.factor
     for k in range(loads.dof.size):
         row = loads.row[k]
