@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from pathlib import Path
 import threading
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest

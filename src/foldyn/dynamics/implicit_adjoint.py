@@ -243,7 +243,7 @@ class ImplicitAdjoint(Adjoint):
         self._z = z
 
     def _back_to_begin(self, start: State, by_u: NDArray, by_v: NDArray) -> None:
-        """Step backward through the acceleration -M^-1 b - alpha w that begins a motion or part."""
+        """Step backward through the acceleration -M^-1 b - alpha w at the start of a part."""
         (_, af, _, _), (t, q, w, a) = self._scheme.parameters, start
         self._forget()
         self._pull(*self._whole(t, q, w), af * self._z + self._push(self._by_a))

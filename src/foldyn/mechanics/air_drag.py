@@ -1,10 +1,11 @@
-"""Drag of the panels in air: a pressure normal to them, quadratic in the velocity past the air.
+"""Air drag of panels: a normal pressure, quadratic in the velocity relative to the air.
 
-On each triangle, with v_n the velocity along its normal n relative to the air, the pressure is
--1/2 rho Cd |v_n| v_n n. It is integrated with the middles of the three sides (a rule of degree 2):
-where the triangle moves one way, its resultant is exact for any motion that keeps it flat.
+On each triangle, with v_n the velocity along its normal n relative to the air, the pressure is -1/2
+rho Cd |v_n| v_n n. It is integrated at the side midpoints (a rule of degree 2): if v_n has the same
+sign everywhere, the resultant is exact for any motion that keeps the triangle flat.
 
-The air takes the power -F . v, v the velocity of the sheet; where a wind drives it, it gives some.
+The air takes the power -F . v, with v the velocity of the sheet; a wind that drives the sheet
+supplies power.
 """
 
 from __future__ import annotations
@@ -24,18 +25,18 @@ from foldyn.mechanics.term import FORCES, PLACE_OBSTACLES, Compiled, Term, force
 
 
 class AirDrag(NamedTuple):
-    """Arrays of t triangles in air, and memory of the last evaluation."""
+    """Arrays of t triangles in air, and results of the last evaluation."""
 
     triangles: NDArray  # (t, 3) nodes
     sides: NDArray  # (t, 2, 3) rest vectors from the first corner to the others, m
     wind: NDArray  # (3,) velocity of the air at factor 1, m/s
-    factor: NDArray  # (1,) memory: of the wind
+    factor: NDArray  # (1,) current factor of the wind
     normal: NDArray  # (t, 3) memory: unit normals
-    slope: NDArray  # (t, 3) memory: change of the force at each side's middle by v_n, N s/m
+    slope: NDArray  # (t, 3) current derivative of the force at each side midpoint by v_n, N s/m
 
 
 def air_drag(x: NDArray, triangles: NDArray, wind: NDArray) -> AirDrag:
-    """Triangles (t, 3) of nodes at x (n, 3) at rest, in air with the velocity wind (3,), m/s."""
+    """Arrays of triangles (t, 3), nodes x (n, 3) at rest, in air with velocity wind (3,), m/s."""
     corners = np.asarray(x, float)[triangles]
     return AirDrag(
         triangles=np.ascontiguousarray(triangles, np.int64),
@@ -57,7 +58,7 @@ class _Context(NamedTuple):
 
 @inner_scalar
 def put_normal(sides, corners, u, out):
-    """Unit normal (3,) of a triangle of three nodes at u (n, 3), to `out`; returns its area, m2."""
+    """Put the unit normal (3,) of a triangle at u (n, 3) into `out`; return its area, m2."""
     first, second, third = corners[0], corners[1], corners[2]
     ax = sides[0, 0] + u[second, 0] - u[first, 0]
     ay = sides[0, 1] + u[second, 1] - u[first, 1]
@@ -102,7 +103,7 @@ def _place(own, factors):
 
 
 class AirDragTerm(Term):
-    """Drag of the panels; see `Term`. Its memory is that of `AirDrag`.
+    """Air drag of panels as a term; see `Term`. Its memory is in `AirDrag`.
 
     Parameters
     ----------
@@ -110,7 +111,7 @@ class AirDragTerm(Term):
     half : float
         1/2 rho Cd, kg/m3.
     row, histories : int
-        Number of the wind's history among as many; none where it is steady.
+        Row of the wind's history, and number of histories; none if the wind is steady.
     """
 
     damps = True
@@ -120,27 +121,27 @@ class AirDragTerm(Term):
         self.air, self.half, self.row, self.histories = air, half, row, histories
 
     def driven(self, row: int, histories: int) -> AirDragTerm:
-        """The same in a wind that varies as one of these histories."""
+        """The drag in a wind that follows row `row` of these histories."""
         return AirDragTerm(self.air, self.half, row, histories)
 
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-        """See `Term`."""
+        """Context and kernels for a thread; see `Term`."""
         rows = int(work.strips.own[1])
         own = Context(_Context(self.air, self.half, self.row, self.histories, rows))
         kernels = {FORCES: _forces} | ({PLACE_OBSTACLES: _place} if self.histories else {})
         return Compiled(own, kernels)
 
     def blow(self, factor: float) -> None:
-        """Make the wind blow with this factor at the next evaluations."""
+        """Set the wind factor for the next evaluations."""
         self.air.factor[0] = factor
 
     @cached_property
     def damping_places(self) -> tuple[NDArray, NDArray]:
-        """See `Term`."""
+        """Rows and columns (k,) of its damping entries; see `Term`."""
         return places_of(pairs_within(self.air.triangles))
 
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
-        """See `Term`: that of the velocities where the forces were evaluated last."""
+        """Derivative of the forces by velocity, at the velocities of the last evaluation."""
         slope, n = 0.25 * self.air.slope, self.air.normal
         ends = np.zeros((len(n), 3, 3))
         for k, (a, b) in enumerate(((0, 1), (1, 2), (2, 0))):
@@ -150,6 +151,6 @@ class AirDragTerm(Term):
         return np.einsum("tab,ti,tj->tabij", ends, n, n).ravel()
 
     def placed(self, order: NDArray, before: Any) -> AirDragTerm:
-        """See `Term`."""
+        """The term with nodes in memory order; see `Term`."""
         here = self.air._replace(triangles=ranks(order)[self.air.triangles])
         return AirDragTerm(here, self.half, self.row, self.histories)

@@ -1,12 +1,12 @@
-"""A model as solvers see it: the energies, forces and tangents of a list of terms, added up.
+"""A model as solvers see it: the sum of energies, forces and tangents of a list of terms.
 
-The m dofs are 3 node + axis, then the hidden ones: those without mass that a sheet may have beside
-the displacements of its nodes. Compiled loops hold them in arrays with a row of three per node,
-(rows, 3); hidden dofs follow in further rows, the last one filled up. Either form is taken.
+The m dofs are 3 node + axis, followed by the hidden dofs: massless dofs that a sheet may have in
+addition to its nodal displacements. Compiled loops store them in arrays with a row of three per
+node, (rows, 3); hidden dofs follow in further rows, the last one padded. Both forms are accepted.
 
 The first term is the sheet, which numbers the dofs; springs, clamped edges, contact and hinges with
-memory follow. They are added up in the order of the list. What makes another assembly of one
-(`folded`, `nominal`, ...) leaves it as it was.
+memory follow. They are added in list order. Methods that derive another assembly (`folded`,
+`nominal`, ...) leave the original unchanged.
 """
 
 from __future__ import annotations
@@ -41,31 +41,31 @@ from foldyn.mechanics.term import (
 from foldyn.mechanics.threads import Team
 
 ITERATIONS = 50
-BALANCED = 1e-13  # rad, of the last step of Newton's method for hidden dofs
+BALANCED = 1e-13  # rad, last Newton step for hidden dofs
 LEAST_SLOPE = 1e-3  # of a fold's stiffness, in these steps
 
 Kind = TypeVar("Kind", bound=Term)
 
 
 class Work(NamedTuple):
-    """Memory of a thread."""
+    """Work arrays of a thread."""
 
     sheet: Any  # of the sheet's kernels
-    angle: NDArray  # (nh,) dihedrals of all hinges at the last force, rad
-    fold_angle: NDArray  # those of what actuators turn
+    angle: NDArray  # (nh,) dihedrals of all hinges at the last force evaluation, rad
+    fold_angle: NDArray  # dihedrals of actuated hinges
     strips: Any
     team: Team
     kept: tuple[Any, ...]  # of the other terms
 
 
 class Assembly:
-    """A list of terms; the arrays and contexts of their kernels live as long as it does.
+    """A list of terms; keeps the arrays and contexts of their kernels alive.
 
     Parameters
     ----------
     sheet : SheetTerm
     *others : Term
-        What adds to it.
+        Terms added to the sheet.
 
     Attributes
     ----------
@@ -74,9 +74,9 @@ class Assembly:
     size, rows : int
         Number m of the dofs, and rows of the arrays that hold them.
     hidden : ndarray of int
-        Dofs beside the displacements of the nodes: they have no mass.
+        Massless dofs in addition to nodal displacements.
     energy_groups : mapping of str to str
-        The parts of the energy, and what they are.
+        Parts of the energy, with descriptions.
     """
 
     def __init__(self, sheet: SheetTerm, *others: Term) -> None:
@@ -86,32 +86,32 @@ class Assembly:
         self.energy_groups = {k: v for term in self.terms for k, v in term.energy_groups.items()}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what holds addresses of this process."""
+        """State without objects that hold addresses of this process."""
         return {name: value for name, value in vars(self).items() if name != "_evaluated"}
 
     def find(self, kind: type[Kind]) -> Kind | None:
-        """The term of a kind, if there is one."""
+        """Term of a kind, or None."""
         return next((term for term in self.others if isinstance(term, kind)), None)
 
     def term(self, kind: type[Kind]) -> Kind:
-        """The term of a kind, which must be there."""
+        """Term of a kind, which must exist."""
         found = self.find(kind)
         assert found is not None
         return found
 
     def parted(self, kind: type[Kind]) -> tuple[Assembly, Kind | None]:
-        """The same without the term of a kind, and that term."""
+        """Assembly without the term of a kind, and that term."""
         found = self.find(kind)
         return Assembly(self.sheet, *(term for term in self.others if term is not found)), found
 
     def with_terms(self, *terms: Term) -> Assembly:
-        """The same with further terms."""
+        """Assembly with additional terms."""
         return Assembly(self.sheet, *self.others, *terms) if terms else self
 
     def displaced(self, moved: NDArray) -> Assembly:
-        """The same with the planes of contact displaced by `moved` (p, 3), m.
+        """Assembly with the contact planes displaced by `moved` (p, 3), m.
 
-        What is compiled serves both: a term puts its planes where they are before an evaluation.
+        Both share the compiled kernels: a term sets its planes before each evaluation.
         """
         body = Assembly(self.sheet, *(term.displaced(moved) for term in self.others))
         body._evaluated, body.hinges_alone = self._evaluated, self.hinges_alone
@@ -122,17 +122,17 @@ class Assembly:
         self, displacement: NDArray, push: NDArray | None = None, memory: Term | None = None,
         held: tuple[NDArray, sparse.csr_array] | None = None, kept: list[Any] | None = None,
     ) -> NDArray:  # fmt: skip
-        """Vector (m,) of displacements (n, 3), the hidden dofs in balance, by Newton's method.
+        """Dof vector (m,) for displacements (n, 3), with the hidden dofs in balance.
 
         push : forces (m,), N, of which those on the hidden dofs count; none by default.
-        memory : what resists beside the sheet.
-        held : where the hidden dofs begin (r,), and rows (k, r) along which they stay there.
-        kept : holds the last factors from one state to the next, while steps with them shrink fast.
+        memory : hinges with memory that add stiffness to the sheet.
+        held : initial hidden dofs (r,), and rows (k, r) along which they are held.
+        kept : stores the last factors for reuse in the next state, while they converge fast.
 
         Raises
         ------
         ComputationError
-            There are none near where they begin, zero by default.
+            No balance was found near the initial values, zero by default.
         """
         begin, rows = held or (np.zeros(len(self.hidden)), sparse.csr_array((0, len(self.hidden))))
         q = np.concatenate([np.asarray(displacement, float).ravel(), begin])
@@ -166,18 +166,18 @@ class Assembly:
 
     @cached_property
     def _of_hidden(self) -> Assembly:
-        """The sheet, and the others that own hidden dofs."""
+        """Assembly of the sheet and the terms that own hidden dofs."""
         own = [term for term in self.others if term.owns_hidden]
         return self if len(own) == len(self.others) else Assembly(self.sheet, *own)
 
     @cached_property
     def _evaluated(self) -> Model:
-        """The model for evaluations one after the other."""
+        """Model for single evaluations from Python."""
         work = self._work(1, [term.memory for term in self.others])[0]
         return Model(self, work, [FORCES])
 
     def _at(self, q: NDArray, energy: NDArray) -> NDArray:
-        """Internal forces (m,) at q; with energies by group, to `energy`, if there is room."""
+        """Internal forces (m,) at q; fills `energy` by group unless it is empty."""
         for term in self.others:
             term.prepare()
         u, force = self.in_rows(q), np.zeros((2, self.rows, 3))
@@ -203,13 +203,13 @@ class Assembly:
         return self._at(q, np.zeros(0))
 
     def hinge_forces(self, q: NDArray) -> NDArray:
-        """Those of hinges (bending and folds) alone: forces at play even where all is at rest."""
+        """Internal forces of hinges (bends and folds) alone, at play even at rest."""
         alone = self.hinges_alone
         return np.zeros(self.size) if alone is None else alone.internal(q)
 
     @cached_property
     def hinges_alone(self) -> Assembly | None:
-        """Its hinges without the rest, if it has some."""
+        """Assembly of the hinges alone, if there are any."""
         alone = self.sheet.hinges_alone()
         others = [term for term in self.others if term.of_hinges]
         return None if alone is None else Assembly(alone, *others)
@@ -220,7 +220,7 @@ class Assembly:
         return self._plus(self.sheet.tangent(q, floor), q, q, floor)
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
-        """The matrix that a step of Newton's method takes at q, after one from `before`."""
+        """Matrix for a Newton step at q, after an iterate `before`."""
         old = q if before is None else before
         return self._plus(self.sheet.step_tangent(q, before), q, old, FLOOR)
 
@@ -236,21 +236,21 @@ class Assembly:
         return matrix
 
     def blocks(self) -> Blocks:
-        """The same for implicit integrators, but for contact; see `mechanics.step_tangent`."""
+        """Tangent blocks for implicit steps, without contact; see `mechanics.step_tangent`."""
         return AssembledBlocks(self)
 
     # ------------------------------------------------------------------ what is compiled
     def workspaces(self, threads: int) -> list[Work]:
-        """Memory of the kernels on each thread, on fewer than asked for if need be."""
+        """Work arrays for each thread, possibly for fewer threads than requested."""
         return self._work(threads)
 
     def _work(self, threads: int, kept: Sequence[Any] | None = None) -> list[Work]:
-        """The same, with what the terms keep for evaluations or new memory for all."""
+        """Work arrays, with the given memory of each term or new memory."""
         alone = not all(term.shared for term in self.terms)
         works: Sequence[Any] = self.sheet.workspaces(1 if alone else threads)
         angles = [work.angle for work in works]
         count = sum(len(term.hinges) for term in self.others)
-        if count:  # whose dihedrals follow, as bars and hinges alone have them
+        if count:  # their dihedrals follow, as in a model of bars and hinges alone
             angles = [np.empty(len(angles[0]) + count)]
             own = angles[0][:-count]
             works = [works[0]._replace(angle=own, fold_angle=own)]
@@ -265,7 +265,7 @@ class Assembly:
         ]
 
     def compiled(self, work: Work) -> list[Compiled]:
-        """The terms for a thread with this memory."""
+        """Compiled terms for a thread with these work arrays."""
         found, group = [self.sheet.compiled(work, work.sheet, 0)], len(self.sheet.energy_groups)
         for term, kept in zip(self.others, work.kept, strict=True):
             found.append(term.compiled(work, kept, group))
@@ -276,13 +276,13 @@ class Assembly:
         return found
 
     def kept(self, work: Work, kind: type[Term]) -> Any:
-        """What the term of a kind has in the memory of a thread; None without such a term."""
+        """Memory of the term of a kind in a thread's work arrays; None without such a term."""
         terms = zip(self.others, work.kept, strict=True)
         return next((kept for term, kept in terms if isinstance(term, kind)), None)
 
     @property
     def threads(self) -> int:
-        """Threads on which a motion runs fastest."""
+        """Fastest number of threads for a motion."""
         return self.sheet.threads if all(term.shared for term in self.terms) else 1
 
     # ------------------------------------------------------------------ measures
@@ -303,23 +303,23 @@ class Assembly:
         return turn
 
     def scale(self) -> NDArray:
-        """Forces (m,), N, at the dofs under a strain of one, whose rounding errors stay."""
+        """Force scale (m,), N, per dof for unit strain: its rounding errors are unavoidable."""
         scale = self.sheet.scale()
         for term in self.others:
             term.add_scale(scale)
         return scale
 
     def holds(self, q: NDArray) -> sparse.csr_array:
-        """Unit rows (s, m) of what keeps it in place beside supports: motions along them strain."""
+        """Unit rows (s, m) of internal constraints: motions along them cause strain."""
         q = np.append(q, np.zeros(self.size - len(q)))
         return sparse.csr_array(sparse.vstack([term.holds(q) for term in self.terms]))
 
     def turning_moments(self) -> float:
-        """Sum of the hinges' moments (N m) for a turn of one."""
+        """Sum of the hinges' moments (N m) for a unit turn."""
         return sum(term.turning_moments() for term in self.terms)
 
     def strains(self) -> Strains | None:
-        """Its bars and hinges; None where panels bend, or stretch, as plates."""
+        """Bars and hinges of all terms; None if panels bend or stretch as plates."""
         found = self.sheet.own_strains()
         for term in self.others:
             found = None if found is None else term.strains(found)
@@ -327,15 +327,15 @@ class Assembly:
 
     # ------------------------------------------------------------------ other assemblies
     def on(self, sheet: SheetTerm) -> Assembly:
-        """The same terms on a sheet with other rest angles."""
+        """Assembly of the same terms on a sheet with other rest angles."""
         return Assembly(sheet, *(term.on(sheet) for term in self.others))
 
     def folded(self, rest: NDArray) -> Assembly:
-        """The same with other rest angles (nr,), rad."""
+        """Assembly with other rest angles (nr,), rad."""
         return self.on(self.sheet.folded(rest))
 
     def renumbered(self) -> tuple[Assembly, Numbering]:
-        """The same as it stands in memory while a motion is computed."""
+        """Assembly with nodes in memory order for motions."""
         sheet, order = self.sheet.renumbered()
         body = Assembly(sheet)
         for term in self.others:
@@ -343,17 +343,17 @@ class Assembly:
         return body, self.numbering(order)
 
     def numbering(self, order: NDArray) -> Numbering:
-        """Of its dofs when node order[k] stands at place k in memory."""
+        """Numbering of its dofs if node order[k] is stored at place k."""
         return Numbering(order, ranks(order), self.rows)
 
     def nominal(self, q: NDArray) -> Assembly:
-        """The same with hinges as stiff as they are meant to be, about their angles at q."""
+        """Assembly with hinges at their nominal stiffness, about their angles at q."""
         sheet: Any = self.sheet.nominal(q)
         others = (term.nominal(q) for term in self.others)
         return Assembly(sheet, *(term.on(sheet) for term in others if term is not None))
 
     def unstrained(self, q: NDArray) -> Unstrained | None:
-        """The same as if it had no strain at q; None where only rigid motions could keep it so."""
+        """Assembly without strain at q; None if only rigid motions could keep it so."""
         whole = self.sheet.unstrained(q)
         if whole is None:
             return None
@@ -364,7 +364,7 @@ class Assembly:
 
 
 class AssembledBlocks:
-    """Blocks of all terms that have places in a tangent; see `mechanics.sheet_term.Blocks`."""
+    """Blocks of all terms with fixed places in a tangent; see `mechanics.sheet_term.Blocks`."""
 
     def __init__(self, body: Assembly) -> None:
         self._sheet = body.sheet.blocks()
@@ -379,7 +379,7 @@ class AssembledBlocks:
         self, of: Assembly, pattern: Sparsity, u: NDArray, before: NDArray, again: bool,
         out: NDArray,
     ) -> None:  # fmt: skip
-        """See `Blocks`."""
+        """Fill blocks with the tangent; see `Blocks.put`."""
         self._sheet.put(of.sheet, pattern, u, before, again, out)
         way = before, u if again else before
         own = [term.step_entries(u, way, FLOOR) for term in _with_places(of)]
@@ -389,38 +389,38 @@ class AssembledBlocks:
         self, of: Assembly, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray,
         before: NDArray, again: bool, out: NDArray,
     ) -> None:  # fmt: skip
-        """See `Blocks`."""
+        """Fill blocks with the derivative of the mean forces; see `Blocks.put_mean`."""
         self._sheet.put_mean(of.sheet, pattern, u0, u1, angle, before, again, out)
         way = before, u1 if again else before
         own = [term.mean_entries(u0, u1, way, FLOOR) for term in _with_places(of)]
         self._add(pattern, own, out)
 
     def _add(self, pattern: Sparsity, entries: Sequence[NDArray], out: NDArray) -> None:
-        """Add the entries of further terms."""
+        """Add the entries of the other terms."""
         for slots, own in zip(self._slots_in(pattern), entries, strict=True):
             add_at(slots, own, out.reshape(-1))
 
     def filled(self, pattern: Sparsity) -> NDArray:
-        """See `Blocks`."""
+        """Mask of the entries that `put` may fill; see `Blocks.filled`."""
         filled = self._sheet.filled(pattern)
         for slots in self._slots_in(pattern):
             filled.reshape(-1)[slots] = True
         return filled
 
     def _slots_in(self, pattern: Sparsity) -> list[NDArray]:
-        """Where the entries of each term stand among those of a pattern's blocks."""
+        """Slots of each term's entries in the blocks of a pattern."""
         if self._slots is None or self._slots[0] is not pattern:
             self._slots = pattern, [entry_slots(pattern, *places) for places in self._places]
         return self._slots[1]
 
 
 def _with_places(body: Assembly) -> list[Term]:
-    """Its terms, without the sheet, that have places in a tangent."""
+    """Terms, except the sheet, that have fixed places in a tangent."""
     return [term for term in body.others if len(term.places[0])]
 
 
 def _together(one: Unstrained, other: Unstrained) -> Unstrained:
-    """Two of them, of the same dofs."""
+    """Sum of two unstrained models with the same dofs."""
     return Unstrained(
         sparse.csr_array(one.tangent + other.tangent),
         sparse.csr_array(one.hinges + other.hinges),
@@ -429,41 +429,41 @@ def _together(one: Unstrained, other: Unstrained) -> Unstrained:
 
 
 class Numbering(NamedTuple):
-    """The order of the nodes in memory while a motion is computed: along the sheet.
+    """Node order in memory during a motion: along the sheet.
 
-    What goes in and what comes out has the structure's own numbers. Place k in memory holds node
-    order[k]; node i stands at place rank[i].
+    Input and output use the structure's node numbers. Place k in memory holds node order[k]; node i
+    stands at place rank[i].
 
-    After the nodes come the rows of the dofs beside displacements, which keep their order.
+    Rows of hidden dofs follow the nodes in their original order.
     """
 
     order: NDArray  # (n,)
     rank: NDArray  # (n,)
-    rows: int  # of arrays in memory, n or more
+    rows: int  # number of rows in memory, n or more
 
     def inward(self, values: NDArray) -> NDArray:
-        """Values per node (n, ...) as they stand in memory, zero in further rows (rows, ...)."""
+        """Nodal values (n, ...) in memory order (rows, ...), zero in further rows."""
         out = np.zeros((self.rows, *values.shape[1:]), values.dtype)
         out[: len(self.order)] = values[self.order]
         return out
 
     def held(self, fixed: NDArray) -> NDArray:
-        """Mask of held dofs (n, 3) as it stands in memory, True in further rows (rows, 3)."""
+        """Mask of held dofs (n, 3) in memory order (rows, 3), True in further rows."""
         out = self.inward(fixed)
         out[len(self.order) :] = True
         return out
 
     def outward(self, values: NDArray) -> NDArray:
-        """Values per place (n, ...) by node."""
+        """Nodal values (n, ...) in the structure's order."""
         return np.ascontiguousarray(values[self.rank])
 
     def dofs(self, dofs: NDArray) -> NDArray:
-        """Numbers 3 place + axis of dofs 3 node + axis, and of those beside displacements."""
+        """Dofs 3 place + axis of dofs 3 node + axis and of hidden dofs."""
         rank = np.append(self.rank, np.arange(len(self.rank), self.rows))
         return (3 * rank[np.asarray(dofs) // 3] + np.asarray(dofs) % 3).astype(np.int64)
 
     def matrix(self, matrix: sparse.csr_array) -> sparse.csr_array:
-        """Nodal (n, n) matrix, or one of all dofs, as it stands in memory."""
+        """Nodal matrix (n, n), or one of all dofs, in memory order."""
         places, size = self.order, self.rows
         if matrix.shape[0] > len(places):
             places = (3 * places[:, None] + np.arange(3)).ravel()

@@ -47,6 +47,6 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
 
 
 def bars_hinges_kernels(model: BarsHinges, work: Workspace, groups: int) -> Compiled:
-    """Bars and hinges, whose energies have so many groups."""
+    """Compiled bars and hinges, with `groups` energy groups."""
     own = Context(_Context(model, work, groups))
     return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})

@@ -1,14 +1,15 @@
-"""The pullback of bars and hinges (`mechanics.pullback`), in blocks as their force.
+"""Pullback of bars and hinges (`mechanics.pullback`), in blocks like their force.
 
 A bar with the vector d = V + du, x = (2 V + du).du / L^2 and the force T d, T = k s(x), has
 
     w . F = T (w.d),    K w = T w + 2 k s' (w.d) d / L^2,
 
-w the difference of the weights at its ends. A hinge with the moment M(theta) has
+with w the difference of the weights at its ends. A hinge with the moment M(theta) has
 
     w . F = M theta',    K w = M g' + M' theta' g,
 
-g the gradient of the dihedral theta and primes of both their rates where the nodes move by w.
+with g the gradient of the dihedral theta; primes of theta and g are their rates for nodal
+velocities w.
 """
 
 from __future__ import annotations
@@ -33,14 +34,14 @@ from foldyn.mechanics.model import BLOCK, BarsHinges
 from foldyn.mechanics.pullback import Pulled, pullback
 
 ALL = (1 << 32) - 1  # mask of buffers that hold all nodes
-LAW = 7  # numbers of a law: those of `series_derivatives`
-TINY = 1e-280  # rad^2: the slope at rest is 0
+LAW = 7  # values per law, from `series_derivatives`
+TINY = 1e-280  # rad^2: below it the slope is 0
 
 
 class PullbackWork(NamedTuple):
-    """Memory of one evaluation."""
+    """Work arrays for one evaluation."""
 
-    points: NDArray  # (24 * BLOCK,) of the nodes, then of their weights
+    points: NDArray  # (24 * BLOCK,) points of the nodes, then their weights
     rates: NDArray  # (26 * BLOCK,) of `dihedral_rates`
     law: NDArray  # (LAW * BLOCK,)
     ones: NDArray  # (2 * BLOCK,) 1, then -1
@@ -51,9 +52,9 @@ class PullbackWork(NamedTuple):
 
 
 class Gradient(NamedTuple):
-    """Derivatives by arrays of `BarsHinges` of the same names, and by the excess of bars.
+    """Gradients with respect to arrays of `BarsHinges`, and to the excess of bars.
 
-    That is lambda^2 - 1 at rest, by which a bar is longer than it was cut: 0 in a model.
+    The excess is lambda^2 - 1 at rest, for bars longer than their natural length: 0 in a model.
     """
 
     rest: NDArray
@@ -69,7 +70,7 @@ class Gradient(NamedTuple):
 
 
 def pullback_work(nodes: int) -> PullbackWork:
-    """Memory for a model with so many nodes."""
+    """Work arrays for a model with `nodes` nodes."""
     ones = np.ones(2 * BLOCK)
     ones[BLOCK:] = -1.0
     buffers = (np.zeros((nodes + 1, 4)) for _ in range(4))
@@ -80,7 +81,7 @@ def pullback_work(nodes: int) -> PullbackWork:
 
 @inner_scalar
 def _spread(rows, out):
-    """Rows of three to rows of four."""
+    """Copy rows of three to rows of four."""
     for i in range(rows.shape[0]):
         for c in range(3):
             out[i, c] = rows[i, c]
@@ -154,7 +155,7 @@ def pull_bars(model, work, out):
 
 @inner
 def _laws(model, code, address, low, high, first, m, angle, law):
-    """Numbers of the laws of the m hinges of a block, with dihedrals `angle`, to `law`."""
+    """Law values of the m hinges of a block with dihedrals `angle`, into `law`."""
     p, offset = flat(model.hinge_parameters), flat(model.hinge_offset)
     locks = (code == STRESS_FREE) | (code == AS_PUBLISHED)
     beyond = 0
@@ -193,7 +194,7 @@ def _laws(model, code, address, low, high, first, m, angle, law):
 
 @inner
 def pull_hinges(model, work, out):
-    """Add K w of the hinges to work.sums, and their gradients to `out`, but that by `rest`."""
+    """Add K w of the hinges to work.sums, and their gradients except by `rest` to `out`."""
     x, g, law, ones = work.points, work.rates, work.law, work.ones
     position, weight, sums = flat(work.position), flat(work.weight), flat(work.sums)
     hinges, p, by_p = flat(model.hinges), flat(model.hinge_parameters), flat(out.hinge_parameters)
@@ -228,7 +229,7 @@ def pull_hinges(model, work, out):
                     x[18 * BLOCK + q], x[19 * BLOCK + q], x[20 * BLOCK + q],
                     x[21 * BLOCK + q], x[22 * BLOCK + q], x[23 * BLOCK + q],
                 )  # fmt: skip
-            # theta1 and theta2 are the run's
+            # theta1 and theta2 are equal within the run
             _laws(model, code, address, p[4 * start], p[4 * start + 1], first, m, g, law)
             for q in range(m):
                 e = first + q
@@ -263,7 +264,7 @@ def pull_bars_hinges(model, u, w, work, out, product):
             work.position[i, c] = model.rest[i, c] + u[i, c]
     work.sums[:] = 0.0
     pull_hinges(model, work, out)
-    for i in range(n):  # hinges see rest and displacement in sum
+    for i in range(n):  # hinges depend on the sum of rest and displacement
         for c in range(3):
             out.rest[i, c] += work.sums[i, c]
     pull_bars(model, work, out)
@@ -286,13 +287,13 @@ def _pullback(own, u, v, t, weight, product, rate):
 
 
 def gradient_of(model: BarsHinges) -> Gradient:
-    """Room for the derivatives by the arrays of a model."""
+    """Zero arrays for the gradients with respect to a model's arrays."""
     arrays = model._asdict() | {"bar_excess": model.bar_stiffness}
     return Gradient(*(np.zeros_like(arrays[name]) for name in Gradient._fields))
 
 
 def bars_hinges_pulled(model: BarsHinges) -> Pulled:
-    """Bars and hinges differentiated."""
+    """Pullback of bars and hinges."""
     out = gradient_of(model)
     own = Context(_Context(model, pullback_work(len(model.rest)), out))
     return Pulled(own, _pullback, out._asdict())

@@ -1,4 +1,4 @@
-"""Matrices of 3x3 blocks at pairs of nodes: of springs and dashpots, of hinges."""
+"""Matrices of 3x3 blocks at pairs of nodes: for springs, dashpots and hinges."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ def pairs_within(nodes: NDArray) -> NDArray:
 
 
 def pairs_of_ends(ends: NDArray) -> NDArray:
-    """Rows and columns (k, 2) of the blocks of what stands between ends (s, 2)."""
+    """Rows and columns (k, 2) of the blocks of elements between ends (s, 2)."""
     grounded = ends[:, 1] < 0
     return np.concatenate([pairs_within(ends[grounded, :1]), pairs_within(ends[~grounded])])
 
 
 def blocks_of_ends(ends: NDArray, resistance: NDArray) -> NDArray:
-    """Blocks (k, 3, 3) at `pairs_of_ends` of what stands between ends (s, 2).
+    """Blocks (k, 3, 3), at `pairs_of_ends`, of elements between ends (s, 2).
 
-    Those with one end on the ground, in place of which is -1, come first.
+    Elements with one end on the ground, marked -1, come first.
 
-    resistance : (s, 3, 3) against motions of one end, the other at rest.
+    resistance : (s, 3, 3) to motions of one end while the other is fixed.
     """
     grounded = ends[:, 1] < 0
     between = np.einsum("ij,sab->sijab", BETWEEN, resistance[~grounded]).reshape(-1, 3, 3)
@@ -43,5 +43,5 @@ def places_of(pairs: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def assembled(pairs: NDArray, blocks: NDArray, size: int) -> sparse.csr_array:
-    """Matrix (size, size) of blocks (k, 3, 3) at pairs (k, 2) of nodes, those of a pair added."""
+    """Matrix (size, size) of blocks (k, 3, 3) at pairs (k, 2) of nodes; duplicates are added."""
     return sparse.csr_array(sparse.coo_array((blocks.ravel(), places_of(pairs)), (size, size)))

@@ -1,8 +1,8 @@
-"""Clamped edges: they hold the tangents of panels.
+"""Clamped edges, which hold the tangents of panels.
 
-A *clamp* at an edge j-k is a hinge (j, k, i, wing) with a linear law, whose wing is no node but
-rides on the mean displacement of j and k. It keeps its direction in space and strains nothing when
-the edge is moved as a whole.
+A *clamp* at an edge j-k is a hinge (j, k, i, wing) with a linear law, whose wing is a virtual point
+that follows the mean displacement of j and k. It keeps its direction in space and causes no strain
+when the edge is translated.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ from foldyn.mechanics.term import (
     nodal,
 )
 
-RIDES = -1  # in place of the node of a wing that rides
+RIDES = -1  # stands for the node of a virtual wing
 
 
 class Clamps(NamedTuple):
     """Arrays of c clamped edges."""
 
     nodes: NDArray  # (c, 3) axis j, k and wing i
-    points: NDArray  # (c, 4, 3) rest positions of j, k, i and of the wing that rides, m
+    points: NDArray  # (c, 4, 3) rest positions of j, k, i and the virtual wing, m
     rest: NDArray  # (c,) rad
     stiffness: NDArray  # (c,) N m/rad
-    group: int  # of the model's energies, to which theirs is added
+    group: int  # energy group of the model that the clamps belong to
 
 
 @inner_scalar
@@ -81,7 +81,7 @@ def clamp_angles(clamps, u):
 
 @inner
 def add_clamp_forces(clamps, u, force, angle):
-    """Add the forces of clamps to those of the nodes; their dihedrals end `angle`."""
+    """Add the forces of clamps to the nodal forces; their dihedrals go to the end of `angle`."""
     first = angle.size - clamps.rest.size
     for e in range(clamps.rest.size):
         found = clamp_dihedral(clamps, u, e)
@@ -98,7 +98,7 @@ def add_clamp_forces(clamps, u, force, angle):
 def add_mean_clamp_forces(clamps, u0, u1, before, force, angle):
     """Add forces whose work from u0 to u1 is the change of the clamps' energy.
 
-    Their dihedrals end `before` at u0 and `angle` at u1.
+    Their dihedrals are at the end of `before` at u0, and of `angle` at u1.
     """
     x, dx, points = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
     plain, gradient, first = np.empty((4, 3)), np.empty((4, 3)), angle.size - clamps.rest.size
@@ -162,7 +162,7 @@ def clamp_blocks(clamps, u):
 
 
 class Gradient(NamedTuple):
-    """Derivatives by arrays of `Clamps` of the same names."""
+    """Gradients with respect to arrays of `Clamps`."""
 
     points: NDArray
     rest: NDArray
@@ -172,9 +172,9 @@ class Gradient(NamedTuple):
 class _Backward(NamedTuple):
     clamps: Clamps
     out: Gradient
-    points: NDArray  # (4, 3) memory: positions of one clamp, m
+    points: NDArray  # (4, 3) work array: positions of one clamp, m
     moves: NDArray  # (4, 3) weights there
-    rows: int  # up to the last node
+    rows: int  # number of rows up to the last node
 
 
 @pullback
@@ -213,7 +213,7 @@ def _pullback(own, u, v, t, weight, product, rate):
 
 class _Context(NamedTuple):
     clamps: Clamps
-    angle: NDArray  # (nh + c,) dihedrals of all hinges, theirs at the end
+    angle: NDArray  # (nh + c,) dihedrals of all hinges, clamps last
     rows: int
 
 
@@ -236,7 +236,7 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
 
 
 class ClampsTerm(Term):
-    """Clamped edges, whose energy belongs to a group of the sheet.
+    """Clamped edges as a term; their energy belongs to a group of the sheet.
 
     Parameters
     ----------
@@ -249,16 +249,16 @@ class ClampsTerm(Term):
         self.clamps = clamps
 
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-        """See `Term`; their dihedrals end those of the thread."""
+        """Kernels for a thread; the clamps' dihedrals are last in its angles. See `Term`."""
         own = Context(_Context(self.clamps, work.angle, int(work.strips.own[1])))
         return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     def arrays(self) -> Arrays:
-        """See `Term`."""
+        """Arrays that its forces depend on; see `Term`."""
         return arrays_of(self.clamps)
 
     def pulled(self) -> Pulled:
-        """See `Term`."""
+        """Pullback of its forces; see `Term`."""
         out = Gradient(*(np.zeros_like(getattr(self.clamps, name)) for name in Gradient._fields))
         points, moves = np.zeros((2, 4, 3))
         rows = 1 + int(self.clamps.nodes.max(initial=0))
@@ -267,38 +267,38 @@ class ClampsTerm(Term):
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:
-        """See `Term`."""
+        """Rows and columns (k,) of its tangent entries; see `Term`."""
         return places_of(pairs_within(self.clamps.nodes))
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
-        """See `Term`."""
+        """Tangent entries (k,), N/m; see `Term`."""
         return clamp_blocks(self.clamps, nodal(q)).ravel()
 
     def unstrained(self, q: NDArray) -> Unstrained:
-        """See `Term`."""
+        """The model without strain at q; see `Term`."""
         tangent = self.nominal(q).tangent(q)
         return Unstrained(tangent, tangent, lambda motion: 0.0)
 
     @property
     def hinges(self) -> NDArray:
-        """See `Term`."""
+        """Rows (nh, 4) of its hinges; see `Term`."""
         own = self.clamps.nodes
         return np.column_stack([own, np.full(len(own), RIDES)])
 
     def angles(self, q: NDArray) -> NDArray:
-        """See `Term`."""
+        """Dihedrals (nh,) of its hinges, rad; see `Term`."""
         return clamp_angles(self.clamps, nodal(q))[0]
 
     def holds(self, q: NDArray) -> sparse.csr_array:
-        """See `Term`: as they turn."""
+        """Internal constraints: clamps hold their dihedrals. See `Term`."""
         return unit_rows(self.clamps.nodes, clamp_angles(self.clamps, nodal(q))[1], q.size)
 
     def turning_moments(self) -> float:
-        """See `Term`."""
+        """Sum of its hinges' moments (N m) for a unit turn; see `Term`."""
         return float(self.clamps.stiffness.sum())
 
     def strains(self, others: Strains) -> Strains:
-        """See `Term`; a clamp's wing has the node of its first end (`viscous.hinge_gradient`)."""
+        """Strains with clamps; a clamp's wing repeats its first end (`viscous.hinge_gradient`)."""
         clamps = self.clamps
         return others._replace(
             hinges=np.concatenate([others.hinges, clamps.nodes[:, [0, 1, 2, 0]]]),
@@ -307,9 +307,9 @@ class ClampsTerm(Term):
         )
 
     def placed(self, order: NDArray, before: Any) -> ClampsTerm:
-        """See `Term`."""
+        """The term with nodes in memory order; see `Term`."""
         return ClampsTerm(self.clamps._replace(nodes=ranks(order)[self.clamps.nodes]))
 
     def nominal(self, q: NDArray) -> ClampsTerm:
-        """See `Term`."""
+        """The model at nominal stiffness, about its state at q; see `Term`."""
         return ClampsTerm(self.clamps._replace(rest=self.angles(q)))

@@ -1,6 +1,6 @@
 """Damping with a constant matrix C: sparse, or the product G' G of a few full rows.
 
-The forces are C v, and they take the power v' C v.
+The forces are C v and dissipate the power v' C v.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class _Matrix(NamedTuple):
     indptr: NDArray
     indices: NDArray
     data: NDArray
-    own: NDArray  # (2,) first and last + 1 of the thread's own rows
+    own: NDArray  # (2,) first and last + 1 of the thread's rows
     team: Team
 
 
@@ -42,7 +42,7 @@ def _of_matrix(own, u, v, t, force, powers):
         out[i] += resisted
         power += resisted * speed[i]
     numbers_at(powers, 2)[1] += power
-    wait(own.team)  # others look at this member's velocities
+    wait(own.team)  # until others have read this member's velocities
 
 
 @forces
@@ -63,7 +63,7 @@ class _MatrixBackward(NamedTuple):
     indptr: NDArray
     indices: NDArray
     data: NDArray
-    out: NDArray  # gradient by the data
+    out: NDArray  # gradient with respect to the data
 
 
 class _RowsBackward(NamedTuple):
@@ -97,7 +97,7 @@ def _rows_pullback(own, u, v, t, weight, product, rate):
 
 
 class DampingMatrix(Term):
-    """A sparse matrix C (m, m), N s/m; see `Term`."""
+    """Damping by a sparse matrix C (m, m), N s/m; see `Term`."""
 
     damps = shared = True
 
@@ -105,19 +105,19 @@ class DampingMatrix(Term):
         self.matrix = matrix
 
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-        """See `Term`."""
+        """Context and kernels for a thread; see `Term`."""
         start, column = self.matrix.indptr.astype(np.int64), self.matrix.indices.astype(np.int64)
         rows = np.asarray(work.strips.own)
         own = _Matrix(start, column, self.matrix.data, rows, work.team)
         return Compiled(Context(own), {FORCES: _of_matrix})
 
     def arrays(self) -> Arrays:
-        """See `Term`."""
+        """Arrays that its forces depend on; see `Term`."""
         layout = {"indptr": self.matrix.indptr, "indices": self.matrix.indices}
         return Arrays({"data": self.matrix.data}, layout)
 
     def pulled(self) -> Pulled:
-        """See `Term`."""
+        """Pullback of its forces; see `Term`."""
         start, column = self.matrix.indptr.astype(np.int64), self.matrix.indices.astype(np.int64)
         out = np.zeros_like(self.matrix.data)
         own = _MatrixBackward(start, column, self.matrix.data, out)
@@ -125,20 +125,20 @@ class DampingMatrix(Term):
 
     @cached_property
     def damping_places(self) -> tuple[NDArray, NDArray]:
-        """See `Term`."""
+        """Rows and columns (k,) of its damping entries; see `Term`."""
         return self.matrix.tocoo().coords
 
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
-        """See `Term`."""
+        """Damping entries (k,), N s/m; see `Term`."""
         return self.matrix.data
 
     def placed(self, order: NDArray, before: Assembly) -> DampingMatrix:
-        """See `Term`."""
+        """The term with nodes in memory order; see `Term`."""
         return DampingMatrix(before.numbering(order).matrix(self.matrix))
 
 
 class DampingRows(Term):
-    """Full rows G (r, m), sqrt(N s/m), which implicit steps add to factors; see `Term`."""
+    """Full rows G (r, m), sqrt(N s/m), added to factors in implicit steps; see `Term`."""
 
     damps = True
     without = ("damping",)
@@ -147,24 +147,24 @@ class DampingRows(Term):
         self.rows = rows
 
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-        """See `Term`."""
+        """Context and kernels for a thread; see `Term`."""
         return Compiled(Context(_Rows(self.rows)), {FORCES: _of_rows})
 
     def arrays(self) -> Arrays:
-        """See `Term`."""
+        """Arrays that its forces depend on; see `Term`."""
         return Arrays({"rows": self.rows}, {})
 
     def pulled(self) -> Pulled:
-        """See `Term`."""
+        """Pullback of its forces; see `Term`."""
         out = np.zeros_like(self.rows)
         return Pulled(Context(_RowsBackward(self.rows, out)), _rows_pullback, {"rows": out})
 
     def damping(self, q: NDArray) -> sparse.csr_array:
-        """See `Term`; full, for few dofs."""
+        """Damping matrix, full, for few dofs; see `Term`."""
         return sparse.csr_array(self.rows.T @ self.rows)
 
     def placed(self, order: NDArray, before: Assembly) -> DampingRows:
-        """See `Term`."""
+        """The term with nodes in memory order; see `Term`."""
         rows = np.zeros((len(self.rows), 3 * before.rows))
         rows[:, before.numbering(order).dofs(np.arange(self.rows.shape[1]))] = self.rows
         return DampingRows(rows)

@@ -1,19 +1,18 @@
-"""Panels that pass through each other, told from panels that touch.
+"""Panels that pass through each other, as opposed to panels that touch.
 
-Two triangles that are not in one plane cross where each has corners on both sides of the other's
-plane, and the pieces of line that the planes cut from them overlap. Touching is no crossing: a
-corner, or a side, that they share or that lies on the other, or layers upon each other. But panels
-may cross along sides of their triangles, each of which touches only (two flaps of one size that
-fold over a panel meet in their middles): so it is panels that must be on both sides of each other,
-counted over their triangles that overlap somewhere.
+Two triangles in different planes cross if each has corners on both sides of the other's plane, and
+the line segments that the planes cut from them overlap. Touching is not crossing: a shared corner
+or side, one that lies on the other triangle, or stacked layers. But panels may cross along sides of
+their triangles, each of which only touches (two flaps of equal size that fold over a panel meet in
+their middles). So the test is whether panels lie on both sides of each other, over all their
+overlapping triangles.
 
-Two triangles with one common corner can cross along a line from there, and are compared as others
-are. Two with a common side cannot, but for an angle between them that passes 0 or 2 pi, which is
-looked for where angles are. Triangles of one panel are compared only where they have no corner in
-common.
+Two triangles with one common corner can cross along a line from it, and are compared like others.
+Two with a common side cannot, except by an angle that passes 0 or 2 pi, which is checked with the
+angles. Triangles of one panel are compared only if they share no corner.
 
-Boxes about the triangles are put into a regular grid, whose cells are as large as boxes are on
-average, and those that share a cell are compared: time and memory grow with their number.
+Bounding boxes of the triangles are sorted into a regular grid with cells of average box size, and
+boxes that share a cell are compared: time and memory grow linearly with their number.
 """
 
 from __future__ import annotations
@@ -25,15 +24,15 @@ from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner, kernel
 
-TOUCHING = 1e-9  # of a triangle's size: a corner so near a plane lies in it
-LEVEL = 1e-3  # rad between planes: triangles lie upon each other
-OVERLAP = 1e-5  # of the smaller triangle's size: pieces that only touch have less in common
-ABOVE, BELOW = 1, 2  # where parts of a triangle are
+TOUCHING = 1e-9  # of a triangle's size: a corner this close to a plane lies in it
+LEVEL = 1e-3  # rad between planes: below it triangles are stacked
+OVERLAP = 1e-5  # of the smaller triangle's size: overlaps below this only touch
+ABOVE, BELOW = 1, 2  # sides of a plane that contain parts of a triangle
 BOTH = 3
-FEWEST, SPREAD = 64, 2  # the grid has at most this many cells, and this many per triangle more
-LARGEST = 0.0625  # of the largest box: the least size of a cell
-ROOM = 64  # pairs at first
-MOST_SHOWN = 8  # pairs of panels that a text names
+FEWEST, SPREAD = 64, 2  # minimum number of cells, plus this many cells per triangle
+LARGEST = 0.0625  # of the largest box: least cell size
+ROOM = 64  # initial room for pairs
+MOST_SHOWN = 8  # pairs of panels named in a text
 
 
 class Boxes(NamedTuple):
@@ -41,7 +40,7 @@ class Boxes(NamedTuple):
 
     low: NDArray  # (m, 3)
     high: NDArray
-    normal: NDArray  # (m, 3) of one, or zero where a triangle has no area
+    normal: NDArray  # (m, 3) unit vectors, or zero for triangles without area
     size: NDArray  # (m,) longest side of each box
 
 
@@ -56,7 +55,7 @@ class Grid(NamedTuple):
 
 
 def crossing_panels(points: NDArray, triangles: NDArray, panels: NDArray) -> NDArray[np.int64]:
-    """Pairs of panels (k, 2), the lower first, that cross each other, or themselves.
+    """Pairs of panels (k, 2), the lower first, that cross; equal for a panel that crosses itself.
 
     Parameters
     ----------
@@ -92,10 +91,10 @@ def pairs_text(panels: NDArray) -> str:
 
 @kernel
 def _overlapping(x, triangles, panels, boxes, grid, found):
-    """Panels of triangles that overlap, and the sides of the other on which each is.
+    """Panels of overlapping triangles, and the sides of the other on which each lies.
 
-    Rows (lower panel, higher panel, sides of the one, of the other) go into `found` as far as there
-    is room; returns their number.
+    Writes rows (lower panel, higher panel, sides of the first, of the second) to `found` as far as
+    there is room; returns their number.
     """
     low, high, normal, size = boxes.low, boxes.high, boxes.normal, boxes.size
     start, members, shape = grid.start, grid.members, grid.shape
@@ -123,7 +122,7 @@ def _overlapping(x, triangles, panels, boxes, grid, found):
                 if shared > 1 or (shared == 1 and alike):
                     continue
                 of_one, of_other = _sides(x, triangles, normal, size, one, other)
-                # within a panel nobody knows which triangle belongs to which part of it
+                # within a panel, the parts that triangles belong to are unknown
                 if of_one == 0 or (alike and (of_one != BOTH or of_other != BOTH)):
                     continue
                 if count < found.shape[0]:
@@ -135,7 +134,7 @@ def _overlapping(x, triangles, panels, boxes, grid, found):
 
 @inner
 def _sides(x, triangles, normal, size, one, other):
-    """On which sides of each other two triangles are that overlap; (0, 0) where they do not."""
+    """Sides of each other on which two overlapping triangles lie; (0, 0) if they do not overlap."""
     least = TOUCHING * max(size[one], size[other])
     lx = normal[one, 1] * normal[other, 2] - normal[one, 2] * normal[other, 1]
     ly = normal[one, 2] * normal[other, 0] - normal[one, 0] * normal[other, 2]
@@ -155,10 +154,11 @@ def _sides(x, triangles, normal, size, one, other):
 
 @inner
 def _cut(x, triangles, normal, one, other, origin, least, lx, ly, lz):
-    """Sides of the other's plane on which a triangle is, and what the plane cuts from it.
+    """Sides of the other's plane on which a triangle lies, and its intersection with the plane.
 
-    That is the piece of the line of both planes from `first` to `last` along (lx, ly, lz), counted
-    from a corner of the triangle `origin`. The sides are 0 where it does not reach the plane.
+    The intersection is the segment of both planes' common line from `first` to `last` along (lx,
+    ly, lz), measured from a corner of triangle `origin`. The sides are 0 if it does not reach the
+    plane.
     """
     base, zero = triangles[other, 0], triangles[origin, 0]
     nx, ny, nz = normal[other, 0], normal[other, 1], normal[other, 2]
@@ -184,7 +184,7 @@ def _cut(x, triangles, normal, one, other, origin, least, lx, ly, lz):
 
 
 def _boxes(corners: NDArray) -> Boxes:
-    """Boxes of triangles with these corners (m, 3, 3)."""
+    """Bounding boxes of triangles (m, 3, 3)."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
@@ -192,7 +192,7 @@ def _boxes(corners: NDArray) -> Boxes:
 
 
 def _grid(boxes: Boxes) -> Grid:
-    """Put boxes into cells."""
+    """Sort boxes into cells."""
     low, high, size = boxes.low, boxes.high, boxes.size
     origin, most = low.min(axis=0), FEWEST + SPREAD * len(size)
     span, cell = high.max(axis=0) - origin, max(size.mean(), LARGEST * size.max(), 1e-300)
@@ -204,7 +204,7 @@ def _grid(boxes: Boxes) -> Grid:
     )
     many = upper - lower + 1
     each = many.prod(axis=1)
-    # the cells of each box one after the other, counted along the last axis first
+    # cells of each box in turn, with the last axis fastest
     which = np.repeat(np.arange(len(each)), each)
     place = np.arange(len(which)) - np.repeat(np.cumsum(each) - each, each)
     here, step = np.zeros_like(place), 1

@@ -65,7 +65,7 @@ def dihedral_gradient(jx, jy, jz, kx, ky, kz, ix, iy, iz, lx, ly, lz):
     mm = mx * mx + my * my + mz * mz
     nn = nx * nx + ny * ny + nz * nz
     length = math.sqrt(bb)
-    # minus both arguments plus pi moves the cut of atan2 from flat to fully folded
+    # negating both arguments and adding pi moves the branch cut from flat to fully folded
     theta = PI + branch_free_atan2(
         -length * (rx * nx + ry * ny + rz * nz), -(mx * nx + my * ny + mz * nz)
     )
@@ -99,7 +99,7 @@ def dihedral_rates(
     jx, jy, jz, kx, ky, kz, ix, iy, iz, lx, ly, lz, vjx, vjy, vjz, vkx, vky, vkz, vix, viy, viz,
     vlx, vly, vlz,
 ):  # fmt: skip
-    """Dihedral (rad), its gradient, and the rates of both where the points move with velocities.
+    """Dihedral (rad), its gradient, and the rates of both for given point velocities.
 
     1 + 12 numbers, then their rates, 1 + 12 numbers.
     """
@@ -228,7 +228,7 @@ def add_hessian(points, gradient, moment, block):
 
 @inner_scalar
 def carry_wing(block):
-    """Give what a block (4, 3, 4, 3) has at its last node to the first two, half to each."""
+    """Distribute a block's entries (4, 3, 4, 3) at the last node to the first two, half each."""
     for row in range(2):
         for a in range(3):
             for w in range(4):
@@ -245,7 +245,7 @@ def carry_wing(block):
 def dihedrals_and_gradients(x, hinges):
     """Dihedrals (nh,), rad, of hinge rows (nh, 4) at positions x (n, 3); gradients (nh, 12), 1/m.
 
-    A gradient is that with respect to the nodes j, k, i, l.
+    Gradients are with respect to the nodes j, k, i, l.
     """
     angle, gradient = np.empty(hinges.shape[0]), np.empty((hinges.shape[0], 12))
     for e in range(hinges.shape[0]):

@@ -1,20 +1,20 @@
 """Forces whose work from one state to another is the change of the strain energy, exactly.
 
-With the positions x0 and x1, their mean x and difference dx, a force f is sought for each bar and
-hinge with f . dx = W1 - W0, and without resultant and moment about x: then a body that flies freely
-keeps its energy and its momenta, whatever the step (Simo and Tarnow, Z. Angew. Math. Phys. 43,
-1992; Gonzalez, J. Nonlinear Sci. 6, 1996).
+With the positions x0 and x1, their mean x and difference dx, each bar and hinge needs a force f
+with f . dx = W1 - W0, without resultant or moment about x: then a free body conserves energy and
+momenta for any step (Simo and Tarnow, Z. Angew. Math. Phys. 43, 1992; Gonzalez, J. Nonlinear Sci.
+6, 1996).
 
-Bars: E = (stretch^2 - 1)/2 is quadratic in the positions, so that f = (dW/dE) grad E(x) does it,
-dW/dE the quotient of the differences.
+Bars: E = (stretch^2 - 1)/2 is quadratic in the positions, so that f = (dW/dE) grad E(x) satisfies
+this, with dW/dE the difference quotient.
 
-Hinges: f = (dW/dtheta) g, g a gradient of the dihedral with g . dx = theta1 - theta0. Between two
-positions that differ by a rotation the mean is smaller than either, which would turn the dihedral.
-With w the Cayley vector of the rotation of the hinge's four points (least squares) and
-A = (1 - skew(w)^2/4)^(1/2), the positions A x are free of that, and A^-1 grad theta(A x) has no
-resultant and no moment about x. Its work differs from the change of the angle to the second order
-in the deformation within the step, to the third without a rotation. The rest of the difference is
-made up along the deformation, dx less its rigid part, which has no resultant and no moment either.
+Hinges: f = (dW/dtheta) g, with g a discrete gradient of the dihedral, g . dx = theta1 - theta0. The
+mean of two rotated positions is smaller than either, which would change the dihedral. With w the
+Cayley vector of the rotation of the hinge's four points (least squares) and A = (1 -
+skew(w)^2/4)^(1/2), the positions A x avoid that, and A^-1 grad theta(A x) has no resultant and no
+moment about x. Its work differs from the change of the angle by second order in the deformation
+within the step, by third order without rotation. The remaining difference is corrected along the
+deformation, dx without its rigid part, which has no resultant and no moment either.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from foldyn.mechanics.dihedral import add_hessian, dihedral_gradient
 from foldyn.mechanics.energy import hinge_dihedral
 from foldyn.mechanics.tangent import add_to_bar, add_to_hinge
 
-GAUSS = 0.5 - math.sqrt(3.0) / 6.0  # the first of the two points of Gauss's rule
-NOISE = 16.0 * float(np.finfo(float).eps)  # of an energy: differences below that are rounding
-LEAST = 1e-9  # strain or rad: over less than that Gauss's rule misses nothing
-ANGLE_NOISE = 4e-15  # the same of a dihedral, rad
+GAUSS = 0.5 - math.sqrt(3.0) / 6.0  # first of the two Gauss points
+NOISE = 16.0 * float(np.finfo(float).eps)  # of an energy: smaller differences are rounding errors
+LEAST = 1e-9  # strain or rad: for smaller changes the Gauss rule is exact
+ANGLE_NOISE = 4e-15  # the same for a dihedral, rad
 
 
 @inner_scalar
@@ -45,8 +45,8 @@ def _extension(x):
 def mean_stress(code, address, x, change):
     """Mean stress S / E_y of a bar whose stretch^2 - 1 goes from x to x + 2 change, and its slope.
 
-    The quotient of energy and strain: Gauss's rule with what it misses. The slope is that with
-    respect to the strain at the end.
+    The difference quotient of energy over strain: Gauss quadrature plus its error. The slope is
+    with respect to the end strain.
     """
     stress, slope = 0.0, 0.0
     for point in (GAUSS, 1.0 - GAUSS):
@@ -63,7 +63,7 @@ def mean_stress(code, address, x, change):
 
 @kernel
 def mean_moment(code, address, p, share, rest, theta, change):
-    """Mean moment / k of a hinge that turns by `change` from theta, and its slope; see bars."""
+    """Mean moment / k of a hinge that turns by `change` from theta, and its slope; like bars."""
     moment, slope, a, b, c, d = 0.0, 0.0, p[0], p[1], p[2], p[3]
     for point in (GAUSS, 1.0 - GAUSS):
         t = theta + point * change
@@ -73,7 +73,7 @@ def mean_moment(code, address, p, share, rest, theta, change):
     after = series.series_energy(code, theta + change, rest, a, b, c, d, share, address)
     missed = after - before - moment * change
     size = max(abs(before), abs(after))
-    if p[2] != 0.0 or p[3] != 0.0:  # what stress-free laws subtract cancels digits
+    if p[2] != 0.0 or p[3] != 0.0:  # subtractions of stress-free laws lose digits
         size += 1.0 + abs(p[2]) + abs(p[3])
     if abs(change) > LEAST and abs(missed) > NOISE * size:
         moment += missed / change
@@ -82,14 +82,14 @@ def mean_moment(code, address, p, share, rest, theta, change):
 
 @inner_scalar
 def _mean_moment(model, e, code, address, theta, change):
-    """The same of hinge e of a model."""
+    """Mean moment / k, and its slope, of hinge e of a model."""
     p, share, rest = model.hinge_parameters[e], model.hinge_share[e], model.hinge_rest[e]
     return mean_moment(code, address, p, share, rest, theta + model.hinge_offset[e, 0], change)
 
 
 @kernel
 def add_bar_forces(model, u0, u1, force):
-    """Add the forces of the bars from u0 to u1, all (n, 3)."""
+    """Add the mean forces of the bars from u0 to u1, all (n, 3)."""
     mean = np.empty(3)
     for run in range(model.bar_runs.shape[0]):
         code, address = model.bar_runs[run, 2], model.addresses[model.bar_runs[run, 3]]
@@ -110,10 +110,10 @@ def add_bar_forces(model, u0, u1, force):
 
 @kernel
 def discrete_gradient(x, dx, turn, points, plain, gradient):
-    """Gradient (4, 3) of a dihedral from the mean x of its points to the change dx, both (4, 3).
+    """Discrete gradient (4, 3) of a dihedral, for points with mean x and change dx, (4, 3).
 
     turn : change of the dihedral (rad).
-    points, plain : (4, 3), get the positions A x about their mean, and the gradient there.
+    points, plain : (4, 3), outputs: the positions A x about their mean, and the gradient there.
     """
     deform = np.empty((4, 3))
     for c in range(3):
@@ -160,7 +160,7 @@ def discrete_gradient(x, dx, turn, points, plain, gradient):
 
 @inner_scalar
 def _rotation(r, d):
-    """Vector w of the rotation w x r that is nearest to d, both (4, 3) about their means."""
+    """Vector w of the rotation w x r closest to d, both (4, 3) about their means."""
     xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     t0, t1, t2 = 0.0, 0.0, 0.0
     for v in range(4):
@@ -196,7 +196,7 @@ def put_motion(rest, hinges, e, u0, u1, x, dx):
 
 @kernel
 def add_hinge_forces(model, u0, u1, angle0, angle1, force):
-    """Add the forces of the hinges; angle1 (nh,) gets the dihedrals at u1, angle0 those at u0."""
+    """Add the mean forces of the hinges; writes the dihedrals at u1 to angle1 (nh,)."""
     x, dx, points = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
     plain, gradient = np.empty((4, 3)), np.empty((4, 3))
     for run in range(model.hinge_runs.shape[0]):
@@ -215,9 +215,9 @@ def add_hinge_forces(model, u0, u1, angle0, angle1, force):
 
 @kernel
 def add_bar_tangent(model, u0, u1, stress, slots, data):
-    """Add the derivative of the bars' forces with respect to u1 to blocks (nnz, 3, 3).
+    """Add the derivative of the bars' mean forces with respect to u1 to blocks (nnz, 3, 3).
 
-    stress : (nb,) of the bars, for the part in which they stand by themselves.
+    stress : (nb,) of the bars, for the geometric part.
     """
     mean, end = np.empty(3), np.empty(3)
     for run in range(model.bar_runs.shape[0]):
@@ -243,7 +243,7 @@ def add_bar_tangent(model, u0, u1, stress, slots, data):
 
 @kernel
 def add_hinge_tangent(model, u0, u1, angle0, floor, slots, data):
-    """Add the derivative of the hinges' forces, their gradients' to first order in the step.
+    """Add the derivative of the hinges' mean forces; gradients to first order in the step.
 
     floor : least slope of built-in laws per unit stiffness.
     """

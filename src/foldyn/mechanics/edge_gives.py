@@ -1,12 +1,12 @@
-"""Edges that give way near their ends: forces in the plane of panels meet at vertices.
+"""Edges that give way near their ends, under in-plane forces concentrated at vertices.
 
-Near either end of an edge its points slide along it by an amplitude g, which the panels beside it
-share (`structures.membranes`). With E the strains of a panel's bars, they add to its energy
+Near each end of an edge, its points slide along it by an amplitude g (a *give*), which the adjacent
+panels share (`structures.membranes`). With E the strains of a panel's bars, gives add to its energy
 
     E^T A g + 1/2 g^T K g.
 
-Amplitudes do not turn with the sheet. They have no mass: they are dofs beside displacements, or,
-for methods that need mass, in balance, K g = -A^T E, with K factorized once as a band.
+Gives do not rotate with the sheet and have no mass: they are hidden dofs or, for methods that need
+mass, in balance, K g = -A^T E, with K factorized once.
 """
 
 from __future__ import annotations
@@ -34,24 +34,24 @@ from foldyn.mechanics.term import (
 
 
 class EdgeGives(NamedTuple):
-    """Arrays of p panels with up to c nodes, b bars and k gives; those with fewer have zeros."""
+    """Arrays of p panels with up to c nodes, b bars and k gives; padded with zeros."""
 
-    count: int  # g, of all gives
+    count: int  # g, number of all gives
     edge: NDArray  # (g, 2) its vertices
     panel: NDArray  # (p,) numbers
     nodes: NDArray  # (p, c)
-    ends: NDArray  # (p, b, 2) numbers among a panel's nodes
+    ends: NDArray  # (p, b, 2) indices among a panel's nodes
     vector: NDArray  # (p, b, 3) rest vector from the first end to the second, m
     per_length2: NDArray  # (p, b) 1 / L^2, or 0
-    number: NDArray  # (p, k) of the gives
+    number: NDArray  # (p, k) indices of the gives
     across: NDArray  # (p, b, k) A, J/m
     stiffness: NDArray  # (p, k, k) K, N/m
-    strain: NDArray  # (b,) memory of one panel
+    strain: NDArray  # (b,) work array of one panel
     along: NDArray  # (b, 3) vectors of its bars, m
 
     @property
     def matrix(self) -> sparse.csc_array:
-        """Stiffness (g, g) of them all, N/m."""
+        """Stiffness (g, g) of all gives, N/m."""
         k = self.number.shape[1]
         places = (np.repeat(self.number, k, axis=1).ravel(), np.tile(self.number, (1, k)).ravel())
         entries = (self.stiffness.ravel(), places)
@@ -80,14 +80,14 @@ class EdgeGives(NamedTuple):
         return -splu(self.matrix).solve(pull)
 
     def ordered(self) -> EdgeGives:
-        """The same with numbers by which the factor of its matrix has few entries."""
+        """Copy with the gives numbered so that the factor of the matrix is sparse."""
         rank = _factorized(self.matrix, "MMD_AT_PLUS_A").perm_c
         edge = np.empty_like(self.edge)
         edge[rank] = self.edge
         return self._replace(edge=edge, number=rank[self.number].astype(np.int64))
 
     def factor(self) -> Factor:
-        """The matrix, factorized; of numbers that are `ordered`."""
+        """Factor of the matrix, for gives numbered by `ordered`."""
         found = _factorized(self.matrix, "NATURAL")
         assert np.array_equal(found.perm_c, np.arange(self.count))
         lower = sparse.csc_array(sparse.tril(found.L, -1))
@@ -126,7 +126,7 @@ def solve_factor(factor, x):
 
 @inner
 def strain_panel(gives, u, p):
-    """Strains and vectors of the bars of panel p, to its memory."""
+    """Compute strains and vectors of the bars of panel p, into its work arrays."""
     for i in range(gives.strain.size):
         a, b = gives.nodes[p, gives.ends[p, i, 0]], gives.nodes[p, gives.ends[p, i, 1]]
         excess = 0.0
@@ -139,7 +139,7 @@ def strain_panel(gives, u, p):
 
 @inner
 def add_pulls(gives, p, g, share, force):
-    """Add a share of the forces on the nodes of panel p, along the vectors in its memory."""
+    """Add a share of the nodal forces of panel p, along the vectors in its work arrays."""
     for i in range(gives.strain.size):
         pull = 0.0
         for k in range(gives.number.shape[1]):
@@ -153,7 +153,7 @@ def add_pulls(gives, p, g, share, force):
 
 @inner
 def add_strained(gives, p, share, out):
-    """Add a share of the forces (g,), N, of the strains in the memory of panel p on its gives."""
+    """Add a share of the forces (g,), N, that panel p's stored strains exert on its gives."""
     for k in range(gives.number.shape[1]):
         for i in range(gives.strain.size):
             out[gives.number[p, k]] += share * gives.across[p, i, k] * gives.strain[i]
@@ -161,7 +161,7 @@ def add_strained(gives, p, share, out):
 
 @inner
 def add_given(gives, p, g, share, out):
-    """Add a share of the forces (g,), N, of the gives of panel p on themselves."""
+    """Add a share of the forces (g,), N, that the gives of panel p exert on each other."""
     for k in range(gives.number.shape[1]):
         for j in range(gives.number.shape[1]):
             out[gives.number[p, k]] += share * gives.stiffness[p, k, j] * g[gives.number[p, j]]
@@ -169,7 +169,7 @@ def add_given(gives, p, g, share, out):
 
 @inner
 def add_gives(gives, u, g, force, pull):
-    """Add the forces on nodes (n, 3), and on gives (g,)."""
+    """Add the forces on nodes (n, 3) and on gives (g,)."""
     for p in range(gives.nodes.shape[0]):
         strain_panel(gives, u, p)
         add_pulls(gives, p, g, 1.0, force)
@@ -179,7 +179,7 @@ def add_gives(gives, u, g, force, pull):
 
 @inner
 def strained_gives(gives, u, pull):
-    """Forces (g,), N, of the strains at u on the gives."""
+    """Forces (g,), N, that the strains at u exert on the gives."""
     pull[:] = 0.0
     for p in range(gives.nodes.shape[0]):
         strain_panel(gives, u, p)
@@ -230,7 +230,7 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
 
 @inner
 def balance_gives(own, u):
-    """Forces of the strains at u on the gives, and gives in balance with them, to its memory."""
+    """Compute the gives' forces from the strains at u, and the gives in balance, to memory."""
     pull, g = own.memory
     strained_gives(own.gives, u, pull)
     for k in range(g.size):
@@ -256,7 +256,7 @@ def _balanced_energies(own, u, out):
 
 
 def gives_kernels(gives: EdgeGives, rows: int, first: int) -> Compiled:
-    """Gives as dofs from `first` on."""
+    """Kernels for gives as dofs from `first` on."""
     context = _Context(gives, rows, first, np.zeros((2, gives.count)), NO_FACTOR)
     return Compiled(
         Context(context), {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
@@ -264,6 +264,6 @@ def gives_kernels(gives: EdgeGives, rows: int, first: int) -> Compiled:
 
 
 def balanced_kernels(gives: EdgeGives, rows: int) -> Compiled:
-    """Gives in balance."""
+    """Kernels for gives in balance."""
     context = _Context(gives, rows, 3 * rows, np.zeros((2, gives.count)), gives.factor())
     return Compiled(Context(context), {FORCES: _balanced_forces, ENERGIES: _balanced_energies})

@@ -1,12 +1,12 @@
-"""The pullback of edges that give way (`mechanics.pullback`).
+"""Pullback of edge gives (`mechanics.pullback`).
 
-With E the strains of a panel's bars, r their rates where the nodes move by the weights, and h the
-weights of the gives g,
+With E the strains of a panel's bars, r their rates for nodal velocities equal to the weights, and h
+the weights of the gives g,
 
     w . F = r^T A g + h^T A^T E + h^T K g.
 
-Gives in balance have the same derivatives, with h = -K^-1 A^T r: what their own change adds. K
-stays symmetric there.
+Gives in balance have the same derivatives, with h = -K^-1 A^T r from their own change, as K is
+symmetric.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from foldyn.mechanics.pullback import Pulled, pullback
 
 
 class Gradient(NamedTuple):
-    """Derivatives by arrays of `EdgeGives` of the same names."""
+    """Gradients with respect to arrays of `EdgeGives`."""
 
     vector: NDArray
     per_length2: NDArray
@@ -51,7 +51,7 @@ class _Context(NamedTuple):
 
 @inner
 def pull_panel(gives, p, weight, g, h, out, product, by_g):
-    """Add the derivatives for panel p, whose strains and vectors are in its memory."""
+    """Add the derivatives for panel p, whose strains and vectors are in its work arrays."""
     for i in range(gives.strain.size):
         a, b = gives.nodes[p, gives.ends[p, i, 0]], gives.nodes[p, gives.ends[p, i, 1]]
         excess, growth, stress, back = 0.0, 0.0, 0.0, 0.0
@@ -104,7 +104,7 @@ def _balanced_pullback(own, u, v, t, weight, product, rate):
     h[:] = 0.0
     for p in range(gives.nodes.shape[0]):
         strain_panel(gives, moved, p)
-        for i in range(gives.strain.size):  # their rates, in the place of the strains
+        for i in range(gives.strain.size):  # their rates, in place of the strains
             a, b = gives.nodes[p, gives.ends[p, i, 0]], gives.nodes[p, gives.ends[p, i, 1]]
             growth = 0.0
             for c in range(3):
@@ -127,10 +127,10 @@ def _pulled(kernel: Addressed, gives: EdgeGives, rows: int, first: int, factor: 
 
 
 def gives_pulled(gives: EdgeGives, rows: int, first: int) -> Pulled:
-    """Gives as dofs from `first` on, differentiated."""
+    """Pullback of gives as dofs from `first` on."""
     return _pulled(_pullback, gives, rows, first, NO_FACTOR)
 
 
 def balanced_pulled(gives: EdgeGives, rows: int) -> Pulled:
-    """Gives in balance, differentiated."""
+    """Pullback of gives in balance."""
     return _pulled(_balanced_pullback, gives, rows, 3 * rows, gives.factor())

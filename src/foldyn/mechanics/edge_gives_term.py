@@ -17,7 +17,7 @@ from foldyn.mechanics.term import Compiled, Term, Unstrained, Way, nodal
 
 
 class EdgeGivesTerm(Term):
-    """Gives as dofs beside displacements; their energy belongs to that of the sheet's bars.
+    """Gives as hidden dofs; their energy counts as energy of the sheet's bars.
 
     Parameters
     ----------
@@ -34,20 +34,20 @@ class EdgeGivesTerm(Term):
         self.gives, self.rows, self.first = gives, rows, first
 
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-        """See `Term`."""
+        """Context and kernels for a thread; see `Term`."""
         return gives_kernels(self.gives, self.rows, self.first)
 
     def arrays(self) -> Arrays:
-        """See `Term`."""
+        """Arrays that its forces depend on; see `Term`."""
         return arrays_of(self.gives, "strain", "along")
 
     def pulled(self) -> Pulled:
-        """See `Term`."""
+        """Pullback of its forces; see `Term`."""
         return gives_pulled(self.gives, self.rows, self.first)
 
     @cached_property
     def _dofs(self) -> NDArray:
-        """Those of each panel (p, 3c + k): of its nodes, then its gives."""
+        """Dofs (p, 3c + k) of each panel: of its nodes, then its gives."""
         nodal = 3 * self.gives.nodes[:, :, None] + np.arange(3)
         return np.concatenate(
             [nodal.reshape(len(nodal), -1), self.first + self.gives.number], axis=1
@@ -55,12 +55,12 @@ class EdgeGivesTerm(Term):
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:
-        """See `Term`."""
+        """Rows and columns (k,) of its tangent entries; see `Term`."""
         dofs, count = self._dofs, self._dofs.shape[1]
         return np.repeat(dofs, count, axis=1).ravel(), np.tile(dofs, (1, count)).ravel()
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
-        """See `Term`."""
+        """Tangent entries (k,), N/m; see `Term`."""
         return panel_tangents(self.gives, nodal(q), nodal(q), self._gives(q)).ravel()
 
     def mean_entries(self, q0: NDArray, q1: NDArray, way: Way, floor: float) -> NDArray:
@@ -72,7 +72,7 @@ class EdgeGivesTerm(Term):
         return np.ravel(q)[self.first : self.first + self.gives.count]
 
     def unstrained(self, q: NDArray) -> Unstrained:
-        """See `Term`."""
+        """The model without strain at q; see `Term`."""
         size = (q.size, q.size)
         loose = panel_tangents(self.gives, nodal(q), nodal(q), np.zeros(self.gives.count))
         tangent = sparse.csr_array(sparse.coo_array((loose.ravel(), self.places), size))
@@ -82,27 +82,27 @@ class EdgeGivesTerm(Term):
         return Unstrained(tangent, alone, lambda motion: 0.0)
 
     def placed(self, order: NDArray, before: Any) -> EdgeGivesTerm:
-        """See `Term`."""
+        """The term with nodes in memory order; see `Term`."""
         gives = self.gives._replace(nodes=ranks(order)[self.gives.nodes])
         return type(self)(gives, self.rows, self.first)
 
 
 class BalancedGivesTerm(EdgeGivesTerm):
-    """Gives that are in balance at every displacement: for methods that need mass."""
+    """Gives in balance at every displacement, for methods that need mass."""
 
     owns_hidden: ClassVar[bool] = False
 
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-        """See `Term`."""
+        """Context and kernels for a thread; see `Term`."""
         return balanced_kernels(self.gives, self.rows)
 
     def pulled(self) -> Pulled:
-        """See `Term`."""
+        """Pullback of its forces; see `Term`."""
         return balanced_pulled(self.gives, self.rows)
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:
-        """See `Term`: all are coupled."""
+        """Rows and columns of all dofs, which are all coupled; see `Term`."""
         size = 3 * self.rows
         return np.repeat(np.arange(size), size), np.tile(np.arange(size), size)
 
@@ -110,11 +110,11 @@ class BalancedGivesTerm(EdgeGivesTerm):
         return self.gives.balanced(self.gives.strains(nodal(q)))
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
-        """See `Term`."""
+        """Tangent entries (k,), N/m; see `Term`."""
         return self._condensed(q, self._gives(q)).ravel()
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """See `Term`: without the places, which would take more room than the matrix."""
+        """Tangent, without the places, which would need more room than the matrix; see `Term`."""
         return sparse.csr_array(self._condensed(q, self._gives(q)))
 
     def mean_entries(self, q0: NDArray, q1: NDArray, way: Way, floor: float) -> NDArray:
@@ -122,7 +122,7 @@ class BalancedGivesTerm(EdgeGivesTerm):
         return Term.mean_entries(self, q0, q1, way, floor)
 
     def _condensed(self, q: NDArray, g: NDArray) -> NDArray:
-        """Tangent of displacements, the gives g giving way with them."""
+        """Tangent of the displacements with gives g in balance."""
         full = EdgeGivesTerm(self.gives, self.rows, self.first)
         u, size = nodal(q), 3 * self.rows
         entries = (panel_tangents(self.gives, u, u, g).ravel(), full.places)
@@ -133,7 +133,7 @@ class BalancedGivesTerm(EdgeGivesTerm):
         return whole[:size, :size].toarray() - across.T @ np.linalg.solve(own, across)
 
     def unstrained(self, q: NDArray) -> Unstrained:
-        """See `Term`."""
+        """The model without strain at q; see `Term`."""
         loose = self._condensed(q, np.zeros(self.gives.count))
         return Unstrained(
             sparse.csr_array(loose), sparse.csr_array(loose.shape), lambda motion: 0.0
@@ -143,8 +143,8 @@ class BalancedGivesTerm(EdgeGivesTerm):
 def panel_tangents(gives: EdgeGives, u0: NDArray, u1: NDArray, g: NDArray) -> NDArray:
     """Tangents (p, 3c + k, 3c + k), N/m, of all panels at u0 = u1 and gives g (g,).
 
-    From u0 to another u1, with g the mean of the gives, it is twice the derivative of the mean
-    forces by u1 and the gives there.
+    From u0 to another u1, with g the mean gives, it is twice the derivative of the mean forces by
+    u1 and the end gives.
     """
     (panels, corners), (bars, given) = gives.nodes.shape, gives.across.shape[1:]
     end = 3 * corners

@@ -1,15 +1,15 @@
 """Loads that depend on the displacement: pressure, moments of creases, tension of bars.
 
-Each entry holds what it needs of the rest geometry, its value at factor 1 and the number of its
-history. With x the positions of its nodes and p, M, N its value times the factor:
+Each entry stores its rest geometry, its value at factor 1 and the row of its history. With x the
+positions of its nodes and p, M, N its value times the factor:
 
 - a triangle with corners x1, x2, x3 under pressure p: p/6 (x2 - x1) x (x3 - x1) on each corner.
   On a closed surface this is p times the gradient of the volume inside;
-- a hinge with moment M: M times the gradient of its dihedral, potential -M angle. A wing that is no
-  node rides on the mean displacement of the axis' ends;
-- a bar from a to b with tension N (N/m, the second Piola-Kirchhoff force over the rest length):
+- a hinge with moment M: M times the gradient of its dihedral, potential -M angle. A virtual wing
+follows the mean displacement of the axis ends; - a bar from a to b with tension N (N/m, the second
+Piola-Kirchhoff force over the rest length):
   -N d on b and N d on a, d = x_b - x_a. Potential N (|d|^2 - |d at rest|^2) / 2;
-- a hidden dof with a constant force (that on a rotation of a shell's sides is a moment).
+- a hidden dof with a constant force (on a side rotation of a shell, it is a moment).
 
 The derivative of a pressure's forces is not symmetric triangle by triangle; on a closed surface,
 and on an open one whose rim is held, the sum is (Hibbitt, Int. J. Solids Struct. 15, 1979).
@@ -30,7 +30,7 @@ from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient
 
-ASYMMETRIC = 1e-3  # share of the stiffness of loads that is not symmetric and not to be overlooked
+ASYMMETRIC = 1e-3  # asymmetric share of the load stiffness that must not be neglected
 NO_POTENTIAL = (
     "the pressure acts on panels with free edges and has no potential: {:.0%} of its stiffness is "
     "not symmetric;"
@@ -62,7 +62,7 @@ class Following(NamedTuple):
         return any(map(len, (self.pressure, self.moment, self.tension, self.push)))
 
     def placed(self, rank: NDArray) -> Following:
-        """The same for nodes that stand at the places rank (n,)."""
+        """Copy for nodes that are stored at the places rank (n,)."""
         return self._replace(
             triangles=_whole(rank[self.triangles]),
             hinges=_whole(np.append(rank, -1)[self.hinges]),
@@ -82,7 +82,7 @@ def pressures(x: NDArray, triangles: NDArray, pressure: NDArray) -> Following:
 
 
 def moments(corners: NDArray, hinges: NDArray, moment: NDArray) -> Following:
-    """Moments (h,), N m, on hinges (h, 4) whose nodes are at corners (h, 4, 3) at rest."""
+    """Moments (h,), N m, on hinges (h, 4) with rest positions corners (h, 4, 3)."""
     return _none()._replace(
         hinges=_whole(hinges),
         corners=_real(corners - corners.mean(axis=1, keepdims=True)),
@@ -108,7 +108,7 @@ def pushes(dofs: NDArray, push: NDArray) -> Following:
 
 
 def joined(parts: Iterable[tuple[Following, int]]) -> Following:
-    """All entries of several, each part with the number of its history."""
+    """All entries of several, each part with the row of its history."""
     numbered = [_none()]
     for part, row in parts:
         rows = {
@@ -143,7 +143,7 @@ def _real(values: NDArray) -> NDArray:
 
 
 def following_force(loads: Following, u: NDArray, factor: NDArray) -> NDArray:
-    """Forces (m,), N, on all dofs at u (m,) for the factors (h, k) of histories, in column 0."""
+    """Forces (m,), N, on all dofs at u (m,); column 0 of `factor` (h, k) has the factors."""
     out = np.zeros(u.size)
     if loads.acts:
         add_following(loads, np.ascontiguousarray(u, float).reshape(-1), factor, out)
@@ -151,7 +151,7 @@ def following_force(loads: Following, u: NDArray, factor: NDArray) -> NDArray:
 
 
 def following_tangent(loads: Following, u: NDArray, factor: NDArray) -> sparse.csr_array:
-    """Minus the derivative (m, m) of `following_force`, N/m: what adds to a stiffness."""
+    """Minus the derivative (m, m) of `following_force`, N/m: its contribution to the stiffness."""
     row, column = following_places(loads)
     values = np.empty(len(row))
     put_following(loads, np.ascontiguousarray(u, float).reshape(-1), factor, False, values)
@@ -159,16 +159,16 @@ def following_tangent(loads: Following, u: NDArray, factor: NDArray) -> sparse.c
 
 
 def asymmetry(matrix: sparse.csr_array) -> float:
-    """Norm of the antisymmetric part of a matrix over its own; 0 of a matrix of zeros."""
+    """Ratio of the norms of a matrix's antisymmetric part and the matrix; 0 for zeros."""
     whole = float(np.linalg.norm(matrix.data))
     apart = sparse.csr_array(matrix - matrix.T)
     return 0.5 * float(np.linalg.norm(apart.data)) / whole if whole else 0.0
 
 
 def following_places(loads: Following) -> tuple[NDArray, NDArray]:
-    """Row and column (e,) of each entry that `put_following` gives."""
+    """Row and column (e,) of each entry of `put_following`."""
     rows, columns = [], []
-    # what a wing that rides has stands, as zero, at the first node
+    # entries of a virtual wing are zeros, placed at the first node
     hinges = np.where(loads.hinges < 0, loads.hinges[:, :1], loads.hinges)
     for nodes in (loads.triangles, hinges, loads.bars):
         width = 3 * nodes.shape[1]
@@ -240,7 +240,7 @@ def add_following(loads, u, factor, out):
 
 @inner
 def push_following(loads, u, v, factor, pushed, bracket):
-    """Take the forces at u from `bracket`, keep them in `pushed`; returns their power on v, W.
+    """Move the forces at u from `bracket` to `pushed`; returns their power on v, W.
 
     All (rows, 3).
     """
@@ -257,9 +257,9 @@ def push_following(loads, u, v, factor, pushed, bracket):
 
 @kernel
 def put_following(loads, u, factor, symmetric, out):
-    """Minus the derivative of the forces, in the order of `following_places`, to out (e,).
+    """Write minus the derivative of the forces to out (e,), ordered as `following_places`.
 
-    symmetric : whether only its symmetric part is wanted.
+    symmetric : whether to write only its symmetric part.
     """
     a, b, side = np.empty(3), np.empty(3), np.empty((3, 3))
     points, gradient, block = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3, 4, 3))
@@ -267,7 +267,7 @@ def put_following(loads, u, factor, symmetric, out):
     for t in range(loads.pressure.size):
         p = loads.pressure[t] * factor[loads.pressure_row[t], 0] / 6.0
         _edges(loads, u, t, a, b)
-        for c in range(3):  # the side that faces each corner: d(a x b) = sum of s x dx
+        for c in range(3):  # the side opposite to each corner: d(a x b) = sum of s x dx
             side[0, c], side[1, c], side[2, c] = b[c] - a[c], -b[c], a[c]
         for v in range(3):
             for c in range(3):

@@ -1,11 +1,11 @@
 """Internal force of bars and hinges: gather a block, compute without branches, scatter.
 
 The compute passes run over blocks of 64 elements in structure-of-arrays form, which the compiler
-vectorizes; the moment pass stands apart, so that laws with branches or powers do not stop it.
+vectorizes; the moment pass is separate, so that laws with branches or powers do not prevent that.
 The scratch arrays are flat and addressed as row * BLOCK + lane: with a stride known when compiling
 the compiler proves that loads and stores do not overlap (two-dimensional scratch: 5 times slower).
-Nodal values stand in buffers of rows of four, which are loaded and stored as vectors (`rows`), and
-which hold a window of a large sheet (`strips`).
+Nodal values are in buffers with rows of four, which load and store as vectors (`rows`), and which
+hold a window of a large sheet (`strips`).
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from foldyn.mechanics.strips import Strips, strips
 from foldyn.mechanics.threads import Team, team, wait
 
 LINE = 8  # numbers in a cache line
-SHIFT = 5 * LINE  # between scratch arrays: a multiple of 4096 bytes would make them collide
+SHIFT = 5 * LINE  # between scratch arrays: a multiple of 4096 bytes would cause cache conflicts
 
 
 class Workspace(NamedTuple):
-    """Scratch memory of the force kernels on one thread, made once and used at every evaluation."""
+    """Work arrays of the force kernels on one thread, allocated once for all evaluations."""
 
     points: NDArray  # (12 * BLOCK,)
     gradient: NDArray  # (13 * BLOCK,), the last row the angle
@@ -42,19 +42,19 @@ class Workspace(NamedTuple):
     position: NDArray  # (r, 4) buffers of nodal values, see `strips`
     displacement: NDArray  # (r, 4)
     sums: NDArray  # (r, 4) forces
-    angle: NDArray  # (nh,) the dihedrals of the last evaluation, rad; all threads write to one
-    fold_angle: NDArray  # (nh,) the same: what actuators may turn
+    angle: NDArray  # (nh,) dihedrals of the last evaluation, rad; shared by all threads
+    fold_angle: NDArray  # (nh,) the same array: dihedrals of actuated hinges
     strips: Strips
     team: Team
 
 
 def workspace(model: BarsHinges) -> Workspace:
-    """Scratch memory for `model` on one thread."""
+    """Work arrays for `model` on one thread."""
     return workspaces(model, 1)[0]
 
 
 def workspaces(model: BarsHinges, threads: int) -> list[Workspace]:
-    """Scratch memory of each thread; fewer than asked for if the model cannot be shared so."""
+    """Work arrays of each thread; fewer than requested if the model cannot be split so far."""
     parts = strips(model, threads)
     angle = np.empty(len(model.hinges))
     return [
@@ -85,13 +85,13 @@ def _scratch(rows: int) -> dict[str, NDArray]:
 
 @inner_scalar
 def whole_lanes(m):
-    """The count of lanes to compute for m elements: the rest of a vector costs nothing."""
+    """Number of lanes to compute for m elements: rounded up to whole vectors."""
     return (m + LANES - 1) // LANES * LANES
 
 
 @inner_scalar
 def gather(rows, mask, nodes, width, v, first, m, out, at):
-    """Coordinates of node v of m elements, rows of `width` nodes, to three rows from out[at]."""
+    """Copy coordinates of node v of m elements, rows of `width` nodes, to rows from out[at]."""
     whole = m // LANES * LANES
     for q in range(0, whole, LANES):
         load_rows(rows, nodes, width * (first + q) + v, width, mask, out, at + q, BLOCK)
@@ -116,7 +116,7 @@ def scatter(rows, mask, nodes, width, v, first, m, vector, at, factor, start):
 
 @inner_scalar
 def first_above(nodes, width, start, end, node):
-    """First of the elements start to end whose lowest node is not below `node`, a strip's end."""
+    """First of the elements start to end whose lowest node is at least `node`, a strip's end."""
     while start < end:
         middle = (start + end) // 2
         low = nodes[width * middle]
@@ -169,7 +169,7 @@ def add_bar_forces(model, low, high, work):
                     x[(6 + c) * BLOCK + q] = vector[3 * e + c]
                 s[q] = per_length2[e]
             for q in range(lanes):
-                # lambda^2 - 1 from displacements: nothing cancels
+                # lambda^2 - 1 from displacements, without cancellation
                 dx, vx = x[3 * BLOCK + q] - x[q], x[6 * BLOCK + q]
                 dy, vy = x[4 * BLOCK + q] - x[BLOCK + q], x[7 * BLOCK + q]
                 dz, vz = x[5 * BLOCK + q] - x[2 * BLOCK + q], x[8 * BLOCK + q]
@@ -198,7 +198,7 @@ def linear_moments(stiffness, rest, offset, first, m, angle, value):
 
 @inner_scalar
 def gives_way(share, first, m):
-    """Whether panels give way beside one of the creases of a block."""
+    """Whether any crease of a block has compliant panels."""
     soft = 0
     for q in range(m):
         soft += share[first + q] < 1.0
@@ -209,7 +209,7 @@ def gives_way(share, first, m):
 def enhanced_moments(
     code, address, stiffness, rest, p, share, offset, low, high, first, m, angle, value
 ):
-    """Moments of hinges of the enhanced linear law: of creases between low and high at once."""
+    """Hinge moments of the enhanced linear law; creases between low and high are linear."""
     beyond = 0
     for q in range(m):
         e = first + q
@@ -231,7 +231,7 @@ def enhanced_moments(
 
 @inner_scalar
 def superlinear_moments(stiffness, rest, first, m, angle, value):
-    """Moments of hinges of the superlinear law whose panels do not give way."""
+    """Hinge moments of the superlinear law without panel compliance."""
     for q in range(m):
         e = first + q
         value[q] = stiffness[e] * superlinear.moment(angle[q] - rest[e])
@@ -252,7 +252,7 @@ def hinge_moments(code, address, stiffness, rest, p, share, offset, first, m, an
 def add_hinge_forces(model, low, high, work):
     """Add the forces of the hinges with lowest nodes from low to high to work.sums.
 
-    Their dihedrals go to work.angle.
+    Writes their dihedrals to work.angle.
     """
     x, g, value, mask = work.points, work.gradient, work.value, work.strips.mask
     position, sums, hinges = flat(work.position), flat(work.sums), flat(model.hinges)
@@ -292,7 +292,7 @@ def add_hinge_forces(model, low, high, work):
                 linear_moments(stiffness, rest, offset, first, m, angle, value)
             elif (code == superlinear.CODE) and not gives_way(share, first, m):
                 superlinear_moments(stiffness, rest, first, m, angle, value)
-            elif (code == STRESS_FREE) | (code == AS_PUBLISHED):  # theta1 and theta2 are the run's
+            elif (code == STRESS_FREE) | (code == AS_PUBLISHED):  # theta1, theta2 are the run's
                 enhanced_moments(
                     code, address, stiffness, rest, p, share, offset,
                     p[4 * start], p[4 * start + 1], first, m, angle, value,
@@ -307,13 +307,13 @@ def add_hinge_forces(model, low, high, work):
 
 @inner_scalar
 def place(at_rest, u, work, start, end):
-    """Put the nodes start to end, flat rows of three, into the buffers of rows of four."""
+    """Put the nodes start to end, flat rows of three, into the buffers with rows of four."""
     mask, last = np.uint32(work.strips.mask), at_rest.size // 3 - 1
     position, displacement, sums = flat(work.position), flat(work.displacement), flat(work.sums)
     for i in range(start, min(end, last)):
-        node = np.uint32(i)  # unsigned: no test for wraparound
+        node = np.uint32(i)  # unsigned: no wraparound test
         at, row = 3 * node, 4 * (node & mask)
-        # the fourth number belongs to the next node and is not used: four make a vector
+        # the fourth number belongs to the next node and is unused: four make a vector
         a, b, c, d = u[at], u[at + 1], u[at + 2], u[at + 3]
         e, f, g, h = at_rest[at], at_rest[at + 1], at_rest[at + 2], at_rest[at + 3]
         displacement[row], displacement[row + 1] = a, b
@@ -330,12 +330,12 @@ def place(at_rest, u, work, start, end):
 
 @inner_scalar
 def finish(force, work, start, end):
-    """Take the sums of the nodes start to end from the buffer to flat rows of three."""
+    """Copy the sums of the nodes start to end from the buffer to flat rows of three."""
     mask, sums = np.uint32(work.strips.mask), flat(work.sums)
     for i in range(start, end - 1):
         node = np.uint32(i)
         at, row = 3 * node, 4 * (node & mask)
-        # the fourth number is overwritten by the next node's first
+        # the next node's first number overwrites the fourth
         a, b, c, d = sums[row], sums[row + 1], sums[row + 2], sums[row + 3]
         force[at], force[at + 1], force[at + 2], force[at + 3] = a, b, c, d
     for i in range(max(start, end - 1), end):
@@ -345,7 +345,7 @@ def finish(force, work, start, end):
 
 @inner_scalar
 def finish_edge(force, work, start, end):
-    """Add the sums of the nodes start to end to those of an edge strip."""
+    """Add the sums of the nodes start to end to the sums of an edge strip."""
     mask, sums = work.strips.mask, flat(work.sums)
     for i in range(start, end):
         for c in range(3):
@@ -372,8 +372,8 @@ def strip_force(model, s, u, force, work):
 def internal_force(model, u, force, work):
     """Internal force (n, 3), N, at displacement u (n, 3), m; dihedrals go to work.angle.
 
-    A member of a team gets the force on its own nodes, work.strips.own; u must be complete before
-    any of them starts, and may be changed on its own nodes when it is done.
+    A team member computes the force on its own nodes, work.strips.own; u must be complete before
+    any member starts, and a member may change u on its own nodes once it is done.
     """
     for s in range(work.strips.lowest.shape[0]):
         if s == work.strips.edge:

@@ -1,12 +1,12 @@
-"""Strain energy of panels that would, if they were free, stretch and curl.
+"""Strain energy of panels that heat would stretch and curl if they were free.
 
-Heat acts as loads do that follow the sheet (`mechanics.following`), and a free sheet gives way to
-them without stress. What is stored is the energy of the strains that differ from the free ones:
-the energy of all strains, plus the potential of these loads, plus what brings it to zero where each
-part of the sheet has its free strain.
+Heat acts like follower loads (`mechanics.following`), to which a free sheet yields without stress.
+The stored energy is due to the difference from the free strains: the energy of all strains, plus
+the potential of these loads, plus a constant that makes it zero if each part of the sheet has its
+free strain.
 
-- parts with quadratic energies: half of what the free strains push with, times the free strains;
-- a bar of any law, free at the Green strain E and pushing with the stress S: V (S E - W(E)), V its
+- parts with quadratic energies: half the thermal forces times the free strains; - a bar of any law,
+free at the Green strain E and pushing with the stress S: V (S E - W(E)), V its
   volume times Young's modulus.
 """
 
@@ -24,29 +24,29 @@ from foldyn.materials.switch import bar_energy, bar_slope, bar_stress
 from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.following import Following, hinge_of
 
-ITERATIONS = 30  # of Newton's method for the free strain of a bar; a few are enough
+ITERATIONS = 30  # Newton iterations for the free strain of a bar; a few suffice
 SHARP = 1e-15  # Green strain
 
 
 class Heat(NamedTuple):
-    """What s swollen states of a sheet push with, h histories; groups of stretching and bending."""
+    """Thermal forces of s swollen states, h histories; energy groups of stretching and bending."""
 
     loads: Following
-    angles: NDArray  # (k,) dihedrals of the hinges of its loads at rest, rad
+    angles: NDArray  # (k,) rest dihedrals of the loaded hinges, rad
     groups: NDArray  # (2,)
     quadratic: NDArray  # (2, h, h) J
     stress: NDArray  # (s, b) of bars, over Young's modulus
     row: NDArray  # (s,) of the histories
     volume: NDArray  # (b,) times Young's modulus, J
-    code: int  # of the law of the bars
+    code: int  # law of the bars
     addresses: NDArray  # (3,) of its energy, stress and slope
     inner: NDArray  # (s, r) forces on dofs in balance, N
-    offset: NDArray  # (., 4) see `SheetTerm.series`; those dofs are the last r rows
-    seen: NDArray  # (2,) what energies lacked in a motion at first, and most since then, J
+    offset: NDArray  # (., 4) see `SheetTerm.series`; dofs in balance are the last r rows
+    seen: NDArray  # (2,) heat correction at the start of a motion, and its largest value, J
 
 
 class Warm(NamedTuple):
-    """Heat in a motion: what is evaluated, and where the energies (groups,) go."""
+    """Heat in a motion: its data, and the energies (groups,) to correct."""
 
     heat: Heat
     displacement: NDArray
@@ -56,7 +56,7 @@ class Warm(NamedTuple):
 
 @inner_scalar
 def free_energy(code, stress, addresses):
-    """S E - W(E) of a bar that is free at the Green strain E of a stress; over Young's modulus."""
+    """S E - W(E), over Young's modulus, of a bar at the free Green strain E of a stress."""
     green, e = 0.0, 0.0
     for _ in range(ITERATIONS):
         step = (stress - bar_stress(code, e, addresses[1])) / bar_slope(code, e, addresses[2])
@@ -78,7 +78,7 @@ def free_energies(code, stress, addresses):
 
 @kernel
 def add_heat(heat, u, factor, out):
-    """Add what strain energies lack, J, to their groups; u flat, factors (h, k) in column 0."""
+    """Add the heat correction of the strain energies, J; u flat, factors (h, k) in column 0."""
     loads, stretching, bending = heat.loads, heat.groups[0], heat.groups[1]
     for g in range(2):
         for i in range(heat.quadratic.shape[1]):
@@ -116,7 +116,7 @@ def add_heat(heat, u, factor, out):
 
 @addressed()
 def warm(m):
-    """The same where a motion is, to `m.energy`."""
+    """Put the heat correction at the current state of a motion into `m.energy`."""
     for g in range(m.energy.size):
         m.energy[g] = 0.0
     add_heat(m.heat, flat(m.displacement), m.factor, m.energy)

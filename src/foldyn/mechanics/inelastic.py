@@ -1,8 +1,8 @@
-"""Hinges with memory on a model: what the branches of their laws add to its forces.
+"""Hinges with memory on a model: the forces of the branches of their laws.
 
-The state of the branches is that of the last accepted step. Every evaluation computes from it, from
-the dihedrals then and now, and from the time since then, what the state would be now; only `commit`
-makes that the state. A step that is refused or tried again leaves no trace.
+The branches store the state at the last accepted step. Every evaluation computes a trial state from
+it, from the dihedrals then and now, and from the elapsed time; only `commit` accepts the trial
+state. A step that is rejected or repeated leaves no trace.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ from foldyn.mechanics.viscous import hinge_gradient
 class MemoryHinges(NamedTuple):
     """Arrays of h hinges with b branches in all; dofs are 3 row + column of arrays (rows, 3).
 
-    Those from `angle` on change in place. The angles in them are turns from the rest angle, with
-    the offset that the laws of the body see (`SheetTerm.series`).
+    Fields from `angle` on change in place. Angles are turns from the rest angle, including the
+    offset (`SheetTerm.series`).
     """
 
     dofs: NDArray  # (h, 14), see `viscous.hinge_gradient`
@@ -55,27 +55,27 @@ class MemoryHinges(NamedTuple):
     row: NDArray  # (h,) int64: of the offsets
     stiffness: NDArray  # (h,) N m/rad
     group: NDArray  # (h,) int64: of the model's energies
-    first: NDArray  # (h + 1,) int64: a hinge has the branches first[e] to first[e + 1]
+    first: NDArray  # (h + 1,) int64: hinge e has the branches first[e] to first[e + 1] - 1
     code: NDArray  # (b,) int64
     parameters: NDArray  # (b, 4)
-    arm: NDArray  # (h,) m: turned by 1 rad, a hinge moves its wings by this much
+    arm: NDArray  # (h,) m: displacement of the wings per rad
     angle: NDArray  # (h,) at the last accepted step, rad
     state: NDArray  # (b, 2) then
     turned: NDArray  # (h,) at the last evaluation, rad
     rate: NDArray  # (h, 2) at that step and at that evaluation, rad/s
     reached: NDArray  # (b, 2) then
     moment: NDArray  # (h,) of the branches then, N m
-    slope: NDArray  # (h,) its derivative with respect to the angle, N m/rad
-    mean: NDArray  # (h, 2) the same of the mean moment of a step from that one
-    stored: NDArray  # (h,) energy of the branches then, J
-    lost: NDArray  # (2,) energy dissipated up to the last accepted step, and since then, J
+    slope: NDArray  # (h,) derivative of the moment with respect to the angle, N m/rad
+    mean: NDArray  # (h, 2) mean moment of a step from the accepted one, and its slope
+    stored: NDArray  # (h,) energy of the branches, J
+    lost: NDArray  # (2,) energy dissipated up to the last accepted step, and since, J
     elapsed: NDArray  # (1,) time since then, s
-    gradient: NDArray  # (14,) memory of one hinge
+    gradient: NDArray  # (14,) work array of one hinge
 
 
 @inner_scalar
 def evaluate_branches(own, offset, e, turn):
-    """Note what the branches of a hinge do at a turn (rad); returns the energy dissipated, J."""
+    """Evaluate the branches of a hinge at a turn (rad); returns the dissipated energy, J."""
     moment, slope, stored, lost = 0.0, 0.0, 0.0, 0.0
     turn += offset[own.row[e], 0]
     for k in range(own.first[e], own.first[e + 1]):
@@ -89,7 +89,7 @@ def evaluate_branches(own, offset, e, turn):
         stored += found[4]
         lost += found[5]
     own.turned[e] = turn
-    offset[own.row[e], 1] += own.stiffness[e] * moment - own.moment[e]  # beside other laws' there
+    offset[own.row[e], 1] += own.stiffness[e] * moment - own.moment[e]  # adds to other laws
     own.moment[e], own.slope[e] = own.stiffness[e] * moment, own.stiffness[e] * slope
     own.stored[e] = own.stiffness[e] * stored
     return own.stiffness[e] * lost
@@ -113,10 +113,10 @@ def add_memory_forces(own, offset, u, v, force):
 
 @inner
 def add_mean_memory_forces(own, offset, start, end, h, out):
-    """Add forces whose work in a step h from `start` to `end` is what branches store and lose.
+    """Add forces whose work in a step h equals the energy that branches store and dissipate.
 
-    All are flat. Offsets are those of the end; returns the work that they do as they change, and
-    how much less is lost than the laws say, J.
+    `start`, `end` and `out` are flat. Offsets have their end values; returns the work of their
+    change, and by how much the dissipation falls short of the laws, J.
     """
     work, lost, lacking, g = 0.0, 0.0, 0.0, own.gradient
     one, other, gradient = np.empty((2, 4, 3)), np.empty((2, 4, 3)), np.empty((4, 3))
@@ -148,9 +148,9 @@ def add_mean_memory_forces(own, offset, start, end, h, out):
 
 @inner
 def _mean_gradient(own, e, start, end, turn, motion, points, gradient):
-    """`discrete_gradient` (4, 3) of a hinge that turns so far; motion, points : (2, 4, 3) memory.
+    """`discrete_gradient` (4, 3) of a hinge with a turn; motion, points : (2, 4, 3) work arrays.
 
-    points : get positions A x, and the gradient of the dihedral there.
+    points : outputs, positions A x and the gradient of the dihedral there.
     """
     dofs = own.dofs[e]
     for v in range(4):
@@ -165,13 +165,14 @@ def _mean_gradient(own, e, start, end, turn, motion, points, gradient):
 
 @inner
 def straightness_error(own, scale):
-    """How wrong the last evaluation is because dihedrals do not change at constant rates.
+    """Error ratio of the last evaluation, as dihedrals do not change at constant rates.
 
-    The other way is a parabola with the rates of both ends, by its middle and where it turns back.
+    The reference path is a parabola with the rates of both ends, evaluated at its middle and
+    turning point.
     """
     h, wrong = own.elapsed[0], 0.0
     for e in range(own.rest.size):
-        if own.code[own.first[e]] == DAMPER:  # whose rates are rounding in short steps
+        if own.code[own.first[e]] == DAMPER:  # its rates are rounding errors in short steps
             continue
         begin, turn = own.angle[e], own.turned[e] - own.angle[e]
         scale = max(scale, own.arm[e] * max(abs(begin), abs(own.turned[e])))
@@ -205,7 +206,7 @@ def evaluate_at(own, offset, u):
 
 @kernel
 def make_last(own):
-    """Make the last evaluation the last accepted step."""
+    """Accept the last evaluation as a step."""
     own.angle[:] = own.turned
     own.state[:] = own.reached
     own.rate[:, 0] = own.rate[:, 1]
@@ -216,7 +217,7 @@ def make_last(own):
 
 @kernel
 def memory_tangents(own, u, out):
-    """Derivatives (h, 14, 14) of the forces of the branches at u, after their evaluation there."""
+    """Derivatives (h, 14, 14) of the branch forces at u, after their evaluation there."""
     points, gradient, block = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3, 4, 3))
     moved, g = flat(u), own.gradient
     for e in range(own.rest.size):
@@ -236,7 +237,7 @@ def memory_tangents(own, u, out):
 
 @kernel
 def mean_memory_tangents(own, floor, u0, u1, out):
-    """Derivatives (h, 14, 14) of the mean forces from u0 to u1 by u1, after these.
+    """Derivatives (h, 14, 14) by u1 of the mean forces from u0 to u1, once these are known.
 
     floor : least slope of the mean moments per unit stiffness.
     """
@@ -262,7 +263,7 @@ def mean_memory_tangents(own, floor, u0, u1, out):
 
 @kernel
 def memory_gradients(own, u, out):
-    """Gradients (h, 14) of the angles at u."""
+    """Gradients (h, 14) of the hinge angles at u."""
     moved = flat(u)
     for e in range(own.rest.size):
         hinge_gradient(own.corners[e], own.dofs[e], own.hidden_turn[e], moved, out[e])
@@ -272,7 +273,7 @@ class _Context(NamedTuple):
     own: MemoryHinges
     offset: NDArray
     rows: int
-    groups: int  # of the energies
+    groups: int  # number of energy groups
 
 
 @forces
@@ -284,7 +285,7 @@ def _forces(term, u, v, t, force, powers):
 @energies
 def _energies(term, u, out):
     own, energy = term.own, numbers_at(out, term.groups)
-    for e in range(own.rest.size):  # as at the last evaluation, which was at u
+    for e in range(own.rest.size):  # as at the last evaluation, at u
         energy[own.group[e]] += own.stored[e]
 
 
@@ -329,7 +330,7 @@ def _step_error(term, scale):
 
 
 def memory_kernels(own: MemoryHinges, offset: NDArray, rows: int, groups: int) -> Compiled:
-    """What the branches of hinges with memory add, with so many groups of energies."""
+    """Kernels of hinges with memory, with `groups` energy groups."""
     context = Context(_Context(own, offset, rows, groups))
     return Compiled(
         context,

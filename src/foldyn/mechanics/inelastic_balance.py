@@ -1,12 +1,12 @@
 """Creases with memory between edge angles in balance: n5b8e in explicit motions.
 
-What a branch of a crease resists depends on the turn of the crease itself, which is found together
-with the edge angles beside it: their balance evaluates the branches, by an address, in every
-iteration (`mechanics.plates_condensed`). Otherwise they are those of `mechanics.inelastic`.
+The moment of a crease branch depends on the turn of the crease itself, which is solved together
+with the adjacent edge angles: their balance calls the branches, by address, in every iteration
+(`mechanics.plates_condensed`). Otherwise the branches are the same as in `mechanics.inelastic`.
 
-The rate at which a crease turns does not follow from velocities alone. At the end of a step of h in
-which the crease turns by d it is taken as (3 d / h - r) / 2, r that at its beginning: a parabola
-would have 2 d / h - r, and never forget an error of r.
+The rate of a crease does not follow from velocities alone. At the end of a step h in which the
+crease turns by d, it is taken as (3 d / h - r) / 2, with r the rate at the start: a parabola would
+give 2 d / h - r, which never damps an error of r.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from foldyn.mechanics.sheet_term import SheetTerm
 from foldyn.mechanics.term import ADDRESS, FORCES, Compiled, forces
 from foldyn.mechanics.viscous import hinge_gradient
 
-ROUNDS = 200  # in which creases find their turns in a given state, at most
-FOUND = 1e-14  # rad, of the last one
+ROUNDS = 200  # maximum iterations for the turns of creases in a given state
+FOUND = 1e-14  # rad, last change of these turns
 
 
 class _Branches(NamedTuple):
@@ -39,7 +39,7 @@ class _Branches(NamedTuple):
 
 @addressed(ADDRESS, ADDRESS)
 def _evaluate(term, angle, out):
-    """Moments and slopes of the branches of all folds, to out (nf, 2), at their angles (nf,)."""
+    """Moments and slopes of the branches of all folds, into out (nf, 2), at their angles (nf,)."""
     own, folds, lost = term.own, term.folds, 0.0
     turned, found = numbers_at(angle, folds), numbers_at(out, 2 * folds)
     for k in range(2 * folds):
@@ -53,7 +53,7 @@ def _evaluate(term, angle, out):
 
 @forces
 def _forces(term, u, v, t, force, powers):
-    """Add those of the branches, which the balance has evaluated, on the nodes."""
+    """Add the nodal forces of the branches, which the balance has evaluated."""
     own, moved, out = term.own, flat(rows_at(u, term.rows)), flat(rows_at(force, term.rows))
     h, g = own.elapsed[0], own.gradient
     for e in range(own.rest.size):
@@ -62,27 +62,27 @@ def _forces(term, u, v, t, force, powers):
             out[own.dofs[e, c]] += own.moment[e] * g[c]
         if h > 0.0:
             own.rate[e, 1] = 1.5 * (own.turned[e] - own.angle[e]) / h - 0.5 * own.rate[e, 0]
-    if h == 0.0:  # loads may have jumped, and the rates of dampers with them
+    if h == 0.0:  # loads may have jumped, and dampers' rates with them
         for k in range(own.code.size):
             if own.code[k] == DAMPER:
                 own.state[k, 0] = own.reached[k, 0]
 
 
 def evaluation(own: MemoryHinges, offset: NDArray, folds: int) -> tuple[Context, NDArray]:
-    """What evaluates the branches of folds: a context to keep, and `CondensedPlates.memory`."""
+    """Context to keep, and `CondensedPlates.memory`, for evaluating the branches of folds."""
     held = Context(_Branches(own, offset, folds))
     return held, np.array([_evaluate.at(held), held.address], np.int64)
 
 
 class BalancedMemory(HingeMemory):
-    """The branches of folds between edge angles in balance; see `HingeMemory`.
+    """Branches of folds between edge angles in balance; see `HingeMemory`.
 
     Parameters
     ----------
     own, settles
         See `HingeMemory`.
     sheet : SheetTerm
-        One in whose balance the branches are evaluated.
+        The sheet whose balance evaluates the branches.
     """
 
     def __init__(self, own: MemoryHinges, settles: NDArray, sheet: SheetTerm) -> None:
@@ -90,19 +90,19 @@ class BalancedMemory(HingeMemory):
         self._sheet = sheet
 
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-        """See `Term`."""
+        """Context and kernels for a thread; see `Term`."""
         found = super().compiled(work, kept, group)
         return Compiled(found.context, {**found.kernels, FORCES: _forces})
 
     def start(self, q: NDArray, state: NDArray | str | None = None) -> None:
-        """See `HingeMemory`; in a given state creases turn to where they are in balance with it."""
+        """Start as `HingeMemory.start`; in a given state, creases turn until in balance."""
         own, sheet = self.own, Assembly(self._sheet)
         for array in (own.angle, own.state, own.rate, own.elapsed, own.lost):
             array[:] = 0.0
         on = own.parameters[:, 0].copy()
         if state is None:
             own.parameters[self.settles, 0] = 0.0
-        sheet.internal(q)  # turned from rest in no time
+        sheet.internal(q)  # turned instantly from rest
         own.parameters[:, 0] = on
         make_last(own)
         if isinstance(state, np.ndarray):
@@ -118,4 +118,4 @@ class BalancedMemory(HingeMemory):
             if moved <= FOUND:
                 break
         own.lost[:] = 0.0
-        self._offset[:, 3] = np.nan  # the motion begins now
+        self._offset[:, 3] = np.nan  # a motion begins now

@@ -25,15 +25,15 @@ from foldyn.mechanics.viscous import WIDTH, coupled
 
 
 class HingeMemory(Term):
-    """The branches of hinges on a sheet with the elastic parts of their laws; see `Term`.
+    """Branches of hinges, added to the elastic parts of their laws on a sheet; see `Term`.
 
-    Their state changes in place, and is that of all terms made of this one.
+    Their state changes in place, and terms derived from this one share it.
 
     Parameters
     ----------
     own : MemoryHinges
     settles : ndarray of bool, shape (b,)
-        Branches that a motion finds settled where it starts, unless it is told otherwise.
+        Branches that are settled at the start of a motion by default.
     sheet : SheetTerm
     """
 
@@ -44,12 +44,12 @@ class HingeMemory(Term):
         self._offset, self._rows = sheet.series()[1], sheet.rows
 
     def start(self, q: NDArray, state: NDArray | str | None = None) -> None:
-        """Begin at the dofs q (m,) or (rows, 3) in a state (b, 2), "fresh", or the default."""
+        """Start at the dofs q (m,) or (rows, 3) in a state (b, 2), "fresh", or the default."""
         own, offset, q = self.own, self._offset, in_rows(q, self._rows)
         for array in (own.angle, own.state, own.moment, own.elapsed, own.lost):
             array[:] = 0.0
-        offset[own.row, 1] = 0.0  # other motions of the sheet have left theirs there
-        evaluate_at(own, offset, q)  # turned from rest in no time
+        offset[own.row, 1] = 0.0  # other motions of the sheet have left their values
+        evaluate_at(own, offset, q)  # turned instantly from rest
         make_last(own)
         own.lost[:] = 0.0
         if isinstance(state, np.ndarray):
@@ -59,23 +59,23 @@ class HingeMemory(Term):
         evaluate_at(own, offset, q)
 
     def resists(self, state: NDArray | str | None) -> bool:
-        """Whether it begins in such a state as if turned in no time, not relaxed or given."""
+        """Whether a start in such a state counts as an instant turn, neither relaxed nor given."""
         return isinstance(state, str) or (state is None and not self.settles.all())
 
     def commit(self) -> None:
-        """Accept the step that ends where the body was evaluated last."""
+        """Accept the step that ends at the last evaluation."""
         make_last(self.own)
 
     def still(self) -> None:
-        """Evaluate next at the last accepted step."""
+        """Set the next evaluation to the time of the last accepted step."""
         self.own.elapsed[0] = 0.0
 
     def snapshot(self) -> tuple[NDArray, ...]:
-        """The last accepted step, to `recall`."""
+        """Copy of the last accepted step, for `recall`."""
         return tuple(array.copy() for array in self._kept)
 
     def recall(self, snapshot: Sequence[NDArray]) -> None:
-        """Go back to an accepted step."""
+        """Return to an accepted step."""
         for array, kept in zip(self._kept, snapshot, strict=True):
             array[:] = kept
         self.still()
@@ -85,7 +85,7 @@ class HingeMemory(Term):
         return self.own.angle, self.own.state, self.own.lost
 
     def gradients(self, q: NDArray, size: int) -> sparse.csr_array:
-        """Gradients (h, size) of the angles at the dofs q (m,)."""
+        """Gradients (h, size) of the hinge angles at the dofs q (m,)."""
         out = np.zeros((len(self.own.rest), WIDTH))
         memory_gradients(self.own, np.ascontiguousarray(q, float), out)
         row = np.repeat(np.arange(len(out)), WIDTH)
@@ -107,11 +107,11 @@ class HingeMemory(Term):
 
     @property
     def places(self) -> tuple[NDArray, NDArray]:
-        """See `Term`."""
+        """Rows and columns (k,) of its tangent entries; see `Term`."""
         return self._coupled[1:]
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
-        """See `Term`; the elastic part of a hinge has a slope of 1 per unit stiffness."""
+        """Tangent entries; the elastic part of a hinge has a slope of 1 per unit stiffness."""
         own, u = self.own, in_rows(q, self._rows)
         out = np.empty((len(own.rest), WIDTH, WIDTH))
         evaluate_at(own, self._offset, u)
@@ -127,5 +127,5 @@ class HingeMemory(Term):
         return out[self._coupled[0]]
 
     def on(self, sheet: SheetTerm) -> Self:
-        """See `Term`; the branches measure from the rest angles that they have had."""
+        """The branches on another sheet; they keep their own rest angles. See `Term`."""
         return type(self)(self.own, self.settles, sheet)

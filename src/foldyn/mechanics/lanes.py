@@ -1,8 +1,8 @@
-"""Forces of many models of one topology at once: the lanes of a vector are models.
+"""Forces of many models of one topology at once: each vector lane is a model.
 
-Every number of a node or an element stands in memory as WIDTH numbers in a row, one of each model.
-Nothing has to be gathered from scattered places then; the formulas are those of `mechanics.force`,
-of one element of WIDTH models at once, from load to sum in registers.
+Each value of a node or an element is stored as WIDTH consecutive numbers, one per model, so that
+nothing has to be gathered. The formulas are the same as in `mechanics.force`, for one element of
+WIDTH models at once, from load to sum in registers.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ SHARED = ("bars", "bar_runs", "hinges", "hinge_runs", "hinge_group", "addresses"
 
 
 def lanes(models: Sequence[BarsHinges]) -> BarsHinges:
-    """A model with the topology of the first and the numbers of WIDTH models."""
+    """A model with the topology of the first and the values of WIDTH models."""
     numbers = [name for name in BarsHinges._fields if name not in SHARED]
     own = {name: side_by_side([getattr(model, name) for model in models]) for name in numbers}
     return models[0]._replace(**own)
@@ -46,14 +46,14 @@ def side_by_side(arrays: Sequence[NDArray]) -> NDArray:
 
 @inner_scalar
 def take(array, row, columns=3):
-    """The first three eights of a node or an element."""
+    """Load the three eights of a node or an element."""
     at = columns * WIDTH * np.int64(row)
     return eight(array, at), eight(array, at + WIDTH), eight(array, at + 2 * WIDTH)
 
 
 @inner_scalar
 def add(array, row, x, y, z):
-    """Add three eights to those of a node."""
+    """Add three eights to a node."""
     at = 3 * WIDTH * np.int64(row)
     increase(array, at, x)
     increase(array, at + WIDTH, y)
@@ -70,7 +70,7 @@ def increase(array, at, more):
 def add_bars(model, u, force, value, strain):
     """Add the forces of the bars at u to `force`, both (3 n WIDTH,).
 
-    value (WIDTH,) is scratch. Their strain energies (J) are added to strain[0], if there is one.
+    value (WIDTH,) is a work array. Adds strain energies (J) to strain[0], unless it is empty.
     """
     for run in range(model.bar_runs.shape[0]):
         code = model.bar_runs[run, 2]
@@ -106,9 +106,9 @@ def add_bars(model, u, force, value, strain):
 def add_hinges(model, position, force, angles, wrong, value, strain):
     """Add the forces of the hinges at the positions to `force`, both (3 n WIDTH,).
 
-    Models in which a hinge has passed through 0 or 360 degrees since the last angles, which are
-    updated, are `wrong` (WIDTH,) then. value (WIDTH,) is scratch. The strain energies (J) of group
-    g are added to strain[1 + g], if there is one.
+    Updates the angles, and marks models in which a hinge has passed through 0 or 360 degrees since
+    as `wrong` (WIDTH,). value (WIDTH,) is a work array. Adds strain energies (J) of group g to
+    strain[1 + g], unless it is empty.
     """
     hinges, p = model.hinges, model.hinge_parameters
     for run in range(model.hinge_runs.shape[0]):

@@ -1,16 +1,16 @@
-"""Forces whose work in a step is the change of a term's energy, of any term with an energy.
+"""Forces whose work in a step is the change of a term's energy, for any term with an energy.
 
-From u0 to u1 = u0 + du, with F the forces halfway and W the energy,
+From u0 to u1 = u0 + du, with F the forces at the midpoint and W the energy,
 
     f = F + (W1 - W0 - F . du - h P) du / |du|^2,
 
-P the power that the term puts in less the one that it dissipates (Gonzalez, J. Nonlinear Sci. 6,
-1996). What is made up along du, for all dofs of the term at once, is of third order in du. It has a
-resultant and a moment, so that momenta are not kept: terms that keep them have `mean_forces` of
-their own.
+P the power that the term puts in minus the power that it dissipates (Gonzalez, J. Nonlinear Sci. 6,
+1996). The correction along du, for all dofs of the term at once, is of third order in du. It has a
+resultant and a moment, so that momenta are not conserved: terms that conserve them have their own
+`mean_forces`.
 
-Hidden dofs have no inertia. With their forces halfway they would ring from step to step; with the
-mean of those at both ends they do not, and what that misses is made up along the displacements.
+Hidden dofs have no inertia. With midpoint forces they would oscillate from step to step; with the
+mean of the forces at both ends they do not, and the correction acts along the displacements.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from foldyn.mechanics.assembly import Assembly, Work
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.term import ENERGIES, FORCES, MEAN_FORCES, Compiled, Term, mean_forces
 
-NOISE = 16.0 * float(np.finfo(float).eps)  # of an energy: differences below that are rounding
+NOISE = 16.0 * float(np.finfo(float).eps)  # of an energy: smaller differences are rounding errors
 
 
 class _Context(NamedTuple):
     term: int  # its context,
     forces: int  # and its kernels
     energies: int
-    dofs: NDArray  # (d,) with mass, on which its forces depend
+    dofs: NDArray  # (d,) dofs with mass, on which its forces depend
     hidden: NDArray  # (r,)
-    found: NDArray  # (3, rows, 3) its forces halfway and, if it has hinges, at u0 and u1
+    found: NDArray  # (3, rows, 3) its forces at the midpoint and, if it has hinges, at u0 and u1
     middle: NDArray  # (rows, 3)
     speed: NDArray  # (rows, 3)
     energy: NDArray  # (groups,)
@@ -49,7 +49,7 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
     start, end, out = flat(rows_at(u0, rows)), flat(rows_at(u1, rows)), flat(rows_at(force, rows))
     for i in range(out.size):
         flat(middle)[i], flat(speed)[i] = 0.5 * (start[i] + end[i]), (end[i] - start[i]) / h
-    for k in range(found.shape[0]):  # last at the end, of which dihedrals stay
+    for k in range(found.shape[0]):  # the end is last, whose dihedrals remain
         place = middle if k == 0 else rows_at(u0 if k == 1 else u1, rows)
         found[k], own.powers[k] = 0.0, 0.0
         run_at(own.forces, (own.term, place, speed, t, found[k], own.powers[k]))
@@ -81,16 +81,16 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
 
 
 class MeanForces:
-    """Those of all terms of a body but contact, on a thread; it owns their contexts.
+    """Mean forces of all terms of a body except contact, on a thread; owns their contexts.
 
-    Contact, whose forces depend on what has touched before, has steps of its own.
+    Contact, whose forces depend on the history, has its own step forces.
 
     Attributes
     ----------
     context, kernel : ndarray, shape (k,)
         Addresses.
     powers : ndarray, shape (3,)
-        Work per time that forces without an energy put in, dissipate and lose to the air, W.
+        Powers that forces without energy put in, dissipate and lose to the air, W.
     """
 
     def __init__(self, body: Assembly, work: Work) -> None:

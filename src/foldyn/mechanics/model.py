@@ -1,12 +1,12 @@
-"""Bars and hinges as plain arrays: what the compiled kernels work on.
+"""Bars and hinges as plain arrays, for the compiled kernels.
 
-Elements stand sorted in runs of one law, so that the choice of the law is made once per block of
-elements, and within a run by their lowest node, so that neighbors in memory are neighbors in
-space. The lowest nodes are sorted by groups of 16 only: within a group, elements with the same
-lowest node stand apart, because a sum that has just been written makes the next addition wait.
+Elements are sorted into runs of one law, so that the law is selected once per block of elements,
+and within a run by their lowest node, so that neighbors in memory are neighbors in space. The
+lowest nodes are sorted by groups of 16 only: within a group, elements with the same lowest node are
+kept apart, because an addition to a sum that has just been written must wait.
 
-A structure numbers vertices before panel centers, so that neighbors on a large sheet stand far
-apart in memory; a long motion is computed with its nodes renumbered.
+A structure numbers vertices before panel centers, so that neighbors on a large sheet are far apart
+in memory; long motions therefore renumber the nodes.
 """
 
 from __future__ import annotations
@@ -40,18 +40,18 @@ class BarsHinges(NamedTuple):
     hinge_stiffness: NDArray  # (nh,) N m/rad, whole hinge
     hinge_rest: NDArray  # (nh,) rad
     hinge_parameters: NDArray  # (nh, 4)
-    hinge_share: NDArray  # (nh,) of its crease in small turns; the rest is its panels'
-    hinge_offset: NDArray  # (nh, 4) beside the dihedral, see `SheetTerm.series`
+    hinge_share: NDArray  # (nh,) share of the crease in small turns; the rest is the panels'
+    hinge_offset: NDArray  # (nh, 4) added to the dihedral, see `SheetTerm.series`
     hinge_group: NDArray  # (nh,) int64: energies are summed per group
     hinge_runs: NDArray  # (rh, 4) int64
     addresses: NDArray  # (na, 3) int64: compiled user laws (energy, response, slope)
 
 
 class Hinges(NamedTuple):
-    """Hinges of one group: rows (axis j, k, wings i, l), stiffness, rest angle and their law.
+    """Hinges of one group: rows (axis j, k, wings i, l), stiffness, rest angle and law.
 
-    parameters : (nh, 4) of each hinge, where they are not those that the law gives.
-    share : (nh,) of its crease in a turn (`materials.series`), where panels give way beside it.
+    parameters : (nh, 4) of each hinge, if they differ from the law's. share : (nh,) of the crease
+    in a turn (`materials.series`), if adjacent panels are compliant.
     """
 
     nodes: NDArray
@@ -63,7 +63,7 @@ class Hinges(NamedTuple):
 
 
 def element_order(nodes: NDArray) -> NDArray:
-    """Order (ne,) in which the elements of a run, rows of nodes (ne, k), stand in a model."""
+    """Order (ne,) of the elements of a run, rows of nodes (ne, k), in a model."""
     if not len(nodes):
         return np.zeros(0, np.int64)
     lowest = nodes.min(axis=1).astype(np.int64)
@@ -90,7 +90,7 @@ def build(
     vector = rest[bars[:, 1]] - rest[bars[:, 0]]
     bar_runs = [run(0, len(bars), law)]
 
-    # groups with equal laws share a run: fewer blocks, and neighbors in space side by side
+    # groups with equal laws share a run: fewer blocks, and spatial neighbors together
     members: list[list[int]] = []
     for number, group in enumerate(groups):
         same = [m for m in members if groups[m[0]].law == group.law]
@@ -111,7 +111,7 @@ def build(
         return np.ascontiguousarray(joined.reshape(shape), kind)
 
     return BarsHinges(
-        rest=np.ascontiguousarray(rest - rest.mean(axis=0)),  # far from the origin digits are lost
+        rest=np.ascontiguousarray(rest - rest.mean(axis=0)),  # digits are lost far from the origin
         bars=bars,
         bar_vector=np.ascontiguousarray(vector),
         bar_per_length2=1.0 / np.einsum("ij,ij->i", vector, vector),
@@ -132,10 +132,10 @@ def build(
 
 
 def node_order(model: BarsHinges) -> NDArray:
-    """Order (n,) of the nodes in which the numbers within an element differ little.
+    """Order (n,) of the nodes with small index differences within elements.
 
-    The reverse Cuthill-McKee order of the graph of bars, or the order as it is, if that is better.
-    Sweeping over a rectangular sheet along its edges halves the differences, but is no quicker.
+    The reverse Cuthill-McKee order of the bar graph, or the current order if that is better.
+    Sweeping over a rectangular sheet along its edges halves the differences, but is no faster.
     """
     n, (a, b) = len(model.rest), model.bars.astype(np.int64).T
     graph = sparse.csr_array((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), (n, n))
@@ -148,7 +148,7 @@ def node_order(model: BarsHinges) -> NDArray:
 def renumber(model: BarsHinges, order: NDArray) -> tuple[BarsHinges, NDArray]:
     """Model whose node k is node order[k] of `model`, and the old rows (nh,) of its hinges.
 
-    Laws, groups and parameters stay; elements are sorted anew within their runs.
+    Laws, groups and parameters stay; elements are sorted again within their runs.
     """
     number = ranks(order).astype(np.uint32)
     bars, hinges = number[model.bars], number[model.hinges]
@@ -178,6 +178,6 @@ def ranks(order: NDArray) -> NDArray:
 
 
 def _rows(nodes: NDArray, runs: NDArray) -> NDArray:
-    """Old rows of elements whose runs are sorted anew."""
+    """Old rows of elements after sorting within their runs."""
     parts = [start + element_order(nodes[start:end]) for start, end in runs[:, :2]]
     return np.concatenate([np.zeros(0, np.int64), *parts])

@@ -1,8 +1,8 @@
-"""Forces differentiated: what the weighted forces of a model change with, term by term.
+"""Pullback of forces: derivatives of the weighted forces of a model, term by term.
 
 For weights w and the forces F of a term at a state, a term's pullback adds the derivatives of w . F
 by the displacements (the tangent times w), by the velocities, and by each of the term's own arrays:
-stiffness, rest angles, rest positions. A solver needs nothing else for exact gradients: the adjoint
+stiffness, rest angles, rest positions. Solvers need nothing else for exact gradients: the adjoint
 method never forms the derivative of F by an array (Griewank and Walther, Evaluating Derivatives,
 2008, chapter 3).
 
@@ -31,10 +31,11 @@ pullback = addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS, ADDRESS)
 
 
 class Arrays(NamedTuple):
-    """What the forces of a term are made of.
+    """Arrays that the forces of a term depend on.
 
     numbers : float arrays that they depend on, by name.
-    layout : what must be equal between models that differ in these alone: nodes, runs, codes.
+    layout : arrays that must be equal in models that differ only in the numbers: nodes, runs,
+    codes.
     """
 
     numbers: Mapping[str, NDArray]
@@ -42,7 +43,7 @@ class Arrays(NamedTuple):
 
 
 class Pulled(NamedTuple):
-    """The pullback of a term, and the arrays to which it adds, named like `Arrays.numbers`."""
+    """Pullback of a term, and the arrays to which it adds, named like `Arrays.numbers`."""
 
     context: Context
     kernel: Addressed
@@ -50,7 +51,7 @@ class Pulled(NamedTuple):
 
 
 def arrays_of(model: Any, *but: str) -> Arrays:
-    """Arrays of a named tuple, those in named tuples within it among them, but for some."""
+    """Arrays of a named tuple, nested named tuples included, except some."""
     numbers: dict[str, NDArray] = {}
     layout: dict[str, NDArray] = {}
     for name, value in model._asdict().items():
@@ -75,7 +76,7 @@ class Pullbacks(NamedTuple):
 
 
 class Pullback:
-    """The forces of a body differentiated, on one thread.
+    """Pullback of a body's forces, on one thread.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ class Pullback:
     ----------
     terms : Pullbacks
     gradient : dict of ndarray
-        By the place of the term and the name of the array: "0.bar_stiffness".
+        Keys are the position of the term and the name of the array: "0.bar_stiffness".
 
     Raises
     ------
@@ -113,7 +114,7 @@ class Pullback:
             out[...] = 0.0
 
     def at(self, q: NDArray, weight: NDArray) -> NDArray:
-        """Add the gradients of weight . F at q to `gradient`; returns that by q, K weight (m,)."""
+        """Add the gradients of weight . F at q to `gradient`; returns K weight (m,)."""
         u, w = in_rows(q, self._rows), in_rows(weight, self._rows)
         still, product, rate = np.zeros((3, self._rows, 3))
         pull_all(self.terms, u, still, 0.0, w, product, rate)
@@ -135,7 +136,7 @@ def arrays_of_body(body: Any) -> Arrays:
 
 
 def not_differentiated(term: Any) -> str:
-    """What to say of a term that has no pullback."""
+    """Message for a term without pullback."""
     return (
         f"there are no gradients through {term.undifferentiated or type(term).__name__}; leave it "
         "out of the case, or vary it by fd.sweep"
@@ -143,7 +144,7 @@ def not_differentiated(term: Any) -> str:
 
 
 def refuse_lacking(what: str, lacks: Mapping[str, bool]) -> None:
-    """Refuse what has no gradients, as the modes of a case with contact, with a remedy."""
+    """Refuse features without gradients, such as the modes of a case with contact."""
     for lack, here in lacks.items():
         if here:
             raise InputError(
@@ -154,12 +155,12 @@ def refuse_lacking(what: str, lacks: Mapping[str, bool]) -> None:
 
 @inner_scalar
 def pulled_back(terms, u, v, t, weight, product, rate):
-    """Add the derivatives of weight . F at u, v and t by u and v to `product` and `rate`."""
+    """Add the derivatives of weight . F by u and v, at u, v and t, to `product` and `rate`."""
     for k in range(terms.context.size):
         run_at(terms.kernel[k], (terms.context[k], u, v, t, weight, product, rate))
 
 
 @kernel
 def pull_all(terms, u, v, t, weight, product, rate):
-    """The same for Python."""
+    """`pulled_back` for calls from Python."""
     pulled_back(terms, u, v, t, weight, product, rate)

@@ -1,4 +1,4 @@
-"""Triangles in plane stress whose displacements are quadratic: corners and middles of the sides.
+"""Triangles in plane stress with quadratic displacements: corners and side midpoints.
 
 Eight models of one topology at once, as in `mechanics.lanes`.
 """
@@ -15,7 +15,7 @@ MIDDLES = 0.5 * (np.ones((3, 3)) - np.eye(3))  # of the sides: three points inte
 
 
 def products() -> NDArray:
-    """Integrals (6, 2, 6, 2) of the products of the shapes' slopes, over twice the area.
+    """Integrals (6, 2, 6, 2) of products of shape function slopes, over twice the area.
 
     In the coordinates that are 1 at the second and at the third corner.
     """
@@ -33,7 +33,7 @@ PRODUCTS = products()
 
 
 def squares(corners: NDArray, stiffness: NDArray) -> NDArray:
-    """Products (nt, 4, 4, 8) of the slopes of the coordinates, integrated: for `add_triangles`.
+    """Slope products (nt, 4, 4, 8) of the coordinates, integrated, for `add_triangles`.
 
     corners : (nt, 3, 2, 8), counter-clockwise.
     stiffness : (nt, 8) E t/(1 - nu^2).
@@ -46,7 +46,7 @@ def squares(corners: NDArray, stiffness: NDArray) -> NDArray:
 
 @inner_scalar
 def turned(products, a, b, numbers, at):
-    """The sum of four products of slopes at two points of a triangle."""
+    """Sum of four slope products at two points of a triangle."""
     return (
         products[a, 0, b, 0] * eight(numbers, at)
         + products[a, 0, b, 1] * eight(numbers, at + COUNT)
@@ -60,9 +60,9 @@ def add_triangles(elements, starts, places, shapes, squares, products, ratio, nu
     """Add the stiffness of triangles to `numbers`.
 
     elements : (nt, 6) their points.
-    starts : (n + 1,) of the points' displacements by unknowns, two eights in `shapes` for each.
-    places : of the entries of all triangles in turn, for ordered pairs of points and of their
-        unknowns, in `numbers`; negative where there is none, as in one of both halves.
+    starts : (n + 1,) start of each point's unknowns; each has two eights in `shapes`.
+    places : positions in `numbers` of the entries of all triangles in turn, for ordered pairs of
+    points and of their unknowns; negative for entries to skip, such as one of both halves.
     squares, ratio : see `squares`; (8,) Poisson's ratio.
     """
     nu, k = eight(ratio, 0), 0

@@ -1,4 +1,4 @@
-"""Entries that are added to sparse matrices, again and again at the same places."""
+"""Entries added to sparse matrices repeatedly at the same places."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from foldyn.mechanics.tangent import distinct
 
 
 class Slots:
-    """Where entries at rows and columns (k,) stand in matrices, most of which have one pattern."""
+    """Positions of entries at rows and columns (k,) in matrices that mostly share a pattern."""
 
     def __init__(self, row: NDArray, column: NDArray) -> None:
         self._row, self._column = row.astype(np.int64), column.astype(np.int64)
-        self._found: tuple[NDArray, ...] = ()  # pattern of the last matrix, and what follows
+        self._found: tuple[NDArray, ...] = ()  # pattern of the last matrix, and derived data
 
     def added(self, matrix: sparse.csr_array, entries: NDArray) -> sparse.csr_array:
         """The matrix, changed, or a fuller one, with entries (k,) added."""
@@ -35,7 +35,7 @@ class Slots:
         return matrix
 
     def _find(self, indices: NDArray, indptr: NDArray) -> tuple[NDArray, ...]:
-        """Pattern of the sum, and slots there of what is in the matrix and of what is added."""
+        """Pattern of the sum, and slots in it of the matrix and of the added entries."""
         size = len(indptr) - 1
         own = np.repeat(np.arange(size), np.diff(indptr)) * size + indices
         new = self._row * size + self._column

@@ -1,8 +1,8 @@
 """Springs between nodes, and from nodes to the ground.
 
-A spring is of one of two kinds. A directed one pulls with k (u_a - u_b) . d along a direction d
-that stays; without b its foot stands on the ground, in space. An axial one pulls with k (l - l0)
-along the current line between its ends.
+There are two kinds of springs. A directed spring pulls with k (u_a - u_b) . d along a fixed
+direction d; without b it is attached to the ground. An axial spring pulls with k (l - l0) along the
+current line between its ends.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from foldyn.mechanics.term import (
 )
 
 GROUP = "strain_springs"
-GROUND = -1  # row of a foot that stands still
+GROUND = -1  # stands for an end on the ground
 
 
 class Springs(NamedTuple):
@@ -48,7 +48,7 @@ class Springs(NamedTuple):
     axial_ends: NDArray  # (a, 2)
     vector: NDArray  # (a, 3) from the first end to the second at rest, m
     length: NDArray  # (a,) its length, m
-    stretch: NDArray  # (a,) how much longer that is than the spring without force, m
+    stretch: NDArray  # (a,) length in excess of the force-free length, m
     axial_stiffness: NDArray  # (a,) N/m
 
 
@@ -65,7 +65,7 @@ def directed_extension(springs, u, s):
 
 @inner_scalar
 def axial_extension(springs, u, s):
-    """l - l0 of an axial spring, and l, m; from displacements, so that nothing cancels."""
+    """l - l0 of an axial spring, and l, m; from displacements, to avoid cancellation."""
     a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
     length, x = springs.length[s], 0.0
     for c in range(3):
@@ -78,7 +78,7 @@ def axial_extension(springs, u, s):
 
 @inner_scalar
 def axial_pull(springs, u, s):
-    """Pull (N/m) of an axial spring per length between its ends; k where they may meet."""
+    """Force over length (N/m) of an axial spring; k if its ends may meet."""
     extension, length = axial_extension(springs, u, s)
     per_length = springs.axial_stiffness[s]
     if springs.stretch[s] < springs.length[s]:
@@ -88,7 +88,7 @@ def axial_pull(springs, u, s):
 
 @inner_scalar
 def add_directed(springs, s, pull, force):
-    """Add the pull (N) of a directed spring to the forces of its ends."""
+    """Add the force `pull` (N) of a directed spring to its ends."""
     a, b = springs.ends[s, 0], springs.ends[s, 1]
     for c in range(3):
         force[a, c] += pull * springs.direction[s, c]
@@ -98,7 +98,7 @@ def add_directed(springs, s, pull, force):
 
 @inner
 def add_spring_forces(springs, u, force):
-    """Add the forces of springs to those of the nodes."""
+    """Add spring forces to the nodal forces."""
     for s in range(springs.stiffness.size):
         pull = springs.stiffness[s] * directed_extension(springs, u, s)
         add_directed(springs, s, pull, force)
@@ -144,13 +144,13 @@ def spring_energy(springs, u):
 
 @kernel
 def axial_blocks(springs, u, loose):
-    """Derivative (a, 3, 3), N/m, of the forces of axial springs; `loose`: without their force."""
+    """Derivative (a, 3, 3), N/m, of axial spring forces; `loose`: without geometric part."""
     out = np.empty((springs.axial_stiffness.size, 3, 3))
     for s in range(springs.axial_stiffness.size):
         a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
         extension, length = axial_extension(springs, u, s)
         across, along = 1.0, 1.0
-        if springs.stretch[s] < springs.length[s]:  # else it is k in all directions
+        if springs.stretch[s] < springs.length[s]:  # otherwise it is k in all directions
             across = 0.0 if loose else extension / length
         for p in range(3):
             x = springs.vector[s, p] + u[b, p] - u[a, p]
@@ -164,7 +164,7 @@ def axial_blocks(springs, u, loose):
 
 
 class Gradient(NamedTuple):
-    """Derivatives by arrays of `Springs` of the same names."""
+    """Gradients with respect to arrays of `Springs`."""
 
     direction: NDArray
     stiffness: NDArray
@@ -190,20 +190,20 @@ def pull_directed(springs, u, weight, out, product):
 
 @inner
 def pull_axial(springs, u, weight, out, product):
-    """The same of axial springs, those without length at rest as they are if that grows."""
+    """Add the derivatives of weight . F of axial springs to `product` and the gradients."""
     for s in range(springs.axial_stiffness.size):
         a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
         extension, length = axial_extension(springs, u, s)
         share = 1.0  # force over k l
         if springs.stretch[s] < springs.length[s]:
             share = extension / length
-        grown = 0.0  # what the ends part by where they move by the weights, times l
+        grown = 0.0  # rate of the ends' separation for velocities equal to the weights, times l
         for c in range(3):
             x = springs.vector[s, c] + u[b, c] - u[a, c]
             grown += (weight[b, c] - weight[a, c]) * x
         k = springs.axial_stiffness[s]
         by_extension = k * grown / length if length > 0.0 else 0.0
-        by_length = by_extension * (1.0 - share)  # l, of which the extension is a part
+        by_length = by_extension * (1.0 - share)  # by l, on which the extension depends
         out.axial_stiffness[s] += share * grown
         out.stretch[s] += by_extension
         if length > 0.0:
@@ -221,7 +221,7 @@ def pull_axial(springs, u, weight, out, product):
 class _Backward(NamedTuple):
     springs: Springs
     out: Gradient
-    rows: int  # up to the last node
+    rows: int  # number of rows up to the last node
 
 
 @pullback
@@ -235,7 +235,7 @@ def _pullback(own, u, v, t, weight, product, rate):
 
 class _Context(NamedTuple):
     springs: Springs
-    group: int  # of the energies
+    group: int  # energy group
     rows: int
 
 
@@ -256,7 +256,7 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
 
 
 class SpringsTerm(Term):
-    """Springs, with a group of energy of their own.
+    """Springs as a term, with their own energy group.
 
     Parameters
     ----------
@@ -269,16 +269,16 @@ class SpringsTerm(Term):
         self.springs = springs
 
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-        """See `Term`."""
+        """Context and kernels for a thread; see `Term`."""
         own = Context(_Context(self.springs, group, int(work.strips.own[1])))
         return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     def arrays(self) -> Arrays:
-        """See `Term`."""
+        """Arrays that its forces depend on; see `Term`."""
         return arrays_of(self.springs)
 
     def pulled(self) -> Pulled:
-        """See `Term`."""
+        """Pullback of its forces; see `Term`."""
         rows = 1 + int(self._ends.max(initial=GROUND))
         out = Gradient(*(np.zeros_like(getattr(self.springs, name)) for name in Gradient._fields))
         own = Context(_Backward(self.springs, out, rows))
@@ -286,33 +286,33 @@ class SpringsTerm(Term):
 
     @cached_property
     def _ends(self) -> NDArray:
-        """Ends (s, 2) of all, directed and axial."""
+        """Ends (s, 2) of all springs, directed and axial."""
         return np.concatenate([self.springs.ends, self.springs.axial_ends])
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:
-        """See `Term`."""
+        """Rows and columns (k,) of its tangent entries; see `Term`."""
         return places_of(pairs_of_ends(self._ends))
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
-        """See `Term`."""
+        """Tangent entries (k,), N/m; see `Term`."""
         return self._entries(q, loose=False)
 
     def _entries(self, q: NDArray, loose: bool) -> NDArray:
-        """The same; loose : without the forces of axial springs."""
+        """Tangent entries; loose : without the geometric part of axial springs."""
         stiffness, direction = self.springs.stiffness, self.springs.direction
         along = np.einsum("s,sa,sb->sab", stiffness, direction, direction)
         axial = axial_blocks(self.springs, nodal(q), loose)
         return blocks_of_ends(self._ends, np.concatenate([along, axial])).ravel()
 
     def unstrained(self, q: NDArray) -> Unstrained:
-        """See `Term`."""
+        """The model without strain at q; see `Term`."""
         size = (q.size, q.size)
         tangent = sparse.csr_array(sparse.coo_array((self._entries(q, True), self.places), size))
         return Unstrained(tangent, sparse.csr_array(size), partial(self._stretch, self._lines(q)))
 
     def _lines(self, q: NDArray) -> NDArray:
-        """Unit vectors (s, 3) along all springs; zero for those that pull in all directions."""
+        """Unit vectors (s, 3) along all springs; zero for springs that pull in all directions."""
         ends, springs, u = self.springs.axial_ends, self.springs, nodal(q)
         apart = springs.vector + u[ends[:, 1]] - u[ends[:, 0]]
         apart[springs.stretch == springs.length] = 0.0
@@ -320,7 +320,7 @@ class SpringsTerm(Term):
         return np.concatenate([springs.direction, apart / np.where(length > 0.0, length, 1.0)])
 
     def _stretch(self, lines: NDArray, motion: NDArray) -> float:
-        """As `Unstrained.stretch`, along lines (s, 3)."""
+        """Stretch for `Unstrained.stretch`, along lines (s, 3)."""
         ends, u, springs = self._ends, nodal(motion), self.springs
         first, second = u[ends[:, 0]], np.where(ends[:, 1:] < 0, 0.0, u[ends[:, 1]])
         stiffness = np.concatenate([springs.stiffness, springs.axial_stiffness])
@@ -330,20 +330,20 @@ class SpringsTerm(Term):
         return np.sqrt(float((stiffness * along**2).sum()) / whole) if whole > 0.0 else 0.0
 
     def add_scale(self, scale: NDArray) -> None:
-        """See `Term`; axial springs count as bars do."""
+        """Add force scales of axial springs, as for bars; see `Term`."""
         ends, force = self.springs.axial_ends, self.springs.axial_stiffness * self.springs.length
         np.add.at(scale, 3 * ends[:, :, None] + np.arange(3), force[:, None, None])
 
     def holds(self, q: NDArray) -> sparse.csr_array:
-        """See `Term`: directed ones along their directions."""
+        """Internal constraints: directed springs hold their directions; see `Term`."""
         ends, direction = self.springs.ends, self.springs.direction
         grounded = ends[:, 1:] < 0
         entries = np.concatenate([direction, np.where(grounded, 0.0, -direction)], axis=1)
         return unit_rows(np.where(grounded, ends[:, :1], ends), entries, q.size)
 
     def placed(self, order: NDArray, before: Any) -> SpringsTerm:
-        """See `Term`."""
-        rank, springs = np.append(ranks(order), GROUND), self.springs  # that of the ground stays
+        """The term with nodes in memory order; see `Term`."""
+        rank, springs = np.append(ranks(order), GROUND), self.springs  # the ground keeps its index
         return SpringsTerm(
             springs._replace(ends=rank[springs.ends], axial_ends=rank[springs.axial_ends])
         )

@@ -1,20 +1,19 @@
-"""Tangent for steps of Newton's method: floored slopes, and bar stresses that it can use.
+"""Tangent for Newton steps: floored slopes, and bar stresses suited to them.
 
-As a sheet bends, panels turn far while their bars hardly stretch. A step of Newton's method moves
-nodes along straight lines, which stretches turning bars to second order, and the huge spurious
-stresses would sit in the geometric stiffness of the next step: convergence would be slow, worse so
-the more slender the sheet. If the bars' stresses are unknowns of their own, Newton's method for
-both gives, after these are eliminated, the same equations for the displacements but with a
-geometric stiffness from
+As a sheet bends, panels turn far while their bars hardly stretch. A Newton step moves nodes along
+straight lines, which stretches turning bars to second order, and the huge spurious stresses would
+enter the geometric stiffness of the next step: convergence would be slow, and the slower the more
+slender the sheet. With the bar stresses as additional unknowns, Newton's method for both gives,
+after their elimination, the same equations for the displacements but with a geometric stiffness
+from
 
     S = S(u0) + S'(u0) (D0 . d) / L^2,    d the step from u0 to u of a bar with vector D0,
 
-which knows nothing of the second order (Magisano, Leonetti and Garcea, Comput. Methods Appl. Mech.
-Eng. 313, 2017). The residual is that of the displacements and never sees any of this, so the
-solution is the same, and convergence is quadratic as before.
+without the second-order error (Magisano, Leonetti and Garcea, Comput. Methods Appl. Mech. Eng. 313,
+2017). The residual remains the residual of the displacements, so the solution is the same, and
+convergence is still quadratic.
 
-Implicit motions take the tangent as 3x3 blocks, in an order of the dofs that keeps their matrix
-narrow.
+Implicit motions use the tangent as 3x3 blocks, in a dof order with a small bandwidth.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ from foldyn.mechanics.model import BarsHinges, node_order, ranks
 from foldyn.mechanics.sheet_term import SheetTerm
 from foldyn.mechanics.tangent import Sparsity, add_tangent, add_to_bar, block_keys, sparsity
 
-FLOOR = 1e-3  # of a hinge's stiffness: its least slope in steps, as in MERLIN2
+FLOOR = 1e-3  # of a hinge's stiffness: least slope in Newton steps, as in MERLIN2
 
 
 def put_tangent(
@@ -60,7 +59,7 @@ def put_mean_tangent(
     model: BarsHinges, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray,
     before: NDArray, again: bool, out: NDArray,
 ) -> None:  # fmt: skip
-    """Blocks likewise of the mean forces from u0, where the dihedrals are `angle` (nh,), to u1."""
+    """Blocks of the mean forces from u0, with dihedrals `angle` (nh,), to u1; see `put_tangent`."""
     start, end = np.empty((2, len(model.bars)))
     expected_stress(model, u0, u0, False, start)
     expected_stress(model, u1, before, again, end)
@@ -70,9 +69,9 @@ def put_mean_tangent(
 
 
 def add_floored_tangent(model: BarsHinges, pattern: Sparsity, u: NDArray, out: NDArray) -> None:
-    """Add tangent blocks with slopes of the built-in laws of at least `FLOOR` times the stiffness.
+    """Add tangent blocks; built-in laws have slopes of at least `FLOOR` times the stiffness.
 
-    Those of a user's law, which may fall on purpose, stay.
+    Slopes of user laws, which may be meant to fall, are kept.
     """
     runs = model.hinge_runs
     own = runs[:, 2] < 0
@@ -84,7 +83,7 @@ def add_floored_tangent(model: BarsHinges, pattern: Sparsity, u: NDArray, out: N
 
 @kernel
 def expected_stress(model, u, before, again, out):
-    """Stress S / E_y of the bars (nb,) at `before`, or `again` extrapolated from there to u."""
+    """Stress S / E_y of the bars (nb,) at `before`; with `again`, extrapolated from there to u."""
     for run in range(model.bar_runs.shape[0]):
         code, address = model.bar_runs[run, 2], model.addresses[model.bar_runs[run, 3]]
         for e in range(model.bar_runs[run, 0], model.bar_runs[run, 1]):
@@ -101,7 +100,7 @@ def expected_stress(model, u, before, again, out):
 
 @kernel
 def _replace_stress(model, u, stress, slots, data):
-    """Replace the bars' stresses in blocks at u by `stress` (nb,)."""
+    """Replace the bar stresses in blocks at u by `stress` (nb,)."""
     for run in range(model.bar_runs.shape[0]):
         code, address = model.bar_runs[run, 2], model.addresses[model.bar_runs[run, 3]]
         for e in range(model.bar_runs[run, 0], model.bar_runs[run, 1]):
@@ -125,31 +124,31 @@ class BarsHingesBlocks:
         self, of: SheetTerm, pattern: Sparsity, u: NDArray, before: NDArray, again: bool,
         out: NDArray,
     ) -> None:  # fmt: skip
-        """See `Blocks`."""
+        """Fill blocks with the tangent; see `Blocks.put`."""
         put_tangent(of.model, pattern, u, before, again, out)
 
     def put_mean(
         self, of: SheetTerm, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray,
         before: NDArray, again: bool, out: NDArray,
     ) -> None:  # fmt: skip
-        """See `Blocks`."""
+        """Fill blocks with the derivative of the mean forces; see `Blocks.put_mean`."""
         put_mean_tangent(of.model, pattern, u0, u1, angle, before, again, out)
 
     def filled(self, pattern: Sparsity) -> NDArray:
-        """See `Blocks`."""
+        """Mask of the entries that `put` may fill; see `Blocks.filled`."""
         return np.ones((len(pattern.indices), 3, 3), bool)
 
 
 class SparseBlocks:
-    """Blocks of any sparse tangent, with hidden dofs three to a row.
+    """Blocks of any sparse tangent, with hidden dofs grouped by three.
 
     Parameters
     ----------
     tangent : csr_array, shape (m, m)
-        Where its entries are: those of `SheetTerm.step_tangent`, in their order.
+        Its sparsity, with the entries of `SheetTerm.step_tangent` in the same order.
     rows : int
     position : ndarray, shape (3 rows, 3)
-        Where the dofs are, m.
+        Positions of the dofs, m.
     """
 
     def __init__(self, tangent: sparse.csr_array, rows: int, position: NDArray) -> None:
@@ -174,7 +173,7 @@ class SparseBlocks:
         self, of: SheetTerm, pattern: Sparsity, u: NDArray, before: NDArray, again: bool,
         out: NDArray,
     ) -> None:  # fmt: skip
-        """See `Blocks`."""
+        """Fill blocks with the tangent; see `Blocks.put`."""
         out[:] = 0.0
         matrix = of.step_tangent(u, before if again else None)
         out.reshape(-1)[self._places(pattern)] = matrix.data
@@ -183,19 +182,19 @@ class SparseBlocks:
         self, of: SheetTerm, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray,
         before: NDArray, again: bool, out: NDArray,
     ) -> None:  # fmt: skip
-        """See `Blocks`."""
+        """Fill blocks with the derivative of the mean forces; see `Blocks.put_mean`."""
         out[:] = 0.0
         matrix = of.mean_tangent(u0, u1, angle, before, again)
         out.reshape(-1)[self._places(pattern)] = matrix.data
 
     def filled(self, pattern: Sparsity) -> NDArray:
-        """See `Blocks`; three dofs that share a row of blocks may lie far apart."""
+        """Mask of the entries that `put` may fill: three dofs of a row may lie far apart."""
         filled = np.zeros((len(pattern.indices), 3, 3), bool)
         filled.reshape(-1)[self._places(pattern)] = True
         return filled
 
     def _places(self, pattern: Sparsity) -> NDArray:
-        """Where the entries stand among those of a pattern's blocks."""
+        """Positions of the entries in the blocks of a pattern."""
         if self._place is None or self._place[0] is not pattern:
             keys, rows = block_keys(pattern.indptr, pattern.indices), len(pattern.indptr) - 1
             block = np.searchsorted(keys, self._row // 3 * rows + self._column // 3)
@@ -204,7 +203,7 @@ class SparseBlocks:
 
 
 def narrowest(order: NDArray, position: NDArray, row: NDArray, column: NDArray) -> NDArray:
-    """`order` of places (n,), or a sweep along an axis if it couples none as far apart.
+    """`order` of places (n,), or a sweep along an axis if that has a smaller bandwidth.
 
     On a rectangular sheet a sweep along its longer side has half the width of other orders.
 
@@ -212,7 +211,7 @@ def narrowest(order: NDArray, position: NDArray, row: NDArray, column: NDArray) 
     row, column : places that are coupled.
     """
     size = np.ptp(position, axis=0).max()
-    x, y, z = np.round(position / size, 6).T  # so that rows of nodes are straight
+    x, y, z = np.round(position / size, 6).T  # makes rows of nodes straight
     sweeps = [np.lexsort(keys) for keys in ((z, y, x), (z, x, y), (y, x, z))]
 
     def width(order: NDArray) -> int:

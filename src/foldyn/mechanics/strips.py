@@ -1,16 +1,16 @@
-"""The order in which the force kernel passes over a sheet: strip after strip of nodes.
+"""Order in which the force kernel passes over a sheet: strip after strip of nodes.
 
 With nodes numbered along the sheet (`model.renumber`) an element's nodes have numbers close to its
-lowest one. A kernel that takes the elements in the order of their lowest nodes then needs the
-nodal values of a narrow window only. They are copied to buffers that stay in the cache, used round
-and round: node i has the row i & mask. Once all elements with lowest nodes up to i are done,
-the force on node i is finished and leaves its buffer.
+lowest one. A kernel that takes the elements in the order of their lowest nodes then needs the nodal
+values of a narrow window only. They are copied to ring buffers that stay in the cache: node i has
+the row i & mask. Once all elements with lowest nodes up to i are done, the force on node i is
+finished and leaves its buffer.
 
 Threads cut the sheet across. An element belongs to the thread that owns its lowest node. The last
 strip of a thread reaches into the nodes of the next one: all threads do these edge strips first,
 leave the sums in the force array, wait for each other and go on with their other strips, which
-touch nodes of their own only; there the sums of the edge strips are added. So the order of
-summation does not depend on which thread is quicker.
+touch only their own nodes; there the sums of the edge strips are added. So the order of summation
+does not depend on the threads' speed.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ class Strips(NamedTuple):
 
     own: NDArray  # (2,) nodes whose force the thread finishes
     lowest: NDArray  # (s, 2) lowest nodes of the strip's elements
-    fresh: NDArray  # (s, 2) nodes that it is the first to touch
-    finished: NDArray  # (s, 2) nodes whose sums leave the buffer after it
-    adds: NDArray  # (s,) 1 if they are added to those of an edge strip
-    edge: int  # strips before the threads wait for each other: 0 or 1
+    fresh: NDArray  # (s, 2) nodes that it touches first
+    finished: NDArray  # (s, 2) nodes whose sums leave the buffer after the strip
+    adds: NDArray  # (s,) 1 if they are added to the sums of an edge strip
+    edge: int  # number of strips before the threads wait for each other: 0 or 1
     rows: int  # of the buffers
     mask: int
 
@@ -51,13 +51,13 @@ def reach(model: BarsHinges) -> int:
 def shares(model: BarsHinges, threads: int) -> NDArray:
     """First nodes (threads + 1,) of shares of equal work, and the number of nodes.
 
-    There are fewer shares than asked for if elements reach too far.
+    There are fewer shares than requested if elements reach too far.
     """
     n = len(model.rest)
     if threads <= 1:
         return np.array([0, n])
     width = _rounded(reach(model))
-    work = np.full(n, 2)  # in bars: a hinge is two, and so are the vector operations of a node
+    work = np.full(n, 2)  # in bars: a hinge counts two, and so do a node's vector operations
     for nodes, cost in ((model.bars, 1), (model.hinges, 2)):
         work += cost * np.bincount(np.minimum.reduce(nodes.T), minlength=n)
     done = np.cumsum(work)
@@ -70,9 +70,9 @@ def shares(model: BarsHinges, threads: int) -> NDArray:
 
 
 def strips(model: BarsHinges, threads: int = 1, window: int = WINDOW) -> list[Strips]:
-    """Strips of each thread; fewer threads than asked for if elements reach too far."""
+    """Strips of each thread; fewer threads than requested if elements reach too far."""
     n = len(model.rest)
-    whole = threads == 1 and n <= window  # one strip
+    whole = threads == 1 and n <= window  # a single strip
     width = 0 if whole else _rounded(reach(model))
     window = max(window, 2 * _power(width))
     step, rows = (window - width, window) if n > window else (max(n, 1), n)
@@ -111,10 +111,10 @@ def _of_thread(a: int, b: int, n: int, width: int, step: int) -> Strips:
 
 
 def _power(count: int) -> int:
-    """Smallest power of two that is not below `count`."""
+    """Smallest power of two that is at least `count`."""
     return 1 << max(count - 1, 0).bit_length()
 
 
 def _rounded(count: int) -> int:
-    """Smallest multiple of GROUP that is not below `count`."""
+    """Smallest multiple of GROUP that is at least `count`."""
     return -(-count // GROUP) * GROUP

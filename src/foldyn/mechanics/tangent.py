@@ -17,7 +17,7 @@ from foldyn.mechanics.model import BarsHinges
 
 
 class Sparsity(NamedTuple):
-    """Where each element's 3x3 blocks stand in the block sparse matrix (rows of node pairs)."""
+    """Positions of each element's 3x3 blocks in the block sparse matrix (rows of node pairs)."""
 
     indptr: NDArray  # (n + 1,)
     indices: NDArray  # (nnz,)
@@ -38,7 +38,7 @@ def distinct(keys: NDArray) -> NDArray:
 
 
 def entry_slots(pattern: Sparsity, row: NDArray, column: NDArray) -> NDArray:
-    """Where entries (k,) at dofs stand among those of the blocks of a pattern, all flat."""
+    """Flat positions of entries (k,) at dofs among the block entries of a pattern."""
     keys, rows = block_keys(pattern.indptr, pattern.indices), len(pattern.indptr) - 1
     block = np.searchsorted(keys, row // 3 * rows + column // 3)
     return (9 * block + 3 * (row % 3) + column % 3).astype(np.int32)
@@ -63,7 +63,7 @@ def sparsity(model: BarsHinges) -> Sparsity:
 
 
 def joined(pattern: Sparsity, more: NDArray) -> Sparsity:
-    """Pattern with further blocks too, by their numbers as `block_keys` has them."""
+    """Pattern with additional blocks, numbered as in `block_keys`."""
     rows, own = len(pattern.indptr) - 1, block_keys(pattern.indptr, pattern.indices)
     both = distinct(np.concatenate([own, more]))
     moved = np.searchsorted(both, own)
@@ -77,7 +77,7 @@ def joined(pattern: Sparsity, more: NDArray) -> Sparsity:
 
 @inner_scalar
 def add_to_bar(data, slots, e, p, q, value):
-    """Add an entry (p, q) to the blocks of both ends of a bar, and its negative between them."""
+    """Add a value to entry (p, q) of both end blocks of a bar; subtract it between them."""
     data[slots[e, 0, 0], p, q] += value
     data[slots[e, 1, 1], p, q] += value
     data[slots[e, 0, 1], p, q] -= value
@@ -86,7 +86,7 @@ def add_to_bar(data, slots, e, p, q, value):
 
 @inner_scalar
 def add_to_hinge(data, slots, e, block, slope, turning, turned):
-    """Add `block` (4, 3, 4, 3) and slope times two gradients (4, 3) to the blocks of a hinge."""
+    """Add `block` (4, 3, 4, 3) plus slope times two gradients (4, 3) to a hinge's blocks."""
     for v in range(4):
         for w in range(4):
             slot = slots[e, v, w]

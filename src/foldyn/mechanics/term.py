@@ -1,10 +1,10 @@
-"""Terms of a model: what adds to its energy and forces, called by address.
+"""Terms of a model: contributions to its energy and forces, called by address.
 
-A model is a flat list of terms (`mechanics.assembly`). Each is a `Term`, which tells solvers its
-tangent and what else they ask, and compiles itself: a context, a named tuple of all that it works
-with (`jit.context`), and kernels of fixed signatures, each compiled once for a kind of term. They
-reach loops as data, by their addresses, so that a loop is compiled once, not once for every
-combination of terms. A kernel that a term lacks has the address 0.
+A model is a flat list of terms (`mechanics.assembly`). Each is a `Term`, which gives solvers its
+tangent and other properties, and compiles itself into a context, a named tuple of its data
+(`jit.context`), and kernels of fixed signatures, each compiled once per kind of term. Loops receive
+kernels as data, by address, so that a loop is compiled once, not once for every combination of
+terms. A missing kernel has the address 0.
 
 Arrays reach a kernel by their addresses, as `rows_at` and `numbers_at` find them: u, v and force
 are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of the context:
@@ -59,7 +59,7 @@ from foldyn.values import writable
     FORCES, ENERGIES, LIMIT, PLACE_OBSTACLES, ADVANCE_CLOCK, COMMIT, DISSIPATED, BRANCH_STATES,
     STEP_ERROR,
 ) = EVERY = range(9)  # fmt: skip
-MEAN_FORCES = 9  # of `dynamics.energy_momentum` alone
+MEAN_FORCES = 9  # only for `dynamics.energy_momentum`
 ADDRESS, NUMBER = types.int64, types.float64
 Way = tuple[NDArray, NDArray]  # states: from one, stresses are extrapolated to the other
 
@@ -78,11 +78,11 @@ PARTS = {
     "damping": {"damping_places", "damping_entries"},
     "gradients": {"arrays", "pulled"},
 }
-WHOLE = {"stiffness": "tangent", "damping": "damping"}  # what may stand for both parts
+WHOLE = {"stiffness": "tangent", "damping": "damping"}  # may replace both parts
 
 
 class Compiled(NamedTuple):
-    """A term as loops see it: its context, and its kernels by what they do."""
+    """A term as compiled loops see it: its context, and its kernels by kind."""
 
     context: Context
     kernels: Mapping[int, Addressed]
@@ -93,7 +93,7 @@ class Unstrained(NamedTuple):
 
     tangent: sparse.csr_array  # (m, m)
     hinges: sparse.csr_array  # (m, m) of the hinges alone
-    stretch: Callable[[NDArray], float]  # of bars in a motion (m,), over what their ends could do
+    stretch: Callable[[NDArray], float]  # bar elongation in a motion (m,), over the possible one
 
 
 class Strains(NamedTuple):
@@ -103,36 +103,37 @@ class Strains(NamedTuple):
     vector: NDArray  # (p, 3) from the first to the second at rest, m
     bar_stiffness: NDArray  # (p,) N/m
     hinges: NDArray  # (h, 4) nodes: axis j, k, wings i, l
-    corners: NDArray  # (h, 4, 3) where they are at rest, m
+    corners: NDArray  # (h, 4, 3) rest positions, m
     hinge_stiffness: NDArray  # (h,) N m/rad
-    membranes: tuple[Any, ...] = ()  # `membranes.Membranes`, of panels of one kind each
+    membranes: tuple[Any, ...] = ()  # `membranes.Membranes`, one per kind of panel
 
 
 class Term(ABC):
-    """What adds to the energy and the forces of a sheet: springs, contact, hinges with memory.
+    """Base class of contributions to energy and forces: springs, contact, hinges with memory.
 
-    A term never changes but for memory that is said to; what makes another one of it leaves it as
-    it was. It must have `compiled`, and `places` and `entries` or, if it damps, `damping_places`
-    and `damping_entries`; if it has gradients, `arrays` and `pulled`. A class that lacks one of
-    these is refused when it is defined. Other defaults are those of a term on the nodes without
-    anything else. Dofs q are (m,), as in `mechanics.assembly`, or arrays (rows, 3).
+    A term is immutable, except for memory that is documented to change; methods that derive another
+    term leave it unchanged. A term must define `compiled`, and `places` and `entries` or, if it
+    damps, `damping_places` and `damping_entries`; if it has gradients, `arrays` and `pulled`. A
+    class that lacks one of these is refused at its definition. Other defaults suit a term on the
+    nodes without hinges and hidden dofs. Dofs q are (m,), as in `mechanics.assembly`, or arrays
+    (rows, 3).
 
     Attributes
     ----------
     energy_groups : mapping of str to str
-        Energies that are its own, and what they are; none where it adds to those of others.
+        Its own energy groups, with descriptions; empty if it adds to groups of other terms.
     of_hinges : bool
-        Whether its forces are moments of hinges, which are at play even where all is at rest.
+        Whether its forces are hinge moments, which are at play even at rest.
     shared : bool
-        Whether threads may share a model with it.
+        Whether threads may share a model with this term.
     owns_hidden : bool
-        Whether some of the hidden dofs are its own.
+        Whether it owns some of the hidden dofs.
     damps : bool
-        Whether its forces resist velocities, and dissipate all their work, or give it to the air.
+        Whether its forces resist velocities, and all their work is dissipated or lost to the air.
     undifferentiated : str
-        What it is called where gradients are refused, of a term that has no `pulled`.
+        Name for messages that refuse gradients, for a term without `pulled`.
     without : tuple of str
-        "stiffness" or "damping" where its forces have some that solvers find elsewhere, or none.
+        "stiffness" or "damping" if solvers obtain it elsewhere, or there is none.
     """
 
     energy_groups: ClassVar[Mapping[str, str]] = {}
@@ -144,11 +145,11 @@ class Term(ABC):
     without: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Refuse a kind of term that lacks a part: solvers would take it for zero."""
+        """Refuse a term class that lacks a part, which solvers would take for zero."""
         super().__init_subclass__(**options)
         names = [name for name in vars(Term) if not name.startswith("_")]
         if any(getattr(getattr(cls, name), "__isabstractmethod__", False) for name in names):
-            return  # a base of others
+            return  # an abstract base
         has = {name for name in names if getattr(cls, name) is not getattr(Term, name)}
         needed = "damping" if cls.damps else "stiffness"
         for whole, parts in PARTS.items():
@@ -159,24 +160,24 @@ class Term(ABC):
     # ------------------------------------------------------------------ what is compiled
     @abstractmethod
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-        """The term for a thread.
+        """Context and kernels of the term for a thread.
 
         work : `assembly.Work` of the thread.
-        kept : memory of its own, from `memories` or `memory`.
-        group : of the energies, the first that is its own.
+        kept : the term's memory, from `memories` or `memory`.
+        group : its first energy group.
         """
 
     def memories(self, works: Sequence[Any]) -> Sequence[Any]:
-        """Memory of its kernels, for each of the threads that share a motion."""
+        """Memory of its kernels, for each thread of a motion."""
         return [None] * len(works)
 
     @property
     def memory(self) -> Any:
-        """The same for evaluations one after the other, from Python."""
+        """Memory for evaluations from Python."""
         return None
 
     def prepare(self) -> None:  # noqa: B027
-        """Put into that memory what the term has of its own, before an evaluation."""
+        """Set the memory to the term's state before an evaluation."""
 
     def stored(self) -> float:
         """Energy (J) in its own group that its kernels leave out, after an evaluation."""
@@ -185,17 +186,17 @@ class Term(ABC):
     # ------------------------------------------------------------------ stiffness
     @property
     def places(self) -> tuple[NDArray, NDArray]:
-        """Rows and columns (k,) of the dofs that its tangent couples in any state."""
+        """Rows and columns (k,) of the dofs that its tangent can couple."""
         none = np.zeros(0, np.int64)
         return none, none
 
     @cached_property
     def slots(self) -> Slots:
-        """Where they stand in the tangent of a model."""
+        """Slots of these entries in the tangent of a model."""
         return Slots(*self.places)
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
-        """Derivative of its forces there (k,), N/m; those of the same place are added.
+        """Tangent entries (k,), N/m, at `places`; entries of the same place are added.
 
         floor : least slope per unit stiffness of a hinge.
         """
@@ -213,87 +214,87 @@ class Term(ABC):
         return 0.5 * self.entries(0.5 * (q0 + q1), floor)
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """The same as a matrix (m, m)."""
+        """Tangent as a matrix (m, m), N/m."""
         entries = (self.entries(q, floor), self.places)
         return sparse.csr_array(sparse.coo_array(entries, shape=(q.size, q.size)))
 
     def unstrained(self, q: NDArray) -> Unstrained | None:
-        """The term as if it had no strain at q; None where it holds nothing."""
+        """The term without strain at q, with linear laws; None if it resists nothing."""
         return None
 
     # ------------------------------------------------------------------ damping
     @property
     def damping_places(self) -> tuple[NDArray, NDArray]:
-        """Rows and columns (k,) of the dofs that its damping couples in any state."""
+        """Rows and columns (k,) of the dofs that its damping can couple."""
         none = np.zeros(0, np.int64)
         return none, none
 
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
-        """Derivative (k,) of its forces there by the velocities, N s/m; added likewise.
+        """Derivative (k,) of its forces by velocity, N s/m, at `damping_places`; added likewise.
 
-        hidden : change of the velocity of hidden dofs, over that of others.
+        hidden : velocity change of hidden dofs relative to other dofs.
         """
         return np.zeros(0)
 
     def damping(self, q: NDArray) -> sparse.csr_array:
-        """The same as a matrix (m, m)."""
+        """Damping as a matrix (m, m), N s/m."""
         entries = (self.damping_entries(q), self.damping_places)
         return sparse.csr_array(sparse.coo_array(entries, shape=(q.size, q.size)))
 
     # ------------------------------------------------------------------ gradients
     def arrays(self) -> Any:
-        """`pullback.Arrays` that its forces depend on; None where it has no gradients."""
+        """`pullback.Arrays` that its forces depend on; None without gradients."""
         return None
 
     def pulled(self) -> Any:
-        """Its forces differentiated, as `pullback.Pulled`; None where it has no gradients."""
+        """Pullback of its forces, as `pullback.Pulled`; None without gradients."""
         return None
 
     # ------------------------------------------------------------------ measures
     @property
     def hinges(self) -> NDArray:
-        """Rows (nh, 4) of its hinges; -1 for a wing that is no node."""
+        """Rows (nh, 4) of its hinges; -1 for a virtual wing."""
         return np.zeros((0, 4), np.int64)
 
     def angles(self, q: NDArray) -> NDArray:
-        """Their dihedrals (nh,), rad."""
+        """Dihedrals (nh,) of its hinges, rad."""
         return np.zeros(0)
 
     def add_scale(self, scale: NDArray) -> None:  # noqa: B027
-        """Add its forces, N, at the dofs (m,) under a strain of one, whose rounding errors stay."""
+        """Add its force scale, N, at the dofs (m,), for unit strain."""
 
     def holds(self, q: NDArray) -> sparse.csr_array:
-        """Unit rows (s, m) of what keeps it in place beside supports: motions along them strain."""
+        """Unit rows (s, m) of its internal constraints: motions along them cause strain."""
         return sparse.csr_array((0, q.size))
 
     def turning_moments(self) -> float:
-        """Sum of its hinges' moments (N m) for a turn of one."""
+        """Sum of its hinges' moments (N m) for a unit turn."""
         return 0.0
 
     def strains(self, others: Strains) -> Strains | None:
-        """Bars and hinges of the terms before it, with its own; None where it has others."""
+        """Bars and hinges of the preceding terms with its own; None if it has other strains."""
         return others
 
     # ------------------------------------------------------------------ other terms
     def placed(self, order: NDArray, before: Any) -> Self:
-        """The same with the nodes in this order (n,) in memory, after the terms of an assembly."""
+        """The term with nodes in memory order (n,), after the terms of an assembly."""
         return self
 
     def displaced(self, moved: NDArray) -> Self:
-        """The same, in the same memory, with the planes of contact displaced (p, 3), m."""
+        """The term, with the same memory, with contact planes displaced by `moved` (p, 3), m."""
         return self
 
     def on(self, sheet: Any) -> Self:
-        """The same on a sheet with other rest angles."""
+        """The term on a sheet with other rest angles."""
         return self
 
     def nominal(self, q: NDArray) -> Self | None:
-        """The same as stiff as it is meant to be, about its state at q; None where it is not."""
+        """The term at nominal stiffness, about its state at q; None if it has none."""
         return self
 
 
 def nodal(q: NDArray) -> NDArray:
-    """Displacements of the nodes, and whole rows of hidden dofs, of dofs (m,) or (rows, 3)."""
+    """Nodal displacements, and whole rows of hidden dofs, from dofs (m,) or (rows, 3)."""
     flat = writable(q).reshape(-1)
     return flat[: flat.size // 3 * 3].reshape(-1, 3)
 
@@ -306,13 +307,13 @@ def in_rows(q: NDArray, rows: int) -> NDArray:
 
 
 class Whole(NamedTuple):
-    """The share of a thread that works alone, in place of `Strips`: everything."""
+    """The share of a single thread, in place of `Strips`: everything."""
 
     own: NDArray  # (2,) first and last + 1 of the rows
 
 
 class Folds(NamedTuple):
-    """What actuators turn: k hinges."""
+    """Actuated hinges: k of them."""
 
     rest: NDArray  # (k,) rest angles, rad
     parameters: NDArray  # (k, 4)
@@ -320,7 +321,7 @@ class Folds(NamedTuple):
 
 
 class Terms(NamedTuple):
-    """A model as compiled loops see it: of one type, whatever its terms."""
+    """A model as compiled loops see it: of one type for any terms."""
 
     context: NDArray  # (k,) addresses
     kernel: NDArray  # (k, 9) addresses, or 0
@@ -329,16 +330,16 @@ class Terms(NamedTuple):
 
 
 class Share(NamedTuple):
-    """What a thread's loop needs of the memory of a model."""
+    """Parts of a model's memory that a thread's loop needs."""
 
-    angle: NDArray  # (nh,) dihedrals at the last force, rad
-    fold_angle: NDArray  # (k,) those of `Folds`, rad
+    angle: NDArray  # (nh,) dihedrals at the last force evaluation, rad
+    fold_angle: NDArray  # (k,) dihedrals of `Folds`, rad
     strips: Whole
     team: Team
 
 
 class Model:
-    """The terms of a body on one thread; the arrays and contexts live as long as it does.
+    """Terms of a body on one thread; keeps their arrays and contexts alive.
 
     Parameters
     ----------
@@ -346,7 +347,7 @@ class Model:
     work : Work
         Of the thread, one of `Assembly.workspaces`.
     kinds : sequence of int
-        Kernels that are called: others are not compiled.
+        Kernels to compile; others are not.
 
     Attributes
     ----------
@@ -364,7 +365,7 @@ class Model:
         self.call(kinds)
 
     def call(self, kinds: Sequence[int]) -> None:
-        """Make these kernels ready, too."""
+        """Compile these kernels, too."""
         for row, term in zip(self.terms.kernel, self._held, strict=True):
             for kind in kinds:
                 if kind in term.kernels and not row[kind]:
@@ -373,7 +374,7 @@ class Model:
 
 @inner_scalar
 def parted_rows(values, n, r):
-    """Those of n nodes (n, 3), and of the r hidden dofs after them, of rows of three."""
+    """Rows of n nodes (n, 3), and values of the r hidden dofs in the rows after them."""
     return values[:n], flat(values)[3 * n : 3 * n + r]
 
 
@@ -381,9 +382,9 @@ def parted_rows(values, n, r):
 def forces_of(terms, u, v, t, force):
     """Internal forces (rows, 3) at u, v and t; returns the powers in and out, W.
 
-    What the air takes is the last of `Terms.powers`.
+    The power lost to the air is the last of `Terms.powers`.
 
-    Keeps all dihedrals in the angle, and in the fold_angle, of the thread's `Share`.
+    Stores all dihedrals in `angle` and `fold_angle` of the thread's `Share`.
     """
     terms.powers[0], terms.powers[1], terms.powers[2] = 0.0, 0.0, 0.0
     for k in range(terms.context.size):
@@ -393,7 +394,7 @@ def forces_of(terms, u, v, t, force):
 
 @inner_scalar
 def _run_each(terms, kind, given):
-    """Run the kernels of a kind of all terms that have one."""
+    """Run the kernels of a kind for all terms that have one."""
     for k in range(terms.context.size):
         if terms.kernel[k, kind] != 0:
             run_at(terms.kernel[k, kind], (terms.context[k],) + given)  # noqa: RUF005 - for Numba
@@ -401,13 +402,13 @@ def _run_each(terms, kind, given):
 
 @inner_scalar
 def energies_of(terms, u, out):
-    """Strain energies (J) by group, to `out`; of what keeps that of its last force, that."""
+    """Strain energies (J) by group, into `out`; some terms report their last force evaluation."""
     _run_each(terms, ENERGIES, (u, out))
 
 
 @inner_scalar
 def limit_of(terms, u, v, a, dt, beta, energy, lightness):
-    """The longest step (s), at most dt, of all terms."""
+    """Longest step (s), at most dt, that all terms allow."""
     for k in range(terms.context.size):
         if terms.kernel[k, LIMIT] != 0:
             own = terms.context[k]
@@ -417,25 +418,25 @@ def limit_of(terms, u, v, a, dt, beta, energy, lightness):
 
 @inner_scalar
 def obstacles_to(terms, factor):
-    """Put moving obstacles where the factors (h, 3) of histories and their derivatives say."""
+    """Set moving obstacles to the factors (h, 3) of histories and their derivatives."""
     _run_each(terms, PLACE_OBSTACLES, (factor,))
 
 
 @inner_scalar
 def clock_to(terms, since):
-    """Tell terms with memory how long (s) after the last accepted step they are evaluated next."""
+    """Tell terms with memory the time (s) from the last accepted step to the next evaluation."""
     _run_each(terms, ADVANCE_CLOCK, (since,))
 
 
 @inner_scalar
 def commit_all(terms):
-    """Tell them that the step has been accepted that ends where they were evaluated last."""
+    """Tell terms that the step that ends at the last evaluation is accepted."""
     _run_each(terms, COMMIT, ())
 
 
 @inner_scalar
 def dissipated_by(terms):
-    """Energy (J) that they have dissipated up to where they were evaluated last."""
+    """Energy (J) dissipated by all terms up to their last evaluation."""
     lost = 0.0
     for k in range(terms.context.size):
         if terms.kernel[k, DISSIPATED] != 0:
@@ -445,13 +446,13 @@ def dissipated_by(terms):
 
 @inner_scalar
 def states_of(terms, out):
-    """Write the states of their branches (b, 2) there to `out`."""
+    """Write the branch states (b, 2) at the last evaluation to `out`."""
     _run_each(terms, BRANCH_STATES, (out,))
 
 
 @inner_scalar
 def step_error_of(terms, scale):
-    """The largest error of the states of their branches; see `step_error` above."""
+    """Largest error ratio of the branch states; see `step_error` above."""
     error = 0.0
     for k in range(terms.context.size):
         if terms.kernel[k, STEP_ERROR] != 0:
@@ -461,7 +462,7 @@ def step_error_of(terms, scale):
 
 @kernel
 def evaluate(terms, u, v, force, energy):
-    """Internal forces (rows, 3), N, and strain energies (J), if there is room: for Python."""
+    """Internal forces (rows, 3), N, and strain energies (J) unless empty, for Python."""
     forces_of(terms, u, v, 0.0, force)
     if energy.size > 0:
         energies_of(terms, u, energy)

@@ -1,10 +1,9 @@
 """Threads that run one compiled function together, each on its share of a model.
 
-All threads run the same function; where one needs what others have computed, they wait for each
-other. So a whole time loop runs on several threads without one being started or stopped on the
-way, and it is compiled only once: a thread that is alone waits for nobody. Numba's `prange` would
-compile it a second time, and its pools of threads do not survive a fork (GNU OpenMP) or two callers
-at once (workqueue).
+All threads run the same function and wait for each other before they use others' results. So a
+whole time loop runs on several threads that are started only once, and it is compiled only once: a
+single thread waits for nobody. Numba's `prange` would compile it a second time, and its pools of
+threads do not survive a fork (GNU OpenMP) or two callers at once (workqueue).
 """
 
 from __future__ import annotations
@@ -25,19 +24,19 @@ from foldyn.jit.intrinsics import call0, fetch_add, look
 from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.strips import shares
 
-HINGES_EACH = 4000  # hinges for each thread: with half of that it pays on an idle machine only
+HINGES_EACH = 4000  # hinges per thread: half as many pay off only on an idle machine
 MOST = 8  # threads: more have not been measured
-SPINS = 100  # looks at the others before the processor is offered to other programs
-ARRIVED, ROUND, BROKEN = 0, 8, 16  # places in `Team.state`, each in a cache line of its own
+SPINS = 100  # checks of the others before the processor is yielded
+ARRIVED, ROUND, BROKEN = 0, 8, 16  # positions in `Team.state`, each on its own cache line
 
 
 class Team(NamedTuple):
     """A member of a team of threads."""
 
     size: int
-    number: int  # of this member, 0..size - 1
+    number: int  # index of this member, 0..size - 1
     state: NDArray  # (24,) int64, of the whole team
-    note: NDArray  # (size, 8), a cache line for what each member tells the others
+    note: NDArray  # (size, 8), a cache line of notes from each member to the others
     pause: int  # see `_pause`
 
 
@@ -49,7 +48,7 @@ def team(size: int) -> list[Team]:
 
 @cache
 def _pause() -> int:
-    """Address of the system's function that lets other programs run."""
+    """Address of the system function that yields the processor."""
     if os.name == "nt":
         function = ctypes.windll.kernel32.SwitchToThread  # type: ignore[attr-defined]
     else:
@@ -58,10 +57,10 @@ def _pause() -> int:
 
 
 def threads_for(model: BarsHinges) -> int:
-    """Number of threads on which a motion of the model runs fastest: one below 8000 hinges.
+    """Fastest number of threads for a motion of the model: one below 8000 hinges.
 
     Never more than NUMBA_NUM_THREADS (by default the processors that this process may use) or
-    OMP_NUM_THREADS, or than its elements' reach permits.
+    OMP_NUM_THREADS, or than the reach of its elements permits.
     """
     allowed = [MOST, int(config.NUMBA_NUM_THREADS)]  # type: ignore[attr-defined]
     text = os.environ.get("OMP_NUM_THREADS", "")
@@ -71,7 +70,7 @@ def threads_for(model: BarsHinges) -> int:
 
 
 def run_together(function: Any, members: Sequence[Team], arguments: Sequence[tuple]) -> list:
-    """Results of a compiled function, run by each member of a team with its tuple of arguments.
+    """Run a compiled function on each member of a team with its own arguments; return the results.
 
     The function must be compiled with `shared`: threads that hold Python's lock would wait for each
     other forever. The caller's thread is the first member. An exception on one thread ends the
@@ -94,7 +93,7 @@ def run_together(function: Any, members: Sequence[Team], arguments: Sequence[tup
             thread.start()
             started.append(thread)
         run(0)
-    except BaseException:  # a thread that cannot start: those that wait for it must end
+    except BaseException:  # a thread that cannot start must end the waiting of others
         members[0].state[BROKEN] = 1
         raise
     finally:
@@ -107,7 +106,7 @@ def run_together(function: Any, members: Sequence[Team], arguments: Sequence[tup
 
 @inner
 def _wait(team):
-    """Count the round's arrivals; the last one starts the next round."""
+    """Count this round's arrivals; the last one starts the next round."""
     now = look(team.state, ROUND)
     if fetch_add(team.state, ARRIVED, 1) == team.size - 1:
         fetch_add(team.state, ARRIVED, -team.size)
@@ -122,14 +121,14 @@ def _wait(team):
 
 @inner_scalar
 def wait(team):
-    """Wait until all members have come here; then what they wrote before can be read."""
+    """Wait until all members have arrived; then everything they wrote before is visible."""
     if team.size > 1:
         _wait(team)
 
 
 @inner_scalar
 def total(team, k):
-    """Sum of note k of all members, in the same order on each: after a `wait` for them."""
+    """Sum of note k over all members, in the same order on each, after a `wait`."""
     out = 0.0
     for member in range(team.size):
         out += team.note[member, k]
@@ -138,7 +137,7 @@ def total(team, k):
 
 @inner_scalar
 def largest(team, k):
-    """Largest note k of all members: after a `wait` for them."""
+    """Largest note k of all members, after a `wait`."""
     out = team.note[0, k]
     for member in range(1, team.size):
         out = max(out, team.note[member, k])
@@ -147,5 +146,5 @@ def largest(team, k):
 
 @scalar
 def part(team, count):
-    """First and last + 1 of this member's share of `count` things."""
+    """First and last + 1 of this member's share of `count` items."""
     return count * team.number // team.size, count * (team.number + 1) // team.size

@@ -1,4 +1,4 @@
-"""Stiffness of flat triangles: constant strain in their plane, constant curvature across it."""
+"""Stiffness of flat triangles: constant in-plane strain, constant curvature."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ def triangle_stiffness(
 ) -> tuple[NDArray, NDArray]:
     """Membrane and bending stiffness (nt, 3, 3) of triangles with corners (nt, 3, 3).
 
-    They act on the strains of the sides and on the turns of the sheet at the sides against the
-    plane of the corners (Morley). Side k runs from corner k to corner k + 1.
+    They act on the side strains, and on the turns of the sheet at the sides relative to the plane
+    of the corners (Morley). Side k runs from corner k to corner k + 1.
 
     Parameters
     ----------

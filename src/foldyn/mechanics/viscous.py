@@ -1,11 +1,11 @@
 """Viscous elements whose direction follows the motion: axial dashpots and creases.
 
-Each resists the rate of a scalar s(q) of the dofs, a distance or an angle, with the force
-c (ds/dt) grad s, ds/dt = grad s . v. It takes the power c (ds/dt)^2, which is none in rigid
-motions, and its matrix in a state is c grad s grad s'. Grad s is sparse: the columns of `dofs`.
+Each resists the rate of a scalar s(q) of the dofs, a distance or an angle, with the force c (ds/dt)
+grad s, ds/dt = grad s . v. It dissipates the power c (ds/dt)^2, which is zero in rigid motions, and
+its matrix in a state is c grad s grad s'. Grad s is sparse: its columns are in `dofs`.
 
-The angle of a hinge is its dihedral less a multiple of two dofs beside displacements, if it has
-them, as a piece of a shell's crease does.
+The angle of a hinge is its dihedral minus multiples of two hidden dofs, if it has them, like a
+piece of a shell's crease.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
 from foldyn.mechanics.sheet_term import NO_DOF
 from foldyn.mechanics.term import FORCES, Compiled, Term, forces
 
-WIDTH = 14  # dofs of an element at most: four nodes, and two beside displacements
+WIDTH = 14  # largest number of dofs of an element: four nodes, and two hidden dofs
 
 
 class Viscous(NamedTuple):
     """Arrays of p axial elements and h hinges; dofs are 3 row + column of arrays (rows, 3)."""
 
-    dofs: NDArray  # (p + h, 14) of each element; the dof 0 with a gradient of 0 where it has fewer
+    dofs: NDArray  # (p + h, 14) of each element; unused ones are dof 0 with a gradient of 0
     axial: NDArray  # (p, 3) rest vector from the first node to the second, m
     corners: NDArray  # (h, 4, 3) rest positions of the nodes j, k, i, l, m
-    hidden_turn: NDArray  # (h, 2) what a unit of the last two dofs takes from the dihedral, rad/m
+    hidden_turn: NDArray  # (h, 2) reduction of the dihedral per unit of the last two dofs, rad/m
     coefficient: NDArray  # (p + h,) N s/m, N m s/rad
-    gradient: NDArray  # (14,) memory of one element
+    gradient: NDArray  # (14,) work array of one element
 
 
 def viscous(
@@ -60,9 +60,9 @@ def viscous(
     axial_coefficient : (p,)
         N s/m.
     hinges, corners : (h, 4), (h, 4, 3)
-        Rows of the nodes: axis j, k, wings i, l; where they are at rest, m.
+        Rows of the nodes: axis j, k, wings i, l; their rest positions, m.
     hidden, hidden_turn : (h, 2)
-        Dofs beside displacements, or NO_DOF, and what a unit of each turns, rad/m.
+        Hidden dofs, or NO_DOF, and the turn per unit of each, rad/m.
     hinge_coefficient : (h,)
         N m s/rad.
     """
@@ -83,7 +83,7 @@ def viscous(
 def hinge_dofs(hinges: NDArray, hidden: NDArray) -> NDArray:
     """Dofs (h, 14) of hinges, rows of nodes (h, 4), with two hidden dofs (h, 2).
 
-    In the place of NO_DOF stands the dof 0, whose part is 0 (`FoldHinges.hidden_turn`).
+    Dof 0 replaces NO_DOF, with a turn of 0 (`FoldHinges.hidden_turn`).
     """
     dofs = np.zeros((len(hinges), WIDTH), np.int64)
     dofs[:, :12] = (3 * hinges[:, :, None] + np.arange(3)).reshape(-1, 12)
@@ -92,7 +92,7 @@ def hinge_dofs(hinges: NDArray, hidden: NDArray) -> NDArray:
 
 
 def coupled(dofs: NDArray, own: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Which pairs (e, w, w) of the dofs (e, w) of elements are theirs; their rows and columns.
+    """Mask (e, w, w) of the pairs of dofs (e, w) that elements have; their rows and columns.
 
     own : (e, w) bool, which of the dofs an element has.
     """
@@ -103,9 +103,10 @@ def coupled(dofs: NDArray, own: NDArray) -> tuple[NDArray, NDArray, NDArray]:
 
 @inner_scalar
 def hinge_gradient(x, dofs, hidden_turn, moved, out):
-    """Angle (rad) of a hinge at flat displacements, and its gradient to `out` (14,).
+    """Angle (rad) of a hinge at flat displacements, and its gradient into `out` (14,).
 
-    A wing with the node of the axis' first end is that of a clamp: it rides on the mean of both.
+    A wing that repeats the first axis node is virtual, as in a clamp: it follows the mean of both
+    axis nodes.
 
     x : (4, 3) rest positions of its nodes, m; dofs, hidden_turn : see `Viscous`.
     """
@@ -149,14 +150,14 @@ def element_gradient(elements, moved, e, out):
 
 @kernel
 def put_gradients(elements, moved, out):
-    """Gradients of all elements at flat displacements, to out (p + h, 14)."""
+    """Gradients of all elements at flat displacements, into out (p + h, 14)."""
     for e in range(elements.coefficient.size):
         element_gradient(elements, moved, e, out[e])
 
 
 class _Context(NamedTuple):
     elements: Viscous
-    size: int  # of flat arrays
+    size: int  # size of flat arrays
 
 
 @forces
@@ -178,7 +179,7 @@ def _forces(own, u, v, t, force, powers):
 
 
 class Gradient(NamedTuple):
-    """Derivatives by arrays of `Viscous` of the same names."""
+    """Gradients with respect to arrays of `Viscous`."""
 
     axial: NDArray
     corners: NDArray
@@ -189,20 +190,20 @@ class Gradient(NamedTuple):
 class _Backward(NamedTuple):
     elements: Viscous
     out: Gradient
-    points: NDArray  # (4, 3) memory: positions of one hinge, m
+    points: NDArray  # (4, 3) work array: positions of one hinge, m
     moves: NDArray  # (14,) velocities of the dofs of one element
     by: NDArray  # (14,)
-    size: int  # up to the last dof
+    size: int  # number of dofs up to the last one used
 
 
 @inner
 def _turn_gradient(elements, moved, e, z, points, out):
-    """Rate (14,) of the gradient of element e where its dofs move by z (14,), to `out`."""
+    """Rate (14,) of the gradient of element e for dof velocities z (14,), into `out`."""
     dofs, p = elements.dofs[e], elements.axial.shape[0]
     for c in range(14):
         out[c] = 0.0
     if e < p:
-        g, square, along = elements.gradient, 0.0, 0.0  # g is at these displacements
+        g, square, along = elements.gradient, 0.0, 0.0  # g is evaluated at these displacements
         for c in range(3):
             x = elements.axial[e, c] + moved[dofs[3 + c]] - moved[dofs[c]]
             square += x * x
@@ -277,16 +278,16 @@ class ViscousTerm(Term):
         self.elements = elements
 
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-        """See `Term`."""
+        """Context and kernels for a thread; see `Term`."""
         own = Context(_Context(self.elements, 3 * int(work.strips.own[1])))
         return Compiled(own, {FORCES: _forces})
 
     def arrays(self) -> Arrays:
-        """See `Term`."""
+        """Arrays that its forces depend on; see `Term`."""
         return arrays_of(self.elements, "gradient")
 
     def pulled(self) -> Pulled:
-        """See `Term`."""
+        """Pullback of its forces; see `Term`."""
         out = Gradient(*(np.zeros_like(getattr(self.elements, name)) for name in Gradient._fields))
         moves, by = np.zeros((2, WIDTH))
         size = 1 + int(self.elements.dofs.max(initial=0))
@@ -302,11 +303,11 @@ class ViscousTerm(Term):
 
     @property
     def damping_places(self) -> tuple[NDArray, NDArray]:
-        """See `Term`."""
+        """Rows and columns (k,) of its damping entries; see `Term`."""
         return self._coupled[1:]
 
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
-        """See `Term`; for symmetry, the other forces on hidden dofs count so, too."""
+        """Damping entries; forces on hidden dofs are scaled likewise, for symmetry; see `Term`."""
         gradient = np.zeros(self.elements.dofs.shape)
         put_gradients(self.elements, np.ravel(q), gradient)
         gradient[:, 12:] *= hidden**0.5
@@ -314,7 +315,7 @@ class ViscousTerm(Term):
         return (weighted[:, :, None] * gradient[:, None, :])[self._coupled[0]]
 
     def turns(self, hidden: NDArray) -> sparse.csr_array:
-        """Rows (k, r) of how hidden dofs (r,) turn hinges that have some, over the largest."""
+        """Rows (k, r) by which hidden dofs (r,) turn hinges, relative to the largest entry."""
         turn, dofs = self.elements.hidden_turn, self.elements.dofs[len(self.elements.axial) :, 12:]
         some = turn.any(axis=1)
         row, end = np.nonzero(turn[some])
@@ -323,6 +324,6 @@ class ViscousTerm(Term):
         return sparse.csr_array(sparse.coo_array(entries, shape=(int(some.sum()), len(hidden))))
 
     def placed(self, order: NDArray, before: Assembly) -> ViscousTerm:
-        """See `Term`."""
+        """The term with nodes in memory order; see `Term`."""
         dofs = before.numbering(order).dofs(self.elements.dofs)
         return ViscousTerm(self.elements._replace(dofs=dofs))

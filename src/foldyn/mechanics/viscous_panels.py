@@ -1,10 +1,11 @@
-"""Viscous panels: panels whose strain rates are resisted as their strains are.
+"""Viscous panels, whose strain rates are resisted in proportion to their stiffness.
 
-With E the strains of a panel's bars, and S what couples them (`mechanics.membranes`), the stresses
-are C dE/dt, C = beta S. They take the power dE/dt' C dE/dt, none where a panel turns or folds.
+With E the strains of a panel's bars, and S their coupling matrix (`mechanics.membranes`), the
+stresses are C dE/dt, C = beta S. They dissipate the power dE/dt' C dE/dt, zero if a panel turns or
+folds.
 
-All panels are of one kind here: those with fewer nodes or bars are filled up with their first node,
-and with bars of no length^-2, which feel nothing.
+All panels have the same array sizes: panels with fewer nodes or bars are padded with their first
+node, and with bars of length^-2 = 0, which have no strain.
 """
 
 from __future__ import annotations
@@ -29,16 +30,16 @@ class ViscousPanels(NamedTuple):
     """Arrays of p panels with up to c nodes and b bars."""
 
     nodes: NDArray  # (p, c) rows
-    ends: NDArray  # (p, b, 2) numbers among a panel's nodes
+    ends: NDArray  # (p, b, 2) indices among a panel's nodes
     vector: NDArray  # (p, b, 3) rest vector from the first end to the second, m
     per_length2: NDArray  # (p, b) 1 / L^2
     resistance: NDArray  # (p, b, b) C, J s
-    along: NDArray  # (b, 3) memory of one panel: vectors of its bars, m
-    rate: NDArray  # (b,) of their strains, 1/s
+    along: NDArray  # (b, 3) work array of one panel: vectors of its bars, m
+    rate: NDArray  # (b,) strain rates, 1/s
 
 
 def viscous_panels(kinds: Sequence[Membranes], beta: float) -> ViscousPanels:
-    """Those of panels with membranes, whose strain rates beta (s) times their stiffness resists."""
+    """Viscous panels with the damping beta (s) times the stiffness of membranes."""
     corners = max((own.nodes.shape[1] for own in kinds), default=0)
     bars = max((len(own.ends) for own in kinds), default=0)
     count = sum(len(own.nodes) for own in kinds)
@@ -100,7 +101,7 @@ def _forces(own, u, v, t, force, powers):
 
 
 class Gradient(NamedTuple):
-    """Derivatives by arrays of `ViscousPanels` of the same names."""
+    """Gradients with respect to arrays of `ViscousPanels`."""
 
     vector: NDArray
     per_length2: NDArray
@@ -112,7 +113,7 @@ class _Backward(NamedTuple):
     out: Gradient
     growth: NDArray  # (2, b) memory of one panel: rates of its bars' lengths, times length,
     stress: NDArray  # (2, b) and C and C^T times those of strains, by the weights and velocities
-    rows: int  # up to the last node
+    rows: int  # number of rows up to the last node
 
 
 @pullback
@@ -155,7 +156,7 @@ def _pullback(own, u, v, t, weight, product, rate):
 
 @kernel
 def panel_blocks(panels, u):
-    """Their matrices (p, c, c, 3, 3) at u (rows, 3), N s/m."""
+    """Damping matrices (p, c, c, 3, 3) at u (rows, 3), N s/m."""
     bars, (count, corners) = panels.rate.size, panels.nodes.shape
     out = np.zeros((count, corners, corners, 3, 3))
     for p in range(panels.nodes.shape[0]):
@@ -183,16 +184,16 @@ class ViscousPanelsTerm(Term):
         self.panels = panels
 
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-        """See `Term`."""
+        """Context and kernels for a thread; see `Term`."""
         own = Context(_Context(self.panels, int(work.strips.own[1])))
         return Compiled(own, {FORCES: _forces})
 
     def arrays(self) -> Arrays:
-        """See `Term`."""
+        """Arrays that its forces depend on; see `Term`."""
         return arrays_of(self.panels, "along", "rate")
 
     def pulled(self) -> Pulled:
-        """See `Term`."""
+        """Pullback of its forces; see `Term`."""
         out = Gradient(*(np.zeros_like(getattr(self.panels, name)) for name in Gradient._fields))
         growth, stress = np.zeros((2, 2, len(self.panels.rate)))
         rows = 1 + int(self.panels.nodes.max(initial=0))
@@ -201,13 +202,13 @@ class ViscousPanelsTerm(Term):
 
     @cached_property
     def damping_places(self) -> tuple[NDArray, NDArray]:
-        """See `Term`."""
+        """Rows and columns (k,) of its damping entries; see `Term`."""
         return places_of(pairs_within(self.panels.nodes))
 
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
-        """See `Term`; panels have no hidden dofs."""
+        """Damping entries; panels have no hidden dofs. See `Term`."""
         return panel_blocks(self.panels, nodal(q)).ravel()
 
     def placed(self, order: NDArray, before: Any) -> ViscousPanelsTerm:
-        """See `Term`."""
+        """The term with nodes in memory order; see `Term`."""
         return ViscousPanelsTerm(self.panels._replace(nodes=ranks(order)[self.panels.nodes]))

@@ -1,4 +1,4 @@
-"""Mass of the fluid that moves with a sheet, M_a = rho B' D^-1 B."""
+"""Added mass: fluid that moves with a sheet, M_a = rho B' D^-1 B."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from foldyn.errors import ComputationError
 from foldyn.mechanics.air.doublets import inductance, normals_of
 from foldyn.threads import one_thread
 
-COLUMNS = 256  # of a matrix that are found at once
+COLUMNS = 256  # columns of a matrix to compute at once
 
 Flow = NDArray[np.float64] | sparse.csr_array
 
@@ -29,7 +29,7 @@ class AddedMass:
     Attributes
     ----------
     flux : sparse array, shape (u, 3n)
-        B, m2: how much fluid velocities of the nodes push at each unknown of the flow.
+        B, m2: flux at each unknown of the flow due to nodal velocities.
     flow : ndarray or sparse array, shape (u, u)
         rho D^-1, kg/m4.
     """
@@ -61,12 +61,12 @@ class AddedMass:
 
     @property
     def moving(self) -> NDArray[np.int64]:
-        """Numbers of the dofs that move fluid."""
+        """Indices of the dofs that move fluid."""
         return np.flatnonzero(np.diff(sparse.csc_array(self.flux).indptr))
 
     @property
     def rows(self) -> NDArray[np.float64]:
-        """Rows G (u, 3n), kg^1/2, of which the matrix is G'G, where the flow's is full."""
+        """Rows G (u, 3n), kg^1/2, with the matrix equal to G'G; needs a full flow matrix."""
         return np.asarray(self.flux.T @ cholesky(self.flow, lower=True)).T
 
     @cached_property
@@ -83,18 +83,18 @@ class AddedMass:
 def flow_of(
     points: NDArray, triangles: NDArray, unknown: NDArray, parts: NDArray | None = None
 ) -> Flow:
-    """D^-1 (u, u), 1/m, of a surface of triangles.
+    """Compute D^-1 (u, u), 1/m, of a surface of triangles.
 
     Parameters
     ----------
     points : ndarray, shape (p, 3)
         Corners of the triangles, m.
     triangles : ndarray of int, shape (t, 3)
-        In the same sense everywhere.
+        With consistent orientation.
     unknown : ndarray of int, shape (p,)
-        Number of the unknown of each corner, -1 on an open edge.
+        Index of the unknown of each corner, -1 on an open edge.
     parts : ndarray of int, shape (t,), optional
-        The part of each triangle, 0 and up, where each part is alone in the fluid.
+        Part of each triangle, from 0; each part is treated as alone in the fluid.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def flow_of(
 
 
 def inverse(matrix: NDArray) -> NDArray[np.float64]:
-    """Inverse of a positive definite matrix, in its place."""
+    """Invert a positive definite matrix in place."""
     with one_thread(len(matrix)):
         try:
             factor, _ = cho_factor(matrix, lower=True, overwrite_a=True)
@@ -133,7 +133,7 @@ def inverse(matrix: NDArray) -> NDArray[np.float64]:
 
 
 def caught(points: NDArray, triangles: NDArray, unknown: NDArray) -> sparse.csr_array:
-    """Integrals (u, t) of the function of each unknown over each triangle, m2."""
+    """Integrals (u, t), m2, of the shape function of each unknown over each triangle."""
     areas, size = normals_of(points[triangles])[1], int(unknown.max(initial=-1)) + 1
     rows = unknown[triangles]
     kept = rows >= 0
@@ -145,9 +145,9 @@ def caught(points: NDArray, triangles: NDArray, unknown: NDArray) -> sparse.csr_
 def normal_velocities(
     x: NDArray, triangles: NDArray, under: NDArray, shares: NDArray
 ) -> sparse.csr_array:
-    """Normal velocities of points (e,) by those of nodes (3n,).
+    """Matrix from velocities of nodes (3n,) to normal velocities of points (e,).
 
-    x : (n, 3) places of the nodes, m.
+    x : (n, 3) positions of the nodes, m.
     triangles : (t, 3) nodes of triangles.
     under, shares : (e,) triangle of each point, and (e, 3) the weights of its nodes.
     """

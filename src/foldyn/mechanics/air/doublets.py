@@ -1,15 +1,15 @@
 """Potential flow about an open surface of triangles, by doublets that are linear on each.
 
-The surface moves with the normal velocity w in a fluid that is at rest far away, and the flow has
-no vortices but those bound to the surface. Its potential jumps there by m, which is zero on the
-edge. The kinetic energy of the fluid for given w is that of the jump for which
+The surface moves with the normal velocity w in a fluid that is at rest far away, and the only
+vortices are bound to the surface. The potential jumps across the surface by m, which is zero on the
+edge. The kinetic energy of the fluid for given w is the maximum over m of
 
     E(m) = rho (b'm - m'D m / 2),     b_i = int w phi_i dS,
     D_ij = 1/(4 pi) int int curl phi_i . curl phi_j / |x - y| dS dS',   curl phi = n x grad phi
 
-is largest (Nedelec 1982, Int. J. Numer. Methods Eng. 18; the jump m is a sheet of vortices of the
-strength curl m, and D its self-inductance). With m linear on triangles D is symmetric and positive
-definite, whatever their shape, and rho b'D^-1 b grows toward the added mass as they get finer.
+(Nedelec 1982, Int. J. Numer. Methods Eng. 18; the jump m is a vortex sheet of strength curl m, and
+D its self-inductance). With m linear on triangles D is symmetric and positive definite, for any
+shape of triangles, and rho b'D^-1 b converges to the added mass from below as they are refined.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from foldyn.jit.compiled import shared
 from foldyn.mechanics.air.potentials import CLOSE, inverse_distances
 from foldyn.threads import in_threads
 
-BLOCK = 64e6  # bytes of the integrals that are held at once
-ROWS = 16  # of them that a thread takes at once
+BLOCK = 64e6  # bytes of the integrals in memory at once
+ROWS = 16  # rows per thread at a time
 FEW = 400  # triangles that one thread is enough for
 
 
@@ -38,9 +38,9 @@ def inductance(points: NDArray, triangles: NDArray, unknown: NDArray) -> NDArray
     points : ndarray, shape (p, 3)
         m.
     triangles : ndarray of int, shape (t, 3)
-        Corners, in the same sense everywhere.
+        Corners, with consistent orientation.
     unknown : ndarray of int, shape (p,)
-        Number of the unknown of each point, -1 on the edge of the surface.
+        Index of the unknown of each point, -1 on the edge of the surface.
     """
     corners = points[triangles]
     normals, areas = normals_of(corners)
@@ -49,7 +49,7 @@ def inductance(points: NDArray, triangles: NDArray, unknown: NDArray) -> NDArray
     inner = 0.5 * (corners + centers[:, None])  # weights 2/3, 1/6, 1/6
     curls = (np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1)) / (
         2.0 * areas[:, None, None]
-    )  # of each corner's function: along the side opposite to it
+    )  # curl of each corner's function: along the opposite side
     numbers = unknown[triangles]
     size, count = int(unknown.max(initial=-1)) + 1, len(triangles)
     owner = sparse.csr_array(
@@ -94,7 +94,7 @@ def normals_of(corners: NDArray) -> tuple[NDArray, NDArray]:
 
 @shared
 def _gather(rows, begin, curls, numbers, chosen, starts, owners, out):
-    """Add to chosen rows of D what rows of integrals give, from the triangle `begin` on."""
+    """Add the contribution of rows of integrals, from triangle `begin` on, to chosen rows of D."""
     for i in chosen:
         for k in range(starts[i + 1], starts[i + 2]):
             a = owners[k]

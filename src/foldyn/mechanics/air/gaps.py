@@ -11,23 +11,23 @@ from scipy import sparse
 from foldyn.jit.compiled import kernel
 from foldyn.mechanics.contact.distances import apart, closest_on_triangle, dot, point
 
-APART = 0.25  # of the size of an element: least distance of panels that share no corner
-JOINED = 0.01  # of panels that do, whose grids open from it like the panels
+APART = 0.25  # of the size of an element: least distance of panels without common corner
+JOINED = 0.01  # for panels that do: their grids open from it as the panels do
 
 
 class Gap(NamedTuple):
-    """Where a surface comes too near to itself."""
+    """Place where a surface comes too close to itself."""
 
     one: int  # triangle
     other: int
     distance: float  # m
-    size: float  # of an element there, m
+    size: float  # local element size, m
 
 
 def narrow_gap(
     points: NDArray, triangles: NDArray, panel: NDArray, joined: sparse.csr_array
 ) -> Gap | None:
-    """A gap between triangles of two panels that is below its limit, if there is one.
+    """Find a gap between triangles of two panels that is below its limit; None if there is none.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def narrow_gap(
 
 @kernel
 def _narrowest(points, triangles, centers, pairs, limits, sizes):
-    """The pair of triangles without a common corner that is farthest below its limit, or -1."""
+    """Pair of triangles without common corner that is farthest below its limit, or -1."""
     worst, at, distance = 1.0, -1, 0.0
     for k in range(len(pairs)):
         for turn in range(2):

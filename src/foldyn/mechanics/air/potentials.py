@@ -2,9 +2,9 @@
 
 The integral over one triangle has a closed form at any point (Wilton, Rao, Glisson, Schaubert,
 Al-Bundak and Butler 1984, IEEE Trans. Antennas Propag. 32, 276-281). Over the other triangle it is
-summed at points, 28 for pairs that touch or nearly so. Pairs that are far apart take three points
-on each. The integral of a triangle over itself is closed, too (Eibert and Hansen 1995, IEEE Trans.
-Antennas Propag. 43, 1499-1502).
+integrated numerically, with 28 points for pairs that touch or are close. Distant pairs use three
+points on each. The integral of a triangle over itself also has a closed form (Eibert and Hansen
+1995, IEEE Trans. Antennas Propag. 43, 1499-1502).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from foldyn.jit.compiled import inner, shared
 from foldyn.mechanics.contact.distances import cross, dot, minus
 
-NEAR = 2.0 + 1e-9  # times the sum of both radii: nearer centers, 2 in grids, take the closed form
+NEAR = 2.0 + 1e-9  # times the sum of both radii: closer centers, 2 in grids, use the closed form
 A1, B1, W1 = 0.797426985353087, 0.101286507323456, 0.125939180544827
 A2, B2, W2 = 0.059715871789770, 0.470142064105115, 0.132394152788506
 SEVEN = np.array([
@@ -28,7 +28,7 @@ SEVEN = np.array([
 
 
 def _finer(rule):
-    """The rule on the four triangles between corners and midpoints of sides."""
+    """Apply the rule on the four subtriangles between corners and side midpoints."""
     corners = np.eye(3)
     middles = 0.5 * (corners + np.roll(corners, -1, axis=0))  # of 01, 12, 20
     parts = [
@@ -44,7 +44,7 @@ CLOSE = _finer(SEVEN)
 
 @inner
 def potential(p, a, b, c, normal):
-    """Integral of 1/|p - y| over the triangle a, b, c with a unit normal, m."""
+    """Integral of 1/|p - y| over the triangle a, b, c with unit normal, m."""
     height = dot(minus(p, a), normal)
     above = abs(height)
     total = 0.0
@@ -59,12 +59,12 @@ def potential(p, a, b, c, normal):
         along = along[0] / length, along[1] / length, along[2] / length
         outward = cross(along, normal)
         first, second = minus(one, p), minus(other, p)
-        inside = dot(first, outward)  # distance of the side from the foot of p, in the plane
+        inside = dot(first, outward)  # distance of the side from the projection of p, in the plane
         begin, end = dot(first, along), dot(second, along)
         r1, r2 = math.sqrt(dot(first, first)), math.sqrt(dot(second, second))
         square = inside * inside + height * height
         if square <= 1e-24 * length * length:
-            continue  # p is on the line of the side
+            continue  # p lies on the line of the side
         if begin + end > 0.0:
             log = math.log((r2 + end) / (r1 + begin))
         else:
@@ -79,7 +79,7 @@ def potential(p, a, b, c, normal):
 
 @inner
 def itself(a, b, c, area):
-    """Integral of 1/|x - y| over a triangle for both points, m3."""
+    """Integral of 1/|x - y| with both points in one triangle, m3."""
     ab, bc, ca = minus(b, a), minus(c, b), minus(a, c)
     one, two, three = math.sqrt(dot(ab, ab)), math.sqrt(dot(bc, bc)), math.sqrt(dot(ca, ca))
     half = 0.5 * (one + two + three)
@@ -117,19 +117,19 @@ def _over(corners, normals, areas, rule, one, other):
 
 @shared
 def inverse_distances(corners, normals, areas, centers, radii, points, rule, begin, out):
-    """Rows of integrals of 1/|x - y| over pairs of triangles, m3, once for each pair.
+    """Rows of integrals of 1/|x - y| over pairs of triangles, m3, each pair once.
 
     Parameters
     ----------
     corners : (t, 3, 3)
     normals, areas, centers, radii : (t, 3), (t,), (t, 3), (t,)
-        Of circles about the centers that hold the corners.
+        Radii of circles about the centers that contain the corners.
     points : (t, 3, 3)
-        Three points of each with equal weights, exact for quadratic functions.
+        Three points per triangle with equal weights, exact for quadratic functions.
     rule : (k, 4)
-        Weights of the corners at points of pairs that are near, and shares of the area.
+        Corner weights of the points for close pairs, and area shares.
     begin : int
-        Triangle of the first row.
+        Triangle index of the first row.
     out : (rows, t)
         Entries right of the diagonal; half of those on the diagonal; zero left of it.
     """

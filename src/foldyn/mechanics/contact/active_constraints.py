@@ -1,4 +1,4 @@
-"""Directions that contact holds where it touches, for the search for mechanisms."""
+"""Directions that active contact constrains, for the search for mechanisms."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from foldyn.mechanics.sheet_term import unit_rows
 
 
 def held_by_planes(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
-    """Unit rows (s, size): normals of planes at nodes that touch, all axes where these rub."""
+    """Unit rows (s, size): normals of planes at contact nodes, all axes with friction."""
     plane, node = np.nonzero(kept.friction[:, :, 3])
     rubs = (own.planes[plane, FRICTION] > 0.0) & (kept.anchor[plane, node, 3] > 0.0)
     normals = own.planes[plane, NORMAL : NORMAL + 3]
@@ -26,7 +26,7 @@ def held_by_planes(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
 
 
 def held_by_panels(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
-    """Unit rows (s, size): distances of pairs that touch, all motions where these rub."""
+    """Unit rows (s, size): distances of touching pairs, all relative motions with friction."""
     first, second = touching_pairs(own, kept)
     count = len(first) + len(second)
     nodes = np.empty((count, 4), np.int64)
@@ -42,7 +42,7 @@ def held_by_panels(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
 def _directions(tables, memory, first, second, nodes, weights, normals):
     """Nodes (k, 4), weights (k, 4) and direction (k, 3) of the distances of some listed pairs.
 
-    After them whether friction ties each (k,).
+    Also returns whether friction ties each (k,).
     """
     tied = np.zeros(first.size + second.size, np.bool_)
     for k in range(first.size + second.size):

@@ -1,4 +1,4 @@
-"""Contact of boards, as solvers see it: that of points that ride on the mesh."""
+"""Contact of boards, as solvers see it: contact of points that ride on the mesh."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ from foldyn.mechanics.contact.ride import (
 from foldyn.mechanics.contact.term import ContactTerm, contact_tangent
 from foldyn.mechanics.term import Compiled, nodal
 
-STRAIGHT = 0.1  # rad: in turns up to that points go as if along straight lines
-MOST = 64  # such pieces of a step
+STRAIGHT = 0.1  # rad: for smaller turns, points move nearly along straight lines
+MOST = 64  # such pieces per step
 
 
 class BoardContactTerm(ContactTerm):
     """Contact of points y(x) that ride on the mesh; see `ContactTerm`.
 
-    Kernels of contact take y for nodes. Forces come back by the transpose of dy/dx, tangents with
-    the second derivative of y.
+    Contact kernels treat y as nodes. The transpose of dy/dx maps forces back to nodes; tangents
+    also need the second derivative of y.
     """
 
     sheets: BoardSheets
@@ -51,59 +51,59 @@ class BoardContactTerm(ContactTerm):
 
     @property
     def ride(self) -> Ride:
-        """The points."""
+        """The riding points."""
         return self._riding[0]
 
     @cached_property
     def tables(self) -> Tables:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """See `ContactTerm`."""
+        """Contact data as arrays, with boards' points; see `ContactTerm`."""
         return board_tables(self.sheets, *self._riding, self._guarded.hinges)
 
     def compiled(self, work: Any, kept: Memory, group: int) -> Compiled:
-        """See `Term`."""
+        """Context and kernels for a thread; see `Term`."""
         return board_kernels(self.ride, self.tables, kept, work.angle, group)
 
     def memories(self, works: Sequence[Any]) -> list[Memory]:
-        """See `Term`."""
+        """Kernel memory for each thread; see `Term`."""
         return [memory(self.tables, self.sheets.panels)]
 
     def points(self, q: NDArray) -> NDArray:
-        """See `ContactTerm`: those that ride, and the nodes."""
+        """Displacements of the riding points, followed by the nodes; see `ContactTerm`."""
         out = np.empty_like(self.ride.rest)
         put_points(Context(self.ride), nodal(q), out)
         return out
 
     @property
     def nodes(self) -> NDArray:
-        """See `ContactTerm`."""
+        """Node (m,) that each point belongs to; see `ContactTerm`."""
         return self._riding[2]
 
     def carried(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """See `ContactTerm`."""
+        """Points (m,) that chosen nodes alone move; see `ContactTerm`."""
         return carried(self.ride, chosen)
 
     def on_nodes(self, q: NDArray, force: NDArray) -> NDArray:
-        """See `ContactTerm`."""
+        """Nodal forces of forces on the points; see `ContactTerm`."""
         out = np.zeros_like(self.ride.x)
         add_back(Context(self.ride), nodal(q), force, out)
         return out
 
     def step_back(self, u0: NDArray, u1: NDArray, force: NDArray) -> NDArray:
-        """See `ContactTerm`."""
+        """Nodal forces in a step, doing the work of the points' forces; see `ContactTerm`."""
         motion = step_jacobian(self.ride, u0, u1, self.ride.x.size)
         return (motion.T @ force.ravel()).reshape(-1, 3)
 
     def step_tangent(
         self, u0: NDArray, u1: NDArray, force: NDArray, inner: sparse.csr_array
     ) -> sparse.csr_array:
-        """See `ContactTerm`; that of the motion of points is of the first order in the step."""
+        """Step tangent by nodes; the points' motion is first order in the step."""
         ride, size = self.ride, u0.size
         motion, ahead = step_jacobian(ride, u0, u1, size), jacobian(ride, u1, size)
         bent = curvature(ride, 0.5 * (u0 + u1), force, size)
         return sparse.csr_array(motion.T @ inner @ ahead + 0.5 * bent)
 
     def tangent_at(self, q: NDArray, kept: Memory) -> sparse.csr_array:
-        """See `ContactTerm`."""
+        """Tangent by nodes at the last evaluation; see `ContactTerm`."""
         tables, push = self.tables, np.zeros_like(kept.x)
         add_contact(
             Context(tables), kept.x - tables.rest, self._guarded.angles(q), push, Context(kept)
@@ -114,7 +114,7 @@ class BoardContactTerm(ContactTerm):
         return sparse.csr_array(motion.T @ inner @ motion + bent)
 
     def holds(self, q: NDArray) -> sparse.csr_array:
-        """See `Term`."""
+        """Unit rows (s, m) of its internal constraints; see `Term`."""
         rows = self.held(q, self.ride.rest.size) @ jacobian(self.ride, nodal(q), q.size)
         size = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel())
         return sparse.csr_array(sparse.diags_array(1.0 / size) @ rows)
@@ -122,7 +122,7 @@ class BoardContactTerm(ContactTerm):
     def clear_with(
         self, kept: Memory, q: NDArray, step: NDArray, moves: NDArray, keep: float
     ) -> float:
-        """See `ContactTerm`: along pieces of a straight step, in which points hardly turn."""
+        """Share of a step without crossing, over pieces in which points hardly turn."""
         u, motion = nodal(q), nodal(step)
         turn = largest_turn(self.ride, u, motion)
         if not turn < math.inf:

@@ -1,8 +1,8 @@
-"""Boards: what may touch of panels that are hinged beside their middle surfaces.
+"""Boards: the contact surfaces of panels hinged off their middle surfaces.
 
-What touches of a board is its middle surface. Its corners ride on the mesh (`ride`), those of each
-panel apart from those of its neighbors. After them come the nodes of the mesh, between which hinges
-are guarded.
+The contact surface of a board is its middle surface. Its corners ride on the mesh (`ride`), and
+neighboring panels have separate corners. The nodes of the mesh follow in the arrays, for the guards
+of hinges.
 
 The middles of two boards are s = |h + h'| apart at a closed crease, h and h' the heights of its
 hinge line above them. Between sheets, s = 0 (`tables`), and boards hinged in their faces, s = t,
@@ -10,9 +10,9 @@ which touch everywhere at once,
 
     d0 = s + (1 - s/t) d0 of sheets, but at most l,
 
-l the distance from the crease: boards that lie flat do not touch with their sides. Hinges are
-guarded from 1 - s/t of the angle on at which those of sheets are: where middles stay apart, their
-distance tells on which side they are.
+with l the distance from the crease: boards that lie flat do not touch with their sides. Guards of
+hinges begin at 1 - s/t of the angle for sheets: if the middle surfaces stay apart, their distance
+already determines the side.
 """
 
 from __future__ import annotations
@@ -35,31 +35,31 @@ from foldyn.mechanics.contact.candidates import (
 )
 from foldyn.mechanics.contact.ride import Ride, carried, ride_on
 
-JUST = 1.0 - 1e-9  # of d0: what just touches at rest does not push
-LEAST = 0.02  # of the angle at which sheets are guarded: least angle of a guard
+JUST = 1.0 - 1e-9  # of d0: parts that just touch at rest exert no force
+LEAST = 0.02  # of the guard angle for sheets: least angle of a guard
 
 
 @dataclass(frozen=True, eq=False)
 class BoardSheets(Sheets):
-    """What may touch, of a mesh whose panels are boards: see `Sheets`.
+    """Contact surfaces of a mesh whose panels are boards; see `Sheets`.
 
     Parameters
     ----------
     middle : (t, 3, 3)
-        Places (m) in the boards' middle surfaces of the corners of each triangle, at rest.
+        Positions (m) of each triangle's corners on the boards' middle surfaces, at rest.
     """
 
     middle: NDArray
 
     def riding(self) -> tuple[Ride, NDArray, NDArray]:
-        """See `ride.ride_on`."""
+        """Points at the corners of the boards; see `ride.ride_on`."""
         return ride_on(self.nodes, self.triangles, self.panel, self.middle)
 
 
 def board_tables(
     sheets: BoardSheets, ride: Ride, panel: NDArray, node: NDArray, hinges: NDArray
 ) -> Tables:
-    """Arrays of what may touch: points of a panel (m,) and a node (m,); hinges of the mesh."""
+    """Contact arrays for points of a panel (m,) and a node (m,), and hinges of the mesh."""
     mesh = Sheets(*(getattr(sheets, field.name) for field in fields(Sheets)))
     held = carried(ride, sheets.held)
     points = replace(mesh, nodes=ride.rest, triangles=ride.points, held=held)
@@ -90,9 +90,9 @@ def board_tables(
 def _neighbors(
     sheets: BoardSheets, ride: Ride, panel: NDArray, node: NDArray
 ) -> tuple[list[list[int]], list[dict[int, float]], dict[tuple[int, int], float]]:
-    """The panels of each point's node, its own first, and d0 (m) against others near it.
+    """Panels of each point's node, its own first, and d0 (m) against others near it.
 
-    After them s/t of two panels that share a crease. Of points of a panel (m,) and a node (m,).
+    Also returns s/t of panels that share a crease. Points belong to a panel (m,) and a node (m,).
     """
     at = {key: k for k, key in enumerate(zip(panel.tolist(), node.tolist(), strict=True))}
     sharing: list[list[int]] = [[] for _ in ride.x]
@@ -120,7 +120,7 @@ def _neighbors(
 
 
 def _guarded(base: Tables, closed: dict[tuple[int, int], float]) -> NDArray[np.float64]:
-    """Shares (h,) of the angles at which sheets are guarded, of which boards need no more."""
+    """Ratios (h,) of the guard angles for boards to the guard angles for sheets."""
     sides = dict(zip(map(tuple, base.edges.tolist()), base.edge_panels.tolist(), strict=True))
     axes = map(tuple, np.sort(base.hinges[:, :2], axis=1).tolist())
     apart = [closed.get(tuple(sides.get(axis, ())), 0.0) for axis in axes]
@@ -128,7 +128,7 @@ def _guarded(base: Tables, closed: dict[tuple[int, int], float]) -> NDArray[np.f
 
 
 def _above(ride: Ride) -> NDArray[np.float64]:
-    """Height (m,) of the nodes above the points of boards, towards the front, at rest."""
+    """Height (m,) of the nodes above the points of boards, toward the front, at rest."""
     a, b, c = np.moveaxis(ride.rest[ride.points], 1, 0)
     normal = np.cross(b - a, c - a)
     normal /= np.linalg.norm(normal, axis=1)[:, None]

@@ -1,14 +1,14 @@
-"""Parts of a sheet that can touch, and at which distances: what stays the same in a motion.
+"""Parts of a sheet that can touch, and their contact distances: constant during a motion.
 
-Parts of one panel never touch. Two panels that share a crease or a corner are near each other by
-nature, so the distance d0 at which a vertex of one feels the other is cut there:
+Parts of one panel never touch. Two panels that share a crease or a corner are always close, so the
+contact distance d0 of a vertex of one against the other is reduced there:
 
     d0 = t min(2, 2 l / w) beside a crease,    d0 = t min(1, 2 l / w) beside a corner,
 
-l the vertex' distance from what they share at rest, w the largest l of its panel. Panels hinged at
-a crease then meet everywhere at once, at a dihedral of 2 t / w, and N layers stack to N t.
-Elsewhere d0 = t, the mean thickness of both. That of two edges is the mean over the ends of one
-against the panel of the other, the least of the combinations.
+with l the vertex's distance from the shared crease or corner at rest, and w the largest l of its
+panel. Panels hinged at a crease then meet everywhere at once, at a dihedral of 2 t / w, and N
+layers stack to N t. Elsewhere d0 = t, the mean thickness of both. For two edges, d0 is the mean
+over the ends of one against the panel of the other, minimized over the combinations.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-ACROSS_CREASE, ACROSS_CORNER = 2.0, 1.0  # most of d0 / t of panels that share one
+ACROSS_CREASE, ACROSS_CORNER = 2.0, 1.0  # largest d0 / t of panels that share a crease or a corner
 POINT, NORMAL, FRICTION, MOTION, HISTORY = 0, 3, 6, 7, 10  # columns of the table of planes
 PLANE_COLUMNS = 11
 
 
 @dataclass(frozen=True, eq=False)
 class Sheets:
-    """What may touch: n nodes, t triangles of p panels, and q planes.
+    """Contact surfaces: n nodes, t triangles of p panels, and q planes.
 
     Parameters
     ----------
@@ -41,12 +41,12 @@ class Sheets:
     panels : bool
         Whether panels touch each other.
     friction : float
-        Coefficient of friction of panels on each other.
+        Friction coefficient between panels.
     planes : (q, 11)
-        A point (m), the unit normal on the side of the sheet, the coefficient of friction, the
-        displacement (m) at factor 1, and the number of the history of the factor.
+        A point (m), the unit normal toward the sheet, the friction coefficient, the displacement
+        (m) at factor 1, and the row of its history.
     held : (n,)
-        Nodes that cannot move, which planes leave alone.
+        Fixed nodes, on which planes do not act.
     """
 
     nodes: NDArray
@@ -60,7 +60,7 @@ class Sheets:
     held: NDArray
 
     def placed(self, order: NDArray) -> Sheets:
-        """The same with node order[k] at place k."""
+        """Copy with node order[k] at place k."""
         rank = np.empty(len(order), np.int64)
         rank[order] = np.arange(len(order))
         return replace(
@@ -69,51 +69,51 @@ class Sheets:
 
 
 class Ranges(NamedTuple):
-    """What tells d0 of nodes and panels. Compiled code takes small tuples several times quicker."""
+    """Data for d0 of nodes and panels. Compiled code passes small tuples several times faster."""
 
     node_thickness: NDArray  # (n,) m
     panel_thickness: NDArray  # (p,) m
-    own_start: NDArray  # (n + 1,) first of a node's panels among `own`
+    own_start: NDArray  # (n + 1,) start of each node's panels in `own`
     own: NDArray
-    near_start: NDArray  # (n + 1,) first of the panels that share nodes with those, among `near`
+    near_start: NDArray  # (n + 1,) start of the panels near each node's panels, in `near`
     near: NDArray
-    near_d0: NDArray  # d0 against these, m
+    near_d0: NDArray  # d0 against these panels, m
 
 
 class Tables(NamedTuple):
-    """The same as arrays of compiled code, with e edges and h hinges that are guarded."""
+    """Contact data as arrays for compiled code, with e edges and h guarded hinges."""
 
     rest: NDArray  # (n, 3) m
     triangles: NDArray  # (t, 3)
     edges: NDArray  # (e, 2)
-    edge_nodes: NDArray  # (e, 2) nodes of the mesh at its ends; edges that share one do not touch
+    edge_nodes: NDArray  # (e, 2) mesh nodes at the ends; edges with a common node do not touch
     edge_square: NDArray  # (e,) squared lengths at rest, m2
-    shared_side: NDArray  # (t, 3) 1/2 where a side is that of two triangles, else 0
-    shared_corner: NDArray  # (n,) 1/n where n triangles close around a node, else 0
+    shared_side: NDArray  # (t, 3) 1/2 for sides of two triangles, else 0
+    shared_corner: NDArray  # (n,) 1/n for nodes enclosed by n triangles, else 0
     panel: NDArray  # (t,)
-    edge_panels: NDArray  # (e, 2) the second one -1 where there is none
+    edge_panels: NDArray  # (e, 2) panels; -1 if there is no second one
     node_thickness: NDArray  # (n,) m
     ranges: Ranges
     surface: NDArray  # (s,) nodes of triangles
-    meeting: NDArray  # (m,) those that planes may meet
+    meeting: NDArray  # (m,) nodes that planes may meet
     hinges: NDArray  # (h, 4) nodes j, k, i, l
-    hinge_row: NDArray  # (h,) where a model keeps their dihedrals
+    hinge_row: NDArray  # (h,) position in the model's dihedrals
     hinge_limit: NDArray  # (h,) dihedral below which they are guarded, rad
-    hinge_reach: NDArray  # (h,) turn per displacement of a node, at most, rad/m
+    hinge_reach: NDArray  # (h,) largest turn per nodal displacement, rad/m
     hinge_stiffness: NDArray  # (h,) N m/rad
     planes: NDArray  # (q, 11)
     stiffness: float  # N/m
-    friction: float  # coefficient of that of panels on each other
+    friction: float  # friction coefficient between panels
     farthest: float  # largest d0, m
-    skin: float  # of lists of pairs, m
+    skin: float  # of pair lists, m
 
 
-SKIN = 0.15  # of the mean edge: how much farther than d0 listed pairs may be
-GUARDED = 1.0  # rad: the largest dihedral at which a guard may begin
+SKIN = 0.15  # of the mean edge: extra distance beyond d0 of listed pairs
+GUARDED = 1.0  # rad: largest dihedral at which a guard may begin
 
 
 def tables(sheets: Sheets, hinges: NDArray) -> Tables:
-    """Arrays of what may touch; hinges (h, 4) of a model, with -1 for a wing that is no node."""
+    """Contact arrays for hinges (h, 4) of a model, with -1 for a virtual wing."""
     nodes, triangles = np.ascontiguousarray(sheets.nodes, float), _whole(sheets.triangles)
     panel = _whole(sheets.panel)
     edges, side = edges_of(triangles)
@@ -173,7 +173,7 @@ def tables(sheets: Sheets, hinges: NDArray) -> Tables:
 
 
 def edges_of(triangles: NDArray) -> tuple[NDArray, NDArray]:
-    """Edges (e, 2), and those of each triangle (t, 3) from its first, second and third corner."""
+    """Edges (e, 2), and each triangle's edges (t, 3) from its first, second and third corner."""
     sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     edges, side = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
     return _whole(edges), side.reshape(-1, 3)
@@ -195,7 +195,7 @@ def _panels_of_nodes(members: list[NDArray], count: int) -> list[list[int]]:
 
 
 def _panels_of_edges(side: NDArray, panel: NDArray, count: int) -> NDArray:
-    """The panels (e, 2) of each edge; -1 where there is no second one."""
+    """Panels (e, 2) of each edge; -1 if there is no second one."""
     out = np.full((count, 2), -1, np.int64)
     edge, of = side.ravel(), np.repeat(panel, 3)
     out[edge[::-1], 0] = of[::-1]
@@ -207,7 +207,7 @@ def _panels_of_edges(side: NDArray, panel: NDArray, count: int) -> NDArray:
 def near_panels(
     nodes: NDArray, members: list[NDArray], own: list[list[int]], thickness: NDArray
 ) -> list[dict[int, float]]:
-    """Of each node, d0 (m) against the panels that share nodes with a panel of its own."""
+    """For each node, d0 (m) against the panels that share nodes with one of its panels."""
     near: list[dict[int, float]] = [{} for _ in own]
     for panel, corners in enumerate(members):
         for other, common in shared_nodes(panel, corners, own).items():
@@ -222,7 +222,7 @@ def near_panels(
 
 
 def shared_nodes(panel: int, corners: NDArray, own: list[list[int]]) -> dict[int, list[int]]:
-    """Other panels of the corners of a panel, and which corners they share."""
+    """Other panels at the corners of a panel, and the corners they share."""
     shared: dict[int, list[int]] = {}
     for node in corners.tolist():
         for other in own[node]:
@@ -243,17 +243,17 @@ def distances(nodes: NDArray, corners: NDArray, common: list[int]) -> NDArray:
 
 
 class Pieces(NamedTuple):
-    """Edges that are one of several along the crease of two panels, c of them."""
+    """Edges that are pieces of a crease between two panels, c of them."""
 
     ends: NDArray  # (c, 2) increasing
     height: NDArray  # (c,) half the width of the narrower panel over the crease, m
-    share: NDArray  # (c,) of the length of all pieces
+    share: NDArray  # (c,) share of the length of all pieces
 
 
 def crease_pieces(
     nodes: NDArray, edges: NDArray, edge_panels: NDArray, members: list[NDArray]
 ) -> Pieces:
-    """Find the pieces of creases: none where a crease has one hinge, as in bars and hinges."""
+    """Find pieces of creases: none if each crease has one hinge, as in bars and hinges."""
     between = np.flatnonzero(edge_panels[:, 1] >= 0)
     pairs, which, count = np.unique(
         np.sort(edge_panels[between], axis=1), axis=0, return_inverse=True, return_counts=True
@@ -274,12 +274,12 @@ def crease_pieces(
 def hinge_guards(
     nodes: NDArray, hinges: NDArray, thickness: NDArray, stiffness: float, pieces: Pieces
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Guarded hinges, and of all: where their guard begins (rad), reach (rad/m), stiffness.
+    """Guarded hinges, and for all hinges: start of the guard (rad), reach (rad/m), stiffness.
 
-    Faces of thickness t whose lower wing has the height h over the axis meet at a dihedral of about
-    t / h; the guard has the stiffness k h^2, that of a contact at the wing. On a piece of a crease
-    the wings are parts of panels, and h is that of the panels: the guards of all pieces begin where
-    the panels meet, and have together the stiffness of one.
+    Faces of thickness t, with the lower wing at height h over the axis, meet at a dihedral of about
+    t / h; the guard has the stiffness k h^2, like a contact at the wing. On a piece of a crease the
+    wings are parts of panels, and h is the panels' height: the guards of all pieces begin when the
+    panels meet, and share the stiffness of one guard.
     """
     whole = np.flatnonzero(((hinges >= 0) & (hinges < len(nodes))).all(axis=1))
     limit, reach, strength = np.zeros((3, len(hinges)))
@@ -299,7 +299,7 @@ def hinge_guards(
 
 
 def starts(lists: list) -> NDArray:
-    """Where each of several lists begins if one follows the other."""
+    """Start indices of several lists that are concatenated."""
     return np.concatenate([[0], np.cumsum([len(of) for of in lists])]).astype(np.int64)
 
 

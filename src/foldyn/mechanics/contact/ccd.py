@@ -1,14 +1,14 @@
-"""Continuous collision detection: how far a step may go before something crosses.
+"""Continuous collision detection: how far a step may go before parts cross.
 
-Explicit methods limit their steps by speeds (`step_limit`). A step of Newton's method is a motion
-without one: nodes and planes go along straight lines, and it is cut so that each gap keeps a share
-of itself and no guarded hinge passes 0 or 2 pi. Pairs are listed anew where it leaves their range.
+Explicit methods limit their steps by speeds (`step_limit`). A Newton step has no speed: nodes and
+planes move along straight lines, and it is shortened so that each gap keeps a share of itself and
+no guarded hinge passes 0 or 2 pi. Pair lists are renewed when the motion leaves their range.
 
-The first gap to close is found by conservative advancement, which needs distances alone: a pair
-whose points move by l at most against each other keeps its gap g above its goal over the share
-(g - goal) / l of the motion; from there the next share follows (additive continuous collision
-detection; Li, Kaufman and Jiang, Codimensional Incremental Potential Contact, ACM Trans. Graph. 40,
-2021, section 5).
+Conservative advancement finds the first gap to close and needs only distances: a pair whose points
+move by at most l relative to each other keeps its gap g above its goal over the share (g - goal) /
+l of the motion; the next share follows from there (additive continuous collision detection; Li,
+Kaufman and Jiang, Codimensional Incremental Potential Contact, ACM Trans. Graph. 40, 2021, section
+5).
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from foldyn.mechanics.contact.pairs import VERTEX, corners_gap, nodes_of, put_co
 from foldyn.mechanics.contact.planes import height
 from foldyn.mechanics.contact.search import list_pairs, place, use_all
 
-KEEP = 0.2  # of each gap
-NEAR = 0.01  # of the goal: gaps so little above it have reached it
-ADVANCES = 100  # of one pair
-LISTS = 40  # of pairs along one motion
-HALVINGS = 40  # where a hinge would pass
+KEEP = 0.2  # share of each gap to keep
+NEAR = 0.01  # of the goal: gaps this close above it count as having reached it
+ADVANCES = 100  # per pair
+LISTS = 40  # pair lists per motion
+HALVINGS = 40  # if a hinge would pass
 
 
 @inner_scalar
@@ -39,7 +39,7 @@ def _length(values, i):
 
 @inner
 def _pair_share(corners, motion, kind, keep, best):
-    """The lesser of `best` and the share of a motion (4, 3) that leaves corners (4, 3) apart."""
+    """The smaller of `best` and the share of a motion (4, 3) that keeps corners (4, 3) apart."""
     for c in range(3):
         mean = 0.25 * (motion[0, c] + motion[1, c] + motion[2, c] + motion[3, c])
         for i in range(4):
@@ -65,7 +65,7 @@ def _pair_share(corners, motion, kind, keep, best):
 
 @inner
 def _pairs_share(tables, memory, step, keep, best):
-    """Share of a motion (n, 3) that leaves all listed pairs apart."""
+    """Share of a motion (n, 3) that keeps all listed pairs apart."""
     x, corners, motion = memory.x, np.empty((4, 3)), np.empty((4, 3))
     triangles, edges = tables.triangles, tables.edges
     for kind in range(2):
@@ -81,7 +81,7 @@ def _pairs_share(tables, memory, step, keep, best):
 
 @inner
 def _planes_share(tables, memory, step, moves, keep, best):
-    """Share of a motion (n, 3) that leaves all nodes before the planes, which move (q, 3)."""
+    """Share of a motion (n, 3) that keeps all nodes in front of the planes, which move (q, 3)."""
     for p in range(len(tables.planes)):
         for m in range(tables.meeting.size):
             i, closing = tables.meeting[m], 0.0
@@ -118,9 +118,9 @@ def _hinges_share(tables, x, step, keep, best):
 
 @inner
 def _listed_share(tables, memory, u, step, keep, fast):
-    """Share of a motion from u, where memory.x is, that leaves all pairs apart.
+    """Share of a motion from u, where memory.x is, that keeps all pairs apart.
 
-    Where the motion leaves the range of the list, it goes on from there with another one.
+    If the motion leaves the range of the pair list, it continues from there with a new one.
     """
     far, done = farthest(u, memory), 0.0
     if memory.counts.has_list == 0 or not far <= 0.25 * memory.facts.skin:
@@ -153,14 +153,14 @@ def _listed_share(tables, memory, u, step, keep, fast):
 
 @kernel
 def clear_share(tables, memory, u, step, moves, keep):
-    """Share, from 0 to 1, of a motion from displacement u by `step`, (rows, 3), that crosses none.
+    """Share, 0 to 1, of a motion (rows, 3) by `step` from u without any crossing.
 
-    moves : (q, 3) motion of the planes along with it, m; keep : share of each gap that is left.
-    The list of pairs is renewed where it would not serve; memory.x becomes the positions at u.
+    moves : (q, 3) simultaneous motion of the planes, m; keep : share of each gap to keep. Renews
+    the pair list if necessary; memory.x becomes the positions at u.
     """
     place(tables, u, memory)
     n, best = len(memory.x), 1.0
-    for i in range(n):  # a largest value does not see nan
+    for i in range(n):  # max would ignore nan
         if not _length(step, i) < math.inf:
             return 0.0
     if memory.d0.shape[1] > 0:

@@ -1,4 +1,4 @@
-"""Clearance: the least distance between panels that share no vertex, and where it is."""
+"""Clearance: least distance between panels without common vertex, and its location."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from foldyn.mechanics.contact.distances import (
 )
 from foldyn.mechanics.crossings import crossing_panels
 
-NEIGHBORS = 32  # of a triangle's center, among which a first bound is looked for
-TIE = 2e-9  # of the square of the least distance: pairs of points that differ by less are as close
-MOST = 64  # of such pairs that are told
+NEIGHBORS = 32  # nearest triangle centers that give a first bound
+TIE = 2e-9  # of the squared least distance: pairs of points within this tie
+MOST = 64  # number of such pairs that are reported
 
 
 class Clearance(NamedTuple):
-    """The closest points of two panels, whose distance is the size of a sum over four nodes.
+    """Closest points of two panels; their distance is the norm of a weighted sum over four nodes.
 
     Attributes
     ----------
     distance : float
-        m; 0 where panels cross, inf where every two panels share a vertex.
+        m; 0 if panels cross, inf if any two panels share a vertex.
     nodes, weights : ndarray, shape (k, 4)
-        The vector between both points is the sum of the weights times the nodes' places: of each
-        pair that is as close as this.
+        The vector between both points is the weighted sum of the nodal positions, for each pair at
+        this distance.
     """
 
     distance: float
@@ -42,12 +42,12 @@ class Clearance(NamedTuple):
 
 
 def clearance(points: NDArray, triangles: NDArray, panels: NDArray) -> Clearance:
-    """The least distance between two panels that share no node.
+    """Least distance between two panels that share no node.
 
     Parameters
     ----------
     points : ndarray, shape (n, 3)
-        Places of all nodes (m).
+        Positions of all nodes (m).
     triangles : ndarray of int, shape (m, 3)
         Triangles into which panels are cut.
     panels : ndarray of int, shape (m,)
@@ -67,7 +67,7 @@ def clearance(points: NDArray, triangles: NDArray, panels: NDArray) -> Clearance
 
 
 def _near(corners: NDArray, panels: NDArray, meet: sparse.csr_array) -> NDArray[np.int64]:
-    """Pairs of triangles (k, 2) of panels that do not meet, the closest ones among them."""
+    """Triangle pairs (k, 2) of panels that do not meet, including the closest ones."""
     from scipy.spatial import cKDTree
 
     center = corners.mean(axis=1)
@@ -88,9 +88,9 @@ def _entries(matrix: sparse.csr_array, rows: NDArray, columns: NDArray) -> NDArr
 
 @kernel
 def _closest(x, triangles, pairs, nodes, weights):
-    """Least distance of some pairs of triangles, and how often it is reached.
+    """Least distance of some pairs of triangles, and how many pairs reach it.
 
-    Where that is goes into the last two arguments, in no order.
+    Writes their nodes and weights to the last two arguments, in any order.
     """
     best, count = np.inf, 0
     for k in range(len(pairs)):
@@ -120,7 +120,7 @@ def _closest(x, triangles, pairs, nodes, weights):
 
 @inner
 def _kept(square, found, best, count, nodes, weights):
-    """Keep a pair of points if it is as close as the others, which go if it is closer.
+    """Record a pair of points if it ties with the closest; a closer pair replaces all.
 
     Returns the square of the least distance, and the number of pairs.
     """

@@ -1,4 +1,4 @@
-"""State of contact between evaluations: pairs that are near, anchors of friction."""
+"""State of contact between evaluations: nearby pairs, anchors of friction."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from foldyn.mechanics.contact.candidates import Tables
 from foldyn.mechanics.contact.thread_partition import NOTES, Share
 from foldyn.mechanics.threads import Team, team
 
-ROOM = 64  # pairs for each triangle, of either kind
+ROOM = 64  # pairs per triangle, for each kind
 
 
 class Memory(NamedTuple):
-    """Memory of one motion of n nodes against q planes; room for m pairs of either kind.
+    """Memory of a motion of n nodes against q planes; room for m pairs of each kind.
 
-    Members of a team of threads have the same arrays, but for `moved`, `counts` and `facts`: these
-    become the same numbers, but for the energy, which is that of a member's share.
+    Members of a thread team share the arrays, except `moved`, `counts` and `facts`: these take
+    equal values, except for the energy, which covers a member's share.
     """
 
     x: NDArray  # (n, 3) positions at the last evaluation, m
-    listed: NDArray  # (n, 3) displacement when the pairs were listed, m
+    listed: NDArray  # (n, 3) displacement at the last listing of pairs, m
     pairs: NDArray  # (2, m, 2) vertex and triangle; edge and edge
     d0: NDArray  # (2, m) m
-    gap: NDArray  # (2, m) distance less d0 when they were listed, m
+    gap: NDArray  # (2, m) distance minus d0 at the last listing, m
     near: NDArray  # (2, m) pairs that may come within d0 in this step
     # with friction between panels, else (2, 0, 4): where a pair is tied (see `pairs.weights_of`),
     # the normal force when it was, N, 0 if it is not, and the stretch of its spring, m
     tie: NDArray  # (2, m, 4)
-    anchor: NDArray  # (q, n, 4) where friction's spring is tied on the plane, m, and the normal
+    anchor: NDArray  # (q, n, 4) anchor of friction's spring on the plane, m, and the normal force
     # force when it was, N; 0 if it is not
     friction: NDArray  # (q, n, 4) gradient of friction, N, and the normal force at the last force
-    moved: NDArray  # (q, 6) displacement of the planes, m, and its velocity, m/s
+    moved: NDArray  # (q, 6) displacement of the planes, m, and their velocity, m/s
     counts: np.record
     facts: np.record
-    share: Share  # of a member of a team
+    share: Share  # of a team member
 
 
 COUNTED = (
@@ -45,12 +45,12 @@ COUNTED = (
     "listed_second",  # edges
     "near_first",
     "near_second",
-    "lists",  # made so far
+    "lists",  # number of lists made
     "has_list",
-    "watched",  # whether `limited` keeps the lists up to date, before every step
-    "hinges",  # that may come within their guard in this step
-    "full",  # whether the last list could not be made
-    "lagged",  # whether friction is bounded by the normal force at the end of the last step
+    "watched",  # whether `limited` updates the lists before every step
+    "hinges",  # hinges that may reach their guard in this step
+    "full",  # whether the last list did not fit
+    "lagged",  # whether friction is limited by the normal force at the end of the last step
 )
 # energy at the last force (J), skin of the list (m), the shortest step asked for so far (s), the
 # longest one that resolves what touches now (s)

@@ -1,11 +1,11 @@
-"""The second derivative of a potential of a distance that is minimal over some weights.
+"""Second derivative of a potential of a distance that is minimal over some weights.
 
 With r = sum w_i x_i, minimized over the free parameters a of the weights, the distance d = |r|
 obeys, by the implicit function theorem,
 
     Hess(d^2 / 2) = w_i w_j I - h_i' (J J')^-1 h_j,    h_i = w_i J + dw_i/da r',    J = dr/da,
 
-which is exact where the closest point stays on the same part.
+which is exact if the closest point remains on the same feature.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from foldyn.mechanics.contact.potential import barrier
 
 @inner
 def apart_of(corners, weights, r):
-    """Set r (3,) to the vector sum w_i x_i of corners (4, 3) and weights (4,); its square."""
+    """Set r (3,) to the sum of w_i x_i over corners (4, 3), weights (4,); return its square."""
     for c in range(3):
         r[c] = 0.0
         for i in range(4):
@@ -65,7 +65,7 @@ def half_square(corners, weights, moves, free, r, slope, second):
 def add_second(corners, weights, moves, free, d0, k, out, slope):
     """Add the derivatives of k d0^2 f(d/d0): the second to out (12, 12), the first to slope (12,).
 
-    The others as in `half_square`. Returns the energy (J).
+    Other arguments: see `half_square`. Returns the energy (J).
     """
     r = np.empty(3)
     d = math.sqrt(apart_of(corners, weights, r))

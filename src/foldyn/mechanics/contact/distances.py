@@ -1,8 +1,8 @@
 """Closest points of a vertex and a triangle, and of two segments.
 
-Points are tuples of three numbers. A closest point is given by its weights on the corners; regions
-tell on which part of the triangle it lies. The walk through the regions of a triangle: Ericson,
-Real-Time Collision Detection, 2005, section 5.1.5; of two segments: section 5.1.9.
+Points are tuples of three numbers. A closest point is given by its weights on the corners; its
+region is the part of the triangle that contains it. Search through the regions of a triangle:
+Ericson, Real-Time Collision Detection, 2005, section 5.1.5; of two segments: section 5.1.9.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
 
 INSIDE, SIDE_AB, SIDE_BC, SIDE_CA, CORNER_A, CORNER_B, CORNER_C = range(7)  # regions
-PARALLEL = 1e-14  # of the product of squared lengths: segments that count as parallel
+PARALLEL = 1e-14  # of the product of squared lengths: below it segments count as parallel
 
 
 @inner_scalar
@@ -33,7 +33,7 @@ def minus(a, b):
 
 @scalar
 def cross(a, b):
-    """Vector product."""
+    """Cross product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
@@ -49,7 +49,7 @@ def apart(p, a, b, c, wa, wb, wc):
 
 @inner_scalar
 def between(a, b, c, d, s, t):
-    """Vector from the point at the fraction t of segment cd to that at s of ab."""
+    """Vector from the point at fraction t of segment cd to the point at fraction s of ab."""
     return (
         a[0] + s * (b[0] - a[0]) - c[0] - t * (d[0] - c[0]),
         a[1] + s * (b[1] - a[1]) - c[1] - t * (d[1] - c[1]),
@@ -91,14 +91,14 @@ def closest_on_triangle(p, a, b, c):
 
 @inner_scalar
 def closest_on_segment(p, a, b):
-    """Fraction of the segment ab at which it is closest to p."""
+    """Fraction along segment ab of its point closest to p."""
     ab = minus(b, a)
     return min(1.0, max(0.0, dot(minus(p, a), ab) / dot(ab, ab)))
 
 
 @kernel
 def closest_of_segments(a, b, c, d):
-    """Fractions of the segments ab and cd at which they are closest, and whether inside both."""
+    """Fractions of the closest points of segments ab and cd, and whether both are inside."""
     e, g, r = minus(b, a), minus(d, c), minus(a, c)
     ee, gg, gr, er, eg = dot(e, e), dot(g, g), dot(g, r), dot(e, r), dot(e, g)
     across = ee * gg - eg * eg
@@ -115,7 +115,7 @@ def closest_of_segments(a, b, c, d):
 
 @inner
 def closest_end(a, b, c, d):
-    """Fractions of the segments ab and cd of the closest of their four pairs of end and segment."""
+    """Fractions, on ab and cd, of the closest of the four pairs of an end and a segment."""
     s, t = 0.0, closest_on_segment(a, c, d)
     r = between(a, b, c, d, s, t)
     best = dot(r, r)

@@ -1,13 +1,12 @@
 """An edge against an edge: energy, force and tangent.
 
-The closest points of two edges lie inside both where neither vertex is the closest. Only there the
-pair adds anything,
+An edge pair contributes only if the closest points lie inside both edges,
 
     V = m(|e x g|^2) (b(d_EE) - b(d_end)),
 
-with d_end the distance of the closest end from the other edge, which vertices and triangles count
-already, so that V begins at zero. m(c) = (2 - c/c0) c/c0 below c0 = 1e-3 |e|^2 |g|^2 at rest takes
-away the jump of the closest points of parallel edges (Li et al., ACM Trans. Graph. 39, 2020).
+with d_end the distance of the closest end from the other edge, which vertex-triangle pairs already
+cover, so that V starts at zero. m(c) = (2 - c/c0) c/c0 below c0 = 1e-3 |e|^2 |g|^2 at rest removes
+the jump of the closest points of parallel edges (Li et al., ACM Trans. Graph. 39, 2020).
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ def mollifier(cc, c0):
 
 @inner
 def _part(x, force, nodes, s, t, d0, k):
-    """Energy of k d0^2 f(d/d0) between the points at s and t of two edges, its force along d.
+    """Energy k d0^2 f(d/d0) between the points at s and t of two edges, and its force along d.
 
     Adds its gradient, unless force is None.
     """
@@ -64,10 +63,10 @@ def _part(x, force, nodes, s, t, d0, k):
 
 @kernel
 def edge_edge(tables, x, force, i, j, d0):
-    """Energy (J) of the edges i and j at positions x (n, 3), and their normal force (N).
+    """Energy (J) of edges i and j at positions x (n, 3), and their normal force (N).
 
-    Adds the gradient to force (n, 3), unless that is None. Returns the fractions of both edges at
-    which they are closest, too.
+    Adds the gradient to force (n, 3), unless that is None. Also returns the fractions of the
+    closest points on both edges.
     """
     a, b = tables.edges[i, 0], tables.edges[i, 1]
     c, d = tables.edges[j, 0], tables.edges[j, 1]
@@ -103,13 +102,13 @@ def edge_edge(tables, x, force, i, j, d0):
 
 @inner
 def weigh_edges(corners, which, weights, moves):
-    """Set weights (4,) and moves (2, 4) of the distance of two edges, or of the closest end.
+    """Set weights (4,) and moves (2, 4) for the distance of two edges, or of the closest end.
 
     corners : (4, 3) of the first edge and the second.
     which : 0 for the edges, 1 for the closest end.
 
-    Returns the number of parameters over which the distance is minimal, see `second`, and whether
-    the closest points lie inside both edges.
+    Returns the number of parameters over which the distance is minimal, and whether the closest
+    points lie inside both edges.
     """
     a, b, c, d = point(corners, 0), point(corners, 1), point(corners, 2), point(corners, 3)
     s, t, inside = closest_of_segments(a, b, c, d)
@@ -129,7 +128,7 @@ def weigh_edges(corners, which, weights, moves):
 
 @kernel
 def edge_edge_tangent(tables, x, i, j, d0, out):
-    """Add the second derivative of the energy of `edge_edge` to out (12, 12); the energy.
+    """Add the Hessian of the energy of `edge_edge` to out (12, 12); return the energy.
 
     Rows and columns belong to the ends of edge i and then of edge j.
     """
@@ -166,7 +165,7 @@ def edge_edge_tangent(tables, x, i, j, d0, out):
 
 @inner
 def square_of_cross(e, g):
-    """First and second derivative, (12,) and (12, 12), of |e x g|^2 by the ends of both edges."""
+    """First and second derivatives, (12,) and (12, 12), of |e x g|^2 by the ends of both edges."""
     ee, gg, eg = dot(e, e), dot(g, g), dot(e, g)
     by_vectors, twice = np.empty(6), np.empty((6, 6))
     for p in range(3):

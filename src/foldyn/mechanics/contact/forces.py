@@ -1,4 +1,4 @@
-"""Energy and force of all that touches."""
+"""Energy and force of all contacts."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ from foldyn.mechanics.threads import part, wait
 
 @inner
 def _add_pairs(tables, angle, force, memory):
-    """Energy (J) of a member's part of near pairs and guards.
+    """Energy (J) of a member's share of near pairs and guards.
 
-    Adds its gradient, and friction, to force (n, 3).
-    Notes which nodes that reaches.
+    Adds its gradient, and friction, to force (n, 3). Records the range of affected nodes.
     """
     counts, team, x, energy = memory.counts, memory.share.team, memory.x, 0.0
     low, high = len(x), 0
@@ -55,8 +54,8 @@ def _add_pairs(tables, angle, force, memory):
 def add_contact(tables, u, angle, force, memory):
     """Add the gradient (N) of the contact energy at u, and friction, to force, both (rows, 3).
 
-    angle : dihedrals (nh,) that the model keeps, rad. The energy (J) stays in memory.facts. A
-    member of a team finishes the force on its own nodes; see `share`.
+    angle : dihedrals (nh,) of the model, rad. The energy (J) is stored in memory.facts. Each team
+    member completes the force on its own nodes; see `thread_partition`.
     """
     counts, share, energy = memory.counts, memory.share, 0.0
     team = share.team
@@ -65,7 +64,7 @@ def add_contact(tables, u, angle, force, memory):
     if near or len(tables.planes) > 0:
         place(tables, u, memory)
     if near:
-        wait(team)  # for the positions and dihedrals of the others
+        wait(team)  # for positions and dihedrals of the others
         if counts.watched == 0:
             follow(tables, u, memory)
         into = force if team.size == 1 else share.sums[team.number]

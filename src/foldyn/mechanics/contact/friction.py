@@ -1,13 +1,13 @@
-"""Friction along a path of equilibria: what an accepted step changes.
+"""Friction along a path of equilibria: updates at accepted steps.
 
 Within a step friction is a function of the state: springs from the anchors and ties of the last
-accepted step, each with no more than mu N, N the present normal force (`planes`, `rubbing`). So a
-step is the return mapping of Coulomb friction by the backward Euler method. A node, or a pair in
-the list, that does not touch is tied where it is, so that it rubs in the step in which it comes to
-touch.
+accepted step, each limited to mu N, with N the current normal force (`planes`, `panel_friction`).
+So a step is the return mapping of Coulomb friction by the backward Euler method. A node or listed
+pair without contact is tied at its current position, so that friction acts from the step in which
+contact begins.
 
-An anchor that goes its way under a mean of the forces mu N at both ends of the step dissipates
-their product; a spring that lets go loses what it holds.
+A sliding anchor dissipates its path times the mean of mu N at both ends of the step; a released
+spring loses its energy.
 """
 
 from __future__ import annotations
@@ -25,32 +25,33 @@ from foldyn.mechanics.contact.ties import lay_ties, take_ties
 
 
 class Friction:
-    """Where the springs of friction are tied, which changes in place.
+    """Anchors and ties of the friction springs, which change in place.
 
-    It commits, takes snapshots and recalls them as `mechanics.inelastic_branches.HingeMemory` does.
+    Its `commit`, `snapshot` and `recall` work like those in
+    `mechanics.inelastic_branches.HingeMemory`.
 
     Parameters
     ----------
     tables : Tables
     kept : Memory
-        Of the body whose steps are accepted.
+        Contact memory of the body whose steps are accepted.
     """
 
     def __init__(self, tables: Tables, kept: Memory) -> None:
         self._tables, self._kept = tables, kept
         shape = kept.anchor.shape[:2]
-        self._stored = np.zeros(shape)  # J, of springs at the last accepted step
+        self._stored = np.zeros(shape)  # J, spring energies at the last accepted step
         self._lost = np.zeros(1)  # J
         self._coefficient = tables.planes[:, FRICTION, None]
 
     def start(self) -> None:
-        """Tie all nodes where the body was evaluated last; springs are at rest."""
+        """Tie all nodes at the last evaluation; springs are without force."""
         self._kept.anchor[:], self._kept.tie[:] = 0.0, 0.0
         self._stored[:], self._lost[:] = 0.0, 0.0
         self._tie()
 
     def commit(self) -> None:
-        """Accept the step that ends where the body was evaluated last."""
+        """Accept the step that ends at the last evaluation."""
         anchor, before = self._kept.anchor, self._kept.anchor.copy()
         slip(self._tables, self._kept.x, self._kept)
         way = np.linalg.norm(anchor[:, :, :3] - before[:, :, :3], axis=2)
@@ -63,7 +64,7 @@ class Friction:
         self._tie()
 
     def slips(self) -> bool:
-        """Whether a node or a pair slips where the body was evaluated last."""
+        """Whether a node or a pair slips at the last evaluation."""
         if self._tables.friction > 0.0 and rub_state(self._tables, self._kept)[1]:
             return True
         kept, normal = self._kept, self._tables.planes[:, None, NORMAL : NORMAL + 3]
@@ -75,16 +76,16 @@ class Friction:
 
     @property
     def lost(self) -> float:
-        """What has been dissipated since the start, J."""
+        """Energy dissipated since the start, J."""
         return float(self._lost[0])
 
     def snapshot(self) -> tuple[NDArray, ...]:
-        """The last accepted step, to `recall`."""
+        """Copy of the last accepted step, for `recall`."""
         tied = take_ties(self._kept) if self._tables.friction > 0.0 else ()
         return (*(array.copy() for array in self._state), *tied)
 
     def recall(self, snapshot: Sequence[NDArray]) -> None:
-        """Go back to an accepted step."""
+        """Return to an accepted step."""
         for array, kept in zip(self._state, snapshot, strict=False):
             array[:] = kept
         if self._tables.friction > 0.0:
@@ -104,12 +105,12 @@ class Friction:
 
 
 def stored_on_planes(tables: Tables, kept: Memory) -> NDArray:
-    """Energy (q, n), J, of the springs on planes where forces were found last."""
+    """Energy (q, n), J, of the springs on planes at the last force evaluation."""
     pull = kept.friction[:, :, :3]
     return (pull * pull).sum(axis=2) / (2.0 * tables.stiffness)
 
 
 def stored(tables: Tables, kept: Memory) -> float:
-    """Energy (J) of all springs of friction where forces were found last."""
+    """Energy (J) of all friction springs at the last force evaluation."""
     on_planes = float(stored_on_planes(tables, kept).sum())
     return on_planes + (rub_state(tables, kept)[0] if tables.friction > 0.0 else 0.0)

@@ -1,7 +1,7 @@
-"""Guards of hinges: panels that share a crease cannot be told apart by their distance.
+"""Guards of hinges, as distance does not tell apart panels that share a crease.
 
-A dihedral theta has the energy K t0^2 f(theta / t0) below t0, and so has 2 pi - theta, whatever the
-law of the hinge: faces of thickness t beside a wing of height h meet at t0 = t / h, K = k h^2.
+For any hinge law, a dihedral theta has the additional energy K t0^2 f(theta / t0) below t0, and
+likewise 2 pi - theta: faces of thickness t with wing height h meet at t0 = t / h, K = k h^2.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def gradient_at(tables, x, h):
 
 @kernel
 def add_guards(tables, x, angle, force, first, last):
-    """Energy (J) of the guards first to last - 1 at dihedrals `angle`; adds their gradient.
+    """Energy (J) of guards first to last - 1 at dihedrals `angle`; adds their gradient.
 
     force : (n, 3) N.
     """

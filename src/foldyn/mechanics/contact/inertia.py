@@ -1,14 +1,14 @@
-"""Inertia of contacts that a step need not resolve.
+"""Added inertia of contacts that a step need not resolve.
 
-Where panels press on each other their contacts are stiff, and in them next to nothing moves. Steps
-that an explicit method could take of these vibrations alone would be as short as their period. So a
-distance (or dihedral) g of stiffness K gets the inertia tau^2 K, of the order of the step squared,
+Contacts between pressed panels are stiff but hardly move. An explicit method that resolved their
+vibrations would need steps of the order of their period. So a distance (or dihedral) g of stiffness
+K gets the inertia tau^2 K, of the order of the step squared,
 
     (M + tau^2 sum K g_i g_i') a = F,
 
-which no vibration of it outruns: 1/tau is the highest frequency. What moves slowly against each
-other does not feel it, nor do rigid motions, so that both momenta are kept; `step_limit` says how
-much energy may be in it. Here is which contacts get it; integrators solve for the accelerations.
+which limits its vibration to the frequency 1/tau. Slow relative motions and rigid motions are not
+affected, so that both momenta are conserved; `step_limit` bounds the energy in such contacts. This
+module selects the contacts; integrators solve for the accelerations.
 
 Selective mass scaling: Olovsson, Simonsson and Unosson, Int. J. Numer. Meth. Engng 63, 2005.
 """
@@ -30,23 +30,23 @@ from foldyn.mechanics.contact.planes import height
 from foldyn.mechanics.contact.potential import barrier
 from foldyn.mechanics.contact.search import place
 
-SLOWNESS = 2.0  # tau over the step: no vibration of a contact is faster than half a radian a step
-STRETCH = 1.02  # of what resolves a contact: steps that end where a load jumps may be so long
+SLOWNESS = 2.0  # tau over the step: limits contact vibrations to half a radian per step
+STRETCH = 1.02  # of the resolving step: limit for steps that end at load jumps
 
 
 class Added(NamedTuple):
-    """The contacts with inertia in a step, and room for all that may have it."""
+    """Contacts with inertia in a step, with room for all candidates."""
 
     count: NDArray  # (1,) int64
     nodes: NDArray  # (room, 4)
     gradient: NDArray  # (room, 4, 3) of the distance, or dihedral
     ease: NDArray  # (room,) 1 / (tau^2 K)
-    lightness: NDArray  # (room,) 1 / mass that each moves, about
-    lines: NDArray  # (4, room) memory for solving
+    lightness: NDArray  # (room,) approximate 1 / moving mass of each
+    lines: NDArray  # (4, room) work array of the solver
 
 
 def room_for(tables: Tables, memory: Memory) -> Added:
-    """Room for all pairs, hinges and nodes on planes that may touch in one step."""
+    """Room for all pairs, hinges and nodes on planes that may touch in a step."""
     room = memory.near.size + tables.hinge_limit.size + tables.meeting.size * len(tables.planes)
     nodes, gradient = np.empty((room, 4), np.int64), np.empty((room, 4, 3))
     ease, lightness, lines = np.empty(room), np.empty(room), np.empty((4, room))
@@ -55,7 +55,7 @@ def room_for(tables: Tables, memory: Memory) -> Added:
 
 @inner
 def _slow(added, k, stiffness, dt, beta, lightness):
-    """Whether a step does not resolve contact k of some stiffness, which then gets its inertia."""
+    """Whether a step does not resolve contact k with a stiffness; if so, adds its inertia."""
     light = 0.0
     for i in range(4):
         for axis in range(3):
@@ -69,9 +69,9 @@ def _slow(added, k, stiffness, dt, beta, lightness):
 
 @inlined
 def added_inertia(tables, added, u, dt, beta, lightness, memory):
-    """Put the contacts at displacement u that a step of dt from there does not resolve in `added`.
+    """Collect in `added` the contacts that a step of dt from displacement u does not resolve.
 
-    beta : radians of a contact's vibration that a step may take; lightness : (n,) 1 / mass of the
+    beta : largest vibration angle of a contact per step, rad; lightness : (n,) 1 / mass of the
     nodes, 1/kg.
     """
     counts, x, found = memory.counts, memory.x, 0

@@ -1,4 +1,4 @@
-"""Contact as loops see it: a term whose parts touch each other and planes."""
+"""Contact as compiled loops see it: a term whose parts touch each other and planes."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ class _Context(NamedTuple):
     tables: Tables
     memory: Memory
     angle: NDArray
-    group: int  # of the energies
+    group: int  # energy group
     rows: int
-    histories: int  # as far as planes move with them
+    histories: int  # number of histories that move planes
 
 
 @inner_scalar
 def _add_powers(own, speed, powers):
-    """Add the powers (W) that planes put in and friction takes."""
+    """Add the powers (W) that planes supply and friction dissipates."""
     both = numbers_at(powers, 2)
     given, taken = plane_powers(own.tables, speed, own.memory)
     if own.tables.friction > 0.0:
@@ -120,7 +120,7 @@ def _board_limit(own, u, v, a, dt, beta, energy, lightness):
 def board_kernels(
     ride: Ride, tables: Tables, memory: Memory, angle: NDArray, group: int
 ) -> Compiled:
-    """The same of points that ride on a mesh."""
+    """Contact kernels for points that ride on a mesh."""
     histories = 1 + int(tables.planes[:, HISTORY].max(initial=-1.0))
     shape = ride.rest.shape
     moved, speed, change, push = (np.zeros(shape) for _ in range(4))
@@ -135,9 +135,9 @@ def board_kernels(
 
 
 def contact_kernels(tables: Tables, memory: Memory, angle: NDArray, group: int) -> Compiled:
-    """Contact of what the tables hold, with the group of its energy.
+    """Contact kernels for these tables, with their energy group.
 
-    That is the energy at the last force; all members of a team have waited for each other then.
+    The energy belongs to the last force evaluation, after which all team members have synchronized.
     """
     histories = 1 + int(tables.planes[:, HISTORY].max(initial=-1.0))
     rows = len(tables.rest)

@@ -1,6 +1,6 @@
-"""How fast nodes are, and how far from where pairs were listed, against the mean of all.
+"""Nodal speeds, and motions since the last listing of pairs, relative to the mean.
 
-What all nodes do together closes no gap.
+Common motion of all nodes closes no gap.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def _moved(now, before, i, c):
 
 @inner_scalar
 def _mean(now, before, first, last, n):
-    """Part of the nodes first to last - 1 in the mean of now - before, both (rows, 3), over n."""
+    """Contribution of nodes first to last - 1 to the mean over n of now - before, (rows, 3)."""
     a, b, c = 0.0, 0.0, 0.0
     for i in range(first, last):
         a += _moved(now, before, i, 0) / n
@@ -32,7 +32,7 @@ def _mean(now, before, first, last, n):
 
 @inner_scalar
 def _largest(now, before, first, last, a, b, c):
-    """Largest of now - before of these nodes against a mean; inf where something is not finite."""
+    """Largest deviation of now - before of these nodes from a mean; inf if not finite."""
     if not abs(a) + abs(b) + abs(c) < math.inf:
         return math.inf
     worst = 0.0
@@ -47,14 +47,14 @@ def _largest(now, before, first, last, a, b, c):
 
 @inner
 def fastest(v, n):
-    """Largest speed (m/s) of n nodes against the mean of all."""
+    """Largest speed (m/s) of n nodes relative to the mean."""
     a, b, c = _mean(v, None, 0, n, n)
     return _largest(v, None, 0, n, a, b, c)
 
 
 @inner
 def farthest(u, memory):
-    """Largest motion (m) of a node from where pairs were listed, against the mean of all."""
+    """Largest motion (m) of a node since the last listing of pairs, relative to the mean."""
     n = len(memory.x)
     a, b, c = _mean(u, memory.listed, 0, n, n)
     return _largest(u, memory.listed, 0, n, a, b, c)
@@ -62,9 +62,9 @@ def farthest(u, memory):
 
 @inner_scalar
 def motions(u, v, memory):
-    """Both for the nodes of all members of a team, each of whom looks at its own.
+    """Both `fastest` and `farthest` over a team, whose members check their own nodes.
 
-    Waits for what the members have written before.
+    Synchronizes the team.
     """
     team, n = memory.share.team, len(memory.x)
     note, first, last = team.note[team.number], memory.share.own[0], memory.share.own[1]

@@ -29,8 +29,8 @@ def nodes_of(triangles, edges, kind, one, other):
 def weights_of(kind, p, q):
     """Weights (4) of the vector from the second part of a pair to the first.
 
-    p, q : where it begins and ends: of a triangle the weights of its second and third corner, of
-    two edges the fractions of their lengths.
+    p, q : its end points: for a triangle, the weights of its second and third corner; for two
+    edges, the fractions of their lengths.
     """
     if kind == VERTEX:
         return 1.0, p + q - 1.0, -p, -q
@@ -86,7 +86,7 @@ def gap_of(triangles, edges, x, kind, one, other):
 
 @inner
 def closest_of(triangles, edges, x, kind, one, other):
-    """Where the parts of a pair are closest, see `weights_of`; whether inside both edges."""
+    """Closest points of a pair, as in `weights_of`; whether inside both edges."""
     a, b, c, d = nodes_of(triangles, edges, kind, one, other)
     pa, pb, pc, pd = point(x, a), point(x, b), point(x, c), point(x, d)
     if kind == VERTEX:

@@ -1,15 +1,15 @@
-"""Friction between panels: springs between the points at which two of them touched first.
+"""Friction between panels: springs between the points of first contact.
 
-A pair whose closest points are apart by r, d = |r|, is tied between two points that stay with its
-parts, apart by q. They are as far from each other along the parts as
+A pair whose closest points differ by r, d = |r|, is tied between two points fixed to its parts,
+which differ by q. Their distance along the parts is
 
     s = sqrt(|q|^2 - d^2)
 
-says, which no rigid motion changes. The spring has the energy k s^2 / 2 and pulls with k s, at most
-mu N, N the normal force of the pair. At the end of a step the tied points follow a pair that slips,
-as anchors on planes do (`planes`). With weights a_i of q and w_i of r on the four nodes the forces
-are k (a_i q - w_i r): two pairs of opposite forces along q and r, which have neither a resultant
-nor a moment.
+which is invariant under rigid motions. The spring has the energy k s^2 / 2 and pulls with k s,
+limited to mu N, with N the normal force of the pair. At the end of a step the tied points follow a
+slipping pair, like anchors on planes (`planes`). With weights a_i of q and w_i of r on the four
+nodes the forces are k (a_i q - w_i r): two pairs of opposite forces along q and r, which have
+neither a resultant nor a moment.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from foldyn.mechanics.threads import part, wait
 
 @kernel
 def pressed_pair(tables, memory, x, kind, pair):
-    """Normal force (N) of a listed pair at x (n, 3), and where its parts are closest."""
+    """Normal force (N) of a listed pair at x (n, 3), and its closest points."""
     one, other, d0 = memory.pairs[kind, pair, 0], memory.pairs[kind, pair, 1], memory.d0[kind, pair]
     if kind == VERTEX:
         _, pressed, p, q = vertex_triangle(tables, x, None, one, other, d0)
@@ -50,9 +50,9 @@ def _across(x, nodes, weights):
 
 @inner
 def stretch_of_pair(tables, memory, x, kind, pair, p, q):
-    """Stretch (m) of the spring of a pair that is closest at p, q.
+    """Stretch (m) of the spring of a pair whose closest points are p, q.
 
-    Before it the nodes, the weights of the tied points and the closest ones, and their vectors.
+    Preceded by the nodes, the weights of the tied and the closest points, and their vectors.
     """
     tie = memory.tie[kind, pair]
     one, other = memory.pairs[kind, pair, 0], memory.pairs[kind, pair, 1]
@@ -65,20 +65,20 @@ def stretch_of_pair(tables, memory, x, kind, pair, p, q):
 
 @inner_scalar
 def bound(tables, memory, kind, pair, pressed):
-    """Stretch (m) at which the spring of a pair slips that is pressed by some force (N)."""
+    """Stretch (m) at which the spring of a pair slips under a normal force `pressed` (N)."""
     normal = memory.tie[kind, pair, 2] if memory.counts.lagged == 1 else pressed
     return tables.friction * normal / tables.stiffness
 
 
 @inner_scalar
 def pull_of(k, stretch, most):
-    """Pull of a spring over its stretch (N/m)."""
+    """Spring force over its stretch (N/m)."""
     return k if stretch <= most else k * most / stretch
 
 
 @kernel
 def add_rub(tables, memory, x, force, kind, pair, pressed, p, q):
-    """Add the gradient (N) of a pair's friction to force (n, 3); its normal force is `pressed`."""
+    """Add the friction gradient (N) of a pair with normal force `pressed` to force (n, 3)."""
     if memory.tie[kind, pair, 2] == 0.0 or pressed <= 0.0:
         return
     nodes, tied, closest, apart, r, stretch = stretch_of_pair(tables, memory, x, kind, pair, p, q)
@@ -91,7 +91,7 @@ def add_rub(tables, memory, x, force, kind, pair, pressed, p, q):
 
 @kernel
 def add_rubs(tables, memory, force):
-    """Add that of a member's part of all near pairs, where forces were found last."""
+    """Add friction of a member's share of near pairs, at the last force evaluation."""
     team = memory.share.team
     for kind in range(2):
         near = memory.counts.near_first if kind == VERTEX else memory.counts.near_second
@@ -105,9 +105,9 @@ def add_rubs(tables, memory, force):
 
 @kernel
 def rub_power(tables, v, memory):
-    """Power (W) that friction takes at velocities v (n, 3): of a member's part of near pairs.
+    """Power (W) dissipated by friction of a member's near pairs at velocities v (n, 3).
 
-    After a force.
+    Call it after a force evaluation.
     """
     team, taken = memory.share.team, 0.0
     for kind in range(2):
@@ -126,13 +126,13 @@ def rub_power(tables, v, memory):
             most = bound(tables, memory, kind, pair, pressed)
             power = dot(apart, _across(v, nodes, tied)) - dot(r, _across(v, nodes, closest))
             taken += pull_of(tables.stiffness, stretch, most) * power
-    wait(team)  # others look at this member's velocities
+    wait(team)  # until others have read this member's velocities
     return taken
 
 
 @kernel
 def rub_state(tables, memory):
-    """Energy (J) of the springs of near pairs where forces were found last; whether one slips."""
+    """Energy (J) of the near pairs' springs at the last force evaluation; whether one slips."""
     energy, slips, k = 0.0, False, tables.stiffness
     for kind in range(2):
         near = memory.counts.near_first if kind == VERTEX else memory.counts.near_second
@@ -152,7 +152,7 @@ def rub_state(tables, memory):
 
 @kernel
 def tie_pairs(tables, memory):
-    """Tie all pairs of the list that are within its skin, and are not tied yet."""
+    """Tie all listed pairs within the skin that are not tied yet."""
     for kind in range(2):
         listed = memory.counts.listed_first if kind == VERTEX else memory.counts.listed_second
         for pair in range(listed):
@@ -168,10 +168,10 @@ def tie_pairs(tables, memory):
 
 @kernel
 def slip_pairs(tables, x, memory):
-    """At the end of a step, ties follow pairs that slip, and begin and end with touch.
+    """Update ties at the end of a step: follow slipping pairs, begin and end with contact.
 
-    Of a member's part of near pairs. Returns what that dissipates (J): the way of the ties under
-    the mean of mu N at both ends of the step, and what springs held that let go.
+    Covers a member's share of near pairs. Returns the dissipated energy (J): the path of the ties
+    times the mean of mu N at both ends of the step, and the energy of released springs.
     """
     lost, team, k = 0.0, memory.share.team, tables.stiffness
     for kind in range(2):

@@ -1,11 +1,12 @@
-"""The derivative of friction between panels.
+"""Derivative of friction between panels.
 
-With Q = (|q|^2 - d^2) / 2, its gradient g and Hess Q = a_i a_j I - Hess(d^2 / 2), see `rubbing` and
-`second`, it is k Hess Q where a pair sticks, and where it slips, with the normal force N,
+With Q = (|q|^2 - d^2) / 2, its gradient g and Hess Q = a_i a_j I - Hess(d^2 / 2), see
+`panel_friction` and `distance_hessian`, it is k Hess Q for a sticking pair, and for a slipping pair
+with the normal force N
 
     mu N / s (Hess Q - g g' / s^2) + mu / s g grad N'.
 
-Methods that take N from the end of the last step have no second term: theirs is symmetric.
+With N from the end of the last step the second term vanishes, and the derivative is symmetric.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from foldyn.mechanics.contact.vertex_triangle import PARTS, share_of, weigh_tria
 
 @kernel
 def add_rub_tangent(tables, memory, x, kind, pair, share, out):
-    """Add that of a pair at x (n, 3), times a share, to out (12, 12)."""
+    """Add the friction tangent of a pair at x (n, 3), times a share, to out (12, 12)."""
     tie = memory.tie[kind, pair]
     if tie[2] == 0.0:
         return
@@ -73,7 +74,7 @@ def add_rub_tangent(tables, memory, x, kind, pair, share, out):
 
 @inner
 def _add_slope(corners, weights, d0, k, out):
-    """Add the gradient of -k d0 f'(d/d0) to out (12,); the value (N)."""
+    """Add the gradient of -k d0 f'(d/d0) to out (12,); return its value (N)."""
     r = np.empty(3)
     d = math.sqrt(apart_of(corners, weights, r))
     if d >= d0:
@@ -96,7 +97,7 @@ def _vertex_slope(tables, corners, t, d0, weights, moves, out):
 
 @inner
 def _edges_slope(tables, corners, i, j, d0, weights, moves, out):
-    """That of the edges i and j."""
+    """Gradient (12,) of the normal force of edges i and j."""
     e, g = minus(point(corners, 1), point(corners, 0)), minus(point(corners, 3), point(corners, 2))
     n = cross(e, g)
     c0 = PARALLEL * tables.edge_square[i] * tables.edge_square[j]

@@ -1,12 +1,12 @@
-"""Planes that the nodes of a sheet meet, with Coulomb friction.
+"""Planes that nodes of a sheet touch, with Coulomb friction.
 
-A node at the distance d from a plane has the energy k d0^2 f(d/d0), d0 half its sheet's thickness.
-Friction is a spring along the plane from the node to an anchor that moves with the plane: it pulls
-with k s, s its stretch, at most mu N, N the normal force. At the end of a step the anchor follows a
-node that slips, and what the spring then loses is dissipated (the elastic predictor and slip of
-return mapping; Wriggers, Computational Contact Mechanics, 2006, section 5.2.3). Implicit methods
-take N from the end of the last step: then friction has a potential within a step, and a symmetric
-tangent.
+A node at the distance d from a plane has the energy k d0^2 f(d/d0), with d0 half the sheet's
+thickness. Friction is a spring along the plane from the node to an anchor that moves with the
+plane: it pulls with k s, s its stretch, limited to mu N, N the normal force. At the end of a step
+the anchor follows a slipping node, and the energy that the spring loses is dissipated (the elastic
+predictor and slip of return mapping; Wriggers, Computational Contact Mechanics, 2006, section
+5.2.3). Implicit methods use N from the end of the last step: friction then has a potential within a
+step, and a symmetric tangent.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.mechanics.contact.candidates import FRICTION, HISTORY, MOTION, NORMAL, POINT
 from foldyn.mechanics.contact.potential import barrier
 
-LEAST = 1e-300  # N: a normal force that is not zero
+LEAST = 1e-300  # N: smallest normal force that counts as contact
 
 
 @kernel
 def move_planes(tables, factor, memory):
-    """Displacements and velocities of the planes for the factors (h, 3) of histories."""
+    """Set displacements and velocities of the planes for the factors (h, 3) of histories."""
     for p in range(len(tables.planes)):
         row = int(tables.planes[p, HISTORY])
         if row < 0:
@@ -34,7 +34,7 @@ def move_planes(tables, factor, memory):
 
 @inner
 def height(tables, x, moved, p, i):
-    """Distance (m) of node i from plane p, positive on its side, as planes have moved (q, 3)."""
+    """Distance (m) of node i from plane p, positive in front, for plane displacements (q, 3)."""
     plane, out = tables.planes[p], 0.0
     for c in range(3):
         out += (x[i, c] - plane[POINT + c] - moved[p, c]) * plane[NORMAL + c]
@@ -43,7 +43,7 @@ def height(tables, x, moved, p, i):
 
 @inner
 def add_planes(tables, x, memory, force):
-    """Energy (J) of a member's nodes at planes; adds its gradient and friction to force (n, 3)."""
+    """Energy (J) of a member's nodes on planes; adds gradient and friction to force (n, 3)."""
     energy, k, mine = 0.0, tables.stiffness, memory.share.meeting
     for p in range(len(tables.planes)):
         plane = tables.planes[p]
@@ -71,7 +71,7 @@ def add_planes(tables, x, memory, force):
 
 @inner_scalar
 def farthest_stretch(tables, memory, p, i):
-    """Stretch (m) at which the spring of node i on plane p slips, after its normal force."""
+    """Stretch (m) at which the spring of node i on plane p slips, given its normal force."""
     lagged = memory.counts.lagged == 1
     normal = memory.anchor[p, i, 3] if lagged else memory.friction[p, i, 3]
     return tables.planes[p, FRICTION] * normal / tables.stiffness
@@ -79,7 +79,7 @@ def farthest_stretch(tables, memory, p, i):
 
 @inner
 def stretch_of(tables, x, moved, memory, p, i):
-    """Stretch (m) of the spring of node i on plane p: its vector along the plane, its length.
+    """Stretch (m) of the spring of node i on plane p: its in-plane vector, its length.
 
     moved : (q, 3) displacement of the planes, m.
     """
@@ -95,7 +95,7 @@ def stretch_of(tables, x, moved, memory, p, i):
 
 @kernel
 def slip(tables, x, memory):
-    """At the end of a step, anchors follow nodes that slip, and begin and end with touch."""
+    """Update anchors at the end of a step: follow slipping nodes, begin and end with contact."""
     mine = memory.share.meeting
     for p in range(len(tables.planes)):
         plane, moved = tables.planes[p], memory.moved[p]
@@ -123,9 +123,9 @@ def slip(tables, x, memory):
 
 @inner
 def plane_powers(tables, v, memory):
-    """Power (W) of moving planes on nodes with velocities v (n, 3), and that of friction.
+    """Power (W) of moving planes on a member's nodes with velocities v (n, 3), and of friction.
 
-    After `add_planes`; of a member's nodes.
+    Call it after `add_planes`.
     """
     work, dissipated, mine = 0.0, 0.0, memory.share.meeting
     for p in range(len(tables.planes)):

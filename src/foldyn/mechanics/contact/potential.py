@@ -1,16 +1,16 @@
 """The potential of contact: k d0^2 f(d/d0) below the distance d0, f(x) = (1 - x)^3 / x^4.
 
-f is twice continuously differentiable where it ends, x = 1, and grows without bound where surfaces
-meet. Potentials of this kind: Li et al., Incremental Potential Contact, ACM Trans. Graph. 39,
-2020, there -(x - 1)^2 ln x. That logarithm holds no more than some k d0^2 at any distance that
-floats can tell from 0; the power x^-4 has taken up a snap's energy while a tenth of d0 is left.
+f is twice continuously differentiable at x = 1, where it ends, and diverges as surfaces meet.
+Potentials of this kind: Li et al., Incremental Potential Contact, ACM Trans. Graph. 39, 2020, there
+-(x - 1)^2 ln x. The logarithm stores no more than some k d0^2 at any distance that floats
+distinguish from 0; the power x^-4 absorbs the energy of a snap with a tenth of d0 left.
 
 Between x0 and x1, with y = 1 - x and z = 1/x, f = y^3 z^4 has the difference quotient
 
     f[x0, x1] = y^3[x0, x1] z1^4 + y0^3 z^4[x0, x1],    y^3[x0, x1] = -(y0^2 + y0 y1 + y1^2),
     z^4[x0, x1] = -z0 z1 (z0^3 + z0^2 z1 + z0 z1^2 + z1^3),
 
-sums of terms of one sign: no digits are lost, however near x0 and x1 are.
+sums of terms of equal sign: no digits are lost, however close x0 and x1 are.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ STIFFNESS = 0.03
 
 @inner_scalar
 def barrier(x):
-    """f and its first two derivatives at x < 1; infinite where surfaces have passed each other."""
+    """f and its first two derivatives at x < 1; infinite after surfaces have crossed."""
     if x <= 0.0:
         return math.inf, -math.inf, math.inf
     y, i = 1.0 - x, 1.0 / x
@@ -41,7 +41,7 @@ def barrier(x):
 def difference_quotient(x0, x1):
     """The quotient (f(x1) - f(x0)) / (x1 - x0), and its derivative with respect to x1.
 
-    f is zero above 1; not finite where x0 or x1 is not positive.
+    f is zero above 1; the result is not finite unless x0 and x1 are positive.
     """
     if x0 >= 1.0 and x1 >= 1.0:
         return 0.0, 0.0

@@ -1,18 +1,18 @@
-"""Points that ride on the triangles of a mesh, beside it, as the corners of boards do.
+"""Points that ride on the triangles of a mesh at an offset, such as the corners of boards.
 
 A point that rides on a triangle of nodes x_i, with N = (x_b - x_a) x (x_c - x_a), n = N / |N|, is
 
     y = sum w_i x_i + h n,    sum w_i = 1;
 
-one that is a corner of several triangles is the mean of what they say. With the edge e_i opposite
-to node i, dN/dx_i = [e_i x], so that
+a corner of several triangles is the mean over them. With the edge e_i opposite to node i, dN/dx_i =
+[e_i x], so that
 
     dy/dx_i = w_i I + h P [e_i x] / |N|,    P = I - n n'.
 
-A rigid motion moves points as it moves the mesh, so forces f on points, which go to the nodes by
-the transpose, keep their resultant and their moment. The second derivative of f.y has terms of h,
+Points follow rigid motions of the mesh, so forces f on points, mapped to the nodes by the
+transpose, keep their resultant and their moment. The second derivative of f.y has terms with h,
 
-    [e_i x]' H [e_j x] and, of N itself, -+[g x],    H = -(p n' + n p' + f.n P) h / |N|^2,
+    [e_i x]' H [e_j x] and, from N itself, -+[g x],    H = -(p n' + n p' + f.n P) h / |N|^2,
 
 p = P f and g = h p / |N|.
 """
@@ -29,7 +29,7 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.mechanics.block_matrix import assembled, pairs_within, places_of
 from foldyn.mechanics.contact.distances import cross, dot, minus, point
 
-NOISE = 16.0 * float(np.finfo(float).eps)  # of a normal: less is rounding
+NOISE = 16.0 * float(np.finfo(float).eps)  # of a normal: rounding error
 LEVI_CIVITA = np.zeros((3, 3, 3))
 LEVI_CIVITA[[0, 1, 2], [1, 2, 0], [2, 0, 1]] = 1.0
 LEVI_CIVITA[[0, 2, 1], [2, 1, 0], [1, 0, 2]] = -1.0
@@ -44,17 +44,16 @@ class Ride(NamedTuple):
     points: NDArray  # (t, 3) points at the corners
     weights: NDArray  # (t, 3, 3) w of each point's share, over the nodes
     heights: NDArray  # (t, 3) h, m
-    reach: (
-        NDArray  # (t, 3, 3) square of how far a node moves a point, at most, in parts that add up
-    )
+    reach: NDArray  # (t, 3, 3) squared bounds of how far a node moves a point, in parts that add up
 
 
 def ride_on(
     x: NDArray, triangles: NDArray, panel: NDArray, middle: NDArray
 ) -> tuple[Ride, NDArray, NDArray]:
-    """The points that are at the places `middle` (t, 3, 3) at rest, one for each node of a panel.
+    """Points at positions `middle` (t, 3, 3) at rest, one for each node of a panel.
 
-    Returns the panel and the node of each, too, those of the nodes themselves -1 and their number.
+    Also returns the panel and node of each point; for mesh nodes, panel -1 and the node's own
+    number.
     """
     n = len(x)
     key, points = np.unique(panel[:, None] * n + triangles, return_inverse=True)
@@ -67,7 +66,7 @@ def ride_on(
     normal /= twice[:, None]
     away = middle - a[:, None]
     heights = np.einsum("tci,ti->tc", away, normal)
-    # weights by the areas that a point and two nodes span
+    # weights from the areas spanned by a point and two nodes
     weights = np.empty((len(triangles), 3, 3))
     for i, (p, q) in enumerate(((b, c), (c, a), (a, b))):
         span = np.cross((q - p)[:, None], middle - p[:, None])
@@ -93,7 +92,7 @@ def ride_on(
 
 
 def carried(ride: Ride, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which points (m,) chosen nodes (n,) alone move."""
+    """Points (m,) that depend on the chosen nodes (n,) only."""
     out = np.concatenate([np.ones(len(ride.rest) - len(ride.x), bool), chosen])
     for corner in range(3):
         np.logical_and.at(out, ride.points[:, corner], chosen[ride.nodes].all(axis=1))
@@ -102,13 +101,13 @@ def carried(ride: Ride, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 @inner_scalar
 def _moved(ride, u, i):
-    """Place of node i at displacements u."""
+    """Position of node i at displacements u."""
     return ride.x[i, 0] + u[i, 0], ride.x[i, 1] + u[i, 1], ride.x[i, 2] + u[i, 2]
 
 
 @inner_scalar
 def _normal(ride, u, t):
-    """Places of the corners of a triangle, its unit normal and |N|."""
+    """Positions of a triangle's corners, its unit normal, and |N|."""
     a = _moved(ride, u, ride.nodes[t, 0])
     b = _moved(ride, u, ride.nodes[t, 1])
     c = _moved(ride, u, ride.nodes[t, 2])
@@ -119,7 +118,7 @@ def _normal(ride, u, t):
 
 @kernel
 def put_points(ride, u, out):
-    """Displacements (m, 3) of the points at those of the nodes (rows, 3), m."""
+    """Put the displacements (m, 3) of the points, m, for nodal displacements (rows, 3), m."""
     first = len(out) - len(ride.x)
     for p in range(first):
         for axis in range(3):
@@ -137,7 +136,7 @@ def put_points(ride, u, out):
 
 @kernel
 def put_rates(ride, u, v, out):
-    """Velocities (m, 3) of the points at those of the nodes (rows, 3), m/s."""
+    """Put the velocities (m, 3) of the points, m/s, for nodal velocities (rows, 3), m/s."""
     first = len(out) - len(ride.x)
     out[:first] = 0.0
     for i in range(len(ride.x)):
@@ -161,7 +160,7 @@ def put_rates(ride, u, v, out):
 
 @kernel
 def add_back(ride, u, push, force):
-    """Add forces on the points, push (m, 3), to those on the nodes, force (rows, 3), N."""
+    """Add point forces push (m, 3) to nodal forces (rows, 3), N."""
     first = len(push) - len(ride.x)
     for i in range(len(ride.x)):
         for axis in range(3):
@@ -191,7 +190,7 @@ def add_back(ride, u, push, force):
 
 @inner
 def put_lightness(ride, lightness, out):
-    """Bounds (m,) of 1 / mass of the points for those of the nodes (n,), 1/kg."""
+    """Put upper bounds (m,) of 1 / mass of the points, given the nodes' (n,), 1/kg."""
     first = len(out) - len(ride.x)
     out[:first] = 0.0
     for i in range(len(ride.x)):
@@ -225,7 +224,7 @@ def jacobian(ride: Ride, u: NDArray, size: int) -> sparse.csr_array:
 
 
 def _motion(ride: Ride, turned: NDArray, size: int) -> sparse.csr_array:
-    """dy/dx (3 m, size) of the change `turned` (t, 3, 3, 3) of normals by each of the nodes."""
+    """Matrix dy/dx (3 m, size), given the derivatives `turned` (t, 3, 3, 3) of normals by nodes."""
     blocks = ride.heights[:, :, None, None, None] * turned[:, None]
     blocks += ride.weights[:, :, :, None, None] * np.eye(3)
     n, first = ride.x.size, ride.rest.size - ride.x.size
@@ -238,12 +237,12 @@ def _motion(ride: Ride, turned: NDArray, size: int) -> sparse.csr_array:
 
 
 def step_jacobian(ride: Ride, u0: NDArray, u1: NDArray, size: int) -> sparse.csr_array:
-    """A matrix G (3 m, size) with y1 - y0 = G (u1 - u0) that moves points rigidly with the mesh.
+    """Matrix G (3 m, size) with y1 - y0 = G (u1 - u0) that moves points rigidly with the mesh.
 
-    In the middle of the step, that is: for a turn w about it G gives w x (y0 + y1) / 2. With the
-    normal m and its derivative A in the middle, the mean normal and the turn W z that is nearest to
-    nodal motions z, A + [(m - mean) x] W does that; what it misses of the change is made up along
-    the part of u1 - u0 that is no rigid motion (Gonzalez, J. Nonlinear Sci. 6, 1996).
+    Rigidity refers to mid-step: for a rotation w, G gives w x (y0 + y1) / 2. With the normal m and
+    its derivative A at mid-step, the mean normal, and the rotation W z closest to nodal motions z,
+    this holds for A + [(m - mean) x] W; the remaining difference is corrected along the deforming
+    part of u1 - u0 (Gonzalez, J. Nonlinear Sci. 6, 1996).
     """
     n = len(ride.x)
     turn, normal, area, across = _frames(ride, 0.5 * (u0 + u1))
@@ -267,7 +266,7 @@ def step_jacobian(ride: Ride, u0: NDArray, u1: NDArray, size: int) -> sparse.csr
 
 
 def curvature(ride: Ride, u: NDArray, push: NDArray, size: int) -> sparse.csr_array:
-    """Second derivative (size, size) of the sum of f.y for forces f on the points, (m, 3)."""
+    """Second derivative (size, size) of the sum of f.y for point forces f (m, 3)."""
     lever = np.einsum("tc,tca->ta", ride.heights, push[ride.points])
     acts = lever.any(axis=1)
     ride, lever = ride._replace(nodes=ride.nodes[acts]), lever[acts]
@@ -286,7 +285,7 @@ def curvature(ride: Ride, u: NDArray, push: NDArray, size: int) -> sparse.csr_ar
 
 
 def largest_turn(ride: Ride, u: NDArray, step: NDArray) -> float:
-    """Largest turn (rad) of a triangle's normal in a step (rows, 3) from u, as if it were small."""
+    """Largest turn (rad) of a triangle's normal in a step (rows, 3) from u, linearized."""
     turn, _, area, across = _frames(ride, u)
     moved = np.einsum("tab,tibc,tic->ta", across, turn, step[ride.nodes]) / area[:, None]
     return float(np.linalg.norm(moved, axis=1).max(initial=0.0))

@@ -1,7 +1,7 @@
-"""Lists of the pairs that are near, found by sorting into the cells of a grid.
+"""Lists of near pairs, found by sorting into the cells of a grid.
 
-A list holds all pairs nearer than d0 + skin, and those that friction ties. It serves until a node
-has moved by half of the skin against the mean motion of all.
+A list holds all pairs closer than d0 + skin, and all pairs tied by friction. It is valid until a
+node has moved by half the skin relative to the mean motion.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from foldyn.mechanics.contact.pairs import VERTEX, edge_gap, vertex_gap
 from foldyn.mechanics.contact.thread_partition import pass_on
 from foldyn.mechanics.contact.ties import lay_ties, put_ties, take_ties
 
-CELLS = 8.0  # per node, at most
-THINNEST = 1e-3  # of the skin: where lists are full it is halved, at most to that
+CELLS = 8.0  # at most, per node
+THINNEST = 1e-3  # of the skin: full lists halve it, at most down to this
 
 
 @inner
 def panel_d0(ranges, v, panel):
-    """d0 (m) of a node against a panel; 0 if it belongs to it."""
+    """d0 (m) of a node against a panel; 0 if the node belongs to it."""
     for at in range(ranges.own_start[v], ranges.own_start[v + 1]):
         if ranges.own[at] == panel:
             return 0.0
@@ -34,7 +34,7 @@ def panel_d0(ranges, v, panel):
 
 @inner
 def edge_d0(ranges, edges, nodes, panels, i, j):
-    """d0 (m) of two edges (e, 2) of some panels (e, 2); 0 if they share one, or a node (e, 2)."""
+    """d0 (m) of two edges (e, 2) of panels (e, 2); 0 if they share a panel or a node."""
     a, b, c, d = nodes[i, 0], nodes[i, 1], nodes[j, 0], nodes[j, 1]
     if a in (c, d) or b in (c, d):
         return 0.0
@@ -55,7 +55,7 @@ def edge_d0(ranges, edges, nodes, panels, i, j):
 
 @inner
 def _corners(x, nodes, low, high):
-    """The box (3,), (3,) of some nodes; whether it is finite."""
+    """Bounding box (3,), (3,) of some nodes; whether it is finite."""
     for c in range(3):
         low[c], high[c] = math.inf, -math.inf
         for k in range(nodes.size):
@@ -68,7 +68,7 @@ def _corners(x, nodes, low, high):
 
 @inner
 def _cells(low, high, size, most, counts):
-    """Numbers (3,) of cells of at least some size, and the size that gives no more than `most`."""
+    """Numbers (3,) of cells of at least `size`, enlarged to give at most `most` cells."""
     while True:
         cells = 1.0
         for c in range(3):
@@ -88,7 +88,7 @@ def _cell(value, low, size, count):
 
 @inner
 def _sort(points, low, size, counts, start, items):
-    """Sort points (m, 3) into cells; those of a cell follow each other in `items`."""
+    """Sort points (m, 3) into cells; `items` lists them cell by cell."""
     start[:] = 0
     cell = np.empty(len(points), np.int64)
     for i in range(len(points)):
@@ -116,7 +116,7 @@ def _within(x, v, low, high):
 
 @inner_scalar
 def _beside(x, edges, i, low, high):
-    """Whether the box of an edge meets a box."""
+    """Whether the bounding box of an edge meets a box."""
     for c in range(3):
         p, q = x[edges[i, 0], c], x[edges[i, 1], c]
         if max(p, q) < low[c] or min(p, q) > high[c]:
@@ -126,13 +126,13 @@ def _beside(x, edges, i, low, high):
 
 @inner
 def _pairs(tables, x, kind, far, skin, low, size, counts, half, start, items, memory):
-    """List vertices and triangles, kind 0, or edges and edges; returns how many there are.
+    """List vertex-triangle pairs, kind 0, or edge-edge pairs; return their number.
 
-    half : (3,) of the largest extent of what is sorted into the cells by its middle.
+    half : (3,) half of the largest extent of the items, which are sorted by their centers.
     """
     first, last = np.empty(3, np.int64), np.empty(3, np.int64)
     below, above = np.empty(3), np.empty(3)
-    # taken out of their tuples, whose arrays would be counted for each pair
+    # unpacked, as arrays in tuples would be reference-counted for each pair
     surface, panels, edge_panels = tables.surface, tables.panel, tables.edge_panels
     edge_nodes = tables.edge_nodes
     ranges, pairs = tables.ranges, memory.pairs[kind]
@@ -172,10 +172,10 @@ def _pairs(tables, x, kind, far, skin, low, size, counts, half, start, items, me
 
 @kernel
 def list_pairs(tables, u, memory):
-    """List all pairs nearer than d0 + skin at memory.x, the positions at displacement u (n, 3).
+    """List all pairs closer than d0 + skin at memory.x, the positions at displacement u (n, 3).
 
-    Where there is no room for them the skin becomes thinner. Without finite positions, and with
-    more pairs than there is room for even so, no list is made, and forces are not finite.
+    The skin shrinks if there is no room. If positions are not finite, or the room is still too
+    small, no list is made, and forces are not finite.
     """
     x, counts, facts = memory.x, memory.counts, memory.facts
     counts.has_list = 0
@@ -234,7 +234,7 @@ def list_pairs(tables, u, memory):
 
 @inner
 def relist(tables, u, memory):
-    """`list_pairs` by the first member of a team, for all: after a `wait` for their positions."""
+    """`list_pairs` by the first team member for all, after a `wait` for their positions."""
     if memory.share.team.number == 0:
         list_pairs(tables, u, memory)
     pass_on(memory.share)
@@ -242,7 +242,7 @@ def relist(tables, u, memory):
 
 @kernel
 def place(tables, u, memory):
-    """Positions at displacement u (rows, 3) to memory.x, of a member's own nodes."""
+    """Put positions at displacement u (rows, 3) into memory.x, for a member's own nodes."""
     for i in range(memory.share.own[0], memory.share.own[1]):
         for c in range(3):
             memory.x[i, c] = tables.rest[i, c] + u[i, c]
@@ -250,7 +250,7 @@ def place(tables, u, memory):
 
 @kernel
 def use_all(memory):
-    """Take all listed pairs for near."""
+    """Mark all listed pairs as near."""
     for kind in range(2):
         count = memory.counts.listed_first if kind == VERTEX else memory.counts.listed_second
         for k in range(count):
@@ -261,9 +261,9 @@ def use_all(memory):
 
 @inner
 def follow(tables, u, memory):
-    """Have all pairs that are near at u, wherever it is, among the near ones.
+    """Update the near pairs for any u.
 
-    After a `wait` for the positions of all members, of whom the first one does it.
+    Call it after a `wait` for all positions; the first member does the work.
     """
     if memory.share.team.number == 0 and (
         memory.counts.has_list == 0 or not farthest(u, memory) < 0.5 * memory.facts.skin

@@ -1,12 +1,12 @@
-"""The longest step of an explicit method in which nothing that touches is overrun.
+"""Longest step of an explicit method that resolves all contacts.
 
-In a step no gap closes by more than `APPROACH` of itself, or of d0 and what it is farther apart,
-at the speed at its begin; and the stiffness of what touches is resolved,
+At the speed at the start of a step, no gap d may close by more than (d - d0)+ plus the share
+`APPROACH` = eta of min(d, d0), and the step resolves the stiffness of active contacts,
 
     h <= ((d - d0)+ + eta min(d, d0)) / closing speed,    h <= beta / sqrt(k f'' sum w_i^2 / m_i),
 
 with the weights w_i of the closest points and the masses m_i. A method that gives slow contacts
-inertia (`inertia`) goes beyond the latter where little energy is in it.
+inertia (`inertia`) may exceed the second limit if the contacts have little energy.
 """
 
 from __future__ import annotations
@@ -37,32 +37,32 @@ from foldyn.mechanics.contact.thread_partition import HINGES, LIMIT, NEAR, gathe
 from foldyn.mechanics.threads import largest, part, wait
 
 APPROACH = 0.1
-REACH = 4.0  # times the fastest motion in a step: how far away pairs are looked at in it
+REACH = 4.0  # times the fastest motion in a step: search range for pairs
 TINY = 1e-300  # m/s
 MARGIN = 0.05  # of the skin: how much farther, as speeds change within a step
 
 
 class Pace(NamedTuple):
-    """What a method asks of its steps where something touches."""
+    """Step requirements of a method in contact."""
 
-    resolved: float  # beta: part of the angular period of a contact
-    energy: float  # k f'' (change of the gap)^2 of contacts that need not be resolved, at most, J
+    resolved: float  # beta: largest vibration angle of a contact per step, rad
+    energy: float  # J, largest k f'' (change of the gap)^2 of unresolved contacts
 
 
-RESOLVED = Pace(0.25, 0.0)  # without an estimate of its error
+RESOLVED = Pace(0.25, 0.0)  # for methods without error estimate
 
 
 @inner_scalar
 def _spring_bound(limit, rate, pace):
-    """The lesser of a step and what a spring allows, of stiffness over mass `rate` (1/s2)."""
+    """The smaller of a step and the limit of a spring with stiffness over mass `rate` (1/s2)."""
     return min(limit, pace.resolved / math.sqrt(rate)) if rate > 0.0 else limit
 
 
 @inner_scalar
 def _bound(limit, d, d0, closing, change, stiffness, lightness, pace, facts):
-    """The lesser of a step (s) and what a gap d allows that closes at some speed.
+    """The smaller of a step (s) and the limit of a gap d that closes at a given speed.
 
-    change : rate of that speed, which tells a contact at rest from one that turns round.
+    change : rate of that speed, which distinguishes resting from reversing contacts.
     """
     if closing > 0.0:
         limit = min(limit, (max(d - d0, 0.0) + APPROACH * min(d, d0)) / closing)
@@ -80,7 +80,7 @@ def _bound(limit, d, d0, closing, change, stiffness, lightness, pace, facts):
 
 @inner
 def _vertex_bound(tables, x, v, a, lightness, i, t, d0, reach, limit, pace, facts):
-    """See `_bound`, for a vertex and a triangle; nan where they are farther than reach."""
+    """Step limit of a vertex and a triangle, see `_bound`; nan if they are beyond reach."""
     j, k, l = tables.triangles[t, 0], tables.triangles[t, 1], tables.triangles[t, 2]  # noqa: E741
     p, pa, pb, pc = point(x, i), point(x, j), point(x, k), point(x, l)
     wa, wb, wc, _ = closest_on_triangle(p, pa, pb, pc)
@@ -99,7 +99,7 @@ def _vertex_bound(tables, x, v, a, lightness, i, t, d0, reach, limit, pace, fact
 
 @inner
 def _edge_bound(tables, x, v, a, lightness, i, j, d0, reach, limit, pace, facts):
-    """See `_bound`, for two edges; nan where they are farther than reach."""
+    """Step limit of two edges, see `_bound`; nan if they are beyond reach."""
     k, l = tables.edges[i, 0], tables.edges[i, 1]  # noqa: E741
     m, n = tables.edges[j, 0], tables.edges[j, 1]
     s, t, _ = closest_of_segments(point(x, k), point(x, l), point(x, m), point(x, n))
@@ -119,7 +119,7 @@ def _edge_bound(tables, x, v, a, lightness, i, j, d0, reach, limit, pace, facts)
 
 @inner_scalar
 def _pairs_bound(tables, x, v, a, lightness, far, reach, limit, pace, memory):
-    """See `_bound`, for a member's part of all listed pairs; notes those that are near."""
+    """Step limit of a member's share of listed pairs, see `_bound`; notes near pairs."""
     counts, team = memory.counts, memory.share.team
     for kind in range(2):
         listed = counts.listed_first if kind == VERTEX else counts.listed_second
@@ -148,9 +148,9 @@ def _pairs_bound(tables, x, v, a, lightness, far, reach, limit, pace, memory):
 
 @inner
 def _hinges_bound(tables, x, v, a, lightness, angle, reach, limit, pace, memory):
-    """See `_bound`, for a member's part of the guarded hinges.
+    """Step limit of a member's share of guarded hinges, see `_bound`.
 
-    Notes how many of them a motion by reach may bring to their guard.
+    Notes how many of them a motion by `reach` may bring to their guard.
     """
     near, team = 0, memory.share.team
     first, last = part(team, tables.hinge_limit.size)
@@ -180,7 +180,7 @@ def _hinges_bound(tables, x, v, a, lightness, angle, reach, limit, pace, memory)
 
 @inner
 def _planes_bound(tables, x, v, a, lightness, memory, limit, pace):
-    """See `_bound`, for a member's nodes and planes; friction's springs are resolved, too."""
+    """Step limit of a member's nodes on planes and their friction springs, see `_bound`."""
     k, mine = tables.stiffness, memory.share.meeting
     for p in range(len(tables.planes)):
         for m in range(mine[0], mine[1]):
@@ -199,14 +199,14 @@ def _planes_bound(tables, x, v, a, lightness, memory, limit, pace):
 
 @kernel
 def limited(tables, u, v, a, angle, dt, pace, lightness, memory):
-    """The longest step (s), at most dt, from displacement u with velocity v, all (rows, 3).
+    """Longest step (s), at most dt, from displacement u with velocity v, all (rows, 3).
 
-    Lists are renewed, pairs that may touch in the step are gathered, and friction slips: to be
-    called once before each step, where the last one has ended. Each member of a team looks at its
-    share; all get the same step.
+    Renews lists, gathers pairs that may touch in the step, and lets friction slip: call it once
+    before each step, at the end of the last one. Each team member checks its share; all get the
+    same step.
 
-    a : acceleration, which is looked at where contacts need not be resolved; angle : dihedrals
-    (nh,) at u; pace : see `Pace`; lightness : (n,) 1 / mass of the nodes, 1/kg.
+    a : acceleration, used for contacts that need not be resolved; angle : dihedrals (nh,) at u;
+    pace : see `Pace`; lightness : (n,) 1 / mass of the nodes, 1/kg.
     """
     limit, counts, x, team = dt, memory.counts, memory.x, memory.share.team
     rubs, memory.facts.resolved = tables.friction > 0.0, dt

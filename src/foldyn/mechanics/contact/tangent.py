@@ -1,4 +1,4 @@
-"""Tangents of all that touches, element by element of four nodes."""
+"""Tangents of all contacts, as elements of four nodes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from foldyn.mechanics.dihedral import add_hessian
 
 @kernel
 def touching_pairs(tables, memory):
-    """Numbers of the listed pairs of either kind nearer than d0 at memory.x."""
+    """Indices of the listed pairs of each kind closer than d0 at memory.x."""
     x, out = memory.x, np.empty((2, memory.d0.shape[1]), np.int64)
     found = np.zeros(2, np.int64)
     for k in range(memory.counts.listed_first):
@@ -44,7 +44,7 @@ def touching_pairs(tables, memory):
 
 @kernel
 def pair_tangents(tables, memory, first, second, nodes, blocks):
-    """Derivatives of the forces of some listed pairs, to nodes (k, 4) and blocks (k, 12, 12)."""
+    """Force derivatives of some listed pairs, into nodes (k, 4) and blocks (k, 12, 12)."""
     x, triangles, edges = memory.x, tables.triangles, tables.edges
     for k in range(first.size + second.size):
         kind = VERTEX if k < first.size else EDGES
@@ -62,7 +62,7 @@ def pair_tangents(tables, memory, first, second, nodes, blocks):
 
 @kernel
 def guard_tangents(tables, x, blocks):
-    """Second derivatives (h, 4, 3, 4, 3) of the guards of hinges, and which of them act (h,)."""
+    """Second derivatives (h, 4, 3, 4, 3) of hinge guards, and whether each acts (h,)."""
     acts = np.zeros(tables.hinge_limit.size, np.bool_)
     points, gradient = np.empty((4, 3)), np.empty((4, 3))
     for h in range(tables.hinge_limit.size):
@@ -87,9 +87,9 @@ def guard_tangents(tables, x, blocks):
 
 @kernel
 def plane_tangents(tables, x, memory):
-    """Derivatives (q, n, 3, 3) of the forces of planes on nodes, friction included.
+    """Force derivatives (q, n, 3, 3) of planes on nodes, friction included.
 
-    After `add_planes`.
+    Call it after `add_planes`.
     """
     out = np.zeros((len(tables.planes), len(x), 3, 3))
     for p in range(len(tables.planes)):
@@ -113,8 +113,8 @@ def friction_tangent(tables, x, moved, memory, p, i, stiffness, out):
     """Add the derivative of the spring of node i on plane p to out (3, 3).
 
     moved : (q, 3) displacement of the planes, m.
-    stiffness : the rate, N/m, with which the present normal force falls as the node rises; where
-    it bounds friction, the derivative of a node that slips is not symmetric.
+    stiffness : rate, N/m, at which the current normal force falls as the node rises; if that force
+    limits friction, the derivative of a slipping node is not symmetric.
     """
     k, stretch = tables.stiffness, stretch_of(tables, x, moved, memory, p, i)
     most = farthest_stretch(tables, memory, p, i)
@@ -125,7 +125,7 @@ def friction_tangent(tables, x, moved, memory, p, i, stiffness, out):
         for b in range(3):
             along = -tables.planes[p, NORMAL + a] * tables.planes[p, NORMAL + b]
             along += 1.0 if a == b else 0.0
-            if slips:  # its force keeps its direction
+            if slips:  # the force keeps its direction
                 along -= stretch[a] * stretch[b] / (stretch[3] * stretch[3])
                 out[a, b] -= rate * stretch[a] / stretch[3] * tables.planes[p, NORMAL + b]
             out[a, b] += k * share * along

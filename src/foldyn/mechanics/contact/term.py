@@ -1,4 +1,4 @@
-"""Contact: parts of a sheet touch each other and planes, as solvers see it."""
+"""Contact of a sheet with itself and with planes, as solvers see it."""
 
 from __future__ import annotations
 
@@ -38,22 +38,22 @@ GROUP = "contact"
 class ContactTerm(Term):
     """Contact; see `Term`.
 
-    Friction acts where springs are tied: on paths of equilibria (`rubbing`), and in motions, which
-    have memory of their own. Elsewhere there is none.
+    Friction acts only with tied springs: on paths of equilibria (`rubbing`), and in motions, which
+    have their own memory.
 
-    Which nodes touch changes, so its tangent has no places of its own in a step's matrix.
+    The set of touching nodes changes, so the tangent has no fixed places in a step's matrix.
 
     Parameters
     ----------
     sheets : Sheets
-        What may touch.
+        Contact surfaces.
     guarded : Assembly
-        The terms before it, whose hinges it guards.
+        The preceding terms, whose hinges it guards.
 
     Attributes
     ----------
     eased : bool
-        Whether slow contacts may be given inertia.
+        Whether slow contacts may get inertia.
     """
 
     energy_groups: ClassVar[Mapping[str, str]] = {GROUP: "energy of contact"}
@@ -67,17 +67,17 @@ class ContactTerm(Term):
 
     @cached_property
     def tables(self) -> Tables:
-        """What may touch, as arrays."""
+        """Contact surfaces as arrays."""
         return tables(self.sheets, self._guarded.hinges)
 
     @cached_property
     def memory(self) -> Memory:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """See `Term`: lists of pairs, which evaluations find again where they serve."""
+        """Memory with pair lists, which evaluations reuse while valid; see `Term`."""
         return memory(self.tables, self.sheets.panels)
 
     def _copy(self, **changes: Any) -> ContactTerm:
-        """The same but for some attributes, with the same tables and, unless given, lists."""
-        _ = self._contexts  # and with them tables and lists
+        """Copy with some attributes changed, with the same tables and, unless given, lists."""
+        _ = self._contexts  # creates tables and lists as well
         other = copy(self)
         if not changes.keys() & {"tables", "memory"}:
             other._contexts = self._contexts
@@ -86,24 +86,24 @@ class ContactTerm(Term):
 
     @cached_property
     def _contexts(self) -> tuple[Context, Context]:
-        """Tables and memory as loops pass them on, so that both call the same kernels."""
+        """Contexts of tables and memory, so that Python and loops call the same kernels."""
         return Context(self.tables), Context(self.memory)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what holds addresses of this process."""
+        """State without objects that hold addresses of this process."""
         return {name: value for name, value in vars(self).items() if name != "_contexts"}
 
     def displaced(self, moved: NDArray) -> ContactTerm:
-        """The same with planes displaced by `moved` (p, 3), m."""
+        """Copy with planes displaced by `moved` (p, 3), m."""
         return self._copy(_moved=np.asarray(moved, float))
 
     def rubbing(self) -> tuple[ContactTerm, Friction]:
-        """The same with springs of friction, and what keeps where they are tied."""
+        """Copy with friction springs, and the `Friction` that holds their anchors."""
         own = memory(self.tables, self.sheets.panels)
         return self._copy(memory=own), Friction(self.tables, own)
 
     def driven(self, rows: Mapping[int, int]) -> ContactTerm:
-        """The same with planes, by number, that move with histories of these numbers."""
+        """Copy whose planes, by index, follow the histories with these rows."""
         planes = self.sheets.planes.copy()
         for plane, row in rows.items():
             planes[plane, HISTORY] = row
@@ -111,54 +111,54 @@ class ContactTerm(Term):
 
     # ------------------------------------------------------------------ as a term
     def compiled(self, work: Any, kept: Memory, group: int) -> Compiled:
-        """See `Term`."""
+        """Context and kernels for a thread; see `Term`."""
         return contact_kernels(self.tables, kept, work.angle, group)
 
     def memories(self, works: Sequence[Any]) -> list[Memory]:
-        """See `Term`."""
-        if len(works) == 1:  # which owns further rows, if there are some
+        """Kernel memory for each thread; see `Term`."""
+        if len(works) == 1:  # it owns further rows, if any
             return [memory(self.tables, self.sheets.panels)]
         teams, own = [work.team for work in works], [work.strips.own for work in works]
         return memories(self.tables, self.sheets.panels, teams, own)
 
     def prepare(self) -> None:
-        """See `Term`: planes stand where they are."""
+        """Set the planes to their current displacements; see `Term`."""
         self.memory.moved[:, :3] = self._moved
 
     def stored(self) -> float:
-        """See `Term`: what springs of friction store."""
+        """Energy (J) stored in friction springs; see `Term`."""
         return stored(self.tables, self.memory)
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """See `Term`."""
+        """Tangent (m, m), N/m; see `Term`."""
         if self.contact(q)[0] == 0.0:  # nothing touches
             return sparse.csr_array((q.size, q.size))
         return self.tangent_at(q, self.memory)
 
     def tangent_at(self, q: NDArray, kept: Memory) -> sparse.csr_array:
-        """The same at q (m,) or (rows, 3), where contact was evaluated last with this memory."""
+        """Tangent at q (m,) or (rows, 3), where contact was last evaluated with this memory."""
         return contact_tangent(self.tables, kept, q.size)
 
     def placed(self, order: NDArray, before: Assembly) -> ContactTerm:
-        """See `Term`."""
+        """The term with nodes in memory order; see `Term`."""
         return type(self)(self.sheets.placed(order), before)
 
     def nominal(self, q: NDArray) -> None:
-        """See `Term`: none."""
+        """None: contact has no nominal stiffness. See `Term`."""
 
     def holds(self, q: NDArray) -> sparse.csr_array:
-        """See `Term`: planes hold nodes that touch them, panels each other, friction all axes."""
+        """Internal constraints: planes hold touching nodes, panels each other; see `Term`."""
         return self.held(q, q.size)
 
     def held(self, q: NDArray, size: int) -> sparse.csr_array:
-        """The same rows (s, size) of the motions of the points that touch."""
+        """Unit rows (s, size) of these constraints for the motions of the contact points."""
         self.contact(q)
         on_planes = held_by_planes(self.tables, self.memory, size)
         on_panels = held_by_panels(self.tables, self.memory, size)
         return sparse.csr_array(sparse.vstack([on_planes, on_panels]))
 
     def unstrained(self, q: NDArray) -> Unstrained | None:
-        """See `Term`: what holds."""
+        """Contact as linear springs along its internal constraints; see `Term`."""
         held = self.holds(q)
         if not held.shape[0]:
             return None
@@ -170,41 +170,41 @@ class ContactTerm(Term):
 
     # ------------------------------------------------------------------ points that touch
     def points(self, q: NDArray) -> NDArray:
-        """Displacements (m, 3) of what touches, m: the nodes."""
+        """Displacements (m, 3) of the contact points, m: the nodes."""
         return nodal(q)[: len(self.tables.rest)]
 
     @property
     def nodes(self) -> NDArray:
-        """Nodes (m,) that each moves with."""
+        """Node (m,) that each contact point belongs to."""
         return np.arange(len(self.tables.rest))
 
     def carried(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which of them (m,) chosen nodes (n,) alone move."""
+        """Contact points (m,) that chosen nodes (n,) alone move."""
         return chosen
 
     def on_nodes(self, q: NDArray, force: NDArray) -> NDArray:
-        """Forces (n, 3) on the nodes of forces (m, 3) on what touches, N."""
+        """Nodal forces (n, 3) of forces (m, 3) on the contact points, N."""
         return force
 
     def step_back(self, u0: NDArray, u1: NDArray, force: NDArray) -> NDArray:
-        """The same in a step: they do the work of those on what touches."""
+        """Nodal forces (n, 3) in a step, doing the work of forces on the contact points, N."""
         return force
 
     def step_tangent(
         self, u0: NDArray, u1: NDArray, force: NDArray, inner: sparse.csr_array
     ) -> sparse.csr_array:
-        """Their derivative (m, m) by the end of the step, N/m; `inner` that of what touches."""
+        """Derivative (m, m) of `step_back` by the end of the step, N/m; `inner`: by the points."""
         inner.resize((u0.size, u0.size))
         return inner
 
     # ------------------------------------------------------------------ forces
     def contact(self, q: NDArray) -> tuple[float, NDArray]:
-        """Energy (J) of contact alone and the force (n, 3), N, against it, friction included."""
+        """Contact energy (J) at q, and its gradient (n, 3), N, friction included."""
         energy, force = self.touching(q)
         return energy, self.on_nodes(q, force)
 
     def touching(self, q: NDArray) -> tuple[float, NDArray]:
-        """The same with the force (m, 3) on the points that touch."""
+        """Contact energy (J) at q, and its gradient (m, 3), N, at the contact points."""
         u = self.points(q)
         force = np.zeros_like(u)
         self.prepare()
@@ -213,13 +213,13 @@ class ContactTerm(Term):
         return float(self.memory.facts.energy), force
 
     def nearest(self, q: NDArray) -> tuple[float, float, NDArray]:
-        """Energy (J) of contact between panels, and which of them are nearest to each other.
+        """Contact energy (J) between panels, and the closest two panels.
 
-        That is the least distance over the one at which they begin to touch, and the panels
-        (1, 2), the lower first; inf and none, (0, 2), where no panels are near.
+        Returns the energy, the least ratio of distance to contact distance, and the panels (1, 2),
+        the lower first; inf and none, (0, 2), if no panels are near.
         """
         own = self.tables._replace(planes=self.tables.planes[:0])
-        kept = memory(own, self.sheets.panels)  # pairs are listed here
+        kept = memory(own, self.sheets.panels)  # lists pairs
         energy = self._copy(tables=own, memory=kept, _moved=np.zeros((0, 3))).contact(q)[0]
         counts = int(kept.counts.listed_first), int(kept.counts.listed_second)
         share = np.concatenate(
@@ -236,7 +236,7 @@ class ContactTerm(Term):
         return energy, float(share[worst]), np.sort(panels)[None]
 
     def touch(self, q: NDArray) -> NDArray:
-        """Size (n,), N, of the force of contact on each node, without friction."""
+        """Norm (n,), N, of the contact force on each node, without friction."""
         force, kept = self.touching(q)[1], self.memory
         rub = np.zeros_like(force)
         if self.tables.friction > 0.0:
@@ -245,14 +245,14 @@ class ContactTerm(Term):
         return np.linalg.norm(self.on_nodes(q, force), axis=1)
 
     def clear(self, q: NDArray, step: NDArray, moves: NDArray, keep: float = KEEP) -> float:
-        """Share of a step (m,) from q in which nothing crosses, while planes move (p, 3), m."""
+        """Share of a step (m,) from q without any crossing, while planes move (p, 3), m."""
         self.prepare()
         return self.clear_with(self.memory, q, step, moves, keep)
 
     def clear_with(
         self, kept: Memory, q: NDArray, step: NDArray, moves: NDArray, keep: float
     ) -> float:
-        """The same with some memory, where its planes are."""
+        """Share of a step without crossing, for a memory with its current planes; see `clear`."""
         return clear_share(self.tables, kept, self.points(q), self.points(step), moves, keep)
 
     def plane_forces(self, q: NDArray) -> NDArray:
@@ -267,10 +267,10 @@ class ContactTerm(Term):
         return -self.memory.friction[:, :, :3].sum(axis=1)
 
     def plane_borders(self, q: NDArray, motion: NDArray) -> tuple[NDArray, NDArray, float]:
-        """Derivatives, N/m, of forces by a way of all planes along their motions (p, 3).
+        """Derivatives, N/m, for a displacement of all planes along their motions (p, 3).
 
-        That of the force on the dofs (m,), that of what moves the planes by the dofs (m,), and that
-        of this by the way.
+        Returns the derivatives of the dof forces (m,) by the displacement, of the force on the
+        planes by the dofs (m,), and of that force by the displacement.
         """
         self.contact(q)
         blocks = plane_tangents(self.tables, self.memory.x, self.memory)
@@ -280,14 +280,14 @@ class ContactTerm(Term):
         return self._on_dofs(q, column), self._on_dofs(q, row), own
 
     def _on_dofs(self, q: NDArray, force: NDArray) -> NDArray:
-        """Forces (m,) on the dofs of those on what touches."""
+        """Dof forces (m,) of forces on the contact points."""
         out, nodes = np.zeros(q.size), self.on_nodes(q, force)
         out[: nodes.size] = nodes.ravel()
         return out
 
 
 def contact_tangent(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
-    """The derivative (size, size), N/m, of the forces of contact where they were last found."""
+    """Derivative (size, size), N/m, of the contact forces at their last evaluation."""
     first, second = touching_pairs(own, kept)
     nodes = np.empty((len(first) + len(second), 4), np.int64)
     blocks = np.zeros((len(nodes), 12, 12))

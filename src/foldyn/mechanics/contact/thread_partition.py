@@ -1,10 +1,10 @@
-"""Partition of the work of contact among the threads of a team.
+"""Partition of contact work among the threads of a team.
 
-A member owns nodes, as in `mechanics.strips`: it places them, meets planes with them and finishes
-the force on them. Pairs and guarded hinges are shared by their numbers, whoever owns their nodes.
-Each member adds their forces to sums of its own; then each adds up the sums of all on its own
-nodes, in the order of the members. So the order of summation does not depend on which thread is
-quicker. A thread that is alone owns everything, and adds to the force itself.
+A member owns nodes, as in `mechanics.strips`: it places them, handles their contact with planes and
+completes the force on them. Pairs and guarded hinges are split by index, regardless of who owns
+their nodes. Each member adds their forces to its own sums; then each adds up all members' sums on
+its own nodes, in member order. So the order of summation does not depend on the threads' speed. A
+single thread owns everything and adds to the force directly.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ NOTES = 16  # two cache lines
 
 
 class Share(NamedTuple):
-    """Share of a member of a team of k threads; room for m pairs of either kind."""
+    """Share of one member of a team of k threads; room for m pairs of each kind."""
 
-    team: Team  # with notes of its own, (k, NOTES)
-    own: NDArray  # (2,) first and last + 1 of the member's nodes,
-    meeting: NDArray  # (2,) and of those that planes may meet
-    found: NDArray  # (2, m) near pairs as members find them; alone where they are kept
-    sums: NDArray  # (k, n, 3) forces of the pairs of each member, N, else 0; alone none (1, 0, 3)
-    counts: NDArray  # (k, ...) int64, the records of all members,
-    facts: NDArray  # (k, ...) and what they have measured
+    team: Team  # with its own notes, (k, NOTES)
+    own: NDArray  # (2,) first and last + 1 of the member's nodes
+    meeting: NDArray  # (2,) and of its nodes that planes may meet
+    found: NDArray  # (2, m) near pairs in the order of discovery; for one thread, the list itself
+    sums: NDArray  # (k, n, 3) pair forces of each member, N, else 0; (1, 0, 3) for one thread
+    counts: NDArray  # (k, ...) int64, counters of all members
+    facts: NDArray  # (k, ...) and their measured values
 
 
 @inner_scalar
 def reaches(team, first, last):
-    """Note that this member's sums reach the nodes first to last - 1, and no other ones."""
+    """Note that this member's sums affect only the nodes first to last - 1."""
     team.note[team.number, LOW], team.note[team.number, HIGH] = first, last
 
 
 @inner
 def pass_on(share):
-    """Wait for the first member; then all have its counts and facts."""
+    """Wait for the first member; then copy its counts and facts to all."""
     wait(share.team)
     mine = share.team.number
     if mine > 0:
@@ -56,7 +56,7 @@ def pass_on(share):
 
 @inner_scalar
 def gather(memory):
-    """Make the near pairs that the members have found one list, that of one thread."""
+    """Merge the near pairs of all members into one list, ordered as on one thread."""
     counts, team = memory.counts, memory.share.team
     for kind in range(2):
         listed = counts.listed_first if kind == VERTEX else counts.listed_second
@@ -76,7 +76,7 @@ def gather(memory):
 
 @inner
 def finish(share, force):
-    """Add the sums of all members to the force (n, 3) on this one's nodes; they become 0 there."""
+    """Add all members' sums to the force (n, 3) on this member's nodes, and reset them."""
     team = share.team
     wait(team)
     for member in range(team.size):
@@ -91,7 +91,7 @@ def finish(share, force):
 
 @inner_scalar
 def energy_of_all(memory):
-    """Energy (J) of contact at the last force of all members: after a `wait` for them."""
+    """Contact energy (J) of all members at the last force, after a `wait` for them."""
     if memory.share.team.size == 1:
         return memory.facts.energy
     return total(memory.share.team, ENERGY)

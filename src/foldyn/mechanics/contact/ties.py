@@ -1,6 +1,6 @@
-"""What is tied by friction stays in the lists of pairs, wherever these are made.
+"""Pairs tied by friction stay in pair lists, wherever these are made.
 
-A step of Newton's method may lead far away before it is cut, and its lists are made on the way.
+A Newton step may lead far away before it is shortened, and lists are made on the way.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from foldyn.mechanics.contact.planes import LEAST
 
 @kernel
 def take_ties(memory):
-    """Kind, parts (m, 3), d0 and tie (m, 5) of all pairs that are tied."""
+    """Kind, parts (m, 3), d0 and tie (m, 5) of all tied pairs."""
     count = 0
     for go in range(2):
         if go == 1:
@@ -38,7 +38,7 @@ def take_ties(memory):
 
 @kernel
 def lay_ties(memory, parts, ties):
-    """Make a list of nothing but what `take_ties` gave, which the next list takes over."""
+    """Make a list of the pairs from `take_ties` only, which the next list takes over."""
     counts = memory.counts
     counts.has_list = counts.listed_first = counts.listed_second = 0
     for m in range(len(parts)):
@@ -56,10 +56,10 @@ def lay_ties(memory, parts, ties):
 
 @inner
 def put_ties(tables, memory, parts, ties, loose, found):
-    """Tie pairs of a new list, of found[kind] pairs, by what `take_ties` gave.
+    """Tie pairs of a new list, of found[kind] pairs, as `take_ties` returned them.
 
-    Those that are not in it are added, and found counts them; `loose` tells whether also those that
-    did not touch. Fresh lists are ordered by triangles and first edges.
+    Missing pairs are added and counted in `found`; `loose`: whether to include pairs that did not
+    touch. New lists are ordered by triangles and first edges.
     """
     for kind in range(2):
         memory.tie[kind, : found[kind], 2:] = 0.0
@@ -91,7 +91,7 @@ def put_ties(tables, memory, parts, ties, loose, found):
 
 @inner
 def _begin(pairs, key, value, count):
-    """The first of the pairs (m, 2), ordered by a column, in which this has at least a value."""
+    """First of the pairs (m, 2), ordered by column `key`, whose key is at least `value`."""
     low, high = 0, count
     while low < high:
         middle = (low + high) // 2

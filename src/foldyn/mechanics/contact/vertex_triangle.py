@@ -1,12 +1,12 @@
 """A vertex against a triangle: energy, force and tangent of the potential of their distance.
 
-Where the closest point lies on a side or corner that triangles share, each of them would count it.
-So what is shared is taken out again:
+If the closest point lies on a shared side or corner, each triangle would count it. So shared parts
+are subtracted:
 
     V = b(d_T) - 1/2 sum b(d_E) + sum b(d_V) / n
 
-over the sides E that two triangles share and the corners V around which n triangles close. Over a
-flat sheet the sum for all its triangles is b(d) once, also above its inner sides and corners.
+summed over sides E of two triangles and corners V enclosed by n triangles. Over a flat sheet, the
+sum over all triangles is b(d), also above inner sides and corners.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from foldyn.mechanics.contact.distances import (
 )
 from foldyn.mechanics.contact.potential import barrier
 
-PARTS = 7  # of a triangle: itself, its sides, its corners
+PARTS = 7  # parts of a triangle: itself, its sides, its corners
 
 
 @inner_scalar
@@ -49,7 +49,7 @@ def _one(i, j):
 
 @inner
 def _part(x, force, nodes, wa, wb, wc, d0, k):
-    """Energy of k d0^2 f(d/d0) for weights of the closest point, and its force along d.
+    """Energy of k d0^2 f(d/d0) for the closest point's weights, and its force along d.
 
     Adds its gradient, unless force is None.
     """
@@ -72,9 +72,9 @@ def _part(x, force, nodes, wa, wb, wc, d0, k):
 def vertex_triangle(tables, x, force, v, t, d0):
     """Energy (J) of vertex v against triangle t at positions x (n, 3), and their normal force (N).
 
-    Adds the gradient to force (n, 3), unless that is None. Returns the weights of the second and
-    the third corner in the closest point, too. The normal forces of all parts of a triangle are
-    summed like their energies: over a flat sheet that is the force, everywhere.
+    Adds the gradient to force (n, 3), unless that is None. Also returns the weights of the second
+    and third corner at the closest point. Normal forces of a triangle's parts are summed like their
+    energies: over a flat sheet this equals the force everywhere.
     """
     a, b, c = tables.triangles[t, 0], tables.triangles[t, 1], tables.triangles[t, 2]
     nodes, k = (v, a, b, c), tables.stiffness
@@ -109,18 +109,18 @@ def vertex_triangle(tables, x, force, v, t, d0):
 
 @inner_scalar
 def _on_side(s, side, first, second):
-    """Region of the point at the fraction s of a side between two corners."""
+    """Region of the point at fraction s of a side between two corners."""
     return first if s <= 0.0 else (second if s >= 1.0 else side)
 
 
 @inner
 def weigh_triangle(corners, which, weights, moves):
-    """Set weights (4,) and moves (2, 4) of the distance of a vertex from a part of a triangle.
+    """Set weights (4,) and moves (2, 4) for the distance of a vertex from a part of a triangle.
 
     corners : (4, 3) of the vertex and the triangle.
     which : 0 for the triangle, 1 to 3 for its sides, 4 to 6 for its corners.
 
-    Returns the number of parameters over which the distance is minimal; see `second`.
+    Returns the number of parameters over which the distance is minimal; see `distance_hessian`.
     """
     p, a, b, c = point(corners, 0), point(corners, 1), point(corners, 2), point(corners, 3)
     if which == 0:
@@ -151,7 +151,7 @@ def weigh_triangle(corners, which, weights, moves):
 
 @inner_scalar
 def share_of(tables, t, which):
-    """What a part of triangle t counts; see `weigh_triangle`."""
+    """Coefficient of a part of triangle t; see `weigh_triangle`."""
     if which == 0:
         return 1.0
     if which < 4:
@@ -161,7 +161,7 @@ def share_of(tables, t, which):
 
 @kernel
 def vertex_triangle_tangent(tables, x, v, t, d0, out):
-    """Add the second derivative of the energy of `vertex_triangle` to out (12, 12); the energy.
+    """Add the Hessian of the energy of `vertex_triangle` to out (12, 12); return the energy.
 
     Rows and columns belong to the vertex and then the corners.
     """
