@@ -27,7 +27,7 @@ GROUPS: Mapping[str, str] = {
     "strain_folds": "strain energy of the folds",
     "strain_bends": "strain energy of the bends",
 }
-SMALL = 300  # nodes below which all values are in the cache anyway, whatever their order
+SMALL = 300  # nodes: smaller models fit in the cache in any order
 
 
 class BarsHingesTerm(SheetTerm):
@@ -37,13 +37,13 @@ class BarsHingesTerm(SheetTerm):
     ----------
     model : BarsHinges
     turning : ndarray, shape (nr,)
-        Rows in `model.hinges` of the folds, then of the bends.
+        Rows in `model.hinges`: the folds, then the bends.
     laws : tuple of (HingeLaw, int)
-        Laws of the folds and of the bends, and how many there are of each.
+        Laws of folds and bends, with the number of each.
     softness : ndarray, shape (nf,)
-        Of the panels beside the folds, rad/(N m).
+        Softness of the panels adjacent to each fold, rad/(N m).
     like : BarsHingesTerm, optional
-        One whose elements have the same nodes.
+        A term whose elements have the same nodes.
     """
 
     energy_groups = GROUPS
@@ -57,7 +57,7 @@ class BarsHingesTerm(SheetTerm):
         self.size, self.rows = model.rest.size, len(model.rest)
 
     def _with(self, model: BarsHinges) -> BarsHingesTerm:
-        """Another sheet whose elements have the same nodes."""
+        """A sheet with another model whose elements have the same nodes."""
         return BarsHingesTerm(model, self._turning, self._laws, self._softness, self)
 
     def _nodal(self, q: NDArray) -> NDArray:
@@ -70,15 +70,15 @@ class BarsHingesTerm(SheetTerm):
 
     @property
     def threads(self) -> int:
-        """See `SheetTerm`."""
+        """Fastest number of threads for a motion; see `SheetTerm`."""
         return mechanics.threads_for(self.model)
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """See `SheetTerm`."""
+        """Tangent (m, m), N/m; see `SheetTerm`."""
         return mechanics.tangent(self.model, self.sparsity, self._nodal(q), floor).tocsr()
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
-        """See `SheetTerm` and `mechanics.step_tangent`."""
+        """Matrix for a Newton step at q; see `SheetTerm` and `mechanics.step_tangent`."""
         pattern, again = self.sparsity, before is not None
         data, old = np.empty((len(pattern.indices), 3, 3)), q if before is None else before
         put_tangent(self.model, pattern, self._nodal(q), self._nodal(old), again, data)
@@ -88,7 +88,7 @@ class BarsHingesTerm(SheetTerm):
     def mean_tangent(
         self, q0: NDArray, q1: NDArray, angle: NDArray, before: NDArray, again: bool
     ) -> sparse.csr_array:
-        """See `SheetTerm`."""
+        """Matrix for the mean forces from q0 to q1; see `SheetTerm`."""
         pattern, ends = self.sparsity, (self._nodal(q0), self._nodal(q1))
         data = np.empty((len(pattern.indices), 3, 3))
         put_mean_tangent(self.model, pattern, *ends, angle, self._nodal(before), again, data)
@@ -96,42 +96,42 @@ class BarsHingesTerm(SheetTerm):
         return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=shape).tocsr()
 
     def blocks(self) -> BarsHingesBlocks:
-        """See `SheetTerm`."""
+        """Tangent blocks for implicit integrators; see `SheetTerm`."""
         return BarsHingesBlocks(self.model)
 
     def workspaces(self, threads: int) -> list[mechanics.Workspace]:
-        """See `SheetTerm`."""
+        """Work arrays for each thread; see `SheetTerm`."""
         return mechanics.workspaces(self.model, threads)
 
     def compiled(self, work: Any, kept: mechanics.Workspace, group: int) -> Compiled:
-        """See `Term`."""
+        """Context and kernels for a thread; see `Term`."""
         return bars_hinges_kernels(self.model, kept, len(GROUPS))
 
     def arrays(self) -> Arrays:
-        """See `Term`."""
+        """Arrays that its forces depend on; see `Term`."""
         return arrays_of(self.model, "addresses")
 
     def pulled(self) -> Pulled:
-        """See `Term`."""
+        """Pullback of its forces; see `Term`."""
         return bars_hinges_pulled(self.model)
 
     @property
     def hinges(self) -> NDArray:
-        """See `SheetTerm`."""
+        """Rows (nh, 4) of its hinges; see `SheetTerm`."""
         return self.model.hinges
 
     @property
     def folds(self) -> Folds:
-        """See `SheetTerm`."""
+        """Actuated hinges; see `SheetTerm`."""
         model = self.model
         return Folds(model.hinge_rest, model.hinge_parameters, model.hinge_stiffness)
 
     def angles(self, q: NDArray) -> NDArray:
-        """See `SheetTerm`."""
+        """Dihedrals (nh,) of its hinges, rad; see `SheetTerm`."""
         return mechanics.angles(self.model.rest + self._nodal(q), self.model.hinges)
 
     def turn(self, q: NDArray, other: NDArray) -> float:
-        """Largest turn of a hinge, or of a bar with the rest of it; inf on penetration."""
+        """Largest turn of a hinge, or of a bar relative to the others; inf on penetration."""
         shift, (a, b) = self._nodal(other - q), self.model.bars.T
         apart = np.linalg.norm(shift[b] - shift[a], axis=1)
         length = np.linalg.norm(self.model.bar_vector, axis=1)
@@ -139,18 +139,18 @@ class BarsHingesTerm(SheetTerm):
         return largest_turn(bars, self.angles(q), self.angles(other))
 
     def scale(self) -> NDArray:
-        """EA of the bars, summed at the nodes."""
+        """Force scale: EA of the bars, summed at the nodes."""
         nodal = np.zeros(self.rows)
         stiff = self.model.bar_stiffness / np.sqrt(self.model.bar_per_length2)
         np.add.at(nodal, self.model.bars, stiff[:, None])
         return np.repeat(nodal, 3)
 
     def turning_moments(self) -> float:
-        """See `SheetTerm`."""
+        """Sum of its hinges' moments (N m) for a unit turn; see `SheetTerm`."""
         return float(self.model.hinge_stiffness.sum())
 
     def longest(self) -> float:
-        """See `SheetTerm`."""
+        """Length (m) of the longest bar or side; see `SheetTerm`."""
         per_length2 = self.model.bar_per_length2
         if not per_length2.size:
             return float(np.ptp(self.model.rest, axis=0).max())
@@ -163,7 +163,7 @@ class BarsHingesTerm(SheetTerm):
         return np.flatnonzero(np.repeat(runs[:, 2], runs[:, 1] - runs[:, 0]) == Superlinear.code)
 
     def soft_hinges(self, q: NDArray) -> SoftHinges:
-        """See `SheetTerm`."""
+        """Hinges of the superlinear law; see `SheetTerm`."""
         model, rows = self.model, self._soft
         columns = 3 * model.hinges[rows].astype(np.int64)[:, :, None] + np.arange(3)
         found = gradients(model, self._nodal(q)) if len(rows) else np.zeros((0, 12))
@@ -174,35 +174,35 @@ class BarsHingesTerm(SheetTerm):
         return SoftHinges(offset, model.hinge_stiffness[rows], gradient)
 
     def soft_tangent(self, q: NDArray, slope: NDArray) -> sparse.csr_array:
-        """See `SheetTerm`."""
+        """Tangent (m, m) of the superlinear hinges alone; see `SheetTerm`."""
         alone = self.nominal(q).hinges_alone().model
         stiffness = np.zeros(len(alone.hinges))
         stiffness[self._soft] = alone.hinge_stiffness[self._soft] * slope
         return self._with(alone._replace(hinge_stiffness=stiffness)).tangent(q)
 
     def weakened(self, hinges: NDArray) -> BarsHingesTerm:
-        """See `SheetTerm`."""
+        """The sheet without the stiffness of some superlinear hinges; see `SheetTerm`."""
         stiffness = self.model.hinge_stiffness.copy()
         stiffness[self._soft[hinges]] = 0.0
         return self._with(self.model._replace(hinge_stiffness=stiffness))
 
     @property
     def rest_angles(self) -> NDArray:
-        """See `SheetTerm`: of the folds, of the bends, and offsets."""
+        """Rest angles of folds and bends, then offsets; see `SheetTerm`."""
         offsets = self.model.hinge_offset[self._turning[: self.offsets], 0]
         return np.append(self.model.hinge_rest[self._turning], offsets)
 
     def rest_law(self, number: int) -> HingeLaw:
-        """See `SheetTerm`."""
+        """Law of the hinge with a rest angle; see `SheetTerm`."""
         (folds, count), (bends, _) = self._laws
         return bends if count <= number < len(self._turning) else folds
 
     def fold_hinges(self) -> FoldHinges:
-        """See `SheetTerm`: one of each."""
+        """Hinges of the folds, one per fold; see `SheetTerm`."""
         return self._hinges_at(self._turning[: self._laws[0][1]], self._softness)
 
     def bend_hinges(self) -> FoldHinges:
-        """See `SheetTerm`."""
+        """Hinges within panels; see `SheetTerm`."""
         rows = self._turning[self._laws[0][1] :]
         return self._hinges_at(rows, np.zeros(len(rows)))
 
@@ -215,7 +215,7 @@ class BarsHingesTerm(SheetTerm):
         )  # fmt: skip
 
     def own_strains(self) -> Strains:
-        """See `SheetTerm`."""
+        """Its bars and hinges; see `SheetTerm`."""
         model, angle = self.model, self.angles(np.zeros(self.size))
         bars, hinges = model.bars.astype(np.int64), model.hinges.astype(np.int64)
         slope, turn = np.zeros(len(bars)), np.zeros(len(hinges))
@@ -232,7 +232,7 @@ class BarsHingesTerm(SheetTerm):
         )  # fmt: skip
 
     def folded(self, rest: NDArray) -> BarsHingesTerm:
-        """See `SheetTerm`."""
+        """The sheet with other rest angles (nr,), rad; see `SheetTerm`."""
         angle, parameters = self.model.hinge_rest.copy(), self.model.hinge_parameters.copy()
         offset, count = self.model.hinge_offset.copy(), len(self._turning)
         angle[self._turning], start = rest[:count], 0
@@ -248,7 +248,7 @@ class BarsHingesTerm(SheetTerm):
         return self._with(model)
 
     def actuated(self, numbers: NDArray) -> tuple[BarsHingesTerm, NDArray, NDArray]:
-        """See `SheetTerm`."""
+        """A copy with rest angles that change in place; see `SheetTerm`."""
         model = self.model
         own = model._replace(
             hinge_rest=model.hinge_rest.copy(), hinge_parameters=model.hinge_parameters.copy(),
@@ -258,23 +258,23 @@ class BarsHingesTerm(SheetTerm):
         return self._with(own), rows[numbers], np.arange(len(numbers))
 
     def turned(self) -> tuple[NDArray, NDArray]:
-        """See `SheetTerm`."""
+        """Rest angles (rad) of actuated hinges, and their rows; see `SheetTerm`."""
         return self.model.hinge_rest, np.arange(len(self.model.hinge_rest))
 
     def series(self) -> tuple[NDArray, NDArray]:
-        """See `SheetTerm`."""
+        """Crease shares and offsets of actuated hinges; see `SheetTerm`."""
         return self.model.hinge_share, self.model.hinge_offset
 
     def offsets_under(self, moments: NDArray) -> NDArray:
-        """See `SheetTerm`: turns to which the panels beside a crease give way."""
+        """Turns of the compliant panels beside creases under moments; see `SheetTerm`."""
         return moments * self._softness
 
     def lowest_nodes(self, turned: NDArray) -> NDArray:
-        """See `SheetTerm`."""
+        """Lowest node (k,) of actuated hinges; see `SheetTerm`."""
         return self.model.hinges[turned].min(axis=1)
 
     def renumbered(self) -> tuple[BarsHingesTerm, NDArray]:
-        """See `SheetTerm`: along the sheet, unless it is small."""
+        """The sheet with nodes numbered along it, unless it is small; see `SheetTerm`."""
         if self.rows < SMALL:
             return self, np.arange(self.rows)
         order = node_order(self.model)
@@ -283,11 +283,11 @@ class BarsHingesTerm(SheetTerm):
         return BarsHingesTerm(model, turning, self._laws, self._softness), order
 
     def hinges_alone(self) -> BarsHingesTerm:
-        """See `SheetTerm`."""
+        """The sheet with its hinges only; see `SheetTerm`."""
         return self._with(self.model._replace(bar_runs=self.model.bar_runs[:0]))
 
     def nominal(self, q: NDArray) -> BarsHingesTerm:
-        """See `SheetTerm`."""
+        """The model at nominal stiffness, about its state at q; see `SheetTerm`."""
         runs = self.model.hinge_runs.copy()
         runs[:, 2] = 0  # the linear law
         model, offset = self.model, np.zeros_like(self.model.hinge_offset)
@@ -296,7 +296,7 @@ class BarsHingesTerm(SheetTerm):
         )
 
     def unstrained(self, q: NDArray) -> Unstrained:
-        """See `SheetTerm`."""
+        """The model without strain at q; see `SheetTerm`."""
         sheet = self._with(self.unstrained_model(q))
         rest = np.zeros(self.size)
         return Unstrained(
@@ -304,7 +304,7 @@ class BarsHingesTerm(SheetTerm):
         )
 
     def unstrained_model(self, q: NDArray) -> BarsHinges:
-        """Arrays of the same with linear laws and its rest state at q."""
+        """Arrays of this model with linear laws and its rest state at q."""
         linear = self.nominal(q).model
         x, runs = linear.rest + self._nodal(q), linear.bar_runs.copy()
         vector = x[linear.bars[:, 1]] - x[linear.bars[:, 0]]
@@ -316,7 +316,7 @@ class BarsHingesTerm(SheetTerm):
 
 
 def stretch(model: BarsHinges, motion: NDArray) -> float:
-    """Elongations of the bars in a small motion (m,), over what the motion of their ends could do.
+    """Bar elongations in a small motion (m,), relative to the largest possible.
 
     Both are weighted by the bars' stiffness; 0 without bars.
     """

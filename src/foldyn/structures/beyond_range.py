@@ -1,7 +1,7 @@
-"""Patterns that a model of bars and hinges gets only roughly: told, and computed all the same.
+"""Patterns beyond the range of bars and hinges: warned of, but computed.
 
-Limits are where errors of frequencies beside the shell pass 5 to 10 % (docs/fidelity.md, "Beyond
-the range").
+The limits are where frequency errors relative to the shell exceed 5 to 10 % (docs/fidelity.md,
+"Beyond the range").
 """
 
 from __future__ import annotations
@@ -20,33 +20,33 @@ from foldyn.structures.rigid_plates import rigid_panels
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import ModelOptions
 
-STIFF = 3.0  # k w/G of a crease beside panels of width w: the sheet bends across as one plate
-STIFF_STRIP, SQUARE = 0.3, 1.4  # the same where creases do not meet, of panels longer than that
+STIFF = 3.0  # k w/G of a crease between panels of width w: the sheet bends across it like one plate
+STIFF_STRIP, SQUARE = 0.3, 1.4  # the same for creases that do not meet, of longer panels
 FEW = 16  # panels of a sheet with clamped edges
-SKEW = 33.0  # degrees, the smallest corner of a panel of four
-FOLDED = 0.05  # t/(L sin fold) of welds, above which they bow, which the model does not allow
-FLAT = 0.15  # the same of creases
+SKEW = 33.0  # degrees, smallest corner of a quadrilateral panel
+FOLDED = 0.05  # t/(L sin fold) of welds, above which they bow, unlike in the model
+FLAT = 0.15  # the same for creases
 LOCKING = 1.1  # times the stiffness of a crease: 5 % in frequency
-SHUT = 100.0  # the same: panels beside such a crease move as one
-SMOOTH = 1e-3  # rad, of a fold that is none
-DIGITS = 6  # decimals of what is compared with these, so that rounding passes none
+SHUT = 100.0  # the same: panels at such a crease move as one
+SMOOTH = 1e-3  # rad, below it a fold is flat
+DIGITS = 6  # decimals in comparisons, so that rounding does not exceed limits
 SHELL = "take the shell, fd.shell"
 GIVING = f'take preset = "n5b8e", or {SHELL[5:]}'
 
 
 def doubt_range(pattern: Pattern, sheet: Sheet, options: ModelOptions, folds: NDArray) -> None:
-    """Warn of what the model gets only roughly.
+    """Warn of patterns beyond the range of the model.
 
     folds : stiffness (nf,) of the creases alone, N m/rad.
     """
-    if options.calibration != "plate":  # that of a published model, whatever its errors
+    if options.calibration != "plate":  # a published model is used with its errors
         return
     for text in _doubts(pattern, sheet, options, folds):
         warn(text, "fidelity.md#beyond-the-range", ModelRangeWarning)
 
 
 def doubt_locking(structure: Discretized) -> None:
-    """Warn of creases that rest where the fold law that nobody chose locks already."""
+    """Warn of creases at rest in the range where the default fold law already locks."""
     law, rest = structure.options.fold_law, structure.fold_rest
     if law != EnhancedLinear() or not len(rest):
         return
@@ -101,7 +101,7 @@ def _doubts(pattern: Pattern, sheet: Sheet, options: ModelOptions, folds: NDArra
             f"twist up to 40 % too stiffly or softly: {GIVING}"
         )
     thick = bent * _slenderness(pattern, sheet, pattern.creases, pattern.crease_faces)
-    if thick.max(initial=0.0) > FLAT and pattern.boards is None:  # whose planes are no panels
+    if thick.max(initial=0.0) > FLAT and pattern.boards is None:  # their planes are no panels
         yield (
             f"crease {int(thick.argmax())} is nearly flat, or closed (t/(L sin fold) = "
             f"{thick.max():.2g}, at most {FLAT:g}): it bows, which this model does not allow, "
@@ -112,7 +112,7 @@ def _doubts(pattern: Pattern, sheet: Sheet, options: ModelOptions, folds: NDArra
 
 
 def _relative_stiffness(pattern: Pattern, sheet: Sheet, folds: NDArray) -> NDArray[np.float64]:
-    """k w/G of creases (nf,), w the mean width and G the modulus of the panels beside each."""
+    """k w/G of creases (nf,), with w and G the mean width and modulus of adjacent panels."""
     modulus = sheet.values("bending_modulus", len(pattern.faces))[pattern.crease_faces]
     length = lengths(pattern.vertices, pattern.creases)
     width = pattern.face_areas[pattern.crease_faces] / length[:, None]
@@ -120,7 +120,7 @@ def _relative_stiffness(pattern: Pattern, sheet: Sheet, folds: NDArray) -> NDArr
 
 
 def _strips(pattern: Pattern) -> NDArray[np.bool_]:
-    """Which creases (nf,) meet no other, of panels with two that are not about square."""
+    """Mask (nf,) of creases that meet no other, between panels that are not about square."""
     count = np.bincount(pattern.creases.ravel(), minlength=len(pattern.vertices))
     alone = (count[pattern.creases] == 1).all(axis=1)
     length = lengths(pattern.vertices, pattern.creases)
@@ -130,7 +130,7 @@ def _strips(pattern: Pattern) -> NDArray[np.bool_]:
 
 
 def _smallest_corner(pattern: Pattern, rigid: Collection[int]) -> tuple[float, int]:
-    """Smallest corner (degrees) of the panels of four corners that bend, and whose it is."""
+    """Smallest corner (degrees) of quadrilateral panels that bend, and the panel."""
     least, panel = np.inf, -1
     for k, face in enumerate(pattern.faces):
         if len(face) != 4 or k in rigid:
@@ -147,7 +147,7 @@ def _smallest_corner(pattern: Pattern, rigid: Collection[int]) -> tuple[float, i
 def _slenderness(
     pattern: Pattern, sheet: Sheet, edges: NDArray, faces: NDArray
 ) -> NDArray[np.float64]:
-    """t/(L sin fold) of edges (k, 2) between two panels (k, 2); 0 where they are in one plane."""
+    """t/(L sin fold) of edges (k, 2) between two panels (k, 2); 0 if these are coplanar."""
     thickness = sheet.values("thickness", len(pattern.faces))[faces].max(axis=1, initial=0.0)
     sine = np.linalg.norm(np.cross(*pattern.face_normals[faces].transpose(1, 0, 2)), axis=1)
     across = lengths(pattern.vertices, edges) * sine

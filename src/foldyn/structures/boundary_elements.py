@@ -1,9 +1,9 @@
-"""Boundary elements of the fluid on a sheet: panels cut into grids, each square in two triangles.
+"""Boundary elements of the fluid on a sheet: panels as grids of squares, each two triangles.
 
-A panel has a grid at each corner, between that, the middles of its two edges and the center. The
-jump of the potential ends at an open edge of the sheet like the square root of the distance to it,
-so grids are graded there, like 1 - cos(pi i / 2m), by which the error falls with the square of the
-number of elements along an edge.
+A panel has a grid at each corner, bounded by the corner, the midpoints of its two edges and the
+center. At an open edge the jump of the potential vanishes like the square root of the distance, so
+grids are graded there, like 1 - cos(pi i / 2m); the error then falls with the square of the number
+of elements along an edge.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ ROUNDING = 1e-9  # weights and, over squared lengths, areas that count as zero
 
 
 class BoundaryElements(NamedTuple):
-    """Triangles on a sheet, in pairs, whose corners move with its nodes.
+    """Triangles on a sheet, in pairs, whose corners move with the sheet's nodes.
 
     Attributes
     ----------
     weights : sparse array, shape (p, n)
-        Places of their corners are these times those of the nodes.
+        Corner positions are these weights times nodal positions.
     triangles : ndarray of int, shape (t, 3)
         Their corners, counter-clockwise from the front.
     panel : ndarray of int, shape (t,)
     unknown : ndarray of int, shape (p,)
-        Number of each corner where the flow may differ on both sides, -1 on open edges.
+        Index of each corner with a potential jump, -1 on open edges.
     element : ndarray of int, shape (k,)
-        Number of an element, once for each triangle of the structure on which its center lies: on
-        the line between two there are two, so that no numbering chooses one.
+        Index of an element, once for each triangle of the structure that contains its center: twice
+        if the center lies between two triangles, so that numbering has no influence.
     under : ndarray of int, shape (k,)
         That triangle.
     shares : ndarray, shape (k, 3)
-        Weights of its nodes at the center; those of an element add up to 1.
+        Weights of the triangle's nodes at the center; they add up to 1 per element.
     """
 
     weights: sparse.csr_array
@@ -51,17 +51,17 @@ class BoundaryElements(NamedTuple):
 
 
 class _Corners(NamedTuple):
-    """Corners (c,) of all panels: each has the grid next to it."""
+    """Corners (c,) of all panels, each with an adjacent grid."""
 
     panel: NDArray
     vertex: NDArray  # number of the point
-    ahead: NDArray  # number of the edge to the next corner, and of that from the one before
+    ahead: NDArray  # index of the edge to the next corner, and of the edge from the previous one
     behind: NDArray
-    before: NDArray  # number of the corner before
-    starts: tuple[NDArray, NDArray]  # whether each of these edges is numbered from here
-    open: tuple[NDArray, NDArray]  # whether they are edges of the sheet
-    graded: tuple[NDArray, NDArray]  # whether they end across an edge of the sheet here
-    rim: NDArray  # whether the vertex is on an edge of the sheet
+    before: NDArray  # index of the previous corner
+    starts: tuple[NDArray, NDArray]  # whether each of these edges is numbered from this corner
+    open: tuple[NDArray, NDArray]  # whether they are open edges of the sheet
+    graded: tuple[NDArray, NDArray]  # whether their other ends lie on an open edge of the sheet
+    rim: NDArray  # whether the vertex is on an open edge of the sheet
     edges: int
 
 
@@ -72,9 +72,9 @@ def boundary_elements(structure: Any, resolution: int, alone: bool = False) -> B
     ----------
     structure : Structure
     resolution : int
-        Along each edge of a panel, even.
+        Elements along each edge of a panel, even.
     alone : bool
-        Whether each panel is taken for itself, with open edges all around.
+        Whether each panel is treated alone, with open edges all around.
 
     Raises
     ------
@@ -152,7 +152,7 @@ def _corners(pattern: Any) -> _Corners:
 
 
 def _alone(corners: _Corners) -> _Corners:
-    """The same with vertices and edges that no two panels share."""
+    """Corners with separate vertices and edges for each panel."""
     number = np.arange(len(corners.panel))
     yes = np.ones(len(number), bool)
     return corners._replace(
@@ -162,7 +162,7 @@ def _alone(corners: _Corners) -> _Corners:
 
 
 def _numbered(corners: _Corners, half: int, panels: int) -> tuple[NDArray, int]:
-    """Numbers (c, half + 1, half + 1) of the points of each grid, and how many there are.
+    """Indices (c, half + 1, half + 1) of the points of each grid, and their number.
 
     Vertices come first, then points of edges, spokes from their middles to the centers, centers,
     and the inside of grids.
@@ -192,7 +192,7 @@ def _numbered(corners: _Corners, half: int, panels: int) -> tuple[NDArray, int]:
 
 
 def _places(corners: _Corners, half: int, structure: Any) -> NDArray:
-    """Places (c, half + 1, half + 1, 3) of the points of each grid at rest, m."""
+    """Positions (c, half + 1, half + 1, 3) of the points of each grid at rest, m."""
     steps = np.arange(half + 1) / half
     by_kind = np.array([steps, 1.0 - np.cos(0.5 * np.pi * steps)])  # even, graded
     bottom, left = (by_kind[graded.astype(int)] for graded in corners.graded)
@@ -216,7 +216,7 @@ def _places(corners: _Corners, half: int, structure: Any) -> NDArray:
 
 
 def _cut(numbers: NDArray) -> NDArray:
-    """Triangles (t, 3) of the squares of grids, which are cut along alternate diagonals."""
+    """Triangles (t, 3) of the grid squares, cut along alternating diagonals."""
     half = numbers.shape[1] - 1
     a, b = numbers[:, :-1, :-1], numbers[:, 1:, :-1]
     c, d = numbers[:, 1:, 1:], numbers[:, :-1, 1:]
@@ -227,9 +227,9 @@ def _cut(numbers: NDArray) -> NDArray:
 
 
 def _located(structure: Any, points: NDArray, panel: NDArray) -> list[NDArray]:
-    """Points (k,) at rest, triangles (k,) of their panels on which they lie, and weights (k, 3).
+    """Points (k,), the triangles (k,) of their panels that contain them at rest, weights (k, 3).
 
-    Triangles that share a point have equal parts of the weights.
+    Triangles that share a point share its weight equally.
     """
     count, found = int(panel.max()) + 1, []
     for own, mine in zip(_by(panel, count), _by(structure.triangle_panel, count), strict=True):
@@ -248,6 +248,6 @@ def _located(structure: Any, points: NDArray, panel: NDArray) -> list[NDArray]:
 
 
 def _by(number: NDArray, count: int) -> list[NDArray]:
-    """Where each number from 0 to count - 1 stands."""
+    """Positions of each number from 0 to count - 1."""
     counts = np.bincount(number, minlength=count)
     return np.split(np.argsort(number, kind="stable"), np.cumsum(counts)[:-1])

@@ -11,7 +11,7 @@ bars of every other panel    2 S t / ((1 - nu) sum L) for edges and inner bars a
 
 Sources: Filipov et al., Int. J. Solids Struct. 124, 2017; Liu and Paulino (MERLIN2). MERLIN2
 assigns two of these in a different order than their formulas say; `calibration="merlin2"`
-reproduces that exactly (`_merlin2_corners`, `_merlin2_edges`): published results contain it.
+reproduces that exactly (`_merlin2_corners`, `_merlin2_edges`), as published results depend on it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from foldyn.structures.mesh import Mesh, double_areas, lengths
 from foldyn.structures.sheet import Sheet
 
 STIFFEST = 1e100  # N/m or kg: beyond, or below its inverse, squares and quotients overflow
-SAME = 1e-9  # relative difference of thicknesses that counts as none
+SAME = 1e-9  # relative difference below which thicknesses are equal
 WEAK = 1e-3  # of thickness times side: bar areas below it leave a panel (almost) free to shear
 
 
@@ -34,7 +34,7 @@ def fold_stiffness(length: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
     """Stiffness of whole creases (nf,), N m/rad, of the given lengths (m).
 
     The two sides of a crease are springs in series, each with half the compliance of a crease
-    between two panels like its own.
+    between two panels of its own kind.
     """
     count = len(pattern.faces)
     g = sheet.values("bending_modulus", count)[pattern.crease_faces]
@@ -93,7 +93,7 @@ def _merlin2_corners(kb: NDArray, rows: NDArray, mesh: Mesh, pattern: Pattern) -
 
 
 def _listed_corners(pattern: Pattern, panel: int) -> list[int]:
-    """Positions of a face's corners in the order in which the face was given."""
+    """Positions of a face's corners in the order of input."""
     m = len(pattern.faces[panel])
     return [0, *range(m - 1, 0, -1)] if pattern.flipped[panel] else list(range(m))
 
@@ -101,12 +101,12 @@ def _listed_corners(pattern: Pattern, panel: int) -> list[int]:
 def bar_areas(
     mesh: Mesh, pattern: Pattern, sheet: Sheet, merlin2: bool = False, alike: bool = False
 ) -> tuple[NDArray, dict[tuple[int, int], float]]:
-    """Cross-section areas (m2): of the inner bars (nh,), and of the edges by (low, high) pair.
+    """Cross-section areas (m2) of the inner bars (nh,), and of the edges by (low, high).
 
-    `alike`: all bars of a panel have the same, in quads with a center too.
+    alike : whether all bars of a panel have equal areas, also in quads with a center.
 
-    Those of panels with a modulus of their own are areas of the transformed section: they count
-    with that modulus over the sheet's, so that E A of an edge is the sum of its panels'.
+    Panels with their own modulus contribute areas of the transformed section, scaled by that
+    modulus over the sheet's, so that E A of an edge is the sum over its panels.
     """
     kinds, kind = sheet.kinds(len(pattern.faces))
     x = mesh.nodes
@@ -173,7 +173,7 @@ def _merlin2_edges(area: NDArray, ends: list, pattern: Pattern, panel: int) -> N
 
 
 def check_sheet(sheet: Sheet, pattern: Pattern) -> None:
-    """Refuse panels that are not there, and what is too far from 1 to compute with."""
+    """Refuse unknown panels, and values too far from 1 to compute with."""
     sheet.check_panels(len(pattern.faces))
     _check_boards(sheet, pattern)
     edges = lengths(pattern.vertices, pattern.edges)
@@ -182,7 +182,7 @@ def check_sheet(sheet: Sheet, pattern: Pattern) -> None:
 
 
 def _check_boards(sheet: Sheet, pattern: Pattern) -> None:
-    """Refuse thick panels of another thickness than the sheet's."""
+    """Refuse thick panels whose thickness differs from the sheet's."""
     if pattern.boards is None:
         return
     drawn, own = pattern.boards.thickness, sheet.values("thickness", len(pattern.faces))

@@ -34,13 +34,13 @@ def boundary_edges(
 ) -> tuple[Edge, ...]:
     """Boundary edges (low, high) from pairs of vertices or a selection, given as `field`.
 
-    A selection ("xmin") means the boundary edges of which it has both ends.
+    A selection ("xmin") means the boundary edges with both ends in it.
 
     Raises
     ------
     InputError
-        No pairs of vertices, an edge that is none of the boundary, or one listed twice; a selection
-        of no such edge.
+        Not pairs of vertices, an edge that is not on the boundary or is listed twice, or a
+        selection without such an edge.
     """
     if isinstance(given, str):
         with given_as(field):
@@ -64,7 +64,7 @@ def boundary_edges(
 
 
 def clamp_rows(edges: Sequence[Edge], triangles: NDArray) -> tuple[NDArray, NDArray]:
-    """Rows (c, 3) of boundary edges: the triangle there, from the edge's first corner; its number.
+    """Rows (c, 3) of boundary edges: their triangle, from the edge's first corner; its index.
 
     edges, triangles : (low, high) vertices of each, (nt, 3).
     """
@@ -90,9 +90,9 @@ def clamp_stiffness(x: NDArray, rows: NDArray, modulus: NDArray) -> NDArray:
 
 
 def clamps(x: NDArray, rows: NDArray, stiffness: NDArray, group: int) -> Clamps:
-    """Clamps of triangles (c, 3) of points x (n, 3), free of moment there.
+    """Clamps of triangles (c, 3) of points x (n, 3), without moment in this state.
 
-    group : of the energies, to which theirs belongs.
+    group : their energy group.
     """
     points = x[rows]
     wings = np.array([opposite(corners) for corners in points]).reshape(-1, 1, 3)
@@ -106,9 +106,9 @@ def clamps(x: NDArray, rows: NDArray, stiffness: NDArray, group: int) -> Clamps:
 
 
 def opposite(corners: NDArray) -> NDArray:
-    """Point beyond the middle of the first side of a triangle (3, 3), as far as its third corner.
+    """Mirror image of a triangle's (3, 3) third corner beyond the middle of its first side.
 
-    At a right angle to the side: a panel whose edge tilts, but whose tangent stays, does not turn.
+    Perpendicular to the side: a panel whose edge tilts, but whose tangent is kept, does not turn.
     """
     a, b, c = corners
     foot = a + (b - a) * ((c - a) @ (b - a)) / ((b - a) @ (b - a))

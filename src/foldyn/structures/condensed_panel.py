@@ -1,14 +1,13 @@
-"""A panel as a thin plate, condensed to its bends and the turns of its creased edges: scheme n5b8e.
+"""A panel as a thin plate, condensed to its bends and crease edge turns: scheme n5b8e.
 
-The angles of a panel of m corners are the turns of its m spokes (none in a triangle) and, of each
-edge that is a crease, the turn beta of the sheet there against the facet of the spokes at that
-edge, averaged along the edge. Their energy 1/2 phi^T K phi is the least that a plate can have which
-goes through the corners and the center, keeps its straight edges straight and has these mean turns;
-other edges are free. At a clamped edge beta is the turn of all of the sheet there, not of its mean.
-An edge along which the sheet runs on into the next panel also has a bow: the
-mean distance of the sheet from the line between its ends, over its length. The plate is made of
-triangles of constant curvature (Morley; in `mechanics.triangle`), twice, and K extrapolated in
-their size.
+The angles of a panel of m corners are the turns of its m spokes (none in a triangle) and, for each
+crease edge, the turn beta of the sheet there relative to the adjacent facet, averaged along the
+edge. Their energy 1/2 phi^T K phi is the minimum over all plates through the corners and the center
+with straight edges kept straight and these mean turns; other edges are free. At a clamped edge beta
+is the turn at every point, not the mean. A weld, along which the sheet continues into the next
+panel, also has a bow: the mean distance of the sheet from the line between its ends, over its
+length. The plate is made of triangles of constant curvature (Morley; in `mechanics.triangle`),
+twice, and K extrapolated in their size.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from foldyn.structures.panel_plate import Outline, PanelPlate, facets_of, mass_o
 from foldyn.structures.plate_boundary import condensed
 from foldyn.structures.shared import shared
 
-COARSE, FINE = 8, 16  # pieces of each edge in the two meshes
+COARSE, FINE = 8, 16  # pieces per edge in the two meshes
 
 
 @shared(lambda panel, nu: (len(panel.corners), panel.center is None, nu))
@@ -34,7 +33,7 @@ def panel_stiffness(kinds: Sequence[tuple[Outline, float]]) -> list[NDArray]:
 
     By its outline and Poisson's ratio. The angles: turns of the spokes, in the order of the corners
     (none in a triangle), then of the creased edges, then the bows, in their order. A turn is the
-    increase of a dihedral, seen from the front, and a bow positive towards it.
+    increase of a dihedral, seen from the front; a bow is positive toward the front.
     """
     panels = [panel for panel, _ in kinds]
     coarse, fine = (condensed(panels, kinds[0][1], n) for n in (COARSE, FINE))
@@ -52,10 +51,10 @@ def panel_stiffness(kinds: Sequence[tuple[Outline, float]]) -> list[NDArray]:
 
 @lru_cache(maxsize=4096)
 def panel_moments(panel: Outline, poissons_ratio: float) -> NDArray:
-    """Moments (q,) of these angles where the panel would have the curvature 1 in both directions.
+    """Moments (q,) of these angles for a panel with curvature 1 in both directions.
 
-    Over its bending stiffness. With phi the angles and kappa the curvature, the energy is
-    1/2 phi^T K phi - kappa phi^T m, but for what depends on kappa alone.
+    Over its bending stiffness. With phi the angles and kappa the curvature, the energy is 1/2 phi^T
+    K phi - kappa phi^T m, up to terms in kappa alone.
     """
     coarse, fine = (_curled(panel, poissons_ratio, n) for n in (COARSE, FINE))
     stiffness, held_back = (
@@ -66,7 +65,7 @@ def panel_moments(panel: Outline, poissons_ratio: float) -> NDArray:
 
 
 def least_heights(panel: Outline, size: int) -> NDArray:
-    """Matrix (size, q): the least heights with these turns of spokes, the other angles as are."""
+    """Matrix (size, q): least heights for given spoke turns; other angles unchanged."""
     points, corners = _points(panel), len(panel.corners)
     spokes = _spoke_turns(points, corners) if panel.center else np.zeros((0, len(points)))
     out = np.zeros((size, len(spokes) + size - len(points)))
@@ -76,9 +75,9 @@ def least_heights(panel: Outline, size: int) -> NDArray:
 
 
 def heights_and_slopes(panel: Outline) -> NDArray:
-    """Heights of corners and center, outward slopes of creases, and bows: with turns for slopes.
+    """Matrix from heights, turns and bows to heights of corners and center, slopes and bows.
 
-    A matrix, by which the turns beta take the place of the slopes.
+    The turns beta replace the outward slopes of creases.
     """
     points, edges = _points(panel), np.flatnonzero(panel.creased)
     turning = slice(len(points), len(points) + len(edges))
@@ -108,20 +107,20 @@ def _facet_slopes(points: NDArray, corners: int) -> NDArray:
 
 
 def _spoke_turns(points: NDArray, corners: int) -> NDArray:
-    """Turns (m, points) of the spokes for heights of the points."""
+    """Turns (m, points) of the spokes, for heights of the points."""
     slopes = _planes(points, corners)
     along = points[:corners] - points[corners]
     return _across(along, np.roll(slopes, 1, axis=0) - slopes)
 
 
 def _across(along: NDArray, slopes: NDArray) -> NDArray:
-    """Slopes (m, points) to the left of lines (m, 2), of those (m, 2, points)."""
+    """Slopes (m, points) to the left of lines (m, 2), from gradients (m, 2, points)."""
     x, y = (along / np.linalg.norm(along, axis=1)[:, None]).T
     return x[:, None] * slopes[:, 1] - y[:, None] * slopes[:, 0]
 
 
 def _paraboloid(panel: Outline) -> NDArray:
-    """The same of the heights r^2 / 2."""
+    """Heights, crease slopes and bows of the paraboloid r^2 / 2."""
     corners = np.array(panel.corners)
     along = np.roll(corners, -1, axis=0) - corners
     length, middle = np.linalg.norm(along, axis=1), corners + 0.5 * along
@@ -132,9 +131,9 @@ def _paraboloid(panel: Outline) -> NDArray:
 
 
 def _curled(panel: Outline, poissons_ratio: float, n: int) -> tuple[NDArray, NDArray]:
-    """Stiffness of heights, slopes and bows, and the forces that lack to hold the paraboloid.
+    """Stiffness of heights, slopes and bows, and forces missing to hold the paraboloid.
 
-    They lack where edges stay straight.
+    Forces are missing at edges that stay straight.
     """
     plate = PanelPlate(panel, poissons_ratio, n)
     held = [*plate.heights, *plate.slopes, *plate.bows]
@@ -148,8 +147,9 @@ def _curled(panel: Outline, poissons_ratio: float, n: int) -> tuple[NDArray, NDA
 def panel_mass(panel: Outline, poissons_ratio: float) -> NDArray:
     """Mass matrix (points, points) of a panel of mass 1 that follows its corners and center.
 
-    As a plate at rest does, without moments at its edges but those that hold clamped ones level;
-    exact for what is linear over the panel and level at those. Creased are none but the clamped.
+    The panel follows them as a plate at rest, without edge moments except those that keep clamped
+    edges level; exact for motions that are linear over the panel and level at clamped edges. Only
+    clamped edges may be creased.
     """
     coarse, fine = (PanelPlate(panel, poissons_ratio, n) for n in (COARSE, FINE))
     x = _points(panel)
@@ -161,10 +161,10 @@ def panel_mass(panel: Outline, poissons_ratio: float) -> NDArray:
         for plate in (coarse, fine)
     )  # fmt: skip
     out = extrapolated(less, more, FINE / COARSE)
-    # what is linear over the panel to the last digit, as its facets have it
+    # keeps linear functions over the panel exact to the last digit, as its facets have them
     edges = np.roll(x[: len(panel.corners)], -1, axis=0) - x[: len(panel.corners)]
     across = edges[list(panel.clamped)] @ [[0.0, -1.0], [1.0, 0.0]]
-    level = null_space(across) if len(across) else np.eye(2)  # SciPy below 1.15 takes no empty one
+    level = null_space(across) if len(across) else np.eye(2)  # SciPy before 1.15 needs this
     linear = np.column_stack([np.ones(len(x)), x @ level])
     along = linear @ np.linalg.pinv(linear)
     facets = np.array(facets_of(x, len(panel.corners)))[: None if panel.center else 1]

@@ -1,4 +1,4 @@
-"""Bars, folds and plates without their edge angles, which stay in balance: for explicit methods."""
+"""Bars, folds and plates with their edge angles in balance: for explicit methods."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ class CondensedPlatesTerm(BarsPlatesTerm):
     """Bars, folds and plates by their displacements alone; see `mechanics.sheet_term.SheetTerm`."""
 
     undifferentiated = "creases that yield, creep, relax or, beside panels that give way, damp"
-    _held: Context  # of branches of its folds
+    _held: Context  # keeps the branches of its folds alive
 
     def __init__(
         self, model: BarsPlates, laws: tuple[HingeLaw, HingeLaw], like: BarsPlatesTerm | None = None
     ) -> None:
         super().__init__(model, laws, like)
-        self._full = BarsPlatesTerm(model, laws, like)  # the same with edge angles
+        self._full = BarsPlatesTerm(model, laws, like)  # the same model with edge angles
         self.condensed = condensed_plates(model, self.linear_folds)
         self.size, self.rows, self.hidden = self._nodal, model.nodes, np.zeros(0, np.int64)
         self.offsets = model.rotations
 
     def _with(self, model: BarsPlates) -> Self:
-        """See `BarsPlatesTerm`; with the same forces on edge angles."""
+        """Copy with another model and the same forces on edge angles; see `BarsPlatesTerm`."""
         other = super()._with(model)
         other.condensed.offset[:] = self.condensed.offset
         return other
@@ -57,39 +57,39 @@ class CondensedPlatesTerm(BarsPlatesTerm):
         return Assembly(self._full).dofs(np.ravel(q)[: self.size], push)
 
     def compiled(self, work: Any, kept: CondensedWork, group: int) -> Compiled:
-        """See `Term`."""
+        """Context and kernels for a thread; see `Term`."""
         return condensed_kernels(self.condensed, kept)
 
     def arrays(self) -> Arrays | None:
-        """See `Term`."""
+        """Arrays that its forces depend on; see `Term`."""
         if self.condensed.memory.any():
             return None
         found = super().arrays()
         return found._replace(numbers={**found.numbers, "push": self._push})
 
     def pulled(self) -> Pulled | None:
-        """See `Term`."""
+        """Pullback of its forces; see `Term`."""
         return None if self.condensed.memory.any() else condensed_pulled(self.condensed)
 
     def workspaces(self, threads: int) -> list[CondensedWork]:
-        """See `SheetTerm`."""
+        """Work arrays for each thread; see `SheetTerm`."""
         return [condensed_work(self.condensed)]
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """See `SheetTerm`."""
+        """Tangent (m, m), N/m; see `SheetTerm`."""
         return balanced(self._full.tangent(self._whole(q), floor), self._full.hidden)
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
-        """See `SheetTerm`."""
+        """Matrix for a Newton step at q; see `SheetTerm`."""
         return self.tangent(q)
 
     def blocks(self) -> SparseBlocks:
-        """See `SheetTerm`: all are full."""
+        """Tangent blocks, all of them full; see `SheetTerm`."""
         full = sparse.csr_array(np.ones((self.size, self.size)))
         return SparseBlocks(full, self.rows, np.repeat(self.model.bars.rest, 3, axis=0))
 
     def fold_hinges(self) -> FoldHinges:
-        """See `SheetTerm`: without the edge angles, which are no dofs."""
+        """Hinges of the folds without the edge angles, which are no dofs; see `SheetTerm`."""
         found = super().fold_hinges()
         plates, turns = self.condensed, self.model.fold_rotations
         side = plates.band[plates.rank, -1] / self.per_hidden**2
@@ -100,7 +100,7 @@ class CondensedPlatesTerm(BarsPlatesTerm):
         return found._replace(hidden=np.full_like(found.hidden, NO_DOF), beside=beside)
 
     def remembering(self, own: MemoryHinges) -> Self:
-        """The same sheet, in whose balance the branches of its folds are evaluated."""
+        """A copy of the sheet whose balance evaluates the branches of its folds."""
         other, folds = copy(self), len(self.model.fold_rest)
         other._held, memory = evaluation(own, self.condensed.offset, folds)
         other.condensed = self.condensed._replace(memory=memory)
@@ -109,35 +109,35 @@ class CondensedPlatesTerm(BarsPlatesTerm):
     # ------------------------------------------------------------------ forces on edge angles
     @property
     def _push(self) -> NDArray:
-        """Those forces (r,), N."""
+        """Forces (r,), N, on the edge angles."""
         return self.condensed.offset[len(self.model.fold_rest) :, 0]
 
     @property
     def rest_angles(self) -> NDArray:
-        """See `SheetTerm`: those of folds and bends, and forces on edge angles."""
+        """Rest angles of folds and bends, then forces on edge angles; see `SheetTerm`."""
         return np.append(super().rest_angles, self._push)
 
     def offsets_under(self, moments: NDArray) -> NDArray:
-        """See `SheetTerm`: the moment of a crease acts on the edge angles beside it."""
+        """Forces on the adjacent edge angles due to moments of creases; see `SheetTerm`."""
         beside = self.model.fold_rotations
         there, both = beside >= 0, np.repeat(moments[:, None], 2, axis=1)
         return -self.per_hidden * np.bincount(beside[there], both[there], minlength=self.offsets)
 
     def folded(self, rest: NDArray) -> Self:
-        """See `SheetTerm`."""
+        """The sheet with other rest angles (nr,), rad; see `SheetTerm`."""
         angles, push = np.split(rest, [len(rest) - self.offsets])
         other = super().folded(angles)
         other._push[:] = push
         return other
 
     def actuated(self, numbers: NDArray) -> tuple[Self, NDArray, NDArray]:
-        """See `SheetTerm`."""
+        """A copy with rest angles that change in place; see `SheetTerm`."""
         folds, bends = len(self.model.fold_rest), len(self.model.bend_rest)
         sheet, _, which = super().actuated(numbers)
         return sheet, np.where(numbers < folds, numbers, numbers - bends), which
 
     def series(self) -> tuple[NDArray, NDArray]:
-        """See `SheetTerm`."""
+        """Crease shares and offsets of actuated hinges; see `SheetTerm`."""
         return np.ones(len(self.condensed.offset)), self.condensed.offset
 
     # ------------------------------------------------------------------ other bodies
@@ -150,7 +150,7 @@ class CondensedPlatesTerm(BarsPlatesTerm):
 
 
 def balanced(matrix: sparse.csr_array, hidden: NDArray) -> sparse.csr_array:
-    """The tangent (3n, 3n) of displacements where the `hidden` last dofs give way."""
+    """The tangent (3n, 3n) of displacements with the `hidden` last dofs in balance."""
     if not len(hidden):
         return matrix
     first = hidden[0]

@@ -20,9 +20,9 @@ PerCrease = float | Sequence[float] | Mapping[str, float] | None
 
 
 def per_crease(name: str, value: Any) -> Any:
-    """Return values for creases as a number, a tuple, or a new dict by word; None as it is.
+    """Return values for creases as a number, a tuple, or a new dict by word; None unchanged.
 
-    How many there are, and the words, is checked with the pattern.
+    Their number and words are checked later, with the pattern.
     """
     if isinstance(value, Mapping):
         if not value:
@@ -38,7 +38,7 @@ def per_crease(name: str, value: Any) -> Any:
 
 
 def fold_stiffness(given: PerCrease, pattern: Pattern, sheet: Sheet) -> NDArray:
-    """Stiffness of whole creases (nf,), N m/rad, calibrated or from that `given` per length."""
+    """Stiffness of whole creases (nf,), N m/rad, calibrated or from the `given` one per length."""
     length = lengths(pattern.vertices, pattern.creases)
     if given is None:
         return calibration.fold_stiffness(length, pattern, sheet)
@@ -59,7 +59,7 @@ def fold_rest(
 ) -> NDArray:
     """Rest dihedrals (rad) of hinge rows, none of them closed.
 
-    crease : crease that each row lies on; the creases in order unless given.
+    crease : crease of each row; the creases in order by default.
     """
     crease = np.arange(len(folds)) if crease is None else crease
     degrees, chosen = _values("crease_rest", given, pattern)
@@ -74,7 +74,7 @@ def fold_rest(
         return rest
     drawn = hinge_angles(x, folds)
     shut = (drawn < 1e-9) | (drawn > 2.0 * np.pi - 1e-9) | np.isnan(drawn)
-    shut |= np.abs(drawn - pattern.dihedrals[crease]) > np.pi  # closed by its letter
+    shut |= np.abs(drawn - pattern.dihedrals[crease]) > np.pi  # closed according to its assignment
     wrong = np.flatnonzero(shut & ~given_there)
     if len(wrong):
         number = crease[wrong[0]]
@@ -87,7 +87,7 @@ def fold_rest(
 
 
 def _values(field: str, given: PerCrease, pattern: Pattern) -> tuple[NDArray, NDArray]:
-    """Value of each crease (nf,), and whether one was given for it (nf,)."""
+    """Value of each crease (nf,), and a mask of the creases with a given value (nf,)."""
     count = len(pattern.creases)
     if given is None:
         return np.zeros(count), np.zeros(count, bool)

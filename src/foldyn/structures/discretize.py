@@ -54,13 +54,12 @@ def discretize(
 ) -> Structure:
     """Discretize a pattern as bars and hinges.
 
-    Options of the model that are left out, from `scheme` to `calibration`, are those of the
-    preset.
+    The preset supplies the model options, from `scheme` to `calibration`, that are not given.
 
     Parameters
     ----------
     pattern : Pattern or Folding
-        Or anything else that has a `pattern`.
+        Or any object with a `pattern` attribute.
     sheet : Sheet
     scheme : {"n5b8", "n4b5", "n5b8e"}
         A center node and spokes in each panel of more than three corners, or cuts along the
@@ -75,38 +74,37 @@ def discretize(
         Laws of creases, and of hinges inside panels.
     calibration : {"standard", "merlin2", "plate"}
         "merlin2" assigns bend stiffnesses and bar areas in MERLIN2's order (see
-        `foldyn.structures.calibration`); "plate" makes panels bend and twist as thin plates do, for
+        `foldyn.structures.calibration`); "plate" makes panels bend and twist like thin plates, for
         small vibrations (see `foldyn.structures.plate`).
     crease_stiffness : float, sequence or mapping, optional
         Stiffness per length (N m/rad per m) of all creases, of each in the order of
-        `pattern.creases`, or by name ("mountain", "valley", "flat", or a family of the pattern),
-        as {"mountain": 0.1, "valley": 0.2}, instead of the calibration, which creases that are
-        not named keep. With "plate"
-        the panels beside a crease still give way to its moment.
+        `pattern.creases`, or by name ("mountain", "valley", "flat", or a family of the pattern), as
+        {"mountain": 0.1, "valley": 0.2}. Creases that are not named keep the calibrated stiffness.
+        With "plate" the adjacent panels remain compliant to the crease's moment.
     crease_rest : float, sequence or mapping, optional
-        Rest dihedral (degrees, between 0 and 360), given likewise, instead of the pattern's own.
+        Rest dihedral (degrees, between 0 and 360), in the same forms, instead of the pattern's own.
     centers : mapping, optional
         Center points (3,) by panel number, instead of the computed ones (N5B8).
     clamped : sequence of (vertex, vertex), or str
-        Boundary edges along which panels keep their rest tangent in space, wherever they are moved;
-        their nodes need a support of their own. A selection ("xmin") means those of which it has
-        both ends. See `foldyn.structures.clamps`, and `edge_angles` for "n5b8e".
+        Boundary edges along which panels keep the direction of their rest tangent in space; their
+        nodes still need supports. A selection ("xmin") means the boundary edges with both ends in
+        it. See `foldyn.structures.clamps`, and `edge_angles` for "n5b8e".
     rigid : "all" or sequence of int, optional
-        Panels that cannot bend, exactly: all their nodes ride on three of their corners. They must
-        be flat. Their bars still stretch.
+        Panels that cannot bend at all: three of their corners determine the positions of all their
+        nodes. They must be flat. Their bars still stretch.
     straight : sequence of (vertex, vertex), or str
-        Boundary edges, given likewise, that stay straight, as along a support or a stiff rim
-        (n5b8e, and in their plane with membrane = "panel"); others may bow between their ends.
+        Boundary edges, in the same forms, that stay straight, such as along a support or a stiff
+        rim (n5b8e, and in their plane with membrane = "panel"); others may bow between their ends.
     membrane : {"bars", "panel"}
-        How panels resist in their plane: each bar by itself, right in uniform strain at most; or
-        bars coupled so that the corners feel the panel's membrane, with which large sheets and
-        held ones come out right (see `foldyn.structures.membranes`). Then `bar_law` is "linear";
-        another one, where no membrane is given, stands for single bars.
+        In-plane stiffness of panels: independent bars, exact at best in uniform strain; or bars
+        coupled so that the corners have the panel's membrane stiffness, which is accurate for large
+        and for supported sheets (see `foldyn.structures.membranes`). "panel" needs `bar_law`
+        "linear"; another bar law, without a given membrane, implies "bars".
     preset : {"plate", "n5b8e", "herkal", "merlin2"}, optional
-        Model that gives what is left out, one of `foldyn.structures.PRESETS`. Without it "plate",
-        but "n5b8e" where its scheme is given or the pattern has welds, and "herkal", the paper's,
-        where a calibration other than "plate" is given, or `bend_law="superlinear"` and no
-        calibration.
+        Model that supplies options that are not given, one of `foldyn.structures.PRESETS`. The
+        default is "plate"; "n5b8e" if its scheme is given or the pattern has welds; and "herkal",
+        the paper's, if a calibration other than "plate" is given, or `bend_law="superlinear"` and
+        no calibration.
 
     Returns
     -------
@@ -120,10 +118,10 @@ def discretize(
     Warns
     -----
     UnitsWarning
-        The sheet's numbers are probably not in SI units: as thick as a fifth of an edge, or with
-        a wave speed that no material has.
+        The sheet's values are probably not in SI units: a thickness over a fifth of an edge, or a
+        wave speed that no material has.
     ModelRangeWarning
-        The model gets such a pattern only roughly.
+        The model is inaccurate for such a pattern.
 
     Examples
     --------
@@ -212,20 +210,20 @@ def discretize(
         membranes=coupled,
         edge_gives=gives,
     )
-    _ = structure.plates  # refuse panels that are not flat
+    _ = structure.plates  # refuses rigid panels that are not flat
     doubt_locking(structure)
     return structure.marked()
 
 
 def checked_kinds(pattern: Any, sheet: Any) -> tuple[Pattern, Sheet]:
-    """Pattern, of what has one, and sheet; refuses anything else."""
+    """Pattern and sheet; accepts objects with a pattern, and refuses anything else."""
     return pattern_of(pattern), of_kind("sheet", sheet, Sheet)
 
 
 def _given_centers(
     centers: Mapping[int, ArrayLike], pattern: Pattern, scheme: str
 ) -> dict[int, NDArray]:
-    """Center points by panel number, each of a panel that has a center node."""
+    """Center points by panel index, each of a panel with a center node."""
     points = {}
     for panel, point in of_kind("centers", centers, Mapping).items():
         known = isinstance(panel, int | np.integer) and 0 <= panel < len(pattern.faces)

@@ -1,4 +1,4 @@
-"""What all models have in common: a discretized pattern, as a case holds it."""
+"""Base of all structures: a discretized pattern, as a case holds it."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from foldyn.structures.swelling import Swelling
 class HingeKind(NamedTuple):
     """Hinges of one kind and law: rows (k, 2 or more) of their ends, stiffness and rest angle.
 
-    onset : of each hinge (k,), rad, where the law leaves it to them.
-    softness : of the panels beside each (k,), rad/(N m), where they give way.
+    onset : of each hinge (k,), rad, if the law has none of its own.
+    softness : of the adjacent panels (k,), rad/(N m), if they are compliant.
     """
 
     name: str
@@ -45,8 +45,8 @@ class HingeKind(NamedTuple):
     def share(self) -> NDArray:
         """Share (k,) of the crease, or of the hinge itself, in a small turn.
 
-        All where a law locks, since it is the panels that meet, and where creases yield or creep:
-        their turn is nearly that of the hinge, as little moment is left for the panels.
+        1 for laws that lock, since the panels themselves meet, and for creases that yield or creep:
+        their turn is nearly the hinge's turn, as little moment remains for the panels.
         """
         memory = memory_of(self.law)
         elastic, flows = self.law, False
@@ -71,18 +71,18 @@ class HingeKind(NamedTuple):
 
 
 def read_only(array: NDArray) -> NDArray:
-    """Return the array, which nobody can change from now on."""
+    """Return the array, made read-only."""
     array.setflags(write=False)
     return array
 
 
 class Discretized:
-    """Base of the data classes that are structures, with arrays that nobody can change.
+    """Base of the data classes for structures, with read-only arrays.
 
     Attributes
     ----------
     nodes, bars : (n, 3), (nb, 2)
-        Rest positions (m), the pattern's vertices first; pairs of nodes that must not meet.
+        Rest positions (m), the pattern's vertices first; pairs of nodes that must not coincide.
     triangles, triangle_panel : (nt, 3), (nt,)
         Counter-clockwise from the front, and the panel of each.
     centers : (np,)
@@ -92,24 +92,24 @@ class Discretized:
     folds, fold_rest : (nf, 4), (nf,)
         Hinge row and rest angle (rad) of each fold.
     body : Assembly
-        What solvers take.
+        Model for solvers.
     kind : str
         Its name in case files.
     energy_groups : mapping of str to str
-        Parts of its strain energy, and what they are.
+        Parts of its strain energy, with descriptions.
     plates : tuple of Plate
-        Its rigid panels, all nodes of which ride on three of their corners.
+        Its rigid panels; three of their corners determine all their nodes.
     massless : str
-        Its dofs without mass, "the rotations of a shell"; empty if it has none.
+        Description of its massless dofs, such as "the rotations of a shell"; empty if none.
     fill : Fill
         Memory of the factors of its tangent.
     clamped_nodes : sequence of (k,)
         Nodes along each clamped edge of a mesh, from one end to the other.
     bowed_edges : collection of (low, high)
-        Edges of the pattern that may bow between their ends, though these are the only nodes there.
+        Edges of the pattern that may bow between their ends without nodes there.
     as_made : bool
-        Whether `discretize`, or the function of its model, made it and would make it again from
-        pattern, sheet and options. `dataclasses.replace` does not pass it on.
+        Whether `discretize`, or the model's own function, made it and can rebuild it from pattern,
+        sheet and options. `dataclasses.replace` resets it.
     """
 
     nodes: NDArray
@@ -140,7 +140,7 @@ class Discretized:
                 object.__setattr__(self, item.name, read_only(np.array(value)))
 
     def marked(self) -> Self:
-        """Mark it as made."""
+        """Set `as_made`."""
         object.__setattr__(self, "as_made", True)
         return self
 
@@ -165,7 +165,7 @@ class Discretized:
 
     @cached_property
     def nodal_mass(self) -> NDArray:
-        """Mass (n,) that moves with each node, kg: the sums of the rows of the mass matrix."""
+        """Mass (n,) of each node, kg: the row sums of the mass matrix."""
         return read_only(row_sums(self.mass))
 
     @cached_property
@@ -177,8 +177,8 @@ class Discretized:
     def inertia(self) -> NDArray:
         """Inertia tensor (3, 3) at rest about the center of mass, kg m2, by the mass rule.
 
-        With the consistent rule it is that of the panels themselves; lumped ones differ, see the
-        page on mass rules.
+        The consistent rule gives the panels' own inertia; lumped rules differ, see the page on mass
+        rules.
         """
         return read_only(inertia_tensor(self.nodes, self.mass))
 
@@ -186,7 +186,7 @@ class Discretized:
     def edge_nodes(self) -> NDArray:
         """Nodes along each edge of the pattern (ne, p), from its lower to its higher vertex.
 
-        The creases come first, in their order, then the boundary edges and the welds in those of
+        Creases come first, then boundary edges and welds, ordered as `pattern.creases`,
         `pattern.boundary` and `pattern.welds`; p is 2, or more for a structure that cuts edges into
         pieces.
         """
@@ -194,28 +194,28 @@ class Discretized:
 
     @property
     def divisions(self) -> int | None:
-        """Pieces of every edge in its mesh; None without one."""
+        """Pieces per edge of its mesh; None without a mesh."""
         return None
 
     def meshed(self, divisions: int) -> Discretized:
-        """The same with another mesh, for those that have one."""
+        """The structure with another mesh, if it has a mesh."""
         raise NotImplementedError
 
     @property
     def condensed(self) -> Discretized | None:
-        """The same by its displacements alone, for those that can do without dofs without mass."""
+        """The structure without massless dofs, if it can condense them; otherwise None."""
         return None
 
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
-        """What it gets where panels would, if they were free, stretch and curl.
+        """What swelling adds to it, if panels would stretch and curl when free.
 
-        strain, curvature : (np,) of each panel; curvature 1/m, positive towards the front.
+        strain, curvature : (np,) of each panel; curvature 1/m, positive toward the front.
         """
         raise InputError("this structure has no panels that could swell")
 
     @cached_property
     def surface(self) -> Surface:
-        """Triangles with their masses: what a mass rule distributes.
+        """Triangles with their masses, the input of mass rules.
 
         Raises
         ------

@@ -4,16 +4,16 @@ Nodes and bars are those of N5B8. Each panel has one constant matrix for the tur
 of its creased edges (`structures.condensed_panel`); a fold acts between the two edges beside it,
 with the stiffness of the crease alone.
 
-A crease between panels that are not in one plane stays straight, because bowing would stretch them:
-by w^2 for a bow w out of the plane of one is w sin(fold) in the plane of the other, against t^2.
-It counts as such above `STRAIGHT` t/L, t the thickness and L its length.
+A crease between panels in different planes stays straight, because bowing would stretch them: a bow
+w out of the plane of one panel is w sin(fold) in the plane of the other (w^2 against t^2). A crease
+counts as such above `STRAIGHT` t/L, with t the thickness and L its length.
 
 Along a weld the sheet is smooth: with d the change of the dihedral of the facets there, one panel
-turns by d/2 + x and the other by d/2 - x, x a rotation that they share. Where it does not stay
-straight they share its bow as well.
+turns by d/2 + x and the other by d/2 - x, with x a shared rotation. A weld that does not stay
+straight also has a shared bow.
 
-A clamped edge has no rotation of its own: the sheet turns there against the facet by the dihedral
-of the facet with its mirror image at rest, less the flat one.
+A clamped edge has no rotation of its own: the sheet turns there relative to the facet by the
+dihedral of the facet with its mirror image at rest, minus pi.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ STRAIGHT = 3.0
 
 
 class EdgePlates(NamedTuple):
-    """Panels as plates: what `BarsPlates` has of them."""
+    """Panels as plates: their data in `BarsPlates`."""
 
     rotation_hinge: NDArray
     fold_rotations: NDArray
@@ -61,9 +61,9 @@ def edge_plates(
     """Panels of a mesh with center nodes as plates.
 
     straight_edges : boundary edges (low, high) that stay straight.
-    rigid : numbers of rigid panels, which have no angles but those at clamped edges.
-    clamped : boundary edges whose hinges follow those of the bends and welds, in this order; and
-        the stiffness, N m/rad, of those of rigid panels.
+    rigid : indices of rigid panels, which have angles only at clamped edges.
+    clamped : boundary edges, whose hinges follow the hinges of bends and welds in this order, with
+        the stiffness, N m/rad, for rigid panels.
     """
     kinds, kind = sheet.kinds(len(pattern.faces))
     folds, bends = len(mesh.folds), len(mesh.bends)
@@ -81,7 +81,7 @@ def edge_plates(
     shared: dict[tuple[int, str], int] = {}
 
     def number(k: int, what: str) -> int:
-        """Of the rotation that both sides of a weld have."""
+        """Index of the rotation that both sides of a weld share."""
         if (k, what) not in shared:
             shared[k, what] = len(beside)
             beside.append(k)
@@ -112,7 +112,7 @@ def edge_plates(
             elif k >= bends + len(hinges):
                 turned.append(k)
                 parts.append(np.ones((1, 1)))
-            else:  # the dihedral there, and the rotation that both sides have
+            else:  # the dihedral there, and the shared rotation
                 first_side = (k, "turn") not in shared
                 turned += [k, -1 - number(k, "turn")]
                 parts.append(np.array([[0.5, 1.0 if first_side else -1.0]]))
@@ -140,18 +140,18 @@ def curl_moments(
     plates: EdgePlates, panels: Sequence[Outline | None], curvature: NDArray, sheet: Sheet,
     area: NDArray, clamps: int,
 ) -> NDArray:  # fmt: skip
-    """Moments (nq,), N m, of the angles of plates that would have these curvatures, 1/m.
+    """Moments (nq,), N m, of the angles of plates with these free curvatures, 1/m.
 
     panels : see `outlines`.
     curvature, area : (np,), 1/m and m2.
-    clamps : number of the first hinge of a clamped edge.
+    clamps : index of the first hinge of a clamped edge.
     """
     kinds, kind = sheet.kinds(len(panels))
     out, seen = np.zeros(len(plates.angle)), set()
     for p, panel in enumerate(panels):
         if panel is None:
             continue
-        own, size = kinds[kind[p]], np.sqrt(2.0 * area[p])  # an outline's is 1
+        own, size = kinds[kind[p]], np.sqrt(2.0 * area[p])  # an outline's size is 1
         scale, place = own.bending_modulus * curvature[p] * size, plates.start[p]
         spokes = len(panel.corners) if panel.center else 0
         for k, moment in enumerate(scale * panel_moments(panel, own.poissons_ratio)):
@@ -159,7 +159,7 @@ def curl_moments(
                 out[place] = moment
                 place += 1
                 continue
-            shared = plates.angle[place + 1]  # at a weld, see `edge_plates`
+            shared = plates.angle[place + 1]  # of a weld, see `edge_plates`
             out[place : place + 2] = 0.5 * moment, -moment if shared in seen else moment
             seen.add(shared)
             place += 2
@@ -167,7 +167,7 @@ def curl_moments(
 
 
 def free_angles(plates: EdgePlates, moment: NDArray) -> NDArray:
-    """Angles (nq,), rad, at which moments (nq,), N m, leave plates without stress."""
+    """Angles (nq,), rad, at which plates under moments (nq,), N m, have no stress."""
     out = np.zeros(len(moment))
     for p, (start, end) in enumerate(pairwise(plates.start)):
         if np.any(moment[start:end]):
@@ -182,9 +182,9 @@ def outlines(
     straight_edges: Collection[Edge] = (), rigid: Collection[int] = (),
     clamped: Collection[Edge] = (),
 ) -> list[Outline | None]:  # fmt: skip
-    """Outline of each panel; None of a rigid one. Welds count as creases, which may bow.
+    """Outline of each panel; None for a rigid one. Welds count as creases, which may bow.
 
-    Arguments as of `straight_creases` and `edge_plates`.
+    Arguments: see `straight_creases` and `edge_plates`.
     """
     bent = np.concatenate([pattern.creases, pattern.welds])
     straight = set(edge_lookup(bent[straight_creases(nodes, hinges, pattern, sheet)]))
@@ -210,7 +210,7 @@ def outlines(
 
 
 def straight_creases(nodes: NDArray, hinges: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
-    """Which creases and welds (nf + nw,) stay straight, for the hinges on them in this order."""
+    """Mask of creases and welds (nf + nw,) that stay straight, for their hinges in this order."""
     edges = np.concatenate([pattern.creases, pattern.welds])
     faces = np.concatenate([pattern.crease_faces, pattern.weld_faces])
     thickness = sheet.values("thickness", len(pattern.faces))[faces].max(axis=1)
@@ -223,7 +223,7 @@ def plates_model(
     fold_stiffness: NDArray, fold_rest: NDArray, fold_law: HingeLaw, bends: NDArray,
     bend_rest: NDArray, plates: EdgePlates, clamps: NDArray,
 ) -> BarsPlates:  # fmt: skip
-    """Arrays of the model: bars with the stiffness E A / L, folds, and what `edge_plates` gives.
+    """Model arrays: bars with the stiffness E A / L, folds, and the result of `edge_plates`.
 
     clamps : (c, 3) triangles at clamped edges.
     """
@@ -246,7 +246,7 @@ def plates_model(
 
 
 def spoke_stiffness(plates: EdgePlates, folds: int, bends: int) -> NDArray:
-    """Stiffness (nb,), N m/rad, of each bend if no other angle of its panel turns."""
+    """Stiffness (nb,), N m/rad, of each bend while the panel's other angles are fixed."""
     out = np.zeros(bends)
     for p, first in enumerate(plates.start[:-1]):
         count = plates.start[p + 1] - first

@@ -1,17 +1,16 @@
-"""Panels whose triangles get smaller toward the vertices, down to a radius about them.
+"""Panels with triangles that get smaller toward the vertices, down to a radius.
 
-A panel is cut from the middle of each edge to the mean of its corners, into one piece for each
-corner. A piece is a fan about its corner: rays to the cuts, and arcs about the corner at distances
+A panel is cut from the midpoint of each edge to the mean of its corners, into one piece per corner.
+A piece is a fan about its corner: rays to the cuts, and arcs about the corner at distances
 
     r (s / r)^(k / m),    k = 0 ... m,
 
-with r the radius, s the length of the ray and m the same for all edges of a pattern. Triangles so
-are as large against their distance from the vertex everywhere, down to the first arc. Those within
-it are the corner, which is rigid in its plane (`shells.shell`).
+with r the radius, s the length of the ray and m the same for all edges of a pattern. So the size of
+triangles is proportional to their distance from the vertex, down to the first arc. Triangles within
+it form the corner, which is rigid in its plane (`shells.shell`).
 
-Forces in the plane meet at vertices, and each octave of distance from one takes about as much
-energy as the next: without a radius, and where panels are not graded, frequencies fall with every
-mesh.
+In-plane forces concentrate at vertices, and each octave of distance from a vertex stores about
+equal energy: without a radius, or without grading, frequencies fall with every refinement.
 """
 
 from __future__ import annotations
@@ -25,16 +24,16 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 
-PER_LOG = 3.0  # divisions for one arc in each factor e of distance: triangles as wide as long
-ROOM = 2.0  # of the radius: the least length of a ray
+PER_LOG = 3.0  # divisions per arc in each factor e of distance: triangles as wide as long
+ROOM = 2.0  # times the radius: least length of a ray
 
 
 class Grading(NamedTuple):
-    """How panels are cut about their corners."""
+    """Subdivision of panels about their corners."""
 
     radius: float  # m
     arcs: int  # m + 1
-    rays: int  # pieces of a cut: half of those of the arcs about a corner
+    rays: int  # pieces of a cut: half as many as in the arcs about a corner
 
     @property
     def edge_pieces(self) -> int:
@@ -42,15 +41,15 @@ class Grading(NamedTuple):
         return 2 * self.arcs
 
     def nodes(self, pattern: Pattern) -> int:
-        """About how many nodes a mesh has."""
+        """Approximate number of nodes of a mesh."""
         return 2 * self.rays * self.arcs * sum(map(len, pattern.faces))
 
     def distances(self, reach: NDArray | float) -> NDArray[np.float64]:
-        """Distances of the arcs (arcs, ...) from a corner, as parts of the lengths of rays."""
+        """Distances of the arcs (arcs, ...) from a corner, relative to the lengths of rays."""
         return np.geomspace(self.radius / np.asarray(reach), 1.0, self.arcs)
 
     def places(self, length: float) -> NDArray[np.float64]:
-        """Places in (0, 1) of the points between the ends of an edge."""
+        """Positions in (0, 1) of the points between the ends of an edge."""
         half = 0.5 * self.distances(0.5 * length)
         return np.concatenate([half, 1.0 - half[-2::-1]])
 
@@ -85,7 +84,7 @@ class Grading(NamedTuple):
 
     @property
     def steps(self) -> NDArray[np.float64]:
-        """Places in (0, 1) of the points of a cut between the middle of an edge and its end."""
+        """Positions in (0, 1) of the points of a cut between an edge's midpoint and its end."""
         return np.arange(1, self.rays) / self.rays
 
     @property
@@ -96,13 +95,13 @@ class Grading(NamedTuple):
 
 
 def grading(pattern: Pattern, divisions: int, radius: float) -> Grading:
-    """What makes triangles about as large as an even mesh of so many divisions, away from vertices.
+    """Grading with triangles about as large as in an even mesh, away from vertices.
 
     Raises
     ------
     InputError
-        The divisions are no multiple of 4, with which rays and arcs grow alike; an edge is shorter
-        than four radii.
+        The divisions are not a multiple of 4, so that rays and arcs cannot grow alike; or an edge
+        is shorter than four radii.
     """
     if divisions % 4:
         raise InputError(
@@ -122,6 +121,6 @@ def grading(pattern: Pattern, divisions: int, radius: float) -> Grading:
 
 
 def graded(length: NDArray, rays: int, radius: float) -> Grading:
-    """The same with edges of these lengths, m, and rays in half a corner."""
+    """Grading for edges of these lengths, m, and rays in half a corner."""
     arcs = 1 + rays * math.ceil(4.0 / PER_LOG * math.log(0.5 * length.max() / radius))
     return Grading(radius, arcs, rays)

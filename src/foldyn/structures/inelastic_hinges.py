@@ -1,4 +1,4 @@
-"""The hinges of a structure that remember: by their laws, or by dampers of their creases."""
+"""Hinges with memory in a structure, by their laws or by dampers of their creases."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.mechanics.sheet_term import FoldHinges
 from foldyn.mechanics.viscous import WIDTH, hinge_dofs
 
-LEAST = 1e-9  # stiffness of a crease over that of its panels: one without has so much
+LEAST = 1e-9  # stiffness of a crease over its panels': used for a crease without stiffness
 
 
 class Remembering(NamedTuple):
     """Hinges of one kind whose law has memory.
 
-    damping : (k,) of their creases, N m s/rad, where panels give way beside them.
+    damping : (k,) of their creases, N m s/rad, if adjacent panels are compliant.
     """
 
     kind: str  # "fold" or "bend"
@@ -34,12 +34,12 @@ class Remembering(NamedTuple):
 
     @property
     def count(self) -> int:
-        """Number of its branches."""
+        """Number of branches."""
         return len(self.hinges.rest) * len(self.branches)
 
     @property
     def stiffness(self) -> NDArray:
-        """Stiffness (k,), N m/rad, that parameters of the branches refer to."""
+        """Stiffness (k,), N m/rad, that branch parameters refer to."""
         if self.alone:
             return np.where(np.isfinite(self.hinges.beside), self.hinges.beside, 0.0)
         stiffness, softness = self.hinges.stiffness, self.hinges.softness
@@ -48,16 +48,16 @@ class Remembering(NamedTuple):
 
     @property
     def alone(self) -> bool:
-        """Whether it is dampers beside edge angles in balance, which know no stiffness."""
+        """Whether these are dampers beside edge angles in balance, without their own stiffness."""
         alone = isinstance(self.law, CreaseDampers)
         return alone and bool(np.isfinite(self.hinges.beside).any())
 
     @property
     def branches(self) -> tuple[Branch, ...]:
-        """Branches of the law, of all hinges.
+        """Branches of the law, for all hinges.
 
-        What yields or creeps is in series with its crease, and so with the panels. What relaxes is
-        beside the crease: of the panels it knows a part.
+        Yielding or creeping elements are in series with the crease, and so with the panels.
+        Relaxing elements are parallel to the crease, and in series with part of the panels.
         """
         if self.alone:
             return (damper_branch(self.stiffness, self.damping),)
@@ -77,10 +77,10 @@ class Remembering(NamedTuple):
 def remembering(
     structure: Any, body: Assembly | None = None, damping: NDArray | None = None
 ) -> tuple[Remembering, ...]:
-    """What of a structure remembers: its folds, its bends, both or nothing.
+    """Hinges with memory of a structure: its folds, its bends, both or none.
 
-    body : the structure's, or one with further terms.
-    damping : (nf,) of its creases, N m s/rad per m; none by default.
+    body : the structure's body, or one with further terms.
+    damping : (nf,) of the structure's creases, N m s/rad per m; none by default.
     """
     laws = {"fold": structure.fold_law, "bend": getattr(structure, "bend_law", None)}
     out, sheet = [], (structure.body if body is None else body).sheet
@@ -102,7 +102,7 @@ def remembering(
 
 
 def memory(parts: tuple[Remembering, ...], body: Assembly) -> HingeMemory:
-    """State of the branches of these parts of a body, which begins at rest."""
+    """State of the branches of these parts of a body, starting at rest."""
     columns: dict[str, list[NDArray]] = {name: [] for name in MemoryHinges._fields}
     settles, count = [], 0
     for part in parts:

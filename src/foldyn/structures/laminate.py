@@ -70,8 +70,7 @@ class Laminate(Checked):
     expansion : float
         Strain of the neutral surface per kelvin, 1/K.
     curvature : float
-        Curvature per kelvin, 1/(m K), positive where the sheet bends as at a valley: towards its
-        front.
+        Curvature per kelvin, 1/(m K), positive if the sheet bends as at a valley: toward its front.
 
     Examples
     --------
@@ -105,14 +104,14 @@ class Laminate(Checked):
 
     @property
     def curvature(self) -> float:
-        """Curvature per kelvin, 1/(m K), towards the front."""
+        """Curvature per kelvin, 1/(m K), toward the front."""
         _, stiff, expansion, z = self._columns
         return -float(stiff @ (z * expansion)) / self._bending
 
     def sheet(
         self, poissons_ratio: float, areal_density: float | None = None, **others: Any
     ) -> Sheet:
-        """Sheet that is as stiff in stretching and in bending, about the neutral surface.
+        """Sheet with the same stiffness in stretching and in bending, about the neutral surface.
 
         Parameters
         ----------

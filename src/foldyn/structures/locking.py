@@ -11,11 +11,11 @@ from foldyn.materials import HingeLaw
 from foldyn.structures.discretized import Discretized
 
 NEARLY = 1e-9  # rad from closed
-BOUND = 1e3  # moment / k that only a law without bounds has there
+BOUND = 1e3  # moment / k that only an unbounded law has there
 
 
 def locks(law: HingeLaw) -> bool:
-    """Whether the moment of a law grows beyond all bounds as panels meet."""
+    """Whether the moment of a law grows without bound as panels meet."""
     nearly = np.array([NEARLY, 2.0 * math.pi - NEARLY])
     return bool((np.abs(law.moment(nearly, math.pi)) > BOUND).all())
 
@@ -23,8 +23,8 @@ def locks(law: HingeLaw) -> bool:
 def kept_apart(structure: Discretized, one: int, other: int) -> str:
     """How to keep the panels at the hinge between two nodes apart, in words.
 
-    Laws that lock do so by energies that grow slowly, EnhancedLinear's with the logarithm of the
-    angle: panels that are pushed hard go through them, however small the steps.
+    The energies of locking laws grow slowly, EnhancedLinear's with the logarithm of the angle:
+    panels that are pushed hard pass through, however small the steps.
     """
     ends = {one, other}
     creases = structure.edge_nodes[: len(structure.fold_rest)].tolist()

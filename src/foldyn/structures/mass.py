@@ -32,7 +32,7 @@ class Surface(NamedTuple):
     triangle_panel: NDArray  # (nt,)
     triangle_area: NDArray  # (nt,) m2
     areal_density: NDArray  # (np,) kg/m2
-    welds: tuple[tuple[int, int], ...]  # edges (low, high) across which the sheet runs on
+    welds: tuple[tuple[int, int], ...]  # edges (low, high) across which the sheet continues
     clamped: tuple[tuple[int, int], ...] = ()  # edges at which panels stay level
 
     @property
@@ -64,7 +64,7 @@ def equi_inertial(surface: Surface) -> sparse.csr_array:
 
 
 def equi_inertial_acute(surface: Surface) -> sparse.csr_array:
-    """The same, but the heavier corners end the longer diagonal."""
+    """Shares of `equi_inertial`, but the heavier corners end the longer diagonal."""
     return _distribute(surface, "equi_inertial_acute", swapped=True)
 
 
@@ -146,7 +146,7 @@ def mixed_voronoi(surface: Surface) -> sparse.csr_array:
 
 
 def _circumcentric_shares(surface: Surface) -> tuple[NDArray, NDArray]:
-    """Share of each triangle nearest to each corner (nt, 3), and which corners are obtuse."""
+    """Share of each triangle closest to each corner (nt, 3), and whether corners are obtuse."""
     x = surface.nodes[surface.triangles]
     opposite = np.roll(x, -2, axis=1) - np.roll(x, -1, axis=1)
     squared = np.einsum("tkc,tkc->tk", opposite, opposite)
@@ -168,7 +168,7 @@ def consistent(surface: Surface) -> sparse.csr_array:
 def _assembled(
     nodes: NDArray, total: NDArray, element: NDArray, surface: Surface
 ) -> sparse.csr_array:
-    """Matrix of elements with the nodes (ne, k), each its mass (ne,) times one matrix (k, k)."""
+    """Assemble elements with nodes (ne, k): each has its mass (ne,) times one matrix (k, k)."""
     k, n = len(element), len(surface.nodes)
     values = total[:, None, None] * element
     rows, columns = np.repeat(nodes, k, axis=1).ravel(), np.tile(nodes, (1, k)).ravel()
@@ -179,10 +179,10 @@ def bubble(surface: Surface) -> sparse.csr_array:
     """Consistent matrix of parallelograms that also twist and bulge as plates do.
 
     In a parallelogram with its center node in the middle the displacement is bilinear between the
-    corners, plus a bulge phi = 1 - (xi^2 + eta^2)/2 by which the center is off their mean:
-    N_i = bilinear_i - phi/4, N_0 = phi, with the mean of phi 2/3 and of its square 22/45. Exact
-    for translations, rotations, every change of shape that is linear over the panel and a twist,
-    whose inertia m w^2/9 no diagonal matrix has. Other panels have the consistent matrix of their
+    corners, plus a bulge phi = 1 - (xi^2 + eta^2)/2 by which the center is off their mean: N_i =
+    bilinear_i - phi/4, N_0 = phi, with the mean of phi 2/3 and of its square 22/45. Exact for
+    translations, rotations, every change of shape that is linear over the panel and a twist, whose
+    inertia m w^2/9 no diagonal matrix reproduces. Other panels get the consistent matrix of their
     triangles.
     """
     triangle = np.ones(len(surface.faces), bool)
@@ -215,10 +215,10 @@ BUBBLE = _bubble_element()
 def condensed(surface: Surface) -> sparse.csr_array:
     """Mass of panels that follow their corners and center as thin plates do.
 
-    Between these a panel takes the shape of a plate with no moments at its edges and straight
+    Between these a panel has the shape of a plate without moments at its edges and with straight
     creases, while welds bow; see `foldyn.structures.condensed_panel`. Panels without a center node
-    have the consistent matrix of their triangles, but at clamped edges. The shape hardly depends on
-    Poisson's ratio, for which 0.3 is taken.
+    have the consistent matrix of their triangles, except at clamped edges. The shape hardly depends
+    on Poisson's ratio, which is set to 0.3.
     """
     panels = condensed_panels(surface)
     plated = np.isin(np.arange(len(surface.faces)), list(panels))
@@ -235,9 +235,9 @@ def condensed(surface: Surface) -> sparse.csr_array:
 
 
 def condensed_panels(surface: Surface) -> dict[int, NDArray]:
-    """Matrices (k, k), kg, by the rule condensed, by number: of panels with a center node.
+    """Matrices (k, k), kg, of the rule condensed, by index, for panels with a center node.
 
-    Their nodes are the corners, then the center. Also of triangles with a clamped edge.
+    Their nodes are the corners, then the center. Triangles with a clamped edge are included.
     """
     edges = [edge_of(a, b) for face in surface.faces for a, b in around(face)]
     creases = {edge for edge, count in Counter(edges).items() if count == 2} - set(surface.welds)
@@ -259,7 +259,7 @@ def _flat(parts: list[NDArray]) -> NDArray:
 
 
 def _without(surface: Surface, panels: NDArray) -> Surface:
-    """The triangles of all but some panels (np,)."""
+    """The triangles of all except some panels (np,)."""
     kept = ~panels[surface.triangle_panel]
     return surface._replace(
         triangles=surface.triangles[kept],
@@ -269,14 +269,14 @@ def _without(surface: Surface, panels: NDArray) -> Surface:
 
 
 def inertia_exact(surface: Surface) -> sparse.csr_array:
-    """Masses with the panel's own mass, center of mass and, as far as they can, inertia.
+    """Masses with the panel's mass, center of mass and, as far as possible, inertia.
 
     On a parallelogram with a center node, 2/3 at the center and 1/12 at each corner have exactly
-    the second moments of the panel about every axis. On other panels the masses start from those of
-    the centroid rule, which have the exact total and center of mass, and move towards the nearest
-    ones that have the second moments too (or come as near as they can, by least squares), as far as
-    every node keeps a quarter of its start: a node without mass could not move. A triangle without
-    a center node keeps a third for each corner.
+    the second moments of the panel about every axis. On other panels the masses start from the
+    centroid rule, which has the exact total and center of mass, and move toward the closest masses
+    that also have the second moments (or match them best, by least squares), as long as every node
+    keeps a quarter of its start value: a node without mass could not move. A triangle without a
+    center node keeps a third for each corner.
     """
     mass = np.zeros(len(surface.nodes))
     total = surface.panel_mass
@@ -299,13 +299,13 @@ def inertia_exact(surface: Surface) -> sparse.csr_array:
 
 
 def _is_parallelogram(x: NDArray) -> bool:
-    """Whether corners x[:4] are those of a parallelogram and x[4] is its middle."""
+    """Whether corners x[:4] form a parallelogram and x[4] is its center."""
     off = np.abs([x[0] + x[2] - x[1] - x[3], x[0] + x[2] - 2.0 * x[4]])
     return bool(off.max() < 1e-9 * np.ptp(x, axis=0).max())
 
 
 def _shares(x: NDArray, triangles: NDArray, part: NDArray) -> NDArray:
-    """Shares of nodes x (m, 3) of a panel's mass, `part` of which lies in each triangle."""
+    """Shares of nodes x (m, 3) in a panel's mass; each triangle contains the share `part`."""
     start = np.bincount(triangles.ravel(), np.repeat(part / 3.0, 3), minlength=len(x))
     x = x - start @ x
     x = x / np.abs(x).max()
@@ -315,7 +315,7 @@ def _shares(x: NDArray, triangles: NDArray, part: NDArray) -> NDArray:
     wanted = np.einsum("t,tka,tkb->ab", part / 12.0, corners, corners)
     wanted += np.einsum("t,ta,tb->ab", part / 12.0, s, s)
     missing = (wanted - np.einsum("k,ka,kb->ab", start, x, x)).ravel()
-    # changes of the shares that leave total and center of mass alone
+    # changes of the shares that preserve total and center of mass
     kept = np.column_stack([np.ones(len(x)), x])
     left, singular, _ = np.linalg.svd(kept)
     free = left[:, int((singular > 1e-9 * singular[0]).sum()) :]
@@ -356,7 +356,7 @@ MASS_RULES: Mapping[str, Callable[[Surface], sparse.csr_array]] = {
 
 
 def row_sums(mass: sparse.csr_array) -> NDArray:
-    """Mass (n,) that moves with each node, kg, of a nodal matrix (n, n)."""
+    """Mass (n,) of each node, kg, from a nodal matrix (n, n)."""
     return np.asarray(mass.sum(axis=1)).ravel()
 
 

@@ -1,23 +1,23 @@
-"""Panels whose bars are coupled so that their corners feel the panel's membrane.
+"""Panels with coupled bars, so that their corners have the panel's membrane stiffness.
 
-Bars that are right in uniform strain resist everything else too much: between its corners a panel
-of a folded sheet is up to six times softer (`structures.panel_membrane`). With B the elongations
-of a panel's bars in displacements in its plane, and K that of the membrane, seen from the corners,
+Bars that are exact in uniform strain are too stiff otherwise: between its corners a panel of a
+folded sheet is up to six times softer (`structures.panel_membrane`). With B the matrix of bar
+elongations for displacements in the panel's plane, and K the membrane stiffness at the corners,
 
     S = B+^T K B+ + N (N^T k^-1 N)^-1 N^T,
 
-B+ the pseudoinverse of B. N spans the elongations that no displacement in the plane gives, which
-come with the curvature of a panel that is no longer flat: there bars of stiffness k resist alone.
-These bars also hold the center, which the membrane leaves free, where the corners would put it.
+B+ the pseudoinverse of B. N spans the elongations that no in-plane displacement causes, which occur
+in a panel that is no longer flat: only bars of stiffness k resist them. These bars also hold the
+center, which the membrane leaves free, at the position that the corners imply.
 
-Corners give way along edges, by a logarithm of length over thickness: with `giving` panels, near
-either end of an edge of length L displacements gain
+Corners give way along edges, by a logarithm of length over thickness: with `giving` panels,
+displacements near each end of an edge of length L gain
 
     g [1 - s/L - log(2 s/L) / log(2 t/L)],
 
-s the distance from that end, between the thickness t and L/2; within t they are constant. Stresses
-about a force at a corner fall with 1/s. Panels share the amplitudes g of the edge between them
-(`mechanics.edge_gives`).
+with s the distance from that end, between the thickness t and L/2; within t they are constant.
+Stresses around a force at a corner fall as 1/s. Panels share the amplitudes g of the edge between
+them (`mechanics.edge_gives`).
 """
 
 from __future__ import annotations
@@ -40,23 +40,23 @@ from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
 
 NONE = np.zeros(0, bool)
-ROUNDING = 1e-13  # of the largest singular value: those that are 0
-STRAIGHT = 100.0  # resistance, over E t and the area, from which edges are straight
+ROUNDING = 1e-13  # of the largest singular value: smaller ones count as 0
+STRAIGHT = 100.0  # resistance, over E t and the area, above which edges are straight
 
 
 class PanelKind(NamedTuple):
-    """Panels of one kind: which, and their membranes."""
+    """Panels of one kind, and their membranes."""
 
     panels: NDArray  # (p,), of a shell those of its triangles
     membranes: Membranes
 
 
 class Sides(NamedTuple):
-    """How the edges of a panel are held: which are straight, and what resists the others' bows."""
+    """How a panel's edges are held: which are straight, and what resists bows of the others."""
 
     outline: Outline
     resistance: tuple[float, ...]
-    convex: bool = True  # others have bars by themselves
+    convex: bool = True  # otherwise it has independent bars
 
 
 def membranes(
@@ -68,10 +68,10 @@ def membranes(
     Parameters
     ----------
     mesh, pattern, sheet
-    straight : boundary edges that neither bow nor give way; those between panels in one plane do
-        not bow.
+    straight : boundary edges that neither bow nor give way; edges between coplanar panels do not
+    bow.
     rigid : panels that do not bend.
-    giving : whether the others give way; where they do not bend, or are not convex, none.
+    giving : whether other edges give way; never for panels that do not bend or are not convex.
     """
     kinds: dict[tuple, list[tuple[int, NDArray, NDArray]]] = {}
     sides, stiff = _sides(mesh, pattern, sheet, straight, rigid), set(rigid)
@@ -114,14 +114,14 @@ def membranes(
 
 
 def _known(panel: Sides, sheet: Sheet, area: float, gives: bool) -> Kind:
-    """What the membrane of a panel depends on."""
+    """Data that determine the membrane of a panel."""
     radius = sheet.thickness / float(np.sqrt(2.0 * area))  # an outline's area is 1/2
     grading = grading_of(panel.outline, radius) if gives else None
     return Kind(panel.outline, sheet.poissons_ratio, panel.resistance, grading)
 
 
 def _numbers(pattern: Pattern, gives: Sequence[bool]) -> dict[tuple[Edge, int], int]:
-    """Numbers of the gives of edges between two panels, by edge and vertex."""
+    """Indices of the gives of edges between two panels, by edge and vertex."""
     beside: dict[Edge, int] = {}
     for face, own in zip(pattern.faces, gives, strict=True):
         for edge in (edge_of(a, b) for a, b in around(face)):
@@ -131,7 +131,7 @@ def _numbers(pattern: Pattern, gives: Sequence[bool]) -> dict[tuple[Edge, int], 
 
 
 def _gives(x: NDArray, parts: list[tuple], edges: list[Edge]) -> EdgeGives:
-    """Panels with nodes (c,), bars (b, 2), numbers (k,) of gives, and columns (b + k, k), N/m."""
+    """Panels with nodes (c,), bars (b, 2), give indices (k,), and columns (b + k, k), N/m."""
     panel, size = np.array([p for p, *_ in parts]), len(parts)
     corners, bars, most = (max(len(part[k]) for part in parts) for k in (1, 2, 3))
     out = EdgeGives(
@@ -157,7 +157,7 @@ def _gives(x: NDArray, parts: list[tuple], edges: list[Edge]) -> EdgeGives:
 def _sides(
     mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[Edge], rigid: Collection[int]
 ) -> list[Sides]:
-    """Of each panel."""
+    """Sides of each panel."""
     bent = edge_lookup(pattern.creases)
     welded, stiff = set(edge_lookup(pattern.welds)) | set(straight), set(rigid)
     turn = np.pi - hinge_angles(mesh.nodes, mesh.folds)
@@ -197,11 +197,11 @@ def coupling(
     sides: Sides, ends: tuple[tuple[int, int], ...], poissons_ratio: float,
     stiff: NDArray | None = None, shared: NDArray = NONE, free: NDArray = NONE,
 ) -> NDArray:  # fmt: skip
-    """Stiffness over E t of the elongations of bars (b,) between corners and center, and of gives.
+    """Stiffness over E t of bar elongations (b,) between corners and center, and of gives.
 
-    stiff : of a convex panel; without it that of corners that do not give way.
-    shared, free : (2m,) gives that stay, k, and that follow; there are no others. The result is
-        (b + k, b + k).
+    stiff : stiffness of a convex panel; by default without gives.
+    shared, free : (2m,) masks of the k gives that are kept, and of gives that follow; there are no
+        others. The result is (b + k, b + k).
     """
     panel = sides.outline
     bars, corners = np.array(ends), 2 * len(panel.corners)
@@ -249,7 +249,7 @@ def energies(
 ) -> NDArray:  # fmt: skip
     """Energy (samples, panels), J, of the membranes at displacements u (samples, n, 3), m.
 
-    free : (samples, k) free strains of all bars in turn, as `swelling` has them.
+    free : (samples, k) free strains of all bars in turn, as `swelling` returns them.
     """
     x, out, first = rest + u, np.zeros((len(u), panels)), 0
     for which, own in kinds:
@@ -278,10 +278,10 @@ def energies(
 def swelling(
     kinds: Sequence[PanelKind], gives: EdgeGives | None, x: NDArray, strain: NDArray
 ) -> tuple[list[Following], NDArray, NDArray]:
-    """What panels push with that would, if they were free, stretch by `strain` (np,).
+    """Forces of panels that would stretch by `strain` (np,) if they were free.
 
-    Gives count from where the swelling has put them. Free strains (k,) and what they push with,
-    J, are those of all bars in turn.
+    Gives are measured from their swollen positions. Returns free strains (k,) and their forces, J,
+    for all bars in turn.
 
     x : (n, 3) rest positions of the nodes, m.
     """

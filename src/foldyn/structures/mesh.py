@@ -15,7 +15,7 @@ from foldyn.patterns.topology import Edge, around
 
 CUT = 'cut it with fd.convex(pattern) (in a case file, leave out facets = "line")'
 """Remedy for panels that are not convex."""
-PARALLEL = 1e-12  # of two vectors: the squared sine of an angle that rounding spoils
+PARALLEL = 1e-12  # of two vectors: squared sine of an angle at the rounding level
 Triangle = tuple[int, int, int]
 
 
@@ -30,7 +30,7 @@ class Mesh:
     centers : (np,)
         Node number of each panel's center, -1 without one.
     inner, inner_panel : (nh, 2), (nh,)
-        Bars inside panels, sorted by panel, the panel of each.
+        Bars inside panels, sorted by panel, and the panel of each.
     bends : (nh, 4)
         Hinge on each inner bar: axis j, k, wings i, l.
     triangles, triangle_panel : (nt, 3), (nt,)
@@ -53,7 +53,7 @@ class Mesh:
 def n5b8(pattern: Pattern, centers: Mapping[int, NDArray] | None = None) -> Mesh:
     """Mesh of a pattern with a center node in each panel of more than three corners.
 
-    centers : center points by panel number, in place of the computed ones.
+    centers : center points by panel index, instead of the computed ones.
     """
     sizes = np.array([len(face) for face in pattern.faces])
     number = np.where(sizes > 3, len(pattern.vertices) + np.cumsum(sizes > 3) - 1, -1).tolist()
@@ -83,7 +83,7 @@ def n5b8(pattern: Pattern, centers: Mapping[int, NDArray] | None = None) -> Mesh
 
 
 def too_narrow(pattern: Pattern) -> InputError:
-    """What to say where the stiffness of a panel is lost in rounding: the narrowest is told."""
+    """Message for panels whose stiffness is lost in rounding, with the narrowest panel."""
     widths = pattern.face_areas / np.array([sides.sum() for sides in pattern.sides]) ** 2
     return InputError(
         f"panel {int(widths.argmin())}: is so narrow that rounding hides its stiffness; cut it "
@@ -115,8 +115,8 @@ def _mesh(
 ) -> Mesh:
     """Mesh of a pattern whose panels are each `cut` into triangles with inner bars.
 
-    j to k runs along a crease as wing i's panel does: wing i is the third corner of the triangle
-    that runs low to high, wing l that of the other.
+    The axis j to k follows a crease in the direction of wing i's panel: wing i is the third corner
+    of the triangle that runs from low to high, wing l the third corner of the other triangle.
     """
     triangles, triangle_panel, inner, inner_panel = [], [], [], []
     third = {}  # corner by panel and directed side: a diagonal may be an edge of another panel
@@ -167,7 +167,7 @@ def lengths(x: NDArray, pairs: NDArray) -> NDArray:
 
 
 def double_areas(x: NDArray, triangles: NDArray) -> NDArray:
-    """Normals (nt, 3) of triangles (nt, 3) of points x (n, 3), as long as twice their areas."""
+    """Normals (nt, 3) of triangles (nt, 3) of points x (n, 3), with length twice the area."""
     a, b, c = (x[triangles[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
 
@@ -181,7 +181,7 @@ def hinge_angles(x: NDArray, hinges: NDArray) -> NDArray:
 def check_triangles(
     nodes: NDArray, triangles: NDArray, panels: NDArray, pattern: Pattern, remedy: str
 ) -> None:
-    """Refuse flat and inside-out triangles, naming their panel."""
+    """Refuse degenerate and inside-out triangles, naming their panel."""
     normals = pattern.face_normals[panels]
     signed = 0.5 * np.einsum("ij,ij->i", double_areas(nodes, triangles), normals)
     small = signed <= 1e-9 * pattern.face_areas[panels]
@@ -205,7 +205,7 @@ def _cut(face: list[int], pattern: Pattern, number: int) -> tuple[list[Triangle]
 
 
 def _in_plane(x: NDArray, normal: NDArray) -> NDArray:
-    """Coordinates (m, 2) in the plane across `normal`, counter-clockwise seen from its tip."""
+    """Coordinates (m, 2) in the plane normal to `normal`, counter-clockwise from its tip."""
     first = x[1] - x[0] - ((x[1] - x[0]) @ normal) * normal
     first /= np.linalg.norm(first)
     return (x - x[0]) @ np.stack([first, np.cross(normal, first)], 1)
@@ -257,9 +257,9 @@ def _inside(flat: NDArray, i: int, j: int) -> bool:
 def quad_centers(x: NDArray) -> NDArray:
     """Crossing of the diagonals of quadrilaterals x (m, 4, 3).
 
-    Where a panel is not flat, the point of the shorter diagonal that is nearest to the other;
-    for equal ones, of the diagonal through corners 1 and 3 (counted from 0). nan where the
-    diagonals are parallel to rounding.
+    If a panel is not flat, the point of the shorter diagonal closest to the other one; for equal
+    ones, of the diagonal through corners 1 and 3 (counted from 0). nan if the diagonals are
+    parallel to rounding.
     """
     p, q = x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]
     start = x[:, 1] - x[:, 0]

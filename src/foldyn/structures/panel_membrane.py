@@ -1,18 +1,18 @@
 """A panel's membrane, condensed to its corners.
 
-Along an edge the two panels of a folded sheet hold each other by shear: displacements there are
-linear between its ends. Across it, in the plane of its panel, an edge is free to bow, but for what
-the panels resist in bending: where it bows by w and the fold angle is phi, the neighbor's edge
-deflects by w / sin(phi), and its own by w / tan(phi). A panel resists a deflection
-sin(q s) of its edge, s along it, by
+The two panels at an edge of a folded sheet hold each other by shear: displacements along the edge
+are linear between its ends. Across it, in the plane of its panel, an edge is free to bow, except
+for the bending resistance of the panels: if it bows by w and the fold angle is phi, the neighbor's
+edge deflects by w / sin(phi), and its own by w / tan(phi). A panel resists a deflection sin(q s) of
+its edge, s along it, by
 
     D (1 - nu)(3 + nu)/2 q^3
 
-per length, as the edge of a half plane without moment there does (Kirchhoff). In a sheet that is
-nearly flat edges so become straight; in a folded one they bow freely.
+per length, like the moment-free edge of a half plane (Kirchhoff). So edges of a nearly flat sheet
+are straight, and edges of a folded sheet bow freely.
 
-The membrane is made of quadratic triangles, twice, and its stiffness extrapolated in their size: as
-the corners feel it, in the plane, over E t.
+Two meshes of quadratic triangles give the stiffness at the corners, in the plane, over E t, which
+is extrapolated in the triangle size.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from foldyn.structures.graded import ROOM, Grading, graded
 from foldyn.structures.panel_plate import Outline, across_edges, meshed, sides_of
 from foldyn.structures.shared import shared
 
-COARSE, FINE = 4, 8  # pieces of each edge in the two meshes; twice as many in triangles
-RAYS = 2  # of a graded mesh, in half a corner
-STIFF = 1e3  # times as stiff as the rest: rigid corners
+COARSE, FINE = 4, 8  # pieces per edge in the two meshes; triangles have twice as many
+RAYS = 2  # rays of a graded mesh, in half a corner
+STIFF = 1e3  # stiffness of rigid corners relative to the rest
 WAVES = 2.0  # in a bow of an edge, for each of its radii
 
 
 class Kind(NamedTuple):
-    """What a panel's membrane depends on, but for E t.
+    """Data that determine a panel's membrane, except E t.
 
     Attributes
     ----------
@@ -48,10 +48,10 @@ class Kind(NamedTuple):
         Its straight edges do not bow.
     poissons_ratio : float
     resistance : tuple of float
-        What q^3 is multiplied by above, over E t, of both panels at each other edge: in the unit
-        of length of the outline, squared.
+        Factor of q^3 above, over E t, of both panels at each bowing edge, in squared length units
+        of the outline.
     grading : Grading, optional
-        Of a panel whose corners give way along its edges, rigid within the radius.
+        For a panel whose corners give way along its edges, rigid within the radius.
     """
 
     outline: Outline
@@ -61,7 +61,7 @@ class Kind(NamedTuple):
 
     @property
     def topology(self) -> tuple:
-        """The same for panels that are cut and condensed alike."""
+        """Key that is equal for panels that are cut and condensed alike."""
         arcs = self.grading and self.grading.arcs
         panel = self.outline
         return len(panel.corners), panel.center is None, arcs, all(panel.straight)
@@ -69,11 +69,11 @@ class Kind(NamedTuple):
 
 @shared(lambda *given: Kind(*given).topology)
 def membrane_stiffness(given: Sequence[tuple]) -> list[NDArray]:
-    """Stiffness (2m, 2m) over E t of the displacements (x, y) of the m corners in the plane.
+    """Stiffness (2m, 2m) over E t of the in-plane displacements (x, y) of the m corners.
 
-    Its arguments are the fields of a `Kind`. With a grading (4m, 4m): after the displacements come
-    the gives, of each edge in turn, at its first and at its last corner: how far the points near it
-    slide along the edge, away from the corner.
+    Its arguments are the fields of a `Kind`. With a grading (4m, 4m): the gives follow the
+    displacements, for each edge in turn, at its first and its last corner: the slip of nearby
+    points along the edge, away from the corner.
     """
     kinds = [Kind(*each) for each in given]
     if kinds[0].grading:
@@ -93,14 +93,14 @@ def _symmetric(stiffness: NDArray) -> list[NDArray]:
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """How panels are cut into quadratic triangles: the same for many.
+    """How panels are cut into quadratic triangles: shared by many panels.
 
     Attributes
     ----------
     ends : (s, 2)
-        Of the triangles' sides; their middles are points after the others.
+        End points of the triangle sides; their midpoints follow the other points.
     elements : (nt, 6)
-        Corners, and the middles of the sides from each to the next.
+        Corners, and the midpoints of the sides from each corner to the next.
     at : (m,)
         The panel's corners.
     along : list of arrays
@@ -116,9 +116,9 @@ class Cut:
 class PanelMesh(NamedTuple):
     """Quadratic triangles of a panel."""
 
-    x: NDArray  # (n, 2) corners and middles of the triangles
+    x: NDArray  # (n, 2) corners and side midpoints of the triangles
     cut: Cut
-    radius: float | None = None  # within which corners are rigid, where they give way
+    radius: float | None = None  # of the rigid corners, if they give way
 
 
 def _even(panel: Outline, n: int) -> PanelMesh:
@@ -129,16 +129,16 @@ def _even(panel: Outline, n: int) -> PanelMesh:
 
 @lru_cache(maxsize=64)
 def _evenly(corners: int, center: bool, n: int) -> tuple[NDArray, Cut]:
-    """Weights (points, corners) of the corners, and of the center, in points; how it is cut."""
+    """Weights (points, corners) of the corners and the center in each point; the cut."""
     unit = np.eye(corners + center)
     weights, triangles, at, edges = meshed(unit[:corners], unit[-1] if center else None, n)
     return weights, _cut(len(weights), triangles, at[:corners], edges)
 
 
 def grading_of(panel: Outline, radius: float) -> Grading:
-    """How a mesh is graded toward corners, down to a radius or to what a short edge has room for.
+    """Grading of a mesh toward corners, down to a radius or to what a short edge permits.
 
-    As that of a shell (`structures.graded`).
+    As for shells (`structures.graded`).
     """
     corners = np.array(panel.corners)
     length = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
@@ -154,7 +154,7 @@ def _pieces(corners: NDArray) -> NDArray:
 
 
 def _graded(kinds: Sequence[Kind]) -> list[PanelMesh]:
-    """Meshes with as many arcs each."""
+    """Meshes with equal numbers of arcs."""
     gradings = [kind.grading for kind in kinds if kind.grading]
     corners = np.array([kind.outline.corners for kind in kinds])
     radius = np.array([grading.radius for grading in gradings])[:, None, None]
@@ -168,14 +168,14 @@ def _graded(kinds: Sequence[Kind]) -> list[PanelMesh]:
 
 @lru_cache(maxsize=64)
 def _fans(corners: int, arcs: int) -> tuple[NDArray, Cut]:
-    """Points that a graded mesh uses, of its pieces' and then the corners, and how it is cut."""
+    """Points of a graded mesh, by the corners of its pieces and then of the panel; the cut."""
     count = corners * arcs * (2 * RAYS + 1)
     node = np.arange(count).reshape(corners, arcs, -1)
-    node[:, -1, RAYS] = node[0, -1, RAYS]  # the mean; cuts belong to two pieces
+    node[:, -1, RAYS] = node[0, -1, RAYS]  # the mean; two pieces share each cut
     node[:, -1, :RAYS:-1] = np.roll(node[:, -1, :RAYS], 1, axis=0)
     at = count + np.arange(corners)
     a, b, c, d = node[:, :-1, :-1], node[:, 1:, :-1], node[:, 1:, 1:], node[:, :-1, 1:]
-    halves = [  # cut alike on both sides of the middle ray
+    halves = [  # symmetric about the middle ray
         np.where((np.arange(2 * RAYS) < RAYS)[:, None], np.stack(one, -1), np.stack(other, -1))
         for one, other in (((a, b, d), (a, b, c)), ((b, c, d), (a, c, d)))
     ]
@@ -193,12 +193,12 @@ def _fans(corners: int, arcs: int) -> tuple[NDArray, Cut]:
 
 
 def _quadratic(points: NDArray, cut: Cut, radius: float | None = None) -> PanelMesh:
-    """Triangles with the middles of their sides."""
+    """Mesh with midpoints of the triangle sides added."""
     return PanelMesh(np.concatenate([points, points[cut.ends].mean(axis=1)]), cut, radius)
 
 
 def _cut(points: int, triangles: NDArray, at: NDArray, edges: list[NDArray]) -> Cut:
-    """Sides of triangles between so many points; `edges` with their ends."""
+    """Sides of triangles between the given number of points; `edges` with their ends."""
     side, _, ends = sides_of(triangles)
     middles = across_edges(edges, ends, points)
     along = [
@@ -210,25 +210,26 @@ def _cut(points: int, triangles: NDArray, at: NDArray, edges: list[NDArray]) -> 
 
 
 class Unknowns(NamedTuple):
-    """What moves the points of panels that are cut alike.
+    """Unknowns that move the points of panels with the same cut.
 
-    Unknowns are the displacements of points inside, (x, y); where edges bow, those of their points
-    across them, from the line between the ends; those of the corners, and how far these give way.
+    Unknowns are the displacements (x, y) of inner points; for bowing edges, the displacements of
+    their points across them, from the line between the ends; the displacements of the corners, and
+    their gives.
 
     Attributes
     ----------
     starts : (n + 1,)
-        Of each point in the two following.
+        Start of each point in the next two arrays.
     number : (k,)
-        Of the unknowns that move each point, in turn.
+        Indices of the unknowns that move each point, in turn.
     axes : (k, 2)
-        How these move it; 0 at edges.
+        Their directions; 0 at edges.
     along : list of arrays (points, j)
-        Which of them move the points of each edge.
+        Unknowns that move the points of each edge.
     bows : list of arrays (points,)
-        Numbers of the bows of each edge.
+        Indices of the bows of each edge.
     free, size : int
-        Unknowns, without and with those of the corners.
+        Number of unknowns, without and with the corners' own.
     """
 
     starts: NDArray
@@ -241,14 +242,14 @@ class Unknowns(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What stands where in the stiffness of all panels that are cut alike.
+    """Layout of the stiffness of all panels with the same cut.
 
     Attributes
     ----------
     unknowns : Unknowns
     places : see `add_triangles`
     bows : list of arrays
-        Places of the entries of bows of each edge, the lower half by rows.
+        Positions of the bow entries of each edge, the lower half by rows.
     condensing : Condensing
     """
 
@@ -287,10 +288,10 @@ def _unknowns(cut: Cut, bowing: bool, gives: bool) -> Unknowns:
 
 @lru_cache(maxsize=64)
 def _plan(cut: Cut, bowing: bool, gives: bool) -> Plan:
-    """Where edges bow, unless all are straight."""
+    """Layout for a cut; edges bow unless all are straight."""
     unknowns = _unknowns(cut, bowing, gives)
     starts, size = unknowns.starts, unknowns.size
-    # of all ordered pairs of points of a triangle; the lower half of the matrix is enough
+    # for all ordered pairs of points of a triangle; the lower half of the matrix suffices
     one, other = np.repeat(cut.elements, 6, axis=1).ravel(), np.tile(cut.elements, (1, 6)).ravel()
     counts = np.diff(starts)
     each = counts[one] * counts[other]
@@ -312,7 +313,7 @@ def _plan(cut: Cut, bowing: bool, gives: bool) -> Plan:
 
 
 def _condensed(kinds: Sequence[Kind], meshes: Sequence[PanelMesh]) -> NDArray:
-    """Stiffness (c, 2m, 2m) of the corners of at most eight panels, cut alike; see `Kind`."""
+    """Stiffness (c, 2m, 2m) of the corners of up to eight panels with the same cut; see `Kind`."""
     cut, some = meshes[0].cut, np.minimum(np.arange(COUNT), len(kinds) - 1)
     straight = np.array([kinds[k].outline.straight for k in some])
     gives = meshes[0].radius is not None
@@ -344,16 +345,16 @@ def _condensed(kinds: Sequence[Kind], meshes: Sequence[PanelMesh]) -> NDArray:
 
 
 class Edge(NamedTuple):
-    """The same edge of eight panels."""
+    """One edge of eight panels."""
 
     normal: NDArray  # (2, 8)
     tangent: NDArray
     length: NDArray  # (8,)
-    place: NDArray  # (p, 8) of points, from its start
+    place: NDArray  # (p, 8) positions of points, from its start
 
 
 def _edge(x: NDArray, start: NDArray, end: NDArray) -> Edge:
-    """With points x (p, 2, 8), from `start` to `end` (2, 8)."""
+    """Edge with points x (p, 2, 8), from `start` to `end` (2, 8)."""
     length = np.linalg.norm(end - start, axis=0)
     tangent = (end - start) / length
     normal = np.stack([-tangent[1], tangent[0]])
@@ -361,9 +362,9 @@ def _edge(x: NDArray, start: NDArray, end: NDArray) -> Edge:
 
 
 def _moves(edge: Edge, radius: NDArray | None) -> list[NDArray]:
-    """How corners, by x and y, and gives at radii (8,) move points on an edge: (p, 2, 8) each.
+    """Motion (p, 2, 8) of edge points per corner displacement x, y, and per give at radii (8,).
 
-    Edges stay straight.
+    Edges remain straight.
     """
     moves, gives = [], []
     within, half = 0.0 if radius is None else radius, 0.5 * edge.length
@@ -380,9 +381,9 @@ def _moves(edge: Edge, radius: NDArray | None) -> list[NDArray]:
 
 
 def _bowing(kind: Kind, k: int, points: int, length: float, radius: float | None) -> NDArray:
-    """Stiffness of the bows of edge k at so many points: the lower half, by rows.
+    """Stiffness of the bows of edge k with the given number of points: the lower half, by rows.
 
-    Those of a straight edge, which move nothing, have the stiffness 1.
+    Bows of a straight edge, which move nothing, have the stiffness 1.
     """
     if kind.outline.straight[k]:
         return np.eye(points)[np.tril_indices(points)]
@@ -394,14 +395,14 @@ def _bowing(kind: Kind, k: int, points: int, length: float, radius: float | None
 
 @lru_cache(maxsize=256)
 def _waves(points: int, radius: float | None) -> NDArray:
-    """The same of an edge of length and resistance 1, whose bows are waves of sines.
+    """Bow stiffness of an edge of length and resistance 1, with sine waves as bows.
 
-    radius : where points are graded, see `Grading`; elsewhere they are equally far apart.
+    radius : of graded points, see `Grading`; without it points are equidistant.
     """
     fade, number = 1.0, np.arange(1, points + 1)
     if radius is None:
         shapes = 2.0 / (points + 1) * np.sin(np.outer(np.pi * number, number / (points + 1)))
-    else:  # of bows that are linear between the points
+    else:  # bows that are linear between the points
         nodes = np.concatenate([[0.0], Grading(radius, (points + 1) // 4, RAYS).places(1.0), [1.0]])
         at = np.interp(np.arange(0, len(nodes) - 0.75, 0.5), np.arange(len(nodes)), nodes)
         count = WAVES / radius
@@ -411,7 +412,7 @@ def _waves(points: int, radius: float | None) -> NDArray:
         kinks = np.diff(np.diff(np.eye(len(at)), axis=0) / np.diff(at)[:, None], axis=0)
         shapes = np.concatenate([half, mirrored], axis=1) @ kinks.T
         shapes *= -2.0 / (np.pi * number[:, None]) ** 2
-        # the shortest ones fade, as a last whole wave would make the stiffness jump with the length
+        # the shortest waves fade out, so that the stiffness is continuous in the length
         part = np.clip(1.5 - number / count, 0.0, 1.0)
         fade = part**2 * (3.0 - 2.0 * part)
     shapes = shapes * np.sqrt(0.5 * fade * (np.pi * number) ** 3)[:, None]

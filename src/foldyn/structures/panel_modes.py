@@ -1,19 +1,19 @@
-"""Internal amplitudes of a panel (Craig and Bampton): what its plate does between what is held.
+"""Internal amplitudes of a panel (Craig and Bampton): plate motions with fixed interface.
 
 A panel of the scheme n5b8e moves as the plate that follows the heights of its corners and center
 and the turns beta of its creased edges statically (`structures.condensed_panel`). The lowest modes
-of the plate with all these held add what it does besides: heights
+of the plate with all these held add its other motions: heights
 
     w = Psi_h h + Psi_beta beta + Psi_gamma gamma + Phi a,
 
-Psi the static shapes, Phi the modes with the amplitudes a. Static shapes and modes with held ends
-have no stiffness in common; their masses have. (R. R. Craig and M. C. C. Bampton, AIAA Journal 6,
-1968.)
+with Psi the static shapes, and Phi the modes with the amplitudes a. Static shapes and
+fixed-interface modes are not coupled by stiffness, but by mass. (R. R. Craig and M. C. C. Bampton,
+AIAA Journal 6, 1968.)
 
-Edges also turn unevenly: by beta_k P_k(s), P_k the Legendre polynomials of the place s from -1 to 1
-along the edge. Without moments of that shape a panel has beta_k = T phi of its angles phi (spokes
-and mean turns beta); gamma, amplitudes as well, are what comes to it. They have no stiffness in
-common with phi and are held in the modes.
+Edges also turn unevenly, by beta_k P_k(s), with P_k the Legendre polynomials of the position s from
+-1 to 1 along the edge. Without moments of that shape a panel has beta_k = T phi, with phi its
+angles (spokes and mean turns beta); the additional amplitudes gamma are deviations from that.
+Stiffness does not couple them with phi, and they are held in the modes.
 """
 
 from __future__ import annotations
@@ -37,22 +37,22 @@ from foldyn.structures.condensed_panel import (
 from foldyn.structures.panel_plate import Outline, PanelPlate
 
 TURNS = 3  # uneven turns of an edge, P_1 and on
-SPARE = 4  # modes beyond those asked for, whose order finer meshes may change
-EQUAL = 1e-3  # relative distance of eigenvalues that belong together: neither is taken alone
+SPARE = 4  # additional modes, as finer meshes may change their order
+EQUAL = 1e-3  # relative distance of eigenvalues that count as equal: they are kept together
 
 
 class PanelModes(NamedTuple):
-    """Internal amplitudes of a panel of size 1, bending stiffness 1 and mass 1, lengths in m.
+    """Internal amplitudes of a panel with size 1, bending stiffness 1 and mass 1; lengths in m.
 
     Attributes
     ----------
     stiffness : (k, k)
-        Of the amplitudes: gamma of each edge that turns, then those of modes, whose mass is 1.
+        Of the amplitudes: gamma of each edge that turns, then the modes, whose mass is 1.
     mass : (b + k, b + k)
         Of all its heights w: the heights of corners and center, the turns of creased edges that
         are not clamped, the amplitudes.
     between : (q, b + k)
-        Heights by these in the middles of the edges, then of the spokes.
+        Resulting heights at the midpoints of the edges, then of the spokes.
     turns : (t, q)
         T: uneven turns by the angles of the panel, see `structures.condensed_panel`.
     """
@@ -65,11 +65,11 @@ class PanelModes(NamedTuple):
 
 @lru_cache(maxsize=4096)
 def panel_modes(panel: Outline, poissons_ratio: float, count: int) -> PanelModes:
-    """The lowest modes of a panel whose corners, center and edges are held, and their masses.
+    """Lowest modes of a panel with corners, center and edges held, and their masses.
 
-    Frequencies are extrapolated in the size of the mesh; masses are those of the fine one, so that
-    they are of real shapes and positive definite. Modes of one frequency are taken together: of a
-    panel with symmetries there may be more than `count`.
+    Frequencies are extrapolated in the size of the mesh; masses come from the fine mesh, so that
+    they belong to actual shapes and are positive definite. Modes of equal frequency are kept
+    together: a panel with symmetries may have more than `count`.
     """
     from scipy.spatial import cKDTree
 
@@ -86,7 +86,7 @@ def panel_modes(panel: Outline, poissons_ratio: float, count: int) -> PanelModes
     static, all_held = solved[1][0], extrapolated(solved[0][1], solved[1][1], FINE / COARSE)
     first = len(fine.heights) + len(fine.slopes)
     own = all_held[first:, first:]
-    turns = np.linalg.solve(own, all_held[first:, :first])  # less the slopes
+    turns = np.linalg.solve(own, all_held[first:, :first])  # minus the slopes
     natural = static[:, :first] - static[:, first:] @ turns
     heights = np.column_stack([natural @ turning(panel), -static[:, first:], shapes[:, :count]])
     mass = heights.T @ (fine.mass @ heights)
@@ -103,7 +103,7 @@ def panel_modes(panel: Outline, poissons_ratio: float, count: int) -> PanelModes
 
 
 def turning(panel: Outline) -> NDArray:
-    """`heights_and_slopes` of a panel that stays level at its clamped edges, not against facets."""
+    """`heights_and_slopes` for a panel that is level at clamped edges, not relative to facets."""
     points = len(panel.corners) + (panel.center is not None)
     clamped = [c for c, there in zip(panel.clamped, panel.creased, strict=True) if there]
     level = points + np.flatnonzero(clamped)
@@ -113,14 +113,14 @@ def turning(panel: Outline) -> NDArray:
 
 
 def middles(panel: Outline) -> NDArray:
-    """Middles (q, 2) of the edges of a panel, then of its spokes."""
+    """Midpoints (q, 2) of the edges of a panel, then of its spokes."""
     x = np.array(panel.corners)
     edges = 0.5 * (x + np.roll(x, -1, axis=0))
     return np.concatenate([edges, 0.5 * (x + panel.center)]) if panel.center else edges
 
 
 def _partners(coarse: NDArray, fine: NDArray) -> NDArray:
-    """Which of the coarse shapes (n, k) each fine one (n, k) is like; their order may differ."""
+    """Coarse shape (n, k) that each fine shape (n, k) corresponds to; their order may differ."""
     from scipy.optimize import linear_sum_assignment
 
     size = np.linalg.norm(fine, axis=0)[:, None] * np.linalg.norm(coarse, axis=0)
@@ -128,7 +128,7 @@ def _partners(coarse: NDArray, fine: NDArray) -> NDArray:
 
 
 def _held_modes(plate: PanelPlate, count: int) -> tuple[NDArray, NDArray]:
-    """Eigenvalues (count,) and shapes (size, count) of a plate whose interface is held."""
+    """Eigenvalues (count,) and shapes (size, count) of a plate with its interface held."""
     basis = _basis(plate)
     pencil = Pencil(
         sparse.csc_array(basis.T @ plate.stiffness @ basis),
@@ -142,10 +142,10 @@ def _held_modes(plate: PanelPlate, count: int) -> tuple[NDArray, NDArray]:
 
 
 def _basis(plate: PanelPlate) -> sparse.csc_array:
-    """Unknowns of a plate by those that are left when corners, center and edges are held.
+    """Basis of a plate's unknowns while corners, center and edges are held.
 
-    Held heights are zero; those along straight edges, too, since their ends are, and slopes along
-    clamped ones. Those along others have no part that is held.
+    Held heights are zero; so are heights along straight edges, as their ends are held, and slopes
+    along clamped edges. Unknowns along other edges have no held component.
     """
     size = plate.stiffness.shape[0]
     still = {next(iter(entries)) for entries in (*plate.heights, *plate.lines)}

@@ -1,4 +1,4 @@
-"""A panel as a thin plate of small triangles: outline, mesh, stiffness, mass, and what is held.
+"""A panel as a thin plate of small triangles: outline, mesh, stiffness, mass, constraints.
 
 The triangles have constant curvature (Morley; in `mechanics.triangle`). Their unknowns are the
 heights of the points and the slopes across the sides.
@@ -17,16 +17,16 @@ from scipy.sparse.linalg import splu
 
 from foldyn.mechanics.triangle import triangle_stiffness
 
-DIGITS = 11  # to which panels have the same shape
-TRIANGLE_MASS = (np.ones((3, 3)) + np.eye(3)) / 12.0  # of 1 in all, linear between corners
+DIGITS = 11  # digits to which panels with the same shape agree
+TRIANGLE_MASS = (np.ones((3, 3)) + np.eye(3)) / 12.0  # total 1, linear between corners
 Rows = tuple[tuple[float, float], ...]
 
 
 class Outline(NamedTuple):
-    """A panel: corners in its plane, counter-clockwise from the front, and how its edges are held.
+    """A panel: corners in its plane, counter-clockwise from the front, and its edge conditions.
 
-    Edge k runs from corner k to corner k + 1. Clamped edges are creased and straight, too: all of
-    the sheet turns there as one.
+    Edge k runs from corner k to corner k + 1. Clamped edges count as creased and straight: the
+    sheet turns there uniformly.
     """
 
     corners: Rows  # m
@@ -45,9 +45,9 @@ def outline(
     bowed: Sequence[bool] = (),
     clamped: Sequence[bool] = (),
 ) -> Outline:
-    """Outline of a panel with corners x (m, 3), of size 1 with its first edge along an axis.
+    """Outline of a panel with corners x (m, 3), with size 1 and its first edge along an axis.
 
-    Without `bowed` or `clamped` no edge is.
+    By default no edge is bowed or clamped.
     """
     middle = x.mean(axis=0)
     points = x if center is None else np.concatenate([x, center[None]])
@@ -70,19 +70,19 @@ def outline(
 
 
 def facets_of(points: NDArray, corners: int) -> list[tuple[int, int, int]]:
-    """Triangles of the panel: the one at edge k has the number k."""
+    """Triangles of the panel; triangle k is at edge k."""
     if len(points) == corners:
         return [(0, 1, 2)] * 3
     return [(k, (k + 1) % corners, corners) for k in range(corners)]
 
 
 class PanelPlate:
-    """A panel as a plate of small triangles; n pieces of each edge, G = 1.
+    """A panel as a plate of small triangles; n pieces per edge, G = 1.
 
     Its unknowns are heights of the points, then slopes across the sides. `heights` (of corners and
-    center), `slopes` (mean, outward, of creased edges), `bows` and `lines` (of points on straight
-    edges off the line between its ends, and of slopes at clamped ones off the last there) are
-    linear functions of them: coefficients by number.
+    center), `slopes` (mean, outward, of creased edges), `bows` and `lines` (deviations of points on
+    straight edges from the line between the ends, and of slopes at clamped edges from the last
+    slope) are linear functions of them, as coefficients by index.
     """
 
     def __init__(self, panel: Outline, poissons_ratio: float, n: int) -> None:
@@ -96,9 +96,9 @@ class PanelPlate:
         self.slopes, self.bows, self.lines, self._turning = _edge_functions(panel, edges, sides)
 
     def uneven(self, count: int) -> list[dict[int, float]]:
-        """Parts P_1 to P_count (Legendre) of the slopes along each creased edge not clamped.
+        """Components P_1 to P_count (Legendre) of the slopes along each creased, unclamped edge.
 
-        Linear functions of the unknowns, as `slopes` is of the part P_0, the mean.
+        They are linear functions of the unknowns, like `slopes` for P_0, the mean.
         """
         found = []
         for mean in self._turning:
@@ -110,9 +110,9 @@ class PanelPlate:
         return found
 
     def solved(self, held: list[dict[int, float]]) -> tuple[NDArray, NDArray]:
-        """Unknowns (size, k) where one of the k held functions is 1; the stiffness (k, k).
+        """Unknowns (size, k) with one of k held functions equal to 1 each; the stiffness (k, k).
 
-        The heights come first among the held functions: with them the rest is positive definite.
+        Heights come first among the held functions: holding them makes the rest positive definite.
         """
         size, count = len(self.stiffness.indptr) - 1, len(self.heights)
         first = np.array([next(iter(entries)) for entries in self.heights])
@@ -137,7 +137,7 @@ class PanelPlate:
 
     @property
     def paraboloid(self) -> NDArray:
-        """Unknowns of the heights r^2 / 2, which triangles of constant curvature have exactly."""
+        """Unknowns for heights r^2 / 2, which triangles of constant curvature represent exactly."""
         one, other = np.moveaxis(self.points[self._ends], 1, 0)
         along = other - one
         across = np.column_stack([along[:, 1], -along[:, 0]])
@@ -147,7 +147,7 @@ class PanelPlate:
 
     @property
     def mass(self) -> sparse.csr_array:
-        """Mass matrix of the unknowns, of a panel of mass 1; slopes have none."""
+        """Mass matrix of the unknowns for a panel of mass 1; slopes have no mass."""
         block = _parts(self.points, self.triangles)[:, None, None] * TRIANGLE_MASS
         rows, columns = np.repeat(self.triangles, 3, axis=1), np.tile(self.triangles, (1, 3))
         entries = (block.ravel(), (rows.ravel(), columns.ravel()))
@@ -157,10 +157,10 @@ class PanelPlate:
 def _edge_functions(
     panel: Outline, edges: Sequence[NDArray], sides: Sequence[tuple[NDArray, NDArray]]
 ) -> tuple[list[dict[int, float]], ...]:
-    """Slopes, bows and lines of `PanelPlate`; the slopes of edges that are not clamped.
+    """Slopes, bows and lines of `PanelPlate`; and the slopes of unclamped edges.
 
-    edges, sides : of each edge the numbers of the heights of its points (n + 1,), and those of the
-        slopes across its sides with their signs (n,), 1 where they are outward.
+    edges, sides : for each edge the indices of its points' heights (n + 1,), and of the slopes
+    across its sides with their signs (n,), 1 if outward.
     """
     slopes, bows, lines, turning = [], [], [], []
     x = np.array(panel.corners)
@@ -176,7 +176,7 @@ def _edge_functions(
                 lines.append({side: n * part, last: -n * share})
         if panel.bowed[k]:
             share = 1.0 / (n * float(np.linalg.norm(x[k] - x[(k + 1) % len(x)])))
-            ends = 0.5 * (1 - n) * share  # the line between them takes them off
+            ends = 0.5 * (1 - n) * share  # subtracts the line between the ends
             inner = {node: share for node in nodes[1:-1]}
             bows.append({nodes[0]: ends, nodes[-1]: ends, **inner})
         if panel.straight[k]:
@@ -195,13 +195,13 @@ def _rows_of(functions: list[dict[int, float]], size: int) -> sparse.csr_array:
 
 
 def mass_of(points: NDArray, triangles: NDArray, heights: NDArray) -> NDArray:
-    """Mass matrix (k, k) of shapes with heights (points or more, k) that triangles join."""
+    """Mass matrix (k, k) of shapes with heights (points or more, k), linear on triangles."""
     shape, part = heights[triangles], _parts(points, triangles)
     return np.einsum("tak,ab,tbl,t->kl", shape, TRIANGLE_MASS, shape, part)
 
 
 def _parts(points: NDArray, triangles: NDArray) -> NDArray:
-    """Parts (nt,) of the area of all triangles."""
+    """Share (nt,) of each triangle in the total area."""
     corners = points[triangles]
     area = 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
     return area / area.sum()
@@ -210,12 +210,12 @@ def _parts(points: NDArray, triangles: NDArray) -> NDArray:
 def meshed(
     x: NDArray, center: Sequence[float] | NDArray | None, n: int
 ) -> tuple[NDArray, NDArray, NDArray, list[NDArray]]:
-    """Points (p, ...), triangles, those at corners and center, and those along each edge."""
+    """Points (p, ...), triangles, points at corners and center, and points along each edge."""
     points = x if center is None else np.concatenate([x, np.asarray(center)[None]])
     facets = [(0, 1, 2)] if center is None else facets_of(points, len(x))
     i, j = (axis.ravel() for axis in np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij"))
     kept = i + j <= n
-    i, j = i[kept], j[kept]  # parts of the way from the first corner to the others, in n-ths
+    i, j = i[kept], j[kept]  # fractions of the way from the first corner to the others, in n-ths
     place = np.full((n + 1, n + 1), -1)
     place[i, j] = np.arange(len(i))
     up = np.argwhere(np.add.outer(np.arange(n + 1), np.arange(n + 1)) < n)
@@ -251,9 +251,9 @@ def sides_of(triangles: NDArray) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def across_edges(edges: Sequence[NDArray], ends: NDArray, heights: int) -> list[tuple]:
-    """Of each edge the numbers (n,) of the slopes across its sides, with their signs.
+    """For each edge the indices (n,) of the slopes across its sides, with their signs.
 
-    edges : points along each edge; of all sides `ends` are the ends, and slopes follow heights.
+    edges : points along each edge; ends : end points of all sides. Slopes follow heights.
     """
     number = {pair: heights + k for k, pair in enumerate(map(tuple, ends.tolist()))}
     found = []
@@ -271,16 +271,16 @@ def plane_slopes(corners: NDArray) -> NDArray:
 
 
 def plate_blocks(corners: NDArray, sign: NDArray, poissons_ratio: float) -> NDArray:
-    """Stiffness (nt, 6, 6) of heights of the corners (nt, 3, 2) of triangles, and of slopes.
+    """Stiffness (nt, 6, 6) for heights of triangle corners (nt, 3, 2), and side slopes.
 
-    sign : (nt, 3), 1 where slopes are outward.
+    sign : (nt, 3), 1 if slopes are outward.
     """
     flat = np.concatenate([corners, np.zeros((len(corners), 3, 1))], axis=2)
     bending = triangle_stiffness(flat, poissons_ratio, 1.0, 1.0)[1]
     along = np.roll(corners, -1, axis=1) - corners
     outward = np.stack([along[:, :, 1], -along[:, :, 0]], axis=2)
     outward /= np.linalg.norm(along, axis=2)[:, :, None]
-    turns = np.zeros((len(corners), 3, 6))  # of the sheet at each side, beta
+    turns = np.zeros((len(corners), 3, 6))  # turns beta of the sheet at each side
     turns[:, :, :3] = -outward @ plane_slopes(corners)
     turns[:, np.arange(3), 3 + np.arange(3)] = sign
     return turns.transpose(0, 2, 1) @ bending @ turns
@@ -289,7 +289,7 @@ def plate_blocks(corners: NDArray, sign: NDArray, poissons_ratio: float) -> NDAr
 def _plate(
     points: NDArray, triangles: NDArray, side: NDArray, sign: NDArray, poissons_ratio: float
 ) -> sparse.csr_array:
-    """Stiffness of heights of the points and slopes across the sides, for G = 1."""
+    """Stiffness for heights of the points and slopes across the sides, with G = 1."""
     block = plate_blocks(points[triangles], sign, poissons_ratio)
     dofs = np.concatenate([triangles, len(points) + side], axis=1)
     rows, columns = np.repeat(dofs, 6, axis=1).ravel(), np.tile(dofs, (1, 6)).ravel()

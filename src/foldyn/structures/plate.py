@@ -37,36 +37,36 @@ from foldyn.structures.quad_bends import quad_bends
 from foldyn.structures.rigid_plates import rigid_panels
 from foldyn.structures.sheet import Sheet
 
-COMPLIANCE = 0.12  # c Lf^2/A of panels of more than four corners, and at most welds
+COMPLIANCE = 0.12  # c Lf^2/A of panels with more than four corners, and at most welds
 TRIANGLE = (0.22, 0.6)  # of triangles without a free edge, and with one or two
 POLYGON = (0.77, 0.87, 0.91, 0.93)  # p of regular polygons of 5, 6, 7 and more corners (the shell)
-WELDED_TRIANGLE, WELDED_ALONE = 2.0 / 3.0, 0.19  # of triangles and of quads with no other crease
+WELDED_TRIANGLE, WELDED_ALONE = 2.0 / 3.0, 0.19  # for triangles, and for quads with no other crease
 Panel = tuple[NDArray, NDArray]  # stiffness of its bends and compliance c of its edges, for G = 1
 
 
 class Plates(NamedTuple):
-    """What panels that bend as plates give to a structure.
+    """Contribution of panels that bend as plates to a structure.
 
     Attributes
     ----------
     bends : (nh,)
         Stiffness of whole bends, N m/rad, in the mesh's order.
     creases : (nf,)
-        By how much both panels of a crease give way to its moment, rad/(N m).
+        Compliance of both panels of a crease to its moment, rad/(N m).
     """
 
     bends: NDArray
     creases: NDArray
 
     def folds(self, crease: NDArray) -> NDArray:
-        """Stiffness (nf,) of whole folds, N m/rad, from that of the creases alone, in series."""
+        """Stiffness (nf,) of whole folds, N m/rad: creases in series with their panels."""
         return crease / (1.0 + crease * self.creases)
 
 
 def panel_plates(
     mesh: Mesh, pattern: Pattern, sheet: Sheet, rigid: str | Sequence[int] | None = None
 ) -> Plates:
-    """Panels of a mesh as plates; rigid ones do not give way to their creases."""
+    """Panels of a mesh as plates; rigid ones add no compliance."""
     count = len(pattern.faces)
     number = edge_lookup(np.concatenate([pattern.creases, pattern.welds]))
     edges = [[number.get(edge_of(a, b), -1) for a, b in around(face)] for face in pattern.faces]
@@ -88,7 +88,7 @@ def panel_plates(
 
 
 def weld_stiffness(pattern: Pattern, sheet: Sheet) -> NDArray:
-    """Stiffness of whole welds (nw,), N m/rad: that of the panels on both sides in series."""
+    """Stiffness of whole welds (nw,), N m/rad: the panels on both sides in series."""
     free = set(edge_lookup(pattern.boundary))
     modulus = sheet.values("bending_modulus", len(pattern.faces))
     compliance = np.zeros(len(pattern.welds))
@@ -102,7 +102,7 @@ def weld_stiffness(pattern: Pattern, sheet: Sheet) -> NDArray:
 
 
 def _quads(mesh: Mesh, pattern: Pattern, sheet: Sheet, edges: list[list[int]]) -> dict[int, Panel]:
-    """Panels of four corners by number; `edges` has the crease or weld on each edge, or -1."""
+    """Panels with four corners, by index; `edges` has the crease or weld on each edge, or -1."""
     faces = pattern.faces
     quads = np.array([p for p, face in enumerate(faces) if len(face) == 4], np.int64)
     corner = np.array([faces[p] for p in quads], np.int64).reshape(-1, 4)
@@ -111,7 +111,7 @@ def _quads(mesh: Mesh, pattern: Pattern, sheet: Sheet, edges: list[list[int]]) -
     straight = np.append(straight_creases(mesh.nodes, hinges, pattern, sheet), False)
     x, center = pattern.vertices[corner], mesh.centers[quads]
     points = np.where((center >= 0)[:, None], mesh.nodes[center], quad_centers(x))
-    cut = mesh.inner[np.searchsorted(mesh.inner_panel, quads)]  # its first bar
+    cut = mesh.inner[np.searchsorted(mesh.inner_panel, quads)]  # first bar of each
     hinged = np.where(center < 0, (cut != corner[:, :1]).all(axis=1), -1)
     nu = sheet.values("poissons_ratio", len(faces))[quads]
     spokes, compliance = quad_bends(x, points, crease >= 0, straight[crease], nu, hinged)
@@ -120,7 +120,7 @@ def _quads(mesh: Mesh, pattern: Pattern, sheet: Sheet, edges: list[list[int]]) -
 
 
 def _other(mesh: Mesh, pattern: Pattern, p: int, rows: slice, nu: float, free: bool) -> Panel:
-    """A panel of three or of more than four corners; `free` if an edge is."""
+    """A panel with three or more than four corners; `free` if an edge is free."""
     x, area = pattern.vertices[list(pattern.faces[p])], float(pattern.face_areas[p])
     shape = area / ((np.roll(x, -1, axis=0) - x) ** 2).sum(axis=1)
     if len(x) == 3:
@@ -142,7 +142,7 @@ def _wings(x: NDArray, bends: NDArray) -> NDArray:
 
 
 def _twisted(spokes: NDArray) -> float:
-    """Sum of the squared turns (m^2) of spokes (m, 3) in the curvatures diag(1, -1) and off it."""
+    """Sum of the squared turns (m^2) of spokes (m, 3) for the curvatures diag(1, -1) and xy."""
     _, _, axes = np.linalg.svd(spokes - spokes.mean(axis=0))
     x, y = (spokes @ axes[:2].T).T
     total = 0.0

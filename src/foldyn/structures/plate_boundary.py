@@ -1,18 +1,18 @@
-"""Panels' plates, condensed to the corners and the center, turns of the edges, and their bows.
+"""Plates of panels, condensed to corners, center, edge turns, and bows.
 
 `PanelPlate` cuts each facet of a panel evenly: all its triangles are the same, half of them turned
-by 180 degrees. So each entry of a panel's stiffness is a sum of entries for its facets, taken as
-single triangles, with factors that all panels with as many corners share. A scale of 1/n makes the
-stiffness of heights n^2 times as large, and leaves that of slopes.
+by 180 degrees. So each entry of a panel's stiffness is a sum of entries for its facets, as single
+triangles, with factors that are equal for all panels with the same number of corners. A scale of
+1/n multiplies the stiffness of heights by n^2, and leaves the stiffness of slopes unchanged.
 
-The unknowns at an edge of n pieces, whatever is held there:
+The unknowns at an edge of n pieces, for any edge condition:
 
     heights   w_i = (1 - i/n) w_0 + i/n w_n + n/(n - 1) L b + e_i - e_(i-1),    i = 1 ... n - 1
     slopes    s_i = s + d_i - d_(i-1),                                          i = 1 ... n
 
-with the bow b, the mean slope s, and e and d, which are 0 at both ends of the edge. Where it is
-straight, b and all e are 0, and where it is clamped all d. Such unknowns stand alone in the matrix,
-with the stiffness 1.
+with the bow b, the mean slope s, and e and d, which are 0 at both ends of the edge. On a straight
+edge, b and all e are 0, on a clamped edge all d. Such unknowns are uncoupled in the matrix, with
+the stiffness 1.
 """
 
 from __future__ import annotations
@@ -37,17 +37,18 @@ from foldyn.structures.panel_plate import (
 
 
 class Cut(NamedTuple):
-    """How the plates of panels with m corners are cut and condensed.
+    """How plates of panels with m corners are cut and condensed.
 
     Attributes
     ----------
     pairs : (k, 2)
-        Unknowns with an entry in the stiffness. Those that stay are the last: heights of corners
-        and center, s of the edges, L b of the edges.
+        Unknowns with an entry in the stiffness. The kept ones are last: heights of corners and
+        center, s of the edges, L b of the edges.
     factors : (k, 36 facets)
-        Entries by those of the stiffness of the facets.
+        Factors from entries of the facets' stiffness to these entries.
     edge : (size,)
-        Where unknowns are 0: k where edge k is straight, m + k where it is clamped, 2 m nowhere.
+        Condition under which an unknown is 0: k if edge k is straight, m + k if it is clamped, 2 m
+        never.
     condensing : Condensing
     """
 
@@ -59,10 +60,10 @@ class Cut(NamedTuple):
 
 @lru_cache(maxsize=64)
 def _cut(m: int, center: bool, n: int) -> Cut:
-    """Of panels with a center or without, with n pieces of each edge, at least 2."""
+    """Cut of panels with or without a center, with n pieces per edge, at least 2."""
     unit, facets = np.eye(m + center), m if center else 1
     points, triangles, at, edges = meshed(unit[:m], unit[-1] if center else None, n)
-    # those turned begin at another corner, so that their sides have the facet's numbers
+    # inverted triangles start at another corner, so that their sides match the facet's numbering
     triangles = triangles.reshape(facets, n * n, 3)
     turned = n * (n + 1) // 2
     triangles[:, turned:] = np.roll(triangles[:, turned:], -1, axis=2)
@@ -91,13 +92,13 @@ def _cut(m: int, center: bool, n: int) -> Cut:
 def _basis(
     at: NDArray, edges: Sequence[NDArray], sides: Sequence[tuple[NDArray, NDArray]], size: int
 ) -> tuple[sparse.csr_array, NDArray]:
-    """Heights and slopes (size,) of a plate by its unknowns; where these are 0, see `Cut`.
+    """Heights and slopes (size,) of a plate by its unknowns; the condition for 0, see `Cut`.
 
     at, edges, sides : heights of corners and center; of the points on each edge (n + 1,); slopes
-        across the sides of each edge and their signs (n,), 1 where they are outward.
+    across the sides of each edge and their signs (n,), 1 if outward.
     """
     m, n = len(edges), len(sides[0][0])
-    first = size - len(at) - 2 * m  # of those that stay
+    first = size - len(at) - 2 * m  # first of the kept unknowns
     own = 2 * n - 3  # e and d of an edge
     steps = np.arange(1, n) / n
     where = np.full(size, 2 * m)
@@ -122,9 +123,9 @@ def _basis(
 
 
 def condensed(panels: Sequence[Outline], poissons_ratio: float, n: int) -> list[NDArray]:
-    """Stiffness of the heights of corners and center, mean outward slopes of creases, and bows.
+    """Stiffness of heights of corners and center, mean outward slopes of creases, and bows.
 
-    For G = 1, of at most eight panels with as many corners each.
+    For G = 1, and up to eight panels with the same number of corners.
 
     n : pieces of each edge.
     """
@@ -150,7 +151,7 @@ def condensed(panels: Sequence[Outline], poissons_ratio: float, n: int) -> list[
 
 
 def _held(stiffness: NDArray, held: NDArray) -> list[NDArray]:
-    """Stiffness of the unknowns that are held (c, k), the others at ease."""
+    """Stiffness of the held unknowns (c, k), with the others in balance."""
     rows, columns = held[:, :, None], held[:, None, :]
     loose = np.where(rows | columns, 0.0, stiffness) + held[:, :, None] * np.eye(held.shape[1])
     across = np.where(~rows & columns, stiffness, 0.0)

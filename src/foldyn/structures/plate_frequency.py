@@ -1,4 +1,4 @@
-"""The frequency above which panels vibrate as plates, whatever their creases do."""
+"""Frequency above which panels vibrate as plates, independent of their creases."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from foldyn.structures.rigid_plates import rigid_panels
 from foldyn.structures.sheet import Sheet
 
 FIRST_OF_A_SQUARE = 13.47  # omega L^2 sqrt(rho t/G) of a free square plate, nu = 0.3 (Leissa 1973)
-BELOW = 0.6  # of the plate frequency: where bars and hinges have the modes of a sheet
-GIVING, AMPLITUDES = 0.8, 2.0  # the same of n5b8e, and of it with internal amplitudes
+BELOW = 0.6  # of the plate frequency: limit up to which bars and hinges have the sheet's modes
+GIVING, AMPLITUDES = 0.8, 2.0  # the same for n5b8e, and for n5b8e with internal amplitudes
 
 
 def plate_frequency(pattern: Pattern, sheet: Sheet, rigid: Collection[int] = ()) -> float:
     """First frequency (Hz) of a free square plate as large as a panel.
 
-    Its side is the panel's longest edge, or the root of its area where that is longer: with five
-    corners and more. Of all panels but rigid ones the lowest one; inf without any, nan of a sheet
-    without density.
+    The side is the panel's longest edge, or the root of its area if that is longer, as with five or
+    more corners. Returns the lowest frequency of all panels that are not rigid; inf without any,
+    nan for a sheet without density.
     """
     count, x = len(pattern.faces), pattern.vertices
     speed = (sheet.values("bending_modulus", count) / sheet.values("areal_density", count)) ** 0.5
@@ -33,9 +33,9 @@ def plate_frequency(pattern: Pattern, sheet: Sheet, rigid: Collection[int] = ())
 
 
 def range_of(structure: Discretized, internal: int = 0) -> tuple[float, float]:
-    """Frequency (Hz) up to which a model has the modes of its sheet, and over that of its plates.
+    """Frequency (Hz) up to which a model has the sheet's modes, and its ratio to the plates' own.
 
-    Infinite for shells and for structures made by hand.
+    inf for shells and for structures made by hand.
     """
     if structure.kind != "bars_and_hinges" or structure.pattern is None:
         return np.inf, np.inf

@@ -1,4 +1,4 @@
-"""Sheets whose numbers are probably in other units than SI: told, and computed all the same."""
+"""Sheets whose values are probably not in SI units: warned of, but computed."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from foldyn.errors import UnitsWarning, warn
 from foldyn.patterns import Pattern
 from foldyn.structures.sheet import Sheet
 
-THICK = 0.2  # of the shortest edge of a panel: no thin sheet any more
-THIN, WIDE = 5e-5, 2.0  # of the shortest edge, and its length, m: of films that are sails
-SLAB = 0.1  # m: what folds is thinner
+THICK = 0.2  # of the shortest edge of a panel: above it a sheet is not thin
+THIN, WIDE = 5e-5, 2.0  # of the shortest edge, and its length, m: thin films of such size are sails
+SLAB = 0.1  # m: sheets that fold are thinner
 SLOWEST, FASTEST = 10.0, 25e3  # m/s, sqrt(E / rho): from soft gels to diamond
 USUAL = 2000.0  # m/s
 PRESSURES = {"kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
@@ -20,7 +20,7 @@ DENSITIES = {"g/cm3": 1e3, "t/mm3": 1e12}
 
 
 def doubt_units(pattern: Pattern, sheet: Sheet) -> None:
-    """Warn of a thickness or a wave speed that no sheet of such panels has."""
+    """Warn of a thickness or a wave speed that no sheet with such panels has."""
     for text in _doubts(pattern, sheet):
         warn(text, "sheets.md#units", UnitsWarning)
 
@@ -52,7 +52,7 @@ def _doubts(pattern: Pattern, sheet: Sheet) -> Iterator[str]:
             "if those of the pattern are meant in mm, make it a thousand times smaller"
         )
     modulus, density = (sheet.values(name, count) for name in ("youngs_modulus", "density"))
-    speed = np.sqrt(modulus / density)  # nan without a density
+    speed = np.sqrt(modulus / density)  # nan without density
     wrong = np.flatnonzero((speed < SLOWEST) | (speed > FASTEST))
     if len(wrong):
         k = int(wrong[0])
@@ -64,7 +64,7 @@ def _doubts(pattern: Pattern, sheet: Sheet) -> Iterator[str]:
 
 
 def _meant(modulus: float, density: float, speed: float) -> str:
-    """What makes the speed that of usual materials."""
+    """Suggestion for values that give the wave speed of usual materials."""
     slow = speed < SLOWEST
     factors = PRESSURES if slow else DENSITIES
 

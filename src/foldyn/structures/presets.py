@@ -1,10 +1,9 @@
-"""Named models: the options of `discretize` that belong together.
+"""Named models: sets of options of `discretize`.
 
-A preset gives what is left out. Without one it is "plate", unless an option is given that stands
-for another: the scheme n5b8e; or for the model of the paper, a calibration other than "plate" or
-superlinear bends without a calibration. A bar law other than "linear" stands for single bars. A
-pattern with welds has "n5b8e" in the place of "plate": a hinge on a weld cannot bend as a plate
-does.
+A preset supplies the options that are not given. The default is "plate", unless a given option
+implies another: the scheme n5b8e; or, for the model of the paper, a calibration other than "plate",
+or superlinear bends without a calibration. A bar law other than "linear" implies independent bars.
+A pattern with welds gets "n5b8e" instead of "plate": a hinge on a weld cannot bend like a plate.
 """
 
 from __future__ import annotations
@@ -50,16 +49,16 @@ def resolved(preset: str | None = None, welds: bool = False, **given: Any) -> Mo
     Parameters
     ----------
     preset : {"plate", "herkal", "merlin2"}, optional
-        See the module for what its absence means.
+        The module docstring describes the default.
     welds : bool
-        Whether the pattern has some.
+        Whether the pattern has welds.
     **given
-        Fields of `ModelOptions` that replace those of the preset, unless they are None.
+        Fields of `ModelOptions` that override the preset, unless they are None.
 
     Raises
     ------
     InputError
-        An option is unknown, or two of them do not go together.
+        An option is unknown, or two options are incompatible.
     """
     known = {name: value for name, value in given.items() if value is not None}
     name = implied(known) if preset is None else choice("preset", preset, PRESETS)
@@ -88,7 +87,7 @@ def resolved(preset: str | None = None, welds: bool = False, **given: Any) -> Mo
 
 
 def implied(given: Mapping[str, Any]) -> str:
-    """Name of the preset that options stand for where none is named."""
+    """Name of the preset that the given options imply."""
     if given.get("scheme") == N5B8E:
         return N5B8E
     if "calibration" in given:
@@ -98,7 +97,7 @@ def implied(given: Mapping[str, Any]) -> str:
 
 
 def _check_bends(options: ModelOptions) -> None:
-    """Refuse laws of bends that have no meaning with the stiffness of the calibration."""
+    """Refuse bend laws that are incompatible with the calibration's stiffness."""
     bends = hinge_law(options.bend_law, "bend_law")
     of_plates = options.calibration == "plate"
     if isinstance(bends, PlateSuperlinear) and bends.onset is None and not of_plates:
@@ -116,7 +115,7 @@ def _check_bends(options: ModelOptions) -> None:
 
 
 def _check_edges(options: ModelOptions) -> None:
-    """Refuse what the scheme n5b8e does not go with, and edges that cannot bow."""
+    """Refuse options that are incompatible with the scheme n5b8e, and edges that cannot bow."""
     if options.scheme != N5B8E:
         if options.straight and not options.bowed:
             raise InputError(

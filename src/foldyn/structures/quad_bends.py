@@ -1,15 +1,15 @@
-"""Bends of quadrilateral panels that move as the corners of a plate: `calibration="plate"`.
+"""Bends of quadrilateral panels that move like the corners of a plate: `calibration="plate"`.
 
-Five nodes have two shapes beside those of a plane: the twist w of the corners and the height w0 of
-the center. Their spokes, kp (whole) on one diagonal and kq on the other, for G = 1, have the energy
+Five nodes have two shapes apart from planes: the twist w of the corners and the height w0 of the
+center. Their spokes, kp (whole) on one diagonal and kq on the other, for G = 1, have the energy
 
     1/2 (w, w0) H (w, w0)^T,  H = kp P + kq Q,  P and Q from the turns of the spokes,
 
-in which forces on the corners alone take the center to w0 = y w. With F the flexibility of a plate
+and forces on the corners alone move the center to w0 = y w. With F the flexibility of a plate
 (`structures.quad_plates`):
 
-- forces alone twist both alike: kp, kq in proportion so that (1, y) H (1, y)^T = 1/F_ww;
-- in that twist the facets turn at the creases as the plate's edges do, s_k + y r_k = F_wk/F_ww, in
+- forces twist both equally: kp and kq are scaled so that (1, y) H (1, y)^T = 1/F_ww; - in that
+twist the facets turn at the creases as the plate's edges do, s_k + y r_k = F_wk/F_ww, in
   the least squares of all creases: that sets y, and by y the ratio kp/kq, which `LARGEST` bounds;
 - moments on creases turn their edges as the plate's. Of the flexibility F_kl the twist gives
   F_ww (s_k + y r_k) (s_l + y r_l) and the center r_k r_l/H_00; with R_kl the rest, c is R_kk, and
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from foldyn.structures.quad_plates import flexibilities, twists
 
 LARGEST = 4.0  # kp/kq or kq/kp
-SHARP = 0.1  # a quad with a corner of less area, over its own, counts as a parallelogram
+SHARP = 0.1  # area of a corner over the quad's, below which the quad counts as a parallelogram
 
 
 def quad_bends(
@@ -34,7 +34,7 @@ def quad_bends(
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
     """Stiffness of spokes and compliance of creases, for the bending stiffness G = 1 N m.
 
-    They do not depend on the size of a panel.
+    Both are independent of the panel's size.
 
     Parameters
     ----------
@@ -50,8 +50,8 @@ def quad_bends(
     Returns
     -------
     (ndarray, ndarray)
-        Stiffness (q, 4) of whole spokes, N m/rad, and c (q, 4), rad/(N m), 0 of free edges. The two
-        spokes of the only diagonal that bends add up to its stiffness; the others have 0.
+        Stiffness (q, 4) of whole spokes, N m/rad, and c (q, 4), rad/(N m), 0 of free edges. If only
+        one diagonal bends, its two spokes add up to its stiffness; the others have 0.
     """
     x, center = _in_plane(corners, centers)
     turns, slopes = _facets(x, center)
@@ -77,14 +77,14 @@ def quad_bends(
 
 
 def _balanced(p: NDArray, q: NDArray, ratio: float) -> NDArray:
-    """Height y (n,) of the center where kq = ratio kp."""
+    """Height y (n,) of the center in balance, for kq = ratio kp."""
     return -(p[:, 0, 1] + ratio * q[:, 0, 1]) / (p[:, 1, 1] + ratio * q[:, 1, 1])
 
 
 def _height(p: NDArray, q: NDArray, wanted: NDArray, hinged: NDArray) -> NDArray:
-    """The height (n,) nearest to the one wanted; on the only diagonal that bends if there is one.
+    """Possible height (n,) closest to `wanted`; fixed if only one diagonal bends.
 
-    A hinge on one diagonal alone does not turn the spokes on the other.
+    With a hinge on one diagonal only, the spokes on the other do not turn.
     """
     ends = _balanced(p, q, 1.0 / LARGEST), _balanced(p, q, LARGEST)
     y = np.clip(wanted, np.minimum(*ends), np.maximum(*ends))
@@ -93,7 +93,7 @@ def _height(p: NDArray, q: NDArray, wanted: NDArray, hinged: NDArray) -> NDArray
 
 
 def _shares(p: NDArray, q: NDArray, y: NDArray, hinged: NDArray) -> tuple[NDArray, NDArray]:
-    """kp and kq (n,) in proportion."""
+    """Relative values of kp and kq (n,)."""
     pull, push = p[:, 0, 1] + y * p[:, 1, 1], -(q[:, 0, 1] + y * q[:, 1, 1])
     one = np.where(hinged == 1, 0.0, np.abs(push))
     other = np.where(hinged == 0, 0.0, np.abs(pull))
@@ -101,7 +101,7 @@ def _shares(p: NDArray, q: NDArray, y: NDArray, hinged: NDArray) -> tuple[NDArra
 
 
 def _products(values: NDArray) -> NDArray:
-    """Products (n, 4, 4) of each two of the values (n, 4)."""
+    """Products (n, 4, 4) of all pairs of the values (n, 4)."""
     return values[:, :, None] * values[:, None, :]
 
 
@@ -111,12 +111,12 @@ def _energy(matrix: NDArray, y: NDArray) -> NDArray:
 
 
 def _in_plane(corners: NDArray, centers: NDArray) -> tuple[NDArray, NDArray]:
-    """Corners (q, 4, 2) and centers (q, 2) in the planes of the panels, of size 1.
+    """Corners (q, 4, 2) and centers (q, 2) in the planes of the panels, scaled to size 1.
 
     Corners are counter-clockwise, with the diagonal of corners 0 and 2 along the first axis.
 
-    A panel with a corner that is nearly straight, or points inward, is no image of a square: the
-    parallelogram with the same diagonals stands for it.
+    A panel with a nearly straight or reentrant corner is not the image of a square: the
+    parallelogram with the same diagonals replaces it.
     """
     middle = corners.mean(axis=1)
     one, other = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
@@ -141,11 +141,11 @@ def _in_plane(corners: NDArray, centers: NDArray) -> tuple[NDArray, NDArray]:
 def _facets(x: NDArray, center: NDArray) -> tuple[NDArray, NDArray]:
     """Turns of the spokes and outward slopes of the facets at the edges, both (n, 2, 4).
 
-    In the twist of size 1 with the center at 0, and of the center at 1 with the corners at 0.
+    For a unit twist with the center at 0, and for the center at 1 with the corners at 0.
     """
     here = x - center[:, None]
     there = np.roll(here, -1, axis=1)
-    heights = np.stack([twists(x), np.full(x.shape[:2], -1.0)], axis=1)  # above the center
+    heights = np.stack([twists(x), np.full(x.shape[:2], -1.0)], axis=1)  # relative to the center
     after = np.roll(heights, -1, axis=2)
     cross = (here[:, :, 0] * there[:, :, 1] - here[:, :, 1] * there[:, :, 0])[:, None]
     by_x = (heights * there[:, None, :, 1] - after * here[:, None, :, 1]) / cross

@@ -1,17 +1,17 @@
-"""Quadrilateral panels as thin plates that their corners twist and moments on their edges bend.
+"""Quadrilateral panels as thin plates, twisted by their corners and bent by edge moments.
 
-The flexibilities of a plate with the bending stiffness G = 1, whose corners keep to a plane but for
-a twist w (heights a_v w, a the combination in which no plane has a part) and whose edges are turned
-by moments M_k in all, spread evenly: the twist and the mean outward slopes beside the edges are
+The flexibilities of a plate with the bending stiffness G = 1, whose corners lie in a plane except
+for a twist w (heights a_v w, a orthogonal to all planes) and whose edges carry total moments M_k,
+evenly distributed: the twist and the mean outward slopes at the edges are
 
     (w, s_1 ... s_4) = F (T, M_1 ... M_4),  T the force on w.
 
-Edges are straight, or free to bow. By Ritz: heights are polynomials in each of the coordinates xi,
-eta of -1 to 1 that the corners span bilinearly (integrated Legendre polynomials, so that an edge
-without those of its own stays straight), and F is extrapolated from the two `DEGREES`. Between
-straight edges that meet at an angle alpha > pi/2 curvatures grow as r^(pi/alpha - 2), and errors
-fall with the power 4 (pi/alpha - 1) of the degree (Babuska and Suri, SIAM Review 36, 1994), of the
-degree + 1 for low ones; corners of free edges are about as bad as those of the angle `OBTUSE`.
+Edges are straight, or free to bow. Ritz method: heights are polynomials in the bilinear coordinates
+xi, eta from -1 to 1 (integrated Legendre polynomials, so that an edge without its own polynomials
+stays straight), and F is extrapolated from the two `DEGREES`. Between straight edges that meet at
+an angle alpha > pi/2 curvatures grow as r^(pi/alpha - 2), and errors fall with the power 4
+(pi/alpha - 1) of the degree (Babuska and Suri, SIAM Review 36, 1994), of the degree + 1 for low
+ones; corners of free edges converge about as slowly as the angle `OBTUSE`.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from numpy.typing import NDArray
 
 DEGREES = (4, 6)
 OBTUSE = 2.0 * np.pi / 3.0
-POINTS = 8  # of Gauss, in each direction
+POINTS = 8  # Gauss points in each direction
 CHUNK = 256  # panels at a time
-DIGITS = 11  # to which panels are alike
+DIGITS = 11  # digits to which equal panels agree
 SIGNS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])  # xi, eta of the corners
 
 
 def flexibilities(x: NDArray, straight: NDArray, poissons_ratio: NDArray) -> NDArray:
-    """Flexibilities F (p, 5, 5) of convex panels of about size 1; those that are alike share them.
+    """Flexibilities F (p, 5, 5) of convex panels of about size 1; equal panels share them.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def flexibilities(x: NDArray, straight: NDArray, poissons_ratio: NDArray) -> NDA
 
 
 def twists(x: NDArray) -> NDArray:
-    """Heights (p, 4) of the corners x (p, 4, 2) in a twist: no plane has a part in them."""
+    """Heights (p, 4) of the corners x (p, 4, 2) in a twist, orthogonal to all planes."""
     planes = np.concatenate([np.ones((*x.shape[:2], 1)), x - x.mean(axis=1, keepdims=True)], axis=2)
     heights = np.stack([np.linalg.det(np.delete(planes, k, axis=1)) for k in range(4)], axis=1)
     heights *= np.array([1.0, -1.0, 1.0, -1.0])
@@ -85,7 +85,7 @@ def _flexibilities(x: NDArray, straight: NDArray, poissons_ratio: NDArray) -> ND
 
 
 def _solved(energy: NDArray, loads: NDArray, held: NDArray) -> NDArray:
-    """Flexibilities (p, 5, 5) without the shapes that are held (p, k)."""
+    """Flexibilities (p, 5, 5) with the shapes `held` (p, k) removed."""
     energy = np.where(held[:, :, None] | held[:, None, :], 0.0, energy)
     energy += held[:, :, None] * np.eye(energy.shape[1])
     loads = np.where(held[:, :, None], 0.0, loads)
@@ -93,7 +93,7 @@ def _solved(energy: NDArray, loads: NDArray, held: NDArray) -> NDArray:
 
 
 def _obtuse(x: NDArray, straight: NDArray) -> NDArray:
-    """Largest angle (p,) between two edges that stay straight, 0 where no two meet."""
+    """Largest angle (p,) between two adjacent straight edges, 0 if there are none."""
     edge = np.roll(x, -1, axis=1) - x
     edge /= np.linalg.norm(edge, axis=2)[:, :, None]
     cosine = -(edge * np.roll(edge, 1, axis=1)).sum(axis=2)
@@ -102,7 +102,7 @@ def _obtuse(x: NDArray, straight: NDArray) -> NDArray:
 
 
 def _edge_and_degree() -> tuple[NDArray, NDArray]:
-    """Edge (k,) that each shape bows, -1 of the twist and of those inside; its degree (k,)."""
+    """Edge (k,) bowed by each shape, -1 for the twist and inner shapes; its degree (k,)."""
     extra = np.arange(2, DEGREES[1] + 1)
     within = np.maximum(extra[:, None], extra).ravel()
     edge = np.repeat([-1, 0, 2, 3, 1, -1], [1, *[len(extra)] * 4, len(within)])
@@ -110,7 +110,7 @@ def _edge_and_degree() -> tuple[NDArray, NDArray]:
 
 
 def _line(t: NDArray, derivative: int) -> tuple[NDArray, NDArray]:
-    """Two linear functions (n, 2) of coordinates t, and those that vanish at the ends (n, d)."""
+    """Two linear functions (n, 2) of coordinates t, and those that vanish at both ends (n, d)."""
     linear, bows = (
         np.stack([legendre.legval(t, c) for c in group], axis=-1)
         for group in _polynomials(derivative)
@@ -120,7 +120,7 @@ def _line(t: NDArray, derivative: int) -> tuple[NDArray, NDArray]:
 
 @cache
 def _polynomials(derivative: int) -> tuple[list[NDArray], list[NDArray]]:
-    """Their Legendre coefficients."""
+    """Legendre coefficients of these functions."""
     ends = [np.array([0.5, -0.5]), np.array([0.5, 0.5])]
     inner = [legendre.legint(np.eye(j + 1)[j], lbnd=-1.0) for j in range(1, DEGREES[1])]
     linear, bows = ([legendre.legder(c, derivative) for c in group] for group in (ends, inner))
@@ -158,7 +158,7 @@ def _curvatures(x: NDArray, at: NDArray) -> tuple[NDArray, NDArray]:
     inverse = np.linalg.inv(jacobian)  # rows xi, eta; columns x, y
     slopes = np.stack([_shapes(heights, at, 1, 0), _shapes(heights, at, 0, 1)], axis=2)
     by = np.swapaxes(inverse, 2, 3) @ slopes  # by x, y
-    # d2 w/d xi2 and so on, less what bends the coordinates: x, y are bilinear
+    # d2 w/d xi2 etc., minus the effect of curved coordinates: x, y are bilinear
     mixed = 0.25 * np.einsum("v,pva->pa", SIGNS[:, 0] * SIGNS[:, 1], x)
     xi, eta = _shapes(heights, at, 2, 0), _shapes(heights, at, 0, 2)
     cross = _shapes(heights, at, 1, 1) - np.einsum("pa,pnak->pnk", mixed, by)
@@ -173,7 +173,7 @@ def _curvatures(x: NDArray, at: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _mean_slope(x: NDArray, k: int, nodes: NDArray, weights: NDArray) -> NDArray:
-    """Mean outward slopes (p, k) beside edge k of all shapes."""
+    """Mean outward slopes (p, k) of all shapes at edge k."""
     start, end = SIGNS[k], SIGNS[(k + 1) % 4]
     at = 0.5 * ((1.0 - nodes)[:, None] * start + (1.0 + nodes)[:, None] * end)
     heights = twists(x)

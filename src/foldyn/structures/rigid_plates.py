@@ -1,9 +1,9 @@
-"""Points of a rigid plate, and the panels of a structure that are one.
+"""Points of a rigid plate, and the panels of a structure that are rigid plates.
 
-A point in the plane of three others is their sum with weights that add up to one. Any motion of a
-plate that stays flat takes the point to the sum of the three with the same weights, however far it
-turns: u = w1 u1 + w2 u2 + w3 u3, with constant weights. A panel whose nodes all ride so on three of
-its corners keeps its plane; it may still deform in it, as its bars or its membrane let it.
+A point in the plane of three others is their sum with weights that add up to one. In any motion of
+a plate that stays flat, the same weights apply, for arbitrary rotations: u = w1 u1 + w2 u2 + w3 u3.
+A panel whose nodes all follow three of its corners in this way stays plane; its bars or its
+membrane may still deform in the plane.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.values import indices, show
 
-OFF_PLANE = 1e-9  # of the size of three corners: how far a point may lie off their plane
-ON_LINE = 1e-9  # sine of an angle between points that are on one line
+OFF_PLANE = 1e-9  # of the size of three corners: largest distance of a point from their plane
+ON_LINE = 1e-9  # sine of an angle below which points are collinear
 
 
 class Plate(NamedTuple):
-    """A rigid panel: k nodes that ride on three of its corners."""
+    """A rigid panel: k nodes that follow three of its corners."""
 
     riders: NDArray  # (k,)
     corners: NDArray  # (3,)
@@ -34,8 +34,8 @@ class Plate(NamedTuple):
 def on_plate(points: NDArray, corners: NDArray) -> tuple[NDArray, NDArray]:
     """Weights (k, 3) of points (k, 3) in the plane of three corners (3, 3).
 
-    Also how far (k,) each lies off that plane, relative to the corners' size; nan where these are
-    on a line.
+    Also returns the distance (k,) of each from that plane, relative to the corners' size; nan if
+    the corners are collinear.
     """
     a, b = corners[1] - corners[0], corners[2] - corners[0]
     size = float(max(np.linalg.norm(a), np.linalg.norm(b)))
@@ -52,7 +52,7 @@ def on_plate(points: NDArray, corners: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def checked_panels(rigid: Any, count: int, field: str = "rigid") -> str | tuple[int, ...] | None:
-    """Return which of `count` panels are rigid: "all", their numbers, or None for none."""
+    """Rigid panels among `count` panels: "all", their indices, or None for none."""
     if rigid is None or (isinstance(rigid, str) and rigid == "all"):
         return rigid
     if isinstance(rigid, str):
@@ -71,7 +71,7 @@ def checked_panels(rigid: Any, count: int, field: str = "rigid") -> str | tuple[
 
 
 def rigid_panels(rigid: str | Sequence[int] | None, count: int) -> Sequence[int]:
-    """Numbers of the rigid panels among `count`; `rigid` as `checked_panels` returns it."""
+    """Indices of the rigid panels among `count`; `rigid` as `checked_panels` returns it."""
     return range(count) if isinstance(rigid, str) else rigid or ()
 
 
@@ -92,7 +92,7 @@ def rigid_plates(
     rigid: str | Sequence[int] | None, faces: Sequence[Sequence[int]], nodes: NDArray,
     triangles: NDArray, panel: NDArray,
 ) -> tuple[Plate, ...]:  # fmt: skip
-    """Plates of the rigid panels; those with no node beside three corners have nothing to ride.
+    """Plates of the rigid panels; panels with only three nodes need none.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def rigid_plates(
 
 
 def _widest(nodes: NDArray, face: Sequence[int]) -> NDArray[np.int64]:
-    """The three corners of a panel that span the largest triangle; the first of equal ones."""
+    """The three corners of a panel that span the largest triangle; the first if equal."""
 
     def area(three: tuple[int, ...]) -> float:
         a, b, c = nodes[list(three)]

@@ -1,4 +1,4 @@
-"""What panels that are alike share: values kept for many panels, found for several at once."""
+"""Cache of functions of panels: equal arguments share values, computed for several at once."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from foldyn.jit.eights import COUNT
 
 Value = TypeVar("Value")
 Find = Callable[[Sequence[tuple]], list[Value]]
-ROOM = 4096  # values of each kind that are kept, the latest
+ROOM = 4096  # cached values of each kind; older ones are dropped
 
 
 class Shared(Generic[Value]):
-    """A function whose values are kept; see `shared`."""
+    """A function with cached values; see `shared`."""
 
     def __init__(self, find: Find[Value], alike: Callable[..., Hashable]) -> None:
         self._find, self._alike = find, alike
@@ -24,7 +24,7 @@ class Shared(Generic[Value]):
         return self.each([given])[0]
 
     def each(self, many: Sequence[tuple]) -> list[Value]:
-        """Values for the arguments of many calls."""
+        """The values for the arguments of many calls."""
         found = {given: self._kept[given] for given in many if given in self._kept}
         groups: dict[Hashable, list[tuple]] = {}
         for given in dict.fromkeys(many):
@@ -43,6 +43,6 @@ def shared(alike: Callable[..., Hashable]) -> Callable[[Find[Value]], Shared[Val
     """Decorator of functions from the arguments of at most `COUNT` calls to their values.
 
     alike : callable
-        From the arguments of a call to what calls have in common that are made together.
+        Maps the arguments of a call to a key; calls with equal keys are computed together.
     """
     return lambda find: Shared(find, alike)

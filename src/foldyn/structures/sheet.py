@@ -1,4 +1,4 @@
-"""What a pattern is made of: a sheet, and panels that differ from the rest of it."""
+"""The material of a pattern: a sheet, and panels that differ from it."""
 
 from __future__ import annotations
 
@@ -51,9 +51,9 @@ class PanelSheet(Checked):
     Parameters
     ----------
     panels : int or sequence of int
-        Their numbers, in the order of `pattern.faces`.
+        Their indices, in the order of `pattern.faces`.
     youngs_modulus, poissons_ratio, thickness, density : float, optional
-        As in `Sheet`, at least one of them; what is left out is that of the sheet.
+        As in `Sheet`, at least one of them; the others are the sheet's.
 
     Raises
     ------
@@ -68,13 +68,13 @@ class PanelSheet(Checked):
     density: Density | None = None
 
     def agree(self) -> None:
-        """Ask for something that differs."""
+        """Refuse panels without a value that differs."""
         if not self.own:
             raise InputError(f": give what differs there: {', '.join(MATERIAL)}", "panels")
 
     @property
     def own(self) -> dict[str, float]:
-        """What differs from the rest of the sheet."""
+        """The values that differ from the rest of the sheet."""
         return {name: getattr(self, name) for name in self.given(*MATERIAL)}
 
 
@@ -101,7 +101,7 @@ class Sheet(Checked):
     Raises
     ------
     InputError
-        A value out of its range; a panel named twice; a density of panels of a sheet without one.
+        A value out of its range; a panel named twice; panels with a density in a sheet without one.
 
     Examples
     --------
@@ -125,7 +125,7 @@ class Sheet(Checked):
     place = "sheet: "
 
     def agree(self) -> None:
-        """Refuse panels that are named twice, and densities of some of them alone."""
+        """Refuse panels that are named twice, and densities of some panels only."""
         before: dict[int, int] = {}
         for i, part in enumerate(self.panels):
             if part.density is not None and self.density is None:
@@ -153,12 +153,12 @@ class Sheet(Checked):
         return math.nan if self.density is None else self.density * self.thickness
 
     def of(self, panel: int) -> Sheet:
-        """The sheet of one panel, which is the same everywhere."""
+        """The sheet of one panel, without differing panels."""
         kinds, kind = self.kinds(panel + 1)
         return kinds[kind[panel]]
 
     def kinds(self, count: int) -> tuple[list[Sheet], NDArray[np.int64]]:
-        """Sheets without differing panels, and which of them each of `count` panels has."""
+        """Uniform sheets, and the index of the sheet of each of `count` panels."""
         rest = replace(self, panels=())
         kind = np.zeros(count, np.int64)
         for number_of, part in enumerate(self.panels, 1):
@@ -167,7 +167,7 @@ class Sheet(Checked):
         return [rest, *(replace(rest, **part.own) for part in self.panels)], kind
 
     def values(self, name: str, count: int) -> NDArray[np.float64]:
-        """An attribute of the sheet, as "thickness", for each of `count` panels (count,)."""
+        """An attribute of the sheet, such as "thickness", for each of `count` panels (count,)."""
         kinds, kind = self.kinds(count)
         return np.array([getattr(sheet, name) for sheet in kinds], float)[kind]
 

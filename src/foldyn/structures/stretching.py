@@ -1,10 +1,11 @@
-"""Whether a result rests on how panels stretch in their plane, which models get only roughly.
+"""Whether a result depends on in-plane stretching of panels, where models are inaccurate.
 
-A panel's bars are right in uniform strain at most, and too stiff in all else. Coupled ones have the
-panel's membrane, but edges that are straight: too stiff, too, where panels of four corners stretch
-as a whole, which takes the energy of their mean strains; those that bend in their plane are right.
-With the scheme n5b8e edges give way, which is right in open sheets; closed ones, and sheets with
-welds, are off by 5 to 20 % there, either way (docs/models.md, "Where panels stretch").
+A panel's bars are exact at best in uniform strain, and too stiff otherwise. Coupled bars have the
+panel's membrane stiffness, but with straight edges: this is also too stiff if quadrilateral panels
+stretch as a whole, with the energy of their mean strains, but accurate if they bend in their plane.
+With the scheme n5b8e edges give way, which is accurate in open sheets; closed sheets, and sheets
+with welds, are off by 5 to 20 % there, in either direction (docs/models.md, "Where panels
+stretch").
 """
 
 from __future__ import annotations
@@ -22,22 +23,22 @@ SINGLE, TRIANGLES, COUPLED, GIVING = 0.05, 0.1, 0.4, 0.5
 """Shares of the strain energy above which it is told: with single bars; with coupled ones of
 triangles, and by mean strains of other panels; and where edges give way. Measured with the mixed
 sets of docs/fidelity.md."""
-LEAST = 1e-9  # mean strain of the bars, below which rounding may be all there is
-FELT = 1e-3  # of the kinetic energy: less strain energy does not matter to a motion
+LEAST = 1e-9  # mean strain of the bars that may be rounding error
+FELT = 1e-3  # of the kinetic energy: less strain energy does not affect a motion
 SHELL = "compare with the shell (foldyn fidelity, fd.fidelity) or take it (--model shell, fd.shell)"
 
 
 class Stretch(NamedTuple):
-    """State with the largest strain energy: its number, and the share that stretching has in it."""
+    """State with the largest strain energy: its index, and the share of stretching in it."""
 
     at: int
     share: float
 
 
 def most(structure: Discretized) -> float:
-    """Share of the strain energy that stretching may have before a result is doubtful.
+    """Share of stretching in the strain energy above which a result is doubtful.
 
-    Infinite of structures made by hand, of shells, and of open sheets whose edges give way.
+    inf for structures made by hand, for shells, and for open sheets whose edges give way.
     """
     pattern = structure.pattern
     if BARS not in structure.energy_groups or pattern is None:
@@ -52,7 +53,7 @@ def most(structure: Discretized) -> float:
 
 
 def remedy(structure: Discretized) -> str:
-    """What to do where stretching has more than that share: the end of a message."""
+    """Remedy if stretching exceeds that share: the end of a message."""
     if not getattr(structure, "membranes", ()):
         return f'where single bars are far too stiff: take membrane = "panel", or {SHELL}'
     if getattr(structure, "edge_gives", None) is None:
@@ -66,9 +67,9 @@ def remedy(structure: Discretized) -> str:
 def stretch(
     structure: Discretized, energies: Mapping[str, NDArray], displacement: Any
 ) -> Stretch | None:
-    """What stretching holds in states with these energies (k,), J, by name; None if that is little.
+    """Share of stretching in states with energies (k,), J, by name; None if it is small.
 
-    Nor is it told of motions that hardly strain the structure: `kinetic` is among theirs.
+    Also None for motions that hardly strain the structure; their energies include `kinetic`.
     displacement : (k, n, 3) of the states, m.
     """
     limit = most(structure)
@@ -107,7 +108,7 @@ def stretching(structure: Discretized, displacement: NDArray, motions: NDArray) 
 
 
 def _gradients(structure: Discretized, field: NDArray) -> NDArray:
-    """Mean gradients (..., f, 3, 2) in the panels of what nodes have (..., n, 3)."""
+    """Mean gradients (..., f, 3, 2) in the panels of nodal values (..., n, 3)."""
     pattern, found = structure.pattern, []
     for face, normal in zip(pattern.faces, pattern.face_normals, strict=True):
         x = pattern.vertices[list(face)]
@@ -119,7 +120,7 @@ def _gradients(structure: Discretized, field: NDArray) -> NDArray:
 
 
 def _of_strains(structure: Discretized, strain: NDArray) -> NDArray:
-    """Twice the energy (...), J, of strains (..., f, 2, 2) that are the same all over a panel."""
+    """Twice the energy (...), J, of strains (..., f, 2, 2) that are uniform in each panel."""
     names = ("youngs_modulus", "poissons_ratio", "thickness")
     modulus, nu, thickness = (structure.sheet.values(name, strain.shape[-3]) for name in names)
     stiffness = modulus * thickness * structure.pattern.face_areas / (1.0 - nu**2)

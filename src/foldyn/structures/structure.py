@@ -63,7 +63,7 @@ MEMBRANES = ("bars", "panel")
 
 @dataclass(frozen=True)
 class ModelOptions(Checked):
-    """Options of a structure, all of them; see `discretize` and `foldyn.structures.presets`."""
+    """All options of a structure; see `discretize` and `foldyn.structures.presets`."""
 
     scheme: Annotated[str, Check(choice, known=SCHEMES)] = "n5b8"
     mass: str = "consistent"
@@ -80,7 +80,7 @@ class ModelOptions(Checked):
 
     @property
     def bowed(self) -> bool:
-        """Whether edges bow between their ends, but for those that are `straight`."""
+        """Whether edges that are not `straight` bow between their ends."""
         return self.scheme == "n5b8e" or self.membrane == "panel"
 
 
@@ -102,13 +102,13 @@ class Structure(Discretized):
         Hinge rows (axis j, k, wings i, l) in the order of `pattern.creases`; stiffness of the
         whole crease (N m/rad); rest dihedral (rad).
     panel_softness : (nf,)
-        Turn (rad/(N m)) by which the panels beside each crease give way to its moment, a part of
-        the turn of its fold (`foldyn.materials.series`).
+        Turn (rad/(N m)) of the panels at each crease per unit of its moment, a part of the turn of
+        its fold (`foldyn.materials.series`).
     bends, bend_stiffness, bend_rest : (nh, 4), (nh,), (nh,)
         The same for the hinges inside panels.
     bend_onset : (nh,)
-        Turn (rad) from which bends of the law `PlateSuperlinear` are no longer linear, where the
-        law leaves it to them.
+        Turn (rad) above which bends of the law `PlateSuperlinear` are nonlinear, if the law has no
+        onset of its own.
     triangles, triangle_panel : (nt, 3), (nt,)
         Triangles, counter-clockwise from the front, and the panel of each.
     centers : (np,)
@@ -116,15 +116,15 @@ class Structure(Discretized):
     clamps, clamp_stiffness : (c, 3), (c,)
         Triangles at clamped edges, from the edge's first end; stiffness (N m/rad).
     edge_plates : EdgePlates or None
-        Panels as plates, of the scheme n5b8e.
+        Panels as plates, for the scheme n5b8e.
     membranes : tuple of PanelKind
-        What couples the bars of panels, with `membrane = "panel"`: `bar_area` does not resist then.
+        Coupling of the bars of panels, with `membrane = "panel"`: `bar_area` is not used then.
     edge_gives : EdgeGives or None
-        How edges give way near their ends, in the plane of panels; of the scheme n5b8e.
+        How edges give way near their ends, in the plane of panels; for the scheme n5b8e.
     without_edge_angles : bool
-        Whether its edge angles, and the gives of its edges, are no dofs but stay in balance.
+        Whether edge angles and gives are kept in balance instead of being dofs.
     pattern, sheet, options
-        What it was made from.
+        Its input.
     """
 
     nodes: NDArray
@@ -165,7 +165,7 @@ class Structure(Discretized):
 
     @cached_property
     def bowed_edges(self) -> frozenset[Edge]:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """See `Discretized`."""
+        """Edges that may bow between their ends; see `Discretized`."""
         if self.pattern is None or not self.options.bowed:
             return frozenset()
         return frozenset(edge_lookup(self.pattern.lines)) - {
@@ -190,7 +190,7 @@ class Structure(Discretized):
 
     @cached_property
     def model(self) -> mechanics.BarsHinges:
-        """The arrays that the compiled kernels work on."""
+        """Arrays for the compiled kernels."""
         return mechanics.build(
             self.nodes,
             self.bars,
@@ -211,7 +211,7 @@ class Structure(Discretized):
 
     @cached_property
     def body(self) -> Assembly:
-        """What solvers take."""
+        """The model for solvers."""
         if self.edge_plates is not None:
             return self._coupled(self._plates_term(self.edge_plates))
         rows = [self._rows(group, kind.nodes) for group, kind in enumerate(self.hinge_kinds)]
@@ -225,7 +225,7 @@ class Structure(Discretized):
         )
 
     def _coupled(self, sheet: BarsHingesTerm | BarsPlatesTerm) -> Assembly:
-        """A sheet with the membranes of its panels, in the place of single bars."""
+        """A sheet with the membranes of its panels, in place of independent bars."""
         if not self.membranes:
             return Assembly(sheet)
         body = Assembly(
@@ -240,7 +240,7 @@ class Structure(Discretized):
 
     @property
     def massless(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Its dofs without mass, in words."""
+        """Its massless dofs, in words; empty if there are none."""
         there = self.edge_plates is not None and not self.without_edge_angles
         return "the edge angles of the scheme n5b8e" if there else ""
 
@@ -251,7 +251,7 @@ class Structure(Discretized):
 
     def _plates_term(self, plates: EdgePlates) -> BarsPlatesTerm:
         stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
-        if self.edge_gives is not None and not self.without_edge_angles:  # dofs of no plate
+        if self.edge_gives is not None and not self.without_edge_angles:  # unlike dofs of plates
             hinge = {frozenset(axis): k for k, axis in enumerate(self._axes)}
             gives = [hinge[frozenset(edge)] for edge in self.edge_gives.edge.tolist()]
             plates = plates._replace(rotation_hinge=np.append(plates.rotation_hinge, gives))
@@ -265,7 +265,7 @@ class Structure(Discretized):
 
     @cached_property
     def condensed(self) -> Structure | None:
-        """See `Discretized`."""
+        """The structure without massless dofs; None if it has none; see `Discretized`."""
         if not self.massless:
             return None
         other = replace(self, without_edge_angles=True)
@@ -281,7 +281,7 @@ class Structure(Discretized):
         )
 
     def _rows(self, group: int, hinges: NDArray) -> NDArray:
-        """Rows in `model.hinges` of the folds (group 0) or bends (1), which may be mixed there."""
+        """Rows in `model.hinges` of the folds (group 0) or bends (1), which may be interleaved."""
         there = np.flatnonzero(self.model.hinge_group == group)
         rows = np.empty(len(there), np.int64)
         rows[np.lexsort(hinges.T)] = there[np.lexsort(self.model.hinges[there].astype(np.int64).T)]
@@ -326,7 +326,7 @@ class Structure(Discretized):
         return mass
 
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
-        """See `Discretized`; a bar between panels takes their mean strain."""
+        """Effect of swelling; a bar between panels gets their mean strain. See `Discretized`."""
         stress, none = np.zeros(0), np.zeros(0)
         if self.membranes:
             own = self.membranes, self.edge_gives, self.nodes, strain
@@ -366,8 +366,8 @@ class Structure(Discretized):
     def _curled(self, plates: EdgePlates, curvature: NDArray) -> tuple[Following, NDArray, NDArray]:
         """Moments on the hinges of plates, and forces (r,), N, on the dofs of their edge angles.
 
-        With the moments (nq,), N m, of all angles of plates. The energies of the plates are linear
-        in these curvatures.
+        Also returns the moments (nq,), N m, of all angles of plates. The plates' energies are
+        linear in these curvatures.
         """
         area = 0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
         area = np.bincount(self.triangle_panel, area)
@@ -387,7 +387,7 @@ class Structure(Discretized):
 
     @cached_property
     def surface(self) -> Surface:
-        """See `Discretized`; panels as plates are level at their clamped edges."""
+        """Triangles with masses; panels as plates are level at clamped edges. See `Discretized`."""
         made = super().surface
         if self.edge_plates is None:
             return made
@@ -397,7 +397,7 @@ class Structure(Discretized):
 
     @cached_property
     def outlines(self) -> list[Outline | None]:
-        """Outlines of its panels as plates; None of rigid ones."""
+        """Outlines of its panels as plates; None for rigid ones."""
         pattern, options = self.pattern, self.options
         assert pattern is not None
         hinges = np.concatenate([self.folds, self.bends[len(self.bends) - len(pattern.welds) :]])
@@ -408,7 +408,7 @@ class Structure(Discretized):
 
     @cached_property
     def _chords(self) -> tuple[Chords, Chords]:
-        """How curvature turns its hinges, folds first, and its clamps."""
+        """Turns of its hinges, folds first, and its clamps per curvature."""
         hinges = np.concatenate([kind.nodes for kind in self.hinge_kinds])
         of_hinges, of_clamps = (
             chords(self.nodes, self.triangles, self.triangle_panel, rows)
@@ -440,9 +440,9 @@ class Structure(Discretized):
         u : (n, 3)
             Displacement.
         floor : float, optional
-            Hinge slopes below floor times the hinge's stiffness are raised to it. Without it
-            the tangent is the exact second derivative of the energy: singular at rest where
-            superlinear bends have no slope.
+            Lower bound for hinge slopes, relative to the hinge's stiffness. Without it the tangent
+            is the exact second derivative of the energy: singular at rest where superlinear bends
+            have no slope.
         """
         return balanced(
             self.body.tangent(self.body.dofs(self._displacement(u)), floor), self.body.hidden

@@ -1,17 +1,17 @@
-"""Panels that would, if they were free, stretch and curl: by heat, moisture or growth.
+"""Panels that heat, moisture or growth would stretch and curl if they were free.
 
 A bar that would have the stretch 1 + e gets the constant second Piola-Kirchhoff stress -S(1 + e),
-S its law: it is free of force where it has that stretch.
+with S its law: it is free of force at that stretch.
 
-A panel that would curl to a paraboloid w = kappa r^2 / 2, towards its front, has no moment where
-each hinge inside it turns by what the paraboloid through its nodes has there. A wing at the
-distance h from an axis of the length L, s along it, then stands higher over the axis by
-kappa (h^2 + s^2 - s L) / 2, so that the dihedral of a hinge is smaller by the sum over its wings of
+A panel that would curl to a paraboloid w = kappa r^2 / 2, toward its front, has no moment if each
+hinge inside it turns as the paraboloid through its nodes does. A wing at the distance h from an
+axis of the length L, at the position s along it, then rises over the axis by kappa (h^2 + s^2 - s
+L) / 2, so that the dihedral of a hinge is smaller by the sum over its wings of
 
     kappa (h - s (L - s) / h) / 2.
 
-The same holds of a fold, whose panels meet under their own tangents: the chords between its nodes
-are what its dihedral is made of.
+The same applies to a fold, whose panels meet at their own tangents: its dihedral is measured
+between chords of its nodes.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from foldyn.mechanics.following import Following
 
 
 class Swelling(NamedTuple):
-    """What swollen panels add to a structure.
+    """Additions to a structure due to swollen panels.
 
-    Parts with quadratic energies have free strains, in the plane and in bending, and what these
-    push with: `mechanics.heat`.
+    Parts with quadratic energies have free strains, in the plane and in bending, and their forces;
+    see `mechanics.heat`.
     """
 
     turns: NDArray  # (nr,) changes of rest angles, rad
@@ -40,7 +40,7 @@ class Swelling(NamedTuple):
 
 
 def chord_turns(corners: NDArray) -> NDArray:
-    """(h - s (L - s) / h) / 2 (n,), m, of corners (n, 3, 3): the ends of an axis and a wing."""
+    """(h - s (L - s) / h) / 2 (n,), m, for corners (n, 3, 3): two axis ends and a wing."""
     start, end, wing = np.moveaxis(corners, 1, 0)
     axis, arm = end - start, wing - start
     length = np.linalg.norm(axis, axis=1)
@@ -50,7 +50,7 @@ def chord_turns(corners: NDArray) -> NDArray:
 
 
 def panel_of_triangle(triangles: NDArray, panel: NDArray, wanted: NDArray) -> NDArray:
-    """Panels of triangles `wanted` (n, 3), whatever the order of their corners."""
+    """Panels of the triangles `wanted` (n, 3), for any order of their corners."""
     known, sought = np.split(_numbers(np.concatenate([triangles, wanted])), [len(triangles)])
     order = np.argsort(known, kind="stable")
     place = order[np.searchsorted(known[order], sought, "right") - 1]
@@ -60,20 +60,20 @@ def panel_of_triangle(triangles: NDArray, panel: NDArray, wanted: NDArray) -> ND
 
 
 def _numbers(triangles: NDArray) -> NDArray:
-    """A number (n,) of each triangle (n, 3), equal for those of the same corners."""
+    """A number (n,) for each triangle (n, 3), equal if the corners are the same."""
     low, middle, high = np.sort(triangles, axis=1).T
     size = int(triangles.max(initial=0)) + 1
     return (low * size + middle) * size + high
 
 
 class Chords(NamedTuple):
-    """Wings of hinges, w of each of n hinges: how the curvature of their panels turns them."""
+    """Wings of n hinges, w each: the effect of panel curvature on their angles."""
 
     panel: NDArray  # (w, n)
     turn: NDArray  # (w, n) `chord_turns`, m
 
     def turns(self, curvature: NDArray) -> NDArray:
-        """Changes (n,), rad, of the angles at curvatures (np,), 1/m, of the panels."""
+        """Changes (n,), rad, of the angles for panel curvatures (np,), 1/m."""
         change = np.zeros(self.panel.shape[1])
         for panel, turn in zip(self.panel, self.turn, strict=True):
             change -= curvature[panel] * turn
@@ -93,7 +93,7 @@ def chords(x: NDArray, triangles: NDArray, panel: NDArray, hinges: NDArray) -> C
 
 
 def mean_of_neighbors(pairs: NDArray, triangles: NDArray, value: NDArray) -> NDArray:
-    """Mean (k,) over the triangles (nt, 3) on each pair of nodes (k, 2) of their values (nt,)."""
+    """Mean (k,) over the triangles (nt, 3) at each pair of nodes (k, 2) of their values (nt,)."""
     sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)).reshape(-1, 2)
     size = int(triangles.max(initial=0)) + 1
     key = np.sort(pairs) @ [size, 1]
