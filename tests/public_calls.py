@@ -227,8 +227,8 @@ def solved(folder: Path) -> Calls:
     return {
         "simulate": (fd.simulate, {
             "case": case(), "duration": 0.02, "method": "rk4", "dt": 1e-3, "every_steps": 2,
-            "interval": None, "initial": fd.State(), "force": False, "tolerance": None, "start": 0.0,
-            "progress": None, "spectral_radius": None, "sample": None, "store": None,
+            "interval": None, "initial": fd.State(), "force": False, "tolerance": None,
+            "start": 0.0, "progress": None, "spectral_radius": None, "sample": None, "store": None,
             "checkpoint": 60.0, "resume": False, "device": "cpu",
         }),
         "simulate_many": (fd.simulate_many, {
