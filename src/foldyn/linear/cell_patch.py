@@ -299,7 +299,7 @@ def hidden_sites(structure: Any, unit: NDArray, step: NDArray) -> list[Site]:
         of_give: dict[int, Site] = {}
         for panel, numbers in zip(gives.panel.tolist(), gives.number.tolist(), strict=True):
             sides_ = [s for s in around(structure.pattern.faces[panel]) if edge_of(*s) in edges]
-            ends_ = [(side, end) for side in sides_ for end in side]  # as in the panel's gives
+            ends_ = [(side, end) for side in sides_ for end in side]  # in the panel's order
             for number, (side, end) in zip(numbers, ends_, strict=False):
                 of_give[number] = site(side, ("give", place[end] == min(place[v] for v in side)))
         found += [of_give[number] for number in range(gives.count)]

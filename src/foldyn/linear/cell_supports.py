@@ -107,7 +107,7 @@ class Repeated:
         return sorted(node for part in parts for _, node in self._copies[part])
 
     def _groups(self, nodes: Sequence[int]) -> list[tuple[Step, list[int]]]:
-        """Copies of a group of nodes that are complete in the patch, and the offset of each."""
+        """Complete copies of a group of nodes in the patch, each with its offset."""
         sites = [self.own[v] for v in nodes]
         base = sites[0][0]
         found = []

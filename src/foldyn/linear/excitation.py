@@ -159,7 +159,7 @@ def _base(case: Case, part: BaseMotion, amplitude: float) -> Drive:
     ):
         raise InputError(
             f"drive[0]: an Impose holds nodes along {part.axis}, which would not follow the base; "
-            "use Fix instead of Impose there and start from a state that has been brought there"
+            "use Fix instead of Impose there and start from a state with these displacements"
         )
     held = case.fixed[:, column]
     if not (case.reaction_dofs % 3 == column).any():

@@ -63,7 +63,7 @@ BESIDE = ("standard", "plate", "n5b8e")
 SHOWN = ("calibration", "mass", "bend_law")
 """Options that distinguish models in tables."""
 BEYOND = 2  # extra modes of the shell that are computed, but not compared
-RUNS, SECONDS = 5, 3.0  # timed runs of a modal analysis, and seconds that end them
+RUNS, SECONDS = 5, 3.0  # most timed runs of a modal analysis, and their time limit, s
 
 
 def fidelity(

@@ -141,7 +141,7 @@ def damped_mode(
             break
     raise ComputationError(
         f"the mode near {np.sqrt(value) / (2.0 * np.pi):.6g} Hz is not found with the memory of "
-        "its creases: they damp it too much to be one"
+        "its creases: they damp it so strongly that it does not vibrate"
     )
 
 

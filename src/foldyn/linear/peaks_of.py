@@ -44,7 +44,7 @@ class Peak:
         Damping ratio from the half-power points: exact for a single mode, and
         (upper - lower) / (2 peak).
     asymmetry : float
-        Asymmetry of the half-power points; above 0.1 the peak has more than a single mode.
+        Asymmetry of the half-power points; above 0.1 it is not the peak of a single mode.
     natural_frequency, damping_ratio : float
         From the circle fit (Hz).
     frequency_error, damping_error : float

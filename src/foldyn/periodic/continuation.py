@@ -180,7 +180,7 @@ class Stride:
 
     first: float
     longest: float
-    most: int  # points
+    most: int  # largest number of points
 
 
 @dataclass(frozen=True, eq=False)
