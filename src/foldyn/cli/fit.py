@@ -166,6 +166,7 @@ def plan_of(given: argparse.Namespace) -> FitFile:
 
 
 def _of_case(path: Path, given: argparse.Namespace) -> FitFile:
+    """Plan a fit of a case file from the command line's data, parameters and ties."""
     from foldyn.experiment.calibration.fit_file import FitFile
     from foldyn.experiment.calibration.measured_files import recognize
 

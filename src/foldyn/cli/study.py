@@ -100,6 +100,7 @@ def _data(names: Sequence[str] | None, say: Say) -> Data | None:
 
 
 def _study(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence[Done]]:
+    """Compute the case studies and the specimen; return the page and the outcome of all tasks."""
     from foldyn.analyses.provenance import Call
     from foldyn.studies.herkal import report
     from foldyn.studies.herkal.study import FULL, QUICK, RESULTS, Study
@@ -135,6 +136,7 @@ def _waves(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence
 
 
 def _vary(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence[Done]]:
+    """Compute the sensitivity of the case studies; return its page and the tasks' outcome."""
     from foldyn.studies import pool
     from foldyn.studies.herkal import report, sensitivity, variations
     from foldyn.studies.herkal.study import CASES, QUICK, VARIED

@@ -232,6 +232,7 @@ def _are_photos(inputs: Sequence[str]) -> bool:
 
 
 def _tracking(given: Namespace) -> Tracking:
+    """Settings of the tracking from the options."""
     from foldyn.experiment import CornerSettings, Placing, Scale, Tracking, scale_of_lengths
 
     if given.scale is not None and given.reference:

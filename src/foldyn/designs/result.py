@@ -78,7 +78,7 @@ class Design:
     history : xarray.Dataset
         A row for each evaluation, see `foldyn.design`.
     evaluations : int
-        Of all starts.
+        Number of evaluations from all starts.
     seconds : float
     """
 

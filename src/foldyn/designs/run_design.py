@@ -39,7 +39,7 @@ class Course:
     start : int
         Number of the start.
     objective, violation : float
-        Of the best design so far; nan without one.
+        Values of the best design so far; nan without one.
     """
 
     done: int

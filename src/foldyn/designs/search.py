@@ -40,7 +40,7 @@ class Trial:
     excess : ndarray, shape (c,)
         Excess of each constraint: at most 0 if it holds, or exactly 0 for an equality.
     slope, slopes : ndarray, shapes (n,) and (c, n)
-        Derivatives of both; empty if no method asks for them.
+        Derivatives of `objective` and `excess`; empty if no method asks for them.
     violation : float
         The largest of all violations.
     """

@@ -84,7 +84,7 @@ class Camera:
     rotation : ndarray, shape (3, 3)
         Rows: to the right, down and forward, in the model's axes.
     position : ndarray, shape (3,)
-        Of the pinhole (m).
+        Position of the pinhole (m).
     k1, k2 : float
         Radial distortion; the image must not fold back on itself.
     """

@@ -191,6 +191,7 @@ def _components(pairs: NDArray, count: int) -> NDArray:
 
 
 def _joints(shell: Shell, split: _Split) -> tuple[Joint, ...]:
+    """Joints of all creases; each pair of nodes has its share of the crease's stiffness."""
     pattern, slope = shell.pattern, fold_slopes(shell)
     found = []
     for crease, (low, high) in enumerate(pattern.creases.tolist()):

@@ -62,7 +62,7 @@ def write(
         A motion, an equilibrium path, modes or a folding.
     path : Path
     case : Case
-        Of the result.
+        Case of the result.
     every, frames : int, optional
         Make a key of every n-th sample and the last one, or this many keys, evenly spread over the
         samples; by default all samples, at most `MOST_KEYS` keys.

@@ -74,7 +74,7 @@ def write(
         have a field `shape`.
     path : Path
     case : Case
-        Of the result.
+        Case of the result.
     every, frames : int, optional
         Take every n-th sample and the last one, or this many, evenly spread; all by default.
     """
@@ -107,6 +107,7 @@ def write(
 
 
 def _mesh(structure: Discretized) -> Mesh:
+    """Mesh of a structure's edges, bars and triangles, in this order."""
     pairs, kind, edge, _ = edge_pieces(structure.pattern, structure.nodes, structure.edge_nodes)
     bars = structure.bars if isinstance(structure, Structure) else np.empty((0, 2), int)
     counts = len(pairs), len(bars), len(structure.triangles)

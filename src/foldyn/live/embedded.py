@@ -48,7 +48,7 @@ class View:
     stage : Stage
         What it shows.
     height : int
-        Of the frame in a notebook (pixels).
+        Height of the frame in a notebook (pixels).
     """
 
     title: str
@@ -89,7 +89,7 @@ def view(what: Any, title: str = "", *, height: int = HEIGHT) -> View:
     title : str
         Title above the view; by default it names the object shown.
     height : int
-        Of the frame in a notebook (pixels).
+        Height of the frame in a notebook (pixels).
 
     Returns
     -------

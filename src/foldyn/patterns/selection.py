@@ -112,6 +112,7 @@ class _Selector:
         return self._truth(tree)
 
     def _truth(self, node: ast.expr) -> NDArray[np.bool_]:
+        """Mask (n,) of the points for which a condition holds."""
         if isinstance(node, ast.BoolOp):
             combine = np.logical_and if isinstance(node.op, ast.And) else np.logical_or
             return combine.reduce([self._truth(value) for value in node.values])
@@ -129,6 +130,7 @@ class _Selector:
         raise self._error(f"{written(node)} is not a condition")
 
     def _extreme(self, name: str) -> NDArray[np.bool_]:
+        """Mask (n,) of the points at an extreme such as "zmax"."""
         axis, which = _AXES.get(name[:1]), name[1:]
         if axis is None or which not in ("min", "max"):
             raise self._error(
@@ -143,6 +145,7 @@ class _Selector:
     def _comparison(
         self, left: ast.expr, operator: ast.cmpop, right: ast.expr
     ) -> NDArray[np.bool_]:
+        """Mask (n,) of the points whose coordinate compares with a number as required."""
         if not isinstance(left, ast.Name):
             left, right = right, left
             operator = _MIRRORED.get(type(operator), type(operator))()

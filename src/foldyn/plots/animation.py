@@ -44,8 +44,8 @@ def animate(
 
     The frame stands still and holds the whole motion, at equal scale along all axes; where a free
     body travels, a line shows the path of its center of mass. Pictures of a motion show the
-    simulated time and how much slower or faster than reality it runs; those of an equilibrium
-    path show its load factor and whether it is unstable there.
+    simulated time and how much slower or faster than reality it runs; pictures of an equilibrium
+    path show the load factor and whether the state is unstable.
 
     Parameters
     ----------

@@ -183,7 +183,7 @@ def add_triangles(axes: Axes3D, triangles: Points, color: str, zorder: float) ->
 
 
 class Labels:
-    """Places short texts beside points, each in the emptiest direction.
+    """Places short texts next to points, each in the emptiest direction.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ class Labels:
         self._taken = view.flat(obstacles.reshape(-1, 3))
 
     def add(self, point: Points, text: str, color: str, size: float) -> None:
-        """Write a text beside a point (3,)."""
+        """Write a text next to a point (3,)."""
         anchor = self._view.flat(point)
         # A wide text needs more room to the left and right than above and below.
         stretch = np.array([1.0 + 0.3 * max(len(text) - 1, 0), 1.0])

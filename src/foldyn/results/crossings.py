@@ -73,7 +73,7 @@ def crossings_of(case: Case, displacement: NDArray | Column, stride: int = 1) ->
     ----------
     case : Case
     displacement : ndarray or Column, shape (k, n, 3)
-        Of the nodes at each sample, m. Samples that are not finite are skipped.
+        Displacement of the nodes at each sample, m. Samples that are not finite are skipped.
     stride : int
         Check every `stride`-th sample, counted back from the last. If panels cross, also check the
         samples between the first crossing and the checked sample before it.

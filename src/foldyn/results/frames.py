@@ -72,7 +72,7 @@ def shapes_of(
     Returns
     -------
     Shapes
-        Of all samples, unless fewer are asked for.
+        Shapes of all samples, unless fewer are requested.
 
     Raises
     ------
@@ -109,6 +109,7 @@ def chosen_samples(count: int, every: int | None, frames: int | None) -> NDArray
 
 
 def _shapes(result: xr.Dataset, samples: NDArray[np.int64], scale: float) -> Shapes:
+    """Shapes at some samples; mode shapes are scaled to `SWING` times the pattern's size."""
     dimension, name, moving, title = _along(result)
     factor = number("scale", scale, largest=LARGEST)
     moved = check_variable(result, moving, (dimension, "node", "axis")).values[samples]
@@ -148,7 +149,7 @@ def frames_of(
     Parameters
     ----------
     result, every, frames, scale
-        As for `shapes_of`.
+        As in `shapes_of`.
 
     Returns
     -------

@@ -168,7 +168,7 @@ def main_effects(
     Raises
     ------
     InputError
-        As of `measured`.
+        As in `measured`.
     """
     found = measured(ds, measure, at)
     left = [name for name in parameters_of(ds) if name not in (at or {})]
@@ -236,7 +236,7 @@ def sobol_indices(
     ds : xarray.Dataset
         A result of `foldyn.sweep`.
     measure, at
-        As of `measured`.
+        As in `measured`.
     confidence : float
         Confidence level of the intervals, which are bootstrap percentiles.
     resamples, seed : int

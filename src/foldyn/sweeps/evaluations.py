@@ -119,6 +119,7 @@ class Evaluations(Generic[Point]):
 
 
 def _read(file: Path) -> tuple[str, Evaluation]:
+    """Stamp and evaluation in a file; raise ValueError if it is damaged."""
     if not sound(file):
         raise ValueError
     with np.load(file) as kept:

@@ -179,6 +179,7 @@ def _with_masses(
 
 
 def _measures(wanted: Sequence[Any] | Mapping[str, Any] | None) -> tuple[Asked, ...]:
+    """Measures from names, functions or a mapping; refuse none, and repeated names."""
     if isinstance(wanted, str) or callable(wanted):
         wanted = [wanted]
     if wanted is None or not (asked_for := listed("measures", wanted, "measures")):

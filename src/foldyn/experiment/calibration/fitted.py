@@ -97,7 +97,7 @@ class Fit:
         `directions`.
     directions : ndarray, shape (p, p)
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
     freedom : int
         Number of fitted values minus free parameters, minus scales, shifts and trends of the data.
     misfit : float

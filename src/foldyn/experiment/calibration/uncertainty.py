@@ -66,7 +66,7 @@ class Uncertainty:
     standard_error : ndarray, shape (p,)
         inf if not determined, nan if at a bound.
     half_width : ndarray, shape (p,)
-        Of the confidence intervals.
+        Half width of the confidence intervals.
     correlation : ndarray, shape (p, p)
         nan for parameters not determined or at a bound.
     singular_values : ndarray, shape (p,)
@@ -125,7 +125,7 @@ class Uncertainty:
         at_bound : ndarray of bool, shape (p,)
             Parameters at a bound, which count as known.
         confidence : float
-            Of the intervals, 0.95 for 95 %.
+            Confidence level of the intervals, 0.95 for 95 %.
         absorbed : int
             Degrees of freedom that predictions take from the data.
         """

@@ -226,7 +226,7 @@ class Studio:
         positions : ndarray, shape (samples, n, 3) or (n, 3)
             Positions of the nodes (m), one set for each ray or the same for all.
         rng : Generator
-            Of the noise.
+            Random generator of the noise.
 
         Returns
         -------

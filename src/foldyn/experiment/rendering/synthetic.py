@@ -180,7 +180,7 @@ def photos_of(
     steps : sequence of int
         Numbers of its states.
     camera, look, sensor, seed
-        As for `film_of`; nothing moves during the exposure.
+        As in `film_of`; nothing moves during the exposure.
 
     Returns
     -------

@@ -76,7 +76,7 @@ class Step:
     Attributes
     ----------
     time : float
-        Of the frame (s).
+        Time of the frame (s).
     position : ndarray, shape (p, 2)
         Pixels of the region of interest; NaN where a corner is lost or not measured.
     error : ndarray, shape (p,)

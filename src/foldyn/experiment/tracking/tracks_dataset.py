@@ -71,7 +71,7 @@ def add_displacements(
     Parameters
     ----------
     ds : xarray.Dataset
-        Of `tracks_of`.
+        Result of `tracks_of`.
     model : TrackedModel
     matches : sequence of Match
         One for the film, or one for each photograph.

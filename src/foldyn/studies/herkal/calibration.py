@@ -141,13 +141,13 @@ def released_case(
     changes : mapping, optional
         Values of the static calibration, by key.
     step : float
-        Of the simulation (s).
+        Time step of the simulation (s).
     press : float
         Displacement of the top (m).
     support : str
         One of `SUPPORTS`.
     duration : float
-        Of the motion (s).
+        Duration of the motion (s).
     """
     folder.mkdir(parents=True, exist_ok=True)
     save(pressed([press / FULL], changes), folder / "pressed.nc")

@@ -46,7 +46,7 @@ class Stiffness:
         A case study for small loads, the specimen for modes, or a model of `PEAKED` for the
         specimen's peaks.
     divisions : tuple of int
-        Of the specimen's shells.
+        Divisions of the specimen's shells.
     """
 
     kind: Literal["small-loads", "modes", "peaks"]
@@ -101,7 +101,7 @@ def specimen_modes(divisions: tuple[int, int] = MESHES, **changes: Any) -> Rows:
     Parameters
     ----------
     divisions : tuple of int
-        Of the shells.
+        Divisions of the shells.
     **changes
         Changed keys of [model], such as fold_law="linear".
 

@@ -95,7 +95,7 @@ class Study:
     ----------
     plan : StudyPlan
     folder : Path
-        Of the study; results are in its folder `runs`.
+        Folder of the study; results are in its folder `runs`.
     data : Data or None
         Measurements of the specimen; None leaves it out.
     """

@@ -179,7 +179,7 @@ class Likeness:
     of : int
         out of this many.
     median, largest : float
-        Of the differences.
+        Median and largest difference.
     same_best : int
         Cases with the same best model.
     correlation : float

@@ -101,8 +101,8 @@ class Release:
     decrement : LogDecrement
         From the maxima, as in the paper; few of them exceed a tenth of the first.
     frequency, damping_ratio : float
-        Of the strongest decaying cosine between 7 and 12 Hz (Hz): the motion has several modes,
-        which maxima do not separate.
+        Frequency (Hz) and damping of the strongest decaying cosine between 7 and 12 Hz: the motion
+        has several modes, which maxima do not separate.
     motion : xarray.Dataset
     """
 

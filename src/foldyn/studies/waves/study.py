@@ -32,7 +32,7 @@ class Plan:
     phases : int
         Number of phases along the zone's edge of a sheet, and of the chain.
     cells : int
-        Of the chain.
+        Number of cells of the chain.
     velocity : float
         Initial velocity of the first plate (m/s).
     """
@@ -116,7 +116,7 @@ class Study:
     ----------
     plan : Plan
     folder : Path
-        Of the study; results are in its folder `runs`.
+        Folder of the study; results are in its folder `runs`.
     """
 
     plan: Plan

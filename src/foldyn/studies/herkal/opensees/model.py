@@ -136,7 +136,7 @@ class Answer:
     at : (m,)
         Load factors, or times (s).
     displacement : (m, v, 3)
-        Of the pattern's vertices, m.
+        Displacement of the pattern's vertices, m.
     iterations : int
         Total number of corrections.
     seconds : float

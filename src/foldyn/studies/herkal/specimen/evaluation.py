@@ -42,7 +42,7 @@ def load_factor(path: xr.Dataset, nodes: Sequence[int], moved: NDArray[np.float6
     Parameters
     ----------
     path : xarray.Dataset
-        Of `foldyn.studies.herkal.calibration.pressed`.
+        Result of `foldyn.studies.herkal.calibration.pressed`.
     nodes : sequence of int
     moved : ndarray, shape (m,)
         Displacement along x (m), NaN for nodes not seen.
@@ -101,7 +101,7 @@ def static_test(
     Parameters
     ----------
     photos : xarray.Dataset
-        Of `foldyn.experiment.track_photos`, with the coordinate `load` (N).
+        Result of `foldyn.experiment.track_photos`, with the coordinate `load` (N).
     label : str
         Label of the data.
     changes : mapping, optional
@@ -206,7 +206,7 @@ def fit_release(
     changes : mapping
         Values that the static test has changed in the case, by key.
     step : float
-        Of the simulations (s).
+        Time step of the simulations (s).
     **options
         Arguments of `foldyn.fit`.
     """
