@@ -249,8 +249,8 @@ def _old(folder: Path, place: str, names: Sequence[str], owner: Owner, replace: 
         strange = sorted(set(there) - set(names))
         if strange and not replace:
             raise InputError(
-                f"{place}: holds {strange[0]}, which this run does not write: it would stand "
-                "beside the new results; name another folder, or replace it with --replace"
+                f"{place}: holds {strange[0]}, which this run does not write and would "
+                "leave among the new results; name another folder, or replace it with --replace"
             )
         return there
     old = [name for name in (*found["results"], *found["outdated"]) if (folder / name).exists()]

@@ -111,7 +111,7 @@ def _keep(task: list[Computation], folder: Path, given: Namespace) -> None:
     """Set up checkpoints in the folder for motions while they run."""
     resume, seconds = getattr(given, "resume", False), getattr(given, "checkpoint", None)
     if resume and given.replace:
-        raise InputError("--resume: goes on with what is there; leave out --replace")
+        raise InputError("--resume: continues from the stored results; leave out --replace")
     if seconds is not None:
         number("--checkpoint", seconds, above=0.0)
     for one in task:

@@ -97,7 +97,7 @@ def problem_of(minimize: Any, maximize: Any, subject_to: Any) -> Problem:
     with within(name):
         objective = parse(text)
         if not objective.measures:
-            raise InputError(f' = "{text}": has no measure, so that all designs are as good')
+            raise InputError(f' = "{text}": has no measure, so it is equal for all designs')
     texts = (
         [subject_to] if isinstance(subject_to, str) else listed("subject_to", subject_to, "texts")
     )

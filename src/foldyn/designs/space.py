@@ -117,7 +117,7 @@ def _ends(name: str, pair: Any, start: Any) -> tuple[tuple[int, ...], NDArray]:
             at = f"[{bad[0]}]" if shape else ""
             raise InputError(
                 f": from {lower[bad[0]]:g} to {upper[bad[0]]:g}: the lower bound must be below the "
-                "upper one; what is fixed is no parameter",
+                "upper one; leave out parameters that are fixed",
                 at,
             )
     begin = 0.5 * (lower + upper) if first is None else np.broadcast_to(first, shape).ravel()

@@ -172,7 +172,7 @@ def _case_for(chosen: Export, result: xr.Dataset | Case) -> Case | None:
         if chosen.of_cases:
             return result
         raise InputError(
-            f": is a case, and the format {chosen.name} holds what is computed of one; give a "
+            f": is a case, and the format {chosen.name} holds computed results; give a "
             "result, as fd.simulate returns it",
             "result",
         )

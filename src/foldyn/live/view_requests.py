@@ -168,7 +168,5 @@ def _frequencies(path: Path, document: Document) -> NDArray[np.float64]:
     values = found["frequency"].values[~found["rigid"].values]
     values = values[np.isfinite(values) & (values > 0.0)]
     if not len(values):
-        raise InputError(
-            "no mode of the sheet swings, which says how long or how fast it moves; choose modes"
-        )
+        raise InputError("no mode of the sheet oscillates, so there is no time scale; choose modes")
     return values

@@ -452,9 +452,9 @@ def _widest_gap(result: xr.Dataset, case: Case) -> float:
 def _attenuation(result: xr.Dataset, case: Case, leg: str, frequency: float) -> float:
     _one_state(result)
     if "attenuation" not in result:
-        raise InputError("is computed where analysis.attenuation says at how many frequencies")
+        raise InputError("needs analysis.attenuation, the number of frequencies")
     if leg not in result["leg"].values:
-        raise InputError(f"is known along {', '.join(map(str, result['leg'].values))}")
+        raise InputError(f"is computed only along {', '.join(map(str, result['leg'].values))}")
     levels = result["level_frequency"].values
     if not 0.0 < frequency <= levels[-1]:
         raise InputError(f"is known up to {levels[-1]:g} Hz")

@@ -69,8 +69,7 @@ def _shares(d: int, count: int, method: str, seed: int) -> NDArray[np.float64]:
     if count & (count - 1):
         near = 2 ** round(math.log2(count))
         raise InputError(
-            f" = {count}: a Sobol sequence is balanced where there are a power of 2 of its points; "
-            f"take {near}",
+            f" = {count}: a Sobol sequence is balanced only for a power of 2; take {near}",
             "samples",
         )
     size = 2 * d if method == SALTELLI else d

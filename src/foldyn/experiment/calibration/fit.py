@@ -392,7 +392,7 @@ class _Search:
             place = next(k for k, one in enumerate(columns) if not np.isfinite(one).all())
             (why,) = self.at([points[pairs[place][0]]], runs)
             raise ComputationError(
-                f"{self.made.space.keys[place]}: the model fails beside {values[place]:.6g}: {why}"
+                f"{self.made.space.keys[place]}: the model fails near {values[place]:.6g}: {why}"
             )
         return np.stack(columns, axis=1)
 

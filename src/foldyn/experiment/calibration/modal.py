@@ -371,7 +371,7 @@ def _enough(name: str, found: int, needed: int, result: Any) -> None:
     modes, most = result.sizes["mode"], int(result.attrs["free_dofs"])
     what = f"mode {needed} was measured, but the model has only {found} that something resists"
     if modes >= most:
-        raise InputError(f"{name}: {what}; leave out what it cannot have, or refine it")
+        raise InputError(f"{name}: {what}; leave out higher modes, or refine it")
     raise InputError(f"{name}: {what} among its lowest {modes}; raise analysis.count")
 
 
