@@ -1,7 +1,7 @@
 """Factorizations of banded matrices by LAPACK.
 
-With its nodes numbered along the sheet, a sheet's matrix is a band. Up to some ten thousand dofs
-the band is factorized faster than the sparse matrix, the more so the smaller it is.
+With nodes numbered along the sheet, a sheet's matrix is a band. Up to some ten thousand dofs, the
+band factorization is faster than the sparse one, especially for small matrices.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from foldyn.jit.compiled import summing
 
 
 class Cholesky:
-    """Factors U' U of a symmetric positive definite band, which they replace in memory.
+    """Factors U' U of a symmetric positive definite band, which they overwrite.
 
     Parameters
     ----------
@@ -32,16 +32,16 @@ class Cholesky:
         factors, failed = lapack.dpbtrf(band, lower=0, overwrite_ab=1)
         if failed or not np.isfinite(factors[-1, -1]):
             raise SingularTangentError("the matrix is not positive definite")
-        self.columns = factors.T  # (n, width + 1), a column of the factor in each row
+        self.columns = factors.T  # (n, width + 1), with a column of the factor in each row
 
     def solve(self, b: NDArray) -> NDArray:
-        """Solution x of A x = b, in the memory of b."""
+        """Solve A x = b in place; return b."""
         substitute(self.columns, b)
         return b
 
 
 class BandLU:
-    """Factors of a band with partial pivoting; they replace it in memory.
+    """LU factors of a band with partial pivoting, which overwrite it.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class BandLU:
 
 @summing
 def substitute(columns, b):
-    """Replace b (n,) by the solution of U' U x = b, U a band by columns; see `Cholesky`."""
+    """Overwrite b (n,) with the solution of U' U x = b, U a band by columns; see `Cholesky`."""
     width = columns.shape[1] - 1
     for j in range(b.size):
         first = max(0, j - width)

@@ -1,4 +1,4 @@
-"""Complex symmetric systems: solutions, and whether rounding leaves anything of them."""
+"""Complex symmetric systems: solutions, and whether rounding errors spoil them."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from scipy.linalg import lapack
 from foldyn.algebra.superlu import SingularTangentError, Solution, factorize
 from foldyn.algebra.woodbury import Updated
 
-LOST = 1e-3  # of the solution: rounding above which it is a resonance without damping
-PIVOT = 0.01  # of the largest entry in a column: what a pivot on the diagonal must have
-BESIDE = 64.0  # times rounding: by how much the factors of A are those of a matrix beside it
-REFINED, ROUNDS = 1e-12, 4  # of the solution: changes below which it is not refined further
-FULL = 0.2  # of the entries: a matrix with more is taken for a full one
-SPARSE = 40.0  # products of full matrices in the time of a solution per entry of a sparse matrix
+LOST = 1e-3  # of the solution: larger rounding errors mean a resonance without damping
+PIVOT = 0.01  # of the largest entry in a column: least pivot on the diagonal
+BESIDE = 64.0  # times rounding: perturbation of A for which its factors are exact
+REFINED, ROUNDS = 1e-12, 4  # of the solution: change at which refinement stops; most rounds
+FULL = 0.2  # share of nonzeros above which a matrix counts as full
+SPARSE = 40.0  # full-matrix products in the time of a sparse entry's solution
 _EPS = float(np.finfo(np.float64).eps)
 
 
 class Gram:
-    """A matrix G'G of rows G (r, n), which is added to many others."""
+    """A matrix G'G of rows G (r, n), which is added to many matrices."""
 
     def __init__(self, rows: NDArray) -> None:
         self.rows = rows
@@ -33,9 +33,10 @@ class Gram:
         return self.rows.T @ self.rows
 
     def fills(self, matrix: sparse.csc_array) -> bool:
-        """Whether factors of the full sum with a sparse matrix take less time than Woodbury's.
+        """Whether factorizing the full sum with a sparse matrix is faster than Woodbury's formula.
 
-        These take a sparse solution per row, a product of r r n and factors of an r by r matrix.
+        The latter takes a sparse solution per row, a product of size r r n, and factors of an r by
+        r matrix.
         """
         r, n = self.rows.shape
         return SPARSE * r * matrix.nnz + r**2 * n + r**3 / 3.0 > n**3 / 4.0
@@ -44,11 +45,11 @@ class Gram:
 def solve(
     matrix: sparse.csc_array, load: NDArray, gram: Gram | None = None, weight: complex = 0.0
 ) -> NDArray[np.complex128]:
-    """Solution of (A + w G'G) x = load, A complex symmetric; nan where rounding leaves nothing.
+    """Solution of (A + w G'G) x = load, A complex symmetric; nan if rounding spoils it.
 
-    Rounding changes each entry of the matrix by a part of about eps. What changes of that size, all
-    in phase with the solution, do to it is found by one more substitution: near a resonance, where
-    the solution is nearly its mode, the worst that can happen.
+    Rounding changes each entry of the matrix by a relative amount of about eps. One more
+    substitution gives the effect of such changes, all in phase with the solution: near a resonance,
+    where the solution is nearly the mode, this is the worst case.
 
     Parameters
     ----------
@@ -56,7 +57,7 @@ def solve(
         A.
     load : ndarray, shape (n,)
     gram : Gram, optional
-        G'G; without it A stands alone.
+        G'G; zero by default.
     weight : complex
         w.
     """
@@ -66,7 +67,7 @@ def solve(
 def solved(
     matrix: sparse.csc_array, load: NDArray, gram: Gram | None = None, weight: complex = 0.0
 ) -> tuple[NDArray[np.complex128], Solution | None]:
-    """As `solve`, with the factors; None if there are none."""
+    """Solution as from `solve`, and the factors; None if there are none."""
     lost = np.full(len(load), np.nan, np.complex128), None
     if gram is None or weight == 0.0:
         gram = Gram(np.zeros((0, len(load))))
@@ -94,11 +95,11 @@ def solved(
 
 
 def _factors(matrix: sparse.csc_array, gram: Gram, weight: complex) -> Solution:
-    """Factors of A + w G'G, to be refined.
+    """Factors of A + w G'G, for refinement.
 
-    At a resonance that only G damps A is singular, and Woodbury's formula fails. It is therefore
-    damped by more than its rounding, and by too little to keep refinement from converging wherever
-    rounding leaves anything of the solution.
+    At a resonance that only G damps, A is singular and Woodbury's formula fails. A is therefore
+    damped by more than its rounding error, but so little that refinement still converges whenever
+    rounding does not spoil the solution.
     """
     rows, full = gram.rows, matrix.nnz > FULL * matrix.shape[0] ** 2
     if not len(rows) and not full:
@@ -111,7 +112,7 @@ def _factors(matrix: sparse.csc_array, gram: Gram, weight: complex) -> Solution:
 
 
 class _Full:
-    """Factors of a full matrix: LU, as the oldest SciPy solves with no symmetric ones."""
+    """LU factors of a full matrix; the oldest supported SciPy has no symmetric ones."""
 
     def __init__(self, matrix: NDArray) -> None:
         self._factors, self._pivots, failed = lapack.zgetrf(matrix.T, overwrite_a=True)

@@ -1,7 +1,7 @@
-"""Definite matrices with the same places of entries, condensed to their last unknowns by eights.
+"""Definite matrices of equal sparsity, condensed to their last unknowns, eight at a time.
 
-Which entries Cholesky's factors have is found once, in an order in which they are few. The numbers
-of eight matrices stand side by side: one pass through the places factorizes all eight.
+The symbolic Cholesky factorization is done once, in an order with little fill-in. The values of
+eight matrices are stored side by side: one pass over the entries factorizes all eight.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from foldyn.jit.eights import COUNT, eight, put
 
 
 class Condensing:
-    """How matrices (size, size) are condensed to their `kept` last unknowns.
+    """Condensation of matrices (size, size) to their `kept` last unknowns.
 
     Parameters
     ----------
     pairs : (k, 2)
-        Unknowns with an entry, each pair once, in any order; all on the diagonal among them.
+        Unknowns with an entry, each pair once, in any order, including the whole diagonal.
     size, kept : int
 
     Attributes
     ----------
     entries : int
-        Of the factors.
+        Number of entries of the factors.
     places : (k,)
-        Of the pairs among them.
+        Position of each pair among them.
     """
 
     def __init__(self, pairs: NDArray, size: int, kept: int) -> None:
@@ -43,7 +43,7 @@ class Condensing:
         for i, j in zip(row.tolist(), column.tolist(), strict=True):
             below[j].add(i)
         found: list[int] = []
-        for own in below:  # what an unknown is coupled to is coupled where that is eliminated
+        for own in below:  # fill-in: eliminating an unknown couples all its neighbors
             coupled = sorted(own)
             found += coupled
             if len(coupled) > 1:
@@ -65,13 +65,13 @@ class Condensing:
         self._free, self._size = free, size
 
     def __call__(self, values: NDArray) -> NDArray:
-        """What is left (c, kept, kept) of at most eight matrices with entries (k, c)."""
+        """Condensed matrices (c, kept, kept) of at most eight matrices with entries (k, c)."""
         numbers = np.zeros((self.entries, COUNT))
         numbers[self.places] = values[:, np.minimum(np.arange(COUNT), values.shape[1] - 1)]
         return self.left(numbers)[: values.shape[1]]
 
     def left(self, numbers: NDArray) -> NDArray:
-        """What is left (8, kept, kept) of eight matrices (`entries`, 8), whose factors replace it.
+        """Condensed matrices (8, kept, kept) of eight (`entries`, 8), overwritten by factors.
 
         Raises
         ------
@@ -87,9 +87,9 @@ class Condensing:
 
 
 def _order(pairs: NDArray, size: int) -> NDArray:
-    """Places (size,) of unknowns in an order in which factors have few entries.
+    """Positions (size,) of unknowns in an order with little fill-in.
 
-    Any definite matrix with these pairs of unknowns says which.
+    It is found from any definite matrix with these pairs of unknowns.
     """
     off = pairs[pairs[:, 0] != pairs[:, 1]]
     diagonal = np.arange(size)
@@ -102,13 +102,14 @@ def _order(pairs: NDArray, size: int) -> NDArray:
 
 @kernel
 def condense(rows, pointers, entry, until, starts, free, where, numbers):
-    """Eliminate the `free` first unknowns of eight matrices.
+    """Eliminate the first `free` unknowns of eight matrices.
 
-    rows, pointers : (k,) of the entries by columns, that on the diagonal first; (n + 1,).
-    entry, until, starts : those (e,) off the diagonal by rows, in columns that are eliminated; the
-        ends of their columns; (n + 1,).
+    rows, pointers : (k,) rows of the entries by columns, the diagonal first; (n + 1,).
+    entry, until, starts : (e,) off-diagonal entries by rows, in eliminated columns; the ends of
+    their columns; (n + 1,).
     where : (n,) scratch.
-    numbers : (8 k,) entries; factors take their place, and in the last columns what is left.
+    numbers : (8 k,) entries; overwritten by the factors and, in the last columns, by the condensed
+    matrices.
     """
     for j in range(starts.size - 1):
         for p in range(pointers[j], pointers[j + 1]):

@@ -1,17 +1,17 @@
 """The lowest modes of K phi = lambda M phi, none missed.
 
-Few dofs are solved in full. Others by shift-invert Lanczos (ARPACK) with one factorization of
-K - s M, the shift s below every eigenvalue: there K - s M is positive definite however singular or
-unstable K is, and the modes nearest to the shift are the lowest. How many eigenvalues lie below
-the shift, and below a gap behind the last mode, is counted; modes that Lanczos missed, as it may
-where many coincide, are sought again beside those found.
+Small problems are solved as full matrices, others by shift-invert Lanczos (ARPACK) with one
+factorization of K - s M, the shift s below every eigenvalue: K - s M is then positive definite even
+if K is singular or indefinite, and the modes closest to the shift are the lowest. The eigenvalues
+below the shift, and below a gap after the last mode, are counted; modes that Lanczos missed, as may
+happen for multiple eigenvalues, are searched for again, orthogonal to the known ones.
 
 A factorization of K - s M has as many negative eigenvalues as the problem has eigenvalues below s
 (Sylvester's law of inertia). Two counts, below and above a set of computed modes, prove that none
-between was missed. M is positive definite, but for dofs without mass that follow the others (edge
-rotations of shells): they have no modes, and, K being positive definite on them, no count.
+between was missed. M is positive definite, except for massless dofs that follow the others (edge
+rotations of shells): they have no modes and, as K is positive definite on them, do not count.
 
-Modes known beforehand (rigid ones) are taken out of the search, so that they come out pure.
+Modes known beforehand (rigid ones) are excluded from the search, so that they remain exact.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from foldyn.algebra.superlu import Factorization, SingularTangentError
 from foldyn.algebra.woodbury import Counted, Squared
 from foldyn.errors import ComputationError, InputError
 
-MOST_DENSE = 6000  # dofs of which nearly all modes may be asked for
-DENSE = 60  # dofs up to which all modes are found at once (the other way is as quick)
-SHIFT = 1e-10  # of the pencil's scale: the first shift below zero
-LOWER = 16.0  # times the last: the next shift
+MOST_DENSE = 6000  # dofs up to which nearly all modes may be requested
+DENSE = 60  # dofs up to which all modes are computed at once (equally fast)
+SHIFT = 1e-10  # of the pencil's scale: first shift below zero
+LOWER = 16.0  # times the last shift: next shift
 LOWERINGS = 12
-LEAST_BASIS = 20  # vectors of Lanczos's basis at least: more than there are modes break it down
-GUARD = 3  # modes beyond those asked for, among which a gap is sought
-GAP = 1e-6  # relative distance of eigenvalues that a count can tell apart
-ROUNDS = 12  # of searches for missed modes
+LEAST_BASIS = 20  # least number of Lanczos vectors, as too few modes break it down
+GUARD = 3  # additional modes in which to search for a gap
+GAP = 1e-6  # relative distance of eigenvalues that a count can separate
+ROUNDS = 12  # searches for missed modes
 EPS = float(np.finfo(float).eps)
-ROUNDING = 5.0 * EPS  # of |phi|' |K| |phi|: how far from zero rounding may move an eigenvalue
+ROUNDING = 5.0 * EPS  # of |phi|' |K| |phi|: rounding error of an eigenvalue at zero
 NUDGES = 4  # of a shift that hits an eigenvalue
 NUDGE = 1e-7
 
@@ -60,12 +60,12 @@ class Pencil:
 
     @property
     def scale(self) -> float:
-        """Mean of the diagonal of K over that of M, rad2/s2: large against the lowest modes."""
+        """Ratio of the mean diagonals of K and M, rad2/s2: large compared to the lowest modes."""
         stiffness = np.abs(self.stiffness.diagonal())[self.heavy]
         return float(stiffness.sum() / self.mass.diagonal().sum())
 
     def factorize(self, shift: float) -> Factorization:
-        """Factors of K - s M; s is moved a little where that is singular."""
+        """Factors of K - s M; s is moved slightly if that is singular."""
         for attempt in range(NUDGES):
             moved = shift + NUDGE * attempt * (abs(shift) or self.scale * EPS)
             self.factorizations += 1
@@ -85,11 +85,11 @@ class Pencil:
         return factors
 
     def below(self, shift: float) -> int:
-        """How many eigenvalues lie below s."""
+        """Number of eigenvalues below s."""
         return self.factorize(shift).negative()
 
     def noise(self, shapes: NDArray) -> NDArray:
-        """What rounding leaves undetermined (k,) in the eigenvalues of shapes (n, k)."""
+        """Rounding errors (k,) in the eigenvalues of shapes (n, k)."""
         size = np.abs(shapes)
         modal = np.einsum("ik,ik->k", shapes, self.mass @ shapes)
         return ROUNDING * np.einsum("ik,ik->k", size, self._sizes @ size) / modal
@@ -108,13 +108,13 @@ class Pencil:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """The lowest eigenvalues (k,), rad2/s2, their shapes (n, k), M-orthonormal, and the checks."""
+    """The lowest eigenvalues (k,), rad2/s2, their M-orthonormal shapes (n, k), and the checks."""
 
     values: NDArray
     shapes: NDArray
-    shift: float  # below which there is no eigenvalue; nan where all were computed
-    checked: int  # lowest modes that a count has shown to be complete
-    missed: int  # modes that the count shows but that were not found
+    shift: float  # no eigenvalue is below this; nan if all were computed
+    checked: int  # number of lowest modes proved complete by a count
+    missed: int  # modes that the count includes but that were not found
 
 
 def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> Spectrum:
@@ -128,13 +128,13 @@ def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> S
     known : (n, r)
         M-orthonormal modes with the eigenvalue zero.
     verify : bool
-        Whether to count the eigenvalues below a gap behind the last mode, by another
+        Whether to count the eigenvalues below a gap after the last mode, with another
         factorization.
 
     Raises
     ------
     InputError
-        More modes than there are, or more than half of those of many dofs.
+        More modes than there are, or more than half of them for many dofs.
     ComputationError
         Lanczos did not converge; the pencil cannot be factorized.
     """
@@ -159,7 +159,7 @@ def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> S
 
 
 def _all(pencil: Pencil, known: NDArray) -> tuple[NDArray, NDArray]:
-    """All modes but the known ones, which are moved behind all others."""
+    """All modes except the known ones, which are shifted above all others."""
     heavy, light = np.flatnonzero(pencil.heavy), np.flatnonzero(~pencil.heavy)
     mass = pencil.mass.toarray()[np.ix_(heavy, heavy)]
     stiffness = pencil.stiffness[heavy][:, heavy].toarray()
@@ -176,7 +176,7 @@ def _all(pencil: Pencil, known: NDArray) -> tuple[NDArray, NDArray]:
     vectors = vectors[:, : len(heavy) - known.shape[1]]
     shapes = np.zeros((pencil.size, vectors.shape[1]))
     shapes[heavy], shapes[light] = vectors, follow @ vectors
-    return pencil.quotients(shapes), shapes  # more exact than the values of a full matrix
+    return pencil.quotients(shapes), shapes  # more accurate than the eigenvalues of a full matrix
 
 
 def _sparse(pencil: Pencil, count: int, known: NDArray, verify: bool) -> Spectrum:
@@ -198,7 +198,7 @@ def _sparse(pencil: Pencil, count: int, known: NDArray, verify: bool) -> Spectru
 
 
 def _shift(pencil: Pencil) -> tuple[float, Factorization, int]:
-    """A shift below every eigenvalue, the factors there, and how many eigenvalues are negative."""
+    """A shift below every eigenvalue, its factors, and the number of negative eigenvalues."""
     shift, unstable = -SHIFT * pencil.scale, 0
     for attempt in range(LOWERINGS):
         factors = pencil.factorize(shift)
@@ -217,7 +217,7 @@ def _shift(pencil: Pencil) -> tuple[float, Factorization, int]:
 def _lanczos(
     pencil: Pencil, shift: float, factors: Factorization, count: int, beside: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """The `count` lowest modes among those M-orthogonal to `beside` (n, r)."""
+    """The `count` lowest modes M-orthogonal to `beside` (n, r)."""
     size, mass = pencil.size, pencil.mass
     count = min(count, pencil.finite - beside.shape[1] - 1)
     carried = mass @ beside
@@ -250,7 +250,7 @@ def _lanczos(
 def _sorted(
     pencil: Pencil, values: NDArray, shapes: NDArray, known: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """All modes by eigenvalue; those zero to rounding are set to zero, known modes first there."""
+    """All modes by eigenvalue; eigenvalues at rounding level become zero, known modes first."""
     rounding = pencil.noise(shapes) + EPS * SHIFT * pencil.scale
     values = np.where(np.abs(values) <= rounding, 0.0, values)
     values = np.r_[np.zeros(known.shape[1]), values]
@@ -259,10 +259,11 @@ def _sorted(
 
 
 def _gap(pencil: Pencil, values: NDArray, count: int) -> tuple[int, float]:
-    """How many of the sorted values (m,) lie below a gap near the count-th, and its middle.
+    """Number of sorted values (m,) below a gap near the count-th, and the middle of the gap.
 
-    A gap behind the last mode asked for proves that all were found. Where a multiple eigenvalue
-    leaves none, the last gap before it is taken: those asked for are then any of the multiple.
+    A gap after the last requested mode proves that all were found. If a multiple eigenvalue leaves
+    no gap, the last gap before it is used: the requested modes are then an arbitrary choice among
+    its modes.
     """
     apart = np.diff(values)
     clear = apart > GAP * (np.abs(values[:-1]) + np.abs(values[1:])) + SHIFT * pencil.scale * 1e-3

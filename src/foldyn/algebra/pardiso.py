@@ -1,15 +1,15 @@
 """Factorization by PARDISO of Intel's Math Kernel Library, for large structures.
 
-The matrix is passed as real symmetric indefinite (type -2), upper triangle by rows: as quick as the
-factorization of a definite one, and it counts the eigenvalues by sign. Pivots stay within blocks of
-the diagonal (Bunch and Kaufman), so the count alone is known: critical points are then located by
+The matrix is passed as real symmetric indefinite (type -2), upper triangle by rows: as fast as the
+factorization of a definite matrix, and it counts the eigenvalues by sign. Pivots stay within blocks
+of the diagonal (Bunch and Kaufman), so only the count is known: critical points are then located by
 bisection on it.
 
 Nested dissection and the symbolic factorization take a third of the time of the numeric one. They
-belong to the places of the entries: as long as these stay, they are done once, for factors that
-live at the same time once more each. Parameters are those of `iparm` in the Developer Reference of
-oneMKL, counted from 0. The package mkl is a set of libraries without Python, which are called by
-their C interface.
+depend only on the sparsity pattern: as long as it stays, they are done once, and once more for each
+set of factors that is alive at the same time. Parameters are those of `iparm` in the Developer
+Reference of oneMKL, counted from 0. The package mkl is a set of libraries without Python, which are
+called by their C interface.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from foldyn.algebra.superlu import SingularTangentError
 from foldyn.errors import ComputationError
 
 LIBRARY = re.compile(r"(lib)?mkl_rt(\.\d+)*\.(so|dll)(\.\d+)*")
-SAME_BITS = 2  # MKL_CBWR_AUTO: the same arithmetic in each run on one machine
+SAME_BITS = 2  # MKL_CBWR_AUTO: the same arithmetic in every run on one machine
 SYMMETRIC_INDEFINITE = -2
 ANALYSIS, NUMERIC, SOLVE, RELEASE = 11, 22, 33, -1
 OWN_VALUES, ORDERING, PERTURBATION, REPLACED, NEGATIVE, REPRODUCIBLE = 0, 1, 9, 13, 22, 33
@@ -40,15 +40,15 @@ _NONE = np.zeros(1)
 
 
 class _Pattern:
-    """Places of entries of a symmetric matrix, and its upper triangle as PARDISO takes it."""
+    """Sparsity pattern of a symmetric matrix, with its upper triangle in PARDISO's format."""
 
     def __init__(self, matrix: sparse.csc_array) -> None:
         self._indptr, self._indices = matrix.indptr, matrix.indices
         size, count = matrix.shape[0], len(matrix.indices)
-        # by rows: a symmetric matrix by columns, read by rows, is the same
+        # a symmetric matrix stored by columns is the same read by rows
         row = np.repeat(np.arange(size), np.diff(matrix.indptr))
         kept = np.flatnonzero(matrix.indices >= row)
-        # the diagonal must be there: where it is not, an entry behind the others, of zero
+        # PARDISO needs all diagonal entries: missing ones are appended as zeros
         there = np.zeros(size, bool)
         there[row[matrix.indices == row]] = True
         none = np.flatnonzero(~there)
@@ -68,13 +68,13 @@ class _Pattern:
         return data[self._take].astype(float, copy=False)
 
     def fits(self, matrix: sparse.csc_array) -> bool:
-        """Whether the entries of a matrix are at these places."""
+        """Whether a matrix has this pattern."""
         pairs = (matrix.indptr, self._indptr), (matrix.indices, self._indices)
         return all(one is other or np.array_equal(one, other) for one, other in pairs)
 
 
 class _Memory:
-    """Memory of PARDISO for one matrix at a time, with what it knows of a pattern."""
+    """PARDISO's memory for one matrix at a time, with its analysis of a pattern."""
 
     def __init__(self, pattern: _Pattern) -> None:
         self.pattern = pattern
@@ -84,10 +84,10 @@ class _Memory:
         self.parameters[PERTURBATION] = SMALL
         self.parameters[REPRODUCIBLE] = library().MKL_Get_Max_Threads()
         end = weakref.finalize(self, _call, RELEASE, self._handle, self.parameters, pattern, _NONE)
-        end.atexit = False  # the process gives all memory back
+        end.atexit = False  # the process frees all memory
 
     def call(self, phase: int, values: NDArray, b: NDArray = _NONE, x: NDArray = _NONE) -> None:
-        """One phase of a solution."""
+        """Run one phase of a solution."""
         error = _call(phase, self._handle, self.parameters, self.pattern, values, b, x)
         if error in NO_MEMORY:
             raise ComputationError(
@@ -99,7 +99,7 @@ class _Memory:
 
 
 class Pardiso:
-    """Factorizes symmetric matrices; what belongs to the places of their entries it keeps."""
+    """Factorizes symmetric matrices; keeps the analysis of the last pattern."""
 
     def __init__(self) -> None:
         self._spare: list[_Memory] = []
@@ -134,7 +134,7 @@ class Pardiso:
 
 
 class PardisoFactors:
-    """Factors by PARDISO; their memory is used again when they are no more."""
+    """Factors by PARDISO; their memory is reused once they are released."""
 
     def __init__(self, memory: _Memory, values: NDArray) -> None:
         self._memory, self._values = memory, values
@@ -148,7 +148,7 @@ class PardisoFactors:
         return x
 
     def pivots(self) -> None:
-        """None: those that were combined do not show."""
+        """None: 2x2 pivots are not available."""
         return
 
     def negative(self) -> int:
@@ -157,7 +157,7 @@ class PardisoFactors:
 
 
 def _hand_back(spare: list[_Memory], memory: _Memory) -> None:
-    """Keep the memory of factors that are no more for the next ones."""
+    """Keep the memory of released factors for the next ones."""
     if not spare:
         spare.append(memory)
 
@@ -166,7 +166,7 @@ def _call(
     phase: int, handle: NDArray, parameters: NDArray, pattern: _Pattern, values: NDArray,
     b: NDArray = _NONE, x: NDArray = _NONE,
 ) -> int:  # fmt: skip
-    """Call PARDISO; returns its error, 0 for none."""
+    """Call PARDISO; return its error code, 0 for none."""
     error = ctypes.c_int32(0)
     whole = [ctypes.c_int32(value) for value in (1, 1, SYMMETRIC_INDEFINITE, phase, pattern.size)]
     none, sides, quiet = np.zeros(1, np.int32), ctypes.c_int32(b[0].size), ctypes.c_int32(0)
@@ -184,7 +184,7 @@ def _reference(value: Any) -> Any:
 
 @cache
 def library() -> Any:
-    """The loaded library, None if it is not there or cannot be loaded."""
+    """The loaded library; None if it is missing or cannot be loaded."""
     try:
         listed = files("mkl") or []
     except PackageNotFoundError:
@@ -195,6 +195,6 @@ def library() -> Any:
                 loaded = ctypes.CDLL(str(file.locate()))
             except OSError:
                 continue
-            loaded.MKL_CBWR_Set(SAME_BITS)  # refused where MKL is at work already: no harm
+            loaded.MKL_CBWR_Set(SAME_BITS)  # refused if MKL is already in use, which is harmless
             return loaded
     return None

@@ -1,4 +1,4 @@
-"""The free dofs' block of matrices that keep their sparsity pattern."""
+"""The free dofs' block of matrices with a fixed sparsity pattern."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-ROUNDING = 1e-12  # of the largest entry: a difference from the transpose below it is none
+ROUNDING = 1e-12  # of the largest entry: smaller differences from the transpose count as zero
 
 
 class Block(NamedTuple):
-    """A block by columns, and its symmetric part: itself where it is symmetric to rounding."""
+    """A block by columns, and its symmetric part: the same object if symmetric to rounding."""
 
     exact: sparse.csc_array
     symmetric: sparse.csc_array
@@ -24,7 +24,7 @@ class Block(NamedTuple):
 
 
 class Reduction:
-    """Takes the block of the free dofs out of matrices of one sparsity pattern."""
+    """Extracts the block of the free dofs from matrices of one sparsity pattern."""
 
     def __init__(self, free: NDArray) -> None:
         self.free = free
@@ -42,7 +42,7 @@ class Reduction:
         mirrored = values[self._mirror]
         apart, largest = np.abs(values - mirrored), np.abs(values)
         if not apart.max(initial=0.0) > ROUNDING * largest.max(initial=0.0):
-            rows = self._by_columns(values)  # which, the matrix being symmetric, are its rows
+            rows = self._by_columns(values)  # equal to its rows, as the matrix is symmetric
             return Block(rows, rows)
         return Block(self._by_columns(mirrored), self._by_columns(0.5 * (values + mirrored)))
 
@@ -64,4 +64,4 @@ class Reduction:
         other.sort_indices()
         alike = np.array_equal(other.indptr, block.indptr)
         alike = alike and np.array_equal(other.indices, block.indices)
-        self._mirror = other.data if alike else None  # where the entry across the diagonal stands
+        self._mirror = other.data if alike else None  # position of the transposed entry

@@ -1,4 +1,4 @@
-"""The linear solvers: which one factorizes a matrix of a size, and the memory of its factors."""
+"""The linear solvers: their choice by matrix size, and the memory of their factors."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from foldyn.values import choice
 class Backend(NamedTuple):
     """A linear solver of symmetric matrices."""
 
-    make: Callable[[], Factorizer]  # for matrices one after the other, best of the same pattern
-    package: str  # that it comes with
-    found: Callable[[], bool]  # whether that is installed
-    worthwhile: int  # rows from which it is worth its overhead
-    band: float  # products of a band's factorization up to which that is quicker
-    memory: float  # of its factors, as a share of SuperLU's
+    make: Callable[[], Factorizer]  # for successive matrices, ideally of the same pattern
+    package: str  # package that provides it
+    found: Callable[[], bool]  # whether that package is installed
+    worthwhile: int  # rows above which it is worth its overhead
+    band: float  # operations up to which a band factorization is faster
+    memory: float  # memory of its factors, relative to SuperLU's
 
 
 SOLVERS: Mapping[str, Backend] = {
@@ -33,7 +33,7 @@ SOLVERS: Mapping[str, Backend] = {
 
 
 def factorizer(name: str, size: int) -> tuple[str, Factorizer]:
-    """Name of a backend, and what factorizes matrices of so many rows.
+    """Name of a backend, and its factorizer for matrices with `size` rows.
 
     "auto" is the last of `SOLVERS` that is installed and worthwhile for the size.
     """
@@ -50,33 +50,33 @@ def factorizer(name: str, size: int) -> tuple[str, Factorizer]:
 
 
 def factorized(matrix: sparse.csc_array) -> Factorization:
-    """Factors of a symmetric matrix by the solver that "auto" takes."""
+    """Factors of a symmetric matrix by the solver that "auto" selects."""
     return factorizer("auto", matrix.shape[0])[1](matrix)
 
 
-MOST_UNSYMMETRIC = 4e9  # products of an unsymmetric band above which SuperLU is quicker
+MOST_UNSYMMETRIC = 4e9  # products of an unsymmetric band above which SuperLU is faster
 
 
 def takes_band(size: int, width: int, symmetric: bool) -> bool:
-    """Whether a matrix of so many rows with all entries in a band is factorized as one.
+    """Whether a matrix with `size` rows is factorized as a band.
 
-    Its factorization takes products of the number of rows and the width squared.
+    A band factorization takes about rows times width squared operations.
     """
     most = SOLVERS[factorizer("auto", size)[0]].band if symmetric else MOST_UNSYMMETRIC
     return float(size) * (width + 1) ** 2 <= most
 
 
 class Fill(NamedTuple):
-    """Memory that SuperLU's factors take, by experience with a model, and what makes it less."""
+    """Measured memory of SuperLU's factors for a model, and the remedy if it is too large."""
 
-    per_doubling: float  # bytes a dof for each doubling of the number of dofs,
-    least: int  # from so many dofs on
+    per_doubling: float  # bytes per dof for each doubling of the number of dofs
+    least: int  # from this number of dofs on
     field: str
     remedy: str
 
 
 def check_fill(fill: Fill, dofs: int) -> None:
-    """Refuse a structure whose factors memory cannot hold."""
+    """Refuse a structure whose factors exceed memory."""
     needed = fill.per_doubling * dofs * max(math.log2(max(dofs, 1) / fill.least), 1.0)
     needed *= SOLVERS[factorizer("auto", dofs)[0]].memory
     check_memory(fill.field, f"solving for {dofs} dofs", needed, fill.remedy)

@@ -4,8 +4,8 @@ The tangent of a structure is symmetric but, beyond a critical point, indefinite
 P A P' = L D L' has as many negative pivots as A has negative eigenvalues (Sylvester's law of
 inertia), so one factorization gives both the step and the stability.
 
-SciPy's SuperLU is always there. What is faster on large structures (PARDISO) is an optional
-package; `solvers` takes what is there.
+SciPy's SuperLU is always available. PARDISO, which is faster on large structures, is an optional
+package; `solvers` chooses among the installed ones.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ Factorizer = Callable[[sparse.csc_array], Factorization]
 def factorize(matrix: sparse.csc_array, symmetric: bool = True, pivot: float = 0.0) -> Any:
     """Factors by SciPy's SuperLU, with its own attributes.
 
-    symmetric : pivots stay on the diagonal, unless one is smaller than `pivot` times the largest
-        entry of its column.
+    symmetric : keep pivots on the diagonal, unless one is smaller than `pivot` times the largest
+    entry of its column.
     """
     symmetrically = {
         "permc_spec": "MMD_AT_PLUS_A",
@@ -66,7 +66,7 @@ def factorize(matrix: sparse.csc_array, symmetric: bool = True, pivot: float = 0
 
 
 class SuperLU:
-    """Factorization by SciPy's SuperLU in its symmetric mode, pivots taken from the diagonal."""
+    """SciPy's SuperLU in symmetric mode, with pivots from the diagonal."""
 
     def __init__(self, matrix: sparse.csc_array) -> None:
         if not np.isfinite(matrix.data).all():
@@ -82,7 +82,7 @@ class SuperLU:
         return self._lu.solve(b)
 
     def pivots(self) -> NDArray:
-        """Pivots, or the eigenvalues themselves where a pivot had to leave the diagonal."""
+        """Pivots, or eigenvalues if a pivot had to leave the diagonal."""
         if self._pivots is not None:
             return self._pivots
         straight = np.array_equal(self._lu.perm_r, self._lu.perm_c)
@@ -95,11 +95,11 @@ class SuperLU:
         return int((self.pivots() < 0.0).sum())
 
 
-PIVOT = 0.01  # of the largest entry in a column: what a pivot on the diagonal must have
+PIVOT = 0.01  # of the largest entry in a column: least pivot on the diagonal
 
 
 class Unsymmetric:
-    """Factorization of a matrix that is nearly symmetric: solutions alone."""
+    """Factorization of a nearly symmetric matrix, for solutions only."""
 
     def __init__(self, matrix: sparse.csc_array) -> None:
         if not np.isfinite(matrix.data).all():

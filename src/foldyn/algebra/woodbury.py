@@ -42,7 +42,7 @@ class Updated:
 
 
 class Squared:
-    """The sum A + G'G of a sparse matrix and a product of rows, which is not formed.
+    """The sum A + G'G of a sparse matrix and a product of rows, which is never formed.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Squared:
         return self.matrix @ x + self.rows.T @ (self.rows @ x)
 
     def toarray(self) -> NDArray:
-        """The sum in full."""
+        """The sum as a full matrix."""
         return self.matrix.toarray() + self.rows.T @ self.rows
 
     def diagonal(self) -> NDArray:
@@ -69,10 +69,10 @@ class Squared:
 
 
 class Counted(Updated):
-    """The same of symmetric matrices, with the number of negative eigenvalues of the sum.
+    """`Updated` for symmetric matrices, with the number of negative eigenvalues of the sum.
 
-    That of the block matrix [[A, G'], [G, -1/w]] can be counted from both of its blocks
-    (Haynsworth's theorem).
+    Both Schur complements of the block matrix [[A, G'], [G, -1/w]] give its count (Haynsworth's
+    theorem).
     """
 
     def __init__(self, factors: Factorization, rows: NDArray, weight: float) -> None:
