@@ -1,9 +1,9 @@
-"""Arguments of data classes: declared with their types, checked where an object is made, shown.
+"""Arguments of data classes: declared with their types, checked at creation, and displayed.
 
-Tables of files are read by the same declarations (`foldyn.tables`).
+The same declarations read tables of files (`foldyn.tables`).
 
-What an argument must be stands among the annotations of its type, its unit too, and the key that it
-has in a case file where that is another than its name:
+Annotations of its type declare the check of an argument, its unit, and its case-file key if that
+differs from its name:
 
     stiffness: Annotated[float, Check(number, above=0.0, unit="N/m")]
     vector: Annotated[Sequence[float], Check(vector, unit="N"), Key("force")]
@@ -52,18 +52,18 @@ class Unit:
 
 
 class Check(Unit):
-    """What an argument must be, and its unit.
+    """Check of an argument, and its unit.
 
     Parameters
     ----------
     check : callable
-        ``check(name, value, **limits)`` gives the value as it is kept, or raises `InputError`.
+        ``check(name, value, **limits)`` returns the value to store, or raises `InputError`.
     unit : str
         For tables, and for messages of checks that take it.
     words : iterable of str, optional
-        Texts that the check accepts, where `limits` do not say so.
+        Texts that the check accepts, unless `limits` contain them.
     given : type, optional
-        Type of what it accepts, where it keeps another.
+        Type that it accepts, if it stores another.
     """
 
     def __init__(
@@ -86,16 +86,16 @@ class Check(Unit):
         return {**self.limits, **asked}
 
     def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
-        """JSON Schema of what it accepts of a type; tables of data classes become definitions."""
+        """JSON Schema of accepted values of a type; tables of data classes become definitions."""
         words = {"known": [*self.words]} if self.words else {}
         return of_checked(self.given or hint, self.check, {**self.limits, **words})
 
 
 class Placed(Check):
-    """A check whose function takes the value alone: what it says continues the name."""
+    """A check whose function takes the value only; its messages continue the name."""
 
     def __call__(self, name: str, value: Any, context: Mapping[str, Any] = NOTHING) -> Any:
-        """See `Check`."""
+        """The value as stored; see `Check`."""
         with within(name):
             return self.check(value, **self._options(context))
 
@@ -104,7 +104,7 @@ Flag = Annotated[bool, Check(flag)]
 
 
 class Read:
-    """How an argument is read from a file, where its value there is another."""
+    """How an argument is read from a file, if its value there has another form."""
 
     def __init__(self, check: Check) -> None:
         self.check = check
@@ -115,7 +115,7 @@ class Key(str):
 
 
 class Argument(NamedTuple):
-    """What a data class says of an argument."""
+    """Declaration of an argument in a data class."""
 
     checks: tuple[Check, ...]
     unit: str
@@ -125,20 +125,20 @@ class Argument(NamedTuple):
     reader: Check | None = None
 
     def read(self, name: str, value: Any, context: Mapping[str, Any]) -> Any:
-        """The value from what a file says."""
+        """Value from its form in a file."""
         if self.reader is not None:
             value = self.reader(name, value, context)
         return self.checked(name, value, context)
 
     def schema(self, definitions: dict[str, Schema]) -> Schema:
-        """JSON Schema of what a file may say."""
+        """JSON Schema of the values that a file may contain."""
         check = self.reader or (self.checks[-1] if self.checks else None)
         schema = check.schema(self.hint, definitions) if check else of_type(self.hint, NOTHING)
         plainly = isinstance(self.default, bool | int | float | str) and "$ref" not in schema
         return {**schema, "default": self.default} if plainly else schema
 
     def checked(self, name: str, value: Any, context: Mapping[str, Any] = NOTHING) -> Any:
-        """The value as it is kept; None is left alone where it is the default."""
+        """Check a value and return it as stored; None is accepted if it is the default."""
         if value is None and self.default is None:
             return None
         for check in self.checks:
@@ -161,7 +161,7 @@ def arguments(kind: type) -> Mapping[str, Argument]:
 
 
 def _notes(hint: Any) -> Iterator[Any]:
-    """What stands beside a type, or beside one of a union."""
+    """Annotations of a type, or of a member of a union."""
     if hasattr(hint, "__metadata__"):
         yield from hint.__metadata__
         hint = hint.__origin__
@@ -173,20 +173,20 @@ def _notes(hint: Any) -> Iterator[Any]:
 
 
 class Checked:
-    """Base of frozen data classes whose arguments are checked as they are declared.
+    """Base of frozen data classes that check their arguments as declared.
 
-    An argument that is None by default may be None. They are shown as `brief` does.
+    An argument whose default is None may be None. `brief` defines their display.
 
     Attributes
     ----------
     place : str
-        What stands before the arguments in messages: "settings: ".
+        Prefix of arguments in messages: "settings: ".
     missing : mapping of str to str
-        Remedies in messages where a file lacks a key that it must have.
+        Remedies in messages about required keys that a file lacks.
     in_files : Check or None
-        What reads an argument of this type, where the type alone says so.
+        Reader for arguments of this type, if no annotation names one.
     like : sequence
-        Functions and classes whose docstrings say what its arguments are.
+        Functions and classes whose docstrings describe its arguments.
     """
 
     place: ClassVar[str] = ""
@@ -195,31 +195,31 @@ class Checked:
     like: ClassVar[Sequence[Any]] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Give a subclass its repr before `dataclass` would give it a long one."""
+        """Give a subclass a short repr before `dataclass` adds its long one."""
         super().__init_subclass__(**options)
         brief(cls)
 
     def __post_init__(self) -> None:
-        """Check the arguments, one by one and then with each other."""
+        """Check each argument, then all of them together."""
         with within(self.place):
             for name, argument in arguments(type(self)).items():
                 self._set(**{name: argument.checked(name, getattr(self, name))})
             self.agree()
 
     def agree(self) -> None:
-        """Refuse arguments that do not go together; what one says of another is set here."""
+        """Refuse incompatible arguments; may set an argument that another implies."""
 
     def _set(self, **values: Any) -> None:
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
     def given(self, *names: str) -> list[str]:
-        """Those of some arguments that are not None."""
+        """Names among the given ones whose arguments are not None."""
         return [name for name in names if getattr(self, name) is not None]
 
 
 def brief(cls: type[T]) -> type[T]:
-    """Give a data class a repr of one short line, and a table for notebooks unless it has another.
+    """Give a data class a repr of one short line, and a table for notebooks unless it has one.
 
     Arrays are shown by their shape, lists by their ends; arguments that are None unless given are
     left out.
@@ -236,7 +236,7 @@ def brief(cls: type[T]) -> type[T]:
 
 
 def _shown(self: Any) -> Iterator[tuple[str, Any]]:
-    """Fields of a data class that its repr shows."""
+    """Fields of a data class to show in its repr."""
     for item in fields(self):
         value = getattr(self, item.name)
         if item.repr and not (item.default is None and value is None):
@@ -244,7 +244,7 @@ def _shown(self: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _table(self: Any) -> str:
-    """A data class as a table in HTML, with units."""
+    """HTML table of a data class, with units."""
     left = 'style="text-align: left"'
     rows = ""
     for name, value in _shown(self):

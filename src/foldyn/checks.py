@@ -52,7 +52,7 @@ def gradient_error(
     seed : int
         Of the random directions.
     size : float, optional
-        What the steps are a thousandth of: by default the largest entry of u, or 1e-3 where all
+        Scale of u; steps are a thousandth of it. By default the largest entry of u, or 1e-3 if all
         are zero.
     """
     point = np.asarray(u, float)

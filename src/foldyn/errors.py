@@ -1,7 +1,7 @@
 """Foldyn's exceptions and warnings.
 
-Bad input raises `InputError` (the command line exits with 2, nothing written); a computation
-that fails raises `ComputationError` (exit status 1) and carries what was computed until then.
+Bad input raises `InputError` (the command line exits with 2, nothing written); a failed computation
+raises `ComputationError` (exit status 1), which carries the results so far.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ MOST_LINES, LONGEST_LINE, LONGEST = 20, 800, 4000
 
 
 def shortened(message: str) -> str:
-    """Return a message that a person can read: long ones lose lines, and the middle of lines."""
+    """Shorten a message for readers: drop lines, and the middle of long lines."""
     if len(message) <= LONGEST_LINE and message.count("\n") < MOST_LINES:
         return message
     end = LONGEST_LINE // 3
@@ -41,7 +41,7 @@ ALSO = "\n  also "
 
 
 class FoldynError(Exception):
-    """Base of everything that Foldyn raises on purpose."""
+    """Base of all exceptions that Foldyn raises on purpose."""
 
     def __init__(self, message: object = "") -> None:
         super().__init__(shortened(str(message)))
@@ -53,14 +53,14 @@ class InputError(FoldynError, ValueError):
     Parameters
     ----------
     reason : str
-        What is wrong and what to do. Where the field is given it goes on from there:
-        " = -1: must be ...", or ": missing; ...".
+        What is wrong and what to do. With a field, it continues the field's name: " = -1: must be
+        ...", or ": missing; ...".
     field : str
-        Path of what is wrong: "duration", "loads[0].history".
+        Path of the wrong value: "duration", "loads[0].history".
     file : path, optional
-        File that says it.
+        File that contains it.
     others : sequence of InputError
-        What else is wrong, told in a line each.
+        Further errors, one line each in the message.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class InputError(FoldynError, ValueError):
         return self.field.partition(".")[0].partition("[")[0]
 
     def within(self, field: str, file: object = None) -> InputError:
-        """The same error seen from further out: its field is part of another, or of a file."""
+        """Copy of the error with its field as part of another, or of a file."""
         inner = self.field if self.file is None else f"{self.file}: {self.field}"
         others = [other.within(field) for other in self.others]
         return type(self)(self.reason, field + inner, file, others)
@@ -103,9 +103,9 @@ def optional(module: str, need: str, install: str) -> Any:
     module : str
         Its name to import.
     need : str
-        What needs it, and what it is called: "camera tracking needs OpenCV".
+        Feature that needs it, and its name: "camera tracking needs OpenCV".
     install : str
-        What follows "pip install".
+        Argument of "pip install".
 
     Raises
     ------
@@ -119,14 +119,14 @@ def optional(module: str, need: str, install: str) -> Any:
 
 
 class Faults:
-    """Collects the faults of independent parts, to be reported together."""
+    """Collects the errors of independent parts, to report them together."""
 
     def __init__(self) -> None:
         self.found: list[InputError] = []
 
     @contextmanager
     def collected(self) -> Iterator[None]:
-        """Keep an `InputError` for later."""
+        """Collect an `InputError` raised in the block."""
         try:
             yield
         except InputError as error:
@@ -138,7 +138,7 @@ class Faults:
         self.found += [alone, *error.others]
 
     def raise_all(self) -> None:
-        """Raise all faults in one error, if there are any."""
+        """Raise all errors as one, if there are any."""
         if self.found:
             first, *others = self.found
             raise type(first)(first.reason, first.field, first.file, others)
@@ -150,7 +150,7 @@ class ComputationError(FoldynError, RuntimeError):
     Attributes
     ----------
     partial : xarray.Dataset or None
-        What was computed until the failure.
+        Results computed before the failure.
     """
 
     def __init__(self, message: str, partial: Any = None) -> None:
@@ -167,7 +167,7 @@ class PenetrationError(ComputationError):
 
 
 class MotionInterrupted(KeyboardInterrupt):
-    """A motion was interrupted from the keyboard; `partial` has what was computed until then."""
+    """A motion was interrupted from the keyboard; `partial` has the results so far."""
 
     def __init__(self, message: str, partial: Any = None) -> None:
         super().__init__(message)
@@ -175,14 +175,14 @@ class MotionInterrupted(KeyboardInterrupt):
 
 
 class FoldynWarning(UserWarning):
-    """Something works, but perhaps not as intended: one line, and the page that explains it.
+    """A result may not be what was intended: one line, and the page that explains it.
 
     Parameters
     ----------
     message : str
         What is doubtful, with its value and the remedy.
     page : str
-        Where `docs` explains it: "modes.md#choose-the-state".
+        Section of `docs` that explains it: "modes.md#choose-the-state".
     """
 
     def __init__(self, message: object = "", page: str = "") -> None:
@@ -195,11 +195,11 @@ class CrossingWarning(FoldynWarning):
 
 
 class StretchWarning(FoldynWarning):
-    """Panels that stretch hold much of the strain energy, which the model gets only roughly."""
+    """Panels that stretch hold much of the strain energy, which the model predicts roughly."""
 
 
 class ModelRangeWarning(FoldynWarning):
-    """Bars and hinges are used beyond their range, where a shell is not."""
+    """Bars and hinges are used beyond their range, where a shell remains accurate."""
 
 
 OF_MODELS = (StretchWarning, ModelRangeWarning)
@@ -207,7 +207,7 @@ OF_MODELS = (StretchWarning, ModelRangeWarning)
 
 
 class UnitsWarning(FoldynWarning):
-    """A number is probably in other units: degrees are asked for, and SI."""
+    """A number is probably in other units: degrees and SI units are expected."""
 
 
 INSIDE = sys.stdlib_module_names | {"foldyn", "numba", "scipy", "xarray"}
@@ -215,7 +215,7 @@ INSIDE = sys.stdlib_module_names | {"foldyn", "numba", "scipy", "xarray"}
 
 
 def warn(message: str, page: str, category: type[FoldynWarning] = FoldynWarning) -> None:
-    """Warn at the user's line; arguments as of `FoldynWarning`."""
+    """Warn at the user's line; arguments as in `FoldynWarning`."""
     _issue(category(message, page))
 
 
@@ -224,7 +224,7 @@ def _issue(warning: Warning) -> None:
     while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in INSIDE:
         frame = frame.f_back
     place = frame.f_code.co_filename, frame.f_lineno
-    known = frame.f_globals.setdefault("__warningregistry__", {})  # as `warnings.warn` has it
+    known = frame.f_globals.setdefault("__warningregistry__", {})  # like `warnings.warn`
     warnings.warn_explicit(warning, type(warning), *place, registry=known)
 
 
@@ -236,18 +236,18 @@ NAMED = 6
 
 
 def listed(names: Sequence[object]) -> str:
-    """Names in a line, the first of many."""
+    """Names on one line, truncated."""
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return f"{', '.join(map(str, names[:NAMED]))}{more}"
 
 
 class Told:
-    """Warnings: those that differ in numbers alone are one, with where they apply.
+    """Collects warnings: texts that differ only in numbers count as one, with their origins.
 
     Attributes
     ----------
     where : str
-        Where those apply that are noted now, such as the name of a run; "" if they tell it.
+        Origin of the warnings collected now, such as the name of a run; "" if the texts name it.
     """
 
     def __init__(self) -> None:
@@ -255,14 +255,14 @@ class Told:
         self._found: dict[str, tuple[str, type[Warning], dict[str, bool]]] = {}
 
     def add(self, text: str, where: str = "", category: type[Warning] = FoldynWarning) -> bool:
-        """Note a text, and say whether it is the first of its kind."""
+        """Add a text; return whether it is the first of its kind."""
         key = NUMBERS.sub("#", text)
         new = key not in self._found
         self._found.setdefault(key, (text, category, {}))[2][where or text] = bool(where)
         return new
 
     def __iter__(self) -> Iterator[str]:
-        """Each once, with the names of where it applies, or how many there are like it."""
+        """Each text once, with its origins, or the number of similar ones."""
         return (text for text, _ in self._texts())
 
     def _texts(self) -> Iterator[tuple[str, type[Warning]]]:
@@ -273,7 +273,7 @@ class Told:
 
     @contextmanager
     def noting(self) -> Iterator[None]:
-        """Note what the block warns of, instead of showing it."""
+        """Collect the warnings of the block instead of showing them."""
         with warnings.catch_warnings():
             warnings.simplefilter("always")
             warnings.showwarning = lambda message, category, *_: self.add(  # type: ignore
@@ -282,24 +282,24 @@ class Told:
             yield
 
     def kept(self) -> str:
-        """Foldyn's own as text, a line each, which begins with the kind."""
+        """Foldyn's own warnings as text, one line each, beginning with the class."""
         found = [(text, kind) for text, kind in self._texts() if issubclass(kind, FoldynWarning)]
         return "\n".join(f"{kind.__name__}: {text}" for text, kind in found)
 
     def add_kept(self, lines: str, where: str) -> None:
-        """Note what was kept as text."""
+        """Add warnings from the text of `kept`."""
         for kind, _, text in (line.partition(": ") for line in lines.splitlines()):
             self.add(text, where, globals()[kind])
 
     def issue(self) -> None:
-        """Warn of all, at the user's line."""
+        """Issue all warnings, at the user's line."""
         for text, category in self._texts():
             _issue(category(text))  # type: ignore
 
 
 @contextmanager
 def told_once() -> Iterator[Told]:
-    """Warn at the end of the block of what it warned of, of each kind once."""
+    """Issue the warnings of the block at its end, one of each kind."""
     told = Told()
     with told.noting():
         yield told

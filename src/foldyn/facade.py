@@ -1,7 +1,7 @@
-"""Packages whose public names are loaded when they are first used, so that importing them is quick.
+"""Packages that load public names on first use, so that importing them is fast.
 
-The stub beside such a package, `__init__.pyi`, says what is public and where it lives: each name
-stands there alone, for type checkers and for this.
+The stub of such a package, `__init__.pyi`, lists its public names and their modules, for type
+checkers and for this module.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def lazy(
     package, file : str
         Its `__name__` and `__file__`.
     *own : str
-        Public names that it defines itself.
+        Public names that the package defines itself.
     """
     stub = ast.parse(Path(file).with_suffix(".pyi").read_text("utf-8"))
     imports = [statement for statement in stub.body if isinstance(statement, ast.ImportFrom)]

@@ -1,6 +1,6 @@
-"""The one door for files from outside: of any kind and size; TOML and JSON of any depth.
+"""Reads all external files: of any kind and size; TOML and JSON of any depth.
 
-Every message says what is wrong and what to do; the caller puts the place before it.
+Every message says what is wrong and what to do; the caller adds the location in front.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ _DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{DEEPEST}
 
 
 def read_text(path: str | os.PathLike[str], what: str, most: int, thin: str) -> str:
-    """Text of a file in UTF-8, with or without a mark at its beginning.
+    """Text of a UTF-8 file, with or without a byte order mark.
 
     Parameters
     ----------
     path : path
         A file; links are followed.
     what : str
-        What it should be, for messages: "a CSV file".
+        Expected kind of file, for messages: "a CSV file".
     most : int
-        Size (MiB) that it may have.
+        Largest accepted size (MiB).
     thin : str
-        What to do where it is larger, for messages.
+        Remedy for larger files, for messages.
 
     Raises
     ------
     InputError
-        There is no such file, it is none (a folder, a pipe, a device), too large, or no text.
+        The file does not exist, is a folder, pipe or device, is too large, or is not text.
     """
     path = check_file(path, what)
     try:
@@ -61,7 +61,7 @@ def read_text(path: str | os.PathLike[str], what: str, most: int, thin: str) -> 
 
 
 def path_of(path: Any, name: str = "path") -> Path:
-    """Path of a file or folder, from what names one."""
+    """Path of a file or folder, from a string or a path-like object."""
     try:
         return Path(path)
     except TypeError:
@@ -69,19 +69,19 @@ def path_of(path: Any, name: str = "path") -> Path:
 
 
 def check_file(path: str | os.PathLike[str], what: str) -> Path:
-    """Path of a file that is one; links are followed.
+    """Path of an existing regular file; links are followed.
 
     Raises
     ------
     InputError
-        There is no such file, or it is none: a folder, a pipe, a device.
+        The file does not exist, or is a folder, a pipe or a device.
     """
     path = path_of(path)
     try:
         mode = path.stat().st_mode
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
-    except (OSError, ValueError) as error:  # no such way, or no name of a file at all
+    except (OSError, ValueError) as error:  # no such path, or an invalid name
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{path}: cannot be read: {reason}") from None
     if stat.S_ISDIR(mode):
@@ -105,7 +105,7 @@ def from_toml(text: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The text is not TOML, or nested deeper than any of ours; the message begins "is not".
+        The text is not TOML, or nested deeper than any supported file; the message begins "is not".
     """
     deep = _DEEP_KEY.search(text)
     if deep:  # tomllib would take minutes
@@ -123,12 +123,12 @@ def from_json(text: str, repeated: list[str] | None = None) -> Any:
     Parameters
     ----------
     repeated : list of str, optional
-        Gets the keys that an object has several times, of which the last counts.
+        Receives keys that occur repeatedly in an object; the last one counts.
 
     Raises
     ------
     InputError
-        The text is not JSON, or nested deeper than any of ours; the message begins "is not".
+        The text is not JSON, or nested deeper than any supported file; the message begins "is not".
     """
     try:
         return _shallow(json.loads(text, object_pairs_hook=partial(_object, repeated)))
@@ -149,7 +149,7 @@ def _why(error: Exception) -> str:
 
 
 def _shallow(value: Any) -> Any:
-    """Return `value` unless it is too deep for the functions that walk through it."""
+    """Return `value` unless it is too deep for recursive functions."""
     level = [value]
     for _ in range(DEEPEST + 1):
         level = [

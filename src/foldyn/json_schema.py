@@ -1,4 +1,4 @@
-"""JSON Schema (draft 7) of types with limits, and texts of docstrings for it."""
+"""JSON Schema (draft 7) of types with limits, with descriptions from docstrings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ITEM = re.compile(r"^(\w[\w, ]*)(?: : .*)?\n((?: +.*\n?|\n)+)", re.M)
 
 
 def of_checked(hint: Any, check: Callable[..., Any], limits: Mapping[str, Any]) -> Schema:
-    """Schema of values of a type that a check with some limits accepts."""
+    """Schema of the values of a type that a check with limits accepts."""
     if check is vector and str not in get_args(hint):
         return TRIPLE
     given = {key: one.default for key, one in inspect.signature(check).parameters.items()}
@@ -31,7 +31,7 @@ def of_checked(hint: Any, check: Callable[..., Any], limits: Mapping[str, Any]) 
 
 
 def of_type(hint: Any, limits: Mapping[str, Any]) -> Schema:
-    """Schema of a type whose numbers are within bounds, and whose texts are known words."""
+    """Schema of a type with bounds for its numbers and known words for its texts."""
     origin, parts = get_origin(hint), [one for one in get_args(hint) if one is not NoneType]
     if origin is Annotated:
         return of_type(parts[0], limits)
@@ -51,14 +51,14 @@ def of_type(hint: Any, limits: Mapping[str, Any]) -> Schema:
 
 
 def item_of(hint: Any) -> Any:
-    """Type of the items of a sequence, or of one among a union."""
+    """Type of the items of a sequence, or of a sequence in a union."""
     if get_origin(hint) in (list, tuple, Sequence):
         return get_args(hint)[0]
     return next(filter(None, map(item_of, get_args(hint))), None)
 
 
 def any_of(schemas: Any) -> Schema:
-    """Schema of what one of some accepts."""
+    """Schema that accepts whatever one of several schemas accepts."""
     found: list[Schema] = []
     for one in schemas:
         found += [one] if one not in found else []
@@ -68,16 +68,16 @@ def any_of(schemas: Any) -> Schema:
 
 
 def described(schema: Schema, text: str | None) -> Schema:
-    """The schema with a text, where there is one."""
+    """The schema with a description, if there is one."""
     return {**schema, "description": text} if text else schema
 
 
 def closed(
     properties: Mapping[str, Schema], required: Sequence[str], thing: Any, word: str = ""
 ) -> Schema:
-    """Schema of a table without other keys, which a thing describes.
+    """Schema of a table without further keys, with the description of `thing`.
 
-    word : what its key `kind` says, if it has one.
+    word : value of its key `kind`, if it has one.
     """
     kind = {"kind": {"enum": [word]}} if word else {}
     schema = {
@@ -90,7 +90,7 @@ def closed(
 
 
 def of_call(function: Callable[..., Any], word: str, more: Mapping[str, Schema]) -> Schema:
-    """Schema of a table whose keys are its kind, the arguments of a function, and some more."""
+    """Schema of a table with its kind, the arguments of a function, and further keys."""
     hints, texts = get_type_hints(function), explained(function)
     parameters = inspect.signature(function).parameters
     own = {key: described(of_type(hints[key], {}), texts.get(key)) for key in parameters}
@@ -99,7 +99,7 @@ def of_call(function: Callable[..., Any], word: str, more: Mapping[str, Schema])
 
 
 def explained(*things: Any) -> dict[str, str]:
-    """Texts on arguments in the docstrings of functions and classes; the first on each counts."""
+    """Descriptions of arguments from the docstrings of functions and classes; the first counts."""
     found: dict[str, str] = {}
     for thing in things:
         for part in _SECTION.findall(inspect.cleandoc(thing.__doc__ or "")):

@@ -1,4 +1,4 @@
-"""Locks of what one process at a time may write; the system lifts them when it ends, however."""
+"""Locks that let one process at a time write; the system releases them when it ends."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def locked(path: Path) -> Iterator[None]:
     Parameters
     ----------
     path : Path
-        Its file, which is there while the lock is held; the folder exists.
+        Lock file, which exists while the lock is held; its folder must exist.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def _take(path: Path) -> int:
         opened = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         try:
             _lock(opened)
-            if _is(path, opened):  # its holder may have removed it just before
+            if _is(path, opened):  # the holder may have just removed it
                 return opened
             os.close(opened)
         except BlockingIOError:
@@ -68,7 +68,7 @@ def _take(path: Path) -> int:
 
 
 def _lock(opened: int) -> None:
-    """Lock an open file; BlockingIOError where another process has it."""
+    """Lock an open file; BlockingIOError if another process holds the lock."""
     if sys.platform == "win32":
         import msvcrt
 

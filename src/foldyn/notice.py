@@ -1,8 +1,8 @@
-"""What is told while kernels are compiled: how many are not on disk, and about how long they take.
+"""Messages while kernels compile: how many are missing on disk, and the expected time.
 
-A kernel that Python calls brings along those that it calls, which its sources name (`jit.sources`).
-So when one has to be compiled, it is known how many others are missing too, and what the ones
-before took says how long that lasts.
+A kernel called from Python requires the kernels that it calls, which its sources name
+(`jit.sources`). So when one must be compiled, the number of missing ones is known, and earlier
+compile times give an estimate.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SHORTEST = 3.0
 
 
 def on_terminal(text: str) -> None:
-    """Tell whoever waits at a terminal; workers keep quiet."""
+    """Print to a terminal, if there is one; worker processes print nothing."""
     if sys.stderr.isatty() and parent_process() is None:
         from tqdm import tqdm
 
@@ -30,16 +30,16 @@ def on_terminal(text: str) -> None:
 
 
 class Notice:
-    """Follows what is compiled, and tells of it.
+    """Follows compilation and reports its progress.
 
     Parameters
     ----------
     tell : callable
-        Is given each message.
+        Receives each message.
     clock : callable
         Time (s).
     worked : callable
-        Time (s) that the processor has worked for this process: less where others have it, too.
+        Processor time (s) of this process.
     """
 
     def __init__(
@@ -54,10 +54,10 @@ class Notice:
         self._since = self._latest = np.zeros(2)
 
     def begin(self, kernel: object, missing: Callable[[], Iterable[object]]) -> None:
-        """Note that a kernel is compiled now.
+        """Note the start of a kernel's compilation.
 
-        missing : gives the kernels that it is made from, itself among them, and that are not on
-            disk; asked only where the kernel was not among those of an earlier one.
+        missing : returns the kernels that it consists of, itself included, and that are not on
+        disk; called only if no earlier kernel included this one.
         """
         self._count += 1
         if kernel in self._known:
@@ -82,12 +82,12 @@ class Notice:
         self._told = True
 
     def end(self) -> None:
-        """Note that a kernel is compiled."""
+        """Note the end of a kernel's compilation."""
         self._latest = self._now()
 
     @contextmanager
     def telling(self, tell: Callable[[str], None]) -> Iterator[None]:
-        """Tell something else within the block."""
+        """Send messages elsewhere within the block."""
         before, self.tell = self.tell, tell
         try:
             yield
@@ -96,7 +96,7 @@ class Notice:
 
 
 def _about(seconds: float) -> str:
-    """A time in words, no more exact than it is known."""
+    """A time in words, rounded to its accuracy."""
     if seconds < 55.0:
         return f"about {max(5, 5 * round(seconds / 5.0))} s"
     minutes = round(seconds / 30.0) / 2.0

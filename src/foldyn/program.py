@@ -1,6 +1,6 @@
-"""Which program computes: a digest of the sources that results depend on.
+"""Identity of the program: a digest of the sources that results depend on.
 
-What is kept to go on with later is known by it, so that what another program computed is not taken.
+Stored intermediate results carry it, so that results of another version are not reused.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Memory: what is too large for the machine is refused from an estimate, before it is made.
+"""Memory limits: refuse input that is too large for the machine, from an estimate.
 
-Estimates are right within a factor of about two. What one byte a thing costs stands where the
-thing is made, beside how it was measured.
+Estimates are right within a factor of about two. The bytes per item are documented where the item
+is made, with their measurement.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _share: ContextVar[float] = ContextVar("share of the memory", default=1.0)
 
 @contextmanager
 def at_most(share: float) -> Iterator[None]:
-    """Refuse within the block what takes more than this share of the memory."""
+    """Within the block, refuse input that needs more than this share of the memory."""
     before = _share.set(share)
     try:
         yield
@@ -34,17 +34,17 @@ def at_most(share: float) -> Iterator[None]:
 
 
 def share() -> float:
-    """Share of the memory beyond which what needs more is refused; see `at_most`."""
+    """Share of the memory that may be used; see `at_most`."""
     return _share.get()
 
 
 def allow(share: float) -> None:
-    """Set this share for the rest of the process."""
+    """Set the share for the rest of the process."""
     _share.set(share)
 
 
 def memory() -> float:
-    """Bytes of the machine, or of its container or the shell's limit if they allow fewer."""
+    """Bytes of memory of the machine, or of its container or shell limit if smaller."""
     known = [_machine(), *map(_limit, _LIMITS)]
     if sys.platform != "win32":
         import resource
@@ -55,12 +55,12 @@ def memory() -> float:
 
 
 def check_memory(field: str, what: str, needed: float, remedy: str) -> None:
-    """Refuse what would not fit in memory.
+    """Refuse input that would not fit in memory.
 
     Parameters
     ----------
     field : str
-        What makes it large, as the user knows it.
+        Field that makes it large, as the user knows it.
     what : str
         What is too large, with its size: "a pattern of 1e+06 vertices".
     needed : float
@@ -71,7 +71,7 @@ def check_memory(field: str, what: str, needed: float, remedy: str) -> None:
     Raises
     ------
     InputError
-        It needs more than the memory, or than the share of it that `at_most` allows.
+        It needs more than the memory, or than the share that `at_most` allows.
     """
     there = memory()
     if needed <= _share.get() * there:

@@ -1,7 +1,7 @@
-"""Tables of files, read as data classes declare them; see `foldyn.arguments`.
+"""Tables of files, read according to data classes; see `foldyn.arguments`.
 
-All mistakes of a file are told together, each with its place. The place of a key is that of its
-table, a dot and the key; that of a whole file is "".
+All errors of a file are reported together, each with its location: the location of the table, a dot
+and the key; "" for the whole file.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ MOST_TOLD = 12
 
 
 class UnknownKeyError(InputError):
-    """A key that its table does not have."""
+    """A key that its table does not define."""
 
 
 def read(
     kind: type[C], name: str, table: Any, folder: Any = None, find: Any = None,
     others: Mapping[str, type[Checked]] = NOTHING,
 ) -> C:  # fmt: skip
-    """Object of a data class from its table in a file.
+    """Create an object of a data class from its table in a file.
 
     Parameters
     ----------
     kind : type
     name : str
-        Place of the table.
+        Location of the table.
     table : mapping
     folder, find, others
         For checks that ask for them; see `foldyn.arguments.CONTEXT`.
@@ -74,7 +74,7 @@ def read(
 
 
 def _of_others(key: str, others: Mapping[str, type[Checked]]) -> str:
-    """Text for a key that tables of other kinds have at that place."""
+    """Hint for a key that belongs to tables of other kinds."""
     owners = [show(kind) for kind, other in others.items() if key in keys(other)]
     if not owners:
         return ""
@@ -84,13 +84,13 @@ def _of_others(key: str, others: Mapping[str, type[Checked]]) -> str:
 
 
 def _within_others(key: str, others: Mapping[str, type[Checked]]) -> dict[str, type[Checked]]:
-    """Tables under a key in files of other kinds."""
+    """Tables under a key, in files of other kinds."""
     return {kind: one for kind, other in others.items() if (one := table_under(key, other))}
 
 
 @contextmanager
 def _placed(name: str, kind: type[Checked]) -> Iterator[None]:
-    """Say where arguments that do not go together stand in a file."""
+    """Add the location in a file to errors about incompatible arguments."""
     try:
         yield
     except InputError as error:
@@ -134,7 +134,7 @@ def check_table(name: str, value: Any) -> Mapping[str, Any]:
 
 
 def check_keys(table: Mapping[str, Any], known: Iterable[str], name: str = "") -> None:
-    """Refuse keys that are not known, with suggestions and the keys that are."""
+    """Refuse unknown keys, with suggestions and the known keys."""
     known, faults = list(known), Faults()
     for key in table:
         if key not in known:
@@ -143,7 +143,7 @@ def check_keys(table: Mapping[str, Any], known: Iterable[str], name: str = "") -
 
 
 def unknown_key(key: str, known: Iterable[str]) -> str:
-    """Text for an unknown key."""
+    """Message for an unknown key."""
     known = list(known)
     return f"unknown key; {suggest(key, known)}known keys: {', '.join(known) or 'none'}"
 
@@ -156,7 +156,7 @@ class TableOf(Check):
         self.kind = kind
 
     def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
-        """See `Check`."""
+        """JSON Schema of the data class's table; see `Check`."""
         return schema_of(self.kind, definitions)
 
 
@@ -168,9 +168,9 @@ class ListOf(Check):
     item : Check
         What each of its items must be.
     what : str
-        For messages, of what else than tables it is: "a list of numbers, as in [0, 1]".
+        For messages, unless it is a list of tables: "a list of numbers, as in [0, 1]".
     least, most : int
-        How many there must be.
+        Bounds of the number of items.
     """
 
     def __init__(self, item: Check, what: str = "", least: int = 0, most: float = math.inf) -> None:
@@ -178,7 +178,7 @@ class ListOf(Check):
         self.item, self.what, self.least, self.most = item, what, least, most
 
     def __call__(self, name: str, value: Any, context: Mapping[str, Any] = NOTHING) -> Any:
-        """See `Check`."""
+        """Check a list and each of its items; see `Check`."""
         fits = isinstance(value, list) and self.least <= len(value) <= self.most
         if not fits and (self.what or not isinstance(value, list)):
             what = self.what or f"a list of tables, written [[{name[1:]}]]"
@@ -193,7 +193,7 @@ class ListOf(Check):
         return found
 
     def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
-        """See `Check`."""
+        """JSON Schema of a list; see `Check`."""
         items = self.item.schema(item_of(hint), definitions)
         most = {"maxItems": self.most} if math.isfinite(self.most) else {}
         return {"type": "array", "items": items, "minItems": self.least, **most}
@@ -202,10 +202,10 @@ class ListOf(Check):
 def schema_of(
     kind: type[Checked], definitions: dict[str, Schema], without: Iterable[str] = (), word: str = ""
 ) -> Schema:
-    """JSON Schema of the table of a data class, as one of the definitions.
+    """JSON Schema of the table of a data class, added to the definitions.
 
-    without : keys that it may not have.
-    word : what its key `kind` says, if it has one for others to tell it by.
+    without : excluded keys.
+    word : value of its key `kind`, if it has one.
     """
     name = "-".join((kind.__name__, *without))
     if name not in definitions:
@@ -222,7 +222,7 @@ def schema_of(
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 class Section(Checked):
-    """A table of a file alone: a frozen data class whose arguments are its keys.
+    """A table that occurs in files only: a frozen data class whose arguments are its keys.
 
     Attributes
     ----------
@@ -233,13 +233,13 @@ class Section(Checked):
     stated: ClassVar[frozenset[str]] = frozenset()
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Make the data class, and what reads it."""
+        """Make the data class and its reader."""
         super().__init_subclass__(**options)
         dataclass(frozen=True, kw_only=True)(cls)
         cls.in_files = TableOf(cls)
 
     def __post_init__(self) -> None:
-        """Nothing: defaults need no check, and a table is checked as it is read."""
+        """Skip checks: defaults need none, and tables are checked as they are read."""
 
     def values(self) -> dict[str, Any]:
         """Its arguments by name."""
@@ -247,7 +247,7 @@ class Section(Checked):
 
 
 def told(error: InputError, file: object) -> InputError:
-    """The error of a file that was read: unknown keys first, for others may follow from them."""
+    """Error of a file, unknown keys first, as other errors may follow from them."""
     found = sorted((error, *error.others), key=lambda one: not isinstance(one, UnknownKeyError))
     shown = [InputError(one.reason, one.field.removeprefix(".")) for one in found[:MOST_TOLD]]
     if len(found) > MOST_TOLD:

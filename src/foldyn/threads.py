@@ -1,4 +1,4 @@
-"""Threads of this process: how many there are, and how many linear algebra takes."""
+"""Threads of this process: their number, and the number that linear algebra uses."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from threadpoolctl import ThreadpoolController, threadpool_limits
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-FEW = 2000  # rows of a full matrix up to which more threads lose
+FEW = 2000  # rows of a full matrix up to which more threads are slower
 
 
 def processors() -> int:
@@ -26,16 +26,16 @@ def processors() -> int:
 
 
 def in_threads(do: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """What is computed for each item, by threads on all processors.
+    """Results of `do` for each item, computed by threads on all processors.
 
-    It pays where that is linear algebra, which runs without Python's lock, on one thread each.
+    This pays off for linear algebra, which runs without Python's lock, on one thread each.
     """
     with threadpool_limits(1), ThreadPoolExecutor(processors()) as pool:
         return list(pool.map(do, items))
 
 
 class _Limit:
-    """Threads of LAPACK in this process, limited while anything is inside."""
+    """Limits LAPACK's threads in this process while any caller is inside."""
 
     def __init__(self) -> None:
         self._lock, self._inside = Lock(), 0
@@ -58,13 +58,13 @@ _ONE = _Limit()
 
 
 def one_thread(rows: int = 0) -> AbstractContextManager:
-    """Keep LAPACK on one thread: more make the factorization of a band, or of few rows, slower.
+    """Keep LAPACK on one thread: more slow down factorizations of bands and of few rows.
 
     Measured with two threads, SciPy's OpenBLAS: bands 5 times at 333 dofs, 1.4 at 6000; full
-    matrices twice at 400 to 900 rows. They also wait for each other where other programs run.
-    Threads of other libraries (PARDISO's) stay.
+    matrices twice at 400 to 900 rows. They also wait for each other if other programs run. Threads
+    of other libraries (PARDISO) are not limited.
 
-    rows : of a full matrix, of which more than FEW keep their threads.
+    rows : of a full matrix; above FEW, threads are not limited.
     """
     return nullcontext() if rows > FEW else _ONE
 

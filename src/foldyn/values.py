@@ -1,4 +1,4 @@
-"""Checks of single values, at the door: what passes them cannot overflow further in.
+"""Checks of single values at the interface: checked values cannot overflow later.
 
 Every message begins with the field's name, so that a caller can put a place in front of it
 ("loads[0].history." + "duration = -1: must be greater than 0").
@@ -39,13 +39,13 @@ N = TypeVar("N", int, float)
 
 
 def show(value: Any) -> str:
-    """Write a value the way a message shows it: short, strings in double quotes."""
+    """Value as shown in a message: short, with strings in double quotes."""
     text = _written(value, 3)
     return text if len(text) <= SHOWN else text[: SHOWN - 4] + " ..."
 
 
 def _written(value: Any, depth: int) -> str:
-    """Text of a value and of what is in it, `depth` levels down."""
+    """Text of a value and its items, down to `depth` levels."""
     if isinstance(value, str):
         return f'"{value[:SHOWN]}"'
     if isinstance(value, np.generic | np.ndarray):
@@ -67,25 +67,25 @@ def _written(value: Any, depth: int) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Return a value of plain Python: lists instead of tuples, no numbers of NumPy."""
+    """Plain Python value: lists instead of tuples, no NumPy numbers."""
     if isinstance(value, tuple):
         return [plain(item) for item in value]
     return value.item() if isinstance(value, np.generic) else value
 
 
 def single(value: Any) -> Any:
-    """Return the number of an array without dimensions, as optimizers and xarray give them."""
+    """The number in a zero-dimensional array, as optimizers and xarray pass it."""
     return value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
 
 
 def shortened(text: str) -> str:
-    """Text for a message in one line; only the beginning of a long one."""
+    """Text for a message, on one line and truncated."""
     text = " ".join(text.splitlines())
     return text if len(text) <= SHOWN else f"{text[: SHOWN - 4]} ..."
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """Return the known word nearest to `word`, if any is near."""
+    """The known word closest to `word`, if any is close."""
     close = difflib.get_close_matches(word[:SHOWN], list(known), n=1, cutoff=0.6)
     return close[0] if close else None
 
@@ -97,7 +97,7 @@ def suggest(word: str, known: Iterable[str]) -> str:
 
 
 def choice(name: str, value: Any, known: Iterable[str]) -> str:
-    """Return `value` when it is one of the `known` words."""
+    """Return `value` if it is one of the `known` words."""
     known = list(known)
     if isinstance(value, str) and value in known:
         return str(value)
@@ -106,12 +106,12 @@ def choice(name: str, value: Any, known: Iterable[str]) -> str:
 
 
 def parsed(text: str, kind: Callable[[str], N] = float) -> N:
-    """Number that a text in a file or a command line is.
+    """Number in the text of a file or command line.
 
     Raises
     ------
     ValueError
-        It is none, or one to Python alone: 1_0, or in digits of other scripts.
+        It is not a number, or only Python accepts it: 1_0, or digits of other scripts.
     """
     if "_" in text or not text.isascii():
         raise ValueError(text)
@@ -161,7 +161,7 @@ def listed(name: str, value: Any, what: str) -> list[Any]:
 
 
 def flag(name: str, value: Any) -> bool:
-    """Return a choice between two."""
+    """Return a truth value as bool."""
     value = single(value)
     if not isinstance(value, bool | np.bool_):
         raise InputError(f" = {show(value)}: must be True or False (true or false in TOML)", name)
@@ -221,7 +221,7 @@ def number(
 
 
 def doubt_degrees(name: str, value: Any) -> None:
-    """Warn of an angle (degrees), or of angles all of which are so, that is one in radians.
+    """Warn if an angle (degrees), or all of several, look like radians.
 
     Below 7 and a simple part of pi to four digits, as np.pi / 3 or 1.0472; of angles between panels
     and of panels, which are hardly that small, any of 0.35 to 2 pi with two decimals or more.
@@ -256,14 +256,14 @@ def length(name: str, value: Any) -> float:
 def whole(
     name: str, value: Any, *, least: int | None = None, most: int = MOST, what: str = ""
 ) -> int:
-    """Return `value` as a whole number; truth values and floats are none.
+    """Return `value` as an int; booleans and floats are refused.
 
     Parameters
     ----------
     least, most : int, optional
         Closed bounds.
     what : str
-        For messages: what it counts, or its unit.
+        For messages: the counted items, or the unit.
     """
     value, what = single(value), f" ({what})" if what else ""
     counts = not isinstance(value, bool | np.bool_) and isinstance(value, Integral)
@@ -280,14 +280,14 @@ def whole(
 def numbers(name: str, value: Any) -> NDArray[np.float64]:
     """Return `value` as a new read-only float array of any shape.
 
-    Its numbers are finite and of a size that can be computed with: at most `LARGEST`, and one of
-    them at least `SMALLEST`, unless all are 0.
+    Its numbers are finite and of a computable size: at most `LARGEST`, and one of them at least
+    `SMALLEST`, unless all are 0.
     """
     try:
         array = np.asarray(value)
     except ValueError:
         raise InputError(f" = {show(value)}: rows have different lengths", name) from None
-    if array.dtype == object:  # whole numbers beyond 64 bits are numbers too, if too large
+    if array.dtype == object:  # integers beyond 64 bits are numbers too, though too large
         array = _as_floats(array)
     if array.dtype.kind not in "iuf" or _has_truth_values(value):
         raise InputError(f" = {show(value)}: must be numbers", name)
@@ -310,13 +310,13 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
 
 
 def writable(array: ArrayLike) -> NDArray[np.float64]:
-    """Floats in a row that can be written: for others, kernels would be compiled once more."""
+    """Contiguous writable floats: others would compile kernels once more."""
     floats = np.ascontiguousarray(array, float)
     return floats if floats.flags.writeable else floats.copy()
 
 
 def _as_floats(array: NDArray) -> NDArray:
-    """Floats of whole numbers of any size; the array itself if it holds anything else."""
+    """Floats from integers of any size; other arrays are returned unchanged."""
     if not all(isinstance(item, int | float) for item in array.ravel()):
         return array
     large = {True: math.inf, False: -math.inf}
@@ -330,9 +330,9 @@ def number_or_list(name: str, value: Any, what: str, **limits: Any) -> float | t
     Parameters
     ----------
     what : str
-        What the list has one number for, for messages: "node".
+        Items with one number each, for messages: "node".
     **limits
-        Bounds of each, as of `number`.
+        Bounds of each, as for `number`.
     """
     value = single(value)
     if not isinstance(value, list | tuple | np.ndarray):
@@ -344,9 +344,9 @@ def number_or_list(name: str, value: Any, what: str, **limits: Any) -> float | t
 
 
 def one_or_each(name: str, value: Any, count: int, what: str) -> NDArray[np.float64]:
-    """Return what `number_or_list` gave as an array (count,): one number for all, or one for each.
+    """Array (count,) from `number_or_list`: one number for all, or one for each.
 
-    what : what there are so many of, for messages: "nodes".
+    what : name of the counted items, for messages: "nodes".
     """
     array = np.array(value)
     if array.ndim and len(array) != count:
@@ -364,9 +364,9 @@ def indices(name: str, value: Any, what: str, alternative: str) -> tuple[int, ..
     Parameters
     ----------
     what : str
-        What the numbers count, for messages: "node".
+        Name of the numbered items, for messages: "node".
     alternative : str
-        What may be given instead of numbers, for messages.
+        Alternative to numbers, for messages.
     """
     array = np.atleast_1d(np.asarray(value, dtype=object))
     if array.ndim != 1 or array.size == 0:
@@ -398,7 +398,7 @@ def vector(name: str, value: Any, *, nonzero: bool = False) -> tuple[float, floa
 
 
 def _has_truth_values(value: Any) -> bool:
-    # numpy silently turns [1.0, True] into floats
+    # NumPy silently turns [1.0, True] into floats
     if isinstance(value, np.ndarray):
         return value.dtype.kind == "b"
     if isinstance(value, list | tuple):

@@ -1,8 +1,7 @@
-"""Processes that compute for this one, and end with it.
+"""Worker processes, which end with this process.
 
-All of them hold the reading end of one pipe, of which this process alone has the other end. When
-that closes, because the work is given up or because the process is gone, however it went, they end
-at once.
+All workers hold the reading end of one pipe, and only this process holds the other end. When it
+closes, because the work is abandoned or this process has ended in any way, they end at once.
 """
 
 from __future__ import annotations
@@ -40,23 +39,23 @@ GONE = "the process that computed it was ended from outside, perhaps for lack of
 
 
 class Workers(Generic[Item, Result]):
-    """Processes to which work is given; a context manager.
+    """Worker processes; a context manager.
 
-    Each runs on one thread, and refuses what takes more than its share of the memory.
+    Each runs on one thread, and refuses work that needs more than its share of the memory.
 
     Parameters
     ----------
     do : callable
-        What is computed for an item; it is sent to each process once.
+        Function of an item; it is sent to each process once.
     count : int
-        Of processes.
+        Number of processes.
     """
 
     def __init__(self, do: Callable[[Item], Result], count: int) -> None:
         self.do, self.count = do, count
         self._context = get_context("spawn")
         line, self._end = self._context.Pipe(duplex=False)
-        self._line = line  # open here too: a process that starts later gets it
+        self._line = line  # open here too: later workers need it
         self._pool = self._started()
 
     def _started(self) -> ProcessPoolExecutor:
@@ -64,9 +63,9 @@ class Workers(Generic[Item, Result]):
         return ProcessPoolExecutor(self.count, self._context, initializer=_live, initargs=given)
 
     def _submit(self, do: Callable[..., Any], *given: object) -> Future[Any]:
-        """Have something computed.
+        """Submit work.
 
-        A process that starts for it does not hear of the terminal's Ctrl-C, which is for this one.
+        A process started for it ignores the terminal's Ctrl-C, which is meant for this process.
         """
         if os.name != "posix":
             return self._pool.submit(do, *given)
@@ -83,9 +82,9 @@ class Workers(Generic[Item, Result]):
         lost: Callable[[Item, str], Result] | None = None,
         first: bool = False,
     ) -> None:
-        """Compute something for each item; each result is kept as soon as it is ready.
+        """Compute a result for each item, and keep each as soon as it is ready.
 
-        When Ctrl-C interrupts this, the results that are ready are kept, too.
+        Results that are ready at an interruption by Ctrl-C are kept, too.
 
         Parameters
         ----------
@@ -93,17 +92,17 @@ class Workers(Generic[Item, Result]):
         keep : callable
             Called with an item and its result.
         lost : callable, optional
-            Result for an item whose process was ended from outside twice, the second time while it
-            computed nothing else; called with the item and the reason. Others are computed all the
-            same. Only where one thread asks at a time.
+            Result for an item whose process was killed twice, the second time while it computed
+            nothing else; called with the item and the reason. Other items are still computed. Only
+            for calls from one thread at a time.
         first : bool
-            Whether the first item is computed here while the processes start, which then find its
+            Whether to compute the first item here while the processes start, so that they find its
             kernels compiled.
 
         Raises
         ------
         ComputationError
-            A process was ended from outside, and there is no `lost`.
+            A process was killed, and there is no `lost`.
         """
         left, doubtful = iter(items), deque[Item]()
         for item in islice(left, int(first)):
@@ -123,14 +122,14 @@ class Workers(Generic[Item, Result]):
                 )
             doubtful.extend(broken)
             self._restart()
-            while doubtful:  # one by one, so that the one to blame is found
+            while doubtful:  # one by one, to find the item at fault
                 item = doubtful.popleft()
                 if self._each(iter([item]), keep):
                     keep(item, lost(item, GONE))
                     self._restart()
 
     def _each(self, left: Iterator[Item], keep: Callable[[Item, Result], None]) -> list[Item]:
-        """Compute what is left; the items that were under way where a process was ended."""
+        """Compute the remaining items; return those under way when a process was killed."""
         waiting: dict[Future[Any], Item] = {}
         broken: list[Item] = []
         try:
@@ -158,7 +157,7 @@ class Workers(Generic[Item, Result]):
         self, future: Future[Any], waiting: dict[Future[Any], Item],
         keep: Callable[[Item, Result], None],
     ) -> list[Item]:  # fmt: skip
-        """Keep the result of a future; its item where a process was ended."""
+        """Keep the result of a future; return its item if its process was killed."""
         try:
             result = future.result()
         except BrokenProcessPool:
@@ -172,7 +171,7 @@ class Workers(Generic[Item, Result]):
         self._pool = self._started()
 
     def stop(self) -> None:
-        """End all processes at once, whatever they compute."""
+        """End all processes immediately."""
         self._end.close()
 
     def __enter__(self) -> Self:
@@ -186,7 +185,7 @@ class Workers(Generic[Item, Result]):
         self._line.close()
 
 
-_own: list[Callable[[Any], Any]] = []  # what a process computes
+_own: list[Callable[[Any], Any]] = []  # the function of a worker process
 
 
 def _do(item: Any) -> Any:
@@ -198,18 +197,18 @@ def _nothing() -> None:
 
 
 def _live(line: Connection, share: float, do: bytes) -> None:
-    """Begin a process that ends when the line does, with its share of the memory and one thread.
+    """Start a worker that ends with the pipe, with its share of the memory and one thread.
 
-    What it does comes as bytes: reading it loads libraries, which look at the variables then.
+    The function arrives as bytes: unpickling it loads libraries, which then read the environment.
     """
     Thread(target=_follow, args=(line,), daemon=True).start()
     _arm(line)
-    if line.poll():  # it ended before that
+    if line.poll():  # it has already closed
         os._exit(1)
     ram_limit.allow(share)
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     _own[:] = [pickle.loads(do)]
-    if "numpy" in sys.modules:  # loaded before, with the script that started all this
+    if "numpy" in sys.modules:  # loaded earlier, by the main script
         from threadpoolctl import threadpool_limits
 
         threadpool_limits(1, user_api="blas")
@@ -223,12 +222,12 @@ def _follow(line: Connection) -> None:
 
 
 def _arm(line: Connection) -> None:
-    """Have the system end this process with the line: compiled code keeps threads waiting."""
+    """Let the system end this process with the pipe: compiled code blocks Python's threads."""
     if sys.platform != "linux":
         return
     import fcntl
 
-    try:  # opened anew, as who is told of what happens to an opened file is one process
+    try:  # opened again, as only one process is notified per open file
         own = os.open(f"/proc/self/fd/{line.fileno()}", os.O_RDONLY | os.O_NONBLOCK)
     except OSError:
         return

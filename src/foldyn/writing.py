@@ -1,4 +1,4 @@
-"""Files that appear only when they are complete, whatever ends the process that writes them."""
+"""Files that appear only when complete, even if the writing process is killed."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _LEFT = re.compile(r"\..+\.(\d+)\.tmp(\.\w+)?")
 
 @contextmanager
 def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Path of a file to write instead of `path`, which takes its place when all went well.
+    """Path of a temporary file that replaces `path` if the block succeeds.
 
-    Until then `path` is as it was; where something is raised, nothing of the new file stays. Its
-    content is on the disk before it appears. A link is followed.
+    Until then `path` is unchanged; after an exception the temporary file is removed. Its content is
+    on disk before it appears. Links are followed.
     """
     target = Path(os.path.realpath(path))
     part = _beside(target, target.suffix)
@@ -38,21 +38,21 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
-    """Write a file whole or not at all."""
+    """Write a file atomically."""
     with whole(path) as part:
         part.write_bytes(content)
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    r"""Write a text file in UTF-8, whole or not at all.
+    r"""Write a UTF-8 text file atomically.
 
-    What UTF-8 has no letter for, bytes of a file's name for one, becomes an escape, "\udcff".
+    Characters that UTF-8 cannot encode, such as raw bytes of file names, are escaped, "\udcff".
     """
     write_bytes(path, text.encode("utf-8", "backslashreplace"))
 
 
 def plain(value: Any) -> Any:
-    """Value as JSON can hold it: arrays become lists, and what is not finite null."""
+    """Value for JSON: arrays become lists, and non-finite numbers null."""
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -63,13 +63,13 @@ def plain(value: Any) -> Any:
 
 
 def write_json(path: str | os.PathLike[str], value: Any) -> None:
-    """Write a value as a file of JSON; see `plain`."""
+    """Write a value as a JSON file; see `plain`."""
     write_text(path, json.dumps(plain(value), indent=2, allow_nan=False) + "\n")
 
 
 @contextmanager
 def scratch(folder: Path, name: str) -> Iterator[Path]:
-    """A temporary folder in another one, which is removed at the end."""
+    """A temporary folder inside another, removed at the end of the block."""
     made = _beside(folder / name)
     made.mkdir()
     try:
@@ -79,12 +79,12 @@ def scratch(folder: Path, name: str) -> Iterator[Path]:
 
 
 def made_folder(folder: str | os.PathLike[str], field: str = "folder") -> Path:
-    """A folder to write into, made where there is none and cleared of what was left half written.
+    """A folder to write into: created if missing, and cleared of partial files.
 
     Raises
     ------
     InputError
-        It is a file, or cannot be made.
+        It is a file, or cannot be created.
     """
     path = Path(folder)
     try:
@@ -97,7 +97,7 @@ def made_folder(folder: str | os.PathLike[str], field: str = "folder") -> Path:
 
 
 def remove_leftovers(*folders: Path) -> None:
-    """Remove what `whole` and `scratch` of dead processes have left in folders."""
+    """Remove temporary files that dead processes have left in folders."""
     for folder in folders:
         with suppress(OSError):
             for path in list(folder.iterdir()):
@@ -107,9 +107,9 @@ def remove_leftovers(*folders: Path) -> None:
 
 
 def _beside(target: Path, suffix: str = "") -> Path:
-    """Name of a temporary file, with the process in it; the suffix tells writers the format.
+    """Name of a temporary file, with the process id; the suffix tells writers the format.
 
-    The letters before it tell processes of other machines apart that share the folder.
+    Random letters distinguish processes on other machines that share the folder.
     """
     letters = secrets.token_hex(4)
     return target.with_name(f".{target.name[:40]}.{letters}.{os.getpid()}.tmp{suffix}")
@@ -124,7 +124,7 @@ def _remove(path: Path) -> None:
 
 
 def _alive(process: int) -> bool:
-    """Whether a process runs; where this is unknown, files in use are held open and so kept."""
+    """Whether a process runs; if unknown, False, as open files then cannot be removed."""
     if os.name != "posix":
         return False
     try:
