@@ -1,7 +1,7 @@
-"""Everything about compiling: decorators of kernels, kernels on disk, what kernels do below Python.
+"""Compilation: decorators of kernels, kernels on disk, and operations below Python.
 
-Importing this package starts Numba, with one clear message where its variables forbid that; so what
-needs Numba imports from here before anything from Numba itself is used.
+Importing this package starts Numba, with one clear message if environment variables prevent that;
+so modules that need Numba import from here first.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import warnings
 
 from foldyn.errors import InputError, warn
 
-UNREADABLE = "could not be parsed"  # Numba's words for a value that it ignores
+UNREADABLE = "could not be parsed"  # Numba's message for a value that it ignores
 
 
 def start() -> None:
@@ -30,7 +30,7 @@ def start() -> None:
         warnings.simplefilter("always")
         try:
             from numba.core import config
-        except Exception as error:  # whatever Numba makes of its variables
+        except Exception as error:  # whatever Numba raises for its variables
             raise InputError(
                 f"Numba, which compiles the kernels, does not start: {error}. {_variables()}"
             ) from error

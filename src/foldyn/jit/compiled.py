@@ -1,12 +1,12 @@
-"""The decorators of compiled functions: nothing else in the package calls Numba's own.
+"""Decorators of compiled functions; nothing else in the package calls Numba's own.
 
-What they compile is kept on disk (`kept`) and stands alone: each function runs its own copies of
-the functions that it calls. Numba links a function's callees into its module and optimizes them
-there once more, but leaves these copies weak: they give way to any function of the same name that
-the process has loaded before. So which of two versions ran, equal but for rounding, would depend on
-what had been compiled or loaded earlier: a run that compiles would differ in the last bit from one
-that loads the same kernels from disk. Here the copies that are left after optimizing are private
-to the module.
+Compiled functions are stored on disk (`kernel_cache`) and self-contained: each function runs its
+own copies of the functions that it calls. Numba links a function's callees into its module and
+optimizes them there again, but leaves these copies weak: a function of the same name that the
+process has loaded before replaces them. So which of two versions runs, equal except for rounding,
+would depend on what was compiled or loaded earlier: a run that compiles would differ in the last
+bit from a run that loads the same kernels from disk. Here the copies that remain after optimization
+are private to the module.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ _FUSED = {"contract"}
 
 
 class AloneLibrary(JITCodeLibrary):
-    """The machine code of one compiled function, with private copies of those it calls.
+    """Machine code of one compiled function, with private copies of its callees.
 
-    One that only compiled functions call is never run itself: it has no machine code.
+    A function that only compiled functions call is never run itself and has no machine code.
     """
 
     called_alone = False  # whether only compiled functions call it
 
     def _finalize_final_module(self) -> None:
-        # what callers link in: as Numba does it, where this function gives way to equal ones
+        # linked into callers: Numba's usual version, which equal functions may replace
         shared = self._final_module.clone()
         for function in self._final_module.functions:
             if function.is_declaration:
                 continue
             if function.linkage == Linkage.external:  # the function itself and its wrappers
                 shared.get_function(function.name).linkage = Linkage.linkonce_odr
-            elif function.linkage == Linkage.linkonce_odr:  # copies of what it calls
+            elif function.linkage == Linkage.linkonce_odr:  # copies of its callees
                 function.linkage = Linkage.internal
             if self.called_alone:
                 function.linkage = Linkage.available_externally
@@ -50,7 +50,7 @@ class AloneLibrary(JITCodeLibrary):
 
 
 class Alone(Compiler):
-    """Numba's compiler, with such a library."""
+    """Numba's compiler with `AloneLibrary`."""
 
     def compile_extra(self, func: Any) -> Any:
         """Compile a Python function."""
@@ -64,8 +64,8 @@ class Alone(Compiler):
 def _decorator(*, inner: bool = False, **options: Any) -> Callable[..., Any]:
     """Decorator of compiled functions.
 
-    inner : for calls from compiled functions alone. What Python calls takes its arguments apart
-        first, which is more code than most functions that get a whole model.
+    inner : for calls from compiled functions only. A function that Python calls must unpack its
+    arguments first, which is more code than most functions of a whole model.
     """
     # error_model="numpy": a division by zero gives inf or nan (looked for by the solvers) instead
     # of a branch in every loop
@@ -76,7 +76,7 @@ def _decorator(*, inner: bool = False, **options: Any) -> Callable[..., Any]:
 
     def decorate(function: Callable[..., Any]) -> Any:
         dispatcher: Any = compiled(function)
-        dispatcher._cache = Kept(function)  # as njit(cache=True) sets Numba's own
+        dispatcher._cache = Kept(function)  # like Numba's njit(cache=True)
         if inner:
             _shut(dispatcher)
         return dispatcher
@@ -85,7 +85,7 @@ def _decorator(*, inner: bool = False, **options: Any) -> Callable[..., Any]:
 
 
 def _shut(dispatcher: Any) -> None:
-    """Refuse calls from Python, which would end the process: there is nothing to call."""
+    """Refuse calls from Python, which would crash the process: there is no entry point."""
 
     def add(result: Any) -> None:
         dispatcher.overloads[tuple(result.signature.args)] = result
@@ -97,28 +97,28 @@ def _shut(dispatcher: Any) -> None:
 
 
 kernel = _decorator(fastmath=_FUSED)
-# the same, and part of each compiled function that calls it: optimized there alone
+# the same, but inlined into each compiled caller and optimized there
 inlined = _decorator(fastmath=_FUSED, inline="always")
-# only called by kernels
+# called by kernels only
 inner = _decorator(fastmath=_FUSED, inner=True)
-# laws and other small formulas: inlined into the kernels that call them
+# laws and other small formulas, inlined into their callers
 scalar = _decorator(fastmath=_FUSED, forceinline=True)
 inner_scalar = _decorator(fastmath=_FUSED, forceinline=True, inner=True)
-# sums whose order does not matter: in any order they can be vectorized; NaN survives here too
+# sums in any order, so that they vectorize; NaN survives here too
 summing = _decorator(fastmath=_FUSED | {"reassoc"})
 # without Python's lock: for functions that threads run together
 shared = _decorator(fastmath=_FUSED, nogil=True)
-# the arithmetic as it is written: pictures
+# exact arithmetic as written, for pictures
 strict = _decorator()
 strict_inlined = _decorator(inline="always")
 
 
 class Addressed:
-    """A function of one signature that compiled code calls by its address, kept on disk.
+    """A function of one signature that compiled code calls by address, stored on disk.
 
-    Its first argument is the address of a context, whose type decides what is compiled. Addresses
-    reach their callers as data, and differ in every process. No exception leaves such a function,
-    and it allocates nothing: where something is wrong it returns nan.
+    Its first argument is the address of a context, whose type determines the compiled version.
+    Callers receive addresses as data; they differ in every process. Such a function raises no
+    exception and allocates nothing: on errors it returns nan.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class Addressed:
         _shut(self._dispatcher)
 
     def at(self, context: Any) -> int:
-        """The address in this process for the type of a `Context`."""
+        """Address in this process for the type of a `Context`."""
         kinds = (context.kind, *self._signature)
         if kinds not in self._dispatcher.overloads:
             self._dispatcher.compile(kinds)
@@ -144,16 +144,16 @@ class Addressed:
 
 
 def addressed(*signature: Any) -> Callable[[Callable[..., Any]], Addressed]:
-    """Decorator of functions that are called by their address; see `Addressed`."""
+    """Decorator of functions that are called by address; see `Addressed`."""
     return lambda function: Addressed(function, signature)
 
 
 def callback(signature: str, function: Callable[..., Any]) -> Any:
-    """Compile a user's function, to be called by its address; it is not kept on disk."""
-    # a division by zero gives inf or nan here too: an exception cannot leave through an address
+    """Compile a user's function for calls by address; it is not stored on disk."""
+    # a division by zero gives inf or nan: an exception cannot leave through an address
     return cfunc(signature, error_model="numpy")(function)
 
 
 def ready(function: Any) -> bool:
-    """Whether a compiled function is kept on disk (else its first use compiles)."""
+    """Whether a compiled function is stored on disk; otherwise its first use compiles."""
     return function._cache.ready()

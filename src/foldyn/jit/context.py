@@ -1,13 +1,13 @@
-"""Tuples of arrays that reach compiled functions as one address.
+"""Tuples of arrays, passed to compiled functions as one address.
 
 A context is an array of slots of eight bytes, one for each number, address, length and stride of a
-(nested) named tuple. Python fills it, so nothing is compiled for that. A kernel names the fields of
-a context as those of the tuple. What it names is loaded there, so whatever else the tuple has costs
-neither time nor code, and a tuple in it is passed on as an address. No references are counted:
-whoever holds the `Context` keeps all arrays alive.
+(nested) named tuple. Python fills it, so nothing is compiled for that. A kernel accesses the fields
+of a context by the names in the tuple. A field is loaded on access, so unused fields cost neither
+time nor code, and a nested tuple is passed on as an address. No references are counted: the
+`Context` object keeps all arrays alive.
 
-The layout is known to the type of a context alone, `ContextType`, whose `types` tell the store of
-kernels (`jit.kernel_cache`) all fields of the tuple.
+Only the type of a context, `ContextType`, knows the layout; its `types` give the kernel cache
+(`jit.kernel_cache`) all fields of the tuple.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ class _Address(models.PrimitiveModel):
 
 
 class Context:
-    """A tuple at an address, for compiled functions; it holds the arrays.
+    """A tuple at an address, for compiled functions; it keeps the arrays alive.
 
-    Numbers in the tuple are those of now. Arrays and records are shared, and may change in place.
+    Numbers in the tuple are copied. Arrays and records are shared, and may change in place.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Context:
     def __init__(self, value: tuple) -> None:
         slots: list[int] = []
         looks = _fill(value, slots)
-        if looks not in _KINDS:  # Numba takes ms to tell the type of a large tuple
+        if looks not in _KINDS:  # Numba takes ms to find the type of a large tuple
             _KINDS[looks] = ContextType(typeof(value))
         self.value: Any = value
         self._slots = np.array(slots, np.int64)
@@ -69,7 +69,7 @@ class Context:
         self._numba_type_ = self.kind
 
 
-_KINDS: dict[tuple, ContextType] = {}  # by what `_fill` says
+_KINDS: dict[tuple, ContextType] = {}  # by the result of `_fill`
 
 
 @unbox(ContextType)
@@ -81,7 +81,7 @@ def _from_python(kind: Any, held: Any, c: Any) -> NativeValue:
 
 
 def _fill(value: Any, slots: list[int]) -> tuple:
-    """Fill the slots of a value; returns what its type depends on."""
+    """Fill the slots of a value; returns a key that determines its type."""
     if isinstance(value, tuple):
         return type(value), *(_fill(item, slots) for item in value)
     if isinstance(value, np.ndarray):
@@ -100,7 +100,7 @@ def _fill(value: Any, slots: list[int]) -> tuple:
 
 
 def _array(context: Any, builder: Any, kind: Any, numbers: Sequence[Any]) -> Any:
-    """Array without an owner from its address, lengths and strides."""
+    """Array view from its address, lengths and strides."""
     out = make_array(kind)(context, builder)
     size = context.get_abi_sizeof(context.get_data_type(kind.dtype))
     populate_array(
@@ -115,7 +115,7 @@ def _array(context: Any, builder: Any, kind: Any, numbers: Sequence[Any]) -> Any
 
 
 def _width(kind: Any) -> int:
-    """How many slots a value of a kind takes."""
+    """Number of slots of a value of a type."""
     if isinstance(kind, types.BaseTuple):
         return sum(map(_width, kind.types))  # type: ignore[attr-defined]
     return 1 + 2 * kind.ndim if isinstance(kind, types.Array) else 1
@@ -126,7 +126,7 @@ class _Fields(AttributeTemplate):
     key = ContextType
 
     def generic_resolve(self, typ: Any, attr: str) -> Any:
-        """Type of a field; a tuple in the tuple is a context of its own."""
+        """Type of a field; a nested tuple is a context of its own."""
         (kind,) = typ.types
         if attr not in kind.fields:
             return None
@@ -136,7 +136,7 @@ class _Fields(AttributeTemplate):
 
 @lower_getattr_generic(ContextType)
 def _field(context: Any, builder: Any, owner: Any, address: Any, name: str) -> Any:
-    """Value of a field, which compiled code may load once for all: nothing writes to slots."""
+    """Value of a field, which compiled code may load once, as nothing writes to slots."""
     (fields,) = owner.types
     place = fields.fields.index(name)
     kind, first = fields.types[place], 8 * sum(map(_width, fields.types[:place]))
@@ -205,5 +205,5 @@ def run_at(typing_context, address, arguments):
 
 @intrinsic
 def value_at(typing_context, address, arguments):
-    """Value (float64) of the function at an address, called likewise."""
+    """Value (float64) of the function at an address; see `run_at`."""
     return types.float64(types.int64, arguments), _call(DOUBLE, arguments.types)

@@ -1,9 +1,9 @@
-"""Eight numbers as one value in compiled code, with the arithmetic of a single one.
+"""Eight numbers as one value in compiled code, with the arithmetic of a single number.
 
 Formulas without branches take them in place of numbers: `+ - * /`, comparisons, `abs`, `math.sqrt`,
 `choose`. The vectors are LLVM's own: they run on any processor, in narrower registers where it has
-no wide ones. Loops over numbers leave it to the compiler to find them, which it does not where it
-cannot know that what is written is not what is read next.
+no wide ones. In loops over numbers, the compiler must find the vectors itself, and does not if
+writes might alias later reads.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Eight(types.Type):
 
 
 class Truths(types.Type):
-    """Type of eight answers: what their comparisons give."""
+    """Type of eight truth values, the result of comparisons."""
 
 
 EIGHT, TRUTHS = Eight("eight"), Truths("truths")
@@ -60,7 +60,7 @@ template: Any = infer_global
 
 
 def _define(function: Any, count: int, result: types.Type, build: Any) -> None:
-    """Give a function its meaning for eights, some of which may be numbers."""
+    """Implement a function for eights, or for eights and numbers."""
 
     @template(function)
     class _Template(AbstractTemplate):
@@ -101,7 +101,7 @@ _define(abs, 1, EIGHT, _of_llvm("fabs"))
 
 @intrinsic
 def choose(typing_context, condition, one, other):
-    """`one` where the condition holds, else `other`: of eights, or of numbers without a branch."""
+    """`one` if the condition holds, else `other`: for eights, or for numbers without a branch."""
     kind = EIGHT if isinstance(condition, Truths) else types.float64
 
     def codegen(context, builder, signature, arguments):
@@ -112,7 +112,7 @@ def choose(typing_context, condition, one, other):
 
 @intrinsic
 def any_of(typing_context, truths):
-    """Whether one of eight answers is true."""
+    """Whether any of eight truth values is true."""
 
     def codegen(context, builder, signature, arguments):
         bits = builder.bitcast(arguments[0], ir.IntType(COUNT))
@@ -123,7 +123,7 @@ def any_of(typing_context, truths):
 
 @intrinsic
 def per_cube_root(typing_context, x):
-    """x^(-1/3) of an eight or a number, by its exponent: 3 % off."""
+    """x^(-1/3) of an eight or a number, from its exponent, with an error of 3 %."""
     many = isinstance(x, Eight)
 
     def codegen(context, builder, signature, arguments):

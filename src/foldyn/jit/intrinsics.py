@@ -1,7 +1,7 @@
-"""What compiled code does below Python, as Numba's intrinsics: addresses, views, memory.
+"""Numba intrinsics: addresses, views and memory operations below Python.
 
-The typing context stands first among the arguments of an intrinsic as it is written; compiled code
-calls it without.
+The typing context is the first parameter in the definition of an intrinsic; compiled code calls it
+without.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from numba.np.arrayobj import make_array, populate_array
 
 from foldyn.jit.compiled import inner_scalar
 
-LINE = 64  # bytes that come into the cache together
+LINE = 64  # bytes of a cache line
 INT32, INT64, DOUBLE = ir.IntType(32), ir.IntType(64), ir.DoubleType()
 
 
 def intrinsic(function: Callable[..., Any]) -> Any:
-    """Numba's decorator, typed for the callers of what it makes."""
+    """Numba's decorator, typed for the callers of its result."""
     return extending.intrinsic(function)
 
 
 def data_of(context: Any, builder: Any, kind: Any, array: Any) -> Any:
-    """Pointer to the first number of an array."""
+    """Pointer to the first element of an array."""
     return make_array(kind)(context, builder, array).data
 
 
@@ -63,9 +63,9 @@ def call2(typing_context, address, x, y):
 # ------------------------------------------------------------------ views of arrays
 @intrinsic
 def flat(typing_context, array):
-    """View of a C-contiguous array with one dimension.
+    """One-dimensional view of a C-contiguous array.
 
-    `reshape(-1)` calls a run-time function of some 30 ns, which counts where a step takes 5000.
+    `reshape(-1)` calls a run-time function of some 30 ns, which matters if a step takes 5000 ns.
     """
     if not isinstance(array, types.Array) or array.layout != "C":
         return None
@@ -104,12 +104,12 @@ def _without_owner(context, builder, kind, value):
 
 @intrinsic
 def borrowed(typing_context, value):
-    """Return an array or a tuple of arrays, of tuples, of numbers, that owns no memory.
+    """An array, or a tuple of arrays, tuples and numbers, without reference counts.
 
-    Compiled code counts references to the arrays of every tuple that a function gets, with atomic
-    operations, wherever the compiler cannot prove that it need not: a third of the time of a step
-    of a small sheet. The caller of a loop holds the arrays for as long as it runs, so inside they
-    can be borrowed.
+    Unless the compiler proves it unnecessary, compiled code counts references to the arrays of
+    every tuple that a function receives, with atomic operations: a third of the time of a step of a
+    small sheet. The caller of a loop keeps the arrays alive while it runs, so the loop can borrow
+    them.
     """
 
     def codegen(context, builder, signature, arguments):
@@ -125,7 +125,7 @@ def borrowed(typing_context, value):
 # of many arrays in turn leave it behind.
 @intrinsic
 def prefetch(typing_context, array, index):
-    """Bring array[index] into the cache; an index beyond the end does no harm."""
+    """Prefetch array[index] into the cache; an index beyond the end does no harm."""
 
     def codegen(context, builder, signature, arguments):
         data = data_of(context, builder, array, arguments[0])
@@ -141,7 +141,7 @@ def prefetch(typing_context, array, index):
 
 @inner_scalar
 def prefetch_range(array, first, count):
-    """Bring array[first : first + count] into the cache."""
+    """Prefetch array[first : first + count] into the cache."""
     for k in range(first, first + count, LINE // array.itemsize):
         prefetch(array, k)
 
@@ -149,7 +149,7 @@ def prefetch_range(array, first, count):
 # ------------------------------------------------------------------ memory that threads share
 @intrinsic
 def fetch_add(typing_context, array, index, value):
-    """array[index] += value in one piece; returns what was there before."""
+    """array[index] += value atomically; returns the previous value."""
 
     def codegen(context, builder, signature, arguments):
         place = builder.gep(data_of(context, builder, array, arguments[0]), [arguments[1]])
@@ -160,7 +160,7 @@ def fetch_add(typing_context, array, index, value):
 
 @intrinsic
 def look(typing_context, array, index):
-    """array[index] as other threads have left it; what they wrote before is then seen too."""
+    """array[index] as other threads left it; their earlier writes are visible then, too."""
 
     def codegen(context, builder, signature, arguments):
         place = builder.gep(data_of(context, builder, array, arguments[0]), [arguments[1]])

@@ -1,15 +1,15 @@
-"""Compiled functions on disk: a file for each function and types of its arguments.
+"""Compiled functions on disk: a file for each function and its argument types.
 
-Numba's own files know a function again by the text of its file alone: with a change in a compiled
-function or a constant imported from another file, the old one goes on; two processes that write at
-once may exchange their kernels; and a damaged file is a traceback. Here the name of a file says
-what was compiled: from which sources (`sources.digest`), for which arguments, with all fields of
-the named tuples among them, and for which processor. So what is found is what would be compiled,
-whoever wrote it, and a check sum tells whether it is whole.
+Numba's own cache identifies a function only by the text of its file: if a compiled function or a
+constant imported from another file changes, the old version is used; two processes that write at
+once may exchange their kernels; and a damaged file causes a traceback. Here the file name
+identifies the compiled version: its sources (`sources.digest`), its argument types, including all
+fields of named tuples, and the processor. So a stored file equals what would be compiled, whoever
+wrote it, and a checksum detects damage.
 
-Kernels go to the first folder that can be written, in Numba's own order: what NUMBA_CACHE_DIR says,
-`__pycache__` beside the source, the user's cache folder; then, with a warning, a folder for
-temporary files. What is kept there is loaded and run, so that one is the user's alone.
+Kernels go to the first writable folder, in Numba's order: NUMBA_CACHE_DIR, `__pycache__` next to
+the source, the user's cache folder; then, with a warning, a temporary folder. As its files are
+loaded and run, only the user may have access to it.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ from foldyn.notice import NOTICE
 from foldyn.writing import remove_leftovers, write_bytes
 
 REMEDY = "set NUMBA_CACHE_DIR to a folder that can be written"
-OTHERS = 3  # versions of a function that are kept beside the present one
+OTHERS = 3  # older versions of a function to keep
 _SEAL = hashlib.sha256().digest_size
 _IMPORTED: dict[Part, list[Kept]] = {}  # by the statements that define them
 
 
 class Kept(_Cache):
-    """The compiled versions of a function on disk: what Numba asks before it compiles."""
+    """The compiled versions of a function on disk, which Numba checks before it compiles."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         source = Path(inspect.getfile(function)).resolve()
@@ -71,39 +71,39 @@ class Kept(_Cache):
         return None if self._folder is None else str(self._folder)
 
     def enable(self) -> None:
-        """Load and save."""
+        """Enable loading and saving."""
         self._enabled = self._folder is not None
 
     def disable(self) -> None:
-        """Neither load nor save."""
+        """Disable loading and saving."""
         self._enabled = False
 
     def ready(self) -> bool:
-        """Whether a version for some arguments is on disk."""
+        """Whether a version for any arguments is on disk."""
         return self._folder is not None and any(self._folder.glob(f"{self._version}.*.nbc"))
 
     def missing(self) -> list[Kept]:
-        """Compiled functions that it is made from, and itself, as far as they are not on disk."""
+        """Compiled functions that it consists of, itself included, that are not on disk."""
         made = (one for part in made_from(*self._source) for one in _IMPORTED.get(part, ()))
         return [one for one in made if not one.ready()]
 
     def flush(self) -> None:
-        """Remove the present versions."""
+        """Remove the current versions."""
         for path in self._folder.glob(f"{self._version}.*.nbc") if self._folder else ():
             path.unlink(missing_ok=True)
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
-        """Compiled function for a signature, if it is on disk and whole."""
+        """Compiled function for a signature, if an undamaged file is on disk."""
         target_context.refresh()
         path = self._file(sig, target_context.codegen())
         data = None if path is None else _read(path)
-        if data is None:  # Numba compiles it now
+        if data is None:  # Numba compiles it
             NOTICE.begin(self, self.missing)
             return None
         return CompileResult._rebuild(target_context, *data)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compiled function; where that fails, it is compiled again next time."""
+        """Store a compiled function; if that fails, it is compiled again next time."""
         NOTICE.end()
         path = self._file(sig, data.codegen)
         if path is None or data.library.has_dynamic_globals:
@@ -120,12 +120,12 @@ class Kept(_Cache):
     def _file(self, sig: Any, codegen: Any) -> Path | None:
         arguments = "; ".join(_spelled(kind) for kind in normalize_signature(sig)[0])
         if self._folder is None or not self._enabled or " at 0x" in arguments:
-            return None  # an address means another thing in another process
+            return None  # addresses are different in another process
         key = repr((arguments, codegen.magic_tuple(), self._code)).encode()
         return self._folder / f"{self._version}.{hashlib.sha256(key).hexdigest()[:16]}.nbc"
 
     def _remove_old(self) -> None:
-        """Remove what earlier sources were compiled to, but for the last few."""
+        """Remove compiled versions of earlier sources, except the last few."""
         assert self._folder is not None
         files: dict[str, list[Path]] = {}
         for path in self._folder.glob(f"{self._stem}*"):
@@ -138,7 +138,7 @@ class Kept(_Cache):
 
 
 def _spelled(kind: Any) -> str:
-    """A type in full: the name that Numba gives to a named tuple lacks those of its fields."""
+    """A type in full: Numba's name of a named tuple lacks its fields."""
     if not hasattr(kind, "types"):
         return repr(kind)
     inside = [_spelled(of) for of in kind.types]
@@ -154,20 +154,20 @@ def _plain(constant: Any) -> bool:
 
 
 def _read(path: Path) -> Any:
-    """Content of a file; None where there is none, or a damaged one, which is removed."""
+    """Content of a file; None if it is missing or damaged; damaged files are removed."""
     try:
         whole = path.read_bytes()
         if hashlib.sha256(whole[_SEAL:]).digest() == whole[:_SEAL]:
             return pickle.loads(whole[_SEAL:])
         path.unlink()
-    except OSError:  # not there, or removed by another process
+    except OSError:  # missing, or removed by another process
         pass
     return None
 
 
 @cache
 def folder_for(source: Path) -> Path | None:
-    """Folder for the kernels of a folder of sources; None where nothing can be written."""
+    """Folder for the kernels of a source folder; None if none is writable."""
     named = str(getattr(config, "CACHE_DIR", ""))
     inside = f"{source.name}_{hashlib.sha1(os.fsencode(source)).hexdigest()[:16]}"
     if named:
@@ -177,7 +177,7 @@ def folder_for(source: Path) -> Path | None:
         _warn(f"NUMBA_CACHE_DIR = {named!r} cannot be written: kernels are kept elsewhere")
     usual = [source / "__pycache__"]
     home = Path(AppDirs(appname="numba", appauthor=False).user_cache_dir)
-    if home.is_absolute():  # else there is no home
+    if home.is_absolute():  # otherwise there is no home
         usual.append(home / inside)
     for folder in usual:
         if _writable(folder):
@@ -195,7 +195,7 @@ def folder_for(source: Path) -> Path | None:
 
 @cache
 def _warn(text: str) -> None:
-    """Warn, once of each, and say what to do."""
+    """Warn once of each text, with the remedy."""
     warn(f"{text}; {REMEDY}", "tutorial.md#install")
 
 
@@ -210,11 +210,11 @@ def _writable(folder: Path) -> bool:
 
 @cache
 def _private() -> Path | None:
-    """Folder for temporary files that nobody else can write; of this process, if need be."""
+    """Temporary folder that nobody else can write to; private to this process, if need be."""
     user = os.getuid() if hasattr(os, "getuid") else "kernels"
     try:
         folder = Path(tempfile.gettempdir()) / f"foldyn-{user}"
-        with suppress(FileExistsError):  # a file, or another process was quicker
+        with suppress(FileExistsError):  # a file, or another process was faster
             folder.mkdir(mode=0o700)
         if _ours(folder):
             return folder
@@ -226,8 +226,8 @@ def _private() -> Path | None:
 
 
 def _ours(folder: Path) -> bool:
-    """Whether a folder is no link, the user's, and closed to all others."""
+    """Whether a folder is not a link, belongs to the user, and is closed to all others."""
     status = folder.lstat()
     if not stat.S_ISDIR(status.st_mode) or not hasattr(os, "getuid"):
-        return stat.S_ISDIR(status.st_mode)  # folders for temporary files are each user's own there
+        return stat.S_ISDIR(status.st_mode)  # temporary folders are private to each user there
     return status.st_uid == os.getuid() and stat.S_IMODE(status.st_mode) & 0o077 == 0

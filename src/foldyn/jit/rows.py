@@ -1,9 +1,9 @@
-"""Eight rows of coordinates at once, in compiled code: load and transpose, transpose and add.
+"""Eight rows of coordinates at once in compiled code: load and transpose, transpose and add.
 
 Nodal arrays of the force kernels have rows of four numbers, the fourth unused, so that a row is one
-vector. Eight rows become three vectors of eight lanes, x, y and z, by shuffles in registers; number
-by number the same takes twice as long, and hardware gathers are no quicker. The vectors are
-LLVM's own: they run on any processor, in narrower registers where it has no wide ones.
+vector. Eight rows become three vectors of eight lanes, x, y and z, by shuffles in registers; one
+number at a time takes twice as long, and hardware gathers are no faster. The vectors are LLVM's
+own: they run on any processor, in narrower registers where it has no wide ones.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def _store(builder, value, pointer):
 
 
 def _row_pointers(context, builder, kinds, values):
-    """Pointers to the rows of nodes[start + step q], q = 0..7, their numbers cut by the mask."""
+    """Pointers to the rows of nodes[start + step q], q = 0..7, with masked node indices."""
     (rows, nodes), (row_values, node_values, start, step, mask) = kinds, values
     row_data = data_of(context, builder, rows, row_values)
     node_data = data_of(context, builder, nodes, node_values)

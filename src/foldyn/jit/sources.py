@@ -1,14 +1,14 @@
-"""Which sources a kernel is made from, found in the sources themselves.
+"""The sources of a kernel, found from the sources themselves.
 
-A kernel holds the compiled functions and the numbers that it names, and knows the fields of the
-named tuples that it names. So it is made from its own text and from the statements that define
-these names, in its file or in those of the package that it imports them from, and so on; nothing
-else counts: neither functions without a decorator, which compiled ones cannot call, nor messages,
-nor lines above. Contents are looked at, never times: a copy, a checkout or a clock may set these as
-it likes.
+A kernel contains the compiled functions and numbers that it names, and depends on the fields of the
+named tuples that it names. So its sources are its own text and the statements that define these
+names, in its file or in files of the package that it imports them from, recursively. Nothing else
+counts: neither functions without a decorator, which compiled ones cannot call, nor messages, nor
+lines above. Only contents are compared, never file times, which copies, checkouts or clocks change
+arbitrarily.
 
-Statements are told apart by their first column, and names are all words in their text. Words that
-are no names, as in comments, make a kernel depend on more than it is made from, never on less.
+Statements start at the first column, and all words in their text count as names. Words that are not
+names, as in comments, only add dependencies, and never hide any.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ _STATEMENT = re.compile(r"^(?=[@\w])", re.MULTILINE)
 _DEFINES = re.compile(r"(?:def|class) +(\w+)|(\w+(?:, *\w+)*)(?: *:[^=\n]*)? *=(?!=)")
 _DECORATOR = re.compile(r"@(\w+)")
 _WORD = re.compile(r"[A-Za-z_]\w*")
-_NO_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")  # variables that leave the code as it is
-# where kernels are kept leaves their code as it is; the rest of `jit` may change Numba itself
+_NO_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")  # variables that do not affect the code
+# storage of kernels does not affect their code; the rest of `jit` may change Numba itself
 _KEEPING, _COMPILING = ("kernel_cache.py", "sources.py"), PACKAGE / "jit"
 _COMPILERS = ("foldyn.jit.compiled", "foldyn.mechanics.term")  # modules with decorators of kernels
-_NO_CODE_IN = ("from ", "import ", "if TYPE_CHECKING:")  # how statements begin that are no code
+_NO_CODE_IN = ("from ", "import ", "if TYPE_CHECKING:")  # starts of statements without code
 _READ: set[Path] = set()
-REST = ""  # name of the statements that define no name
+REST = ""  # stands for statements that define no name
 
 Part = tuple[Path, str]  # the statements of a file that define a name
-_WRITTEN: dict[Part, tuple[str, frozenset[Part]]] = {}  # text that is no file's, and what it names
+_WRITTEN: dict[Part, tuple[str, frozenset[Part]]] = {}  # generated text, and names in it
 
 
 class Module(NamedTuple):
-    """What kernels may take from a file."""
+    """Names that kernels may use from a file."""
 
     parts: dict[str, str]  # statements by the name that they define
     names: dict[str, tuple[str, str]]  # module and name there, "" for all of it, by name here
@@ -58,19 +58,19 @@ class Module(NamedTuple):
 
 @cache
 def digest(source: Path, name: str) -> str:
-    """Digest of all that a function or class of a file is made from, "1f0c6a2b9d3e4f58"."""
+    """Digest of everything that a function or class of a file consists of, "1f0c6a2b9d3e4f58"."""
     parts = sorted(_content(part) for part in made_from(source, name))
     return hashlib.sha256(_tools().encode() + b"".join(parts)).hexdigest()[:16]
 
 
 def define(part: Part, text: str, named: Iterable[Part]) -> None:
-    """Let a name of a file be defined by a text that is made when the file is imported."""
+    """Define a name of a file by a text that is generated at import."""
     _WRITTEN[part] = text, frozenset(named)
 
 
 @cache
 def _content(part: Part) -> bytes:
-    """Digest of a part, with its place in the package."""
+    """Digest of a part, including its location in the package."""
     path, name = part
     place = path.relative_to(PACKAGE).as_posix() if path.is_relative_to(PACKAGE) else path.name
     text = _WRITTEN[part][0] if part in _WRITTEN else _module(path).parts.get(name)
@@ -78,7 +78,7 @@ def _content(part: Part) -> bytes:
 
 
 def made_from(source: Path, name: str) -> set[Part]:
-    """Parts of files that a function or class of a file is made from."""
+    """Parts of files that a function or class of a file consists of."""
     found: set[Part] = set()
     ahead = [(source, name)]
     while ahead:
@@ -91,7 +91,7 @@ def made_from(source: Path, name: str) -> set[Part]:
 
 @cache
 def _needed(path: Path, name: str) -> frozenset[Part]:
-    """Parts that a part of a file names."""
+    """Parts that a part of a file refers to."""
     if (path, name) in _WRITTEN:
         return _WRITTEN[path, name][1]
     own = _module(path)
@@ -106,7 +106,7 @@ def _needed(path: Path, name: str) -> frozenset[Part]:
             elif original in parts:
                 wanted = {original}
             elif original and home.stem != original:
-                wanted = parts.keys()  # nobody knows which
+                wanted = parts.keys()  # unknown which
             else:  # the word is a module
                 wanted = words & parts.keys() | {REST}
             needed |= {(home, part) for part in wanted}
@@ -118,7 +118,7 @@ def _needed(path: Path, name: str) -> frozenset[Part]:
 
 @cache
 def _in_python(path: Path, name: str) -> bool:
-    """Whether a name is that of a function without a decorator, which no compiled one can call."""
+    """Whether a name is a function without decorator, which compiled code cannot call."""
     text = _module(path).parts.get(name, "")
     alone = text.startswith("def ") and len(_STATEMENT.findall(text)) == 1
     return alone and path.parent != _COMPILING
@@ -126,7 +126,7 @@ def _in_python(path: Path, name: str) -> bool:
 
 @cache
 def _module(path: Path) -> Module:
-    """What kernels may take from a file."""
+    """Names that kernels may use from a file."""
     text = _DOCSTRING.sub("", _text(path))
     names = {alias: (module, name) for module, name, alias in imports(text)}
     parts, decorators = {REST: ""}, ""
@@ -143,9 +143,9 @@ def _module(path: Path) -> Module:
 
 
 def imports(text: str) -> Iterator[tuple[str, str, str]]:
-    """Imports of a file from the package: module, name, and what it is called here.
+    """Imports of a file from the package: module, name, and local name.
 
-    No name where a module is imported as a whole.
+    The name is empty if a whole module is imported.
     """
     for module, names, whole, alias in _IMPORT.findall(text):
         if whole:
@@ -157,7 +157,7 @@ def imports(text: str) -> Iterator[tuple[str, str, str]]:
 
 @cache
 def _home(module: str, name: str) -> frozenset[Path]:
-    """Files in which a name that is imported from a module may be defined."""
+    """Files that may define a name imported from a module."""
     place = PACKAGE.joinpath(*module.split(".")[1:])
     if not place.is_dir():
         return frozenset([place.with_suffix(".py")])
@@ -170,11 +170,11 @@ def _home(module: str, name: str) -> frozenset[Path]:
     passed_on = passed_on or [origin for origin, other, _ in there if other == "*"]
     if name and passed_on:
         return frozenset(path for origin in passed_on for path in _home(origin, name))
-    return frozenset(place.rglob("*.py"))  # the folder as a whole, or nobody knows which file
+    return frozenset(place.rglob("*.py"))  # the whole folder, as the file is unknown
 
 
 def read(source: Path) -> None:
-    """Read a file and those that it needs while they are as they were imported."""
+    """Read a file and its imports now, so that they match the imported code."""
     ahead = [source]
     while ahead:
         path = ahead.pop()
@@ -191,13 +191,13 @@ def _imported(source: Path) -> frozenset[Path]:
 
 @cache
 def _text(path: Path) -> str:
-    """Text of a file when this process first looked: before it is imported, or soon after."""
+    """Text of a file when first read in this process: before its import, or soon after."""
     return path.read_text("utf-8")
 
 
 @cache
 def _tools() -> str:
-    """What else decides on the code of a kernel; Numba looks at the processor itself."""
+    """Further facts that determine a kernel's code; Numba checks the processor itself."""
     versions = (sys.version, np.__version__, numba.__version__, llvmlite.__version__)
     variables = getattr(config, "_env_reloader").old_environ  # noqa: B009 - of files too
     settings = sorted(item for item in variables.items() if item[0] not in _NO_CODE)

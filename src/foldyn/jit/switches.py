@@ -1,7 +1,7 @@
-"""Compiled functions that are written when the package is imported: a branch for each entry.
+"""Compiled functions generated at import, with a branch for each entry.
 
-A formula that a class declares is reached from kernels by its code, through one function with a
-branch for each code. That function is made here from what is declared, so nothing lists it twice.
+Kernels reach a formula that a class declares by its code, through one function with a branch for
+each code. That function is generated here from the declarations, so that nothing is listed twice.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ def switch(
 
 
 def _part(function: Any) -> tuple[Path, str]:
-    """Where a compiled function or an intrinsic one is defined."""
+    """File and name that define a compiled function or an intrinsic."""
     text = function.py_func if hasattr(function, "py_func") else function._defn
     return Path(inspect.getfile(text)).resolve(), function.__name__
 
 
 def by_code(declared: Mapping[str, Iterable[Any]]) -> dict[int, Any]:
-    """What classes declare, by its code; refuses a class without any, and one code twice."""
+    """Declarations of classes, by code; refuses a class without any, and duplicate codes."""
     found: dict[int, Any] = {}
     owner: dict[int, str] = {}
     for name, formulas in declared.items():
