@@ -268,7 +268,7 @@ def _alike(keys: Iterable[Any], motions: Sequence[Motion]) -> dict[Any, list[tup
 
 
 def _in_lanes(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]:
-    """Integrate what lanes support; return numbers of the other motions and of failures."""
+    """Integrate what lanes support; return the indices of the other motions and of failures."""
     lanes = motions[0].method.name == METHOD
     alike = _alike([topology(motion) if lanes else () for motion in motions], motions)
     alone = {k for k, _ in alike.pop((), ())}
@@ -278,7 +278,7 @@ def _in_lanes(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]
 
 
 def _on_gpu(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]:
-    """Integrate all on the GPU; return numbers of motions that fail."""
+    """Integrate all on the GPU; return the indices of motions that fail."""
     from foldyn.dynamics.gpu import many
 
     return many.integrate(motions)

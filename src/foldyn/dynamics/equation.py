@@ -105,7 +105,7 @@ class Equation(NamedTuple):
     commit: int  # 0 without memory
     step_error: int  # 0 without memory
     offsets: int  # 0 if nothing turns
-    spent: int  # 0 likewise, or if steps end at jumps only
+    spent: int  # 0 likewise, or in methods that end steps only at jumps
     sample: int
     balance: int  # contexts
     setting: int

@@ -135,7 +135,7 @@ def topology(motion: Motion) -> tuple[bytes, ...]:
 
 
 def integrate(motions: Sequence[tuple[int, Motion]], out: Samples) -> set[int]:
-    """Integrate up to WIDTH motions of one topology and plan; return numbers of failures.
+    """Integrate up to WIDTH motions of one topology and plan; return the indices of failures.
 
     motions : with their numbers in `out`.
     out : sample arrays: times (k,), all others (m, k, ...).

@@ -50,8 +50,8 @@ class BarsHinges(NamedTuple):
 class Hinges(NamedTuple):
     """Hinges of one group: rows (axis j, k, wings i, l), stiffness, rest angle and law.
 
-    parameters : (nh, 4) of each hinge, if they differ from the law's. share : (nh,) of the crease
-    in a turn (`materials.series`), if adjacent panels are compliant.
+    parameters : (nh, 4) of each hinge, if they differ from the law's.
+    share : (nh,) of the crease in a turn (`materials.series`), if adjacent panels are compliant.
     """
 
     nodes: NDArray

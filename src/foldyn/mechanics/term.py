@@ -11,29 +11,29 @@ are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of 
 
     forces(u, v, t, force, powers)   adds its forces at u, v and the time t to `force`, N, and to
                                      `powers` the powers that it puts in, dissipates and loses to
-                                     the air, W; that of the sheet comes first, and writes
+                                     the air, W; the sheet's comes first, and overwrites
     energies(u, out)                 adds its energies to their groups; the sheet's are written
     limit(u, v, a, h, beta, energy, lightness) -> h
-                                     the longest step (s), at most h, in which nothing is overrun:
-                                     before each step, after the forces where the last one ended;
+                                     the longest step (s), at most h, that resolves all contacts:
+                                     before each step, after the forces at the end of the last one;
                                      a is the acceleration there, beta and energy are those of
                                      `contact.step_limit.Pace`; lightness (n,) is 1 / mass of the
                                      nodes, 1/kg
-    place_obstacles(factors)         puts what moves with histories, obstacles and air, where their
-                                     factors (h, 3) say
-    advance_clock(since)             it is evaluated next so long (s) after the last accepted step
-    commit()                         the step is accepted that ends where it was evaluated last
-    dissipated() -> J                what its laws have dissipated up to there
+    place_obstacles(factors)         sets obstacles and air to the factors (h, 3) of their histories
+    advance_clock(since)             the next evaluation is `since` (s) after the last accepted step
+    commit()                         accepts the step that ends at the last evaluation
+    dissipated() -> J                energy that its laws have dissipated up to there
     branch_states(out)               writes the states (b, 2) of its branches there
-    step_error(scale) -> ratio       how wrong they are if the step that ends there is accepted: the
-                                     turn that this makes, over the largest one or the one that
-                                     moves nodes by `scale` (m)
+    step_error(scale) -> ratio       their error if the step that ends there is accepted: as a turn,
+                                     over the largest turn or the turn that moves nodes by `scale`
+                                     (m)
     mean_forces(u0, u1, before, h, t, force, powers)
                                      adds forces whose work from u0 to u1 is the change of its
-                                     energy and what its laws dissipate, in a step h (s) about the
-                                     time t, and writes its dihedrals at u1; before (nh,) are all
-                                     those at u0. Adds other powers as `forces` does. Of a term
-                                     without it `mechanics.mean_forces` makes some of the others
+                                     energy plus the dissipation of its laws, in a step h (s) about
+                                     the time t, and writes its dihedrals at u1; before (nh,) are
+                                     all dihedrals at u0. Adds other powers as `forces` does. If a
+                                     term has none, `mechanics.mean_forces` derives them from its
+                                     other kernels
 """
 
 from __future__ import annotations

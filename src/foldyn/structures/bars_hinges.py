@@ -57,7 +57,7 @@ class BarsHingesTerm(SheetTerm):
         self.size, self.rows = model.rest.size, len(model.rest)
 
     def _with(self, model: BarsHinges) -> BarsHingesTerm:
-        """A sheet with another model whose elements have the same nodes."""
+        """Term for another model whose elements have the same nodes."""
         return BarsHingesTerm(model, self._turning, self._laws, self._softness, self)
 
     def _nodal(self, q: NDArray) -> NDArray:

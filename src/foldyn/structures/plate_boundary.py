@@ -92,7 +92,7 @@ def _cut(m: int, center: bool, n: int) -> Cut:
 def _basis(
     at: NDArray, edges: Sequence[NDArray], sides: Sequence[tuple[NDArray, NDArray]], size: int
 ) -> tuple[sparse.csr_array, NDArray]:
-    """Heights and slopes (size,) of a plate by its unknowns; the condition for 0, see `Cut`.
+    """Matrix from unknowns to heights and slopes (size,); when unknowns are 0, see `Cut.edge`.
 
     at, edges, sides : heights of corners and center; of the points on each edge (n + 1,); slopes
     across the sides of each edge and their signs (n,), 1 if outward.

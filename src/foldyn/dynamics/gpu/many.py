@@ -21,7 +21,7 @@ AT_ONCE = 16384  # models per launch: more are no faster
 
 
 def integrate(motions: Sequence[Motion]) -> set[int]:
-    """Integrate motions with room for their samples; return the numbers of failures.
+    """Integrate motions with room for their samples; return the indices of failures.
 
     Motions with the same topology and method run together; their steps may differ.
     """
@@ -42,7 +42,7 @@ def integrate(motions: Sequence[Motion]) -> set[int]:
 
 
 def integrate_prepared(motions: Sequence[Motion]) -> set[int]:
-    """Integrate the motions that have GPU kernels; return the numbers of successes."""
+    """Integrate the motions that have GPU kernels; return the indices of successes."""
     taken = [k for k, motion in enumerate(motions) if _is_taken(motion)]
     wrong = integrate([motions[k] for k in taken])
     for k in wrong:  # the CPU run will report the failure

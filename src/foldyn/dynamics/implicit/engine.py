@@ -416,7 +416,7 @@ def equal_step(
 
 
 def impulse_duration(scheme: Scheme, matrix: StepMatrix, packed: Packed, duration: float) -> float:
-    """How long (s) an impulse acts on, in which a vibration moves on; at most a duration.
+    """Time (s) during which an impulse acts on a motion; at most a duration.
 
     1/omega of the vibration that the histories set in motion, with omega^2 Rayleigh's quotient of
     the displacements under slow loads: as slow as the duration, for bodies without supports. Hinges
