@@ -121,7 +121,7 @@ class _Beside:
         first, second, third = ((0, 0, 0), (1, 0, 0), (2, -1, 0), (3, -3, 1))[self._known]
         scheme.shift[:] = one.shift + first * apart[0] + second * apart[1] + third * apart[2]
         if self._solve(one, matrix, h, t) == MOST:
-            raise ComputationError(f"no motion was found beside that at t = {t:.6g} s")
+            raise ComputationError(f"no companion motion was found at t = {t:.6g} s")
         apart[1:] = apart[:-1]
         apart[0] = scheme.shift - one.shift
         self._largest = max(self._largest, float(np.linalg.norm(apart[0])))

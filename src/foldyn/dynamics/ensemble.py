@@ -167,7 +167,7 @@ def simulate_many(
 
 
 def _origins(motions: Sequence[Motion], times: NDArray) -> dict[str, Any]:
-    """Origins of motions at sample times, per model; None unless something depends on them.
+    """Origins of motions at sample times, per model; empty unless something depends on them.
 
     The flow is valid for the last sample if they end there.
     """

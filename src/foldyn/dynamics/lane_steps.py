@@ -120,7 +120,7 @@ def advance_lanes(model, loads, factor, state, plan, places, out, first, last):
 
 
 def topology(motion: Motion) -> tuple[bytes, ...]:
-    """Properties that motions in lanes must share; None for motions that lanes do not support.
+    """Properties that motions in lanes must share; () for motions that lanes do not support.
 
     Supported are bars and hinges with the package's laws, lumped masses, drag, and dead loads.
     """

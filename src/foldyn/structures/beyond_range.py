@@ -120,7 +120,7 @@ def _relative_stiffness(pattern: Pattern, sheet: Sheet, folds: NDArray) -> NDArr
 
 
 def _strips(pattern: Pattern) -> NDArray[np.bool_]:
-    """Mask (nf,) of creases that meet no other, between panels that are not about square."""
+    """Mask (nf,) of creases that meet no other, of non-square panels with two creases."""
     count = np.bincount(pattern.creases.ravel(), minlength=len(pattern.vertices))
     alone = (count[pattern.creases] == 1).all(axis=1)
     length = lengths(pattern.vertices, pattern.creases)

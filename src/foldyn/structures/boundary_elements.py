@@ -60,7 +60,7 @@ class _Corners(NamedTuple):
     before: NDArray  # index of the previous corner
     starts: tuple[NDArray, NDArray]  # whether each of these edges is numbered from this corner
     open: tuple[NDArray, NDArray]  # whether they are open edges of the sheet
-    graded: tuple[NDArray, NDArray]  # whether their other ends lie on an open edge of the sheet
+    graded: tuple[NDArray, NDArray]  # whether they end here, across an open edge of the sheet
     rim: NDArray  # whether the vertex is on an open edge of the sheet
     edges: int
 

@@ -168,7 +168,7 @@ def _graded(kinds: Sequence[Kind]) -> list[PanelMesh]:
 
 @lru_cache(maxsize=64)
 def _fans(corners: int, arcs: int) -> tuple[NDArray, Cut]:
-    """Points of a graded mesh, by the corners of its pieces and then of the panel; the cut."""
+    """Points that a graded mesh uses, among its pieces' points and then the corners; the cut."""
     count = corners * arcs * (2 * RAYS + 1)
     node = np.arange(count).reshape(corners, arcs, -1)
     node[:, -1, RAYS] = node[0, -1, RAYS]  # the mean; two pieces share each cut

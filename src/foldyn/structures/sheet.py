@@ -136,7 +136,7 @@ class Sheet(Checked):
             for panel in _numbers(part):
                 if panel in before:
                     raise InputError(
-                        f": panel {panel} is among those of panels[{before[panel]}] already; "
+                        f": panel {panel} is already in panels[{before[panel]}]; "
                         "leave it out of one of the two",
                         f"panels[{i}].panels",
                     )
