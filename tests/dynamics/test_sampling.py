@@ -46,7 +46,7 @@ def test_functions_cannot_change_the_motion():
         (3, "sample = 3: give functions by name"),
         ({"kinetic": lambda u, v, t: 0.0}, "sample: 'kinetic' is not free"),
         ({"two words": lambda u, v, t: 0.0}, "is not free"),
-        ({"welds": lambda u, v, t: 0.0}, "sample: 'welds' is not free"),
+        ({"case": lambda u, v, t: 0.0}, "sample: 'case' is not free"),
         ({"x": 7}, r"sample\.x: has no function"),
         ({"x": fd.Quantity("m")}, r"sample\.x: has no function"),
         ({"x": lambda u: 0.0}, r"sample\.x: the function raised TypeError"),

@@ -10,6 +10,7 @@ import pytest
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.formats import diagnose
+from foldyn.results.contents import pattern_of
 
 
 def test_frames_have_the_angles_at_which_creases_are_folded(motion, case, tmp_path):
@@ -47,7 +48,7 @@ def test_a_shorter_series_does_not_hide_in_a_longer_one(motion, tmp_path):
 def test_modes_as_shapes(modes, tmp_path):
     (file,) = fd.export(modes, tmp_path / "x.fold")
     first = diagnose(file, frame=1).pattern
-    largest = np.linalg.norm(first.vertices - modes["vertices"].values, axis=1).max()
+    largest = np.linalg.norm(first.vertices - pattern_of(modes).vertices, axis=1).max()
     assert 0.5 * 0.12 < largest / diagnose(file).pattern.size <= 0.12 * (1 + 1e-12)
     assert first.name == f"mode 1: {float(modes.frequency[0]):.6g} Hz"
     assert len(fd.export(modes, tmp_path / "x.obj", every=1)) == 3

@@ -23,7 +23,7 @@ from foldyn.experiment import TrackedModel, load_tracks, save_tracks
 from foldyn.experiment.calibration.measured_files import recognize, shapes
 from foldyn.results import frf_dataset, netcdf, trajectory_dataset
 
-WORDS_OF_CASES = ("kind", "nodes", "variable", "history", "supports", "loads", "sheet", "model",
+WORDS_OF_CASES = ("kind", "nodes", "array", "history", "supports", "loads", "sheet", "model",
                   "shell", "divisions", "linear", "faces", "vertices", "rest_position")  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 import time
 
 import h5py
@@ -12,11 +13,13 @@ import pytest
 import xarray as xr
 
 import foldyn as fd
+from foldyn.cases.document import Document
 from foldyn.dynamics import initial_state
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment import TrackedModel
 from foldyn.results import netcdf, trajectory_dataset
 from foldyn.results.sandbox import apart
+from foldyn.results.stored_case import case_variables, document_of
 
 SEAL = 80  # bytes at the end
 
@@ -173,6 +176,22 @@ def case_text(text):
     return lambda ds: ds.assign(case=((), text))
 
 
+def edited(pattern, new):
+    """Change what a pattern finds in the text of the case."""
+    return lambda ds: case_text(re.sub(pattern, new, str(ds["case"].values[()]), count=1))(ds)
+
+
+def faces(change):
+    """Change the vertex numbers of the faces."""
+
+    def changed(ds):
+        sections, arrays = document_of(ds)
+        other = arrays | {"faces": change(arrays["faces"])}
+        return ds.assign(case=case_variables(Document(sections, other, ()))["case"])
+
+    return changed
+
+
 NONE = "no finite displacements"
 NUMBERS = "must be numbers over node, axis; it has"
 
@@ -185,11 +204,17 @@ NUMBERS = "must be numbers over node, axis; it has"
         (fd.case_of, case_text("a = " + "9" * 5000), "case is damaged"),
         (fd.case_of, case_text("[pattern"), "damaged"),
         (fd.case_of, case_text("title = 1"), "damaged"),
-        (fd.case_of, lambda ds: ds.drop_vars("face_offsets"), "lacks its variable face_offsets"),
+        (fd.case_of, edited(r"face_offsets = .*\n", ""), "lacks its array face_offsets"),
+        (fd.case_of, edited("i8 16 ", "i8 15 "), "its array .faces. cannot be read"),
+        (fd.case_of, edited('faces = "<i8 ', 'faces = "O '), "its array .faces. cannot be read"),
+        (fd.case_of, edited("i8 16 ....", "i8 16 "), "its array .faces. cannot be read"),
+        (fd.case_of, edited("i8 16 ....", "i8 16 é"), "its array .faces. cannot be read"),
+        (fd.case_of, edited('faces = ".*"', "faces"), "its array .faces. cannot be read"),
+        (fd.case_of, lambda ds: ds.drop_vars("rest_position"), "lacks its array rest_position"),
         (fd.case_of, lambda ds: ds.isel(node=[1, 2]), "use the whole result"),
-        (fd.case_of, lambda ds: ds.assign(faces=ds["faces"] + 1000), "vert"),
-        (fd.case_of, lambda ds: ds.assign(faces=ds["faces"] * 2**62), "vert|damaged"),
-        (fd.case_of, lambda ds: ds.assign(faces=ds["faces"].astype(str)), "damaged|vert"),
+        (fd.case_of, faces(lambda numbers: numbers + 1000), "vert"),
+        (fd.case_of, faces(lambda numbers: numbers * 2**62), "vert|damaged"),
+        (fd.case_of, faces(lambda numbers: numbers.astype(str)), "damaged|vert"),
         (initial_state, lambda ds: ds.assign(displacement=ds["node"]), "displacement must be numb"),
         (
             initial_state,

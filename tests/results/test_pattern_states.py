@@ -49,12 +49,11 @@ def test_angles_families_and_data_survive_a_result(make, tmp_path):
     np.testing.assert_array_equal(pattern.fold_angles, TOLD.fold_angles)
     assert {k: v.tolist() for k, v in pattern.families.items()} == {"zigzag": [0, 1], "a b": [3]}
     assert pattern.custom == TOLD.custom
-    assert found["fold_angles"].attrs["units"] == "rad"
 
 
 def test_a_result_without_them_is_as_it_was(path):
-    assert not {"fold_angles", "tables_family0_creases"} & set(path.variables)
-    assert "families" not in str(path["case"].values)
+    text = str(path["case"].values)
+    assert "families" not in text and "fold_angles" not in text
 
 
 def test_data_that_cannot_be_written_is_an_obstacle():

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
 import math
+import tomllib
 from dataclasses import fields
 
 import numpy as np
@@ -14,6 +16,7 @@ import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import LinearHinge
 from foldyn.results import case_of, load, save, trajectory_dataset
+from foldyn.results.stored_case import document_of, sections_of
 
 SHEET = fd.Sheet(1e6, 0.25, 1.0 / 3.0, 0.1, 2.7)
 CELLS = fd.patterns.miura((2, 1), a=1 / 3, b=0.7)
@@ -100,19 +103,21 @@ def test_contents() -> None:
     assert {name: ds.attrs[name] for name in wanted} == wanted
     assert "note" not in ds.attrs
     assert ds.attrs["foldyn_version"]
-    np.testing.assert_array_equal(ds["vertices"], case.structure.pattern.vertices)
-    start, end = ds["face_offsets"].values[2:4]
-    assert tuple(ds["faces"].values[start:end]) == case.structure.pattern.faces[2]
+    np.testing.assert_array_equal(ds["rest_position"], case.structure.nodes)
     with pytest.raises(ValueError, match="rerunnable"):  # may not pose as something else
         dataset(case, rerunnable=True)
 
 
-def test_the_text_of_the_case_refers_to_the_geometry() -> None:
+def test_the_text_of_the_case_refers_to_the_arrays_at_its_end() -> None:
     case = make_case(fd.Table(np.arange(500.0), np.zeros(500)), crease_rest=[100.0] * 10)
-    text = str(dataset(case)["case"].values[()])
-    assert 'variable = "vertices"' in text
-    assert "kind" in text
-    assert len(text) < 2000  # no geometry, tables or per-crease values in it
+    ds = dataset(case)
+    sections = sections_of(ds)
+    assert 'array = "vertices"' in sections and "kind" in sections
+    assert len(sections) < 2000  # no geometry, tables or per-crease values in it
+    whole = tomllib.loads(str(ds["case"].values[()]))
+    kind, shape, data = whole["arrays"]["tables_0_times"].split(" ")
+    assert (kind, shape) == ("<f8", "500")
+    np.testing.assert_array_equal(np.frombuffer(base64.b64decode(data)), np.arange(500.0))
 
 
 PER_CREASE = {"crease_stiffness": np.linspace(0.1, 1 / 3, 10), "crease_rest": [100 / 3] * 10}
@@ -186,7 +191,7 @@ def test_functions_are_stored_sampled_at_stage_times(case, start, tmp_path) -> N
 def test_loads_that_share_a_function_share_a_table() -> None:
     loads = [fd.Force(i, (1, 0, 0), fading) for i in range(3)]
     ds = dataset(fd.Case(MADE, loads=loads))
-    tables = sorted(name for name in ds if name.startswith("tables_0"))
+    tables = sorted(name for name in document_of(ds)[1] if name.startswith("tables_0"))
     assert tables == ["tables_0_times", "tables_0_values"]
     assert len(case_of(ds).load_terms) == 1
 
@@ -202,6 +207,29 @@ def test_functions_that_move_supports_are_stored_as_smooth_tables(tmp_path) -> N
     times = np.array([0.1, 0.125, 0.3])
     np.testing.assert_allclose(moves.derivatives(times)[1], 3 * np.sin(3 * times), rtol=2e-3)
     assert_same_case(case_of(dataset(found)), found)
+
+
+def drawn(case):
+    """A motion, a path, modes and a frequency response."""
+    yield fd.simulate(case, 0.01, method="dormand_prince")
+    yield fd.trace(case, load_factors=[1.0])
+    yield fd.modes(case, count=2)
+    yield fd.frf(case, frequencies=[1.0, 2.0], drive=fd.Force("xmax", (0, 0, 1.0)))
+
+
+def test_a_printed_result_shows_physics_and_a_copy_of_it_is_rerunnable(tmp_path) -> None:
+    """Of the case it names one variable, whatever is stored; other programs keep that one."""
+    made = fd.discretize(CELLS, SHEET, crease_stiffness=PER_CREASE["crease_stiffness"])
+    case = fd.Case(made, [fd.Fix("xmin")], [fd.Force("xmax", (0, 0, 1e-3), CHIRP)])
+    hidden = set(document_of(dataset(case))[1]) - {"rest_position"}
+    assert {"vertices", "faces", "tables_family0_creases", "tables_crease_stiffness"} <= hidden
+    for result in drawn(case):
+        assert len(str(result).splitlines()) <= 40
+        assert not hidden & {*result.variables, *result.dims}
+        assert not {"vertex", "face", "face_corner", "face_bound", "crease"} & {*result.dims}
+        result.to_netcdf(tmp_path / "own.nc", engine="h5netcdf")
+        with xr.open_dataset(tmp_path / "own.nc", engine="h5netcdf") as found:
+            assert_same_case(case_of(found), case_of(result))
 
 
 def test_tables_from_csv_are_stored_as_numbers(tmp_path) -> None:
@@ -259,11 +287,13 @@ def test_files_that_are_no_results(tmp_path) -> None:
     (tmp_path / "text.nc").write_text("not NetCDF")
     xr.Dataset({"a": ("x", [1.0])}).to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
     save(dataset(make_case()).assign_attrs(foldyn_format=99), tmp_path / "newer.nc")
+    save(dataset(make_case()).assign_attrs(foldyn_format=1), tmp_path / "older.nc")
     for name, text in (
         ("none", "there is no such file"),
         ("text", "is not a Foldyn result"),
         ("other", "is not a Foldyn result"),
         ("newer", "was written by Foldyn .* update"),
+        ("older", "was written by Foldyn .* in format 1, .* compute it again"),
     ):
         with pytest.raises(InputError, match=rf"{name}\.nc: {text}"):
             load(tmp_path / f"{name}.nc")

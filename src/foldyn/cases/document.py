@@ -1,7 +1,7 @@
 """A case as a document (a table that TOML can hold) and named arrays, and back.
 
 The document has the sections of a case file. What is long lives in the arrays and is referred to
-as ``{ variable = "name" }``: the pattern's vertices and faces, per-crease values, tables of
+as ``{ array = "name" }``: the pattern's vertices and faces, per-crease values, tables of
 histories. Numbers survive exactly.
 """
 
@@ -54,7 +54,7 @@ class Document:
     sections : dict
         Sections of a case file, of plain Python values.
     arrays : dict of str to ndarray
-        What the sections refer to, by variable name.
+        What the sections refer to, by name.
     obstacles : tuple of str
         Why the case cannot be rebuilt from the document; empty when it can.
     """
@@ -161,7 +161,7 @@ class _Writer:
 
     def store(self, name: str, values: Any) -> dict[str, str]:
         self.arrays[name] = np.asarray(values)
-        return {"variable": name}
+        return {"array": name}
 
     def pattern(self, pattern: Pattern | None) -> dict[str, Any]:
         if pattern is None:
@@ -378,10 +378,10 @@ def _stored_pattern(table: Mapping[str, Any]) -> Pattern:
 def _resolve(value: Any, arrays: Mapping[str, NDArray]) -> Any:
     """Put the arrays in the place of their references."""
     if isinstance(value, Mapping):
-        if set(value) == {"variable"}:
-            if value["variable"] not in arrays:
-                raise InputError(f"the stored case lacks its variable {value['variable']}")
-            return arrays[value["variable"]]
+        if set(value) == {"array"}:
+            if value["array"] not in arrays:
+                raise InputError(f"the stored case lacks its array {value['array']}")
+            return arrays[value["array"]]
         return {key: _resolve(item, arrays) for key, item in value.items()}
     if isinstance(value, list):
         return [_resolve(item, arrays) for item in value]

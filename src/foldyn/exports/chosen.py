@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.results.contents import nodes_of
-from foldyn.results.dataset import DOCUMENT
 from foldyn.values import choice, indices, show
 
 ALONG = {
@@ -26,15 +25,11 @@ ALONG = {
     "backbone": "point",
 }
 """The dimension along which a kind of results runs."""
-TABLES = "tables_"
-"""Prefixes of array names that the text of a case refers to."""
 
 
 def quantities_of(result: xr.Dataset) -> list[str]:
-    """Names of computed variables and of the rest position, not of those that describe the case."""
-    names = map(str, result.data_vars)
-    described = {*DOCUMENT} - {"rest_position"}
-    return [n for n in names if n not in described and not n.startswith(TABLES)]
+    """Names of what was computed, and of the rest position; not the case."""
+    return [str(name) for name in result.data_vars if name != "case"]
 
 
 def chosen_fields(known: Iterable[str], fields: str | Sequence[str] | None) -> list[str]:

@@ -21,6 +21,7 @@ from foldyn.errors import InputError
 from foldyn.exports.chosen import ALONG, chosen_fields, quantities_of
 from foldyn.results.contents import pattern_of
 from foldyn.results.frames import chosen_samples
+from foldyn.results.stored_case import sections_of
 from foldyn.writing import whole
 
 MOST = 2**31 - 1
@@ -81,7 +82,7 @@ def write(
         "faces": _faces(pattern.faces),
         "creases": pattern.creases + 1.0,
         "assignments": "".join(pattern.assignments),
-        "case_file": str(result["case"].values[()]),
+        "case_file": sections_of(result),
         "units": _texts(result, names, "units"),
         "labels": _texts(result, names, "long_name"),
         "attributes": _named({key: _attribute(value) for key, value in result.attrs.items()}),

@@ -10,8 +10,8 @@ import numpy as np
 
 from foldyn import __version__
 
-FORMAT = 1
-"""Version of the layout of results, raised when older programs could not read a new one."""
+FORMAT = 2
+"""Number of the layout of results. Files of another one are refused."""
 
 OWN = ("foldyn_result", "foldyn_format", "foldyn_version", "rerunnable", "not_rerunnable_because")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -11,9 +10,9 @@ import xarray as xr
 from foldyn.cases import Case
 from foldyn.cases.document import from_document, pattern_from_document
 from foldyn.errors import InputError
-from foldyn.input_files import from_toml
 from foldyn.patterns import Pattern
 from foldyn.patterns.selection import given_as, select
+from foldyn.results.stored_case import document_of
 from foldyn.values import show, whole
 
 NUMBERS, WHOLES, TEXTS = "iuf", "iu", "UOST"
@@ -76,7 +75,7 @@ def case_of(ds: xr.Dataset) -> Case:
         raise InputError(
             f"this result cannot be run again from itself: {reason}; make its case anew in Python"
         )
-    return from_document(*_document(ds))
+    return from_document(*document_of(ds))
 
 
 def pattern_of(ds: xr.Dataset) -> Pattern:
@@ -88,17 +87,7 @@ def pattern_of(ds: xr.Dataset) -> Pattern:
         Not a result, or a damaged one.
     """
     check_result(ds)
-    return pattern_from_document(*_document(ds))
-
-
-def _document(ds: xr.Dataset) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the sections of a result's case and the arrays that they refer to."""
-    try:
-        sections = from_toml(str(ds["case"].values[()]))
-    except InputError as error:
-        raise InputError(f"the stored case is damaged: it {error}") from None
-    names = [name for name in ds.variables if name != "case"]
-    return sections, {str(name): ds[name].values for name in names}
+    return pattern_from_document(*document_of(ds))
 
 
 def check_result(ds: xr.Dataset, place: str = "") -> None:
@@ -142,10 +131,11 @@ def nodes_of(
 
 def _numbers(result: xr.Dataset, nodes: int | str | Sequence[int], name: str) -> list[int]:
     if isinstance(nodes, str):
-        if "vertices" not in result:
+        _, arrays = document_of(result) if "case" in result else ({}, {})
+        if "vertices" not in arrays:
             raise InputError(f" = {show(nodes)}: {name} has no pattern; give numbers", "nodes")
         with given_as("nodes"):
-            return select(result["vertices"].values, nodes).tolist()
+            return select(arrays["vertices"], nodes).tolist()
     given = np.atleast_1d(np.asarray(nodes, dtype=object))
     if given.ndim > 1 or not given.size:
         raise InputError(

@@ -7,12 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import tomli_w
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases import HISTORIES, Case, Continuation, Origin
-from foldyn.cases.document import Document, pattern_document, to_document
+from foldyn.cases.document import pattern_document, to_document
 from foldyn.patterns import Pattern
 from foldyn.results.attributes import facts, own_attributes
 from foldyn.results.quantities import (
@@ -36,31 +35,15 @@ from foldyn.results.quantities import (
     variables,
     with_reason,
 )
+from foldyn.results.stored_case import CASE_VARIABLES, case_variables
 
 AXIS = np.array(["x", "y", "z"])
 
-DOCUMENT: Mapping[str, tuple[str, ...]] = {
-    "case": (),
-    "rest_position": PLACE,
-    "vertices": ("vertex", "axis"),
-    "faces": ("face_corner",),
-    "face_offsets": ("face_bound",),
-    "assignments": ("crease",),
-    "fold_angles": ("crease",),
-    "welds": ("weld", "end"),
-    "board_corners": ("face_corner", "axis"),
-    "board_thickness": ("face",),
-    "tables_crease_stiffness": ("crease",),
-    "tables_crease_rest": ("crease",),
-}
-"""Variables of the case, which every result has, with their dimensions; other tables have their
-own."""
 TAKEN = frozenset(
-    {*MOTION, *CROSSINGS, *DOCUMENT, "time", "node", "axis", *CONTINUATIONS, *ORIGIN}
+    {*MOTION, *CROSSINGS, *CASE_VARIABLES, "time", "node", "axis", *CONTINUATIONS, *ORIGIN}
     | {"support", "support_node", "support_axis"}
 )
 """Names that every motion has."""
-LENGTHS = ("rest_position", "vertices", "board_corners", "board_thickness")
 
 
 def trajectory_dataset(
@@ -109,10 +92,8 @@ def trajectory_dataset(
     xarray.Dataset
         `displacement`, `velocity` (time, node, axis), `reaction` (time, support) with the
         coordinates `support_node` and `support_axis`, the energies (time), `rest_position`
-        (node, axis), and the case: `case` (TOML), `vertices`, `faces` (vertex numbers of all
-        faces in a row) with `face_offsets` (face i is faces[face_offsets[i]:face_offsets[i+1]]),
-        `assignments`, and tables. The attribute `rerunnable` is 1 when `case_of` can rebuild the
-        case, else 0, and `not_rerunnable_because` says why.
+        (node, axis), and the `case` (TOML). The attribute `rerunnable` is 1 when `case_of` can
+        rebuild the case, else 0, and `not_rerunnable_because` says why.
     """
     time = np.array(time, dtype=np.float64)
     added = sampled or {}
@@ -419,21 +400,3 @@ def stage_times(statistics: Mapping[str, Any]) -> NDArray[np.float64] | None:
     times[::2] = float(statistics.get("start", 0.0)) + np.arange(steps + 1) * dt
     times[1::2] = times[:-1:2] + 0.5 * dt
     return times
-
-
-def case_variables(document: Document) -> dict[str, Any]:
-    """Variables that store a case as written down."""
-    variables: dict[str, Any] = {
-        "case": (
-            DOCUMENT["case"],
-            tomli_w.dumps(document.sections),
-            {"long_name": "the case (TOML)"},
-        )
-    }
-    for name, array in document.arrays.items():
-        # the times and values of a table share a dimension
-        own = (f"{name.rsplit('_', 1)[0]}_point",)
-        unit = "m" if name in LENGTHS else "rad" if name == "fold_angles" else ""
-        attributes = {"units": unit} if unit else {}
-        variables[name] = (DOCUMENT.get(name, own), array, attributes)
-    return variables

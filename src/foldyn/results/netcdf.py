@@ -100,13 +100,14 @@ def load(path: str | os.PathLike[str], whole: bool = True) -> xr.Dataset:
     ds = read(path, "is not a Foldyn result (it cannot be read as NetCDF)", whole)
     check_result(ds, f"{path}: ")
     try:
-        newer = whole_attribute(ds, "foldyn_format") > FORMAT
+        layout = whole_attribute(ds, "foldyn_format")
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    if newer:
+    if layout != FORMAT:
+        remedy = "update Foldyn" if layout > FORMAT else "compute it again"
         raise InputError(
-            f"{path}: was written by Foldyn {ds.attrs.get('foldyn_version')}, whose format this "
-            "version does not know; update Foldyn"
+            f"{path}: was written by Foldyn {ds.attrs.get('foldyn_version')} in format {layout}, "
+            f"and this version reads format {FORMAT}; {remedy}"
         )
     try:
         return _joined(ds)

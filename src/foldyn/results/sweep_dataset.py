@@ -16,7 +16,7 @@ from foldyn.cases.document import to_document
 from foldyn.errors import InputError
 from foldyn.results.attributes import facts, own_attributes
 from foldyn.results.contents import check_result
-from foldyn.results.dataset import case_variables
+from foldyn.results.stored_case import case_variables
 from foldyn.values import choice, number, whole
 
 POINT = "point"

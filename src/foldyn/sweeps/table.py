@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from foldyn.analyses.keys import parts
 from foldyn.cases.units import unit_of
-from foldyn.results.dataset import DOCUMENT
+from foldyn.results.stored_case import CASE_VARIABLES
 from foldyn.results.sweep_dataset import POINT, sweep_dataset
 from foldyn.sweeps.evaluations import Evaluation
 from foldyn.sweeps.measure import Asked
@@ -33,7 +33,7 @@ ABOUT: Mapping[str, str] = {
 def names_of(keys: Sequence[str], taken: Sequence[str]) -> list[str]:
     """Short names of keys: their last words, or all words if these are not unique."""
     short = [_last(key) for key in keys]
-    counts = Counter([*short, *taken, *ABOUT, *DOCUMENT, POINT, "case_file"])
+    counts = Counter([*short, *taken, *ABOUT, *CASE_VARIABLES, POINT, "case_file"])
     return [
         name if counts[name] == 1 else re.sub(r"\W+", "_", key).strip("_")
         for key, name in zip(keys, short, strict=True)
