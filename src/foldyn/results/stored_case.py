@@ -75,5 +75,5 @@ def _read(name: str, text: str) -> NDArray:
         return values.reshape([int(size) for size in shape.split(",") if size]).copy()
     except Exception as error:  # whatever damage leads to
         raise InputError(
-            f"the stored case is damaged: its array {show(name)} cannot be read ({error})"
-        ) from None
+            f"the stored case is damaged: its array {show(name)} cannot be read"
+        ) from error
