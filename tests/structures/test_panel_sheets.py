@@ -39,15 +39,16 @@ BITS = ("bar_area", "fold_stiffness", "bend_stiffness")
         (fd.discretize, {"scheme": "n5b8"}, BITS),
         (fd.discretize, {"scheme": "n4b5"}, BITS),
         (fd.discretize, {"scheme": "n5b8", "calibration": "merlin2"}, BITS),
-        (fd.shell, {"divisions": 3}, ("membrane", "bending", "piece_stiffness")),
+        (fd.shell, {"divisions": 3}, ("fold_stiffness",)),
     ],
 )
 def test_panels_that_differ_in_nothing_change_no_bit(build, options, names):
     same = fd.PanelSheet([0, 3, 5], E, NU, T, RHO)
     one, two = (build(MIURA, s, **options) for s in (SHEET, replace(SHEET, panels=[same])))
     for name in names:
-        parts = [getattr(s.model if build is fd.shell else s, name) for s in (one, two)]
-        np.testing.assert_array_equal(*parts)
+        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+    tangents = [s.body.tangent(np.zeros(s.body.size)) for s in (one, two)]
+    np.testing.assert_array_equal(*(each.toarray() for each in tangents))
     np.testing.assert_array_equal(one.mass.toarray(), two.mass.toarray())
 
 

@@ -99,9 +99,10 @@ def jumped() -> None:
 
 
 def folded() -> None:
-    """Fold a pattern, evaluate its law's curve, and find a corner in a photograph."""
+    """Fold a pattern, evaluate laws' curves, and find a corner in a photograph."""
     fd.fold(fd.patterns.simple_fold(dihedral=170), 90.0, steps=2)
     in_series(fd.EnhancedLinear(), 1.0, 3.0, 0.5)
+    fd.materials.LinearBar().stress(1.0)
     refine(np.zeros((40, 40), np.uint8), [[20.0, 20.0]], reach=8.0, moved=2.0)
 
 
