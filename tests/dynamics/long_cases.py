@@ -80,7 +80,7 @@ CASES = {
 def simulated(name: str, changes: dict[str, Any] | None = None, **options: Any) -> xarray.Dataset:
     """The motion of one of them, looked after every few steps."""
     motion.CHUNK, motion.REPORT_EVERY = 16, 0.0
-    return fd.simulate(CASES[name](**(changes or {})), **options)
+    return fd.simulate(CASES[name](**(changes or {})), **{"method": "rk4", **options})
 
 
 def same(one: xarray.Dataset, other: xarray.Dataset, also: tuple[str, ...] = ()) -> None:

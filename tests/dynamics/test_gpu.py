@@ -100,7 +100,7 @@ def springs() -> SpringsTerm:
 
 def test_the_device_is_named_in_a_case_file_and_on_the_command_line(tmp_path, monkeypatch, capsys):
     file = tmp_path / "case.toml"
-    file.write_text(MOTION + 'method = "rk4"\n')
+    file.write_text(MOTION)
     monkeypatch.setattr(checks, "no_card", lambda: "no GPU is here")
     command = ["run", str(file), "--out", str(tmp_path / "out"), "--no-figures"]
     assert main([*command, "--device", "gpu"]) == 2

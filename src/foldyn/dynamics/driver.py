@@ -192,6 +192,7 @@ def prepare(
     of_kind("case", case, Case)
     choice("method", method, (*METHODS, AUTO))
     if choice("device", device, ("cpu", "gpu")) == "gpu":
+        method = "rk4" if method == AUTO else method
         check_gpu(method)
     integrator = method_of("rk4") if method == AUTO else suited(method, case)
     if method != AUTO:
