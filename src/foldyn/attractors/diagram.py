@@ -120,12 +120,12 @@ def bifurcation_diagram(
     Examples
     --------
     >>> import foldyn as fd
-    >>> s = fd.discretize(fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.1, 1.0))
+    >>> s = fd.discretize(fd.patterns.simple_fold(dihedral=60), fd.Sheet(1e6, 0.25, 0.1, 1.0))
     >>> supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")]
     >>> push = fd.Force([0, 1], (1.0, 0, 0), history=fd.Harmonic(5.0))
     >>> case = fd.Case(s, supports, [push], damping=fd.Rayleigh(alpha=20.0))
     >>> ridge = fd.Quantity("m", "height of the ridge", function=lambda u, v, t: u[2, 2])
-    >>> found = bifurcation_diagram(case, ridge, [4.0, 5.0], settle=10, record=4)
+    >>> found = bifurcation_diagram(case, ridge, frequencies=[4.0, 5.0], settle=10, record=4)
     >>> found.periods.values.tolist()
     [[1, 1], [1, 1]]
     """

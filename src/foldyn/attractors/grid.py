@@ -113,14 +113,15 @@ def basins(
     Examples
     --------
     >>> import foldyn as fd
-    >>> s = fd.discretize(fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.1, 1.0))
+    >>> s = fd.discretize(fd.patterns.simple_fold(dihedral=60), fd.Sheet(1e6, 0.25, 0.1, 1.0))
     >>> supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")]
     >>> case = fd.Case(s, supports, damping=fd.Rayleigh(alpha=40.0))
     >>> def pulled(length):
     ...     u = np.zeros((len(s.nodes), 3))
     ...     u[[0, 1], 0] = length
     ...     return fd.State(u)
-    >>> basins(case, pulled, {"length": [-0.01, 0.0, 0.01]}, 1.0, dt=5e-5).basin.values.tolist()
+    >>> grid = {"length": [-0.01, 0.0, 0.01]}
+    >>> basins(case, pulled, grid=grid, duration=1.0, dt=5e-5).basin.values.tolist()
     [0, 0, 0]
     """
     began = time.perf_counter()

@@ -102,7 +102,7 @@ def lyapunov_exponent(
     Examples
     --------
     >>> import foldyn as fd
-    >>> s = fd.discretize(fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.1, 1.0))
+    >>> s = fd.discretize(fd.patterns.simple_fold(dihedral=60), fd.Sheet(1e6, 0.25, 0.1, 1.0))
     >>> supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")]
     >>> push = fd.Force([0, 1], (1.0, 0, 0), history=fd.Harmonic(5.0))
     >>> case = fd.Case(s, supports, [push], damping=fd.Rayleigh(alpha=4.0))

@@ -78,7 +78,7 @@ def poincare_section(
     Examples
     --------
     >>> import foldyn as fd
-    >>> s = fd.discretize(fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.1, 1.0))
+    >>> s = fd.discretize(fd.patterns.simple_fold(dihedral=60), fd.Sheet(1e6, 0.25, 0.1, 1.0))
     >>> push = fd.Force([0, 1], (1.0, 0, 0), history=fd.Harmonic(5.0))
     >>> supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")]
     >>> case = fd.Case(s, supports, [push], damping=fd.Rayleigh(alpha=20.0))

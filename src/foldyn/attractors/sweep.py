@@ -102,12 +102,13 @@ def swept_sine(
     Examples
     --------
     >>> import foldyn as fd
-    >>> s = fd.discretize(fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.1, 1.0))
+    >>> s = fd.discretize(fd.patterns.simple_fold(dihedral=60), fd.Sheet(1e6, 0.25, 0.1, 1.0))
     >>> supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")]
     >>> push = fd.Force([0, 1], (1.0, 0, 0), history=fd.Harmonic(5.0))
     >>> case = fd.Case(s, supports, [push], damping=fd.Rayleigh(alpha=20.0))
     >>> ridge = fd.Quantity("m", "height of the ridge", function=lambda u, v, t: u[2, 2])
-    >>> dict(swept_sine(case, ridge, (5.0, 10.0), 2.0).amplitude.sizes)
+    >>> swept = swept_sine(case, ridge, frequencies=(5.0, 10.0), duration=2.0)
+    >>> dict(swept.amplitude.sizes)
     {'sweep': 2, 'cycle': 15}
     """
     began = time.perf_counter()

@@ -131,7 +131,8 @@ def sensitivity(
     ...     sheet = fd.Sheet(1e6, 0.25, 0.01, 1000.0)
     ...     return fd.Case(fd.discretize(pattern, sheet), [fd.Fix("xmin")])
     >>> found = fd.sensitivity(
-    ...     build, {"panel_angle": 62.0}, "frequency[1]", {"kind": "modes", "count": 3}
+    ...     build, {"panel_angle": 62.0}, measures="frequency[1]",
+    ...     analysis={"kind": "modes", "count": 3},
     ... )
     >>> found["gradient_panel_angle"].dims
     ('measure',)

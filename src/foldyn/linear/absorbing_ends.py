@@ -194,7 +194,7 @@ def absorbing_end(case: Case, nodes: Nodes, *, waves: LongWaves) -> list[Dashpot
     >>> tower = lambda n: fd.Case(fd.discretize(
     ...     fd.patterns.kresling(radius=0.05, height=0.07, storeys=n), sheet))
     >>> waves = fd.linear.long_waves(fd.UnitCell(tower(1)))
-    >>> len(fd.linear.absorbing_end(tower(8), range(48, 54), waves))
+    >>> len(fd.linear.absorbing_end(tower(8), range(48, 54), waves=waves))
     12
     """
     structure = of_kind("case", case, Case).structure

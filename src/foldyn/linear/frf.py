@@ -155,7 +155,7 @@ def frf(
     >>> s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0))
     >>> supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
     >>> case = fd.Case(s, supports, damping=fd.Rayleigh(alpha=0.5))
-    >>> response = frf(case, fd.Force([0, 1], (1e-3, 0, 0)), [0.0, 1.0])
+    >>> response = frf(case, fd.Force([0, 1], (1e-3, 0, 0)), frequencies=[0.0, 1.0])
     >>> abs(response.receptance).sel(node=0, axis="x").values.round(1).tolist()
     [17.7, 4.3]
     """

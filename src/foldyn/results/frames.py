@@ -165,7 +165,7 @@ def frames_of(
     Examples
     --------
     >>> pattern, frames = frames_of(trajectory, every=10)  # doctest: +SKIP
-    >>> fd.write_pattern("run.fold", pattern, frames)  # doctest: +SKIP
+    >>> fd.write_pattern(pattern, "run.fold", frames=frames)  # doctest: +SKIP
     """
     return _states(result, shapes_of(result, every, frames=frames, scale=scale))
 

@@ -38,7 +38,8 @@ def convert_response(
 
     Examples
     --------
-    >>> print(convert_response([1.0, 2.0], [1.0, 1.0], "receptance", "mobility").round(3))
+    >>> found = convert_response([1.0, 2.0], [1.0, 1.0], source="receptance", target="mobility")
+    >>> print(found.round(3))
     [0. +6.283j 0.+12.566j]
     """
     order = (

@@ -96,7 +96,7 @@ def fit_sine(
     --------
     >>> import numpy as np
     >>> t = np.arange(200) * 0.01
-    >>> fit = fit_sine(t, 0.5 + 0.3 * t + 2.0 * np.cos(2 * np.pi * 3.1 * t - 1.0), 3.1)
+    >>> fit = fit_sine(t, 0.5 + 0.3 * t + 2.0 * np.cos(2 * np.pi * 3.1 * t - 1.0), frequency=3.1)
     >>> print(np.round(np.abs(fit.amplitude[0]), 12), np.round(np.angle(fit.amplitude[0]), 12))
     2.0 -1.0
     """
