@@ -13,13 +13,12 @@ pattern = fd.Pattern(corners, [(0, 2, 3, 1), (2, 4, 5, 3)])
 laws = {"fold_law": "linear", "bend_law": "linear", "crease_stiffness": STIFFNESS / B}
 structure = fd.discretize(pattern, foam, **laws)
 gust = fd.Air(velocity=(0, 0, 4.0), history=fd.HalfSine(0.1), drag_coefficient=1.2)
-held = [fd.Fix([0, 1, 2, 3])]
-case = fd.Case(structure, held, air=gust)
+case = fd.Case(structure, [fd.Fix([0, 1, 2, 3])], air=gust)
 motion = fd.simulate(case, 1.5, method="central_difference", interval=0.002)
 x, _, z = (structure.nodes[4] + motion.displacement.values[:, 4]).T
 angle = np.arctan2(z, x - A)  # rad
 # I phi'' + c |phi'| phi' + k phi = 0: half a swing takes 4/3 c/I phi^2 from its angle phi
-modes = fd.modes(fd.Case(structure, held, air=fd.Air()), 1)
+modes = fd.modes(case.altered(air=fd.Air()), 1)
 inertia = STIFFNESS / (2.0 * np.pi * modes.frequency.values[0]) ** 2
 drag = 0.5 * gust.density * gust.drag_coefficient * B * A**4 / 4.0
 size = np.abs(angle)

@@ -35,7 +35,5 @@ figure = fd.plots.draw_sensitivity(
 )
 figure.savefig("design-which-crease.png", dpi=90)
 change = np.log2(best["parameters"]["stiffness"] / equal)
-figure = fd.plots.draw_sensitivity(
-    build(equal), change, label="log2 of the stiffness over 0.02 N/rad"
-)
+figure = fd.plots.draw_sensitivity(build(equal), change, label="log2(stiffness / 0.02 N/rad)")
 figure.savefig("design-creases.png", dpi=90)

@@ -8,6 +8,6 @@ landscape = fd.landscape(path)
 print(landscape)
 
 plots = fd.plots
-plots.plot_load_displacement(path, [6], "-z").savefig("kresling-curve.png", dpi=90)
-plots.draw_shapes(case, path, 3).savefig("kresling-shapes.png", dpi=80)
+plots.plot_load_displacement(path, [6], direction="-z").savefig("kresling-curve.png", dpi=90)
+plots.draw_shapes(case, path, points=3).savefig("kresling-shapes.png", dpi=80)
 plots.plot_landscape(landscape).savefig("kresling-landscape.png", dpi=90)

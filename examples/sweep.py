@@ -25,7 +25,7 @@ if __name__ == "__main__":  # its processes import this file
     plots = fd.plots
     plots.plot_sweep_map(grid, "frequencies", at={"mode": 2}).savefig("sweep-map.png", dpi=90)
     at = {"length_scale_ratio": 1.0}
-    lines = plots.plot_sweep_lines(grid, "frequencies", "dihedral", "mode", at)
+    lines = plots.plot_sweep_lines(grid, "frequencies", x="dihedral", by="mode", at=at)
     lines.savefig("sweep-lines.png", dpi=90)
     plots.plot_main_effects(design, "frequency_1").savefig("sweep-effects.png", dpi=90)
     plots.plot_sobol_indices(indices).savefig("sweep-indices.png", dpi=90)

@@ -35,7 +35,7 @@ ends = []
 implicit = "newmark", "generalized_alpha", "energy_momentum"
 for method in ("rk4", "central_difference", "dormand_prince", *implicit):
     step = 1e-4 if method in implicit else None
-    found = fd.simulate(case, 0.05, method, dt=step)
+    found = fd.simulate(case, 0.05, method=method, dt=step)
     ends.append(found.displacement.values[-1])
     strain = sum(found[name] for name in case.energy_groups)
     balance = found.kinetic + strain + found.dissipated - found.work
@@ -69,7 +69,7 @@ def end(growth, rest=125.0, method="statics"):
     built = case(Stiffening(growth), rest)
     if method == "statics":
         return float(fd.trace(built, load_factors=[1.0]).displacement[-1].sel(node=0, axis="x"))
-    found = fd.simulate(built, 0.1, method, dt=4e-4)
+    found = fd.simulate(built, 0.1, method=method, dt=4e-4)
     return float(found.displacement[-1].sel(node=0, axis="x"))
 
 assert abs(end(2.0) - end(0.0)) > 1e-3 * abs(end(0.0))
@@ -78,7 +78,8 @@ for method, analysis in (
     ("rk4", {"kind": "dynamics", "duration": 0.1, "method": "rk4", "dt": 4e-4}),
 ):
     build = lambda growth, rest: case(Stiffening(growth), rest)
-    found = fd.sensitivity(build, {"growth": 2.0, "rest": 125.0}, "displacement[0,x]", analysis)
+    values = {"growth": 2.0, "rest": 125.0}
+    found = fd.sensitivity(build, values, measures="displacement[0,x]", analysis=analysis)
     for name, h in (("growth", 1e-3), ("rest", 1e-2)):
         ends = [end(**({"growth": 2.0, "rest": 125.0} | {name: x}), method=method)
                 for x in ({"growth": 2.0, "rest": 125.0}[name] + k * h for k in (-1, 1))]

@@ -81,7 +81,7 @@ def test_frequencies_of_a_mended_sheet_are_those_without_slips(tmp_path):
 def test_digits_of_a_file_are_no_slips(digits, tmp_path):
     """Coordinates rounded to so many digits of a meter, in panels of 30 mm."""
     rounded = SHEET.changed(vertices=np.round(SHEET.vertices, digits))
-    write_pattern(tmp_path / "x.fold", rounded)
+    write_pattern(rounded, tmp_path / "x.fold")
     doubted = any("nearly" in doubt for doubt in diagnose(tmp_path / "x.fold").diagnosis.doubts)
     assert doubted == (digits == 5)
     mended = diagnose(tmp_path / "x.fold", flat_foldable=True).pattern

@@ -32,6 +32,7 @@ force = [-1e-3, 0, 0]
 history = {{ kind = "half_sine", duration = 0.5 }}
 [analysis]
 kind = "dynamics"
+method = "rk4"
 duration = 2.0
 [output]
 interval = 0.01

@@ -263,7 +263,7 @@ class Shell(Discretized):
             nodes=self.triangles.copy(),
             ends=np.array([[0, 1], [1, 2], [2, 0]]),
             vector=np.ascontiguousarray(side.transpose(1, 2, 0)),
-            per_length2=1.0 / np.einsum("tki,tki->kt", side, side),
+            per_length2=np.ascontiguousarray(1.0 / np.einsum("tki,tki->kt", side, side)),
             stiffness=np.ascontiguousarray(self._stiffness[0].transpose(1, 2, 0)),
         )
         return (PanelKind(self.triangle_panel, own),)

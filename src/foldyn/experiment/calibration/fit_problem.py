@@ -242,7 +242,8 @@ class Problem:
                 motion = motion_of(run, self.case_file(run, values))
                 orders.append(motion.method.order)
                 steps[k] = {"analysis.dt": 0.5 * motion.plan.dt}
-                steps[k]["output.interval"] = 0.5 * motion.plan.interval
+                if "every_steps" not in run.document.get("output", {}):
+                    steps[k]["output.interval"] = 0.5 * motion.plan.interval
             if run.document.get("model", {}).get("kind") == SHELL:
                 divisions = self.case_file(run, values).case().structure.options.divisions
                 meshes[k] = {"model.divisions": 2 * divisions}
