@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import sys
 import time
 import tracemalloc
 
@@ -152,6 +153,7 @@ def test_the_command_takes_half_of_the_memory_unless_forced(tmp_path, monkeypatc
             assert time.perf_counter() - began < 2.0
             told = capsys.readouterr().err
             assert re.search(r"(cells = .* vertices|analysis.steps: .* points) needs about", told)
+    monkeypatch.setattr(sys.modules["foldyn.structures.discretize"], "PER_NODE", 7000.0)
     monkeypatch.setattr(ram_limit, "memory", lambda: 195e3)  # the factors take 105 kB
     assert main(call) == 2
     assert "pattern: solving for 39 dofs needs about" in capsys.readouterr().err

@@ -57,7 +57,7 @@ from foldyn.values import choice, length, show, whole
 MASSES = {"lumped": "centroid", "consistent": "consistent"}  # and the rules they are
 STIFF = 100.0  # times the stiffness in the plane: corners about vertices that count as rigid
 RANDOM = 0.05  # of rounding errors, how much is left where many of either sign add up
-PER_NODE = 16_000.0
+PER_NODE = 20_000.0
 """Bytes a node with its tangent: 14,200 and 16,000 measured with 3,721 and 14,641 nodes."""
 PER_DOUBLING, LEAST = 5900.0, 1450
 """Memory of its factors, see `Fill`: 23 and 35 kB a dof with 21,963 and 87,123 dofs."""
