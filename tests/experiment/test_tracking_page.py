@@ -36,7 +36,8 @@ def test_the_way_to_a_free_vibration(tracked, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     _, block = re.findall(r"^```python\n(.*?)^```$", PAGE, re.M | re.S)
     # this film is short, and its node 6 is one of those that are seen best
-    block = block.replace("start=0.14, stop=1.34", "start=0.0, stop=0.33").replace("node=8", "node=6")
+    block = block.replace("start=0.14, stop=1.34", "start=0.0, stop=0.33")
+    block = block.replace("node=8", "node=6")
     names: dict = {}
     exec(compile(block, "tracking.md", "exec"), names)
     assert names["found"].damped_frequency == pytest.approx(12.0, rel=0.02)
