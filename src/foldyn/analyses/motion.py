@@ -47,6 +47,7 @@ from foldyn.values import number, show
 LOADS = "Loads and imposed motions over time."
 
 SAMPLING = ("every_steps", "interval")
+"""Keys of [output] that are arguments of `simulate`."""
 SAMPLES = 2000
 """Samples that a motion keeps when the file does not say."""
 MASSLESS_METHODS = tuple(name for name, method in METHODS.items() if method.massless)

@@ -14,6 +14,7 @@ import numpy as np
 from foldyn.analyses.casefile import CaseFile, Output
 from foldyn.analyses.conversion import converted, flagged, remodeled
 from foldyn.analyses.keys import dotted, replaced
+from foldyn.analyses.motion import SAMPLING
 from foldyn.analyses.pattern_section import FACES, FACETS, HINGES, READING
 from foldyn.analyses.registry import ANALYSES, schema_of
 from foldyn.cases import Case, resolve_nodes
@@ -180,11 +181,7 @@ def case_of_document(
             if chosen is None
             else resolve_nodes(case.structure, chosen, "output.nodes")
         )
-    shown = {
-        k: v
-        for k, v in schema.output.values().items()
-        if k not in ("nodes", "every_steps", "interval")
-    }
+    shown = {k: v for k, v in schema.output.values().items() if k not in ("nodes", *SAMPLING)}
     case_file = CaseFile(
         path, schema.title, pattern, sheet, schema.model.kind, masses, analysis,
         Output(nodes, chosen is not None, **shown), schema, make,

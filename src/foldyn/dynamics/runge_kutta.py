@@ -83,7 +83,7 @@ RK4 = Tableau("rk4", 4, ((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1.0, 2.0, 2.0, 1
 
 
 @inner_scalar
-def keep_slopes(method, k, dt, vt, fa, others):
+def _keep_slopes(method, k, dt, vt, fa, others):
     """Add the slopes of stage k, weighted, to the later stages but the next, (s, 2, n)."""
     for later in range(k + 2, others.shape[0]):
         ahead = method.ahead[later, k] * dt
@@ -94,12 +94,30 @@ def keep_slopes(method, k, dt, vt, fa, others):
 
 
 @inner_scalar
-def add_kept(k, others, ut, vt):
+def _add_kept(k, others, ut, vt):
     """Add the stored slopes of earlier stages to stage k, and reset them."""
     for i in range(ut.size):
         ut[i] += others[k, 0, i]
         vt[i] += others[k, 1, i]
         others[k, 0, i], others[k, 1, i] = 0.0, 0.0
+
+
+@inner_scalar
+def next_stage(method, k, dt, u, v, ut, vt, fa, du, dv, others):
+    """Add the slopes vt, fa of stage k to those of the step, and set ut, vt to stage k + 1.
+
+    All but `others`, (s, 2, n) or (0, ...), have n entries.
+    """
+    weight, ahead = method.weight[k], method.ahead[k + 1, k] * dt
+    if method.mixed > 0:
+        _keep_slopes(method, k, dt, vt, fa, others)
+    for i in range(u.size):
+        du[i] += weight * vt[i]
+        dv[i] += weight * fa[i]
+        ut[i] = u[i] + ahead * vt[i]
+        vt[i] = v[i] + ahead * fa[i]
+    if method.mixed > 0:
+        _add_kept(k + 1, others, ut, vt)
 
 
 @shared
@@ -119,7 +137,6 @@ def advance(equation, course, plan, room, stretch, method):
     ut, vt, fa = flat(stage_u)[low:high], flat(stage_v)[low:high], flat(a)[low:high]
     stages = method.weight.size
     du, dv = np.zeros_like(u), np.zeros_like(v)  # slopes of the step, and for other stages
-    mixed = method.mixed > 0
     others = np.zeros((stages * method.mixed, 2, u.size))
     for i in range(u.size):
         ut[i], vt[i] = u[i], v[i]
@@ -148,16 +165,7 @@ def advance(equation, course, plan, room, stretch, method):
                     dt = longest_step(equation, course.u, course.v, a, left, RESOLVED)
                     dt = split_step(dt, left)
                 if k + 1 < stages:
-                    if mixed:
-                        keep_slopes(method, k, dt, vt, fa, others)
-                    ahead = method.ahead[k + 1, k] * dt
-                    for i in range(u.size):
-                        du[i] += weight * vt[i]
-                        dv[i] += weight * fa[i]
-                        ut[i] = u[i] + ahead * vt[i]
-                        vt[i] = v[i] + ahead * fa[i]
-                    if mixed:
-                        add_kept(k + 1, others, ut, vt)
+                    next_stage(method, k, dt, u, v, ut, vt, fa, du, dv, others)
             share = dt / method.whole
             for i in range(u.size):
                 u[i] += share * (du[i] + weight * vt[i])

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.adjoint import Adjoint
 from foldyn.dynamics.equation import EquationOfMotion, acceleration
-from foldyn.dynamics.runge_kutta import add_kept, keep_slopes
+from foldyn.dynamics.runge_kutta import next_stage
 from foldyn.dynamics.system import carried
 from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.jit.context import Context, run_at
@@ -66,18 +66,9 @@ def retrace(equation, u, v, plan, method, first, count, stages):
                 _into(at_u, stages[k, s, 0])
                 _into(at_v, stages[k, s, 1])
                 _into(a, stages[k, s, 2])
-            weight = method.weight[s]
             if s < last:
-                if method.mixed > 0:
-                    keep_slopes(method, s, dt, vt, fa, others)
-                ahead = method.ahead[s + 1, s] * dt
-                for i in range(un.size):
-                    du[i] += weight * vt[i]
-                    dv[i] += weight * fa[i]
-                    ut[i], vt[i] = un[i] + ahead * vt[i], vn[i] + ahead * fa[i]
-                if method.mixed > 0:
-                    add_kept(s + 1, others, ut, vt)
-        share = dt / method.whole
+                next_stage(method, s, dt, un, vn, ut, vt, fa, du, dv, others)
+        share, weight = dt / method.whole, method.weight[last]
         for i in range(un.size):
             un[i] += share * (du[i] + weight * vt[i])
             vn[i] += share * (dv[i] + weight * fa[i])
