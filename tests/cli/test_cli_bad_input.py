@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 from pathlib import Path
 
@@ -64,6 +65,7 @@ def test_every_problem_has_its_line(workplace, miura) -> None:
 
 
 def test_the_memory_of_all_mass_rules_together(workplace, miura, monkeypatch) -> None:
+    monkeypatch.setattr(sys.modules["foldyn.structures.discretize"], "PER_NODE", 7000.0)
     monkeypatch.setattr(ram_limit, "memory", lambda: 200e3)  # one motion needs 75 kB
     assert workplace.run(changed(miura, "output.interval = 0.001")).status == 0
     workplace.write(

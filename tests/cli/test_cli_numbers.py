@@ -50,7 +50,7 @@ def test_divisions_that_memory_does_not_hold(workplace, miura) -> None:
     shell = ("run", "case.toml", "--model", "shell", "--divisions=3000")
     for force in ([], ["--force"]):
         told = refused(workplace, *shell, *force)
-        assert "model: divisions = 3000: a shell of about 3.6e+07 nodes needs about 536 GiB" in told
+        assert "model: divisions = 3000: a shell of about 3.6e+07 nodes needs about 671 GiB" in told
 
 
 FORCES = "displacement [mm],force [mN]\n-100,-8\n-200,-17\n-300,-27\n"
