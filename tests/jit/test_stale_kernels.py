@@ -335,5 +335,5 @@ def test_motions_follow_histories_and_shells_follow_laws(tmp_path):
     edit(package / "cases" / "histories.py", *HALF_SINE)
     assert motions(package, bars)[bars][1] > 2.0 * before[bars][1]
     edit(package / "cases" / "histories.py", *HALF_SINE[::-1])
-    edit(package / "materials" / "linear.py", "return theta - rest", "return 1.2 * (theta - rest)")
+    edit(package / "materials" / "linear.py", "    return turn\n", "    return 1.2 * turn\n")
     assert motions(package, shell)[shell][1] != before[shell][1]
