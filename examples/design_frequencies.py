@@ -21,7 +21,7 @@ best = fd.design(
     {"stiffness": (0.002, 0.2)},
     minimize=" + ".join(f"log(frequency[{k}] / {wanted}) ** 2" for k, wanted in WANTED.items()),
     analysis=modes,
-    start={"stiffness": equal},
+    guess={"stiffness": equal},
     tolerance=1e-12,
 )
 print(best)

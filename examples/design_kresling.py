@@ -25,7 +25,7 @@ best = fd.design(
     minimize="mass",
     subject_to=["limit_load == 20", "barrier == 0.8"],  # N on each corner, J
     analysis=snap,
-    start={"height": 0.06, "twist": 30.0, "thickness": 2.4e-4},
+    guess={"height": 0.06, "twist": 30.0, "thickness": 2.4e-4},
 )
 print(best)
 

@@ -23,7 +23,7 @@ best = fd.design(
     maximize="frequency[2] / frequency[1]",
     subject_to=["frequency[1] == 12"],
     analysis={"kind": "modes", "count": 4},
-    starts=5,
+    searches=5,
     seed=1,
 )
 print(best)

@@ -320,12 +320,12 @@ def solved(folder: Path) -> Calls:
         "design": (fd.design, {  # refused: nothing to make small
             "build": folder / "case.toml", "bounds": {"sheet.thickness": (0.01, 0.02)},
             "minimize": None, "maximize": None, "subject_to": ["mass <= 1"], "analysis": None,
-            "start": {"sheet.thickness": 0.015}, "method": "slsqp", "starts": 1, "seed": 0,
+            "guess": {"sheet.thickness": 0.015}, "method": "slsqp", "searches": 1, "seed": 0,
             "tolerance": 1e-6, "slack": 1e-4, "max_evaluations": 2, "folder": None,
             "progress": None,
         }),
         "fit": (fd.fit, {  # refused: nothing to fit to
-            "case": folder / "case.toml", "data": [], "parameters": [], "ties": None, "starts": 1,
+            "case": folder / "case.toml", "data": [], "parameters": [], "ties": None, "searches": 1,
             "seed": 0, "processes": 1, "confidence": 0.95, "folder": None, "progress": None,
         }),
         "fidelity": (fd.fidelity, {  # refused: such models are not known
@@ -335,11 +335,11 @@ def solved(folder: Path) -> Calls:
         }),
         "periodic_motion": (fd.periodic_motion, {
             "case": shaken(), "frequency": 1.0, "harmonics": 1, "method": "harmonic_balance",
-            "start": None, "periods": 1, "modes": None, "steps": 8, "tolerance": 1e-6,
+            "guess": None, "periods": 1, "modes": None, "steps": 8, "tolerance": 1e-6,
         }),
         "response_curve": (fd.response_curve, {
             "case": shaken(), "frequencies": (1.0, 1.02), "harmonics": 1, "measure": None,
-            "amplitudes": None, "start": None, "periods": 1, "modes": None, "branches": 0,
+            "amplitudes": None, "guess": None, "periods": 1, "modes": None, "branches": 0,
             "longest_step": 1.0, "most_points": 4, "steps": 8, "tolerance": 1e-6, "progress": None,
         }),
         "backbone": (fd.backbone, {

@@ -22,7 +22,7 @@ maximize = "frequency[1]"
 max_evaluations = 4
 [design.bounds]
 "model.crease_stiffness" = [0.5, 2.0]
-[design.start]
+[design.guess]
 "model.crease_stiffness" = [1.0, 1.0, 1.0, 1.0]
 """
 
@@ -94,7 +94,7 @@ def test_the_table_is_aside_for_other_commands(workplace):
         (ASKED.replace(">= 1.0", "> 1.0"), "design.subject_to[0] = "),
         (ASKED.replace("sheet.thickness", "sheet.thicknes"), ".toml: sheet.thicknes: unknown key"),
         (ASKED.replace("frequency[1]", "reaction[x]"), "design.subject_to[0]: reaction[x] is"),
-        (ASKED + '[design.start]\n"sheet.thickness" = 7\n', "must be within its bounds"),
+        (ASKED + '[design.guess]\n"sheet.thickness" = 7\n', "must be within its bounds"),
     ],
 )  # fmt: skip
 def test_bad_tables_are_refused_before_anything_is_written(workplace, text, why):

@@ -20,7 +20,7 @@ FIT = """
 case = "case.toml"
 [[parameters]]
 key = "sheet.length_scale_ratio"
-start = 2
+guess = 2
 lower = 0.5
 upper = 4
 [[data]]
@@ -108,7 +108,7 @@ def test_frequencies_from_the_command_line(workplace) -> None:
             "case.toml forces.csv --vary sheet.thickness --sigma 1 --sigma 2",
             "--sigma: 2 of them for 1 data files",
         ),
-        ("case.toml forces.csv --vary sheet.thickness --starts 2", "give sheet.th"),
+        ("case.toml forces.csv --vary sheet.thickness --searches 2", "give sheet.th"),
         ("fit.toml forces.csv", "DATA: fit.toml is a fit file, which says that itself"),
         ("fit.toml --processes 0", "processes = 0: must be a whole number, at least 1"),
         ("fit.toml --out fit.toml", "--out fit.toml: is a file; name a folder"),

@@ -59,7 +59,7 @@ FORCES = "displacement [mm],force [mN]\n-100,-8\n-200,-17\n-300,-27\n"
 @pytest.mark.parametrize(
     ("option", "numbers"),
     [
-        ("--starts", WHOLES),
+        ("--searches", WHOLES),
         ("--processes", WHOLES),
         ("--sigma", SIZES),
         ("--vary=sheet.thickness", tuple(f"{size}" for size in SIZES)),

@@ -199,7 +199,7 @@ def test_a_fit_that_is_ended_keeps_its_evaluations_and_no_workers(tmp_path) -> N
     for name, text in (("case.toml", CASE), ("fit.toml", FIT), ("forces.csv", FORCES)):
         (tmp_path / name).write_text(text)
     kept = tmp_path / "fit-fit" / "evaluations"
-    fit = ("fit", "fit.toml", "--starts", "400", "--processes", "2", "--no-figures")
+    fit = ("fit", "fit.toml", "--searches", "400", "--processes", "2", "--no-figures")
     process = start(tmp_path, *fit)
     wait_for(lambda: [*kept.glob("*.npz")] or process.poll() is not None, 300.0)
     time.sleep(1.0)  # until the command has heard of it, too

@@ -35,15 +35,15 @@ class Formulas:
 
 def plan(
     bounds: Mapping[str, Any], minimize: str | None = None, subject_to: Any = (), *,
-    maximize: str | None = None, start: Any = None, method: str = "slsqp", starts: int = 1,
+    maximize: str | None = None, guess: Any = None, method: str = "slsqp", searches: int = 1,
     evaluator: Any = None, tolerance: float = 1e-9, most: int = 1500,
 ) -> Plan:  # fmt: skip
     METHODS[method].check()
     problem = problem_of(minimize, maximize, subject_to)
-    space, first = space_of(bounds, start)
+    space, first = space_of(bounds, guess)
     assert problem.measures == tuple(space.entries)
     settings = Settings(tolerance, 1e-4, most, 0)
-    return Plan(problem, space, first, evaluator or Formulas(), method, settings, starts)
+    return Plan(problem, space, first, evaluator or Formulas(), method, settings, searches)
 
 
 def best(*arguments: Any, folder: Any = None, **options: Any) -> Design:

@@ -30,7 +30,7 @@ def method(request):
 
 @pytest.mark.parametrize(("text", "keep", "least", "where"), [CIRCLE, CORNER])
 def test_known_optima_under_constraints_are_found(method, text, keep, least, where):
-    found = best(SQUARE, text, keep, start=AWAY, method=method)
+    found = best(SQUARE, text, keep, guess=AWAY, method=method)
     assert found.feasible
     assert found.objective == pytest.approx(least, abs=3e-4)
     assert [*found.parameters.values()] == pytest.approx(where, abs=2e-3)
@@ -39,7 +39,7 @@ def test_known_optima_under_constraints_are_found(method, text, keep, least, whe
 
 def test_a_curved_valley_is_followed_to_its_end():
     for method in ("slsqp", "trust-constr"):
-        found = best(SQUARE, VALLEY, start=AWAY, method=method)
+        found = best(SQUARE, VALLEY, guess=AWAY, method=method)
         assert [*found.parameters.values()] == pytest.approx([1.0, 1.0], abs=1e-3)
         assert found.ends[0].converged and found.evaluations < 100
 
@@ -55,7 +55,7 @@ def test_maximum_at_a_bound_and_arrays():
 
 def test_each_design_is_evaluated_once_with_its_gradient():
     evaluator = Formulas()
-    found = best(SQUARE, VALLEY, ["a**2 + b**2 <= 1"], start=AWAY, evaluator=evaluator)
+    found = best(SQUARE, VALLEY, ["a**2 + b**2 <= 1"], guess=AWAY, evaluator=evaluator)
     assert all(gradient for _, gradient in evaluator.asked)
     assert len(set(evaluator.asked)) == len(evaluator.asked) == found.evaluations
     history = found.history
@@ -86,20 +86,20 @@ def test_a_method_without_gradients_asks_for_none():
 
 def test_all_starts_are_counted_and_the_best_is_returned():
     text = "a**4 - 4 * a**2 + a"  # a minimum on either side
-    found = best({"a": (-2.0, 2.0)}, text, start={"a": 1.0}, starts=5)
-    assert [end.start for end in found.ends] == [0, 1, 2, 3, 4]
+    found = best({"a": (-2.0, 2.0)}, text, guess={"a": 1.0}, searches=5)
+    assert [end.search for end in found.ends] == [0, 1, 2, 3, 4]
     assert sum(end.evaluations for end in found.ends) == found.evaluations
     assert found.ends[0].objective == pytest.approx(-2.6185, abs=1e-3)
     assert found.objective == pytest.approx(-5.4442, abs=1e-3)
     assert found.objective == min(end.objective for end in found.ends)
-    assert np.unique(found.history["start"]).tolist() == [0, 1, 2, 3, 4]
-    again = best({"a": (-2.0, 2.0)}, text, start={"a": 1.0}, starts=5)
+    assert np.unique(found.history["search"]).tolist() == [0, 1, 2, 3, 4]
+    again = best({"a": (-2.0, 2.0)}, text, guess={"a": 1.0}, searches=5)
     assert again.history.drop_vars("seconds").equals(found.history.drop_vars("seconds"))
 
 
 def test_designs_that_fail_shorten_the_step_and_are_noted(method):
     evaluator = Formulas(fails=lambda x: x[0] > 0.5)
-    found = best(SQUARE, "(a - 0.45)**2 + (b - 1)**2", start=AWAY, method=method,
+    found = best(SQUARE, "(a - 0.45)**2 + (b - 1)**2", guess=AWAY, method=method,
                  evaluator=evaluator)  # fmt: skip
     assert found.objective == pytest.approx(0.0, abs=1e-3)
     failed = found.history["failure"].values == "no equilibrium"
@@ -112,7 +112,7 @@ def test_designs_that_fail_shorten_the_step_and_are_noted(method):
 
 def test_starts_are_drawn_again_where_they_fail():
     evaluator = Formulas(fails=lambda x: x[0] > 0.0)
-    found = best({"a": (-1.0, 9.0)}, "(a + 0.5)**2", start={"a": -0.9}, starts=3,
+    found = best({"a": (-1.0, 9.0)}, "(a + 0.5)**2", guess={"a": -0.9}, searches=3,
                  evaluator=evaluator)  # fmt: skip
     assert all(end.converged for end in found.ends)
     assert found.parameters["a"] == pytest.approx(-0.5, abs=1e-4)
@@ -152,16 +152,16 @@ def test_a_start_that_no_parameter_improves_is_no_optimum_found(method, text):
         pytest.skip("draws its designs")
     start = {"a": 0.0, "b": 0.0}
     with pytest.warns(FoldynWarning, match=r"no parameter changes .* at the best design"):
-        found = best({"a": (-2.0, 2.0), "b": (-2.0, 2.0)}, text, start=start, method=method)
+        found = best({"a": (-2.0, 2.0), "b": (-2.0, 2.0)}, text, guess=start, method=method)
     assert found.parameters == start
     assert not found.ends[0].converged
-    assert "stays at its start, where no parameter changes" in found.ends[0].message
+    assert "stays at its guess, where no parameter changes" in found.ends[0].message
 
 
 def test_a_start_that_is_the_optimum_is_said_to_be_the_start():
-    found = best(SQUARE, "a + b", start={"a": -2.0, "b": -1.0})
+    found = best(SQUARE, "a + b", guess={"a": -2.0, "b": -1.0})
     assert found.ends[0].converged
-    assert "stays at its start, no design that was tried is better" in found.ends[0].message
+    assert "stays at its guess, no design that was tried is better" in found.ends[0].message
 
 
 def test_without_a_feasible_design_the_nearest_is_returned_with_a_warning():
@@ -174,7 +174,7 @@ def test_without_a_feasible_design_the_nearest_is_returned_with_a_warning():
 
 
 def test_a_search_that_was_cut_off_goes_on(tmp_path):
-    known = best(SQUARE, VALLEY, start=AWAY, starts=2).history
+    known = best(SQUARE, VALLEY, guess=AWAY, searches=2).history
 
     class Stop(Exception):
         pass
@@ -185,18 +185,18 @@ def test_a_search_that_was_cut_off_goes_on(tmp_path):
 
     asked = Formulas()
     with pytest.raises(Stop):
-        designed(plan(SQUARE, VALLEY, start=AWAY, starts=2, evaluator=asked), tmp_path, stop)
+        designed(plan(SQUARE, VALLEY, guess=AWAY, searches=2, evaluator=asked), tmp_path, stop)
     assert len(asked.asked) == 17
     courses, later = [], Formulas()
     found = designed(
-        plan(SQUARE, VALLEY, start=AWAY, starts=2, evaluator=later), tmp_path, courses.append
+        plan(SQUARE, VALLEY, guess=AWAY, searches=2, evaluator=later), tmp_path, courses.append
     )
     assert len(later.asked) == len(known["evaluation"]) - 17
     assert not set(later.asked) & set(asked.asked)
     assert found.history.drop_vars("seconds").equals(known.drop_vars("seconds"))
     assert courses[-1].found == 17 and courses[-1].done == found.evaluations
     other = Formulas(stamp="another program")
-    designed(plan(SQUARE, VALLEY, start=AWAY, evaluator=other), tmp_path)
+    designed(plan(SQUARE, VALLEY, guess=AWAY, evaluator=other), tmp_path)
     assert other.asked
 
 
@@ -249,11 +249,11 @@ MODES = {"kind": "modes", "count": 3}
         ({"bounds": {"thickness": (2, 1)}}, "bounds.thickness: from 2 to 1: the lower bound"),
         ({"bounds": {"thickness": ([0, 0], [1, 1, 1])}}, "lists of different lengths"),
         ({"bounds": {"thickness": ("a", 1)}}, r"bounds.thickness\[0\] = .*must be numbers"),
-        ({"start": {"thickness": 1.0}}, "start.thickness = 1: must be within its bounds"),
-        ({"start": {"width": 1.0}}, "start: width has no bounds"),
-        ({"start": 3}, "start = 3: give a mapping"),
+        ({"guess": {"thickness": 1.0}}, "guess.thickness = 1: must be within its bounds"),
+        ({"guess": {"width": 1.0}}, "guess: width has no bounds"),
+        ({"guess": 3}, "guess = 3: give a mapping"),
         ({"method": "newton"}, "method = .newton.: choose one of slsqp"),
-        ({"starts": 0}, "starts = 0"),
+        ({"searches": 0}, "searches = 0"),
         ({"seed": -1}, "seed = -1"),
         ({"tolerance": 0.0}, "tolerance = 0.0: must be greater than 0"),
         ({"slack": 2.0}, "slack = 2.0: must be less than 1"),

@@ -154,9 +154,9 @@ def test_shapes_under_a_force_give_a_stiffness(tmp_path) -> None:
 
 
 def test_searches_from_several_starts_agree(pressed) -> None:
-    found = fd.fit(pressed, [forces(pressed, 1e-5)], parameters=[RATIO], starts=4, seed=2)
+    found = fd.fit(pressed, [forces(pressed, 1e-5)], parameters=[RATIO], searches=4, seed=2)
     assert len(found.descents) == found.agreeing == 4
-    assert len({one.start for one in found.descents}) == 4
+    assert len({one.guess for one in found.descents}) == 4
     assert min(one.cost for one in found.descents) == pytest.approx(
         0.5 * found.misfit**2 * found.freedom, rel=1e-6
     )
@@ -219,8 +219,8 @@ def test_kept_evaluations_of_another_model_are_not_used(pressed, tmp_path) -> No
 @pytest.mark.matrix
 def test_processes_change_nothing(pressed) -> None:
     data = [forces(pressed, 1e-5)]
-    alone = fd.fit(pressed, data, parameters=[RATIO], starts=2)
-    beside = fd.fit(pressed, data, parameters=[RATIO], starts=2, processes=2)
+    alone = fd.fit(pressed, data, parameters=[RATIO], searches=2)
+    beside = fd.fit(pressed, data, parameters=[RATIO], searches=2, processes=2)
     assert beside.values == alone.values
     assert beside.descents == alone.descents
 
@@ -269,7 +269,7 @@ def test_results_as_files(pressed, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"starts": 0}, "starts = 0: must be a whole number, at least 1"),
+        ({"searches": 0}, "searches = 0: must be a whole number, at least 1"),
         ({"processes": 1.5}, "processes = 1.5: must be a whole number"),
         ({"confidence": 95}, "confidence = 95: must be less than 1"),
     ],

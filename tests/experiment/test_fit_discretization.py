@@ -104,7 +104,7 @@ def test_fine_steps_leave_the_interval_to_the_noise(swung, seen) -> None:
     fine = refined(swung, interval="interval = 0.004")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = fd.fit(fine, [seen], parameters=[replace(ALPHA, start=0.42)])
+        found = fd.fit(fine, [seen], parameters=[replace(ALPHA, guess=0.42)])
     alpha = found.estimates[0]
     assert abs(alpha.discretization) < 0.5 * alpha.standard_error
     assert alpha.lower < 0.4 < alpha.upper
@@ -169,7 +169,7 @@ def test_a_model_that_fails_with_finer_steps_is_told_of(swung, seen, monkeypatch
 
     monkeypatch.setattr(fit, "evaluate", failing)
     with pytest.warns(FoldynWarning, match=r"finer time step \(no equilibrium\): the intervals"):
-        found = fd.fit(swung, [seen], parameters=[replace(ALPHA, start=0.41)])
+        found = fd.fit(swung, [seen], parameters=[replace(ALPHA, guess=0.41)])
     alpha = found.estimates[0]
     assert np.isnan(alpha.discretization)
     assert alpha.lower < alpha.value < alpha.upper
@@ -182,7 +182,7 @@ def test_finer_evaluations_are_kept_too(swung, seen, tmp_path) -> None:
             found = fd.fit(
                 swung,
                 [seen],
-                parameters=[replace(ALPHA, start=0.41)],
+                parameters=[replace(ALPHA, guess=0.41)],
                 folder=tmp_path,
                 progress=course.append,
             )

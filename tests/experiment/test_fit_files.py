@@ -53,7 +53,7 @@ sigma = 1e-4
 held_out = true
 case = "swung.toml"
 [solver]
-starts = 3
+searches = 3
 """
 
 
@@ -80,7 +80,7 @@ def checked(path) -> Problem:
 def test_a_fit_file_says_all_that_fit_is_told(folder) -> None:
     plan = read_fit(folder / "fit.toml")
     assert plan.case == folder / "case.toml"
-    assert plan.solver == {"starts": 3, "seed": 0, "processes": 1, "confidence": 0.95}
+    assert plan.solver == {"searches": 3, "seed": 0, "processes": 1, "confidence": 0.95}
     assert plan.ties == {"model.fold_law.theta2": "335 - model.fold_law.theta1"}
     assert [(p.key, p.lower, p.upper) for p in plan.parameters] == [
         ("sheet.length_scale_ratio", 0.5, 4.0),
@@ -112,7 +112,7 @@ def test_fit_files_are_told_from_case_files(folder) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("[solver]", "[solver]\nstart = 1", "solver.start: unknown key; did you mean 'starts'?"),
+        ("[solver]", "[solver]\nsearch = 1", "solver.search: unknown key; did you mean 'searches'"),
         ("lower = 0.5", "lower = 5", "parameters[0]: sheet.length_scale_ratio: lower = 5 is not"),
         ("lower = 0.5", "low = 5", "parameters[0].low: unknown key; did you mean 'lower'?"),
         ('kind = "shapes"', 'kind = "shape"', "data[1].kind = \"shape\": did you mean 'shapes'?"),

@@ -93,27 +93,27 @@ def test_starts_and_scales_come_from_the_case() -> None:
     found = space(
         DOCUMENT, [Parameter("sheet.thickness"), Parameter("damping.beta", 0.0, 0, 2)], {}
     )
-    assert found.column("start").tolist() == [0.01, 0.0]
+    assert found.column("guess").tolist() == [0.01, 0.0]
     assert found.column("scale").tolist() == [0.01, 2.0]
 
 
 def test_random_starts_fill_the_bounds_and_are_the_same_again() -> None:
     found = space(DOCUMENT, [Parameter("sheet.thickness", 0.01, 0.005, 0.05),
                              Parameter("sheet.length_scale_ratio", 2.0, 1.0, 5.0)], {})  # fmt: skip
-    starts = found.starts(9, seed=3)
+    starts = found.guesses(9, seed=3)
     assert starts[0].tolist() == [0.01, 2.0]
     pieces = np.floor((starts[1:] - [0.005, 1.0]) / [0.045, 4.0] * 8)
     for column in pieces.T:
         assert sorted(column) == list(range(8))
-    np.testing.assert_array_equal(starts, found.starts(9, seed=3))
-    assert not np.array_equal(starts, found.starts(9, seed=4))
+    np.testing.assert_array_equal(starts, found.guesses(9, seed=3))
+    assert not np.array_equal(starts, found.guesses(9, seed=4))
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (("sheet.thickness", 0.01, 0.5, 0.2), "lower = 0.5 is not below upper = 0.2"),
-        (("sheet.thickness", 1.0, 0.0, 0.5), "start = 1 is outside the bounds 0 to 0.5"),
+        (("sheet.thickness", 1.0, 0.0, 0.5), "guess = 1 is outside the bounds 0 to 0.5"),
         (("sheet.thickness", 1.0, 0.0, 2.0, 0.0), "scale = 0.0: must be greater than 0"),
     ],
 )
@@ -129,7 +129,7 @@ def test_parameters_that_make_no_sense(arguments, message) -> None:
         (["sheet.thickness"], "parameters[0]: got"),
         ([Parameter("sheet.thicknes")], "did you mean 'sheet.thickness'"),
         ([Parameter("model.bend_law")], 'model.bend_law = "enhanced": is no number'),
-        ([Parameter("damping.beta", 0.0)], "damping.beta: starts from 0; give scale"),
+        ([Parameter("damping.beta", 0.0)], "damping.beta: begins from 0; give scale"),
         ([Parameter("sheet.thickness")] * 2, "sheet.thickness: is given twice"),
     ],
 )
@@ -140,4 +140,4 @@ def test_parameters_that_do_not_fit_the_case(parameters, message) -> None:
 
 def test_random_starts_need_bounds() -> None:
     with pytest.raises(InputError, match=r"give sheet\.thickness both lower and upper"):
-        space(DOCUMENT, [Parameter("sheet.thickness")], {}).starts(2, 0)
+        space(DOCUMENT, [Parameter("sheet.thickness")], {}).guesses(2, 0)

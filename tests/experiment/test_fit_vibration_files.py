@@ -34,10 +34,10 @@ FIT = """
 case = "modes.toml"
 [[parameters]]
 key = "sheet.youngs_modulus"
-start = 1.02e6
+guess = 1.02e6
 [[parameters]]
 key = "damping.alpha"
-start = 0.45
+guess = 0.45
 [[data]]
 kind = "frequencies"
 file = "modes.csv"

@@ -30,7 +30,7 @@ FRF = (
 FREE = [3, 4, 5, 6, 7, 8]
 LINES = np.linspace(0.2, 2.8, 14)
 MODULUS = Parameter("sheet.youngs_modulus", 1.2e6, 1e5, 1e7)
-NEAR = replace(MODULUS, start=1.03e6)  # peaks that are apart by more than their width do not meet
+NEAR = replace(MODULUS, guess=1.03e6)  # peaks that are apart by more than their width do not meet
 RATIO = Parameter("sheet.length_scale_ratio", 1.6, 0.2, 20.0)
 ALPHA = Parameter("damping.alpha", 0.6, 0.0, 5.0)
 TRUTH = {MODULUS.key: 1e6, RATIO.key: 1.0, ALPHA.key: 0.4}
@@ -126,7 +126,7 @@ def test_all_kinds_together(folder, modes, response) -> None:
         shapes(modes, noise=0.02, sigma=0.02),
         replace(receptances(response, 0.05, sigma=0.05), case=folder / "frf.toml"),
     ]
-    found = fd.fit(folder / "modes.toml", data, parameters=[NEAR, replace(RATIO, start=1.1), ALPHA])
+    found = fd.fit(folder / "modes.toml", data, parameters=[NEAR, replace(RATIO, guess=1.1), ALPHA])
     for one in found.estimates:
         assert one.lower < TRUTH[one.key] < one.upper
     assert len(found.problem.runs) == 2

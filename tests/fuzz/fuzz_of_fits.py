@@ -56,7 +56,7 @@ title = "a fold"
 case = "case.toml"
 [[parameters]]
 key = "sheet.length_scale_ratio"
-start = 1.5
+guess = 1.5
 lower = 0.5
 upper = 4
 scale = 1.0
@@ -78,7 +78,7 @@ sigma = 1e-4
 held_out = true
 set = { "sheet.thickness" = 0.02 }
 [solver]
-starts = 3
+searches = 3
 seed = 7
 processes = 2
 confidence = 0.9
@@ -87,7 +87,7 @@ SWUNG = """
 case = "swung.toml"
 [[parameters]]
 key = "damping.alpha"
-start = 0.3
+guess = 0.3
 [[data]]
 kind = "history"
 file = "sway.csv"
@@ -129,8 +129,8 @@ band = [0.1, 2]
 sigma = 0.1
 """
 WORDS = (
-    "title", "case", "parameters", "key", "start", "lower", "upper", "scale", "ties", "data",
-    "kind", "file", "sigma", "held_out", "set", "solver", "starts", "seed", "processes",
+    "title", "case", "parameters", "key", "guess", "lower", "upper", "scale", "ties", "data",
+    "kind", "file", "sigma", "held_out", "set", "solver", "searches", "seed", "processes",
     "confidence", "history", "spectrum", "shapes", "force_displacement", "nodes", "band", "axis",
     "align", "time", "unit", "damping.alpha", "loads[0].force[2]", "sheet.thickness", "sin(",
     "case.toml", "swung.toml", "forces.csv", "sway.csv", "fit.toml", ".", "/dev/null", "1e50",
@@ -153,9 +153,9 @@ def read(file: Path) -> None:
         plan = read_fit(file, find_case)
         try:
             made = problem(plan.case, plan.data, plan.parameters, plan.ties)
-        except ComputationError as error:  # vibrations at the start, which do not exist
+        except ComputationError as error:  # vibrations at the guess, which do not exist
             raise InputError(str(error)) from None
-        made.space.starts(plan.solver["starts"], plan.solver["seed"])
+        made.space.guesses(plan.solver["searches"], plan.solver["seed"])
 
 
 TARGET = Target("fit", seeds, read, ".toml", WORDS, mutator(WORDS))

@@ -107,7 +107,7 @@ def test_frequency_responses_modes_and_periodic_motions(kind, model):
         with pytest.raises(InputError, match=r"damping|structure|remember"):
             fd.periodic_motion(driven, harmonics=2)
         return
-    one = fd.periodic_motion(driven, harmonics=2, start=state)
+    one = fd.periodic_motion(driven, harmonics=2, guess=state)
     expected = -1j * direct[1] * 2e-4
     assert np.abs(one.coefficient.values[1] - expected).max() < 1e-3 * np.abs(expected).max()
 

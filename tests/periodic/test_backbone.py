@@ -95,7 +95,7 @@ def test_in_phase_resonance_force_and_displacement_are_a_quarter_apart(resonant)
     assert np.angle(first / -1j) == pytest.approx(-np.pi / 2, abs=1e-9)  # the force is a sine
     point = resonant.isel(point=-1)
     case = oscillator(0.5 * float(point.level), float(point.frequency))
-    one = fd.periodic_motion(case, start=point)
+    one = fd.periodic_motion(case, guess=point)
     assert one.coefficient.values[1, NODE, 2] == pytest.approx(first[-1], rel=1e-6)
 
 

@@ -31,8 +31,8 @@ def found():
     with pytest.warns(FoldynWarning, match="harmonics = 5: twice as many would change"):
         few = fd.periodic_motion(bouncing(), harmonics=5)
     with pytest.warns(FoldynWarning, match="harmonics = 9: twice as many would change"):
-        more = fd.periodic_motion(bouncing(), harmonics=9, start=few)
-    return few, more, fd.periodic_motion(bouncing(), harmonics=17, start=more)
+        more = fd.periodic_motion(bouncing(), harmonics=9, guess=few)
+    return few, more, fd.periodic_motion(bouncing(), harmonics=17, guess=more)
 
 
 def test_what_does_not_reach_the_plane_does_not_feel_it():
@@ -44,7 +44,7 @@ def test_what_does_not_reach_the_plane_does_not_feel_it():
 
 
 def test_harmonics_converge_to_what_shooting_finds(found):
-    shot = fd.periodic_motion(bouncing(), method="shooting", steps=96, start=found[-1])
+    shot = fd.periodic_motion(bouncing(), method="shooting", steps=96, guess=found[-1])
     errors = [np.abs(height(one) - height(shot)).max() for one in found]
     assert height(shot).min() < -0.09  # deep in what touches, of which 0.05 is 0
     assert all(after < 0.25 * before for before, after in pairwise(errors))
@@ -113,7 +113,7 @@ def test_panels_touch():
 def test_a_start_behind_the_plane_is_refused():
     behind = fd.State(np.array([[0, 0, 0], [0, 0, 0], [0, 0, -0.3]]))
     with pytest.raises(InputError, match=r"contact.planes\[0\]: node 2 is 0.1 m behind it"):
-        fd.periodic_motion(bouncing(), start=behind)
+        fd.periodic_motion(bouncing(), guess=behind)
 
 
 def test_motions_through_the_plane_are_told():

@@ -63,7 +63,7 @@ def test_curves_and_damped_backbones_have_it_and_say_about_which_state():
     case = shaken("modes at the start", force=1e-5)
     curve = fd.response_curve(case, (0.95 * F1, 1.05 * F1), harmonics=3)
     spine = fd.backbone(case, amplitudes=(1e-5, 2e-5), harmonics=3, damped=True)
-    one = fd.periodic_motion(case, harmonics=3, start=curve.isel(point=-1))
+    one = fd.periodic_motion(case, harmonics=3, guess=curve.isel(point=-1))
     equilibrium = fd.trace(fd.Case(S, HELD, [PRELOAD]), "newton").displacement.values[-1]
     for found in (curve, spine, one):
         assert np.abs(found.origin.values - equilibrium).max() < 1e-6

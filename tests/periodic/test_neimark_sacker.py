@@ -71,7 +71,7 @@ def test_it_is_where_a_pair_of_the_equation_leaves_the_circle(curve):
 def strobed(point, periods=600):
     """The oscillator once a period, m, after a little push on a motion of the curve."""
     f = float(point.frequency)
-    one = fd.periodic_motion(absorber.case(f), f, start=point, steps=32)
+    one = fd.periodic_motion(absorber.case(f), f, guess=point, steps=32)
     start = fd.State(one.displacement.values[0] * 1.001, one.velocity.values[0])
     run = fd.simulate(
         absorber.case(f),

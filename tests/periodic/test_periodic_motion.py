@@ -64,7 +64,7 @@ def test_superlinear_bends_converge_as_a_power():
     assert (
         errors[1] / errors[2] < (13 / 9) ** 6
     )  # 2.4 of a power; 10 and more where laws are smooth
-    shot = fd.periodic_motion(case, method="shooting", steps=192, start=finest)
+    shot = fd.periodic_motion(case, method="shooting", steps=192, guess=finest)
     assert difference(shot, finest) < 2e-6
 
 
@@ -157,14 +157,14 @@ def test_start_takes_a_motion_or_a_state():
     case = oscillator(height=0.2, spring=False, force=1e-4)
     well = np.zeros((3, 3))
     well[NODE, 2] = -0.4
-    near, other = (fd.periodic_motion(case, start=s) for s in (None, fd.State(well)))
+    near, other = (fd.periodic_motion(case, guess=s) for s in (None, fd.State(well)))
     shift = (
         other.displacement.values[:, NODE, 2].mean() - near.displacement.values[:, NODE, 2].mean()
     )
     assert shift == pytest.approx(-0.4, abs=0.01)
-    again = fd.periodic_motion(case, start=other)
+    again = fd.periodic_motion(case, guess=other)
     assert difference(again, other) < 1e-9
-    doubled = fd.periodic_motion(case, start=other, periods=2)
+    doubled = fd.periodic_motion(case, guess=other, periods=2)
     assert doubled.attrs["iterations"] == 1
     assert doubled.displacement.values[::2] == pytest.approx(
         np.tile(other.displacement.values[::4], (2, 1, 1))[::1], abs=1e-9
@@ -234,7 +234,7 @@ def test_what_it_cannot_follow_is_refused(message):
 
 def test_arguments_out_of_range_are_refused():
     for field, value in (
-        ("frequency", -1.0), ("harmonics", 0), ("method", "guess"), ("start", 3), ("periods", 0),
+        ("frequency", -1.0), ("harmonics", 0), ("method", "guess"), ("guess", 3), ("periods", 0),
         ("steps", 1), ("tolerance", 2.0), ("steps", 10**9), ("harmonics", 10**9),
         ("harmonics", 10**4),  # matrices of one dof, but many of them
     ):  # fmt: skip

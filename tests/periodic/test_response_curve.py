@@ -83,7 +83,7 @@ def test_only_motions_between_the_folds_are_unstable_and_they_repel(curve):
     middle = curve.isel(point=(at[0] + at[1]) // 2)
     f = float(middle.frequency)
     case = oscillator(frequency=f)
-    one = fd.periodic_motion(case, start=middle, harmonics=13)
+    one = fd.periodic_motion(case, guess=middle, harmonics=13)
     assert not one.stable
     start = one.displacement.values[0].copy()
     start[NODE, 2] += 1e-4
@@ -119,7 +119,7 @@ def test_curve_along_the_amplitude_meets_that_along_the_frequency(curve):
         {
             round(float(np.abs(one.displacement.values).max()), 8)
             for near in _beside(line, of, value)
-            for one in [fd.periodic_motion(at, start=near, harmonics=13)]
+            for one in [fd.periodic_motion(at, guess=near, harmonics=13)]
         }
         for line, of, value in ((along, along.level, 1.0), (curve, curve.frequency, 0.3))
     ]
@@ -184,7 +184,7 @@ def test_period_doubles_and_simulation_follows():
     steady = branch.isel(point=np.flatnonzero(branch.stable.values))
     middle = steady.isel(point=steady.sizes["point"] // 2)
     here = float(middle.frequency)
-    one = fd.periodic_motion(case, here, harmonics=16, start=middle, periods=2)
+    one = fd.periodic_motion(case, here, harmonics=16, guess=middle, periods=2)
     assert one.time.values[1] == pytest.approx(2.0 / here / 128)
     load = fd.Force([NODE], case.loads[0].vector, history=fd.Harmonic(here))
     run = fd.simulate(
@@ -257,7 +257,7 @@ def test_arguments_out_of_range_are_refused():
         ("harmonics", 0), ("measure", 3), ("measure", fd.Quantity("m")), ("branches", -1),
         ("measure", fd.Quantity("m", function=lambda u, v, t: u[99, 2])), ("steps", 10**9),
         ("longest_step", 0.0), ("most_points", 1), ("steps", 2), ("tolerance", 0.0),
-        ("periods", 0), ("start", "here"),
+        ("periods", 0), ("guess", "here"),
     ):  # fmt: skip
         with pytest.raises(InputError, match=field):
             fd.response_curve(oscillator(), **({"frequencies": (0.1, 0.2)} | {field: value}))

@@ -16,7 +16,7 @@ PATTERN = fd.patterns.miura(cells=(1, 1), panel_angle=60, dihedral=120)
 def history():
     count = 7
     data = {
-        "start": ("evaluation", np.array([0, 0, 0, 0, 1, 1, 1])),
+        "search": ("evaluation", np.array([0, 0, 0, 0, 1, 1, 1])),
         "objective": ("evaluation", np.linspace(3.0, 1.0, count), {"long_name": "mass"}),
         "violation": ("evaluation", np.array([1.0, 0.1, np.nan, 0.0, 1e-2, 1e-3, 0.0])),
         "best": ((), 3),
@@ -62,9 +62,9 @@ def test_nothing_but_zeros_can_be_drawn():
     assert fd.plots.draw_sensitivity(PATTERN, np.zeros(len(PATTERN.creases)))
 
 
-def test_each_start_has_its_curve_and_the_best_is_marked(history):
+def test_each_search_has_its_curve_and_the_best_is_marked(history):
     objective, violation = convergence_charts(history)
-    assert [curve.name for curve in objective.curves] == ["start 1", "start 2", "best"]
+    assert [curve.name for curve in objective.curves] == ["search 1", "search 2", "best"]
     assert objective.ylabel == "mass"
     assert (objective.curves[2].x, objective.curves[2].y) == ([4], [2.0])
     np.testing.assert_allclose(violation.curves[0].y, [0.0, -1.0, np.nan, -5.0])

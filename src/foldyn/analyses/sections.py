@@ -284,12 +284,12 @@ class DesignSection(Section):
         Expression of measures; one of the two.
     subject_to : sequence of str
         Constraints, as "frequency[1] >= 12".
-    start : mapping, optional
-        Values to start from; those of the file by default.
+    guess : mapping, optional
+        Values to begin from; those of the file by default.
     method : {"slsqp", "trust-constr", "mma", "cma"}
         Method of the search.
-    starts : int
-        How many searches, all but the first from designs that are drawn.
+    searches : int
+        How many, all but the first from designs that are drawn.
     seed : int
         Of designs that are drawn.
     tolerance : float
@@ -297,16 +297,16 @@ class DesignSection(Section):
     slack : float
         What counts as no violation of a constraint.
     max_evaluations : int
-        Evaluations from each start, at most.
+        Evaluations of each search, at most.
     """
 
     bounds: Anything
     minimize: Text | None = None
     maximize: Text | None = None
     subject_to: Texts = ()
-    start: Anything | None = None
+    guess: Anything | None = None
     method: Text = "slsqp"
-    starts: Count = 1
+    searches: Count = 1
     seed: Seed = 0
     tolerance: Positive = 1e-6
     slack: Positive = 1e-4

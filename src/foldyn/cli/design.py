@@ -43,7 +43,7 @@ def add_design(commands: Any) -> None:
         "--method", metavar="slsqp|trust-constr|mma|cma", help="method (default: that of the file)"
     )
     design.add_argument(
-        "--starts", type=integer, metavar="N", help="searches, from designs drawn within the bounds"
+        "--searches", type=integer, metavar="N", help="from designs drawn within the bounds"
     )
     design.add_argument("--seed", type=integer, help="of the drawn designs (default: 0)")
     add_results(design, "NAME-design")
@@ -59,7 +59,7 @@ def run_design(given: argparse.Namespace) -> Path:
     if given.figures and given.no_figures:
         raise InputError(BOTH)
     path = find_case(given.case)
-    changes = {name: getattr(given, name) for name in ("method", "starts", "seed")}
+    changes = {name: getattr(given, name) for name in ("method", "searches", "seed")}
     changes = {name: value for name, value in changes.items() if value is not None}
     case_file, plan = planned(path, changes)
     folder = Path(f"{path.stem}-design" if given.out is None else given.out)
@@ -125,4 +125,4 @@ def _tell(found: Design, say: Any) -> None:
         say(f"  {text}: {f'violated by {amount:.3g}' if amount else 'holds'}")
     for end in found.ends:
         count = f"{end.evaluations} evaluation{'s' * (end.evaluations != 1)}"
-        say(f"  start {end.start + 1}: {end.objective:.6g} after {count}: {end.message}")
+        say(f"  search {end.search + 1}: {end.objective:.6g} after {count}: {end.message}")

@@ -69,7 +69,7 @@ def add_fit(commands: Any) -> None:
     )
     fit.add_argument("--axis", default="x", help="with a case file: axis of the data (default: x)")
     fit.add_argument(
-        "--starts", type=integer, help="searches, from random starts within the bounds"
+        "--searches", type=integer, help="how many, from random guesses within the bounds"
     )
     fit.add_argument("--processes", type=integer, help="evaluations that run at a time")
     add_results(fit, "NAME-fit")
@@ -160,7 +160,7 @@ def plan_of(given: argparse.Namespace) -> FitFile:
         plan = read_fit(path, find_case)
     else:
         plan = _of_case(path, given)
-    changed = {key: getattr(given, key) for key in ("starts", "processes")}
+    changed = {key: getattr(given, key) for key in ("searches", "processes")}
     solver = plan.solver | {key: value for key, value in changed.items() if value is not None}
     return replace(plan, solver=solver)
 

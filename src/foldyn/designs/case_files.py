@@ -39,7 +39,7 @@ def planned(path: Path, changes: Mapping[str, Any]) -> tuple[CaseFile, Plan]:
             path,
         )
     asked = case_file.design.values() | dict(changes)
-    asked["start"] = _starts(document, asked["bounds"]) | (asked["start"] or {})
+    asked["guess"] = _guesses(document, asked["bounds"]) | (asked["guess"] or {})
     try:
         return case_file, plan_of(path, analysis=None, **asked)
     except InputError as error:
@@ -48,7 +48,7 @@ def planned(path: Path, changes: Mapping[str, Any]) -> tuple[CaseFile, Plan]:
         raise error.within("design.", path) from None
 
 
-def _starts(document: Mapping[str, Any], bounds: Mapping[str, Any]) -> dict[str, Any]:
+def _guesses(document: Mapping[str, Any], bounds: Mapping[str, Any]) -> dict[str, Any]:
     """Values from the file, if they are within their bounds."""
     found = {}
     for key, pair in bounds.items():

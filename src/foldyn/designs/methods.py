@@ -47,7 +47,7 @@ class Method:
     Attributes
     ----------
     run : callable
-        Searches from a start; returns why it ended, and whether it is an optimum.
+        Searches from a guess; returns why it ended, and whether it is an optimum.
     gradient : bool
         Whether it needs derivatives.
     doc : str
@@ -165,7 +165,7 @@ def _cma(search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
     """Run CMA-ES, with constraints in an augmented Lagrangian (Atamna et al. 2017)."""
     cma = optional("cma", "CMA-ES needs cma", "foldyn[design]")
     handler = optional("cma.constraints_handler", "CMA-ES needs cma", "foldyn[design]")
-    drawn = np.random.RandomState(settings.seed + search.start)
+    drawn = np.random.RandomState(settings.seed + search.number)
     options: dict[str, Any] = {
         "bounds": [0.0, 1.0], "randn": drawn.randn, "seed": np.nan, "verbose": -9,
         "verb_log": 0, "tolfun": settings.tolerance, "tolx": 1e-2 * settings.tolerance,
@@ -203,7 +203,7 @@ METHODS: Mapping[str, Method] = {
 
 
 def searched(method: str, search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
-    """Search from a start; return why it ended, and whether it is an optimum."""
+    """Search from a guess; return why it ended, and whether it is an optimum."""
     try:
         search.at(x)
         return METHODS[method].run(search, x, settings)

@@ -57,7 +57,7 @@ def write_design(
     for name, values in designs.items():
         try:
             cases[name] = evaluator.case(values)  # type: ignore[attr-defined]
-        except FoldynError:  # the start may not give a case
+        except FoldynError:  # the guess may not give a case
             continue
     sections: list[Section | Stage] = [*_stages(plan, cases, designs, case_file)]
     sections += [Heading("The best design"), Text(_verdict(found, plan)), _parameters(found, plan)]
@@ -129,10 +129,10 @@ def _constraints(found: Design, plan: Plan) -> Table:
 
 def _ends(found: Design) -> Table:
     rows = [
-        [one.start + 1, cell(one.objective), cell(one.violation), one.feasible, one.evaluations,
+        [one.search + 1, cell(one.objective), cell(one.violation), one.feasible, one.evaluations,
          one.message] for one in found.ends
     ]  # fmt: skip
-    header = ["start", "objective", "violation", "feasible", "evaluations", "why it ended"]
+    header = ["search", "objective", "violation", "feasible", "evaluations", "why it ended"]
     caption = (
         f"{found.evaluations} evaluations in all. Violations are over the size of a constraint."
     )
@@ -190,7 +190,7 @@ def _rows(
     yield goal, plan.problem.objective.text
     yield "subject to", "; ".join(one.text for one in plan.problem.constraints)
     yield "method", f"{plan.method}: {METHODS[plan.method].doc}"
-    yield "starts", f"{plan.starts}, seed {plan.settings.seed}"
+    yield "searches", f"{plan.searches}, seed {plan.settings.seed}"
     yield "tolerance", f"{plan.settings.tolerance:g}; slack of constraints {plan.settings.slack:g}"
     seconds = float(np.nansum(found.history["seconds"].values))
     yield from cost_rows(str(facts["foldyn_version"]), call or Call(), seconds)

@@ -29,13 +29,13 @@ PARAMETER, GRADIENT = "parameter_", "gradient_"
 
 @dataclass(frozen=True)
 class End:
-    """End of the search from one start.
+    """End of one search.
 
     Attributes
     ----------
-    start : int
+    search : int
     objective, violation : float
-        Values of the best design from this start; nan if none could be computed. The violation is
+        Values of the best design of this search; nan if none could be computed. The violation is
         the largest of all constraints, relative to their scales.
     feasible : bool
         Whether the violation is small enough to count as none.
@@ -45,7 +45,7 @@ class End:
     converged : bool
     """
 
-    start: int
+    search: int
     objective: float
     violation: float
     feasible: bool
@@ -74,11 +74,11 @@ class Design:
     gradient : dict
         Derivatives of the objective with respect to the parameters; empty if not computed.
     ends : tuple of End
-        How the search from each start ended.
+        How each search ended.
     history : xarray.Dataset
         A row for each evaluation, see `foldyn.design`.
     evaluations : int
-        Number of evaluations from all starts.
+        Number of evaluations of all searches.
     seconds : float
     """
 
@@ -157,7 +157,7 @@ def history_of(
     numbers = np.array([row.numbers for row in rows])
     along = "evaluation"
     data: dict[str, Any] = {
-        "start": (along, np.array([row.start for row in rows])),
+        "search": (along, np.array([row.search for row in rows])),
         "iteration": (along, np.array([row.iteration for row in rows])),
         "objective": (along, numbers[:, 0], {"long_name": problem.objective.text}),
         "violation": (

@@ -25,7 +25,7 @@ from foldyn.values import MOST, choice, number, whole
 FLAT = 1e-12
 """Relative change of the objective across the bounds that counts as none."""
 MOST_DRAWN = 20
-"""Most designs drawn for a start before one can be computed."""
+"""Most designs drawn for a guess before one can be computed."""
 
 
 @dataclass(frozen=True)
@@ -36,15 +36,15 @@ class Course:
     ----------
     done, found : int
         Number of evaluations, and of stored ones among them.
-    start : int
-        Number of the start.
+    search : int
+        Number of the search.
     objective, violation : float
         Values of the best design so far; nan without one.
     """
 
     done: int
     found: int
-    start: int
+    search: int
     objective: float
     violation: float
 
@@ -58,11 +58,11 @@ class Plan:
     problem : Problem
     space : Space
     first : ndarray
-        Entries of the first start.
+        Entries of the first guess.
     evaluator : Evaluator
     method : str
     settings : Settings
-    starts : int
+    searches : int
     """
 
     problem: Problem
@@ -71,7 +71,7 @@ class Plan:
     evaluator: Evaluator
     method: str
     settings: Settings
-    starts: int
+    searches: int
 
 
 def design(
@@ -82,9 +82,9 @@ def design(
     maximize: str | None = None,
     subject_to: str | Sequence[str] = (),
     analysis: Mapping[str, Any] | None = None,
-    start: Mapping[str, Any] | None = None,
+    guess: Mapping[str, Any] | None = None,
     method: str = "slsqp",
-    starts: int = 1,
+    searches: int = 1,
     seed: int = 0,
     tolerance: float = 1e-6,
     slack: float = 1e-4,
@@ -101,7 +101,7 @@ def design(
         "pattern.panel_angle".
     bounds : mapping
         Parameters by name, each with its lower and upper bound: numbers, or for an array lists of
-        one for each entry; numbers hold for all entries of an array that `start` gives.
+        one for each entry; numbers hold for all entries of an array that `guess` gives.
     minimize, maximize : str
         Exactly one of the two: an expression of sweep measures, "-frequency[2] / frequency[1]",
         with ``+ - * / **``, parentheses, min, max, abs, sqrt, log and exp.
@@ -110,23 +110,23 @@ def design(
     analysis : mapping
         Analysis of a built case: its kind, "modes", "dynamics", "statics" or "frf", and arguments
         of `modes`, `simulate`, `trace` or `frf`. A case file has its own.
-    start : mapping, optional
-        Values to start from, by default the middle between the bounds.
+    guess : mapping, optional
+        Values to begin from, by default the middle between the bounds.
     method : {"slsqp", "trust-constr", "mma", "cma"}
         The first three use exact derivatives, see `sensitivity`; "mma" needs NLopt. "cma" (CMA-ES)
         needs no derivatives, but some hundred times as many evaluations.
-    starts : int
-        Number of searches: the first from `start`, the others from random designs within the
+    searches : int
+        Number of searches: the first from `guess`, the others from random designs within the
         bounds.
     seed : int
-        Random seed of the starts and of CMA-ES.
+        Random seed of the other guesses and of CMA-ES.
     tolerance : float
         Change of the objective, relative to its size at the first design, at which a search ends.
     slack : float
         Violation of a constraint that counts as none, relative to the constraint's size: its
         numeric side, or else the larger side at the first design.
     max_evaluations : int
-        Most evaluations from each start.
+        Most evaluations of each search.
     folder : path, optional
         Keeps every evaluation, so that an interrupted search resumes.
     progress : callable, optional
@@ -135,7 +135,7 @@ def design(
     Returns
     -------
     Design
-        The best of all evaluated feasible designs, with the history of all starts:
+        The best of all evaluated feasible designs, with the history of all searches:
         ``best["parameters"]``, ``best["history"]``.
 
     Raises
@@ -143,7 +143,7 @@ def design(
     InputError
         An argument cannot be used, or the first design gives no case or lacks a measure.
     ComputationError
-        None of the starts can be computed.
+        No guess can be computed.
 
     Warns
     -----
@@ -156,7 +156,7 @@ def design(
     history says why. CMA-ES enforces constraints, and MMA equalities, by an augmented Lagrangian.
     """
     plan = plan_of(
-        build, bounds, minimize, maximize, subject_to, analysis, start, method, starts, seed,
+        build, bounds, minimize, maximize, subject_to, analysis, guess, method, searches, seed,
         tolerance, slack, max_evaluations,
     )  # fmt: skip
     return designed(plan, folder, progress)
@@ -164,12 +164,12 @@ def design(
 
 def plan_of(
     build: Source, bounds: Any, minimize: Any, maximize: Any, subject_to: Any, analysis: Any,
-    start: Any, method: str, starts: int, seed: int, tolerance: float, slack: float,
+    guess: Any, method: str, searches: int, seed: int, tolerance: float, slack: float,
     max_evaluations: int,
 ) -> Plan:  # fmt: skip
     """Check the arguments of `design`; raises `InputError`."""
     problem = problem_of(minimize, maximize, subject_to)
-    space, first = space_of(bounds, start)
+    space, first = space_of(bounds, guess)
     METHODS[choice("method", method, METHODS)].check()
     settings = Settings(
         number("tolerance", tolerance, above=0.0, below=1.0),
@@ -177,9 +177,9 @@ def plan_of(
         whole("max_evaluations", max_evaluations, least=1),
         whole("seed", seed, least=0, most=2**31),
     )
-    whole("starts", starts, least=1, most=MOST)
+    whole("searches", searches, least=1, most=MOST)
     evaluator = measured(build, analysis, problem.places, space, METHODS[method].gradient)
-    return Plan(problem, space, first, evaluator, method, settings, starts)
+    return Plan(problem, space, first, evaluator, method, settings, searches)
 
 
 def designed(
@@ -198,7 +198,7 @@ def designed(
             plan.settings.most, lambda: _tell(search, progress),
         )  # fmt: skip
         ends = []
-        for k in range(plan.starts):
+        for k in range(plan.searches):
             search.begin(k)
             x = _first(plan, search, k)
             message, converged = searched(plan.method, search, x, plan.settings)
@@ -206,15 +206,15 @@ def designed(
             if k == 0 and search.rows[0].failure and search.sizes is None:
                 plan.evaluator(plan.space.values(search.rows[0].point), gradient)  # raises it
     if search.best is None:
-        raise ComputationError(f"no start can be computed: {search.rows[0].failure}")
+        raise ComputationError(f"no guess can be computed: {search.rows[0].failure}")
     return _found(plan, search, search.best, ends, time.perf_counter() - began)
 
 
-def _first(plan: Plan, search: Search, start: int) -> NDArray:
-    """Start of a search: given, or drawn until a design can be computed."""
-    if start == 0:
+def _first(plan: Plan, search: Search, number: int) -> NDArray:
+    """Guess of a search: given, or drawn until a design can be computed."""
+    if number == 0:
         return plan.space.x(plan.first)
-    drawn = np.random.default_rng([plan.settings.seed, start])
+    drawn = np.random.default_rng([plan.settings.seed, number])
     for _ in range(MOST_DRAWN - 1):
         x = drawn.random(len(plan.first))
         if search.can(x):
@@ -227,22 +227,22 @@ def _tell(search: Search, progress: Callable[[Course], None] | None) -> None:
         return
     best, found = search.best, search.evaluations.found
     objective, violation = (np.nan, np.nan) if best is None else (best.numbers[0], best.violation)
-    progress(Course(len(search.rows), found, search.start, float(objective), float(violation)))
+    progress(Course(len(search.rows), found, search.number, float(objective), float(violation)))
 
 
-def _end(start: int, search: Search, message: str, converged: bool) -> End:
-    own = [row for row in search.rows if row.start == start]
+def _end(number: int, search: Search, message: str, converged: bool) -> End:
+    own = [row for row in search.rows if row.search == number]
     sound = [row for row in own if not row.failure]
     if not sound:
-        return End(start, np.nan, np.nan, False, len(own), message, False)
+        return End(number, np.nan, np.nan, False, len(own), message, False)
     best = min(sound, key=search.key)
     if best is sound[0]:
         why = "no design that was tried is better"
         if _insensitive(search, best):
             why, converged = f"where no parameter changes {search.problem.objective.text}", False
-        message = f"{message}; the design stays at its start, {why}"
+        message = f"{message}; the design stays at its guess, {why}"
     return End(
-        start, float(best.numbers[0]), best.violation, best.feasible, len(own), message, converged
+        number, float(best.numbers[0]), best.violation, best.feasible, len(own), message, converged
     )
 
 
@@ -270,13 +270,13 @@ def _found(
         )
         warn(
             f"none of {len(search.rows)} designs is feasible; the nearest one violates {violated}. "
-            "Widen the bounds, relax constraints, or take more starts",
+            "Widen the bounds, relax constraints, or take more searches",
             "design-optimization.md#what-comes-back",
         )
-    elif _insensitive(search, best) and not ends[best.start].converged:
+    elif _insensitive(search, best) and not ends[best.search].converged:
         warn(
             f"no parameter changes {problem.objective.text} at the best design: it need not be an "
-            "optimum; start elsewhere, or take another objective",
+            "optimum; give another guess, or take another objective",
             "design-optimization.md#what-comes-back",
         )
     gradient: dict[str, Any] = {}
@@ -284,7 +284,7 @@ def _found(
         gradient = space.values(tuple(best.slopes[0].tolist()))
     facts = {
         "objective": problem.objective.text, "sense": "min" if problem.sign > 0.0 else "max",
-        "method": plan.method, "starts": plan.starts, "seed": plan.settings.seed,
+        "method": plan.method, "searches": plan.searches, "seed": plan.settings.seed,
         "tolerance": plan.settings.tolerance, "slack": plan.settings.slack,
         "feasible": int(best.feasible), "seconds": seconds,
     }  # fmt: skip

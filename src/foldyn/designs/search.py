@@ -60,7 +60,7 @@ class Row:
     numbers : the objective, and left minus right sides of the constraints; nan if it failed.
     """
 
-    start: int
+    search: int
     iteration: int
     point: Point
     numbers: NDArray
@@ -85,7 +85,7 @@ class Search:
     slack : float
         Relative violation of constraints that counts as none.
     most : int
-        Most evaluations from one start.
+        Most evaluations of one search.
     tell : callable, optional
         Called after each new row.
     """
@@ -98,14 +98,14 @@ class Search:
         self.gradient, self.slack, self.most, self.tell = gradient, slack, most, tell
         self.rows: list[Row] = []
         self.sizes: NDArray | None = None  # from the first design that can be computed
-        self.start = 0
+        self.number = 0
         self.best: Row | None = None
         self._known: dict[Point, Trial | None] = {}
         self.begin(0)
 
-    def begin(self, start: int) -> None:
-        """Begin a search from another start."""
-        self.start, self.iteration, self.count, self._failed = start, 0, 0, 0
+    def begin(self, number: int) -> None:
+        """Begin a search from another guess."""
+        self.number, self.iteration, self.count, self._failed = number, 0, 0, 0
         self._still = 0
         self._known.clear()
         self._last: Trial | None = None
@@ -187,7 +187,7 @@ class Search:
         violation = np.nan if trial is None else trial.violation
         nothing = np.full(1 + len(self.problem.constraints), np.nan)
         row = Row(
-            self.start, self.iteration, point, nothing if trial is None else np.asarray(numbers),
+            self.number, self.iteration, point, nothing if trial is None else np.asarray(numbers),
             violation, violation <= self.slack, found.seconds, failure, found.warnings, values,
             slopes,
         )  # fmt: skip

@@ -64,42 +64,42 @@ class Space:
         ]
 
 
-def space_of(bounds: Any, start: Any) -> tuple[Space, NDArray]:
+def space_of(bounds: Any, guess: Any) -> tuple[Space, NDArray]:
     """Design space and the entries of the first design, by default in the middle.
 
     Raises
     ------
     InputError
-        Bounds are missing, or inconsistent with each other or the start.
+        Bounds are missing, or inconsistent with each other or the guess.
     """
     if not isinstance(bounds, Mapping) or not bounds:
         raise InputError(
             f' = {show(bounds)}: give each parameter its bounds, as {{"panel_angle": (45, 80)}}',
             "bounds",
         )
-    if start is not None and not isinstance(start, Mapping):
-        raise InputError(f" = {show(start)}: give a mapping of names to values", "start")
-    for name in start or {}:
+    if guess is not None and not isinstance(guess, Mapping):
+        raise InputError(f" = {show(guess)}: give a mapping of names to values", "guess")
+    for name in guess or {}:
         if name not in bounds:
-            raise InputError(f": {name} has no bounds; give it some in bounds", "start")
+            raise InputError(f": {name} has no bounds; give it some in bounds", "guess")
     shapes, columns = {}, []
     for name, pair in bounds.items():
         if not isinstance(name, str):
             raise InputError(f": {show(name)} must be the name of a parameter", "bounds")
-        shape, ends = _ends(name, pair, None if start is None else start.get(name))
+        shape, ends = _ends(name, pair, None if guess is None else guess.get(name))
         shapes[name] = shape
         columns.append(ends)
     lower, upper, first = np.concatenate(columns, axis=1)
     return Space(shapes, lower, upper), first
 
 
-def _ends(name: str, pair: Any, start: Any) -> tuple[tuple[int, ...], NDArray]:
-    """Shape of a parameter, and its lower bound, upper bound and start (3, count)."""
+def _ends(name: str, pair: Any, guess: Any) -> tuple[tuple[int, ...], NDArray]:
+    """Shape of a parameter, and its lower bound, upper bound and guess (3, count)."""
     place = f"bounds.{name}"
     if isinstance(pair, str) or not hasattr(pair, "__len__") or len(pair) != 2:
         raise InputError(f" = {show(pair)}: must be a lower and an upper bound", place)
     lower, upper = (numbers(f"{place}[{k}]", end) for k, end in enumerate(pair))
-    first = None if start is None else numbers(f"start.{name}", start)
+    first = None if guess is None else numbers(f"guess.{name}", guess)
     given = [one for one in (lower, upper, first) if one is not None]
     if any(one.ndim > 1 or not one.size for one in given):
         raise InputError(": must be numbers, or lists of one for each entry", place)
@@ -108,7 +108,7 @@ def _ends(name: str, pair: Any, start: Any) -> tuple[tuple[int, ...], NDArray]:
     except ValueError:
         lengths = ", ".join(str(one.size) for one in given if one.ndim)
         raise InputError(
-            f": lists of different lengths ({lengths}), start among them", place
+            f": lists of different lengths ({lengths}), guess among them", place
         ) from None
     lower, upper = (np.broadcast_to(end, shape).ravel() for end in (lower, upper))
     bad = np.flatnonzero(~(lower < upper))
@@ -126,6 +126,6 @@ def _ends(name: str, pair: Any, start: Any) -> tuple[tuple[int, ...], NDArray]:
         k = outside[0]
         raise InputError(
             f" = {begin[k]:g}: must be within its bounds, {lower[k]:g} to {upper[k]:g}",
-            f"start.{name}{f'[{k}]' if shape else ''}",
+            f"guess.{name}{f'[{k}]' if shape else ''}",
         )
     return shape, np.stack([lower, upper, begin])

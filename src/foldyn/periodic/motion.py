@@ -43,7 +43,7 @@ def periodic_motion(
     *,
     harmonics: int = 9,
     method: str = "harmonic_balance",
-    start: State | xarray.Dataset | None = None,
+    guess: State | xarray.Dataset | None = None,
     periods: int = 1,
     modes: int | None = None,
     steps: int = STEPS,
@@ -52,7 +52,7 @@ def periodic_motion(
     """Periodic motion of a case under its harmonic histories, and its stability.
 
     Solves M u'' + C u' + F(u, t) = p(t) with the exact internal forces F. Several motions may exist
-    at a frequency: `start` selects one, `response_curve` finds connected ones.
+    at a frequency: `guess` selects one, `response_curve` finds connected ones.
 
     Parameters
     ----------
@@ -67,14 +67,14 @@ def periodic_motion(
     method : {"harmonic_balance", "shooting"}
         A Fourier series whose equation is satisfied in the mean over each harmonic, or the initial
         state to which integration over a period (Radau's method of order 5) returns.
-    start : State or xarray.Dataset, optional
+    guess : State or xarray.Dataset, optional
         Start of the search: small motions about a state, or a result of `periodic_motion` or a
         point of a `response_curve`. By default the equilibrium under the constant loads. Damping
         with ``state = "start"`` is taken about this state, or continued from a result.
     periods : int
         Periods of the drive in one period of the motion: 2 after a period doubling.
     modes : int, optional
-        For large sheets: instead of all free dofs, use the span of this many modes about the start
+        For large sheets: instead of all free dofs, use the span of this many modes about the guess
         (about the equilibrium, if it is a motion), their derivatives and the static response to the
         drive.
     steps : int
@@ -129,13 +129,13 @@ def periodic_motion(
     tolerance = number("tolerance", tolerance, above=0.0, below=1.0)
     steps = whole("steps", steps, least=4)
     periods = whole("periods", periods, least=1)
-    balance = balance_of(case, "fd.periodic_motion", harmonics, periods, modes, start, steps)
+    balance = balance_of(case, "fd.periodic_motion", harmonics, periods, modes, guess, steps)
     omega = TURN * frequency_of(balance, frequency)
     with balance.threads:
         if method == "shooting":
-            orbit, floquet, spent = _shot(balance, start, omega, steps, tolerance)
+            orbit, floquet, spent = _shot(balance, guess, omega, steps, tolerance)
         else:
-            x = coefficients(balance, start, omega)
+            x = coefficients(balance, guess, omega)
             found = balanced(balance, x, omega, tolerance)
             orbit, spent = orbit_of(balance, found.x, omega), found.iterations
             floquet = multipliers(balance.equation, orbit.amplitudes, omega, periods, steps=steps)
@@ -166,17 +166,17 @@ def periodic_motion(
 
 def balance_of(
     case: Case, name: str, harmonics: int, periods: int = 1, modes: int | None = None,
-    start: Any = None, steps: int = STEPS,
+    guess: Any = None, steps: int = STEPS,
 ) -> Balance:  # fmt: skip
     """Balance of a driven case; raises `InputError` without a drive, or if memory is too small."""
     harmonics = whole("harmonics", harmonics, least=1)
-    equation = Equation(case, name, origin=origin_of(case, start))
+    equation = Equation(case, name, origin=origin_of(case, guess))
     if not equation.drive.varies:
         raise InputError(
             f"case: nothing drives it: {name} follows the period of a load or support; give one "
             f"the history {HARMONIC}"
         )
-    equation = on_modes(equation, modes, start)
+    equation = on_modes(equation, modes, guess)
     fourier, size = Fourier(harmonics), (2 * harmonics + 1) * equation.size
     needed = fourier.memory(equation.size)
     check_memory("harmonics", f"a matrix of {size} unknowns", needed, "take fewer")
@@ -186,13 +186,13 @@ def balance_of(
     return Balance(equation, fourier, periods)
 
 
-def on_modes(equation: Equation, modes: int | None, start: Any) -> Equation:
-    """The equation reduced to modes about a start; itself if `modes` is None."""
+def on_modes(equation: Equation, modes: int | None, guess: Any) -> Equation:
+    """The equation reduced to modes about a guess; itself if `modes` is None."""
     if modes is None:
         return equation
     count, case = whole("modes", modes, least=1), equation.case
-    if isinstance(start, State):
-        return reduced(equation, count, start.of_nodes("displacement", case.structure.nodes.shape))
+    if isinstance(guess, State):
+        return reduced(equation, count, guess.of_nodes("displacement", case.structure.nodes.shape))
     return reduced(equation, count, equilibrium(case))
 
 
@@ -229,18 +229,18 @@ def warn_of_crossing(orbits: Sequence[Orbit]) -> None:
     if crossed:
         warn(
             f"contact: the motion at {', '.join(crossed[:NAMED])} passes through what it touches, "
-            "so that it is not valid; start elsewhere, or give more harmonics",
+            "so that it is not valid; give another guess, or give more harmonics",
             "nonlinear-vibration.md#one-motion",
         )
 
 
 def _shot(
-    balance: Balance, start: Any, omega: float, steps: int, tolerance: float
+    balance: Balance, guess: Any, omega: float, steps: int, tolerance: float
 ) -> tuple[Orbit, NDArray, int]:
     """Motion by shooting from one of few harmonics, its multipliers, and the iterations spent."""
     equation, longer = balance.equation, balance.multiple
     few = Balance(equation, Fourier(min(balance.fourier.harmonics, FEW * longer)), longer)
-    near = orbit_of(few, balanced(few, coefficients(few, start, omega), omega, 1e-3).x, omega)
+    near = orbit_of(few, balanced(few, coefficients(few, guess, omega), omega, 1e-3).x, omega)
     shooting = Shooting(equation, omega, steps, longer)
     begin = [values_of(near.amplitudes, np.zeros(1), k)[0] for k in (0, 1)]
     found = newton(shooting, np.concatenate(begin), tolerance)

@@ -149,7 +149,7 @@ def backbone(
     tolerance = number("tolerance", tolerance, above=0.0, below=1.0)
     damped = flag("damped", damped)
     if damped:
-        balance = balance_of(case, "fd.backbone", harmonics, modes=modes, start=state)
+        balance = balance_of(case, "fd.backbone", harmonics, modes=modes, guess=state)
         if not balance.equation.damping.any():
             raise InputError(
                 ": nothing damps the sheet, which in resonance swings without bound; give the case "

@@ -71,7 +71,7 @@ def response_curve(
     harmonics: int = 9,
     measure: Quantity | None = None,
     amplitudes: Sequence[float] | None = None,
-    start: State | xarray.Dataset | None = None,
+    guess: State | xarray.Dataset | None = None,
     periods: int = 1,
     modes: int | None = None,
     branches: int = 1,
@@ -101,7 +101,7 @@ def response_curve(
     amplitudes : (float, float), optional
         Instead of frequencies: both ends of a factor on all harmonic histories, at the case's own
         frequency.
-    start : State or xarray.Dataset, optional
+    guess : State or xarray.Dataset, optional
         Start of the search at the first end; see `periodic_motion`.
     periods : int
         Periods of the drive in one period of the motion.
@@ -128,7 +128,7 @@ def response_curve(
         or ""), `branch` (0 for the curve itself), `periods`, `floquet` (multiplier), `coefficient`
         (harmonic, node, axis) as in `periodic_motion`, of the motion's own frequency, `truncation`,
         with `modes` also `reduction`. The motion at a point is
-        ``periodic_motion(case, f, start=curve.isel(point=3))``.
+        ``periodic_motion(case, f, guess=curve.isel(point=3))``.
         Attributes: `complete`, 1 if every branch reached an end of the range, and facts.
 
     Raises
@@ -158,13 +158,13 @@ def response_curve(
     branches = whole("branches", branches, least=0)
     periods = whole("periods", periods, least=1)
     steps = whole("steps", steps, least=4)
-    balance = balance_of(case, "fd.response_curve", harmonics, periods, modes, start, steps)
+    balance = balance_of(case, "fd.response_curve", harmonics, periods, modes, guess, steps)
     tracer = _Tracer(by, ends, stride, steps, tolerance)
     report, close = reporter(progress)
     try:
         with balance.threads:
             family = tracer.family(balance)
-            first = tracer.first(family, start)
+            first = tracer.first(family, guess)
             tracer.follow(family, first, branches, report)
     except KeyboardInterrupt:
         tracer.complete = False
@@ -207,14 +207,14 @@ class _Tracer:
         frequency = balance.equation.drive.frequency
         return ByLevel(balance, self.span, self.tolerance, frequency)
 
-    def first(self, family: Any, start: Any) -> Point:
+    def first(self, family: Any, guess: Any) -> Point:
         """Point at the first end, with the tangent toward the second."""
         balance, p = family.balance, self.ends[0]
         if self.by == "frequencies":
             omega, level = 2.0 * np.pi * p, 1.0
         else:
             omega, level = family.omega, p
-        x = coefficients(balance, start, omega, level)
+        x = coefficients(balance, guess, omega, level)
         z = balanced(balance, x, omega, self.tolerance, level).x
         ahead = np.append(np.zeros(len(z)), np.sign(self.ends[1] - self.ends[0]))
         return point_at(family, z, p, ahead)

@@ -61,28 +61,28 @@ def equilibrium(case: Case) -> NDArray:
     return trace(still, "newton", load_factors=[0.0, 1.0])["displacement"].values[-1]
 
 
-def origin_of(case: Case, start: Any) -> Origin | None:
+def origin_of(case: Case, guess: Any) -> Origin | None:
     """State of damping that is defined at the start; None without such damping.
 
     It is the state or the result from which the search begins, or the equilibrium.
     """
     if not case.damped_at_start:
         return None
-    if isinstance(start, State):
-        return start.origin_of(case.structure.nodes.shape, field="start")
-    found = initial.origin_of(start, "start: ") if isinstance(start, xr.Dataset) else None
+    if isinstance(guess, State):
+        return guess.origin_of(case.structure.nodes.shape, field="guess")
+    found = initial.origin_of(guess, "guess: ") if isinstance(guess, xr.Dataset) else None
     return found or Origin(equilibrium(case))
 
 
-def coefficients(balance: Balance, start: Any, omega: float, level: float = 1.0) -> NDArray:
+def coefficients(balance: Balance, guess: Any, omega: float, level: float = 1.0) -> NDArray:
     """Initial coefficients (c, k): from a given motion, or of small motions about a state."""
     equation = balance.equation
-    if isinstance(start, xr.Dataset):
-        return _of_result(balance, start, level)
-    if start is None:
+    if isinstance(guess, xr.Dataset):
+        return _of_result(balance, guess, level)
+    if guess is None:
         place = equilibrium(equation.case)
     else:
-        place = displacement_of(start, equation.case, "start", PLACES)
+        place = displacement_of(guess, equation.case, "guess", PLACES)
     mean = equation.at(np.zeros(1), 0.0)
     check_contact(equation.case, place, mean.planes[0])
     x = np.zeros(balance.shape)
@@ -107,23 +107,23 @@ def linear_response(balance: Balance, x: NDArray, omega: float, level: float) ->
     return fourier.real_of(amplitudes)
 
 
-def _of_result(balance: Balance, start: xr.Dataset, level: float) -> NDArray:
+def _of_result(balance: Balance, guess: xr.Dataset, level: float) -> NDArray:
     """Coefficients (c, k) of a motion from an earlier result."""
-    found = start.variables.get("coefficient")
+    found = guess.variables.get("coefficient")
     n = len(balance.equation.case.structure.nodes)
     if found is None or found.dims != ("harmonic", "node", "axis") or found.shape[1:] != (n, 3):
         raise InputError(
             f": must be {PLACES} of this case (of a curve one point, as curve.isel(point=3))",
-            "start",
+            "guess",
         )
     given, longer = np.asarray(found), balance.multiple
     if not np.isfinite(given).all():
-        raise InputError(": its coefficients must be finite", "start")
-    own = int(start.get("periods", 1))
+        raise InputError(": its coefficients must be finite", "guess")
+    own = int(guess.get("periods", 1))
     if own != longer:  # the same motion in a longer period
         if longer % own:
             raise InputError(
-                f": its period is {own} of the drive; give periods = {own}, or a multiple", "start"
+                f": its period is {own} of the drive; give periods = {own}, or a multiple", "guess"
             )
         spread = np.zeros(((len(given) - 1) * (longer // own) + 1, n, 3), complex)
         spread[:: longer // own] = given
@@ -167,7 +167,7 @@ def _grown(balance: Balance, x: NDArray, omega: float, tolerance: float, level: 
             return Converged(found.x, spent + found.iterations)
     raise ComputationError(
         f"frequency = {omega / TURN:g} Hz: no periodic motion is found; the search ends at "
-        f"{share:.2g} of the drive. Remedies: another start (a motion at a frequency nearby, or a "
+        f"{share:.2g} of the drive. Remedies: another guess (a motion at a frequency nearby, or a "
         "State), fd.response_curve from a frequency off resonance, or more damping"
     )
 

@@ -12,18 +12,18 @@ from foldyn.plots.charts import Chart, Curve
 
 
 def convergence_charts(history: xr.Dataset) -> list[Chart]:
-    """Objective and largest violation over the evaluations, a curve for each start."""
+    """Objective and largest violation over the evaluations, a curve for each search."""
     number = 1 + history["evaluation"].values
-    starts = history["start"].values
+    search = history["search"].values
     objective, violation = history["objective"].values, history["violation"].values
     best = int(history["best"])
     along = "evaluation"
 
     def curves(values: NDArray) -> list[Curve]:
-        several = len(np.unique(starts)) > 1
+        several = len(np.unique(search)) > 1
         return [
-            Curve(f"start {k + 1}" if several else "", number[starts == k], values[starts == k])
-            for k in np.unique(starts).tolist()
+            Curve(f"search {k + 1}" if several else "", number[search == k], values[search == k])
+            for k in np.unique(search).tolist()
         ]
 
     label = str(history["objective"].attrs["long_name"])

@@ -81,7 +81,7 @@ def fit(
     *,
     parameters: Sequence[Parameter],
     ties: Mapping[str, str] | None = None,
-    starts: int = 1,
+    searches: int = 1,
     seed: int = 0,
     processes: int = 1,
     confidence: float = 0.95,
@@ -106,11 +106,11 @@ def fit(
     parameters : sequence of Parameter
     ties : mapping of str to str, optional
         Keys that follow parameters, ``{"model.fold_law.theta2": "360 - model.fold_law.theta1"}``.
-    starts : int
+    searches : int
         Number of searches: the first from the given values, the others from random ones within the
         bounds.
     seed : int
-        Random seed of the starts.
+        Random seed of the guesses.
     processes : int
         Number of evaluations that run in parallel.
     confidence : float
@@ -147,12 +147,12 @@ def fit(
     confidence = number("confidence", confidence, above=0.0, below=1.0)
     whole("processes", processes, least=1, most=MOST_PROCESSES)
     made = problem(case, data, parameters, {} if ties is None else ties)
-    points = made.space.starts(starts, seed)
+    points = made.space.guesses(searches, seed)
     began = time.perf_counter()
     with pool_of(partial(evaluate, made), processes) as pool:
         search = _Search(made, pool, folder, progress)
-        if processes > 1 and starts > 1:
-            descents = _at_a_time(min(starts, processes), pool, search, points)
+        if processes > 1 and searches > 1:
+            descents = _at_a_time(min(searches, processes), pool, search, points)
         else:
             descents = [search.descend(point) for point in points]
         lowest = min(descents, key=lambda one: one.cost)
@@ -168,7 +168,7 @@ def fit(
     if not lowest.converged:
         _warn(
             f"the search was {lowest.message}: the values are not those of the least misfit, and "
-            "their intervals mean nothing yet; start from these values, or nearer to the truth"
+            "their intervals mean nothing yet; begin from these values, or nearer to the truth"
         )
     _warn_of_pairing(made, values)
     return Fit(
@@ -182,7 +182,7 @@ def fit(
 def _at_a_time(
     count: int, pool: Pool, search: _Search, points: NDArray[np.float64]
 ) -> list[Descent]:
-    """Search from several starts in threads, which end if this one is interrupted."""
+    """Search from several guesses in threads, which end if this one is interrupted."""
     with ThreadPoolExecutor(count) as threads:
         try:
             return list(threads.map(search.descend, points))
@@ -235,16 +235,16 @@ class _Search:
         found = self.evaluations.at([Point(tuple(map(float, point)), runs) for point in points])
         return [one.failure or one.values[PREDICTED] for one in found]
 
-    def descend(self, start: NDArray[np.float64]) -> Descent:
-        """Search from a start."""
-        begin = tuple(start.tolist())
-        (first,) = self.at([start])
+    def descend(self, guess: NDArray[np.float64]) -> Descent:
+        """Search from a guess."""
+        begin = tuple(guess.tolist())
+        (first,) = self.at([guess])
         try:
             if isinstance(first, str):
                 raise ComputationError(first)
             end = least_squares(
                 lambda z: self._residual([z * self.scale])[0],
-                start / self.scale,
+                guess / self.scale,
                 lambda z: self._jacobian(z * self.scale, both_sides=False),
                 bounds=(self.lower / self.scale, self.upper / self.scale),
                 xtol=ENOUGH, ftol=LEVEL, gtol=1e-12, max_nfev=TRIED,

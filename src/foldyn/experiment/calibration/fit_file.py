@@ -99,7 +99,7 @@ def _known(kind: str) -> list[str]:
 class SolverSection(Section):
     """[solver]: other arguments of `fit`."""
 
-    starts: Count = 1
+    searches: Count = 1
     seed: Seed = 0
     processes: Count = 1
     confidence: Annotated[float, Check(number, above=0.0, below=1.0)] = 0.95
@@ -137,7 +137,7 @@ class FitFile:
     parameters : tuple of Parameter
     ties : dict of str to str
     solver : dict
-        Arguments starts, seed, processes and confidence.
+        Arguments searches, seed, processes and confidence.
     """
 
     path: Path

@@ -202,10 +202,10 @@ def _scores(fit: Fit) -> Table:
 def _searches(fit: Fit) -> Table:
     keys = [key.rsplit(".", 1)[-1] for key in fit.values]
     rows = [
-        [*one.start, *one.values, cell(one.cost), one.evaluations, one.message]
+        [*one.guess, *one.values, cell(one.cost), one.evaluations, one.message]
         for one in fit.descents
     ]
-    header = [*(f"{key}, start" for key in keys), *(f"{key}, end" for key in keys),
+    header = [*(f"{key}, guess" for key in keys), *(f"{key}, end" for key in keys),
               "cost", "steps", "why it ended"]  # fmt: skip
     text = f"{fit.evaluations} evaluations of the model in all."
     if fit.quotients:

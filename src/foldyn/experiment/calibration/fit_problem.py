@@ -207,7 +207,7 @@ class Problem:
         digest.update(json.dumps(names).encode())
         for run in self.runs:
             digest.update(json.dumps(run.document, sort_keys=True, default=str).encode())
-            state = run.start(self.case_file(run, self.space.column("start")))
+            state = run.start(self.case_file(run, self.space.column("guess")))
             for array in () if state is None else (state.displacement, state.velocity):
                 digest.update(b"" if array is None else np.asarray(array).tobytes())
             for file in sorted(files_of(run.document, "initial")):
@@ -323,12 +323,12 @@ def problem(
         path, document, space(document, parameters, ties), tuple(measurements),
         tuple(_runs(path, document, measurements)),
     )  # fmt: skip
-    start = made.space.column("start")
+    guess = made.space.column("guess")
     for run in made.runs:
-        case_file = case_of_document(run.path, replaced(run.document, made.space.changes(start)))
+        case_file = case_of_document(run.path, replaced(run.document, made.space.changes(guess)))
         for i in run.members:
             _check(measurements[i], case_file)
-    made.examine(start)
+    made.examine(guess)
     fitted = sum(len(one.observed()) - one.absorbed for one in measurements if not one.held_out)
     if fitted < len(parameters):
         raise InputError(
@@ -342,10 +342,10 @@ def _check_keys(
     path: Path, document: dict[str, Any], parameters: Sequence[Parameter], ties: Mapping[str, str]
 ) -> None:
     """Refuse keys that case files cannot have, before looking up their values."""
-    starts = {one.key: one.start for one in parameters if isinstance(one, Parameter)}
-    for key, start in (starts | dict.fromkeys(ties)).items():
+    guesses = {one.key: one.guess for one in parameters if isinstance(one, Parameter)}
+    for key, guess in (guesses | dict.fromkeys(ties)).items():
         if value_at(document, key) is None:
-            validated(path, replaced(document, {key: 1.0 if start is None else start}))
+            validated(path, replaced(document, {key: 1.0 if guess is None else guess}))
 
 
 def _check_sigmas(measurements: Sequence[Measurement]) -> None:

@@ -30,12 +30,12 @@ RARE = 0.01
 @brief
 @dataclass(frozen=True)
 class Descent:
-    """A search from one start.
+    """One search.
 
     Attributes
     ----------
-    start, values : tuple of float
-        Parameters at its start and end.
+    guess, values : tuple of float
+        Parameters at its beginning and end.
     cost : float
         Half the sum of squares of the weighted residuals at its end; inf if it failed.
     evaluations : int
@@ -45,7 +45,7 @@ class Descent:
     converged : bool
     """
 
-    start: tuple[float, ...]
+    guess: tuple[float, ...]
     values: tuple[float, ...]
     cost: float
     evaluations: int
@@ -106,7 +106,7 @@ class Fit:
     scores : tuple of Score
         One per measurement.
     descents : tuple of Descent
-        One per start, in order.
+        One per search, in order.
     problem : Problem
     predicted : tuple of ndarray
         The model's prediction of each measurement.
@@ -208,7 +208,7 @@ class Fit:
             "misfit": plain(self.misfit),
             "quality": self.quality,
             "measurements": [plain(vars(one)) for one in self.scores],
-            "starts": [plain(vars(one)) for one in self.descents],
+            "searches": [plain(vars(one)) for one in self.descents],
             "evaluations": self.evaluations,
             "seconds": self.seconds,
             "quotients": list(self.quotients),

@@ -25,7 +25,7 @@ SECOND = (
     ((0, 1.5), (-1, -2.0), (-2, 0.5)),
 )
 """Steps and weights of difference quotients by order; later ones apply if a bound is near."""
-MOST_STARTS = 100_000
+MOST_SEARCHES = 100_000
 """Most searches; a larger number is a typing error."""
 
 
@@ -38,17 +38,17 @@ class Parameter:
     key : str
         Key in the case file: "sheet.length_scale_ratio", "damping.alpha",
         "model.fold_law.theta1" (degrees, as there), "loads[0].force[2]".
-    start : float, optional
-        Value to start from; by default the case file's.
+    guess : float, optional
+        Value to begin from; by default the case file's.
     lower, upper : float
-        Bounds; none by default. Several starts need both.
+        Bounds; none by default. Several searches need both.
     scale : float, optional
-        A significant change of the value; by default the magnitude of the start or, if that is 0,
+        A significant change of the value; by default the magnitude of the guess or, if that is 0,
         the distance of the bounds.
     """
 
     key: str
-    start: float | None = None
+    guess: float | None = None
     lower: float = -math.inf
     upper: float = math.inf
     scale: float | None = None
@@ -56,7 +56,7 @@ class Parameter:
     def __post_init__(self) -> None:
         """Check the arguments."""
         parts(self.key)
-        missing = {"start": None, "scale": None, "lower": -math.inf, "upper": math.inf}
+        missing = {"guess": None, "scale": None, "lower": -math.inf, "upper": math.inf}
         for name, default in missing.items():
             value, above = getattr(self, name), 0.0 if name == "scale" else None
             if value != default:
@@ -66,9 +66,9 @@ class Parameter:
                 f"{self.key}: lower = {self.lower:g} is not below upper = {self.upper:g}; exchange "
                 "them, or leave one out"
             )
-        if self.start is not None and not self.lower <= self.start <= self.upper:
+        if self.guess is not None and not self.lower <= self.guess <= self.upper:
             raise InputError(
-                f"{self.key}: start = {self.start:g} is outside the bounds {self.lower:g} to "
+                f"{self.key}: guess = {self.guess:g} is outside the bounds {self.lower:g} to "
                 f"{self.upper:g}"
             )
 
@@ -94,7 +94,7 @@ class Space:
     Attributes
     ----------
     parameters : tuple of Parameter
-        With start and scale filled in.
+        With guess and scale filled in.
     ties : tuple of Tie
     """
 
@@ -107,7 +107,7 @@ class Space:
         return tuple(p.key for p in self.parameters)
 
     def column(self, name: str) -> NDArray[np.float64]:
-        """One field, "start", "lower", "upper" or "scale", of all parameters."""
+        """One field, "guess", "lower", "upper" or "scale", of all parameters."""
         return np.array([getattr(p, name) for p in self.parameters], dtype=np.float64)
 
     def changes(self, values: Sequence[float] | NDArray) -> dict[str, float]:
@@ -140,38 +140,38 @@ class Space:
                 found.append(Beside(point, k, weight / step))
         return found
 
-    def starts(self, count: int, seed: int) -> NDArray[np.float64]:
-        """Values to start from, shape (count, p): the given ones, then random ones.
+    def guesses(self, count: int, seed: int) -> NDArray[np.float64]:
+        """Values to begin from, shape (count, p): the given ones, then random ones.
 
         The random ones are a Latin hypercube within the bounds: each parameter's range is cut
-        into as many pieces as there are starts, and each piece is used once.
+        into as many pieces as there are of them, and each piece is used once.
         """
-        whole("starts", count, least=1, most=MOST_STARTS)
+        whole("searches", count, least=1, most=MOST_SEARCHES)
         whole("seed", seed, least=0)
         if count == 1:
-            return self.column("start")[None]
+            return self.column("guess")[None]
         low, high = self.column("lower"), self.column("upper")
         free = [p.key for p in self.parameters if not math.isfinite(p.upper - p.lower)]
         if free:
             raise InputError(
-                f"starts = {count}: random starts are drawn between bounds; give {free[0]} both "
+                f"searches = {count}: random guesses are drawn between bounds; give {free[0]} both "
                 "lower and upper"
             )
         drawn = np.random.default_rng(seed)
         pieces = [drawn.permutation(count - 1) for _ in self.parameters]
         places = (np.array(pieces).T + drawn.random((count - 1, len(pieces)))) / (count - 1)
-        return np.vstack([self.column("start"), low + places * (high - low)])
+        return np.vstack([self.column("guess"), low + places * (high - low)])
 
 
 def space(
     document: Mapping[str, Any], parameters: Sequence[Parameter], ties: Mapping[str, str]
 ) -> Space:
-    """Parameters with starts and scales filled in from the case file, and their ties.
+    """Parameters with guesses and scales filled in from the case file, and their ties.
 
     Raises
     ------
     InputError
-        No parameter; a parameter given twice, without a start or not a number; a tie to something
+        No parameter; a parameter given twice, without a guess or not a number; a tie to something
         that is not a parameter.
     """
     if not parameters:
@@ -185,27 +185,27 @@ def space(
         if keys.count(key) > 1:
             raise InputError(f"{key}: is given twice, as a parameter or as a tie")
     filled = Space(tuple(_filled(p, document) for p in parameters), tied)
-    filled.changes(filled.column("start"))
+    filled.changes(filled.column("guess"))
     return filled
 
 
 def _filled(parameter: Parameter, document: Mapping[str, Any]) -> Parameter:
-    start = parameter.start
-    if start is None:
+    guess = parameter.guess
+    if guess is None:
         given = value_at(document, parameter.key)
         if given is None:
             hint = suggest(parameter.key, number_keys(document))
             raise InputError(
-                f"{parameter.key}: the case file has no value for it; {hint}give start if the key "
+                f"{parameter.key}: the case file has no value for it; {hint}give guess if the key "
                 "is right"
             )
         if isinstance(given, bool) or not isinstance(given, int | float):
             raise InputError(f"{parameter.key} = {show(given)}: is no number that could be fitted")
-        start = float(given)
+        guess = float(given)
     scale = parameter.scale
     if scale is None:
         width = parameter.upper - parameter.lower
-        scale = abs(start) or (width if math.isfinite(width) else 0.0)
+        scale = abs(guess) or (width if math.isfinite(width) else 0.0)
     if scale == 0.0:
-        raise InputError(f"{parameter.key}: starts from 0; give scale, a change of it that matters")
-    return replace(parameter, start=start, scale=scale)
+        raise InputError(f"{parameter.key}: begins from 0; give scale, a change of it that matters")
+    return replace(parameter, guess=guess, scale=scale)
