@@ -98,8 +98,8 @@ DATA: Calls = {
         "change": 0.125, "expansion": 0.5, "curvature": 0.25, "panels": [0], "layers": None,
         "history": None,
     }),
-    "Rayleigh": (fd.Rayleigh, {"alpha": 0.5, "beta": 0.25, "state": "start"}),
-    "ModalDamping": (fd.ModalDamping, {"ratios": 0.5, "count": 3, "state": "start"}),
+    "Rayleigh": (fd.Rayleigh, {"alpha": 0.5, "beta": 0.25, "state": "initial"}),
+    "ModalDamping": (fd.ModalDamping, {"ratios": 0.5, "count": 3, "state": "initial"}),
     "StrainDamping": (fd.StrainDamping, {"beta": 1e-4}),
     "CreaseDamping": (fd.CreaseDamping, {"coefficient": 0.5, "creases": [0]}),
     "PointMass": (fd.PointMass, {"nodes": [0], "mass": 0.5}),
@@ -121,7 +121,9 @@ DATA: Calls = {
     "Ramp": (fd.Ramp, {"duration": 0.5, "smooth": True}),
     "Step": (fd.Step, {"time": 0.5}),
     "Harmonic": (fd.Harmonic, {"frequency": 0.5, "phase": 30.0}),
-    "Chirp": (fd.Chirp, {"start": 0.5, "end": 2.0, "duration": 4.0, "phase": 30.0}),
+    "Chirp": (fd.Chirp, {
+        "from_frequency": 0.5, "to_frequency": 2.0, "duration": 4.0, "phase": 30.0,
+    }),
     "Table": (fd.Table, {"times": [0.0, 0.5, 1.0], "values": [0.0, 1.0, 0.5], "smooth": True}),
     "Function": (fd.Function, {"function": np.sin, "at": [0.5]}),
     "EnhancedLinear": (fd.EnhancedLinear, {
@@ -288,7 +290,7 @@ def solved(folder: Path) -> Calls:
         }),
         "fold": (fd.fold, {
             "pattern": fd.Pattern(POINTS, PANELS, {(1, 2): "V"}), "fraction": 0.5, "angles": None,
-            "steps": 2, "start": "auto", "panels": "whole", "progress": None,
+            "steps": 2, "initial": "auto", "panels": "whole", "progress": None,
         }),
         "critical_step": (fd.critical_step, {"case": case(), "method": "rk4", "u": None}),
         "initial_state": (fd.initial_state, {"result": run, "at": 1}),

@@ -108,7 +108,7 @@ def test_gravity_alone_and_beside_a_force(read, short) -> None:
     alone = read(changed(short, "loads[0] = { gravity = [0, 0, -9.81] }"))
     assert alone.case().loads == (Gravity((0, 0, -9.81)),)
     np.testing.assert_array_equal(alone.output.nodes, [3, 4, 5, 6, 7, 8])  # what can move
-    sweep = '{ kind = "chirp", start = 1, end = 5, duration = 2 }'
+    sweep = '{ kind = "chirp", from_frequency = 1, to_frequency = 5, duration = 2 }'
     both = read(changed(short, f"loads[1] = {{ gravity = [0, 0, -9.81], history = {sweep} }}"))
     assert both.case().loads == (
         Force([7, 6], (1, 0, 0)),

@@ -29,7 +29,7 @@ history = {{ kind = "table", times = [0, 1], values = [0, 1] }}
 [[loads]]
 creases = [0]
 angle = 70
-history = {{ kind = "chirp", start = 1, end = 2, duration = 0.1, phase = 0 }}
+history = {{ kind = "chirp", from_frequency = 1, to_frequency = 2, duration = 0.1, phase = 0 }}
 [initial]
 spin = [0, 0, 0]
 [analysis]

@@ -42,9 +42,9 @@ DASHPOTS = [
 @pytest.mark.parametrize(
     ("damping", "supports"),
     [
-        (fd.Rayleigh(0.1, 0.2, "start"), []),
+        (fd.Rayleigh(0.1, 0.2, "initial"), []),
         (fd.ModalDamping(0.02), []),
-        (fd.ModalDamping(0.02, 3, "start"), [fd.Dashpot(1.0, nodes="xmax")]),
+        (fd.ModalDamping(0.02, 3, "initial"), [fd.Dashpot(1.0, nodes="xmax")]),
         ([fd.Rayleigh(0.1), fd.ModalDamping([0.1, 0.2]), fd.CreaseDamping(1e-3)], DASHPOTS),
         ([fd.Rayleigh(0.1), fd.StrainDamping(1e-4)], []),
         ([fd.CreaseDamping(1e-3, [1, 2]), fd.CreaseDamping(2e-3, "valley")], []),
@@ -69,8 +69,8 @@ EACH = "[{ coefficient = 1e-3, creases = [0] }, { coefficient = 2e-3 }]"
         ("modal = 0.02", fd.ModalDamping(0.02)),
         ("modal = [0.02, 0.03]\nalpha = 0.1", (fd.Rayleigh(0.1), TWO)),
         (
-            'modal = { ratios = 0.02, count = 2, state = "start" }',
-            fd.ModalDamping(0.02, 2, "start"),
+            'modal = { ratios = 0.02, count = 2, state = "initial" }',
+            fd.ModalDamping(0.02, 2, "initial"),
         ),
         ("strain = 1e-4", fd.StrainDamping(1e-4)),
         ("strain = { beta = 1e-4 }\nalpha = 0.1", (fd.Rayleigh(0.1), fd.StrainDamping(1e-4))),
@@ -192,9 +192,9 @@ def test_the_ratios_come_back(seed):
     alpha, beta = random.uniform(0.0, 30.0), random.uniform(0.0, 1e-2)
     f1, f2 = random.uniform(0.1, 50.0, 2)
     z1, z2 = (alpha / (4 * np.pi * f) + beta * np.pi * f for f in (f1, f2))
-    found = fd.Rayleigh.from_ratios(f1, z1, f2, z2, "start")
+    found = fd.Rayleigh.from_ratios(f1, z1, f2, z2, "initial")
     assert (found.alpha, found.beta) == pytest.approx((alpha, beta), rel=1e-9, abs=1e-12)
-    assert found.state == "start"
+    assert found.state == "initial"
 
 
 def test_alone():

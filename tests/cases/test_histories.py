@@ -32,7 +32,7 @@ EXAMPLES = [
     Ramp(duration=2.0),
     Step(time=0.25),
     Harmonic(frequency=2.0, phase=30.0),
-    Chirp(start=0.5, end=3.0, duration=2.0, phase=30.0),
+    Chirp(from_frequency=0.5, to_frequency=3.0, duration=2.0, phase=30.0),
     Table(times=[0.0, 1.0, 3.0], values=[0.0, 2.0, -2.0]),
 ]
 # of others, numbers without a default are 0.7
@@ -117,9 +117,9 @@ def test_values(history, time, factor) -> None:
         (lambda: Ramp(math.nan), "duration = nan: must be a finite number"),
         (lambda: Step(math.inf), "time = inf: must be a finite number"),
         (lambda: Harmonic(0.0), "frequency = 0.0: must be greater than 0"),
-        (lambda: Chirp(-1, 2, 3), "start = -1: must be at least 0"),
-        (lambda: Chirp(1, -2, 3), "end = -2: must be at least 0"),
-        (lambda: Chirp(0, 0, 3), "start or end must be greater than 0"),
+        (lambda: Chirp(-1, 2, 3), "from_frequency = -1: must be at least 0"),
+        (lambda: Chirp(1, -2, 3), "to_frequency = -2: must be at least 0"),
+        (lambda: Chirp(0, 0, 3), "this or from_frequency must be above 0"),
         (lambda: Chirp(1, 2, 0), "duration = 0: must be greater than 0"),
         (lambda: Chirp(1, 2, 3, math.inf), "phase = inf: must be a finite number"),
         (lambda: Table([0, 1], [0, math.nan]), r"values\[1\] = nan: must be a finite number"),
@@ -138,7 +138,7 @@ def test_wrong_arguments(make, text) -> None:
 
 def test_a_chirp_sweeps_from_start_to_end() -> None:
     time = np.linspace(0.0, 10.0, 200_001)[:-1]
-    factor = Chirp(start=1.0, end=9.0, duration=10.0)(time)
+    factor = Chirp(from_frequency=1.0, to_frequency=9.0, duration=10.0)(time)
     # the mean of the frequency times the duration is the number of turns: two zeros in each
     zeros = time[1:][np.diff(np.signbit(factor))]
     assert len(zeros) == pytest.approx(2 * 5.0 * 10.0, abs=1)

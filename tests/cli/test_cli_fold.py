@@ -113,7 +113,7 @@ def test_creases_that_do_not_turn_are_told_and_kept(workplace) -> None:
         ("flap.fold --to 150%", "fraction = 1.5"),
         ("flap.fold --to 50% --out flap.xyz", "--out flap.xyz: name a file that ends"),
         ("flap.fold --to 50% --steps 0", "steps = 0"),
-        ("flap.fold --to 50% --start flat", 'start = "flat"'),
+        ("flap.fold --to 50% --initial flat", 'initial = "flat"'),
         ("flap.fold --angles wrong.txt", "wrong.txt: line 2: 'valley'"),
         ("flap.fold --angles twice.txt", "twice.txt: line 2: mountain is given twice"),
         ("flap.fold --angles empty.txt", "empty.txt: is empty"),

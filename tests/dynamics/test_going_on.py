@@ -17,8 +17,8 @@ S = fd.discretize(
 HELD = [fd.Fix([2, 3, 4, 5])]
 PUSH = fd.Force([0, 1], (0, 0, 3.0))
 OMEGA = 2.0 * np.pi * float(fd.modes(fd.Case(S, HELD), 1).frequency[0])
-STIFF = fd.Rayleigh(beta=0.1 / OMEGA, state="start")
-MODAL = fd.ModalDamping(0.1, state="start")
+STIFF = fd.Rayleigh(beta=0.1 / OMEGA, state="initial")
+MODAL = fd.ModalDamping(0.1, state="initial")
 WATER = fd.Air(density=40.0, resolution=2)
 UP, DOWN = (fd.Case(S, HELD, [fd.Force([0, 1], (0, 0, f))]) for f in (20.0, -15.0))
 BENT, DROPPED = (fd.trace(each, "newton").displacement.values[-1] for each in (UP, DOWN))

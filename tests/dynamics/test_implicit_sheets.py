@@ -129,7 +129,7 @@ def test_damping_by_the_stiffness_at_the_start(method):
     omega = np.sqrt(own / MASS)
     force = stiffness * stretch * (1.0 + cubic * (stretch / LENGTH) ** 2)
     free, start = oscillator(duffing_law(cubic), stiffness), released(stretch + 1e-5)
-    for state, damper in (("start", own), ("rest", stiffness)):
+    for state, damper in (("initial", own), ("rest", stiffness)):
         case = pulled(free.altered(damping=fd.Rayleigh(beta=beta, state=state)), force)
         motion = fd.simulate(case, 0.8, method=method, dt=5e-4, initial=start)
         exact = damped(motion.time.values, omega, 0.5 * beta * damper / MASS / omega)
@@ -138,11 +138,11 @@ def test_damping_by_the_stiffness_at_the_start(method):
 
 def test_damping_that_drives_is_told():
     """A folded sheet pulled against its locked folds is stable; one pushed in buckles."""
-    damping = fd.Rayleigh(beta=1e-3, state="start")
+    damping = fd.Rayleigh(beta=1e-3, state="initial")
     case = oscillator(duffing_law(-40.0), 8.0).altered(damping=damping)
     with pytest.warns(FoldynWarning, match="drives 1 motion instead of damping it"):
         fd.simulate(case, 0.01, method="newmark", dt=1e-3, initial=released(0.5))
-    stable = fd.Case(cell(), CELL_HELD, [], fd.Rayleigh(beta=1e-5, state="start"))
+    stable = fd.Case(cell(), CELL_HELD, [], fd.Rayleigh(beta=1e-5, state="initial"))
     with warnings.catch_warnings():
         warnings.simplefilter("error", FoldynWarning)
         fd.simulate(stable, 0.01, method="newmark", dt=1e-3)

@@ -131,9 +131,9 @@ def test_free_bodies_keep_their_momenta():
 def test_an_unstable_state_is_refused():
     """About a state of compression modes have no frequency."""
     s = fold(170, fd.Sheet(1e4, 0.25, 0.01, 1.0), fold_law="linear", bend_law="linear")
-    case = fd.Case(s, [fd.Fix([0, 1])], damping=fd.ModalDamping(0.1, 2, "start"))
+    case = fd.Case(s, [fd.Fix([0, 1])], damping=fd.ModalDamping(0.1, 2, "initial"))
     u = -0.3 * ~case.fixed * [1.0, 0.0, 0.0]
-    with pytest.raises(fd.errors.InputError, match='the state "start" is unstable'):
+    with pytest.raises(fd.errors.InputError, match='the state "initial" is unstable'):
         fd.simulate(case, 0.1, method="rk4", initial=fd.State(u))
 
 
@@ -148,6 +148,6 @@ def test_modes_are_computed_once(method, monkeypatch):
 
     monkeypatch.setattr(modal_damping, "rows_of", counted)
     prepare(
-        sheet("bars", damping=fd.ModalDamping(RATIOS, state="start")), 0.1, method, interval=0.01
+        sheet("bars", damping=fd.ModalDamping(RATIOS, state="initial")), 0.1, method, interval=0.01
     )
     assert len(seen) == 1

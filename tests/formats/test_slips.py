@@ -71,7 +71,7 @@ def test_frequencies_of_a_mended_sheet_are_those_without_slips(tmp_path):
     sheet = fd.Sheet(2e9, 0.3, 2e-4, density=900)
     found = []
     for pattern in (SHEET, mended):
-        folded = fd.fold(pattern, fraction=0.4, steps=2, start="pattern").pattern
+        folded = fd.fold(pattern, fraction=0.4, steps=2, initial="pattern").pattern
         structure = fd.discretize(folded.moved(-folded.vertices.min(axis=0)), sheet)
         found.append(fd.modes(fd.Case(structure, [fd.Fix("x < 0.002")]), 4).frequency.values)
     np.testing.assert_allclose(found[1], found[0], rtol=0.02)
@@ -98,7 +98,7 @@ def test_exact_and_other_patterns_are_not_doubted(tmp_path):
 def test_folded_patterns_cannot_be_mended(tmp_path):
     off = built(drawn(*by_hand(SHEET, 3e-5))).pattern
     pair, letter = tuple(off.creases[0].tolist()), off.assignments[0]
-    folded = fd.fold(off, {pair: 30 if letter == "V" else -30}, steps=1, start="pattern").pattern
+    folded = fd.fold(off, {pair: 30 if letter == "V" else -30}, steps=1, initial="pattern").pattern
     write_pattern(folded, tmp_path / "x.fold")
     (doubt,) = diagnose(tmp_path / "x.fold").diagnosis.doubts
     assert "fold it anew from its flat drawing, read with flat_foldable = true" in doubt

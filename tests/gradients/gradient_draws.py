@@ -108,7 +108,7 @@ def _design(rng: Any, model: Any, kind: str) -> tuple[Callable[..., fd.Case], di
     far, beside = (8, [2, 5]) if miura else (5, [4])
     moves = kind in ("statics", "dynamics") and rng.random() < 0.4
     history = fd.HalfSine(3.0) if kind == "dynamics" else fd.Step()
-    state = str(rng.choice(["rest", "start"]))
+    state = str(rng.choice(["rest", "initial"]))
     stiff = 10.0 ** rng.uniform(-2.0, 0.0)
     values: dict[str, Any] = {
         "youngs": 1e6 * rng.uniform(0.5, 2.0),

@@ -43,7 +43,7 @@ CASES = {
     "shaken": (case, BASIC, SHAKE),
     "membranes": (partial(case, membrane="panel"), BASIC, SHAKE),
     "loaded": (case, BASIC | {"force": 12.0}, LOADED),
-    "damped there": (partial(case, state="start"), BASIC | {"force": 12.0}, LOADED),
+    "damped there": (partial(case, state="initial"), BASIC | {"force": 12.0}, LOADED),
     "plates": (partial(case, model="n5b8e"), BASIC, PUSH),
     "shell": (partial(case, model="shell"), BASIC, SHAKE),
 }

@@ -25,9 +25,9 @@ Kind = tuple[Any, tuple[Any, ...], Any]  # damping, further supports, law of the
 KINDS: dict[str, Kind] = {
     "drag": (fd.Rayleigh(2.0 * RATIO * OMEGA), (), "linear"),
     "stiffness at rest": (fd.Rayleigh(beta=BETA / 4e4), (), "linear"),  # of panels that have turned
-    "stiffness at the start": (fd.Rayleigh(beta=BETA, state="start"), (), "linear"),
+    "stiffness at the start": (fd.Rayleigh(beta=BETA, state="initial"), (), "linear"),
     "modes at rest": (fd.ModalDamping([RATIO, 0.02]), (), "linear"),
-    "modes at the start": (fd.ModalDamping(RATIO, state="start"), (), "linear"),
+    "modes at the start": (fd.ModalDamping(RATIO, state="initial"), (), "linear"),
     "creases": (fd.CreaseDamping(2.0), (), "linear"),
     "strain rates": (fd.StrainDamping(BETA), (), "linear"),
     "dashpot to the ground": ((), (fd.Dashpot(0.6, nodes=[0, 1], direction="z"),), "linear"),

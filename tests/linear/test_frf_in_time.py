@@ -208,7 +208,7 @@ def test_folds_turned_part_of_the_way():
 def test_damping_of_the_state():
     """K0 in the state about which it moves, also where steps of a sine start elsewhere."""
     loaded = miura_case([fd.Force([7], (0.004, 0, 0))])
-    case = loaded.altered(damping=fd.Rayleigh(2.0, 1e-3, state="start"))
+    case = loaded.altered(damping=fd.Rayleigh(2.0, 1e-3, state="initial"))
     direct = struck(case)
     at_rest = loaded.altered(damping=fd.Rayleigh(2.0, 1e-3))
     other = frf(at_rest, LIFT, frequencies=STATES, state="equilibrium")

@@ -286,7 +286,7 @@ def test_rigid_panels_have_none():
 # ---------------------------------------------------------------------------- responses
 
 
-DAMPED = [fd.Rayleigh(0.02, 1e-4), fd.ModalDamping(0.02), fd.ModalDamping(0.02, state="start")]
+DAMPED = [fd.Rayleigh(0.02, 1e-4), fd.ModalDamping(0.02), fd.ModalDamping(0.02, state="initial")]
 
 
 @pytest.mark.parametrize("damping", DAMPED)

@@ -66,7 +66,7 @@ def test_damping_takes_the_stiffness_at_rest_unless_told_otherwise():
     pressed = fd.Case(s, [fd.Fix([0, 1, 2, 3, 4], "xyz"), fd.Impose([20, 24], "x", -0.2)])
     state = fd.initial_state(fd.trace(pressed, load_factors=[1.0]))
     free = pressed.free_dofs
-    for where, u in (("rest", np.zeros_like(s.nodes)), ("start", state.displacement)):
+    for where, u in (("rest", np.zeros_like(s.nodes)), ("initial", state.displacement)):
         damped = replace(pressed, damping=fd.Rayleigh(0.0, 0.5, state=where))
         expected = 0.5 * flat(s.tangent(u))[np.ix_(free, free)]
         np.testing.assert_allclose(flat(linearize(damped, state).damping), expected, rtol=1e-15)

@@ -166,7 +166,7 @@ def test_a_base_moves_the_sheet_against_the_air(sheet):
 
 
 def test_modal_damping_has_its_ratios_in_air(sheet):
-    for state in ("rest", "start"):
+    for state in ("rest", "initial"):
         damped = sheet.altered(damping=fd.ModalDamping([0.02, 0.03], state=state))
         ratios = fd.modes(damped, 2).damping_ratio.values
         np.testing.assert_allclose(ratios, [0.02, 0.03], rtol=1e-9)

@@ -47,7 +47,7 @@ def test_kawasaki_holds_at_the_nearest_vertices(drawn, part):
 
 def test_panels_stay_plane_where_they_were_to():
     mended = flat_foldable(slipped(flat_miura(), 2e-5, seed=3))
-    folding = fd.fold(mended, fraction=0.4, steps=1, start="pattern")
+    folding = fd.fold(mended, fraction=0.4, steps=1, initial="pattern")
     assert folding.kind == "rigid" and not len(folding.pattern.welds)
 
 

@@ -19,9 +19,9 @@ DAMPINGS = {
     "all modes": [fd.ModalDamping(0.04)],
     "one mode": [fd.ModalDamping(0.04, count=1)],
     "ratios of two, and drag": [fd.ModalDamping([0.04, 0.02]), fd.Rayleigh(0.05 * W1)],
-    "modes at the start": [fd.ModalDamping(0.04, state="start")],
+    "modes at the start": [fd.ModalDamping(0.04, state="initial")],
     "stiffness at rest": [fd.Rayleigh(beta=BETA)],
-    "stiffness at the start": [fd.Rayleigh(beta=BETA, state="start")],
+    "stiffness at the start": [fd.Rayleigh(beta=BETA, state="initial")],
 }
 
 

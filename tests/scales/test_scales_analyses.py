@@ -51,7 +51,7 @@ MOTIONS = {
     **{m: lambda by, m=m: simulated(fold, by, m) for m in (*EXPLICIT, *IMPLICIT)},
     "steps of dt": lambda by: simulated(fold, by, "newmark", dt=1 / 250),
     "stiffness damps": lambda by: simulated(fold, by, "generalized_alpha", beta=0.01),
-    "damped at the start": lambda by: simulated(fold, by, "newmark", beta=0.01, state="start"),
+    "damped at the start": lambda by: simulated(fold, by, "newmark", beta=0.01, state="initial"),
     "shell": lambda by: simulated(shell, by, "auto", beta=0.01),
     "shell newmark": lambda by: simulated(shell, by, "newmark"),
     "gravity": lambda by: simulated_miura(

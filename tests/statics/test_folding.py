@@ -221,14 +221,14 @@ def test_the_odd_crease_of_a_vertex_must_be_beside_its_smallest_sector(letters, 
 
 def test_a_state_that_rotations_close_is_opened():
     pattern = vertex([40, 100, 140, 80], "MVVV")
-    folding = fd.fold(pattern, fraction=0.7, steps=6, start="folded")
+    folding = fd.fold(pattern, fraction=0.7, steps=6, initial="folded")
     assert folding.started_from == "folded" and not folding.wrong
     np.testing.assert_allclose(np.abs(folding.path["fold_angle"].values[0]), math.pi, atol=1e-9)
     assert folding.rigid_path
-    unfolded = fd.fold(pattern, fraction=0.7, steps=6, start="pattern")  # the other way
+    unfolded = fd.fold(pattern, fraction=0.7, steps=6, initial="pattern")  # the other way
     np.testing.assert_allclose(folding.angles, unfolded.angles, atol=1e-6)
-    with pytest.raises(InputError, match='start = "folded": the panels do not close'):
-        fd.fold(vertex([80, 90, 90, 100], "VVVM"), fraction=0.9, start="folded")
+    with pytest.raises(InputError, match='initial = "folded": the panels do not close'):
+        fd.fold(vertex([80, 90, 90, 100], "VVVM"), fraction=0.9, initial="folded")
 
 
 @pytest.mark.filterwarnings("ignore:panels pass through")
@@ -240,7 +240,7 @@ def test_a_state_that_stays_closed_is_not_taken_where_less_was_asked():
     assert folding.started_from == "pattern" and folding.wrong
     assert np.degrees(np.abs(folding.angles)).max() < 150.0
     with pytest.warns(FoldynWarning, match=r"4 creases stay closed that were to open: creases 0 "):
-        folding = fd.fold(pattern, fraction=0.6, steps=4, start="folded")
+        folding = fd.fold(pattern, fraction=0.6, steps=4, initial="folded")
     assert np.degrees(np.abs(folding.angles)).min() > 175.0
 
 
@@ -308,7 +308,7 @@ def test_an_interrupted_folding_has_the_steps_that_are_done():
         ({"angles": {(0, 2): [30]}}, "give one number"),
         ({"angles": fd.patterns.miura()}, "angles: has other creases"),
         ({"angles": 30, "steps": 0}, "steps = 0"),
-        ({"angles": 30, "start": "flat"}, 'start = "flat"'),
+        ({"angles": 30, "initial": "flat"}, 'initial = "flat"'),
     ],
 )
 def test_wrong_arguments_are_refused(arguments, message):

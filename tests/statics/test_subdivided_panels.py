@@ -68,7 +68,7 @@ def test_letters_that_plane_panels_forbid_fold_by_bending():
 @pytest.mark.filterwarnings("ignore:.* creases stay closed")
 def test_a_crane_opens_from_its_folded_state_with_every_crease_its_way():
     flat = fd.read_pattern(CRANE)
-    folding = fd.fold(flat, fraction=0.9, start="folded", steps=2, panels="subdivided")
+    folding = fd.fold(flat, fraction=0.9, initial="folded", steps=2, panels="subdivided")
     assert len(folding.angles) == 186 and not folding.wrong
     turned = np.degrees(np.abs(folding.angles))
     assert turned.min() > 150.0 and turned.max() < 180.0

@@ -388,7 +388,7 @@ class Damped(Supported):
     @property
     def damped_at_start(self) -> bool:
         """See the class."""
-        return any(getattr(part, "state", "rest") == "start" for part in self.dampings)
+        return any(getattr(part, "state", "rest") == "initial" for part in self.dampings)
 
     @property
     def damped(self) -> bool:

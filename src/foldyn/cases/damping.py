@@ -21,7 +21,7 @@ from foldyn.json_schema import Schema, any_of
 from foldyn.tables import ListOf, Section, read, schema_of
 from foldyn.values import choice, number, number_or_list, numbers, show, whole
 
-STATES = ("rest", "start")
+STATES = ("rest", "initial")
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Rayleigh(Part):
         Mass-proportional coefficient (1/s), at least 0.
     beta : float
         Stiffness-proportional coefficient (s), at least 0.
-    state : {"rest", "start"}
+    state : {"rest", "initial"}
         Where K0 is taken: at the structure's rest, or where a motion starts (for modes and
         frequency responses: the state about which it vibrates).
     """
@@ -64,7 +64,7 @@ class Rayleigh(Part):
             Frequencies (Hz), positive and different.
         z1, z2 : float
             Damping ratios there, at least 0 (0.02 is 2 %).
-        state : {"rest", "start"}
+        state : {"rest", "initial"}
             See `Rayleigh`.
 
         Raises
@@ -124,7 +124,7 @@ class ModalDamping(Part):
         Damping ratio (0.02 is 2 %, at least 0) of `count` modes, or of each from the lowest on.
     count : int, optional
         How many of the lowest modes have the ratio, if it is one number; all by default.
-    state : {"rest", "start"}
+    state : {"rest", "initial"}
         Whose modes: at the structure's rest, or where a motion starts (for modes and frequency
         responses: those of the state about which it vibrates).
     """

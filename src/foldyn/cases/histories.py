@@ -217,14 +217,15 @@ def chirp(t, start, slope, phase, duration):
 
 @dataclass(frozen=True)
 class Chirp(Formula):
-    """Factor sin(2 pi (start t + (end - start) t^2 / (2 duration)) + phase), 0 <= t < duration.
+    """Factor sin(2 pi (f0 t + (f1 - f0) t^2 / (2 duration)) + phase), 0 <= t < duration.
 
-    The frequency goes from `start` to `end` in a straight line; before and after, the factor is 0.
+    The frequency goes from one to the other in a straight line; before and after, the factor is 0.
 
     Parameters
     ----------
-    start, end : float
-        Frequency (Hz) at t = 0 and at t = duration, at least 0, not both 0; `end` may be the lower.
+    from_frequency, to_frequency : float
+        Frequencies f0 at t = 0 and f1 at t = duration (Hz), at least 0, not both 0; either may be
+        the lower.
     duration : float
         Length of the sweep (s), greater than 0.
     phase : float
@@ -232,13 +233,13 @@ class Chirp(Formula):
 
     Examples
     --------
-    >>> sweep = Chirp(start=0.0, end=2.0, duration=1.0)
+    >>> sweep = Chirp(from_frequency=0.0, to_frequency=2.0, duration=1.0)
     >>> sweep([0.0, 0.5, 1.0]).round(12)
     array([0., 1., 0.])
     """
 
-    start: Annotated[float, Check(number, least=0.0, unit="Hz")]
-    end: Annotated[float, Check(number, least=0.0, unit="Hz")]
+    from_frequency: Annotated[float, Check(number, least=0.0, unit="Hz")]
+    to_frequency: Annotated[float, Check(number, least=0.0, unit="Hz")]
     duration: Annotated[float, Check(number, above=0.0, unit="s")]
     phase: Annotated[float, Check(number, unit="degrees")] = 0.0
     kind: ClassVar[str] = "chirp"
@@ -246,13 +247,13 @@ class Chirp(Formula):
 
     def agree(self) -> None:
         """Refuse what does not swing."""
-        if self.start == self.end == 0.0:
-            raise InputError(f" = {self.end}: start or end must be greater than 0", "end")
+        if self.from_frequency == self.to_frequency == 0.0:
+            raise InputError(" = 0.0: this or from_frequency must be above 0", "to_frequency")
 
     def parameters(self) -> tuple[float, ...]:
         """See `History.parameters`."""
-        slope = (self.end - self.start) / self.duration
-        return self.start, slope, math.radians(self.phase), self.duration
+        slope = (self.to_frequency - self.from_frequency) / self.duration
+        return self.from_frequency, slope, math.radians(self.phase), self.duration
 
     def jumps(self) -> tuple[float, ...]:
         """See `History.jumps`."""

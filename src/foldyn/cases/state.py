@@ -38,7 +38,7 @@ class Origin:
     Parameters
     ----------
     displacement : ndarray, shape (n, 3)
-        There, m: that about which damping has its `state = "start"`.
+        There, m: that about which damping has its `state = "initial"`.
     time : float, optional
         When (s), for the rest angles there; without it those of the constant loads alone.
     flow : ndarray, shape (n, 3), optional
@@ -93,7 +93,7 @@ class State(Checked):
         from the result. It serves the same method where the state and the forces are those of the
         end; otherwise the motion starts as without it.
     origin : Origin, optional
-        Where the motion began that goes on here: damping with ``state = "start"`` and added mass
+        Where the motion began that goes on here: damping with ``state = "initial"`` and added mass
         stay what they were. `initial_state` takes it from the result; without it the motion begins
         in the state itself.
     """

@@ -52,7 +52,7 @@ def add_fold(commands: Any) -> None:
     )
     command.add_argument("--steps", type=integer, default=20, help="states on the way (20)")
     command.add_argument(
-        "--start",
+        "--initial",
         default="auto",
         help="pattern, folded (open from the folded state), or auto (default): folded where the "
         "pattern does not fold its way",
@@ -62,7 +62,7 @@ def add_fold(commands: Any) -> None:
         default="whole",
         help="subdivided: cut from their middles, so that they bend as paper does (default: whole)",
     )
-    add_reading(command, "number or title of the frame to start from")
+    add_reading(command, "number or title of the frame to begin with")
     command.add_argument(
         "--out",
         help="file to write (default: NAME-folded.fold): the folded pattern, or as a result (.nc) "
@@ -133,7 +133,7 @@ def _folded(pattern: Pattern, source: Path, given: Namespace) -> Folding:
             bar.update()
 
         return fold(
-            pattern, angles, fraction=given.to, steps=given.steps, start=given.start,
+            pattern, angles, fraction=given.to, steps=given.steps, initial=given.initial,
             panels=given.panels, progress=tell,
         )  # fmt: skip
 

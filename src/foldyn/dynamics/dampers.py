@@ -31,7 +31,7 @@ def damping_terms(case: Case, start: Origin | None, modal: ModalRows) -> list[Te
     """All damping terms of a motion that began at `start`, or at rest; `modal`: modal damping."""
     terms, rayleigh = dampers(case), case.rayleigh
     if rayleigh.beta > 0.0:
-        state, body = about(case, start if rayleigh.state == "start" else None)
+        state, body = about(case, start if rayleigh.state == "initial" else None)
         terms.insert(0, DampingMatrix(_tangent(body, body.dofs(state)) * rayleigh.beta))
     modal.warn()
     return [*terms, DampingRows(modal.rows)] if len(modal.rows) else terms

@@ -154,7 +154,7 @@ def simulate(
     -----
     Histories are evaluated at every stage time t_n + c dt with t_n = start + n dt. The damping
     matrices, alpha M + beta K0 and modal damping, are constant: K0 and the modes are taken at rest
-    or, with the damping's state = "start", in the state where the motion began: the initial
+    or, with the damping's state = "initial", in the state where the motion began: the initial
     displacement or, if `initial` is a sample of a motion, the start of that motion. Dashpots
     between nodes and damped creases follow the motion.
     """

@@ -42,7 +42,7 @@ def initial_state(result: Any, at: int = -1) -> State:
     Parameters
     ----------
     result : xarray.Dataset
-        A trajectory or a path. Damping with ``state = "start"`` and added mass keep their values
+        A trajectory or a path. Damping with ``state = "initial"`` and added mass keep their values
         from the trajectory; a plain `State` of its displacement and velocity resets them.
     at : int, default -1
         Number of the sample; negative ones count from the end.
@@ -189,7 +189,7 @@ def check_steady(case: Case, start: float, end: float) -> None:
 
 def warn_of_unstable_damping(case: Case, start: Origin) -> None:
     """Warn if damping follows the stiffness of a start where it is not positive definite."""
-    if case.rayleigh.beta == 0.0 or case.rayleigh.state != "start":
+    if case.rayleigh.beta == 0.0 or case.rayleigh.state != "initial":
         return
     free = np.asarray(case.free_dofs)
     place, body = about(case, start)
@@ -203,7 +203,7 @@ def warn_of_unstable_damping(case: Case, start: Origin) -> None:
         return
     if negative:
         warn(
-            f'damping: with state = "start" beta K0 drives {negative} '
+            f'damping: with state = "initial" beta K0 drives {negative} '
             f"motion{'s' if negative > 1 else ''} instead of damping "
             f"{'them' if negative > 1 else 'it'}: the stiffness is not positive where the motion "
             'starts; take state = "rest", or start from a stable state',

@@ -106,12 +106,12 @@ def modal_rows(case: Case, start: Origin | None = None) -> ModalRows:
     damping = case.modal_damping
     if damping is None:
         return ModalRows(np.zeros((0, case.elastic_body.size)), 0.0, 0)
-    state, body = about(case, start if damping.state == "start" else None)
+    state, body = about(case, start if damping.state == "initial" else None)
     q = body.dofs(state)
     change, soft = soft_slopes(case, body, q)
     stiffness = body.tangent(q) if change is None else sparse.csr_array(body.tangent(q) + change)
     loads = joined((part, k) for k, (part, _) in enumerate(case.following_terms))
-    if loads.acts and start is not None and damping.state == "start":
+    if loads.acts and start is not None and damping.state == "initial":
         factors = np.zeros((len(case.following_terms), 3))
         factors[:, 0] = [factor(history, start.time) for _, history in case.following_terms]
         pushed = following_tangent(loads, q, factors)

@@ -64,7 +64,7 @@ def turned(
     nodes, tri = case.structure.nodes, case.structure.triangles
     modal = case.modal_damping
     states = {case.rayleigh.state if case.rayleigh.beta else "", modal.state if modal else ""}
-    there = start if "start" in states else np.zeros_like(start)
+    there = start if "initial" in states else np.zeros_like(start)
     before, area = _frames((nodes + there)[tri])
     turn = _frames((nodes + displacement)[:, tri])[0] @ np.swapaxes(before, -1, -2)
     angle = np.arccos(np.clip(0.5 * (np.trace(turn, axis1=-2, axis2=-1) - 1.0), -1.0, 1.0))

@@ -365,7 +365,7 @@ def _modal_rows(
 ) -> NDArray:
     """Rows (r, m) of modal damping: from the modes in the state (n, 3), or at rest."""
     damping = case.modal_damping
-    if damping is not None and damping.state == "start":
+    if damping is not None and damping.state == "initial":
         modal = rows_of(damping, case, stiffness, mass, state)
     elif damping is None or not internal:
         modal = modal_rows(case)

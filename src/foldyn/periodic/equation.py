@@ -38,7 +38,7 @@ class Equation:
     driven : bool
         False leaves out all varying terms, and the damping.
     origin : Origin, optional
-        State of damping with ``state = "start"``; rest by default.
+        State of damping with ``state = "initial"``; rest by default.
 
     Attributes
     ----------

@@ -70,7 +70,7 @@ def periodic_motion(
     guess : State or xarray.Dataset, optional
         Start of the search: small motions about a state, or a result of `periodic_motion` or a
         point of a `response_curve`. By default the equilibrium under the constant loads. Damping
-        with ``state = "start"`` is taken about this state, or continued from a result.
+        with ``state = "initial"`` is taken about this state, or continued from a result.
     periods : int
         Periods of the drive in one period of the motion: 2 after a period doubling.
     modes : int, optional

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 MOST_SHOWN = 8  # creases listed in a message
 SHUT = 1e-3  # rad from 180 degrees within which a crease counts as closed
 CRUMPLED = 0.1  # strain beyond which a state is the last choice
-STARTS = ("auto", "pattern", "folded")
+INITIALS = ("auto", "pattern", "folded")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -191,7 +191,7 @@ def fold(
     *,
     fraction: float | str | None = None,
     steps: int = 20,
-    start: Literal["auto", "pattern", "folded"] = "auto",
+    initial: Literal["auto", "pattern", "folded"] = "auto",
     panels: Literal["whole", "subdivided"] = "whole",
     progress: Callable[[int, int], None] | None = None,
 ) -> Folding:
@@ -219,7 +219,7 @@ def fold(
         valleys without one. Without either the pattern is folded to its own fold angles.
     steps : int
         States on the way, 1 to 1000.
-    start : {"auto", "pattern", "folded"}
+    initial : {"auto", "pattern", "folded"}
         Where the path begins. "folded" takes the state found by rotating the panels by the full
         angles, if it closes, and opens it to the angles wanted. "auto" folds the pattern as given,
         and if creases turn the wrong way also tries the folded state: this is taken if all creases
@@ -275,7 +275,7 @@ def fold(
     if not len(pattern.creases):
         raise InputError(": has no creases to fold", "pattern")
     steps = whole("steps", steps, least=1, most=1000)
-    choice("start", start, STARTS)
+    choice("initial", initial, INITIALS)
     choice("panels", panels, tuple(BENDING))
     targets = fold_targets(pattern, angles, fraction)
     if panels == "subdivided":
@@ -289,7 +289,7 @@ def fold(
             progress(step, steps)
 
     try:
-        way = _best_way(pattern, energy, BENDING[panels], targets, steps, start, tell)
+        way = _best_way(pattern, energy, BENDING[panels], targets, steps, initial, tell)
     except WayInterrupted as stop:
         done = len(stop.way.shapes) - 1
         partial = _result(pattern, energy, stop.way, targets) if done else None
@@ -302,7 +302,7 @@ def fold(
 
 def _best_way(
     pattern: Pattern, energy: FoldEnergy, bending: Bending, targets: NDArray,
-    steps: int, start: str, tell: Callable[[int], None],
+    steps: int, initial: str, tell: Callable[[int], None],
 ) -> Way:  # fmt: skip
     """The best way: fewest creases turned wrong, then no strain, then closest to the targets.
 
@@ -314,13 +314,13 @@ def _best_way(
         return strain > CRUMPLED, wrong, strain > ISOMETRIC, _off(energy, way, targets)
 
     best = None
-    if start != "folded":
+    if initial != "folded":
         stiffest, *others = bending.folding
         best = from_pattern(energy, stiffest, targets, steps, tell)
         for softer in others:
             if any(cost(best)[:3]) or _bend(energy, best) > SLIGHT:
                 best = min(best, from_pattern(energy, softer, targets, steps, tell), key=cost)
-        if start == "pattern" or not any(cost(best)[:3]):
+        if initial == "pattern" or not any(cost(best)[:3]):
             return best
     way = from_folded(energy, bending.opening, pattern, full_angles(pattern), targets, steps, tell)
     if best is not None:
@@ -333,7 +333,7 @@ def _best_way(
         raise InputError(
             ' = "folded": the panels do not close when they are rotated by the full angles about '
             'the creases, or the pattern is not flat; take "pattern"',
-            "start",
+            "initial",
         )
     return way
 

@@ -88,7 +88,7 @@ def response(
         Other arguments of `frf`.
     """
     name = "frf-published" if published else "frf"
-    damping = replace(damping, state="start" if published else "rest")
+    damping = replace(damping, state="initial" if published else "rest")
     return Response.of(specimen(name, damping, IN_AIR if air else None).run(mass, **changes))
 
 
