@@ -71,7 +71,7 @@ def test_accelerations_are_those_of_the_mass_with_the_inertia_of_contacts(mass):
     course = Course(u, np.zeros_like(u), np.zeros_like(u), np.zeros(1, TALLY)[0], np.zeros(0))
     work, own = body.workspaces(1)[0], scratch(system)
     equation = EquationOfMotion(packed, work, own, course, True)
-    slow = slow_contacts(packed, work, own, equation.balance.value)
+    slow = slow_contacts(packed, work, equation.case.value)
     assert slow is not None
     slow_down(Context(slow.value._replace(added=added)), w, a)
     nodal = packed.mass

@@ -35,7 +35,7 @@ from foldyn.cases.added_mass import Fluid, fluid_at
 from foldyn.dynamics.inertia import Inertia, kinetic_energy, substitute, times_mass
 from foldyn.errors import InputError
 from foldyn.jit.compiled import addressed, inner, kernel
-from foldyn.jit.context import rows_at
+from foldyn.jit.context import numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.air.added_mass import inverse
 from foldyn.mechanics.term import ADDRESS
@@ -371,14 +371,14 @@ def move(own, mass, jump, out, line):
 
 
 # ------------------------------------------------------------------ parts of the equation of motion
-@addressed(ADDRESS, ADDRESS)
-def turn_flow(m, u, v):
+@addressed(ADDRESS, ADDRESS, ADDRESS)
+def turn_flow(m, u, v, powers):
     """Add the forces, N, that turning area vectors need, and the drag alpha M v.
 
-    Also what an air takes that accelerates. Returns the power of the drag, W. The fluid has none
-    but what it takes from the wind.
+    Also what an air takes that accelerates. Sets the second and third of the powers (3,) to those
+    of the drag and of the wind, W; the fluid has no others.
     """
-    own, rows, power = m.added, m.s.force.shape[0], 0.0
+    own, rows, power, air = m.added, m.s.force.shape[0], 0.0, 0.0
     moved, speed, past, pushed = rows_at(u, rows), rows_at(v, rows), own.nodal[0], own.nodal[1]
     w, q, turned, driven = own.lines[0], own.lines[1], own.lines[2], own.lines[3]
     if own.gust >= 0:
@@ -399,7 +399,7 @@ def turn_flow(m, u, v):
     flux(own, own.area, past, w)
     times(own.flow, w, q)
     if own.gust >= 0:
-        m.terms.powers[2] -= dot(q, driven)
+        air -= dot(q, driven)
     add_push(own, own.rate, q, m.s.force)
     one, other, pressed, back = own.vectors[0], own.vectors[1], own.vectors[2], own.vectors[3]
     for t in range(own.triangles.shape[0]):  # q . B (v - U) is a sum of area . pressed
@@ -425,7 +425,8 @@ def turn_flow(m, u, v):
                 drag = m.system.alpha * m.s.product[i, c]
                 m.s.force[i, c] += drag
                 power += drag * speed[i, c]
-    return power
+    found = numbers_at(powers, 3)
+    found[1], found[2] = power, air
 
 
 @addressed(ADDRESS)

@@ -50,15 +50,15 @@ def growth(omega, damping, dt):
 
 
 @shared
-def advance(equation, course, plan, room, stretch):
+def advance(handle, course, plan, room, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
     `course.carry` is the acceleration, kept from one step and stretch to the next; the tally keeps
     powers and energies. Each thread of a team advances its own nodes.
     """
     course = borrowed(course)
-    team, stage, a, powers = equation.team, equation.stage, course.carry, equation.before
-    low, high = 3 * equation.own[0], 3 * equation.own[1]
+    team, stage, a, powers = handle.team, handle.stage, course.carry, handle.before
+    low, high = 3 * handle.own[0], 3 * handle.own[1]
     u, v = flat(course.u)[low:high], flat(course.v)[low:high]
     fa, ahead = flat(a)[low:high], flat(stage[0])[low:high]
     begun = course.tally.steps
@@ -71,7 +71,7 @@ def advance(equation, course, plan, room, stretch):
         while True:  # one pass, unless contact asks for shorter steps
             dt = 0.0
             if step > 0:
-                dt = longest_step(equation, course.u, course.v, a, left, RESOLVED)
+                dt = longest_step(handle, course.u, course.v, a, left, RESOLVED)
                 dt = split_step(dt, left)
             for i in range(u.size):
                 v[i] += 0.5 * dt * fa[i]
@@ -79,21 +79,21 @@ def advance(equation, course, plan, room, stretch):
                 ahead[i] = v[i] + 0.5 * dt * fa[i]
             left = 0.0 if dt == left else left - dt
             now = plan.start + step * plan.dt - left
-            advance_clock(equation, span - left)
-            power_in, power_out = acceleration(equation, course.u, stage[0], now, a)
+            advance_clock(handle, span - left)
+            new = acceleration(handle, course.u, stage[0], now, a)
             for i in range(u.size):
                 v[i] += 0.5 * dt * fa[i]  # the kick that ends the step
                 wrong += not abs(v[i]) < np.inf
-            work_in += 0.5 * dt * (powers[0] + power_in)
-            work_out += 0.5 * dt * (powers[1] + power_out)
-            work_air += 0.5 * dt * (powers[2] + equation.powers[2])
-            powers[0], powers[1], powers[2] = power_in, power_out, equation.powers[2]
+            work_in += 0.5 * dt * (powers[0] + new[0])
+            work_out += 0.5 * dt * (powers[1] + new[1])
+            work_air += 0.5 * dt * (powers[2] + new[2])
+            powers[0], powers[1], powers[2] = new
             if team.number == 0 and step > 0:
                 course.tally.evaluations += 1
             if left == 0.0 or wrong > 0:
                 break
         post_totals(team, work_in, work_out, work_air, wrong)
-        outcome, hinge = observe(equation, course, plan, a, step)
+        outcome, hinge = observe(handle, course, plan, a, step)
         if outcome != Outcome.DONE:
             return outcome, hinge
     return Outcome.DONE, -1

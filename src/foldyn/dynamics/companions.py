@@ -162,7 +162,7 @@ def follow(step, shift, target, h, t, band, free, least, share, most):
     norm `least`.
     """
     d, left, own, goal = flat(step.shift), flat(step.out), flat(shift), flat(target)
-    change, ties, last = np.empty(free.size), step.setting.system.ties, np.inf
+    change, ties, last = np.empty(free.size), step.case.system.ties, np.inf
     for steps in range(most):
         residual(step, h, t)
         size = apart = whole = 0.0

@@ -94,10 +94,9 @@ def _integral(start, slopes, h, weights, count):
 
 
 @inner
-def _keep(equation, powers, stage):
-    """Store the powers of the last acceleration for a stage."""
-    for k in range(3):
-        powers[k, stage] = equation.powers[k]
+def _keep(found, powers, stage):
+    """Store the powers that `acceleration` found for a stage."""
+    powers[0, stage], powers[1, stage], powers[2, stage] = found
 
 
 @inner
@@ -130,15 +129,15 @@ def _weights(theta, out):
 
 
 @inner
-def _longest(equation, q, w, a, plan, tally):
+def _longest(handle, q, w, a, plan, tally):
     """Longest step for contact; slow contacts that can get inertia need not be resolved."""
-    tally.kinetic = max(tally.kinetic, slow_energy(equation, w))
+    tally.kinetic = max(tally.kinetic, slow_energy(handle, w))
     pace = Pace(RESOLVED, EASED * plan.tolerance * tally.kinetic)
-    return longest_step(equation, q, w, a, plan.dt, pace)
+    return longest_step(handle, q, w, a, plan.dt, pace)
 
 
 @kernel
-def advance(equation, course, plan, room, stretch):
+def advance(handle, course, plan, room, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
     The error of a step is the worst node's, relative to the largest displacement and the largest
@@ -154,15 +153,14 @@ def advance(equation, course, plan, room, stretch):
     fut, fvt, fa = flat(ut), flat(vt), flat(a)
     raw = flat(course.carry)  # acceleration at the step's start, without inertia of contacts
     if tally.steps == 0:
-        acceleration(equation, course.u, course.v, plan.start, a)
-        _keep(equation, powers, 0)
+        _keep(acceleration(handle, course.u, course.v, plan.start, a), powers, 0)
         for i in range(n):
             raw[i] = fa[i]
-        longest = _longest(equation, course.u, course.v, a, plan, tally)
+        longest = _longest(handle, course.u, course.v, a, plan, tally)
         tally.wanted = min(tally.wanted, longest)
         if tally.samples == 0:
             tally.farthest, tally.fastest = _largest(u), _largest(v)
-            outcome = sample(equation, course.u, course.v, a, plan.start)
+            outcome = sample(handle, course.u, course.v, a, plan.start)
             if outcome != Outcome.DONE:
                 return outcome, -1
     else:
@@ -185,27 +183,26 @@ def advance(equation, course, plan, room, stretch):
         stops = stops and h == goal - t
         if h < SMALLEST * max(abs(plan.end), abs(t)):
             return Outcome.STUCK, -1
-        gather_slow(equation, course.u, h, RESOLVED)
+        gather_slow(handle, course.u, h, RESOLVED)
         for i in range(n):
             accelerations[0, i] = raw[i]
-        slow_contacts_down(equation, course.v, accelerations[0])
+        slow_contacts_down(handle, course.v, accelerations[0])
         for stage in range(1, 7):
             _combine(u, speeds, A[stage], h, stage, fut)
             _combine(v, accelerations, A[stage], h, stage, fvt)
             moment = t + C[stage] * h
             if stops and C[stage] == 1.0:  # just before a jump
                 moment = np.nextafter(goal, -np.inf)
-            advance_clock(equation, C[stage] * h)
-            acceleration(equation, ut, vt, moment, a)
-            _keep(equation, powers, stage)
+            advance_clock(handle, C[stage] * h)
+            _keep(acceleration(handle, ut, vt, moment, a), powers, stage)
             for i in range(n):
                 speeds[stage, i], accelerations[stage, i] = fvt[i], fa[i]
-            slow_contacts_down(equation, vt, accelerations[stage])
+            slow_contacts_down(handle, vt, accelerations[stage])
         tally.evaluations += 6
         scale_u = max(tally.farthest, _largest(fut), plan.floor) * plan.tolerance
         scale_v = max(tally.fastest, _largest(fvt), plan.floor / plan.dt) * plan.tolerance
         error_u, error_v = _error(speeds, h), _error(accelerations, h)
-        error = step_error(equation, scale_u / plan.tolerance) / plan.tolerance
+        error = step_error(handle, scale_u / plan.tolerance) / plan.tolerance
         if error_u > 0.0 or error_v > 0.0:
             error = max(error, error_u / scale_u, error_v / scale_v)
         if not abs(error) < np.inf:  # diverged: try a shorter step
@@ -219,17 +216,17 @@ def advance(equation, course, plan, room, stretch):
             tally.wanted = h * max(0.2, min(factor, 0.9))
             tally.refused += 1
             continue
-        hinge = passed_through(equation.angle, course.angle, 0, equation.angle.size)
+        hinge = passed_through(handle.angle, course.angle, 0, handle.angle.size)
         if hinge >= 0:
             return Outcome.PENETRATION, hinge
-        longest = _longest(equation, ut, vt, accelerations[6], plan, tally)
+        longest = _longest(handle, ut, vt, accelerations[6], plan, tally)
         for i in range(n):
             raw[i] = fa[i]
         after = goal if h == goal - t else t + h
         tally.steps += 1
         tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
         due = plan.start + tally.samples * plan.interval
-        done, first = work_of_offsets(equation, True), tally.samples
+        done, first = work_of_offsets(handle, True), tally.samples
         begun = tally.work + done, tally.dissipated, tally.air
         near = after - ROUNDING * h if stops else after + ROUNDING * h  # just after a jump
         while plan.every == 0 and tally.samples < room and due <= near:
@@ -239,11 +236,11 @@ def advance(equation, course, plan, room, stretch):
             tally.work = _integral(begun[0], powers[0], h, weights, 7)
             tally.dissipated = _integral(begun[1], powers[1], h, weights, 7)
             tally.air = _integral(begun[2], powers[2], h, weights, 7)
-            advance_clock(equation, min(due - t, h))
-            acceleration(equation, ut, vt, due, a)
+            advance_clock(handle, min(due - t, h))
+            acceleration(handle, ut, vt, due, a)
             tally.evaluations += 1
-            tally.work += work_of_offsets(equation, False)
-            outcome = sample(equation, ut, vt, a, due)
+            tally.work += work_of_offsets(handle, False)
+            outcome = sample(handle, ut, vt, a, due)
             if outcome != Outcome.DONE:
                 return outcome, -1
             due = plan.start + tally.samples * plan.interval
@@ -254,13 +251,13 @@ def advance(equation, course, plan, room, stretch):
         for i in range(n):
             u[i], v[i] = fut[i], speeds[6, i]
             speeds[0, i] = speeds[6, i]
-        jumps = stops and equation.spent != 0
-        if tally.samples > first and (equation.commit != 0 or jumps):  # its terms
-            advance_clock(equation, h)
-            acceleration(equation, course.u, course.v, moment, a)
+        jumps = stops and handle.spent != 0
+        if tally.samples > first and (handle.commit != 0 or jumps):  # its terms
+            advance_clock(handle, h)
+            acceleration(handle, course.u, course.v, moment, a)
             tally.evaluations += 1
-        if equation.commit != 0:
-            run_at(equation.commit, (equation.setting,))
+        if handle.commit != 0:
+            run_at(handle.commit, (handle.case,))
         for k in range(3):
             powers[k, 0] = powers[k, 6]
         tally.time, tally.error = after, max(error, 1e-4)
@@ -268,25 +265,24 @@ def advance(equation, course, plan, room, stretch):
         tally.wanted = min(plan.dt, h * max(0.2, min(factor, 5.0)))
         if stops:
             tally.wanted = max(tally.wanted, min(wanted, plan.dt))
-            tally.work -= spent(equation, course.u)
-            acceleration(equation, course.u, course.v, after, a)
-            _keep(equation, powers, 0)
+            tally.work -= spent(handle, course.u)
+            _keep(acceleration(handle, course.u, course.v, after, a), powers, 0)
             tally.evaluations += 1
-            tally.work += spent(equation, course.u)  # jumped offsets, of any law
-            work_of_offsets(equation, True)
+            tally.work += spent(handle, course.u)  # jumped offsets, of any law
+            work_of_offsets(handle, True)
             for i in range(n):
                 raw[i] = fa[i]
             if plan.every == 0 and tally.samples < room and due <= after + ROUNDING * h:
-                outcome = sample(equation, course.u, course.v, a, due)
+                outcome = sample(handle, course.u, course.v, a, due)
                 if outcome != Outcome.DONE:
                     return outcome, -1
-            if equation.commit != 0:  # a jump takes no time
-                run_at(equation.commit, (equation.setting,))
+            if handle.commit != 0:  # a jump takes no time
+                run_at(handle.commit, (handle.case,))
         tally.wanted = min(tally.wanted, longest)
         if plan.every > 0 and tally.steps % plan.every == 0:
-            acceleration(equation, course.u, course.v, after, a)
+            acceleration(handle, course.u, course.v, after, a)
             tally.evaluations += 1
-            outcome = sample(equation, course.u, course.v, a, after)
+            outcome = sample(handle, course.u, course.v, a, after)
             if outcome != Outcome.DONE:
                 return outcome, -1
     tally.power_in, tally.power_out, tally.power_air = powers[0, 0], powers[1, 0], powers[2, 0]

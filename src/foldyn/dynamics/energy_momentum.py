@@ -31,7 +31,7 @@ from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Phase, Scheme, add_load_work, copy, drag_works, norms
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.motion_state import Course
-from foldyn.dynamics.parts import Setting
+from foldyn.dynamics.parts import ThreadCase
 from foldyn.dynamics.system import Packed, carry, place
 from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import inner, inner_scalar, kernel
@@ -49,12 +49,10 @@ ORDER = 2
 class Step(NamedTuple):
     """Data that the compiled functions of a step need."""
 
-    setting: Setting
+    case: ThreadCase
     terms: NDArray  # (k,) contexts of all but contact,
     forces: NDArray  # (k,) their mean-force kernels,
     powers: NDArray  # (3,) powers that they put in, dissipate and lose to air, W
-    context: int  # of the `Setting`
-    histories: int  # address of the kernel that evaluates them; 0 if constant
     old: Phase
     new: Phase
     mean: NDArray  # (h, 3) factors of the histories
@@ -78,13 +76,12 @@ class EnergyMomentum(Scheme):
             kept = body.kept(self.work, ContactTerm)
             touch = StepContact(contact, kept, packed.system.rows)
         self._contact, equation = touch, self.equation
-        balance = equation.balance.value
         self._terms = terms = MeanForces(body, self.work)
         self._step = Context(
             Step(
-                equation.setting, terms.context, terms.kernel, terms.powers, balance.setting,
-                balance.histories, self.old, self.new, np.zeros_like(self.new.factor), self.shift,
-                self.out, course.angle, np.zeros((0, 3)) if touch is None else touch.force,
+                equation.case.value, terms.context, terms.kernel, terms.powers, self.old, self.new,
+                np.zeros_like(self.new.factor), self.shift, self.out, course.angle,
+                np.zeros((0, 3)) if touch is None else touch.force,
             )
         )  # fmt: skip
         self._before = 0.0  # length of the last step, s
@@ -165,7 +162,7 @@ class EnergyMomentum(Scheme):
 def residual(step, h, t):
     """Residual of a step into `out`; returns its norm and the norm of the forces at play, N."""
     old, new, out = step.old, step.new, step.out
-    system, mass, s = step.setting.system, step.setting.mass, step.setting.s
+    system, mass, s = step.case.system, step.case.mass, step.case.s
     q0, w0, q1, w1, a1 = flat(old.q), flat(old.w), flat(new.q), flat(new.w), flat(new.a)
     d, x, left, bracket = flat(step.shift), flat(s.moving), flat(out), flat(new.force)
     for i in range(q0.size):
@@ -180,8 +177,8 @@ def residual(step, h, t):
     if system.ties.slave.size > 0:  # masters may be such nodes
         follow_masters(system.ties, a1)
         follow_masters(system.ties, w1)
-    if step.histories != 0:
-        run_at(step.histories, (step.context, t))
+    if step.case.histories != 0:
+        run_at(step.case.histories, (step.case, t))
     copy(s.factor, new.factor)
     mean = mean_factors(step)
     carry(system.moved, old.factor[:, 0], old.q, s.displacement)
@@ -191,11 +188,11 @@ def residual(step, h, t):
     middle = t - 0.5 * h
     for k in range(step.terms.size):
         if system.turns:  # terms that remember the step's start need the end
-            turn(step.setting.terms.folds, system.actuators, mean if k == 0 else new.factor)
+            turn(step.case.terms.folds, system.actuators, mean if k == 0 else new.factor)
         ends = step.terms[k], s.displacement, s.velocity
         run_at(step.forces[k], (*ends, step.before, h, middle, new.force, step.powers))
     if system.turns:  # for the tangent
-        turn(step.setting.terms.folds, system.actuators, mean)
+        turn(step.case.terms.folds, system.actuators, mean)
     touch = flat(step.touch)
     for i in range(touch.size):
         bracket[i] += touch[i]
@@ -228,7 +225,7 @@ def mean_factors(step):
 @kernel
 def _works(step, h):
     """Work input (J) and dissipated energy (J) of a step."""
-    system, mass, s = step.setting.system, step.setting.mass, step.setting.s
+    system, mass, s = step.case.system, step.case.mass, step.case.s
     old, new = step.old, step.new
     moved, bracket = system.moved, flat(new.force)
     du, speed = flat(s.displacement), flat(s.moving)
@@ -247,8 +244,8 @@ def _works(step, h):
 @kernel
 def _actuation(step, u0, u1):
     """Work (J) of the actuators in a step: energy change as rest angles turn at its two ends."""
-    terms, old, new = step.setting.terms, step.old, step.new
-    done, mean, system, s = 0.0, mean_factors(step), step.setting.system, step.setting.s
+    terms, old, new = step.case.terms, step.old, step.new
+    done, mean, system, s = 0.0, mean_factors(step), step.case.system, step.case.s
     turn(terms.folds, system.actuators, old.factor)
     done -= _energy_of_sheet(terms, u0, s.energy)
     turn(terms.folds, system.actuators, mean)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics import parts
 from foldyn.dynamics.added_mass import observe_fluid, solve_with_fluid, turn_flow
-from foldyn.dynamics.explicit_contact import ContactParts, contact_parts, slow_contacts
+from foldyn.dynamics.explicit_contact import contact_parts, slow_contacts
 from foldyn.dynamics.inertia import lumped_energy
 from foldyn.dynamics.motion_state import (
     AIR,
@@ -30,9 +30,9 @@ from foldyn.dynamics.motion_state import (
     Samples,
     passed_through,
 )
-from foldyn.dynamics.parts import Setting
+from foldyn.dynamics.parts import ThreadCase
 from foldyn.dynamics.record import record
-from foldyn.dynamics.system import Entries, Packed, Scratch
+from foldyn.dynamics.system import Packed, Scratch
 from foldyn.jit.compiled import addressed, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at, run_at, value_at
 from foldyn.jit.intrinsics import flat
@@ -44,7 +44,6 @@ from foldyn.mechanics.term import (
     LIMIT,
     NUMBER,
     Model,
-    Terms,
     forces_of,
     obstacles_to,
     states_of,
@@ -55,127 +54,107 @@ DONE, NOT_FINITE = int(Outcome.DONE), int(Outcome.NOT_FINITE)
 PENETRATION = int(Outcome.PENETRATION)
 
 
-class Balance(NamedTuple):
-    """Data for every acceleration; optional parts are addresses, or 0."""
+class LoopHandle(NamedTuple):
+    """What a time loop has of the equation: addresses, and arrays of its thread.
 
-    terms: Terms
-    setting: int  # context of the parts
-    histories: int  # address of their evaluation
-    turn: int  # moves rest angles,
-    carry: int  # moves supports
-    presses: bool  # whether obstacles or air move
-    follow: int  # loads that depend on the displacement
-    turn_flow: int  # adds forces of added mass as it turns, and drag
-    solve: int  # M^-1, 0 if M is diagonal
-    kinetic: int  # kinetic energy, 0 likewise
-    moving_power: int  # power of moving supports
-    turning_power: int  # power of turning rest angles
-    alpha: float
-    diagonal: NDArray
-    inverse: NDArray
-    loads: Entries
-    loads_own: NDArray  # (2,) first and last + 1 of the thread's loads
-    factor: NDArray
-    force: NDArray
-    displacement: NDArray
-    velocity: NDArray
+    Addresses of what a case lacks are 0.
+    """
+
+    acceleration: int
+    case: int  # context of the `ThreadCase`
+    powers: NDArray  # (3,) in, out and to the air at the last acceleration, W
+    before: NDArray  # (3,) and at the last step, for methods that keep them
     team: Team
     own: NDArray  # (2,) first and last + 1 of the thread's rows
+    stage: NDArray  # (3, n, 3) scratch of methods with several stages
+    angle: NDArray  # (nh,) dihedrals at the last acceleration, rad
+    clock: int = 0  # of laws with memory,
+    commit: int = 0  # likewise,
+    step_error: int = 0  # and likewise
+    offsets: int = 0  # 0 if nothing turns
+    spent: int = 0  # 0 likewise, or in methods that end steps only at jumps
+    limit: int = 0  # of a step by contact
+    gather: int = 0  # finds slow contacts that get inertia,
+    slow_down: int = 0  # uses it,
+    slow_kinetic: int = 0  # has its energy,
+    slow: int = 0  # and their context
+    sample: int = 0
+    recorder: int = 0  # its context
 
 
-class Recording(NamedTuple):
-    """A case on one thread, and the destination of its samples."""
+class Recorder(NamedTuple):
+    """A case on one thread, and where its samples go."""
 
-    setting: Setting
+    case: ThreadCase
     course: Course
     out: Samples
-    whole: int  # context of the setting
     fluid: int  # adds what moves the fluid; 0 without added mass
     warm: int  # evaluates the heat correction of the strain energies; 0 without heat,
     heat: int  # its context,
     lacking: NDArray  # (groups,) and its result, J
 
 
-class Equation(NamedTuple):
-    """Addresses that a loop needs, and its thread's share."""
-
-    acceleration: int
-    contact: ContactParts
-    clock: int  # 0 without memory
-    commit: int  # 0 without memory
-    step_error: int  # 0 without memory
-    offsets: int  # 0 if nothing turns
-    spent: int  # 0 likewise, or in methods that end steps only at jumps
-    sample: int
-    balance: int  # contexts
-    setting: int
-    recording: int
-    powers: NDArray  # (3,) in, out and to the air at the last acceleration, W
-    before: NDArray  # (3,) and at the last step, for methods that keep them
-    team: Team
-    own: NDArray  # (2,)
-    stage: NDArray  # (3, n, 3) work array of methods with several stages
-    angle: NDArray  # (nh,) dihedrals at the last acceleration, rad
-
-
 # ------------------------------------------------------------------ the equation
 @addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS)
 def _acceleration(m, q, w, t, out, powers):
-    rows, first, last = m.force.shape[0], 3 * m.own[0], 3 * m.own[1]
+    """See `acceleration`; m is the `ThreadCase`."""
+    force, factor, system, mass = m.s.force, m.s.factor, m.system, m.mass
+    rows, first, last = force.shape[0], 3 * m.own[0], 3 * m.own[1]
     if m.histories != 0:
-        run_at(m.histories, (m.setting, t))
+        run_at(m.histories, (m, t))
     if m.turn != 0:
-        run_at(m.turn, (m.setting,))
+        run_at(m.turn, (m,))
     if m.carry != 0:
-        run_at(m.carry, (m.setting, q, w))
-    if m.presses:
-        obstacles_to(m.terms, m.factor)
-    u = m.displacement if m.carry != 0 else rows_at(q, rows)
-    v = m.velocity if m.carry != 0 else rows_at(w, rows)
+        run_at(m.carry, (m, q, w))
+    if system.presses:
+        obstacles_to(m.terms, factor)
+    u = m.s.displacement if m.carry != 0 else rows_at(q, rows)
+    v = m.s.velocity if m.carry != 0 else rows_at(w, rows)
     wait(m.team)  # for q and w of the other threads
-    power_in, power_out = forces_of(m.terms, u, v, t, m.force)
-    force, speed, loads = flat(m.force), flat(v), m.loads
-    for k in range(m.loads_own[0], m.loads_own[1]):
+    power_in, power_out, power_air = forces_of(m.terms, u, v, t, force)
+    bracket, speed, loads, found = flat(force), flat(v), system.loads, numbers_at(powers, 3)
+    for k in range(m.s.loads[0], m.s.loads[1]):
         dof = loads.dof[k]
-        load = loads.value[k] * m.factor[loads.row[k], 0]
-        force[dof] -= load
+        load = loads.value[k] * factor[loads.row[k], 0]
+        bracket[dof] -= load
         power_in += load * speed[dof]
     if m.follow != 0:
-        power_in += value_at(m.follow, (m.setting, u, v))
+        power_in += value_at(m.follow, (m, u, v))
     if m.turn_flow != 0:
-        power_out += value_at(m.turn_flow, (m.setting, u, v))
+        run_at(m.turn_flow, (m, u, v, powers))
+        power_out += found[1]
+        power_air += found[2]
     kinetic = 0.0
-    if m.alpha > 0.0:
+    if m.drag > 0.0:
         if m.kinetic != 0:
-            kinetic = value_at(m.kinetic, (m.setting, v))
+            kinetic = value_at(m.kinetic, (m, v))
         else:
-            kinetic = lumped_energy(m.diagonal, v, m.own)
+            kinetic = lumped_energy(mass.diagonal, v, m.own)
     accelerated, relative = flat(rows_at(out, rows))[first:last], flat(rows_at(w, rows))[first:last]
     if m.solve != 0:
-        run_at(m.solve, (m.setting, out))
+        run_at(m.solve, (m, out))
         for i in range(relative.size):
-            accelerated[i] = -accelerated[i] - m.alpha * relative[i]
+            accelerated[i] = -accelerated[i] - m.drag * relative[i]
     else:
-        bracket, inverse = force[first:last], flat(m.inverse)[first:last]
-        for i in range(bracket.size):
-            accelerated[i] = -bracket[i] * inverse[i] - m.alpha * relative[i]
-    if m.alpha > 0.0:
-        power_out += 2.0 * m.alpha * kinetic
+        own, inverse = bracket[first:last], flat(mass.inverse)[first:last]
+        for i in range(own.size):
+            accelerated[i] = -own[i] * inverse[i] - m.drag * relative[i]
+    if m.drag > 0.0:
+        power_out += 2.0 * m.drag * kinetic
     if m.moving_power != 0:  # without the change of the kinetic energy of S f'
-        power_in += value_at(m.moving_power, (m.setting,))
+        power_in += value_at(m.moving_power, (m,))
     if m.turning_power != 0:
-        power_in += value_at(m.turning_power, (m.setting,))
-    found = numbers_at(powers, 3)
-    found[0], found[1], found[2] = power_in, power_out, m.terms.powers[2]
+        power_in += value_at(m.turning_power, (m,))
+    found[0], found[1], found[2] = power_in, power_out, power_air
 
 
 # ------------------------------------------------------------------ what is seen of a motion
 @addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER)
 def _sample(r, u, v, a, t):
-    m, course, out, rows = r.setting, r.course, r.out, r.setting.s.force.shape[0]
+    m, course, out, rows = r.case, r.course, r.out, r.case.s.force.shape[0]
     k = course.tally.samples - out.first
     out.time[k] = t
-    fluid = value_at(r.fluid, (r.whole, v, a)) if r.fluid != 0 else 0.0
+    fluid = value_at(r.fluid, (m, v, a)) if r.fluid != 0 else 0.0
     record(
         m.terms, m.system, m.mass, rows_at(u, rows), rows_at(v, rows), rows_at(a, rows),
         course.tally, m.s, out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
@@ -206,74 +185,74 @@ def _sample(r, u, v, a, t):
 
 # ------------------------------------------------------------------ what loops call
 @inner_scalar
-def acceleration(equation, q, w, t, a):
+def acceleration(handle, q, w, t, a):
     """Acceleration q'' (n, 3) at time t, q and w the displacement and velocity without S f.
 
     q'' = - M^-1 (F_int + beta K0 v - p) - alpha w on free dofs. Returns the power of loads,
-    supports and actuators, and the power dissipated (W); the power lost to the air stays in
-    `equation.powers`, and the bracket in `Scratch.force`.
+    supports and actuators, the power dissipated, and the power lost to the air (W); leaves the
+    bracket in `Scratch.force`.
 
     A team member computes its own nodes only, and may have changed q and w only there.
     """
-    run_at(equation.acceleration, (equation.balance, q, w, t, a, equation.powers))
-    return equation.powers[0], equation.powers[1]
+    run_at(handle.acceleration, (handle.case, q, w, t, a, handle.powers))
+    return handle.powers[0], handle.powers[1], handle.powers[2]
 
 
 @inner_scalar
-def advance_clock(equation, since):
+def advance_clock(handle, since):
     """Tell laws with memory the time (s) from the last accepted step to the next evaluation."""
-    if equation.clock != 0:
-        run_at(equation.clock, (equation.setting, since))
+    if handle.clock != 0:
+        run_at(handle.clock, (handle.case, since))
 
 
 @inner_scalar
-def step_error(equation, scale):
+def step_error(handle, scale):
     """Error ratio of laws with memory if the step that ends at the last evaluation is accepted.
 
     scale : displacement (m) that errors are relative to, unless turns cause larger ones.
     """
-    if equation.step_error == 0:
+    if handle.step_error == 0:
         return 0.0
-    return value_at(equation.step_error, (equation.setting, scale))
+    return value_at(handle.step_error, (handle.case, scale))
 
 
 @inner_scalar
-def work_of_offsets(equation, accepted):
+def work_of_offsets(handle, accepted):
     """Work (J) of offsets since the last step; see `actuation.offset_work`."""
-    if equation.offsets == 0:
+    if handle.offsets == 0:
         return 0.0
-    return value_at(equation.offsets, (equation.setting, 1.0 if accepted else 0.0))
+    return value_at(handle.offsets, (handle.case, 1.0 if accepted else 0.0))
 
 
 @inner_scalar
-def spent(equation, q):
+def spent(handle, q):
     """Energy (J) stored and dissipated by terms, after `acceleration` at q."""
-    return value_at(equation.spent, (equation.setting, q)) if equation.spent != 0 else 0.0
+    return value_at(handle.spent, (handle.case, q)) if handle.spent != 0 else 0.0
 
 
 @inner_scalar
-def sample(equation, u, v, a, t):
+def sample(handle, u, v, a, t):
     """Write the next sample, after `acceleration` at u, v and t; returns an outcome."""
-    return int(value_at(equation.sample, (equation.recording, u, v, a, t)))
+    return int(value_at(handle.sample, (handle.recorder, u, v, a, t)))
 
 
 @inner_scalar
-def observe(equation, course, plan, a, step):
+def observe(handle, course, plan, a, step):
     """Finish a fixed step after its `acceleration`; every team member calls it.
 
     Adds up the members' works. Ends the motion if it is no longer finite or if panels pass through
     each other; writes a sample every plan.every steps. Returns (outcome, hinge), the same for all
     members.
     """
-    team, tally = equation.team, course.tally
+    team, tally = handle.team, course.tally
     wait(team)  # for accelerations, dihedrals and notes of the other threads
     t = plan.start + step * plan.dt
-    if equation.offsets != 0:
-        team.note[team.number, WORK] += work_of_offsets(equation, True)
+    if handle.offsets != 0:
+        team.note[team.number, WORK] += work_of_offsets(handle, True)
         wait(team)
     wrong = total(team, WRONG)
-    first, last = part(team, equation.angle.size)
-    hinge = passed_through(equation.angle, course.angle, first, last)
+    first, last = part(team, handle.angle.size)
+    hinge = passed_through(handle.angle, course.angle, first, last)
     team.note[team.number, HINGE] = hinge
     wait(team)
     hinge = int(largest(team, HINGE))
@@ -284,10 +263,10 @@ def observe(equation, course, plan, a, step):
         tally.time = t
         tally.steps = step
         outcome = DONE
-        if wrong == 0.0 and hinge < 0 and equation.commit != 0:
-            run_at(equation.commit, (equation.setting,))
+        if wrong == 0.0 and hinge < 0 and handle.commit != 0:
+            run_at(handle.commit, (handle.case,))
         if wrong == 0.0 and hinge < 0 and step == tally.samples * plan.every:
-            outcome = sample(equation, course.u, course.v, a, t)
+            outcome = sample(handle, course.u, course.v, a, t)
         team.note[0, OUTCOME] = outcome
     wait(team)
     if wrong > 0.0:
@@ -298,16 +277,16 @@ def observe(equation, course, plan, a, step):
 
 
 @kernel
-def accelerate(equation, q, w, t, out):
+def accelerate(handle, q, w, t, out):
     """`acceleration` for calls from Python."""
-    return acceleration(equation, q, w, t, out)
+    return acceleration(handle, q, w, t, out)
 
 
 @kernel
-def write(equation, q, w, t, a):
+def write(handle, q, w, t, a):
     """Write the next sample at time t; a (n, 3) is a work array."""
-    acceleration(equation, q, w, t, a)
-    return sample(equation, q, w, a, t)
+    acceleration(handle, q, w, t, a)
+    return sample(handle, q, w, a, t)
 
 
 # ------------------------------------------------------------------ its owner
@@ -325,9 +304,10 @@ class EquationOfMotion:
 
     Attributes
     ----------
-    setting : Setting
-    balance, still : Context
-        Data for accelerations, and the equation without samples.
+    case : Context
+        `ThreadCase`.
+    still : Context
+        `LoopHandle` without samples.
     """
 
     def __init__(
@@ -335,84 +315,74 @@ class EquationOfMotion:
     ) -> None:
         limited = slows is not None
         called = [kind for kind in EVERY if limited or kind != LIMIT]
-        system, mass, model = packed.system, packed.mass, Model(packed.body, work, called)
-        self._model, self._course, share = model, course, model.share
-        self.setting = Setting(model.terms, system, mass, share, s, packed.added)
-        self._whole = whole = Context(self.setting)
-        self.balance = balance = Context(_balance(self.setting, whole))
+        system, self._course = packed.system, course
+        self._model = model = Model(packed.body, work, called)
+        self.case = case = _thread_case(packed, model, s)
         self._heat = packed.heat and Context(
             Warm(packed.heat, s.displacement, s.factor, np.zeros(system.energies))
         )
-        self._slow = slow = slow_contacts(packed, work, s, balance.value) if slows else None
+        self._slow = slow = slow_contacts(packed, work, case.value) if slows else None
         remembers = model.terms.kernel[:, ADVANCE_CLOCK].any()
-        equation = Equation(
-            acceleration=_acceleration.at(balance),
-            contact=contact_parts(whole, limited and system.touches, slow),
-            clock=parts.clock.at(whole) if remembers else 0,
-            commit=parts.commit.at(whole) if remembers else 0,
-            step_error=parts.step_error.at(whole) if remembers and slows is not None else 0,
-            offsets=parts.offsets.at(whole) if system.turns else 0,
-            spent=parts.spent.at(whole) if system.turns and slows else 0,
-            sample=0,
-            balance=balance.address,
-            setting=whole.address,
-            recording=0,
-            powers=np.zeros(3),
-            before=s.powers,
-            team=share.team,
-            own=share.strips.own,
-            stage=s.stage,
-            angle=share.angle,
+        self.still = Context(
+            LoopHandle(
+                acceleration=_acceleration.at(case),
+                case=case.address,
+                powers=np.zeros(3),
+                before=s.powers,
+                team=case.value.team,
+                own=case.value.own,
+                stage=s.stage,
+                angle=case.value.angle,
+                clock=parts.clock.at(case) if remembers else 0,
+                commit=parts.commit.at(case) if remembers else 0,
+                step_error=parts.step_error.at(case) if remembers and limited else 0,
+                offsets=parts.offsets.at(case) if system.turns else 0,
+                spent=parts.spent.at(case) if system.turns and slows else 0,
+                **contact_parts(case, limited and system.touches, slow),
+            )
         )
-        self.still = Context(equation)
         self._out: Samples | None = None
 
     def sampled(self, out: Samples) -> Context:
-        """The equation with `out` as the destination of samples."""
+        """`LoopHandle` with `out` as the destination of samples."""
         if self._out is not out:  # Python fills contexts: once per window of samples
-            whole, heat = self._whole, self._heat
-            fluid = observe_fluid.at(whole) if self.setting.added.acts else 0
+            case, heat = self.case, self._heat
+            fluid = observe_fluid.at(case) if case.value.added.acts else 0
             lacks: tuple[int, int, NDArray] = 0, 0, np.zeros(0)
             if heat:
                 lacks = warm.at(heat), heat.address, heat.value.energy
-            given = self.setting, self._course, out, whole.address, fluid
-            self._recording = recording = Context(Recording(*given, *lacks))
+            self._recorder = recorder = Context(
+                Recorder(case.value, self._course, out, fluid, *lacks)
+            )
             self._sampled = Context(
-                self.still.value._replace(sample=_sample.at(recording), recording=recording.address)
+                self.still.value._replace(sample=_sample.at(recorder), recorder=recorder.address)
             )
             self._out = out
         return self._sampled
 
 
-def _balance(setting: Setting, whole: Context) -> Balance:
-    """Data for accelerations of a case; `whole` is the context of the setting."""
-    terms, system, mass, share, s, added = setting
+def _thread_case(packed: Packed, model: Model, s: Scratch) -> Context:
+    """Context of a case on a thread; its terms are those of the model."""
+    system, mass, added, share = packed.system, packed.mass, packed.added, model.share
+    drag = 0.0 if added.acts else system.alpha
+    case = ThreadCase(
+        model.terms, system, mass, added, s, share.angle, share.fold_angle, share.strips.own,
+        share.team, drag,
+    )  # fmt: skip
+    at = Context(case)  # of the type that the parts are compiled for
     solve = parts.solve_constrained if len(mass.ties.slave) else parts.solve
     solve = solve_with_fluid if added.acts else solve
     diagonal = mass.lumped and not added.acts
-    alpha = 0.0 if added.acts else system.alpha  # added mass handles the sheet's own drag
-    return Balance(
-        terms=terms,
-        setting=whole.address,
-        histories=parts.histories.at(whole) if system.varies else 0,
-        turn=parts.turn.at(whole) if system.turns else 0,
-        carry=parts.carry.at(whole) if system.moves else 0,
-        presses=system.presses,
-        follow=parts.follow.at(whole) if system.follows else 0,
-        turn_flow=turn_flow.at(whole) if added.acts else 0,
-        solve=0 if diagonal else solve.at(whole),
-        kinetic=0 if diagonal or not alpha else parts.kinetic.at(whole),
-        moving_power=parts.moving_power.at(whole) if system.moves else 0,
-        turning_power=parts.turning_power.at(whole) if system.turns else 0,
-        alpha=alpha,
-        diagonal=mass.diagonal,
-        inverse=mass.inverse,
-        loads=system.loads,
-        loads_own=s.loads,
-        factor=s.factor,
-        force=s.force,
-        displacement=s.displacement,
-        velocity=s.velocity,
-        team=share.team,
-        own=share.strips.own,
+    return Context(
+        case._replace(
+            histories=parts.histories.at(at) if system.varies else 0,
+            turn=parts.turn.at(at) if system.turns else 0,
+            carry=parts.carry.at(at) if system.moves else 0,
+            follow=parts.follow.at(at) if system.follows else 0,
+            turn_flow=turn_flow.at(at) if added.acts else 0,
+            solve=0 if diagonal else solve.at(at),
+            kinetic=0 if diagonal or not drag else parts.kinetic.at(at),
+            moving_power=parts.moving_power.at(at) if system.moves else 0,
+            turning_power=parts.turning_power.at(at) if system.turns else 0,
+        )
     )

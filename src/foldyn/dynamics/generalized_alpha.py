@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.banded import substitute
 from foldyn.dynamics.actuation import actuator_power, offset_work, turn
-from foldyn.dynamics.equation import Equation, acceleration, advance_clock
+from foldyn.dynamics.equation import LoopHandle, acceleration, advance_clock
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import (
     GO_ON,
@@ -44,7 +44,7 @@ from foldyn.dynamics.implicit.scheme import (
 )
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.motion_state import Course
-from foldyn.dynamics.parts import Setting
+from foldyn.dynamics.parts import ThreadCase
 from foldyn.dynamics.system import Packed, carry
 from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import inner, kernel
@@ -75,8 +75,8 @@ def parameters(spectral_radius: float) -> Parameters:
 class Step(NamedTuple):
     """Data that the compiled functions of a step need."""
 
-    equation: Equation
-    setting: Setting
+    handle: LoopHandle
+    case: ThreadCase
     p: Parameters
     old: Phase
     new: Phase
@@ -100,8 +100,8 @@ class Alpha(Scheme):
         self.parameters, self.facts, equation = parameters, facts, self.equation
         self.context = Context(
             Step(
-                equation.still.value, equation.setting, parameters, self.old, self.new, self.shift,
-                self.out, self.earlier, self.damping, self.drag,
+                equation.still.value, equation.case.value, parameters, self.old, self.new,
+                self.shift, self.out, self.earlier, self.damping, self.drag,
             )
         )  # fmt: skip
 
@@ -181,7 +181,7 @@ def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[Packed, Course
 @inner
 def move(step, h):
     """Set displacement, velocity and acceleration at the end of a step from its shift."""
-    old, new, mass, ties = step.old, step.new, step.setting.mass, step.setting.system.ties
+    old, new, mass, ties = step.old, step.new, step.case.mass, step.case.system.ties
     beta, gamma = step.p.beta, step.p.gamma
     q0, w0, a0, d = flat(old.q), flat(old.w), flat(old.a), flat(step.shift)
     q1, w1, a1 = flat(new.q), flat(new.w), flat(new.a)
@@ -204,7 +204,7 @@ def slowed(step):
     """Put what the mass acts on in a step into `moving`: acceleration plus alpha times velocity."""
     old, new, am, af = step.old, step.new, step.p.am, step.p.af
     w0, a0, w1, a1 = flat(old.w), flat(old.a), flat(new.w), flat(new.a)
-    alpha, x = step.setting.system.alpha, flat(step.setting.s.moving)
+    alpha, x = step.case.system.alpha, flat(step.case.s.moving)
     for i in range(x.size):
         drag = alpha * ((1.0 - af) * w1[i] + af * w0[i])
         x[i] = (1.0 - am) * a1[i] + am * a0[i] + drag
@@ -216,7 +216,7 @@ def balanced(step, target, h):
     af = step.p.af
     move(step, h)
     slowed(step)
-    times_mass(step.setting.mass, step.setting.s.moving, step.out)
+    times_mass(step.case.mass, step.case.s.moving, step.out)
     b0, b1, inertia, left = flat(step.old.force), flat(step.new.force), flat(step.out), flat(target)
     for i in range(b0.size):
         b1[i] = (left[i] - inertia[i] - af * b0[i]) / (1.0 - af)
@@ -225,13 +225,13 @@ def balanced(step, target, h):
 @kernel
 def residual(step, h, t):
     """Residual of a step into `out`; returns its norm and the norm of the forces at play, N."""
-    equation, old, new, out = step.equation, step.old, step.new, step.out
-    system, mass, s = step.setting.system, step.setting.mass, step.setting.s
+    handle, old, new, out = step.handle, step.old, step.new, step.out
+    system, mass, s = step.case.system, step.case.mass, step.case.s
     af = step.p.af
     b0, b1, left = flat(old.force), flat(new.force), flat(out)
     move(step, h)
-    advance_clock(equation, h)
-    acceleration(equation, new.q, new.w, t, out)
+    advance_clock(handle, h)
+    acceleration(handle, new.q, new.w, t, out)
     copy(s.force, new.force)
     copy(s.factor, new.factor)
     copy(s.pushed, new.pushed)
@@ -248,7 +248,7 @@ def residual(step, h, t):
 def _iterate(step, h, t, band, free, goal, last, lowest, most):
     """Iterate with the factors of a band matrix; see `Scheme.iterate`."""
     d, left = flat(step.shift), flat(step.out)
-    change, ties = np.empty(free.size), step.setting.system.ties
+    change, ties = np.empty(free.size), step.case.system.ties
     norm = np.inf
     for steps in range(most):
         norm, reference = residual(step, h, t)
@@ -270,7 +270,7 @@ def _iterate(step, h, t, band, free, goal, last, lowest, most):
 @kernel
 def _works(step, h):
     """Work put in and energy dissipated in a step."""
-    system, mass, s = step.setting.system, step.setting.mass, step.setting.s
+    system, mass, s = step.case.system, step.case.mass, step.case.s
     old, new, du = step.old, step.new, flat(s.displacement)
     v0, v1, b0, b1 = flat(old.w), flat(new.w), flat(old.force), flat(new.force)
     moved = system.moved
@@ -289,7 +289,7 @@ def _works(step, h):
 @kernel
 def _taken(step):
     """Energies (J) dissipated by damping and lost to the air in a step, after `_works`."""
-    old, new, moved, s = step.old, step.new, step.setting.system.moved, step.setting.s
+    old, new, moved, s = step.old, step.new, step.case.system.moved, step.case.s
     carry(moved, new.factor[:, 0], new.q, s.product)
     carry(moved, new.factor[:, 1], new.w, s.velocity)
     damped = _taken_by(step, step.damping, old.damped, new.damped)
@@ -299,7 +299,7 @@ def _taken(step):
 @inner
 def _taken_by(step, numbers, before, after):
     """Energy (J) dissipated by some terms in a step: mean force times displacement."""
-    terms, s = step.setting.terms, step.setting.s
+    terms, s = step.case.terms, step.case.s
     one, other, du, work = flat(before), flat(after), flat(s.displacement), 0.0
     for i in range(other.size):
         other[i] = 0.0
@@ -314,7 +314,7 @@ def _taken_by(step, numbers, before, after):
 @kernel
 def _actuation(step, angle0, angle1):
     """Work (J) of the actuators in a step between the dihedrals angle0 and angle1."""
-    folds, system, old, new = step.setting.terms.folds, step.setting.system, step.old, step.new
+    folds, system, old, new = step.case.terms.folds, step.case.system, step.old, step.new
     change = np.zeros_like(new.factor)
     change[:, 1] = 0.5 * (new.factor[:, 0] - old.factor[:, 0])
     turn(folds, system.actuators, old.factor)

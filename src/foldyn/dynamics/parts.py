@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from numpy.typing import NDArray
+
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.actuation import offset_work, power_of_part, turn_part
 from foldyn.dynamics.added_mass import AddedMass
@@ -20,7 +22,6 @@ from foldyn.mechanics.following import push_following
 from foldyn.mechanics.term import (
     ADDRESS,
     NUMBER,
-    Share,
     Terms,
     clock_to,
     commit_all,
@@ -28,18 +29,34 @@ from foldyn.mechanics.term import (
     energies_of,
     step_error_of,
 )
-from foldyn.mechanics.threads import wait
+from foldyn.mechanics.threads import Team, wait
 
 
-class Setting(NamedTuple):
-    """A case on one thread: data of the parts."""
+class ThreadCase(NamedTuple):
+    """A case on one thread: its arrays, and addresses of the optional parts, 0 where it has none.
+
+    Each part takes this record as its context.
+    """
 
     terms: Terms
     system: System
     mass: Inertia
-    share: Share
-    s: Scratch
     added: AddedMass
+    s: Scratch
+    angle: NDArray  # (nh,) dihedrals at the last force evaluation, rad
+    fold_angle: NDArray  # (k,) dihedrals of the actuated hinges, rad
+    own: NDArray  # (2,) first and last + 1 of the thread's rows
+    team: Team
+    drag: float  # alpha, 1/s; 0 with added mass, which has the sheet's drag
+    histories: int = 0  # evaluates them
+    turn: int = 0  # moves rest angles
+    carry: int = 0  # moves supports
+    follow: int = 0  # adds loads that depend on the displacement
+    turn_flow: int = 0  # adds forces of added mass as it turns, and drag
+    solve: int = 0  # M^-1; 0 if M is diagonal
+    kinetic: int = 0  # kinetic energy; 0 likewise
+    moving_power: int = 0  # power of moving supports
+    turning_power: int = 0  # power of turning rest angles
 
 
 @addressed(NUMBER)
@@ -60,7 +77,7 @@ def turn(m):
 @addressed(ADDRESS, ADDRESS)
 def carry(m, q, w):
     """Add support motion to q and w: displacement and velocity."""
-    rows, own = m.s.force.shape[0], m.share.strips.own
+    rows, own = m.s.force.shape[0], m.own
     dofs, supports = (3 * own[0], 3 * own[1]), (m.s.moved[0], m.s.moved[1])
     here, there, moved = flat(m.s.displacement), flat(m.s.velocity), m.system.moved
     carry_part(moved, m.s.factor[:, 0], flat(rows_at(q, rows)), here, dofs, supports)
@@ -78,7 +95,7 @@ def follow(m, u, v):
 @addressed(ADDRESS)
 def solve(m, out):
     """Solve with a mass matrix that is not diagonal."""
-    rows, team = m.s.force.shape[0], m.share.team
+    rows, team = m.s.force.shape[0], m.team
     wait(team)  # for the forces of the others, and until they have read this member's velocities
     solve_mass(m.mass, m.s.force, rows_at(out, rows), m.s.line, team.number, team.size)
     wait(team)  # until each has solved for its axes
@@ -94,14 +111,14 @@ def solve_constrained(m, out):
 @addressed(ADDRESS)
 def kinetic(m, v):
     """Kinetic energy (J) of a thread's nodes with a mass matrix that is not diagonal."""
-    return kinetic_energy(m.mass, rows_at(v, m.s.force.shape[0]), m.share.strips.own)
+    return kinetic_energy(m.mass, rows_at(v, m.s.force.shape[0]), m.own)
 
 
 @addressed()
 def moving_power(m):
     """Power (W) of moving supports, without the change of the kinetic energy of S f'."""
     power = power_of_moved(m.system.moved, m.s.force, m.s.factor, m.s.moved[0], m.s.moved[1])
-    if m.share.team.number == 0:
+    if m.team.number == 0:
         power += 2.0 * m.system.alpha * moving_energy(m.system.moved_mass, m.s.factor)
     return power
 
@@ -110,7 +127,7 @@ def moving_power(m):
 def turning_power(m):
     """Power (W) of turning rest angles."""
     return power_of_part(
-        m.terms.folds, m.system.actuators, m.s.factor, m.share.fold_angle, m.s.turned[0],
+        m.terms.folds, m.system.actuators, m.s.factor, m.fold_angle, m.s.turned[0],
         m.s.turned[1],
     )  # fmt: skip
 
@@ -119,7 +136,7 @@ def turning_power(m):
 def offsets(m, accepted):
     """Work (J) of offsets since the last step; see `actuation.offset_work`."""
     return offset_work(
-        m.terms.folds, m.system.actuators, m.share.fold_angle, m.s.turned[0], m.s.turned[1],
+        m.terms.folds, m.system.actuators, m.fold_angle, m.s.turned[0], m.s.turned[1],
         accepted > 0.0,
     )  # fmt: skip
 

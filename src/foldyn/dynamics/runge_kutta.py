@@ -121,7 +121,7 @@ def next_stage(method, k, dt, u, v, ut, vt, fa, du, dv, others):
 
 
 @shared
-def advance(equation, course, plan, room, stretch, method):
+def advance(handle, course, plan, room, stretch, method):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
     method : `Coefficients`.
@@ -130,8 +130,8 @@ def advance(equation, course, plan, room, stretch, method):
     advances its own nodes.
     """
     course = borrowed(course)
-    team, stage = equation.team, equation.stage
-    low, high = 3 * equation.own[0], 3 * equation.own[1]
+    team, stage = handle.team, handle.stage
+    low, high = 3 * handle.own[0], 3 * handle.own[1]
     stage_u, stage_v, a = stage[0], stage[1], stage[2]
     u, v = flat(course.u)[low:high], flat(course.v)[low:high]
     ut, vt, fa = flat(stage_u)[low:high], flat(stage_v)[low:high], flat(a)[low:high]
@@ -152,17 +152,17 @@ def advance(equation, course, plan, room, stretch, method):
             for k in range(stages):
                 since, weight = method.time[k] * dt, method.weight[k]
                 if k > 0:
-                    advance_clock(equation, plan.dt - left + since)
-                power_in, power_out = acceleration(equation, stage_u, stage_v, now + since, a)
-                part_in += weight * power_in
-                part_out += weight * power_out
-                part_air += weight * equation.powers[2]
+                    advance_clock(handle, plan.dt - left + since)
+                powers = acceleration(handle, stage_u, stage_v, now + since, a)
+                part_in += weight * powers[0]
+                part_out += weight * powers[1]
+                part_air += weight * powers[2]
                 if k == 0:
                     if first:
-                        outcome, hinge = observe(equation, course, plan, a, step)
+                        outcome, hinge = observe(handle, course, plan, a, step)
                         if outcome != Outcome.DONE or step == end:
                             return outcome, hinge
-                    dt = longest_step(equation, course.u, course.v, a, left, RESOLVED)
+                    dt = longest_step(handle, course.u, course.v, a, left, RESOLVED)
                     dt = split_step(dt, left)
                 if k + 1 < stages:
                     next_stage(method, k, dt, u, v, ut, vt, fa, du, dv, others)

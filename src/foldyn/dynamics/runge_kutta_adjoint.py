@@ -44,14 +44,14 @@ def _into(source, out):
 
 
 @kernel
-def retrace(equation, u, v, plan, method, first, count, stages):
+def retrace(handle, u, v, plan, method, first, count, stages):
     """Recompute `count` steps from number `first` on; u and v change in place.
 
     method : `Coefficients`.
     stages : (count, s, 3, n, 3) or (0, ...), displacement, velocity and acceleration at each
         stage. Reproduces `runge_kutta.advance` bit for bit.
     """
-    stage = equation.stage
+    stage = handle.stage
     at_u, at_v, a = stage[0], stage[1], stage[2]
     un, vn, ut, vt, fa = flat(u), flat(v), flat(at_u), flat(at_v), flat(a)
     du, dv, dt, last = np.zeros_like(un), np.zeros_like(vn), plan.dt, method.weight.size - 1
@@ -61,7 +61,7 @@ def retrace(equation, u, v, plan, method, first, count, stages):
         _into(u, at_u)
         _into(v, at_v)
         for s in range(last + 1):
-            acceleration(equation, at_u, at_v, now + method.time[s] * dt, a)
+            acceleration(handle, at_u, at_v, now + method.time[s] * dt, a)
             if stages.shape[0] > 0:
                 _into(at_u, stages[k, s, 0])
                 _into(at_v, stages[k, s, 1])
@@ -77,21 +77,21 @@ def retrace(equation, u, v, plan, method, first, count, stages):
 
 @kernel
 def pull_steps(
-    balance, pulls, plan, method, first, stages, by_u, by_v, memory, by_slope, mass, moved, out
+    case, pulls, plan, method, first, stages, by_u, by_v, memory, by_slope, mass, moved, out
 ):
     """Process the steps of `stages` backward; by_u and by_v (n, 3) change in place.
 
     memory : (7, n, 3). by_slope : (s, 2, n, 3), zeros, for the sums of m. mass : `Inertia`.
     moved : `System.moved`.
     """
-    dt, loads, alpha = plan.dt, balance.loads, balance.alpha
-    lumped, count = balance.solve == 0, by_u.size
+    dt, loads, alpha, scratch = plan.dt, case.system.loads, case.drag, case.s
+    lumped, count = case.solve == 0, by_u.size
     y, product, rate = memory[0], memory[1], memory[2]
     yn, pn, rn, both = flat(y), flat(product), flat(rate), flat(memory[6])
     ka, su, sv, lu, lv = (
         flat(memory[3]), flat(memory[4]), flat(memory[5]), flat(by_u), flat(by_v)
     )  # fmt: skip
-    force, inverse = flat(balance.force), flat(balance.inverse)
+    force, inverse = flat(scratch.force), flat(case.mass.inverse)
     for i in range(count):
         both[i] = 0.0
     for k in range(stages.shape[0] - 1, -1, -1):
@@ -103,12 +103,12 @@ def pull_steps(
             mu, mv = flat(by_slope[s, 0]), flat(by_slope[s, 1])
             q, w = stages[k, s, 0], stages[k, s, 1]
             speed, rise = flat(w), flat(stages[k, s, 2])
-            if balance.histories != 0:
-                run_at(balance.histories, (balance.setting, t))
-            if balance.carry != 0:
-                run_at(balance.carry, (balance.setting, q, w))
-            u = balance.displacement if balance.carry != 0 else q
-            v = balance.velocity if balance.carry != 0 else w
+            if case.histories != 0:
+                run_at(case.histories, (case, t))
+            if case.carry != 0:
+                run_at(case.carry, (case, q, w))
+            u = scratch.displacement if case.carry != 0 else q
+            v = scratch.velocity if case.carry != 0 else w
             if lumped:
                 for i in range(count):
                     ka[i] = own * lv[i] + mv[i]
@@ -119,7 +119,7 @@ def pull_steps(
                 for i in range(count):
                     ka[i] = own * lv[i] + mv[i]
                     force[i], pn[i], rn[i] = ka[i], 0.0, 0.0
-                run_at(balance.solve, (balance.setting, y))
+                run_at(case.solve, (case, y))
                 for i in range(mass.indptr.size - 1):
                     for e in range(mass.indptr[i], mass.indptr[i + 1]):
                         j = mass.indices[e]
@@ -128,10 +128,10 @@ def pull_steps(
                             out.mass[e] -= y[i, c] * by
             pulled_back(pulls, u, v, t, y, product, rate)
             for e in range(loads.dof.size):
-                out.loads[e] += yn[loads.dof[e]] * balance.factor[loads.row[e], 0]
+                out.loads[e] += yn[loads.dof[e]] * scratch.factor[loads.row[e], 0]
             for e in range(moved.dof.size):
                 dof, row = moved.dof[e], moved.row[e]
-                out.moved[e] -= pn[dof] * balance.factor[row, 0] + rn[dof] * balance.factor[row, 1]
+                out.moved[e] -= pn[dof] * scratch.factor[row, 0] + rn[dof] * scratch.factor[row, 1]
             drag = 0.0
             for i in range(count):
                 drag += ka[i] * speed[i]
@@ -208,7 +208,7 @@ class RungeKuttaAdjoint(Adjoint):
             stages = self._stages[:count]
             self._retrace(u.copy(), v.copy(), first, count, stages)
             pull_steps(
-                self._equation.balance, self._pullback.terms, self._steps, self._method, first,
+                self._equation.case, self._pullback.terms, self._steps, self._method, first,
                 stages, by_u, by_v, self._memory, self._by_slope, self._inertia, self._moved,
                 self._out,
             )  # fmt: skip

@@ -21,7 +21,7 @@ ITERATIONS = 200
 @inner
 def _pushed(m, y, out):
     """out = M^-1 G' y (n, 3), via the nodal forces."""
-    added, r = m.added, m.s.force
+    added, r = m.added, m.case.s.force
     for i in range(len(r)):
         for c in range(3):
             r[i, c] = 0.0
@@ -29,10 +29,10 @@ def _pushed(m, y, out):
         for i in range(4):
             for c in range(3):
                 r[added.nodes[k, i], c] += added.gradient[k, i, c] * y[k]
-    if m.solve != 0:
-        run_at(m.solve, (m.setting, out))
+    if m.case.solve != 0:
+        run_at(m.case.solve, (m.case, out))
     else:
-        values, given, inverse = flat(out), flat(r), flat(m.inverse)
+        values, given, inverse = flat(out), flat(r), flat(m.case.mass.inverse)
         for i in range(values.size):
             values[i] = inverse[i] * given[i]
 
@@ -53,7 +53,7 @@ def slow_down(m, w, a):
 
     m : see `explicit_contact.SlowContacts`.
     """
-    added, alpha, out = m.added, m.system.alpha, m.s.stage[0]
+    added, alpha, out = m.added, m.case.system.alpha, m.case.s.stage[0]
     size = added.count[0]
     if size == 0:
         return

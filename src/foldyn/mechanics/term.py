@@ -326,7 +326,7 @@ class Terms(NamedTuple):
     context: NDArray  # (k,) addresses
     kernel: NDArray  # (k, 9) addresses, or 0
     folds: Folds
-    powers: NDArray  # (3,) memory
+    powers: NDArray  # (3,) scratch of `forces_of`
 
 
 class Share(NamedTuple):
@@ -380,16 +380,14 @@ def parted_rows(values, n, r):
 
 @inner_scalar
 def forces_of(terms, u, v, t, force):
-    """Internal forces (rows, 3) at u, v and t; returns the powers in and out, W.
-
-    The power lost to the air is the last of `Terms.powers`.
+    """Internal forces (rows, 3) at u, v and t; returns the powers in, out and to the air, W.
 
     Stores all dihedrals in `angle` and `fold_angle` of the thread's `Share`.
     """
     terms.powers[0], terms.powers[1], terms.powers[2] = 0.0, 0.0, 0.0
     for k in range(terms.context.size):
         run_at(terms.kernel[k, FORCES], (terms.context[k], u, v, t, force, terms.powers))
-    return terms.powers[0], terms.powers[1]
+    return terms.powers[0], terms.powers[1], terms.powers[2]
 
 
 @inner_scalar
