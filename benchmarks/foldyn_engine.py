@@ -13,7 +13,7 @@ from foldyn.dynamics.methods import Compiled
 from foldyn.dynamics.motion_state import StepPlan, samples
 from foldyn.dynamics.runge_kutta import RK4, advance
 from foldyn.dynamics.system import pack
-from foldyn.mechanics import internal_force, workspace
+from foldyn.mechanics import force_scratch, internal_force
 
 
 class FoldynEngine:
@@ -30,7 +30,7 @@ class FoldynEngine:
         """Internal force (n, 3) at displacement u (n, 3), both in the twins' order."""
         out, by = np.empty_like(u), self.packed.numbering
         model = self.packed.model
-        internal_force(model, by.inward(u[self._back]), out, workspace(model))
+        internal_force(model, by.inward(u[self._back]), out, force_scratch(model))
         return by.outward(out)[self.problem.order]
 
     def run(self, steps: int) -> tuple[float, NDArray]:

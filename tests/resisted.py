@@ -13,7 +13,7 @@ def resisted(case: fd.Case, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, f
     """Forces (rows, 3), N, of the dampers alone, and the power (W) that they take."""
     body = case.elastic_body
     whole = body.with_terms(*dampers(case))
-    model, first = Model(whole, whole.workspaces(1)[0], [FORCES]), len(body.terms)
+    model, first = Model(whole, whole.thread_parts(1)[0], [FORCES]), len(body.terms)
     terms, force = model.terms, np.zeros((body.rows, 3))
     own = terms._replace(context=terms.context[first:], kernel=terms.kernel[first:])
     evaluate(own, u, v, force, np.zeros(0))

@@ -112,7 +112,7 @@ def forces(case, v):
     """Forces (n, 3) of drag at rest with velocities v, and minus their derivative (3n, 3n)."""
     (term,) = air_terms(case, [])
     body = Assembly(case.structure.body.sheet, term)
-    model, force = Model(body, body.workspaces(1)[0]), np.zeros_like(v)
+    model, force = Model(body, body.thread_parts(1)[0]), np.zeros_like(v)
     evaluate(model.terms, np.zeros_like(v), v, force, np.zeros(0))
     return force, term.damping(np.zeros(v.size)).toarray()
 

@@ -69,9 +69,9 @@ def test_accelerations_are_those_of_the_mass_with_the_inertia_of_contacts(mass):
     before, w = rng.standard_normal((2, *u.shape))
     a = before.copy()
     course = Course(u, np.zeros_like(u), np.zeros_like(u), np.zeros(1, TALLY)[0], np.zeros(0))
-    work, own = body.workspaces(1)[0], scratch(system)
-    equation = EquationOfMotion(packed, work, own, course, True)
-    slow = slow_contacts(packed, work, equation.case.value)
+    part, own = body.thread_parts(1)[0], scratch(system)
+    equation = EquationOfMotion(packed, part, own, course, True)
+    slow = slow_contacts(packed, part, equation.case.value)
     assert slow is not None
     slow_down(Context(slow.value._replace(added=added)), w, a)
     nodal = packed.mass

@@ -178,7 +178,7 @@ def test_a_motion_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path,
 
     def forgetful(self, arrays):
         """What a new process would not know."""
-        for array in (self._works[0].angle, *self._memories[0][6:8]):
+        for array in (self._threads[0].angle, *self._scratches[0][6:8]):
             array[:] = 3.0
         resume_from(self, arrays)
 

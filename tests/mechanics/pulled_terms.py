@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.mechanics.assembly import Assembly, Work
+from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.constant_damping import DampingMatrix, DampingRows
 from foldyn.mechanics.pullback import Pullbacks, pull_all
 from foldyn.mechanics.sheet_term import SheetTerm
-from foldyn.mechanics.term import FORCES, Term, Terms, Whole, evaluate
-from foldyn.mechanics.threads import team
+from foldyn.mechanics.term import FORCES, Term, Terms, evaluate
+from foldyn.mechanics.threads import ThreadPart, team
 
 MODELS = {
     "MembranesTerm": "membranes",
@@ -66,17 +66,16 @@ class Lone(NamedTuple):
         kernel = np.zeros((1, 9), np.int64)
         kernel[0, FORCES] = held.kernels[FORCES].at(held.context)
         context = np.array([held.context.address])
-        evaluate(Terms(context, kernel, None, np.zeros(2)), u, speed, force, np.zeros(0))
+        evaluate(Terms(context, kernel, None, np.zeros(3)), u, speed, force, np.zeros(0))
         return force.ravel()[: self.size]
 
     def _memory(self) -> tuple[Any, Any]:
         if isinstance(self.term, SheetTerm):
-            work = self.term.workspaces(1)[0]
-            return work, work
+            own = self.term.scratches(1)[0]
+            return ThreadPart(own.team, own.own, own.angle, own.fold_angle, own), own
         angle = np.zeros(len(self.term.hinges))
-        strips = Whole(np.array([0, self.rows]))
-        work = Work(None, angle, angle, strips, team(1)[0], ())
-        return work, self.term.memories([work])[0]
+        part = ThreadPart(team(1)[0], np.array([0, self.rows]), angle, angle, None)
+        return part, self.term.memories([part])[0]
 
     def pulled(
         self, q: NDArray, v: NDArray, w: NDArray

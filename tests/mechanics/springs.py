@@ -22,7 +22,7 @@ from foldyn.materials import hinge_law
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.sheet_term import SheetTerm
 from foldyn.mechanics.step_tangent import SparseBlocks
-from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Folds, Whole, energies, forces
+from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Folds, energies, forces
 from foldyn.mechanics.threads import Team, team
 from foldyn.structures.discretized import Discretized
 
@@ -36,12 +36,12 @@ class Springs(NamedTuple):
     length: NDArray  # (s,) L, m
 
 
-class SpringsWork(NamedTuple):
-    """Memory of the kernels: none."""
+class SpringsScratch(NamedTuple):
+    """Scratch of the kernels: none."""
 
     angle: NDArray  # (0,)
     fold_angle: NDArray  # (0,)
-    strips: Whole
+    own: NDArray  # (2,) first and last + 1 of the rows
     team: Team
 
 
@@ -105,11 +105,11 @@ class SpringsTerm(SheetTerm):
         where = np.repeat(self.model.rest, 3, axis=0)
         return SparseBlocks(self.tangent(np.zeros(self.size)), self.rows, where)
 
-    def workspaces(self, threads: int) -> list[SpringsWork]:
-        own = Whole(np.array([0, self.rows]))
-        return [SpringsWork(np.zeros(0), np.zeros(0), own, team(1)[0])]
+    def scratches(self, threads: int) -> list[SpringsScratch]:
+        own = np.array([0, self.rows])
+        return [SpringsScratch(np.zeros(0), np.zeros(0), own, team(1)[0])]
 
-    def compiled(self, work, kept: SpringsWork, group: int) -> Compiled:
+    def compiled(self, part, kept: SpringsScratch, group: int) -> Compiled:
         own = Context(SpringsContext(self.model, np.zeros((self.rows, 3))))
         return Compiled(own, {FORCES: _forces, ENERGIES: _energies})
 

@@ -36,7 +36,7 @@ def random_model(bars, folds, bends, seed=0, fold_law=None, bend_law=None):
 
 def force_of(model, u, work=None):
     out = np.full_like(u, np.nan)
-    mechanics.internal_force(model, u, out, work or mechanics.workspace(model))
+    mechanics.internal_force(model, u, out, work or mechanics.force_scratch(model))
     return out
 
 
@@ -88,7 +88,7 @@ def test_energies_of_any_number_of_elements(count):
 def test_workspace_holds_the_dihedrals_and_may_be_reused():
     s = structure("miura n5b8")
     model = s.model
-    work = mechanics.workspace(model)
+    work = mechanics.force_scratch(model)
     u = state(s, 1)
     first = force_of(model, u, work)
     np.testing.assert_array_equal(

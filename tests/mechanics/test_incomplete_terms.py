@@ -32,8 +32,8 @@ def test_a_kind_that_lacks_a_part_is_refused_when_it_is_defined(parts, said):
 class Silent(SpringsTerm):
     """Springs that have an energy, and no kernel for it."""
 
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-        found = super().compiled(work, kept, group)
+    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+        found = super().compiled(part, kept, group)
         return Compiled(found.context, {FORCES: found.kernels[FORCES]})
 
 

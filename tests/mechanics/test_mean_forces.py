@@ -73,12 +73,12 @@ def mean_forces(
     body: Assembly, q0: np.ndarray, q1: np.ndarray, h: float = 1.0, powers: np.ndarray = NO_POWERS
 ) -> np.ndarray:
     """Mean forces (m,) of all terms from q0 to q1, and their powers."""
-    work = body.workspaces(1)[0]
-    terms, out = MeanForces(body, work), np.zeros((body.rows, 3))
+    part = body.thread_parts(1)[0]
+    terms, out = MeanForces(body, part), np.zeros((body.rows, 3))
     ends = body.in_rows(q0), body.in_rows(q1)
     for function, context in zip(terms.kernel, terms.context, strict=True):
         _call(function, context, *ends, body.angles(q0), h, out, powers)
-    np.testing.assert_allclose(work.angle, body.angles(q1), atol=1e-14)
+    np.testing.assert_allclose(part.angle, body.angles(q1), atol=1e-14)
     return out.ravel()[: body.size]
 
 
@@ -86,8 +86,8 @@ def halfway(body: Assembly) -> Assembly:
     """The same with a sheet whose mean forces are made of its forces and energies."""
 
     class Sheet(type(body.sheet)):
-        def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-            own = super().compiled(work, kept, group)
+        def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+            own = super().compiled(part, kept, group)
             kernels = {k: v for k, v in own.kernels.items() if k != MEAN_FORCES}
             return own._replace(kernels=kernels)
 
@@ -263,8 +263,8 @@ class Drag(Term):
     def __init__(self, coefficient: float) -> None:
         self.coefficient = coefficient
 
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-        own = DragContext(self.coefficient, int(work.strips.own[1]))
+    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+        own = DragContext(self.coefficient, int(part.own[1]))
         return Compiled(Context(own), {FORCES: _drag})
 
 

@@ -26,7 +26,7 @@ def energies(model, u):
 
 def check_same_mechanics(model, u, order, other, rows):
     """Force, dihedrals, energies and tangent of the renumbered model are those of the model."""
-    work, other_work = mechanics.workspace(model), mechanics.workspace(other)
+    work, other_work = mechanics.force_scratch(model), mechanics.force_scratch(other)
     force = force_of(model, u, work)
     moved = np.ascontiguousarray(u[order])
     assert relative(force_of(other, moved, other_work), force[order]) < 1e-13

@@ -64,7 +64,7 @@ def sheet(cells, laws="mixed"):
 
 
 def alone(model, u):
-    out, work = np.full_like(u, np.nan), mechanics.workspace(model)
+    out, work = np.full_like(u, np.nan), mechanics.force_scratch(model)
     mechanics.internal_force(model, u, out, work)
     return out, work.angle
 
@@ -88,7 +88,7 @@ def test_strips_give_the_force_of_the_whole(monkeypatch, cells, laws):
     model, u = sheet(cells, laws)
     force, angle = alone(model, u)
     in_windows_of(monkeypatch, 64)
-    work = mechanics.workspace(model)
+    work = mechanics.force_scratch(model)
     assert len(work.strips.lowest) > 1 or len(model.rest) <= max(64, 4 * reach(model))
     for _ in range(2):  # buffers keep nothing from one evaluation to the next
         out = np.full_like(u, np.nan)
@@ -102,7 +102,7 @@ def test_threads_agree_to_rounding_and_repeat_to_the_bit(monkeypatch, count, win
     model, u = sheet((60, 2), laws)
     force, angle = alone(model, u)
     in_windows_of(monkeypatch, window)
-    works = mechanics.workspaces(model, count)
+    works = mechanics.force_scratches(model, count)
     assert len(works) == count
     first = together(model, u, works)
     assert relative(first, force) < ROUNDING
@@ -117,7 +117,7 @@ def test_evaluations_in_a_compiled_loop_do_not_overtake_each_other():
     model, u = sheet((60, 2))
     ends = []
     for count in (1, 2, 2, 3):
-        works, moved, force = mechanics.workspaces(model, count), u.copy(), np.empty_like(u)
+        works, moved, force = mechanics.force_scratches(model, count), u.copy(), np.empty_like(u)
         arguments = [(model, moved, force, work, 200) for work in works]
         run_together(again_and_again, [work.team for work in works], arguments)
         ends.append(moved)
@@ -158,11 +158,11 @@ def test_work_is_shared_evenly():
 def test_models_that_cannot_be_shared_stay_on_one_thread():
     """Elements between random nodes reach through the whole model; so do small sheets'."""
     tangled = random_model(200, 200, 200)
-    assert len(mechanics.workspaces(tangled, 2)) == 1
-    assert len(mechanics.workspaces(sheet((1, 1))[0], 2)) == 1
+    assert len(mechanics.force_scratches(tangled, 2)) == 1
+    assert len(mechanics.force_scratches(sheet((1, 1))[0], 2)) == 1
     empty = random_model(0, 0, 0)
     u = np.zeros((60, 3))
-    works = mechanics.workspaces(empty, 3)
+    works = mechanics.force_scratches(empty, 3)
     assert not together(empty, u, works).any()
 
 
@@ -232,7 +232,7 @@ from foldyn import mechanics
 from samples import relative
 model, u = sheet((60, 2))
 def error(_=None):
-    return relative(together(model, u, mechanics.workspaces(model, 2)), alone(model, u)[0])
+    return relative(together(model, u, mechanics.force_scratches(model, 2)), alone(model, u)[0])
 assert error() < 1e-13
 with multiprocessing.get_context("fork").Pool(1) as pool:
     assert pool.apply_async(error).get(60) < 1e-13

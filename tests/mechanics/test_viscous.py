@@ -42,11 +42,11 @@ def scalars(case: fd.Case, q: np.ndarray) -> np.ndarray:
     n = len(case.structure.nodes)
     x = case.structure.nodes + q.reshape(-1, 3)[:n]
     lengths = [np.linalg.norm(x[b] - x[a]) for a, b in case.dashpots[0][1].between]
-    work = case.body.workspaces(1)[0]
-    model, moved = Model(case.body, work), case.body.in_rows(q)
+    part = case.body.thread_parts(1)[0]
+    model, moved = Model(case.body, part), case.body.in_rows(q)
     evaluate(model.terms, moved, 0.0 * moved, 0.0 * moved, np.zeros(0))
     hinges = case.body.sheet.fold_hinges()
-    angles = work.fold_angle
+    angles = part.fold_angle
     if len(angles) != len(hinges.fold):  # bars and hinges: all hinges stand there
         angles = case.structure.dihedrals(q[: case.structure.nodes.size])[0]
     return np.concatenate([lengths, angles])

@@ -51,7 +51,7 @@ SCALED = 0.25, 4.0  # by how much a new flow may scale the deformation energy: a
 
 
 class AddedMass(NamedTuple):
-    """The flow about t triangles with u unknowns, and its work arrays."""
+    """The flow about t triangles with u unknowns, and its scratch."""
 
     triangles: NDArray  # (t, 3) nodes
     sides: NDArray  # (t, 2, 3) rest vectors from the first corner to the others, m
@@ -347,7 +347,7 @@ def dot(x, y):
 
 @inner
 def lighten(mass, force, out, line):
-    """out = M^-1 force on free dofs, both (rows, 3); `line` is a work array."""
+    """out = M^-1 force on free dofs, both (rows, 3); `line` is scratch."""
     if mass.lumped:
         inverse, given, found = flat(mass.inverse), flat(force), flat(out)
         for i in range(inverse.size):
@@ -358,7 +358,7 @@ def lighten(mass, force, out, line):
 
 @kernel
 def move(own, mass, jump, out, line):
-    """Add B M^-1 B' jump to `out` (u,); M^-1 B' jump stays in the nodal work array."""
+    """Add B M^-1 B' jump to `out` (u,); M^-1 B' jump stays in the nodal scratch."""
     force, moved, found = own.nodal[0], own.nodal[1], own.lines[5]
     pushed = flat(force)
     for i in range(pushed.size):
@@ -493,7 +493,7 @@ def put_uniform(velocity, out):
 
 @inner
 def put_relative(own, v):
-    """Put velocities (rows, 3) relative to the air into the first nodal work array."""
+    """Put velocities (rows, 3) relative to the air into the first nodal scratch."""
     for i in range(v.shape[0]):
         for c in range(3):
             own.nodal[0, i, c] = v[i, c] - own.blown[0, c]

@@ -35,8 +35,8 @@ class CentralDifferenceAdjoint(Adjoint):
     def __init__(self, motion: Any) -> None:
         super().__init__(motion)
         packed, start = self._packed, motion.beginning
-        self._work = packed.body.workspaces(1)[0]
-        self._equation = EquationOfMotion(packed, self._work, self._scratch, start, None)
+        part = packed.body.thread_parts(1)[0]
+        self._equation = EquationOfMotion(packed, part, self._scratch, start, None)
         self._apart = max(1, int(ROOM / (3 * start.u.nbytes)))
         self._number, self._segment = -1, list[Evaluated]()
         self._by_a = np.zeros_like(start.u)

@@ -73,10 +73,10 @@ class EnergyMomentum(Scheme):
         body, touch = packed.body, None
         contact = body.find(ContactTerm)
         if contact is not None:
-            kept = body.kept(self.work, ContactTerm)
+            kept = body.kept(self.part, ContactTerm)
             touch = StepContact(contact, kept, packed.system.rows)
         self._contact, equation = touch, self.equation
-        self._terms = terms = MeanForces(body, self.work)
+        self._terms = terms = MeanForces(body, self.part)
         self._step = Context(
             Step(
                 equation.case.value, terms.context, terms.kernel, terms.powers, self.old, self.new,

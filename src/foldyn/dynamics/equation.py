@@ -9,7 +9,7 @@ are built in, because calls cost time.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,11 +44,12 @@ from foldyn.mechanics.term import (
     LIMIT,
     NUMBER,
     Model,
+    Terms,
     forces_of,
     obstacles_to,
     states_of,
 )
-from foldyn.mechanics.threads import Team, largest, part, total, wait
+from foldyn.mechanics.threads import Team, ThreadPart, largest, part, total, wait
 
 DONE, NOT_FINITE = int(Outcome.DONE), int(Outcome.NOT_FINITE)
 PENETRATION = int(Outcome.PENETRATION)
@@ -284,7 +285,7 @@ def accelerate(handle, q, w, t, out):
 
 @kernel
 def write(handle, q, w, t, a):
-    """Write the next sample at time t; a (n, 3) is a work array."""
+    """Write the next sample at time t; a (n, 3) is scratch."""
     acceleration(handle, q, w, t, a)
     return sample(handle, q, w, a, t)
 
@@ -296,7 +297,8 @@ class EquationOfMotion:
     Parameters
     ----------
     packed : Packed
-    work : memory of the thread, one of `Assembly.workspaces`
+    own : ThreadPart
+        One of `Assembly.thread_parts`.
     s : Scratch
     course : Course
     slows : bool, optional
@@ -311,17 +313,17 @@ class EquationOfMotion:
     """
 
     def __init__(
-        self, packed: Packed, work: Any, s: Scratch, course: Course, slows: bool | None
+        self, packed: Packed, own: ThreadPart, s: Scratch, course: Course, slows: bool | None
     ) -> None:
         limited = slows is not None
         called = [kind for kind in EVERY if limited or kind != LIMIT]
         system, self._course = packed.system, course
-        self._model = model = Model(packed.body, work, called)
-        self.case = case = _thread_case(packed, model, s)
+        self._model = model = Model(packed.body, own, called)
+        self.case = case = _thread_case(packed, own, model.terms, s)
         self._heat = packed.heat and Context(
             Warm(packed.heat, s.displacement, s.factor, np.zeros(system.energies))
         )
-        self._slow = slow = slow_contacts(packed, work, case.value) if slows else None
+        self._slow = slow = slow_contacts(packed, own, case.value) if slows else None
         remembers = model.terms.kernel[:, ADVANCE_CLOCK].any()
         self.still = Context(
             LoopHandle(
@@ -361,14 +363,13 @@ class EquationOfMotion:
         return self._sampled
 
 
-def _thread_case(packed: Packed, model: Model, s: Scratch) -> Context:
-    """Context of a case on a thread; its terms are those of the model."""
-    system, mass, added, share = packed.system, packed.mass, packed.added, model.share
+def _thread_case(packed: Packed, own: ThreadPart, terms: Terms, s: Scratch) -> Context:
+    """Context of a case on a thread."""
+    system, mass, added = packed.system, packed.mass, packed.added
     drag = 0.0 if added.acts else system.alpha
     case = ThreadCase(
-        model.terms, system, mass, added, s, share.angle, share.fold_angle, share.strips.own,
-        share.team, drag,
-    )  # fmt: skip
+        terms, system, mass, added, s, own.angle, own.fold_angle, own.own, own.team, drag
+    )
     at = Context(case)  # of the type that the parts are compiled for
     solve = parts.solve_constrained if len(mass.ties.slave) else parts.solve
     solve = solve_with_fluid if added.acts else solve

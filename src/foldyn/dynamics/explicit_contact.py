@@ -5,7 +5,7 @@ Optional parts of the equation of motion (`equation`): their address is 0 if unu
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from foldyn.dynamics.parts import ThreadCase, kinetic
 from foldyn.dynamics.slow_contacts import slow_down
@@ -17,6 +17,7 @@ from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.inertia import Added, added_inertia, room_for
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.term import ADDRESS, NUMBER, limit_of
+from foldyn.mechanics.threads import ThreadPart
 
 
 class SlowContacts(NamedTuple):
@@ -84,7 +85,7 @@ def slow_contacts_down(handle, w, a):
         run_at(handle.slow_down, (handle.slow, w, a))
 
 
-def slow_contacts(packed: Packed, work: Any, case: ThreadCase) -> Context | None:
+def slow_contacts(packed: Packed, part: ThreadPart, case: ThreadCase) -> Context | None:
     """Context of slow contacts; None if their inertia would resist supports or planes.
 
     Boards have none either, as their contacts involve more nodes.
@@ -92,7 +93,7 @@ def slow_contacts(packed: Packed, work: Any, case: ThreadCase) -> Context | None
     system, body, contact = packed.system, packed.body, packed.body.find(ContactTerm)
     if contact is None or not contact.eased or system.moves or system.presses:
         return None
-    tables, memory = contact.tables, body.kept(work, ContactTerm)
+    tables, memory = contact.tables, body.kept(part, ContactTerm)
     return Context(SlowContacts(case, tables, memory, room_for(tables, memory)))
 
 

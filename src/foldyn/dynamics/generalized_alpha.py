@@ -150,7 +150,7 @@ class Alpha(Scheme):
             damped, to_air = _taken(self.context)
             lost += damped
         if system.turns:
-            done += _actuation(self.context, self.folds, self.work.fold_angle)
+            done += _actuation(self.context, self.folds, self.part.fold_angle)
         return done, lost, to_air
 
     def change(self, h: float) -> NDArray:

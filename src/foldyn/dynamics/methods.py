@@ -70,29 +70,29 @@ class Compiled:
     ) -> None:  # fmt: skip
         self._loop, self._packed, self._course, self._plan = loop, packed, course, plan
         self._further = further
-        self._works = packed.body.workspaces(threads)
-        self._memories = scratches(packed.system, self._works)
+        self._threads = packed.body.thread_parts(threads)
+        self._scratches = scratches(packed.system, self._threads)
         self._equations = [
-            EquationOfMotion(packed, work, memory, course, slows)
-            for work, memory in zip(self._works, self._memories, strict=True)
+            EquationOfMotion(packed, own, scratch, course, slows)
+            for own, scratch in zip(self._threads, self._scratches, strict=True)
         ]
-        self.threads = len(self._works)
+        self.threads = len(self._threads)
 
     def start_with(self, powers: NDArray) -> None:
         """Set the powers (2,) in and out, W, of the last step."""
-        for memory in self._memories:
-            memory.powers[:2] = powers if memory is self._memories[0] else 0.0
+        for scratch in self._scratches:
+            scratch.powers[:2] = powers if scratch is self._scratches[0] else 0.0
 
     @property
     def powers(self) -> NDArray:
         """Powers (3,) in, out and to the air, W, at the last step."""
-        return np.sum([memory.powers for memory in self._memories], axis=0)
+        return np.sum([scratch.powers for scratch in self._scratches], axis=0)
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
         case = self._course, self._plan, out.end, stretch, *self._further
         arguments = [(equation.sampled(out), *case) for equation in self._equations]
-        return run_together(self._loop, [work.team for work in self._works], arguments)[0]
+        return run_together(self._loop, [own.team for own in self._threads], arguments)[0]
 
     def accelerate(self) -> None:
         """Recompute the current acceleration, for methods that store it."""
@@ -108,17 +108,17 @@ class Compiled:
         restore(self._parts(), arrays)
 
     def _parts(self) -> dict[str, Any]:
-        contact = [self._packed.body.kept(work, ContactTerm) or () for work in self._works]
-        powers = [memory.powers for memory in self._memories]
+        contact = [self._packed.body.kept(own, ContactTerm) or () for own in self._threads]
+        powers = [scratch.powers for scratch in self._scratches]
         parts = state_parts(self._packed, self._course) | {"powers": powers, "contact": contact}
         if self._packed.system.touches:  # the step limit uses the end of the last step
-            whole = self._memories[0]
-            parts["seen"] = [self._works[0].angle, whole.displacement, whole.velocity]
+            whole = self._scratches[0]
+            parts["seen"] = [self._threads[0].angle, whole.displacement, whole.velocity]
         return parts
 
     def facts(self) -> dict[str, Any]:
         """Statistics for the result's attributes: contact lists, shortest contact step."""
-        kept = self._packed.body.kept(self._works[0], ContactTerm)
+        kept = self._packed.body.kept(self._threads[0], ContactTerm)
         if kept is None:
             return {}
         shortest = float(kept.facts.shortest)

@@ -173,8 +173,8 @@ class RungeKuttaAdjoint(Adjoint):
         packed, system = self._packed, self._system
         self._steps, self._inertia = Context(self._plan), Context(packed.mass)
         self._moved, self._out = Context(system.moved), Context(self._by)
-        self._work = packed.body.workspaces(1)[0]
-        self._equation = EquationOfMotion(packed, self._work, self._scratch, motion.course, None)
+        part = packed.body.thread_parts(1)[0]
+        self._equation = EquationOfMotion(packed, part, self._scratch, motion.course, None)
         self._times = samples["time"].values
         self._states = tuple(
             samples[name].transpose("time", "node", "axis").values

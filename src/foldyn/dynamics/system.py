@@ -39,6 +39,7 @@ from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.following import Following, joined
 from foldyn.mechanics.heat import Heat
+from foldyn.mechanics.threads import ThreadPart
 
 ROUNDING = 1e-14  # of support motion: smaller motions of other nodes are zero
 
@@ -76,7 +77,7 @@ class System(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Work arrays for one evaluation of the equation of motion.
+    """Scratch of the equation of motion on one thread.
 
     Threads share them, except for histories, powers, `line`, and the ranges of their own nodes.
     """
@@ -233,7 +234,7 @@ def _moved_mass(mass: sparse.csr_array, moves, histories) -> NDArray:
 
 
 def scratch(system: System) -> Scratch:
-    """Work arrays for a single thread."""
+    """Scratch of a single thread."""
     nodes, histories = system.rows, len(system.waves.code)
     force, product, displacement, velocity, moving = np.zeros((5, nodes, 3))
     line = np.zeros(3 * nodes if len(system.ties.slave) else nodes)
@@ -249,8 +250,8 @@ def scratch(system: System) -> Scratch:
     )  # fmt: skip
 
 
-def scratches(system: System, works: Sequence[Any]) -> list[Scratch]:
-    """Work arrays for each thread of a team."""
+def scratches(system: System, threads: Sequence[ThreadPart]) -> list[Scratch]:
+    """Scratch of each thread of a team."""
     whole = scratch(system)
     return [
         whole._replace(
@@ -258,11 +259,11 @@ def scratches(system: System, works: Sequence[Any]) -> list[Scratch]:
             time=whole.time.copy(),
             factor=whole.factor.copy(),
             line=np.empty_like(whole.line),
-            loads=np.searchsorted(system.loads.dof, 3 * work.strips.own),
-            moved=np.searchsorted(system.moved.dof, 3 * work.strips.own),
-            turned=np.searchsorted(system.actuators.lowest, work.strips.own),
+            loads=np.searchsorted(system.loads.dof, 3 * part.own),
+            moved=np.searchsorted(system.moved.dof, 3 * part.own),
+            turned=np.searchsorted(system.actuators.lowest, part.own),
         )
-        for work in works
+        for part in threads
     ]
 
 

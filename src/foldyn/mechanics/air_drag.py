@@ -124,9 +124,9 @@ class AirDragTerm(Term):
         """The drag in a wind that follows row `row` of these histories."""
         return AirDragTerm(self.air, self.half, row, histories)
 
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
         """Context and kernels for a thread; see `Term`."""
-        rows = int(work.strips.own[1])
+        rows = int(part.own[1])
         own = Context(_Context(self.air, self.half, self.row, self.histories, rows))
         kernels = {FORCES: _forces} | ({PLACE_OBSTACLES: _place} if self.histories else {})
         return Compiled(own, kernels)

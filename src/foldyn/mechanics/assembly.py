@@ -38,24 +38,13 @@ from foldyn.mechanics.term import (
     evaluate,
     in_rows,
 )
-from foldyn.mechanics.threads import Team
+from foldyn.mechanics.threads import ThreadPart
 
 ITERATIONS = 50
 BALANCED = 1e-13  # rad, last Newton step for hidden dofs
 LEAST_SLOPE = 1e-3  # of a fold's stiffness, in these steps
 
 Kind = TypeVar("Kind", bound=Term)
-
-
-class Work(NamedTuple):
-    """Work arrays of a thread."""
-
-    sheet: Any  # of the sheet's kernels
-    angle: NDArray  # (nh,) dihedrals of all hinges at the last force evaluation, rad
-    fold_angle: NDArray  # dihedrals of actuated hinges
-    strips: Any
-    team: Team
-    kept: tuple[Any, ...]  # of the other terms
 
 
 class Assembly:
@@ -173,8 +162,8 @@ class Assembly:
     @cached_property
     def _evaluated(self) -> Model:
         """Model for single evaluations from Python."""
-        work = self._work(1, [term.memory for term in self.others])[0]
-        return Model(self, work, [FORCES])
+        part = self._parts(1)[0]._replace(kept=tuple(term.memory for term in self.others))
+        return Model(self, part, [FORCES])
 
     def _at(self, q: NDArray, energy: NDArray) -> NDArray:
         """Internal forces (m,) at q; fills `energy` by group unless it is empty."""
@@ -240,44 +229,41 @@ class Assembly:
         return AssembledBlocks(self)
 
     # ------------------------------------------------------------------ what is compiled
-    def workspaces(self, threads: int) -> list[Work]:
-        """Work arrays for each thread, possibly for fewer threads than requested."""
-        return self._work(threads)
+    def thread_parts(self, threads: int) -> list[ThreadPart]:
+        """The part of each thread in a motion; maybe of fewer threads than requested."""
+        parts = self._parts(threads)
+        kept = [term.memories(parts) for term in self.others]
+        return [part._replace(kept=tuple(own[k] for own in kept)) for k, part in enumerate(parts)]
 
-    def _work(self, threads: int, kept: Sequence[Any] | None = None) -> list[Work]:
-        """Work arrays, with the given memory of each term or new memory."""
+    def _parts(self, threads: int) -> list[ThreadPart]:
+        """These parts without the memory of terms."""
         alone = not all(term.shared for term in self.terms)
-        works: Sequence[Any] = self.sheet.workspaces(1 if alone else threads)
-        angles = [work.angle for work in works]
-        count = sum(len(term.hinges) for term in self.others)
-        if count:  # their dihedrals follow, as in a model of bars and hinges alone
-            angles = [np.empty(len(angles[0]) + count)]
-            own = angles[0][:-count]
-            works = [works[0]._replace(angle=own, fold_angle=own)]
-        if kept is None:
-            columns = [term.memories(works) for term in self.others]
-        else:
-            columns = [[memory] for memory in kept]
-        rows = zip(*columns, strict=True) if columns else [()] * len(works)
-        return [
-            Work(work, angle, work.fold_angle, work.strips, work.team, tuple(row))
-            for work, angle, row in zip(works, angles, rows, strict=True)
+        found = [
+            ThreadPart(own.team, own.own, own.angle, own.fold_angle, own)
+            for own in self.sheet.scratches(1 if alone else threads)
         ]
+        count = sum(len(term.hinges) for term in self.others)
+        if not count:
+            return found
+        angle = np.empty(len(found[0].angle) + count)  # the others follow the sheet's hinges
+        own = angle[:-count]
+        scratch = found[0].scratch._replace(angle=own, fold_angle=own)
+        return [found[0]._replace(angle=angle, fold_angle=own, scratch=scratch)]
 
-    def compiled(self, work: Work) -> list[Compiled]:
-        """Compiled terms for a thread with these work arrays."""
-        found, group = [self.sheet.compiled(work, work.sheet, 0)], len(self.sheet.energy_groups)
-        for term, kept in zip(self.others, work.kept, strict=True):
-            found.append(term.compiled(work, kept, group))
+    def compiled(self, part: ThreadPart) -> list[Compiled]:
+        """Compiled terms for a thread."""
+        found, group = [self.sheet.compiled(part, part.scratch, 0)], len(self.sheet.energy_groups)
+        for term, kept in zip(self.others, part.kept, strict=True):
+            found.append(term.compiled(part, kept, group))
             group += len(term.energy_groups)
         for term, one in zip(self.terms, found, strict=True):
             if FORCES not in one.kernels or (term.energy_groups and ENERGIES not in one.kernels):
                 raise TypeError(f"{type(term).__name__} has no kernel for its forces or energies")
         return found
 
-    def kept(self, work: Work, kind: type[Term]) -> Any:
-        """Memory of the term of a kind in a thread's work arrays; None without such a term."""
-        terms = zip(self.others, work.kept, strict=True)
+    def kept(self, part: ThreadPart, kind: type[Term]) -> Any:
+        """Memory of the term of a kind on a thread; None without such a term."""
+        terms = zip(self.others, part.kept, strict=True)
         return next((kept for term, kept in terms if isinstance(term, kind)), None)
 
     @property

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.discrete_gradient import add_bar_forces, add_hinge_forces
 from foldyn.mechanics.energy import strain_energies
-from foldyn.mechanics.force import Workspace, internal_force
+from foldyn.mechanics.force import ForceScratch, internal_force
 from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.term import (
     ENERGIES,
@@ -22,14 +22,14 @@ from foldyn.mechanics.term import (
 
 class _Context(NamedTuple):
     model: BarsHinges
-    work: Workspace
+    scratch: ForceScratch
     groups: int
 
 
 @forces
 def _forces(own, u, v, t, force, powers):
     rows = own.model.rest.shape[0]
-    internal_force(own.model, rows_at(u, rows), rows_at(force, rows), own.work)
+    internal_force(own.model, rows_at(u, rows), rows_at(force, rows), own.scratch)
 
 
 @energies
@@ -40,13 +40,13 @@ def _energies(own, u, out):
 
 @mean_forces
 def _mean_forces(own, u0, u1, before, h, t, force, powers):
-    rows, angle = own.model.rest.shape[0], own.work.angle
+    rows, angle = own.model.rest.shape[0], own.scratch.angle
     start, end, out = rows_at(u0, rows), rows_at(u1, rows), rows_at(force, rows)
     add_bar_forces(own.model, start, end, out)
     add_hinge_forces(own.model, start, end, numbers_at(before, angle.size), angle, out)
 
 
-def bars_hinges_kernels(model: BarsHinges, work: Workspace, groups: int) -> Compiled:
+def bars_hinges_kernels(model: BarsHinges, scratch: ForceScratch, groups: int) -> Compiled:
     """Compiled bars and hinges, with `groups` energy groups."""
-    own = Context(_Context(model, work, groups))
+    own = Context(_Context(model, scratch, groups))
     return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})

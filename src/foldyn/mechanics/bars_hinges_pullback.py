@@ -38,8 +38,8 @@ LAW = 7  # values per law, from `series_derivatives`
 TINY = 1e-280  # rad^2: below it the slope is 0
 
 
-class PullbackWork(NamedTuple):
-    """Work arrays for one evaluation."""
+class PullbackScratch(NamedTuple):
+    """Scratch of one evaluation."""
 
     points: NDArray  # (24 * BLOCK,) points of the nodes, then their weights
     rates: NDArray  # (26 * BLOCK,) of `dihedral_rates`
@@ -69,12 +69,12 @@ class Gradient(NamedTuple):
     bar_excess: NDArray  # (nb,)
 
 
-def pullback_work(nodes: int) -> PullbackWork:
-    """Work arrays for a model with `nodes` nodes."""
+def pullback_scratch(nodes: int) -> PullbackScratch:
+    """Scratch for a model with `nodes` nodes."""
     ones = np.ones(2 * BLOCK)
     ones[BLOCK:] = -1.0
     buffers = (np.zeros((nodes + 1, 4)) for _ in range(4))
-    return PullbackWork(
+    return PullbackScratch(
         np.zeros(24 * BLOCK), np.zeros(26 * BLOCK), np.zeros(LAW * BLOCK), ones, *buffers
     )
 
@@ -88,10 +88,10 @@ def _spread(rows, out):
 
 
 @inner
-def pull_bars(model, work, out):
-    """Add K w of the bars to work.sums, and their gradients to `out`."""
-    x, s, ones = work.points, work.law, work.ones
-    u, weight, sums = flat(work.displacement), flat(work.weight), flat(work.sums)
+def pull_bars(model, scratch, out):
+    """Add K w of the bars to scratch.sums, and their gradients to `out`."""
+    x, s, ones = scratch.points, scratch.law, scratch.ones
+    u, weight, sums = flat(scratch.displacement), flat(scratch.weight), flat(scratch.sums)
     bars, vector, by_vector = flat(model.bars), flat(model.bar_vector), flat(out.bar_vector)
     w, dx, d = x[6 * BLOCK :], x[12 * BLOCK :], x[15 * BLOCK :]
     stress, slope, wd = s[BLOCK:], s[2 * BLOCK :], s[3 * BLOCK :]
@@ -193,10 +193,10 @@ def _laws(model, code, address, low, high, first, m, angle, law):
 
 
 @inner
-def pull_hinges(model, work, out):
-    """Add K w of the hinges to work.sums, and their gradients except by `rest` to `out`."""
-    x, g, law, ones = work.points, work.rates, work.law, work.ones
-    position, weight, sums = flat(work.position), flat(work.weight), flat(work.sums)
+def pull_hinges(model, scratch, out):
+    """Add K w of the hinges to scratch.sums, and their gradients except by `rest` to `out`."""
+    x, g, law, ones = scratch.points, scratch.rates, scratch.law, scratch.ones
+    position, weight, sums = flat(scratch.position), flat(scratch.weight), flat(scratch.sums)
     hinges, p, by_p = flat(model.hinges), flat(model.hinge_parameters), flat(out.hinge_parameters)
     by_offset = flat(out.hinge_offset)
     for run in range(model.hinge_runs.shape[0]):
@@ -254,28 +254,28 @@ def pull_hinges(model, work, out):
 
 
 @inner
-def pull_bars_hinges(model, u, w, work, out, product):
+def pull_bars_hinges(model, u, w, scratch, out, product):
     """Add K w of the model at u to `product` (n, 3), and its gradients to `out`."""
     n = model.rest.shape[0]
-    _spread(u, work.displacement)
-    _spread(w, work.weight)
+    _spread(u, scratch.displacement)
+    _spread(w, scratch.weight)
     for i in range(n):
         for c in range(3):
-            work.position[i, c] = model.rest[i, c] + u[i, c]
-    work.sums[:] = 0.0
-    pull_hinges(model, work, out)
+            scratch.position[i, c] = model.rest[i, c] + u[i, c]
+    scratch.sums[:] = 0.0
+    pull_hinges(model, scratch, out)
     for i in range(n):  # hinges depend on the sum of rest and displacement
         for c in range(3):
-            out.rest[i, c] += work.sums[i, c]
-    pull_bars(model, work, out)
+            out.rest[i, c] += scratch.sums[i, c]
+    pull_bars(model, scratch, out)
     for i in range(n):
         for c in range(3):
-            product[i, c] += work.sums[i, c]
+            product[i, c] += scratch.sums[i, c]
 
 
 class _Context(NamedTuple):
     model: BarsHinges
-    work: PullbackWork
+    scratch: PullbackScratch
     out: Gradient
 
 
@@ -283,7 +283,7 @@ class _Context(NamedTuple):
 def _pullback(own, u, v, t, weight, product, rate):
     rows = own.model.rest.shape[0]
     moved, weights, out = rows_at(u, rows), rows_at(weight, rows), rows_at(product, rows)
-    pull_bars_hinges(own.model, moved, weights, own.work, own.out, out)
+    pull_bars_hinges(own.model, moved, weights, own.scratch, own.out, out)
 
 
 def gradient_of(model: BarsHinges) -> Gradient:
@@ -295,5 +295,5 @@ def gradient_of(model: BarsHinges) -> Gradient:
 def bars_hinges_pulled(model: BarsHinges) -> Pulled:
     """Pullback of bars and hinges."""
     out = gradient_of(model)
-    own = Context(_Context(model, pullback_work(len(model.rest)), out))
+    own = Context(_Context(model, pullback_scratch(len(model.rest)), out))
     return Pulled(own, _pullback, out._asdict())

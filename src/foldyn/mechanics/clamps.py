@@ -172,7 +172,7 @@ class Gradient(NamedTuple):
 class _Backward(NamedTuple):
     clamps: Clamps
     out: Gradient
-    points: NDArray  # (4, 3) work array: positions of one clamp, m
+    points: NDArray  # (4, 3) scratch: positions of one clamp, m
     moves: NDArray  # (4, 3) weights there
     rows: int  # number of rows up to the last node
 
@@ -248,9 +248,9 @@ class ClampsTerm(Term):
     def __init__(self, clamps: Clamps) -> None:
         self.clamps = clamps
 
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
         """Kernels for a thread; the clamps' dihedrals are last in its angles. See `Term`."""
-        own = Context(_Context(self.clamps, work.angle, int(work.strips.own[1])))
+        own = Context(_Context(self.clamps, part.angle, int(part.own[1])))
         return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     def arrays(self) -> Arrays:

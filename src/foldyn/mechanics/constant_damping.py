@@ -104,11 +104,11 @@ class DampingMatrix(Term):
     def __init__(self, matrix: sparse.csr_array) -> None:
         self.matrix = matrix
 
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
         """Context and kernels for a thread; see `Term`."""
         start, column = self.matrix.indptr.astype(np.int64), self.matrix.indices.astype(np.int64)
-        rows = np.asarray(work.strips.own)
-        own = _Matrix(start, column, self.matrix.data, rows, work.team)
+        rows = np.asarray(part.own)
+        own = _Matrix(start, column, self.matrix.data, rows, part.team)
         return Compiled(Context(own), {FORCES: _of_matrix})
 
     def arrays(self) -> Arrays:
@@ -146,7 +146,7 @@ class DampingRows(Term):
     def __init__(self, rows: NDArray) -> None:
         self.rows = rows
 
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
         """Context and kernels for a thread; see `Term`."""
         return Compiled(Context(_Rows(self.rows)), {FORCES: _of_rows})
 

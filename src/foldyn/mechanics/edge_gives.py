@@ -46,7 +46,7 @@ class EdgeGives(NamedTuple):
     number: NDArray  # (p, k) indices of the gives
     across: NDArray  # (p, b, k) A, J/m
     stiffness: NDArray  # (p, k, k) K, N/m
-    strain: NDArray  # (b,) work array of one panel
+    strain: NDArray  # (b,) scratch of one panel
     along: NDArray  # (b, 3) vectors of its bars, m
 
     @property
@@ -126,7 +126,7 @@ def solve_factor(factor, x):
 
 @inner
 def strain_panel(gives, u, p):
-    """Compute strains and vectors of the bars of panel p, into its work arrays."""
+    """Compute strains and vectors of the bars of panel p, into its scratch."""
     for i in range(gives.strain.size):
         a, b = gives.nodes[p, gives.ends[p, i, 0]], gives.nodes[p, gives.ends[p, i, 1]]
         excess = 0.0
@@ -139,7 +139,7 @@ def strain_panel(gives, u, p):
 
 @inner
 def add_pulls(gives, p, g, share, force):
-    """Add a share of the nodal forces of panel p, along the vectors in its work arrays."""
+    """Add a share of the nodal forces of panel p, along the vectors in its scratch."""
     for i in range(gives.strain.size):
         pull = 0.0
         for k in range(gives.number.shape[1]):

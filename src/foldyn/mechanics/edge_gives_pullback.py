@@ -51,7 +51,7 @@ class _Context(NamedTuple):
 
 @inner
 def pull_panel(gives, p, weight, g, h, out, product, by_g):
-    """Add the derivatives for panel p, whose strains and vectors are in its work arrays."""
+    """Add the derivatives for panel p, whose strains and vectors are in its scratch."""
     for i in range(gives.strain.size):
         a, b = gives.nodes[p, gives.ends[p, i, 0]], gives.nodes[p, gives.ends[p, i, 1]]
         excess, growth, stress, back = 0.0, 0.0, 0.0, 0.0

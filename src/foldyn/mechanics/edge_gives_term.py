@@ -33,7 +33,7 @@ class EdgeGivesTerm(Term):
     def __init__(self, gives: EdgeGives, rows: int, first: int) -> None:
         self.gives, self.rows, self.first = gives, rows, first
 
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
         """Context and kernels for a thread; see `Term`."""
         return gives_kernels(self.gives, self.rows, self.first)
 
@@ -92,7 +92,7 @@ class BalancedGivesTerm(EdgeGivesTerm):
 
     owns_hidden: ClassVar[bool] = False
 
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
         """Context and kernels for a thread; see `Term`."""
         return balanced_kernels(self.gives, self.rows)
 

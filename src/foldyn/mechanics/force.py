@@ -33,8 +33,8 @@ LINE = 8  # numbers in a cache line
 SHIFT = 5 * LINE  # between scratch arrays: a multiple of 4096 bytes would cause cache conflicts
 
 
-class Workspace(NamedTuple):
-    """Work arrays of the force kernels on one thread, allocated once for all evaluations."""
+class ForceScratch(NamedTuple):
+    """Scratch of the force kernels on one thread, made once for all evaluations."""
 
     points: NDArray  # (12 * BLOCK,)
     gradient: NDArray  # (13 * BLOCK,), the last row the angle
@@ -47,40 +47,38 @@ class Workspace(NamedTuple):
     strips: Strips
     team: Team
 
+    @property
+    def own(self) -> NDArray:
+        """First and last + 1 of the nodes whose force the thread finishes."""
+        return self.strips.own
 
-def workspace(model: BarsHinges) -> Workspace:
-    """Work arrays for `model` on one thread."""
-    return workspaces(model, 1)[0]
+
+def force_scratch(model: BarsHinges) -> ForceScratch:
+    """Scratch for `model` on one thread."""
+    return force_scratches(model, 1)[0]
 
 
-def workspaces(model: BarsHinges, threads: int) -> list[Workspace]:
-    """Work arrays of each thread; fewer than requested if the model cannot be split so far."""
+def force_scratches(model: BarsHinges, threads: int) -> list[ForceScratch]:
+    """Scratch of each thread; of fewer than requested if the model cannot be split so far."""
     parts = strips(model, threads)
     angle = np.empty(len(model.hinges))
     return [
-        Workspace(**_scratch(part.rows), angle=angle, fold_angle=angle, strips=part, team=member)
+        ForceScratch(*_aligned(part.rows), angle, angle, part, member)
         for part, member in zip(parts, team(len(parts)), strict=True)
     ]
 
 
-def _scratch(rows: int) -> dict[str, NDArray]:
-    """Scratch arrays that start at cache lines."""
-    shapes = {
-        "points": (12 * BLOCK,),
-        "gradient": (13 * BLOCK,),
-        "value": (2 * BLOCK,),
-        "position": (rows, 4),
-        "displacement": (rows, 4),
-        "sums": (rows, 4),
-    }
-    sizes = [math.prod(shape) for shape in shapes.values()]
+def _aligned(rows: int) -> list[NDArray]:
+    """The first six arrays, each from the start of a cache line."""
+    shapes = [(12 * BLOCK,), (13 * BLOCK,), (2 * BLOCK,), (rows, 4), (rows, 4), (rows, 4)]
+    sizes = [math.prod(shape) for shape in shapes]
     starts = np.cumsum([0, *(math.ceil(size / LINE) * LINE + SHIFT for size in sizes)])
     room = np.zeros(starts[-1] + LINE)  # lanes beyond a block's end are computed too
     room = room[-room.ctypes.data % (8 * LINE) // 8 :]
-    return {
-        name: room[start : start + size].reshape(shape)
-        for (name, shape), start, size in zip(shapes.items(), starts[:-1], sizes, strict=True)
-    }
+    return [
+        room[start : start + size].reshape(shape)
+        for shape, start, size in zip(shapes, starts[:-1], sizes, strict=True)
+    ]
 
 
 @inner_scalar
@@ -141,13 +139,13 @@ def elements_of(nodes, width, run, low, high, n):
 
 
 @inner
-def add_bar_forces(model, low, high, work):
-    """Add the forces of the bars with lowest nodes from low to high to work.sums."""
-    x, s, mask = work.points, work.value, work.strips.mask
-    u, sums = flat(work.displacement), flat(work.sums)
+def add_bar_forces(model, low, high, scratch):
+    """Add the forces of the bars with lowest nodes from low to high to scratch.sums."""
+    x, s, mask = scratch.points, scratch.value, scratch.strips.mask
+    u, sums = flat(scratch.displacement), flat(scratch.sums)
     bars, vector = flat(model.bars), flat(model.bar_vector)
     per_length2, stiffness = model.bar_per_length2, model.bar_stiffness
-    far = work.strips.lowest.shape[0] > 1
+    far = scratch.strips.lowest.shape[0] > 1
     for run in range(model.bar_runs.shape[0]):
         code = model.bar_runs[run, 2]
         address = model.addresses[model.bar_runs[run, 3], 1]
@@ -249,17 +247,17 @@ def hinge_moments(code, address, stiffness, rest, p, share, offset, first, m, an
 
 
 @inner
-def add_hinge_forces(model, low, high, work):
-    """Add the forces of the hinges with lowest nodes from low to high to work.sums.
+def add_hinge_forces(model, low, high, scratch):
+    """Add the forces of the hinges with lowest nodes from low to high to scratch.sums.
 
-    Writes their dihedrals to work.angle.
+    Writes their dihedrals to scratch.angle.
     """
-    x, g, value, mask = work.points, work.gradient, work.value, work.strips.mask
-    position, sums, hinges = flat(work.position), flat(work.sums), flat(model.hinges)
-    stiffness, rest, kept = model.hinge_stiffness, model.hinge_rest, work.angle
+    x, g, value, mask = scratch.points, scratch.gradient, scratch.value, scratch.strips.mask
+    position, sums, hinges = flat(scratch.position), flat(scratch.sums), flat(model.hinges)
+    stiffness, rest, kept = model.hinge_stiffness, model.hinge_rest, scratch.angle
     p, angle = flat(model.hinge_parameters), g[12 * BLOCK :]
     share, offset = model.hinge_share, flat(model.hinge_offset)
-    far = work.strips.lowest.shape[0] > 1
+    far = scratch.strips.lowest.shape[0] > 1
     for run in range(model.hinge_runs.shape[0]):
         code = model.hinge_runs[run, 2]
         address = model.addresses[model.hinge_runs[run, 3]]
@@ -306,10 +304,11 @@ def add_hinge_forces(model, low, high, work):
 
 
 @inner_scalar
-def place(at_rest, u, work, start, end):
+def place(at_rest, u, scratch, start, end):
     """Put the nodes start to end, flat rows of three, into the buffers with rows of four."""
-    mask, last = np.uint32(work.strips.mask), at_rest.size // 3 - 1
-    position, displacement, sums = flat(work.position), flat(work.displacement), flat(work.sums)
+    mask, last = np.uint32(scratch.strips.mask), at_rest.size // 3 - 1
+    position, displacement = flat(scratch.position), flat(scratch.displacement)
+    sums = flat(scratch.sums)
     for i in range(start, min(end, last)):
         node = np.uint32(i)  # unsigned: no wraparound test
         at, row = 3 * node, 4 * (node & mask)
@@ -329,9 +328,9 @@ def place(at_rest, u, work, start, end):
 
 
 @inner_scalar
-def finish(force, work, start, end):
+def finish(force, scratch, start, end):
     """Copy the sums of the nodes start to end from the buffer to flat rows of three."""
-    mask, sums = np.uint32(work.strips.mask), flat(work.sums)
+    mask, sums = np.uint32(scratch.strips.mask), flat(scratch.sums)
     for i in range(start, end - 1):
         node = np.uint32(i)
         at, row = 3 * node, 4 * (node & mask)
@@ -340,42 +339,42 @@ def finish(force, work, start, end):
         force[at], force[at + 1], force[at + 2], force[at + 3] = a, b, c, d
     for i in range(max(start, end - 1), end):
         for c in range(3):
-            force[3 * i + c] = sums[4 * (i & work.strips.mask) + c]
+            force[3 * i + c] = sums[4 * (i & scratch.strips.mask) + c]
 
 
 @inner_scalar
-def finish_edge(force, work, start, end):
+def finish_edge(force, scratch, start, end):
     """Add the sums of the nodes start to end to the sums of an edge strip."""
-    mask, sums = work.strips.mask, flat(work.sums)
+    mask, sums = scratch.strips.mask, flat(scratch.sums)
     for i in range(start, end):
         for c in range(3):
             force[3 * i + c] += sums[4 * (i & mask) + c]
 
 
 @inlined
-def strip_force(model, s, u, force, work):
-    """Force (n, 3) on the nodes work.strips.finished[s], for each strip s in turn.
+def strip_force(model, s, u, force, scratch):
+    """Force (n, 3) on the nodes scratch.strips.finished[s], for each strip s in turn.
 
-    Members of a team must `wait` for each other before strip work.strips.edge.
+    Members of a team must `wait` for each other before strip scratch.strips.edge.
     """
-    plan = work.strips
-    place(flat(model.rest), flat(u), work, plan.fresh[s, 0], plan.fresh[s, 1])
-    add_bar_forces(model, plan.lowest[s, 0], plan.lowest[s, 1], work)
-    add_hinge_forces(model, plan.lowest[s, 0], plan.lowest[s, 1], work)
+    plan = scratch.strips
+    place(flat(model.rest), flat(u), scratch, plan.fresh[s, 0], plan.fresh[s, 1])
+    add_bar_forces(model, plan.lowest[s, 0], plan.lowest[s, 1], scratch)
+    add_hinge_forces(model, plan.lowest[s, 0], plan.lowest[s, 1], scratch)
     if plan.adds[s]:
-        finish_edge(flat(force), work, plan.finished[s, 0], plan.finished[s, 1])
+        finish_edge(flat(force), scratch, plan.finished[s, 0], plan.finished[s, 1])
     else:
-        finish(flat(force), work, plan.finished[s, 0], plan.finished[s, 1])
+        finish(flat(force), scratch, plan.finished[s, 0], plan.finished[s, 1])
 
 
 @inlined
-def internal_force(model, u, force, work):
-    """Internal force (n, 3), N, at displacement u (n, 3), m; dihedrals go to work.angle.
+def internal_force(model, u, force, scratch):
+    """Internal force (n, 3), N, at displacement u (n, 3), m; dihedrals go to scratch.angle.
 
-    A team member computes the force on its own nodes, work.strips.own; u must be complete before
+    A team member computes the force on its own nodes, scratch.strips.own; u must be complete before
     any member starts, and a member may change u on its own nodes once it is done.
     """
-    for s in range(work.strips.lowest.shape[0]):
-        if s == work.strips.edge:
-            wait(work.team)
-        strip_force(model, s, u, force, work)
+    for s in range(scratch.strips.lowest.shape[0]):
+        if s == scratch.strips.edge:
+            wait(scratch.team)
+        strip_force(model, s, u, force, scratch)

@@ -70,7 +70,7 @@ class MemoryHinges(NamedTuple):
     stored: NDArray  # (h,) energy of the branches, J
     lost: NDArray  # (2,) energy dissipated up to the last accepted step, and since, J
     elapsed: NDArray  # (1,) time since then, s
-    gradient: NDArray  # (14,) work array of one hinge
+    gradient: NDArray  # (14,) scratch of one hinge
 
 
 @inner_scalar
@@ -148,7 +148,7 @@ def add_mean_memory_forces(own, offset, start, end, h, out):
 
 @inner
 def _mean_gradient(own, e, start, end, turn, motion, points, gradient):
-    """`discrete_gradient` (4, 3) of a hinge with a turn; motion, points : (2, 4, 3) work arrays.
+    """`discrete_gradient` (4, 3) of a hinge with a turn; motion, points : (2, 4, 3) scratch.
 
     points : outputs, positions A x and the gradient of the dihedral there.
     """

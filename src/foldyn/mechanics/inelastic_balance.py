@@ -89,9 +89,9 @@ class BalancedMemory(HingeMemory):
         super().__init__(own, settles, sheet)
         self._sheet = sheet
 
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
         """Context and kernels for a thread; see `Term`."""
-        found = super().compiled(work, kept, group)
+        found = super().compiled(part, kept, group)
         return Compiled(found.context, {**found.kernels, FORCES: _forces})
 
     def start(self, q: NDArray, state: NDArray | str | None = None) -> None:

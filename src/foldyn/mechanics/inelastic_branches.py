@@ -95,7 +95,7 @@ class HingeMemory(Term):
         return rates
 
     # ------------------------------------------------------------------ as a term
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
         """See `Term`; the energy belongs to groups of the sheet."""
         return memory_kernels(self.own, self._offset, self._rows, group)
 

@@ -70,7 +70,7 @@ def increase(array, at, more):
 def add_bars(model, u, force, value, strain):
     """Add the forces of the bars at u to `force`, both (3 n WIDTH,).
 
-    value (WIDTH,) is a work array. Adds strain energies (J) to strain[0], unless it is empty.
+    value (WIDTH,) is scratch. Adds strain energies (J) to strain[0], unless it is empty.
     """
     for run in range(model.bar_runs.shape[0]):
         code = model.bar_runs[run, 2]
@@ -107,7 +107,7 @@ def add_hinges(model, position, force, angles, wrong, value, strain):
     """Add the forces of the hinges at the positions to `force`, both (3 n WIDTH,).
 
     Updates the angles, and marks models in which a hinge has passed through 0 or 360 degrees since
-    as `wrong` (WIDTH,). value (WIDTH,) is a work array. Adds strain energies (J) of group g to
+    as `wrong` (WIDTH,). value (WIDTH,) is scratch. Adds strain energies (J) of group g to
     strain[1 + g], unless it is empty.
     """
     hinges, p = model.hinges, model.hinge_parameters

@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 from foldyn.jit.compiled import Addressed
 from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.assembly import Assembly, Work
+from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.term import ENERGIES, FORCES, MEAN_FORCES, Compiled, Term, mean_forces
+from foldyn.mechanics.threads import ThreadPart
 
 NOISE = 16.0 * float(np.finfo(float).eps)  # of an energy: smaller differences are rounding errors
 
@@ -93,9 +94,9 @@ class MeanForces:
         Powers that forces without energy put in, dissipate and lose to the air, W.
     """
 
-    def __init__(self, body: Assembly, work: Work) -> None:
+    def __init__(self, body: Assembly, part: ThreadPart) -> None:
         self.powers, self._body = np.zeros(3), body
-        pairs = zip(body.terms, body.compiled(work), strict=True)
+        pairs = zip(body.terms, body.compiled(part), strict=True)
         self._held = [
             (own.context, *self._of(term, own))
             for term, own in pairs

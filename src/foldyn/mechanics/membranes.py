@@ -403,9 +403,9 @@ class MembranesTerm(Term):
     def __init__(self, membranes: Membranes, rows: int) -> None:
         self.membranes, self.rows = membranes, rows
 
-    def memories(self, works: Sequence[Any]) -> list[Packed]:
+    def memories(self, parts: Sequence[Any]) -> list[Packed]:
         """See `Term`: each thread has the panels that its nodes belong to."""
-        nodes, ends = self.membranes.nodes, [work.strips.own for work in works]
+        nodes, ends = self.membranes.nodes, [part.own for part in parts]
         here = [np.any((nodes >= low) & (nodes < high), axis=1) for low, high in ends]
         return [packed(taken(self.membranes, np.flatnonzero(own))) for own in here]
 
@@ -414,10 +414,10 @@ class MembranesTerm(Term):
         """See `Term`."""
         return packed(self.membranes)
 
-    def compiled(self, work: Any, kept: Packed, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Packed, group: int) -> Compiled:
         """See `Term`."""
-        low, high = (int(end) for end in work.strips.own)
-        context = _Context(kept, self.membranes, low, high, self.rows, work.team)
+        low, high = (int(end) for end in part.own)
+        context = _Context(kept, self.membranes, low, high, self.rows, part.team)
         return Compiled(
             Context(context), {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
         )

@@ -30,14 +30,13 @@ from foldyn.mechanics.discrete_gradient import (
     put_motion,
 )
 from foldyn.mechanics.energy import strain_energies
-from foldyn.mechanics.force import Workspace, internal_force, workspace
+from foldyn.mechanics.force import ForceScratch, force_scratch, internal_force
 from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
     MEAN_FORCES,
     Compiled,
-    Whole,
     energies,
     forces,
     mean_forces,
@@ -82,32 +81,32 @@ class BarsPlates(NamedTuple):
         return self.nodes + -(-self.rotations // 3)
 
 
-class PlatesWork(NamedTuple):
-    """Memory of one evaluation; nh = nf + nb."""
+class PlatesScratch(NamedTuple):
+    """Scratch of one evaluation; nh = nf + nb."""
 
-    bars: Workspace
+    bars: ForceScratch
     angle: NDArray  # (nh,) dihedrals, rad
     gradient: NDArray  # (nh, 12)
     moment: NDArray  # (nh,) N m
     fold_angle: NDArray  # (nf,) rad
     slope: NDArray  # (nf,) of the folds' law
     turn: NDArray  # (the most angles of a plate,) rad
-    strips: Whole
+    own: NDArray  # (2,) first and last + 1 of the rows
     team: Team
 
 
-def plates_work(model: BarsPlates) -> PlatesWork:
-    """Memory for `model`."""
+def plates_scratch(model: BarsPlates) -> PlatesScratch:
+    """Scratch for `model`."""
     nh, nf = len(model.hinges), len(model.fold_rest)
     most = int(np.diff(model.start).max(initial=0))
-    return PlatesWork(
-        workspace(model.bars), np.zeros(nh), np.zeros((nh, 12)), np.zeros(nh),
-        np.zeros(nf), np.zeros(nf), np.zeros(most), Whole(np.array([0, model.rows])), team(1)[0],
+    return PlatesScratch(
+        force_scratch(model.bars), np.zeros(nh), np.zeros((nh, 12)), np.zeros(nh),
+        np.zeros(nf), np.zeros(nf), np.zeros(most), np.array([0, model.rows]), team(1)[0],
     )  # fmt: skip
 
 
 @kernel
-def turn_hinges(model, u, work):
+def turn_hinges(model, u, scratch):
     """Dihedrals and their gradients at displacements u."""
     rest, p = model.bars.rest, np.empty((4, 3))
     for e in range(model.hinges.shape[0]):
@@ -120,10 +119,10 @@ def turn_hinges(model, u, work):
             p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2],
             p[2, 0], p[2, 1], p[2, 2], p[3, 0], p[3, 1], p[3, 2],
         )  # fmt: skip
-        work.angle[e] = found[0]
+        scratch.angle[e] = found[0]
         for c in range(12):
-            work.gradient[e, c] = found[1 + c]
-        carry(model, e, work.gradient)
+            scratch.gradient[e, c] = found[1 + c]
+        carry(model, e, scratch.gradient)
 
 
 @inner_scalar
@@ -158,149 +157,149 @@ def carry(model, h, gradient):
 
 
 @kernel
-def turn_folds(model, x, work):
+def turn_folds(model, x, scratch):
     """Angles of the folds with rotations x."""
     for f in range(model.fold_rest.size):
         one, other = model.fold_rotations[f]
         both = (x[one] if one >= 0 else 0.0) + (x[other] if other >= 0 else 0.0)
-        work.fold_angle[f] = work.angle[f] - model.per_reach * both
+        scratch.fold_angle[f] = scratch.angle[f] - model.per_reach * both
 
 
 @inner
-def turn_plate(model, x, work, p):
-    """Angles phi of plate p, to work.turn."""
+def turn_plate(model, x, scratch, p):
+    """Angles phi of plate p, to scratch.turn."""
     folds = model.fold_rest.size
     for k in range(model.start[p + 1] - model.start[p]):
         h = model.angle[model.start[p] + k]
         if h >= 0:
-            work.turn[k] = work.angle[h] - model.bend_rest[h - folds]
+            scratch.turn[k] = scratch.angle[h] - model.bend_rest[h - folds]
         else:
-            work.turn[k] = model.per_reach * x[-1 - h]
+            scratch.turn[k] = model.per_reach * x[-1 - h]
 
 
 @inner
-def fold_moment(model, work, f):
+def fold_moment(model, scratch, f):
     """Moment (N m) of a fold."""
     p = model.fold_parameters
     return model.fold_stiffness[f] * hinge_moment(
-        model.code, work.fold_angle[f], model.fold_rest[f],
+        model.code, scratch.fold_angle[f], model.fold_rest[f],
         p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[1],
     )  # fmt: skip
 
 
 @inner
-def plates_energy(model, u, x, work, out):
+def plates_energy(model, u, x, scratch, out):
     """Energies (J) of bars, folds and bends, to out (3,)."""
     strain_energies(model.bars, u, out)
-    turn_hinges(model, u, work)
-    turn_folds(model, x, work)
+    turn_hinges(model, u, scratch)
+    turn_folds(model, x, scratch)
     p = model.fold_parameters
     for f in range(model.fold_rest.size):
         w = hinge_energy(
-            model.code, work.fold_angle[f], model.fold_rest[f],
+            model.code, scratch.fold_angle[f], model.fold_rest[f],
             p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[0],
         )  # fmt: skip
         out[1] += model.fold_stiffness[f] * w
     for plate in range(model.start.size - 1):
-        turn_plate(model, x, work, plate)
+        turn_plate(model, x, scratch, plate)
         count = model.start[plate + 1] - model.start[plate]
         for k in range(count):
             for m in range(count):
                 stiff = model.stiffness[model.entry[plate] + k * count + m]
-                out[2] += 0.5 * work.turn[k] * stiff * work.turn[m]
+                out[2] += 0.5 * scratch.turn[k] * stiff * scratch.turn[m]
 
 
 @inner
-def plates_force(model, u, x, force, couple, work):
+def plates_force(model, u, x, force, couple, scratch):
     """Internal force (n, 3), N, and that of the dofs of rotations (r,), N."""
-    internal_force(model.bars, u, force, work.bars)
-    turn_hinges(model, u, work)
-    turn_moments(model, x, couple, work)
+    internal_force(model.bars, u, force, scratch.bars)
+    turn_hinges(model, u, scratch)
+    turn_moments(model, x, couple, scratch)
     for h in range(model.hinges.shape[0]):
         for v in range(4):
             node = model.hinges[h, v]
             for c in range(3):
-                force[node, c] += work.moment[h] * work.gradient[h, 3 * v + c]
+                force[node, c] += scratch.moment[h] * scratch.gradient[h, 3 * v + c]
 
 
 @inner
-def turn_moments(model, x, couple, work):
+def turn_moments(model, x, couple, scratch):
     """Moments of all hinges, and forces (r,) on the dofs of rotations, at known dihedrals."""
-    turn_folds(model, x, work)
+    turn_folds(model, x, scratch)
     couple[:] = 0.0
-    work.moment[:] = 0.0
+    scratch.moment[:] = 0.0
     for f in range(model.fold_rest.size):
-        moment = fold_moment(model, work, f)
-        work.moment[f] = moment
+        moment = fold_moment(model, scratch, f)
+        scratch.moment[f] = moment
         for side in range(2):
             rotation = model.fold_rotations[f, side]
             if rotation >= 0:
                 couple[rotation] -= model.per_reach * moment
     for p in range(model.start.size - 1):
-        turn_plate(model, x, work, p)
-        add_plate_moments(model, couple, work, p)
+        turn_plate(model, x, scratch, p)
+        add_plate_moments(model, couple, scratch, p)
 
 
 @inner
-def add_plate_moments(model, couple, work, p):
+def add_plate_moments(model, couple, scratch, p):
     """Add the moments of plate p at its angles, and its forces on the dofs of rotations."""
     count = model.start[p + 1] - model.start[p]
     for k in range(count):
         moment = 0.0
         for m in range(count):
-            moment += model.stiffness[model.entry[p] + k * count + m] * work.turn[m]
+            moment += model.stiffness[model.entry[p] + k * count + m] * scratch.turn[m]
         h = model.angle[model.start[p] + k]
         if h >= 0:
-            work.moment[h] += moment  # of two plates at a weld
+            scratch.moment[h] += moment  # of two plates at a weld
         else:
             couple[-1 - h] += model.per_reach * moment
 
 
 @inner
-def add_mean_plates_force(model, u0, x0, u1, x1, before, force, couple, work):
-    """Add forces whose work is the change of the energy; `before` are the dihedrals at u0."""
+def add_mean_plates_force(model, u0, x0, u1, x1, before, force, couple, scratch):
+    """Add forces whose scratch is the change of the energy; `before` are the dihedrals at u0."""
     add_bar_forces(model.bars, u0, u1, force)
-    turn_hinges(model, u1, work)
-    turn_folds(model, x1, work)
-    work.moment[:] = 0.0
+    turn_hinges(model, u1, scratch)
+    turn_folds(model, x1, scratch)
+    scratch.moment[:] = 0.0
     for f in range(model.fold_rest.size):
         start = before[f]
         for rotation in model.fold_rotations[f]:
             start -= model.per_reach * x0[rotation] if rotation >= 0 else 0.0
-        work.moment[f] = model.fold_stiffness[f] * mean_moment(
+        scratch.moment[f] = model.fold_stiffness[f] * mean_moment(
             model.code, model.addresses, model.fold_parameters[f], 1.0, model.fold_rest[f], start,
-            work.fold_angle[f] - start,
+            scratch.fold_angle[f] - start,
         )[0]  # fmt: skip
         for rotation in model.fold_rotations[f]:
             if rotation >= 0:
-                couple[rotation] -= model.per_reach * work.moment[f]
+                couple[rotation] -= model.per_reach * scratch.moment[f]
     folds = model.fold_rest.size
     for p in range(model.start.size - 1):
         for k in range(model.start[p + 1] - model.start[p]):
             h = model.angle[model.start[p] + k]
             if h >= 0:
-                work.turn[k] = 0.5 * (before[h] + work.angle[h]) - model.bend_rest[h - folds]
+                scratch.turn[k] = 0.5 * (before[h] + scratch.angle[h]) - model.bend_rest[h - folds]
             else:
-                work.turn[k] = 0.5 * model.per_reach * (x0[-1 - h] + x1[-1 - h])
-        add_plate_moments(model, couple, work, p)
+                scratch.turn[k] = 0.5 * model.per_reach * (x0[-1 - h] + x1[-1 - h])
+        add_plate_moments(model, couple, scratch, p)
     x, dx, points = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
     plain, gradient = np.empty((4, 3)), np.empty((4, 3))
     for h in range(model.hinges.shape[0]):
         put_motion(model.bars.rest, model.hinges, h, u0, u1, x, dx)
         ride(model, h, 1.0, x)
         ride(model, h, 0.0, dx)
-        discrete_gradient(x, dx, work.angle[h] - before[h], points, plain, gradient)
+        discrete_gradient(x, dx, scratch.angle[h] - before[h], points, plain, gradient)
         for c in range(12):
-            work.gradient[h, c] = flat(gradient)[c]
-        carry(model, h, work.gradient)
+            scratch.gradient[h, c] = flat(gradient)[c]
+        carry(model, h, scratch.gradient)
         for v in range(4):
             for c in range(3):
-                force[model.hinges[h, v], c] += work.moment[h] * work.gradient[h, 3 * v + c]
+                force[model.hinges[h, v], c] += scratch.moment[h] * scratch.gradient[h, 3 * v + c]
 
 
 class _Context(NamedTuple):
     model: BarsPlates
-    work: PlatesWork
+    scratch: PlatesScratch
     rows: int
     groups: NDArray  # (3,) of the energies of bars, folds and bends
     energy: NDArray  # (3,) these, J
@@ -313,7 +312,7 @@ def _forces(own, u, v, t, force, powers):
     for k in range(3 * n + r, out.size):
         flat(out)[k] = 0.0
     (here, x), (pull, couple) = parted_rows(moved, n, r), parted_rows(out, n, r)
-    plates_force(model, here, x, pull, couple, own.work)
+    plates_force(model, here, x, pull, couple, own.scratch)
 
 
 @energies
@@ -321,7 +320,7 @@ def _energies(own, u, out):
     model, moved = own.model, rows_at(u, own.rows)
     n, r = model.bars.rest.shape[0], model.rotations
     here, x = parted_rows(moved, n, r)
-    plates_energy(model, here, x, own.work, own.energy)
+    plates_energy(model, here, x, own.scratch, own.energy)
     for k in range(3):
         numbers_at(out, 3)[own.groups[k]] = own.energy[k]
 
@@ -329,16 +328,16 @@ def _energies(own, u, out):
 @mean_forces
 def _mean_forces(own, u0, u1, before, h, t, force, powers):
     model, start, end = own.model, rows_at(u0, own.rows), rows_at(u1, own.rows)
-    out, angle = rows_at(force, own.rows), numbers_at(before, own.work.angle.size)
+    out, angle = rows_at(force, own.rows), numbers_at(before, own.scratch.angle.size)
     n, r = model.bars.rest.shape[0], model.rotations
     (one, x0), (other, x1) = parted_rows(start, n, r), parted_rows(end, n, r)
     pull, couple = parted_rows(out, n, r)
-    add_mean_plates_force(model, one, x0, other, x1, angle, pull, couple, own.work)
+    add_mean_plates_force(model, one, x0, other, x1, angle, pull, couple, own.scratch)
 
 
 def plates_kernels(
-    model: BarsPlates, work: PlatesWork, rows: int, groups: tuple[int, int, int]
+    model: BarsPlates, scratch: PlatesScratch, rows: int, groups: tuple[int, int, int]
 ) -> Compiled:
     """Bars, folds and plates, whose dofs fill so many rows, with the groups of their energies."""
-    own = Context(_Context(model, work, rows, np.array(groups), np.zeros(3)))
+    own = Context(_Context(model, scratch, rows, np.array(groups), np.zeros(3)))
     return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})

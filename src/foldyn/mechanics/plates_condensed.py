@@ -24,14 +24,14 @@ from foldyn.materials.switch import hinge_slope
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.plates import (
     BarsPlates,
-    PlatesWork,
+    PlatesScratch,
     plates_energy,
     plates_force,
-    plates_work,
+    plates_scratch,
     turn_hinges,
     turn_moments,
 )
-from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Whole, energies, forces
+from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, energies, forces
 from foldyn.mechanics.threads import Team
 
 STEPS = 100  # of Newton's method, at most
@@ -64,10 +64,10 @@ class CondensedPlates(NamedTuple):
     memory: NDArray  # (2,) address of what evaluates branches of folds, and of its context; or 0
 
 
-class CondensedWork(NamedTuple):
-    """Memory of one evaluation."""
+class CondensedScratch(NamedTuple):
+    """Scratch of one evaluation."""
 
-    plates: PlatesWork
+    plates: PlatesScratch
     x: NDArray  # (r,) rotations of the last evaluation, m
     couple: NDArray  # (r,) N
     step: NDArray  # (r,) in the order of the band
@@ -75,7 +75,7 @@ class CondensedWork(NamedTuple):
     branches: NDArray  # (nf, 2) moments, N m, and slopes, N m/rad, of branches of folds
     angle: NDArray  # those of `plates`
     fold_angle: NDArray
-    strips: Whole
+    own: NDArray  # (2,) first and last + 1 of the rows
     team: Team
 
 
@@ -117,13 +117,13 @@ def condensed_plates(model: BarsPlates, constant: bool) -> CondensedPlates:
     return CondensedPlates(model, constant, rank, band, factor, offset, memory)
 
 
-def condensed_work(model: CondensedPlates) -> CondensedWork:
-    """Memory for `model`."""
-    r, plates = model.plates.rotations, plates_work(model.plates)
-    return CondensedWork(
+def condensed_scratch(model: CondensedPlates) -> CondensedScratch:
+    """Scratch for `model`."""
+    r, plates = model.plates.rotations, plates_scratch(model.plates)
+    return CondensedScratch(
         plates, np.zeros(r), np.zeros(r), np.zeros(r), model.factor.copy(),
         np.zeros((len(plates.fold_angle), 2)), plates.angle, plates.fold_angle,
-        Whole(np.array([0, model.plates.nodes])), plates.team,
+        np.array([0, model.plates.nodes]), plates.team,
     )  # fmt: skip
 
 
@@ -159,13 +159,13 @@ def factorize_band(band):
 
 
 @inner
-def factorize(model, work):
-    """Factorize the stiffness of rotations at the slopes of folds in memory, to work.factor."""
-    factor, band = flat(work.factor), flat(model.band)
+def factorize(model, scratch):
+    """Factorize the stiffness of rotations at the slopes of folds in memory, to scratch.factor."""
+    factor, band = flat(scratch.factor), flat(model.band)
     for k in range(band.size):  # an assignment of slices takes seconds to compile
         factor[k] = band[k]
-    add_folds(model.plates, model.rank, work.plates.slope, work.factor)
-    factorize_band(work.factor)
+    add_folds(model.plates, model.rank, scratch.plates.slope, scratch.factor)
+    factorize_band(scratch.factor)
 
 
 @inner
@@ -183,111 +183,111 @@ def solve_band(factor, x):
 
 
 @inner
-def add_branches(model, work):
+def add_branches(model, scratch):
     """Evaluate the branches of folds at their angles; their moments act on rotations too."""
     if model.memory[0] == 0:
         return
-    run_at(model.memory[0], (model.memory[1], work.plates.fold_angle, work.branches))
-    for f in range(work.branches.shape[0]):
+    run_at(model.memory[0], (model.memory[1], scratch.plates.fold_angle, scratch.branches))
+    for f in range(scratch.branches.shape[0]):
         for rotation in model.plates.fold_rotations[f]:
             if rotation >= 0:
-                work.couple[rotation] -= model.plates.per_reach * work.branches[f, 0]
+                scratch.couple[rotation] -= model.plates.per_reach * scratch.branches[f, 0]
 
 
 @inner_scalar
-def along_step(model, push, work):
+def along_step(model, push, scratch):
     """Work of the forces on rotations along a step."""
     total = 0.0
-    for k in range(work.x.size):
-        total += work.step[model.rank[k]] * (push[k, 0] - work.couple[k])
+    for k in range(scratch.x.size):
+        total += scratch.step[model.rank[k]] * (push[k, 0] - scratch.couple[k])
     return total
 
 
 @inner
-def balance(model, u, work):
-    """Rotations in balance at displacements u, to work.x; nan where there are none."""
+def balance(model, u, scratch):
+    """Rotations in balance at displacements u, to scratch.x; nan where there are none."""
     plates, push = model.plates, model.offset[model.plates.fold_rest.size :]
-    turn_hinges(plates, u, work.plates)
-    p, slope = plates.fold_parameters, work.plates.slope
+    turn_hinges(plates, u, scratch.plates)
+    p, slope = plates.fold_parameters, scratch.plates.slope
     again = model.memory[0] != 0  # rates of creases are differences of turns
     begun = 0.0  # forces along the last step, where it began
-    for k in range(work.x.size):
-        if np.isnan(work.x[k]):  # there were none at the last displacements
-            work.x[k] = 0.0
+    for k in range(scratch.x.size):
+        if np.isnan(scratch.x[k]):  # there were none at the last displacements
+            scratch.x[k] = 0.0
     for i in range(STEPS):
-        turn_moments(plates, work.x, work.couple, work.plates)
-        add_branches(model, work)
-        along = along_step(model, push, work)
+        turn_moments(plates, scratch.x, scratch.couple, scratch.plates)
+        add_branches(model, scratch)
+        along = along_step(model, push, scratch)
         if 0.0 < begun < -along / BEYOND:  # a crease began or ceased to yield: to where they vanish
             share = begun / (begun - along)
-            for k in range(work.x.size):
-                work.x[k] -= (1.0 - share) * work.step[model.rank[k]]
-            for k in range(work.x.size):
-                work.step[k] *= share
+            for k in range(scratch.x.size):
+                scratch.x[k] -= (1.0 - share) * scratch.step[model.rank[k]]
+            for k in range(scratch.x.size):
+                scratch.step[k] *= share
             begun *= share
             continue
         if not model.constant or model.memory[0] != 0:
             for f in range(plates.fold_rest.size):
                 found = hinge_slope(
-                    plates.code, work.plates.fold_angle[f], plates.fold_rest[f],
+                    plates.code, scratch.plates.fold_angle[f], plates.fold_rest[f],
                     p[f, 0], p[f, 1], p[f, 2], p[f, 3], plates.addresses[2],
                 )  # fmt: skip
                 stiff = plates.fold_stiffness[f]
-                slope[f] = max(stiff * found + work.branches[f, 1], 0.0)
-            factorize(model, work)
+                slope[f] = max(stiff * found + scratch.branches[f, 1], 0.0)
+            factorize(model, scratch)
         largest = 0.0
-        for k in range(work.x.size):
-            work.step[model.rank[k]] = push[k, 0] - work.couple[k]
-        solve_band(work.factor, work.step)
-        begun = along_step(model, push, work)
-        for k in range(work.x.size):
-            work.x[k] += work.step[model.rank[k]]
-            largest = max(largest, abs(work.step[model.rank[k]]))
+        for k in range(scratch.x.size):
+            scratch.step[model.rank[k]] = push[k, 0] - scratch.couple[k]
+        solve_band(scratch.factor, scratch.step)
+        begun = along_step(model, push, scratch)
+        for k in range(scratch.x.size):
+            scratch.x[k] += scratch.step[model.rank[k]]
+            largest = max(largest, abs(scratch.step[model.rank[k]]))
         small = plates.per_reach * largest <= (BALANCED if i < STEPS // 2 else ROUNDED)
         if small:
             begun = 0.0
         close, again = small and not again, False
         if close or not largest < np.inf:
-            for k in range(work.x.size):
-                push[k, 1] = work.x[k]
+            for k in range(scratch.x.size):
+                push[k, 1] = scratch.x[k]
                 if np.isnan(push[k, 3]):  # where a motion begins
-                    push[k, 3] = work.x[k]
+                    push[k, 3] = scratch.x[k]
             return
-    work.x[:] = np.nan
+    scratch.x[:] = np.nan
 
 
 @inner
-def condensed_force(model, u, force, work):
+def condensed_force(model, u, force, scratch):
     """Internal force (n, 3), N, with rotations in balance."""
-    balance(model, u, work)
-    plates_force(model.plates, u, work.x, force, work.couple, work.plates)
+    balance(model, u, scratch)
+    plates_force(model.plates, u, scratch.x, force, scratch.couple, scratch.plates)
 
 
 @inner
-def condensed_energy(model, u, work, out):
+def condensed_energy(model, u, scratch, out):
     """Energies (J) of bars, folds and bends, to out (3,), with rotations in balance."""
-    balance(model, u, work)
-    plates_energy(model.plates, u, work.x, work.plates, out)
+    balance(model, u, scratch)
+    plates_energy(model.plates, u, scratch.x, scratch.plates, out)
 
 
 class _Context(NamedTuple):
     model: CondensedPlates
-    work: CondensedWork
+    scratch: CondensedScratch
 
 
 @forces
 def _forces(own, u, v, t, force, powers):
     rows = own.model.plates.bars.rest.shape[0]
-    condensed_force(own.model, rows_at(u, rows), rows_at(force, rows), own.work)
+    condensed_force(own.model, rows_at(u, rows), rows_at(force, rows), own.scratch)
 
 
 @energies
 def _energies(own, u, out):
     moved = rows_at(u, own.model.plates.bars.rest.shape[0])
-    condensed_energy(own.model, moved, own.work, numbers_at(out, 3))
+    condensed_energy(own.model, moved, own.scratch, numbers_at(out, 3))
 
 
-def condensed_kernels(model: CondensedPlates, work: CondensedWork) -> Compiled:
+def condensed_kernels(model: CondensedPlates, scratch: CondensedScratch) -> Compiled:
     """Bars, folds and plates with their rotations in balance."""
-    own = Context(_Context(model, work))
+    own = Context(_Context(model, scratch))
     return Compiled(own, {FORCES: _forces, ENERGIES: _energies})

@@ -19,9 +19,9 @@ from foldyn.mechanics.bars_hinges_pullback import pull_bars_hinges
 from foldyn.mechanics.plates import turn_folds
 from foldyn.mechanics.plates_condensed import (
     CondensedPlates,
-    CondensedWork,
+    CondensedScratch,
     balance,
-    condensed_work,
+    condensed_scratch,
     factorize,
     solve_band,
 )
@@ -36,17 +36,17 @@ from foldyn.mechanics.pullback import Pulled, pullback
 
 
 @inner
-def rate_couples(model, work, back, out):
+def rate_couples(model, scratch, back, out):
     """Rates of the forces on rotations with those of the dihedrals alone, to out (r,)."""
     out[:], p = 0.0, model.fold_parameters
     for f in range(model.fold_rest.size):
-        work.slope[f] = model.fold_stiffness[f] * hinge_slope(
-            model.code, work.fold_angle[f], model.fold_rest[f],
+        scratch.slope[f] = model.fold_stiffness[f] * hinge_slope(
+            model.code, scratch.fold_angle[f], model.fold_rest[f],
             p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[2],
         )  # fmt: skip
         for rotation in model.fold_rotations[f]:
             if rotation >= 0:
-                out[rotation] -= model.per_reach * work.slope[f] * back.rate[f]
+                out[rotation] -= model.per_reach * scratch.slope[f] * back.rate[f]
     for p in range(model.start.size - 1):
         count = model.start[p + 1] - model.start[p]
         for k in range(count):
@@ -61,22 +61,22 @@ def rate_couples(model, work, back, out):
 
 
 @inner
-def rate_rotations(model, work, back, y):
+def rate_rotations(model, scratch, back, y):
     """Rates y (r,) of the rotations in balance."""
-    turn_folds(model.plates, work.x, work.plates)
-    rate_couples(model.plates, work.plates, back, y)
+    turn_folds(model.plates, scratch.x, scratch.plates)
+    rate_couples(model.plates, scratch.plates, back, y)
     if not model.constant:
-        factorize(model, work)
+        factorize(model, scratch)
     for k in range(y.size):
-        work.step[model.rank[k]] = -y[k]
-    solve_band(work.factor, work.step)
+        scratch.step[model.rank[k]] = -y[k]
+    solve_band(scratch.factor, scratch.step)
     for k in range(y.size):
-        y[k] = work.step[model.rank[k]]
+        y[k] = scratch.step[model.rank[k]]
 
 
 class _Context(NamedTuple):
     model: CondensedPlates
-    work: CondensedWork
+    scratch: CondensedScratch
     back: Back
     y: NDArray  # (r,) rates of the rotations, m
     push: NDArray  # (r,) gradient
@@ -84,14 +84,14 @@ class _Context(NamedTuple):
 
 @pullback
 def _pullback(own, u, v, t, weight, product, rate):
-    model, work, plates = own.model, own.work, own.model.plates
+    model, scratch, plates = own.model, own.scratch, own.model.plates
     rows = plates.bars.rest.shape[0]
     here, w, out = rows_at(u, rows), rows_at(weight, rows), rows_at(product, rows)
-    balance(model, here, work)
-    rate_hinges(plates, here, w, work.plates, own.back)
-    rate_rotations(model, work, own.back, own.y)
+    balance(model, here, scratch)
+    rate_hinges(plates, here, w, scratch.plates, own.back)
+    rate_rotations(model, scratch, own.back, own.y)
     pull_bars_hinges(plates.bars, here, w, own.back.bars, own.back.out.bars, out)
-    pull_turns(plates, work.x, own.y, work.plates, own.back, out, work.couple)
+    pull_turns(plates, scratch.x, own.y, scratch.plates, own.back, out, scratch.couple)
     for k in range(own.y.size):
         own.push[k] -= own.y[k]
 
@@ -99,5 +99,5 @@ def _pullback(own, u, v, t, weight, product, rate):
 def condensed_pulled(model: CondensedPlates) -> Pulled:
     """Bars, folds and plates with their rotations in balance, differentiated."""
     back, (y, push) = back_of(model.plates), np.zeros((2, model.plates.rotations))
-    own = Context(_Context(model, condensed_work(model), back, y, push))
+    own = Context(_Context(model, condensed_scratch(model), back, y, push))
     return Pulled(own, _pullback, {**gradients(back.out), "push": push})

@@ -21,12 +21,16 @@ from foldyn.jit.compiled import inner
 from foldyn.jit.context import Context, rows_at
 from foldyn.materials.series import series_derivatives
 from foldyn.mechanics import bars_hinges_pullback as of_bars
-from foldyn.mechanics.bars_hinges_pullback import PullbackWork, pull_bars_hinges, pullback_work
+from foldyn.mechanics.bars_hinges_pullback import (
+    PullbackScratch,
+    pull_bars_hinges,
+    pullback_scratch,
+)
 from foldyn.mechanics.dihedral import dihedral_rates
 from foldyn.mechanics.plates import (
     BarsPlates,
-    PlatesWork,
-    plates_work,
+    PlatesScratch,
+    plates_scratch,
     ride,
     rides,
     turn_folds,
@@ -53,7 +57,7 @@ class Back(NamedTuple):
     """Memory of the pullback of one evaluation, and what it adds to; nh = nf + nb."""
 
     out: Gradient
-    bars: PullbackWork
+    bars: PullbackScratch
     points: NDArray  # (4, 3) of a hinge, m
     moves: NDArray  # (4, 3) weights there
     by: NDArray  # (4, 3)
@@ -75,7 +79,7 @@ def back_of(model: BarsPlates) -> Back:
     )
     points, moves, by = np.zeros((3, 4, 3))
     return Back(
-        out, pullback_work(model.nodes), points, moves, by, np.zeros(nh), np.zeros((nh, 12)),
+        out, pullback_scratch(model.nodes), points, moves, by, np.zeros(nh), np.zeros((nh, 12)),
         np.zeros(nh), np.zeros(most), np.zeros(most),
     )  # fmt: skip
 
@@ -89,7 +93,7 @@ def gradients(out: Gradient) -> dict[str, NDArray]:
 
 
 @inner
-def rate_hinges(model, u, w, work, back):
+def rate_hinges(model, u, w, scratch, back):
     """Dihedrals and their gradients at u, and their rates where the nodes move by w."""
     for h in range(model.hinges.shape[0]):
         for v in range(4):
@@ -106,9 +110,9 @@ def rate_hinges(model, u, w, work, back):
             dx[0, 0], dx[0, 1], dx[0, 2], dx[1, 0], dx[1, 1], dx[1, 2],
             dx[2, 0], dx[2, 1], dx[2, 2], dx[3, 0], dx[3, 1], dx[3, 2],
         )  # fmt: skip
-        work.angle[h], back.rate[h] = found[0], found[13]
+        scratch.angle[h], back.rate[h] = found[0], found[13]
         for c in range(12):
-            work.gradient[h, c], back.gradient_rate[h, c] = found[1 + c], found[14 + c]
+            scratch.gradient[h, c], back.gradient_rate[h, c] = found[1 + c], found[14 + c]
 
 
 @inner
@@ -120,17 +124,17 @@ def rate_plate(model, y, back, p):
 
 
 @inner
-def pull_folds(model, x, y, work, back, by_x):
+def pull_folds(model, x, y, scratch, back, by_x):
     """Moments of folds, and what is their share in the gradients, `moment` and by_x (r,)."""
-    turn_folds(model, x, work)
+    turn_folds(model, x, scratch)
     out, p = back.out, model.fold_parameters
     for f in range(model.fold_rest.size):
         stiffness, rate = model.fold_stiffness[f], back.rate[f]
         moment, slope, by_rest, by_a, by_b, by_c, _ = series_derivatives(
-            model.code, work.fold_angle[f], model.fold_rest[f],
+            model.code, scratch.fold_angle[f], model.fold_rest[f],
             p[f, 0], p[f, 1], p[f, 2], p[f, 3], 1.0, model.addresses,
         )  # fmt: skip
-        work.moment[f] = stiffness * moment
+        scratch.moment[f] = stiffness * moment
         for rotation in model.fold_rotations[f]:
             if rotation >= 0:
                 rate -= model.per_reach * y[rotation]
@@ -138,7 +142,7 @@ def pull_folds(model, x, y, work, back, by_x):
         for rotation in model.fold_rotations[f]:
             if rotation >= 0:
                 by_x[rotation] -= model.per_reach * back.moment[f]
-                out.per_reach[0] -= back.moment[f] * x[rotation] + work.moment[f] * y[rotation]
+                out.per_reach[0] -= back.moment[f] * x[rotation] + scratch.moment[f] * y[rotation]
         out.fold_stiffness[f] += moment * rate
         rate *= stiffness
         out.fold_rest[f] += by_rest * rate
@@ -148,22 +152,22 @@ def pull_folds(model, x, y, work, back, by_x):
 
 
 @inner
-def pull_plate(model, x, y, work, back, by_x, p):
+def pull_plate(model, x, y, scratch, back, by_x, p):
     """The same for plate p."""
     count, folds, out = model.start[p + 1] - model.start[p], model.fold_rest.size, back.out
-    turn_plate(model, x, work, p)
+    turn_plate(model, x, scratch, p)
     rate_plate(model, y, back, p)
     for k in range(count):
         back.resisted[k] = 0.0
     for k in range(count):
         row, moment, rate = model.entry[p] + k * count, 0.0, back.turned[k]
         for m in range(count):
-            moment += model.stiffness[row + m] * work.turn[m]
+            moment += model.stiffness[row + m] * scratch.turn[m]
             back.resisted[m] += model.stiffness[row + m] * rate
-            out.stiffness[row + m] += rate * work.turn[m]
+            out.stiffness[row + m] += rate * scratch.turn[m]
         h = model.angle[model.start[p] + k]
         if h >= 0:
-            work.moment[h] += moment
+            scratch.moment[h] += moment
         else:
             out.per_reach[0] += moment * y[-1 - h]
     for k in range(count):
@@ -177,15 +181,15 @@ def pull_plate(model, x, y, work, back, by_x, p):
 
 
 @inner
-def pull_hinges(model, work, back, product):
+def pull_hinges(model, scratch, back, product):
     """Add what the nodes of all hinges get, to `product` and to the gradients."""
     by, rest = back.by, back.out.bars.rest
     for h in range(model.hinges.shape[0]):
-        moment, other = work.moment[h], back.moment[h]
+        moment, other = scratch.moment[h], back.moment[h]
         for v in range(4):
             for c in range(3):
                 by[v, c] = moment * back.gradient_rate[h, 3 * v + c]
-                by[v, c] += other * work.gradient[h, 3 * v + c]
+                by[v, c] += other * scratch.gradient[h, 3 * v + c]
         if rides(model, h):
             e = h - model.hinges.shape[0] + model.wings.shape[0]
             for c in range(3):  # as `plates.carry` does
@@ -200,19 +204,19 @@ def pull_hinges(model, work, back, product):
 
 
 @inner
-def pull_turns(model, x, y, work, back, product, by_x):
+def pull_turns(model, x, y, scratch, back, product, by_x):
     """Add the derivatives for folds and plates, after `rate_hinges`."""
     for h in range(model.hinges.shape[0]):
-        work.moment[h], back.moment[h] = 0.0, 0.0
-    pull_folds(model, x, y, work, back, by_x)
+        scratch.moment[h], back.moment[h] = 0.0, 0.0
+    pull_folds(model, x, y, scratch, back, by_x)
     for p in range(model.start.size - 1):
-        pull_plate(model, x, y, work, back, by_x, p)
-    pull_hinges(model, work, back, product)
+        pull_plate(model, x, y, scratch, back, by_x, p)
+    pull_hinges(model, scratch, back, product)
 
 
 class _Context(NamedTuple):
     model: BarsPlates
-    work: PlatesWork
+    scratch: PlatesScratch
     back: Back
     rows: int
 
@@ -224,12 +228,12 @@ def _pullback(own, u, v, t, weight, product, rate):
     (here, x), (w, y) = parted_rows(moved, n, r), parted_rows(weights, n, r)
     out, by_x = parted_rows(rows_at(product, own.rows), n, r)
     pull_bars_hinges(model.bars, here, w, own.back.bars, own.back.out.bars, out)
-    rate_hinges(model, here, w, own.work, own.back)
-    pull_turns(model, x, y, own.work, own.back, out, by_x)
+    rate_hinges(model, here, w, own.scratch, own.back)
+    pull_turns(model, x, y, own.scratch, own.back, out, by_x)
 
 
 def plates_pulled(model: BarsPlates) -> Pulled:
     """Bars, folds and plates differentiated."""
     back = back_of(model)
-    own = Context(_Context(model, plates_work(model), back, model.rows))
+    own = Context(_Context(model, plates_scratch(model), back, model.rows))
     return Pulled(own, _pullback, gradients(back.out))

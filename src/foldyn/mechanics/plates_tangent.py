@@ -139,42 +139,42 @@ def _scatter(indptr, dof, first, nodes, block, data):
 
 
 @inner_scalar
-def _curvature(model, u, work, h, points, gradient, out):
+def _curvature(model, u, scratch, h, points, gradient, out):
     """Moment of hinge h times the second derivative of its dihedral, to out (4, 3, 4, 3)."""
     for v in range(4):
         node = model.hinges[h, v]
         for c in range(3):
             points[v, c] = model.bars.rest[node, c] + u[node, c]
-            gradient[v, c] = work.gradient[h, 3 * v + c]
+            gradient[v, c] = scratch.gradient[h, 3 * v + c]
     ride(model, h, 1.0, points)
     if rides(model, h):
         for c in range(3):
             gradient[3, c] *= 2.0  # `carry` has given half of it away
     out[:] = 0.0
-    add_hessian(points, gradient, work.moment[h], out)
+    add_hessian(points, gradient, scratch.moment[h], out)
     if rides(model, h):
         carry_wing(out)
 
 
 @kernel
-def _add_folds(model, pattern, u, work, floor, data):
+def _add_folds(model, pattern, u, scratch, floor, data):
     points, gradient, turned = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3, 4, 3))
     along, bent, block = np.empty(14), turned.reshape(12, 12), np.empty((14, 14))
     p = model.fold_parameters
     for f in range(model.fold_rest.size):
-        work.moment[f] = fold_moment(model, work, f)
+        scratch.moment[f] = fold_moment(model, scratch, f)
         slope = hinge_slope(
-            model.code, work.fold_angle[f], model.fold_rest[f],
+            model.code, scratch.fold_angle[f], model.fold_rest[f],
             p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[2],
         )  # fmt: skip
         slope = model.fold_stiffness[f] * max(slope, floor)
         for c in range(12):
-            along[c] = work.gradient[f, c]
+            along[c] = scratch.gradient[f, c]
         along[12] = along[13] = -model.per_reach
         for r in range(14):
             for q in range(14):
                 block[r, q] = slope * along[r] * along[q]
-        _curvature(model, u, work, f, points, gradient, turned)
+        _curvature(model, u, scratch, f, points, gradient, turned)
         for r in range(12):
             for q in range(12):
                 block[r, q] += bent[r, q]
@@ -182,7 +182,7 @@ def _add_folds(model, pattern, u, work, floor, data):
 
 
 @inner_scalar
-def _plate_block(model, pattern, work, p, bend, resist, block):
+def _plate_block(model, pattern, scratch, p, bend, resist, block):
     """The matrix of plate p between its dofs, to `block`; adds the moments of its hinges."""
     first, nodes = model.start[p], pattern.nodes[p]
     count, wide = model.start[p + 1] - first, 3 * nodes
@@ -195,7 +195,7 @@ def _plate_block(model, pattern, work, p, bend, resist, block):
             for v in range(4):
                 at = 3 * pattern.corner[first + k, v]
                 for c in range(3):
-                    bend[k, at + c] += work.gradient[h, 3 * v + c]
+                    bend[k, at + c] += scratch.gradient[h, 3 * v + c]
     for r in range(size):
         for q in range(size):
             block[r, q] = 0.0
@@ -205,7 +205,7 @@ def _plate_block(model, pattern, work, p, bend, resist, block):
             resist[r] = 0.0
         for m in range(count):
             stiff = model.stiffness[model.entry[p] + k * count + m]
-            moment += stiff * work.turn[m]
+            moment += stiff * scratch.turn[m]
             if model.angle[first + m] >= 0:
                 for r in range(wide):
                     resist[r] += stiff * bend[m, r]
@@ -213,7 +213,7 @@ def _plate_block(model, pattern, work, p, bend, resist, block):
                 other = 2 * nodes + pattern.corner[first + m, 0]
                 block[own, other] = model.per_reach**2 * stiff
         if h >= 0:
-            work.moment[h] += moment
+            scratch.moment[h] += moment
             for r in range(wide):
                 along = bend[k, r]
                 if along != 0.0:
@@ -225,17 +225,17 @@ def _plate_block(model, pattern, work, p, bend, resist, block):
 
 
 @kernel
-def _add_plates(model, pattern, x, work, bend, resist, block, data):
+def _add_plates(model, pattern, x, scratch, bend, resist, block, data):
     for p in range(pattern.nodes.size):
-        turn_plate(model, x, work, p)
-        _plate_block(model, pattern, work, p, bend, resist, block)
+        turn_plate(model, x, scratch, p)
+        _plate_block(model, pattern, scratch, p, bend, resist, block)
         dof = pattern.dof[pattern.begin[p] : pattern.begin[p + 1]]
         first = pattern.plate[pattern.start[p] : pattern.start[p + 1]]
         _scatter(pattern.indptr, dof, first, pattern.nodes[p], block, data)
 
 
 @kernel
-def _add_bends(model, pattern, u, work, data):
+def _add_bends(model, pattern, u, scratch, data):
     """What the moments of the hinges of plates add."""
     points, gradient, turned = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3, 4, 3))
     dof, first, block = np.empty(4, np.int32), np.empty(16, np.int32), turned.reshape(12, 12)
@@ -243,7 +243,7 @@ def _add_bends(model, pattern, u, work, data):
         p, k = pattern.owner[h]
         if p < 0:
             continue
-        _curvature(model, u, work, h, points, gradient, turned)
+        _curvature(model, u, scratch, h, points, gradient, turned)
         begin, wide = pattern.begin[p], pattern.begin[p + 1] - pattern.begin[p]
         for v in range(4):
             at = pattern.corner[k, v]
@@ -258,18 +258,18 @@ def _add_bends(model, pattern, u, work, data):
 
 
 def add_plates_tangent(
-    model: BarsPlates, pattern: PlatesPattern, u: NDArray, x: NDArray, work: object, floor: float,
-    data: NDArray,
+    model: BarsPlates, pattern: PlatesPattern, u: NDArray, x: NDArray, scratch: object,
+    floor: float, data: NDArray,
 ) -> None:  # fmt: skip
     """Add the tangent of folds and plates at displacements u (n, 3) and rotations x (r,).
 
-    work : `PlatesWork` without moments.
+    scratch : `PlatesScratch` without moments.
     floor : slopes of the folds' law per unit stiffness below it are raised to it.
     """
-    turn_hinges(model, u, work)
-    turn_folds(model, x, work)
-    _add_folds(model, pattern, u, work, floor, data)
+    turn_hinges(model, u, scratch)
+    turn_folds(model, x, scratch)
+    _add_folds(model, pattern, u, scratch, floor, data)
     wide = 3 * int(np.diff(pattern.begin).max(initial=0))
     bend = np.empty((int(np.diff(model.start).max(initial=0)), wide))
-    _add_plates(model, pattern, x, work, bend, np.empty(wide), np.empty((wide, wide)), data)
-    _add_bends(model, pattern, u, work, data)
+    _add_plates(model, pattern, x, scratch, bend, np.empty(wide), np.empty((wide, wide)), data)
+    _add_bends(model, pattern, u, scratch, data)

@@ -172,8 +172,11 @@ class SheetTerm(Term):
         """Tangent blocks for implicit integrators; see `mechanics.step_tangent`."""
 
     @abstractmethod
-    def workspaces(self, threads: int) -> Sequence[Any]:
-        """Work arrays for each thread, possibly for fewer threads than requested."""
+    def scratches(self, threads: int) -> Sequence[Any]:
+        """Scratch of each thread, maybe of fewer threads than requested.
+
+        Each has the fields `team`, `own`, `angle` and `fold_angle` of a `ThreadPart`.
+        """
 
     def hinges_alone(self) -> SheetTerm | None:
         """The sheet with its hinges only; None if it has none."""

@@ -268,9 +268,9 @@ class SpringsTerm(Term):
     def __init__(self, springs: Springs) -> None:
         self.springs = springs
 
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
         """Context and kernels for a thread; see `Term`."""
-        own = Context(_Context(self.springs, group, int(work.strips.own[1])))
+        own = Context(_Context(self.springs, group, int(part.own[1])))
         return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     def arrays(self) -> Arrays:

@@ -52,7 +52,7 @@ from foldyn.jit.compiled import Addressed, addressed, inner_scalar, kernel
 from foldyn.jit.context import Context, run_at, value_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.slots import Slots
-from foldyn.mechanics.threads import Team
+from foldyn.mechanics.threads import ThreadPart
 from foldyn.values import writable
 
 (
@@ -159,17 +159,17 @@ class Term(ABC):
 
     # ------------------------------------------------------------------ what is compiled
     @abstractmethod
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: ThreadPart, kept: Any, group: int) -> Compiled:
         """Context and kernels of the term for a thread.
 
-        work : `assembly.Work` of the thread.
+        part : the thread's, one of `Assembly.thread_parts`.
         kept : the term's memory, from `memories` or `memory`.
         group : its first energy group.
         """
 
-    def memories(self, works: Sequence[Any]) -> Sequence[Any]:
+    def memories(self, parts: Sequence[ThreadPart]) -> Sequence[Any]:
         """Memory of its kernels, for each thread of a motion."""
-        return [None] * len(works)
+        return [None] * len(parts)
 
     @property
     def memory(self) -> Any:
@@ -306,12 +306,6 @@ def in_rows(q: NDArray, rows: int) -> NDArray:
     return out
 
 
-class Whole(NamedTuple):
-    """The share of a single thread, in place of `Strips`: everything."""
-
-    own: NDArray  # (2,) first and last + 1 of the rows
-
-
 class Folds(NamedTuple):
     """Actuated hinges: k of them."""
 
@@ -329,39 +323,27 @@ class Terms(NamedTuple):
     powers: NDArray  # (3,) scratch of `forces_of`
 
 
-class Share(NamedTuple):
-    """Parts of a model's memory that a thread's loop needs."""
-
-    angle: NDArray  # (nh,) dihedrals at the last force evaluation, rad
-    fold_angle: NDArray  # (k,) dihedrals of `Folds`, rad
-    strips: Whole
-    team: Team
-
-
 class Model:
     """Terms of a body on one thread; keeps their arrays and contexts alive.
 
     Parameters
     ----------
     body : Assembly
-    work : Work
-        Of the thread, one of `Assembly.workspaces`.
+    part : ThreadPart
+        One of `Assembly.thread_parts`.
     kinds : sequence of int
         Kernels to compile; others are not.
 
     Attributes
     ----------
     terms : Terms
-    share : Share
     """
 
-    def __init__(self, body: Any, work: Any, kinds: Sequence[int] = EVERY) -> None:
-        self._held = terms = body.compiled(work)
+    def __init__(self, body: Any, part: ThreadPart, kinds: Sequence[int] = EVERY) -> None:
+        self._held = terms = body.compiled(part)
         kernel = np.zeros((len(terms), len(EVERY)), np.int64)
         context = np.array([term.context.address for term in terms], np.int64)
         self.terms = Terms(context, kernel, body.sheet.folds, np.zeros(3))
-        own = Whole(np.asarray(work.strips.own))
-        self.share = Share(work.angle, work.fold_angle, own, work.team)
         self.call(kinds)
 
     def call(self, kinds: Sequence[int]) -> None:
@@ -382,7 +364,7 @@ def parted_rows(values, n, r):
 def forces_of(terms, u, v, t, force):
     """Internal forces (rows, 3) at u, v and t; returns the powers in, out and to the air, W.
 
-    Stores all dihedrals in `angle` and `fold_angle` of the thread's `Share`.
+    Stores all dihedrals in `angle` and `fold_angle` of the `ThreadPart`.
     """
     terms.powers[0], terms.powers[1], terms.powers[2] = 0.0, 0.0, 0.0
     for k in range(terms.context.size):

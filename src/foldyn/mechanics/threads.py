@@ -40,6 +40,17 @@ class Team(NamedTuple):
     pause: int  # see `_pause`
 
 
+class ThreadPart(NamedTuple):
+    """The part of a body (`mechanics.assembly`) that one thread has."""
+
+    team: Team
+    own: NDArray  # (2,) first and last + 1 of its rows
+    angle: NDArray  # (nh,) dihedrals of all hinges at the last force evaluation, rad
+    fold_angle: NDArray  # (k,) dihedrals of the actuated hinges, rad
+    scratch: Any  # of the sheet's kernels
+    kept: tuple[Any, ...] = ()  # memory of the other terms
+
+
 def team(size: int) -> list[Team]:
     """Members of a team of `size` threads."""
     state, note = np.zeros(24, np.int64), np.zeros((size, 8))

@@ -38,7 +38,7 @@ class Viscous(NamedTuple):
     corners: NDArray  # (h, 4, 3) rest positions of the nodes j, k, i, l, m
     hidden_turn: NDArray  # (h, 2) reduction of the dihedral per unit of the last two dofs, rad/m
     coefficient: NDArray  # (p + h,) N s/m, N m s/rad
-    gradient: NDArray  # (14,) work array of one element
+    gradient: NDArray  # (14,) scratch of one element
 
 
 def viscous(
@@ -190,7 +190,7 @@ class Gradient(NamedTuple):
 class _Backward(NamedTuple):
     elements: Viscous
     out: Gradient
-    points: NDArray  # (4, 3) work array: positions of one hinge, m
+    points: NDArray  # (4, 3) scratch: positions of one hinge, m
     moves: NDArray  # (14,) velocities of the dofs of one element
     by: NDArray  # (14,)
     size: int  # number of dofs up to the last one used
@@ -277,9 +277,9 @@ class ViscousTerm(Term):
     def __init__(self, elements: Viscous) -> None:
         self.elements = elements
 
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
         """Context and kernels for a thread; see `Term`."""
-        own = Context(_Context(self.elements, 3 * int(work.strips.own[1])))
+        own = Context(_Context(self.elements, 3 * int(part.own[1])))
         return Compiled(own, {FORCES: _forces})
 
     def arrays(self) -> Arrays:

@@ -34,7 +34,7 @@ class ViscousPanels(NamedTuple):
     vector: NDArray  # (p, b, 3) rest vector from the first end to the second, m
     per_length2: NDArray  # (p, b) 1 / L^2
     resistance: NDArray  # (p, b, b) C, J s
-    along: NDArray  # (b, 3) work array of one panel: vectors of its bars, m
+    along: NDArray  # (b, 3) scratch of one panel: vectors of its bars, m
     rate: NDArray  # (b,) strain rates, 1/s
 
 
@@ -183,9 +183,9 @@ class ViscousPanelsTerm(Term):
     def __init__(self, panels: ViscousPanels) -> None:
         self.panels = panels
 
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
         """Context and kernels for a thread; see `Term`."""
-        own = Context(_Context(self.panels, int(work.strips.own[1])))
+        own = Context(_Context(self.panels, int(part.own[1])))
         return Compiled(own, {FORCES: _forces})
 
     def arrays(self) -> Arrays:

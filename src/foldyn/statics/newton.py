@@ -172,7 +172,7 @@ class Stiffness:
 
 
 class Solver:
-    """A problem, with the settings and work arrays for its equilibria."""
+    """A problem, with the settings and scratch for its equilibria."""
 
     def __init__(self, problem: Problem, settings: Settings | None = None) -> None:
         self.problem = problem

@@ -99,11 +99,11 @@ class BarsHingesTerm(SheetTerm):
         """Tangent blocks for implicit integrators; see `SheetTerm`."""
         return BarsHingesBlocks(self.model)
 
-    def workspaces(self, threads: int) -> list[mechanics.Workspace]:
-        """Work arrays for each thread; see `SheetTerm`."""
-        return mechanics.workspaces(self.model, threads)
+    def scratches(self, threads: int) -> list[mechanics.ForceScratch]:
+        """Scratch for each thread; see `SheetTerm`."""
+        return mechanics.force_scratches(self.model, threads)
 
-    def compiled(self, work: Any, kept: mechanics.Workspace, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: mechanics.ForceScratch, group: int) -> Compiled:
         """Context and kernels for a thread; see `Term`."""
         return bars_hinges_kernels(self.model, kept, len(GROUPS))
 

@@ -16,9 +16,9 @@ from foldyn.materials import HingeLaw, LinearHinge, Superlinear
 from foldyn.mechanics.clamps import RIDES
 from foldyn.mechanics.plates import (
     BarsPlates,
-    PlatesWork,
+    PlatesScratch,
     plates_kernels,
-    plates_work,
+    plates_scratch,
     turn_folds,
     turn_hinges,
 )
@@ -120,11 +120,11 @@ class BarsPlatesTerm(SheetTerm):
     def _assembled(
         self, q: NDArray, floor: float, bars: Callable[[], sparse.csr_array]
     ) -> sparse.csr_array:
-        pattern, work = self.sparsity, plates_work(self.model)
+        pattern, scratch = self.sparsity, plates_scratch(self.model)
         data = np.zeros(len(pattern.indices))
         if len(self.model.bars.bar_runs):
             data[pattern.bars] = bars().data
-        add_plates_tangent(self.model, pattern, *self._split(q), work, floor, data)
+        add_plates_tangent(self.model, pattern, *self._split(q), scratch, floor, data)
         entries = (data, pattern.indices, pattern.indptr)
         return sparse.csr_array(entries, (self.size, self.size))
 
@@ -135,11 +135,11 @@ class BarsPlatesTerm(SheetTerm):
         matrix = sparse.csr_array(entries, (self.size, self.size))
         return SparseBlocks(matrix, self.rows, positions(self.model))
 
-    def workspaces(self, threads: int) -> list[PlatesWork]:
+    def scratches(self, threads: int) -> list[PlatesScratch]:
         """See `SheetTerm`."""
-        return [plates_work(self.model)]
+        return [plates_scratch(self.model)]
 
-    def compiled(self, work: Any, kept: PlatesWork, group: int) -> Compiled:
+    def compiled(self, scratch: Any, kept: PlatesScratch, group: int) -> Compiled:
         """See `Term`."""
         return plates_kernels(self.model, kept, self.rows, self._groups)
 
@@ -174,11 +174,11 @@ class BarsPlatesTerm(SheetTerm):
 
     def holds(self, q: NDArray) -> sparse.csr_array:
         """See `SheetTerm`: clamped edges as they turn."""
-        model, work = self.model, plates_work(self.model)
+        model, scratch = self.model, plates_scratch(self.model)
         first = len(model.hinges) - len(model.wings)
         if len(model.wings):
-            turn_hinges(model, self._split(q)[0], work)
-        turns = work.gradient[first:]
+            turn_hinges(model, self._split(q)[0], scratch)
+        turns = scratch.gradient[first:]
         turns[:, :3] += turns[:, 9:]  # of the wing, in whose place the first end stands
         return unit_rows(model.hinges[first:, :3], turns[:, :9], self.size)
 
@@ -189,9 +189,10 @@ class BarsPlatesTerm(SheetTerm):
 
     def plate_energies(self, q: NDArray, turn: NDArray) -> NDArray:
         """See `SheetTerm`."""
-        model, work, (displacement, rotation) = self.model, plates_work(self.model), self._split(q)
-        turn_hinges(model, displacement, work)
-        from_rest = work.angle.copy()
+        model, scratch = self.model, plates_scratch(self.model)
+        displacement, rotation = self._split(q)
+        turn_hinges(model, displacement, scratch)
+        from_rest = scratch.angle.copy()
         from_rest[len(model.fold_rest) :] -= model.bend_rest
         turned = np.append(from_rest, (self.per_hidden * rotation)[::-1])  # number -1 comes last
         angle, size = turned[model.angle], np.diff(model.start)
@@ -227,16 +228,16 @@ class BarsPlatesTerm(SheetTerm):
 
     def turns(self, q: NDArray) -> tuple[sparse.csr_array, NDArray]:
         """Gradients (nq, m), 1/m, of the plates' angles, and slopes (nf,) of the folds, N m/rad."""
-        model, work, hinges = self.model, plates_work(self.model), len(self.model.hinges)
+        model, scratch, hinges = self.model, plates_scratch(self.model), len(self.model.hinges)
         displacement, rotation = self._split(q)
-        turn_hinges(model, displacement, work)
-        turn_folds(model, rotation, work)
+        turn_hinges(model, displacement, scratch)
+        turn_folds(model, rotation, scratch)
         columns = 3 * model.hinges[:, :, None] + np.arange(3)
         places = (np.repeat(np.arange(hinges), 12), columns.ravel())
-        nodal = sparse.coo_array((work.gradient.ravel(), places), shape=(hinges, self.size))
+        nodal = sparse.coo_array((scratch.gradient.ravel(), places), shape=(hinges, self.size))
         edges = self.per_hidden * sparse.eye_array(model.rotations, self.size, k=self._nodal)
         rows = np.where(model.angle < 0, hinges - 1 - model.angle, model.angle)
-        slope = self._laws[0].slope(work.fold_angle, model.fold_rest)
+        slope = self._laws[0].slope(scratch.fold_angle, model.fold_rest)
         all_turns = sparse.csr_array(sparse.vstack([nodal, edges], format="csr"))
         return all_turns[rows], model.fold_stiffness * slope
 

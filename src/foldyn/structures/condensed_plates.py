@@ -17,10 +17,10 @@ from foldyn.mechanics.inelastic import MemoryHinges
 from foldyn.mechanics.inelastic_balance import evaluation
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.mechanics.plates_condensed import (
-    CondensedWork,
+    CondensedScratch,
     condensed_kernels,
     condensed_plates,
-    condensed_work,
+    condensed_scratch,
 )
 from foldyn.mechanics.plates_condensed_pullback import condensed_pulled
 from foldyn.mechanics.pullback import Arrays, Pulled
@@ -56,7 +56,7 @@ class CondensedPlatesTerm(BarsPlatesTerm):
         push = np.append(np.zeros(self.size), self._push)
         return Assembly(self._full).dofs(np.ravel(q)[: self.size], push)
 
-    def compiled(self, work: Any, kept: CondensedWork, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: CondensedScratch, group: int) -> Compiled:
         """Context and kernels for a thread; see `Term`."""
         return condensed_kernels(self.condensed, kept)
 
@@ -71,9 +71,9 @@ class CondensedPlatesTerm(BarsPlatesTerm):
         """Pullback of its forces; see `Term`."""
         return None if self.condensed.memory.any() else condensed_pulled(self.condensed)
 
-    def workspaces(self, threads: int) -> list[CondensedWork]:
-        """Work arrays for each thread; see `SheetTerm`."""
-        return [condensed_work(self.condensed)]
+    def scratches(self, threads: int) -> list[CondensedScratch]:
+        """Scratch for each thread; see `SheetTerm`."""
+        return [condensed_scratch(self.condensed)]
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
         """Tangent (m, m), N/m; see `SheetTerm`."""

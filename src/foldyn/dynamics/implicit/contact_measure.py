@@ -26,7 +26,7 @@ NOISE = 16.0 * float(np.finfo(float).eps)  # of positions: rounding error of a m
 
 
 class Move(NamedTuple):
-    """Motion of four points in a step, and work arrays for a measure."""
+    """Motion of four points in a step, and scratch for a measure."""
 
     start: NDArray  # (4, 3) m
     middle: NDArray  # (4, 3) m
@@ -44,7 +44,7 @@ class Move(NamedTuple):
 
 
 def new_move() -> Move:
-    """Work arrays for four points."""
+    """Scratch for four points."""
     start, middle, end, motion, deform = np.zeros((5, 4, 3))
     slope, after, gradient = np.zeros((3, 12))
     by_end, second = np.zeros((2, 12, 12))

@@ -315,7 +315,7 @@ class Implicit:
         verdict = self._newton.solve(h, moment)
         if self._packed.callbacks.error is not None:
             return Outcome.NOT_FINITE, -1
-        turned = np.abs(self._scheme.work.angle - self._course.angle)
+        turned = np.abs(self._scheme.part.angle - self._course.angle)
         if turned.max(initial=0.0) > TURN:
             return Outcome.PENETRATION, int(turned.argmax())
         return OUTCOMES.get(verdict, Outcome.NOT_CONVERGED), -1
@@ -335,7 +335,7 @@ class Implicit:
             course.tally.work += given
             course.tally.dissipated += taken
             self._touching.begin()
-        course.angle[:] = scheme.work.angle
+        course.angle[:] = scheme.part.angle
         scheme.accept(h)
         if self._memory is not None:
             self._memory.commit()
@@ -347,7 +347,7 @@ class Implicit:
                 self._memory.commit()
             if system.turns:
                 note_offsets(
-                    self._packed.body.sheet.folds, system.actuators, scheme.work.fold_angle
+                    self._packed.body.sheet.folds, system.actuators, scheme.part.fold_angle
                 )
             if self._touching is not None:
                 self._touching.begin()

@@ -107,9 +107,9 @@ class Scheme(ABC):
 
     def __init__(self, packed: Packed, course: Course) -> None:
         self.packed, self.course = packed, course
-        self.work = packed.body.workspaces(1)[0]
+        self.part = packed.body.thread_parts(1)[0]
         self.scratch: Scratch = scratch(packed.system)
-        self.equation = EquationOfMotion(packed, self.work, self.scratch, course, None)
+        self.equation = EquationOfMotion(packed, self.part, self.scratch, course, None)
         shape, histories = course.u.shape, self.scratch.factor.shape
         self.out, self.step = np.zeros(shape), np.zeros(shape)
         self.shift = np.zeros(shape)  # new.q - old.q, stored as the difference would lose digits
@@ -127,7 +127,7 @@ class Scheme(ABC):
         self._speed, self._growth, self._last = course.v.copy(), np.zeros(shape), 0.0
         self.massless = packed.mass.diagonal <= 0.0
         self.rounding = EPS * float(np.linalg.norm(packed.body.scale()))
-        self.folds = np.zeros_like(self.work.fold_angle)  # fold angles at old.q, rad
+        self.folds = np.zeros_like(self.part.fold_angle)  # fold angles at old.q, rad
 
     @abstractmethod
     def weights(self, h: float) -> Weights:
@@ -195,7 +195,7 @@ class Scheme(ABC):
         self._speed[:], self._last = old.w, 0.0
         self._growth[:] = 0.0
         old.force[:], old.factor[:], old.pushed[:] = s.force, s.factor, s.pushed
-        self.folds[:] = self.work.fold_angle
+        self.folds[:] = self.part.fold_angle
 
     def settle(self, t: float) -> float:
         """Let massless parts follow loads that jump at t (s); returns the work on them, J.
@@ -322,7 +322,7 @@ class Scheme(ABC):
         self._speed[:], self._last = speed, h
         for old, new in zip(self.old, self.new, strict=True):
             old[:] = new
-        self.folds[:] = self.work.fold_angle
+        self.folds[:] = self.part.fold_angle
 
 
 @inner_scalar

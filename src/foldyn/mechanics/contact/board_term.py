@@ -59,11 +59,11 @@ class BoardContactTerm(ContactTerm):
         """Contact data as arrays, with boards' points; see `ContactTerm`."""
         return board_tables(self.sheets, *self._riding, self._guarded.hinges)
 
-    def compiled(self, work: Any, kept: Memory, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Memory, group: int) -> Compiled:
         """Context and kernels for a thread; see `Term`."""
-        return board_kernels(self.ride, self.tables, kept, work.angle, group)
+        return board_kernels(self.ride, self.tables, kept, part.angle, group)
 
-    def memories(self, works: Sequence[Any]) -> list[Memory]:
+    def memories(self, parts: Sequence[Any]) -> list[Memory]:
         """Kernel memory for each thread; see `Term`."""
         return [memory(self.tables, self.sheets.panels)]
 

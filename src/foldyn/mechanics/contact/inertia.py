@@ -42,7 +42,7 @@ class Added(NamedTuple):
     gradient: NDArray  # (room, 4, 3) of the distance, or dihedral
     ease: NDArray  # (room,) 1 / (tau^2 K)
     lightness: NDArray  # (room,) approximate 1 / moving mass of each
-    lines: NDArray  # (4, room) work array of the solver
+    lines: NDArray  # (4, room) scratch of the solver
 
 
 def room_for(tables: Tables, memory: Memory) -> Added:

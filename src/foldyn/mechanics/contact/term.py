@@ -110,15 +110,15 @@ class ContactTerm(Term):
         return type(self)(replace(self.sheets, planes=planes), self._guarded)
 
     # ------------------------------------------------------------------ as a term
-    def compiled(self, work: Any, kept: Memory, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Memory, group: int) -> Compiled:
         """Context and kernels for a thread; see `Term`."""
-        return contact_kernels(self.tables, kept, work.angle, group)
+        return contact_kernels(self.tables, kept, part.angle, group)
 
-    def memories(self, works: Sequence[Any]) -> list[Memory]:
+    def memories(self, parts: Sequence[Any]) -> list[Memory]:
         """Kernel memory for each thread; see `Term`."""
-        if len(works) == 1:  # it owns further rows, if any
+        if len(parts) == 1:  # it owns further rows, if any
             return [memory(self.tables, self.sheets.panels)]
-        teams, own = [work.team for work in works], [work.strips.own for work in works]
+        teams, own = [part.team for part in parts], [part.own for part in parts]
         return memories(self.tables, self.sheets.panels, teams, own)
 
     def prepare(self) -> None:
