@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from problem import Problem
 
 from foldyn.dynamics.initial import begin
-from foldyn.dynamics.methods import Compiled
+from foldyn.dynamics.methods import ExplicitEngine
 from foldyn.dynamics.motion_state import StepPlan, samples
 from foldyn.dynamics.runge_kutta import RK4, advance
 from foldyn.dynamics.system import pack
@@ -41,15 +41,15 @@ class FoldynEngine:
         case, packed, dt = self.problem.case, self.packed, self.problem.dt
         plan = StepPlan(0.0, steps * dt, dt, steps, 1 << 60, 0.0, 0.0, 0.0, np.zeros(0))
         start = self.problem.start[self._back]
-        course = begin(case, start, np.zeros_like(start), None, None, plan, packed)
-        course.tally.samples = 1  # so that no step is due for a sample
+        state = begin(case, start, np.zeros_like(start), None, None, plan, packed)
+        state.tally.samples = 1  # so that no step is due for a sample
         out = samples(0, len(start), len(packed.system.supported), 6)
         further = (RK4.coefficients,)
-        engine = Compiled(advance, packed, course, plan, self._threads, further=further)
+        engine = ExplicitEngine(advance, packed, state, plan, self._threads, further=further)
         began = time.perf_counter()
         code, _ = engine.advance(out, steps)
         seconds = time.perf_counter() - began
         if code:
             raise RuntimeError(f"Foldyn's loop stopped with code {code}")
-        u = packed.numbering.outward(course.u)
+        u = packed.numbering.outward(state.u)
         return seconds * 4 * steps / (4 * steps + 1), u[self.problem.order]

@@ -134,9 +134,9 @@ def prepared(case: fd.Case, method: str) -> Motion:
 
 def launches_of(motions: list[Motion], wide: bool) -> Launches:
     """Them on the card."""
-    courses = [motion.course for motion in motions]
+    states = [motion.state for motion in motions]
     u, v, carry, angle = (
-        np.stack([getattr(course, name) for course in courses])
+        np.stack([getattr(state, name) for state in states])
         for name in ("u", "v", "carry", "angle")
     )
     places = Places(u, v, carry, np.zeros((len(motions), 4)), angle)
@@ -351,8 +351,8 @@ def _unchecked(case: fd.Case) -> Any:
     dt = 1.4e-4  # s, a fifth of the critical one
     u, packed = shaken(case).displacement, pack(case, 0.05 * dt)
     plan = StepPlan(0.0, 1e4 * dt, dt, 10_000, 10_000, 0.0, 0.0, 0.0, np.zeros(0))
-    course = begin(case, u, np.zeros_like(u), None, None, plan, packed)
-    return SimpleNamespace(packed=packed, plan=plan, course=course, method=INTEGRATORS["rk4"])
+    state = begin(case, u, np.zeros_like(u), None, None, plan, packed)
+    return SimpleNamespace(packed=packed, plan=plan, state=state, method=INTEGRATORS["rk4"])
 
 
 def main() -> None:

@@ -155,9 +155,9 @@ def test_explicit_steps_watch_the_dihedrals_of_all_hinges(preset, clamped):
     case = fd.Case(s, [fd.Fix([0, 1]), fd.Spring(1.0, nodes=[3])], [fd.Force([2], (0, 0, 1.0))])
     motion = prepare(case, 0.1, method="rk4", interval=0.01)
     motion.run()
-    body, u = motion.packed.body, motion.course.u
+    body, u = motion.packed.body, motion.state.u
     found = body.angles(u.ravel())
-    np.testing.assert_allclose(motion.course.angle, found, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(motion.state.angle, found, rtol=0, atol=1e-12)
     assert np.abs(found - body.angles(0.0 * u.ravel())).max() > 1e-3
 
 

@@ -194,10 +194,10 @@ def test_an_engine_goes_on_from_a_checkpoint(method):
         motion.output.begin()
         kept = {}
         for stop in stops:
-            engine = motion.method.engine(each, motion.packed, motion.course, motion.plan, "gpu")
+            engine = motion.method.engine(each, motion.packed, motion.state, motion.plan, "gpu")
             if kept:
                 engine.resume_from(kept)
-            engine.advance(motion.output.window, stop - int(motion.course.tally.steps))
+            engine.advance(motion.output.window, stop - int(motion.state.tally.steps))
             kept = engine.checkpoint_arrays()
         ends.append(kept)
     for name, array in ends[0].items():

@@ -186,9 +186,9 @@ def test_refused_steps_leave_no_trace(name):
     motion = prepare(pushed(LAWS[name]), 2.0, DP, tolerance=1e-7, every_steps=10**6)
     motion.run()  # to where everything has flowed
     plan = motion.plan._replace(end=4.0, dt=1.0)
-    engine = motion.method.engine(motion.case, motion.packed, motion.course, plan)
-    tally, out = motion.course.tally, motion.output.window
-    parts = engine._parts()
+    engine = motion.method.engine(motion.case, motion.packed, motion.state, plan)
+    tally, out = motion.state.tally, motion.output.window
+    parts = engine.changing()
     tally.wanted, tally.shortest, before = 1.0, np.inf, tally.refused
     begun = snapshot(parts)
     assert engine.advance(out, 1)[0] == 0
@@ -199,8 +199,8 @@ def test_refused_steps_leave_no_trace(name):
     assert engine.advance(out, 1)[0] == 0
     assert tally.refused == before
     again = snapshot(parts)
-    course = [f"course.{part}" for part in ("u", "v", "carry")]
-    for part in (*course, *(f"branches.{part}" for part in ("angle", "state", "rate", "lost"))):
+    state = [f"state.{part}" for part in ("u", "v", "carry")]
+    for part in (*state, *(f"branches.{part}" for part in ("angle", "state", "rate", "lost"))):
         np.testing.assert_array_equal(again[part], ended[part])
 
 

@@ -15,7 +15,7 @@ from contact_sheets import SHEET, crossing, on_a_panel
 from foldyn.dynamics import prepare
 from foldyn.dynamics.equation import EquationOfMotion
 from foldyn.dynamics.explicit_contact import slow_contacts
-from foldyn.dynamics.motion_state import TALLY, Course
+from foldyn.dynamics.motion_state import TALLY, MotionState
 from foldyn.dynamics.slow_contacts import slow_down
 from foldyn.dynamics.system import pack, scratch
 from foldyn.jit.context import Context
@@ -68,9 +68,9 @@ def test_accelerations_are_those_of_the_mass_with_the_inertia_of_contacts(mass):
     rng = np.random.default_rng(0)
     before, w = rng.standard_normal((2, *u.shape))
     a = before.copy()
-    course = Course(u, np.zeros_like(u), np.zeros_like(u), np.zeros(1, TALLY)[0], np.zeros(0))
+    state = MotionState(u, np.zeros_like(u), np.zeros_like(u), np.zeros(1, TALLY)[0], np.zeros(0))
     part, own = body.thread_parts(1)[0], scratch(system)
-    equation = EquationOfMotion(packed, part, own, course, True)
+    equation = EquationOfMotion(packed, part, own, state, True)
     slow = slow_contacts(packed, part, equation.case.value)
     assert slow is not None
     slow_down(Context(slow.value._replace(added=added)), w, a)

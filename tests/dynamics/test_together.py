@@ -13,7 +13,7 @@ from moving_sheets import HEAVY
 
 import foldyn as fd
 from foldyn.dynamics import methods
-from foldyn.dynamics.methods import Compiled, threads_of
+from foldyn.dynamics.methods import ExplicitEngine, threads_of
 from foldyn.dynamics.system import pack
 from foldyn.errors import InstabilityError, PenetrationError
 
@@ -174,7 +174,7 @@ def test_a_motion_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path,
     what, start = closing()
     given = half_steps(what, method, 60, 30) | {"initial": start}
     whole = on(monkeypatch, 2, what, method, **given)
-    resume_from = Compiled.resume_from
+    resume_from = ExplicitEngine.resume_from
 
     def forgetful(self, arrays):
         """What a new process would not know."""
@@ -182,6 +182,6 @@ def test_a_motion_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path,
             array[:] = 3.0
         resume_from(self, arrays)
 
-    monkeypatch.setattr(Compiled, "resume_from", forgetful)
+    monkeypatch.setattr(ExplicitEngine, "resume_from", forgetful)
     run = partial(on, monkeypatch, 2, what, method)
     same(killed_and_resumed(run, tmp_path / "run.nc", **given), whole)

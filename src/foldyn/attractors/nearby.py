@@ -214,7 +214,7 @@ class Pair:
         engines = []
         for motion in self._motions:
             motion.output.begin()
-            engine = motion.method.engine(motion.case, motion.packed, motion.course, motion.plan)
+            engine = motion.method.engine(motion.case, motion.packed, motion.state, motion.plan)
             engines.append(engine)
             self._advance(motion, engine, 0)  # records the start
         size = max(self._size(first), SMALL * float(first.case.structure.bar_length.max()))
@@ -237,8 +237,8 @@ class Pair:
                     f"{self._interval:.3g} s, too much to be measured; take a shorter interval"
                 )
             size = max(size, self._size(first))
-            now = float(first.course.tally.time)
-            report(Progress(now, first.plan.end, int(first.course.tally.steps), 0.0))
+            now = float(first.state.tally.time)
+            report(Progress(now, first.plan.end, int(first.state.tally.steps), 0.0))
             if (k + 1) % 64 == 0:
                 self._look(first)
             yield grown
@@ -263,11 +263,11 @@ class Pair:
     def _look(self, motion: Motion) -> None:
         """Stop if energies do not balance, or the step has become too long."""
         motion.audit()
-        motion.recheck(motion.packed.numbering.outward(motion.course.u))
+        motion.recheck(motion.packed.numbering.outward(motion.state.u))
 
     def _size(self, motion: Motion) -> float:
         """Norm of a motion's state, m."""
-        return self._distance(motion.course.u, motion.course.v)
+        return self._distance(motion.state.u, motion.state.v)
 
     def _distance(self, u: NDArray, v: NDArray) -> float:
         """Norm (m) of displacements, and velocities scaled to a length."""
@@ -276,6 +276,6 @@ class Pair:
 
 def _arrays(motion: Motion) -> list[NDArray]:
     """State of a motion: displacement, velocity, acceleration, and memory of hinges."""
-    course, memory = motion.course, motion.packed.body.find(HingeMemory)
+    state, memory = motion.state, motion.packed.body.find(HingeMemory)
     remembered = [] if memory is None else [memory.own.angle, memory.own.state]
-    return [course.u, course.v, course.carry, *remembered]
+    return [state.u, state.v, state.carry, *remembered]

@@ -162,54 +162,54 @@ def _catch(fluid: Fluid, x: NDArray) -> sparse.csr_array:
     return sparse.csr_array(fluid.catch @ spread)
 
 
-def begin_flow(case: Case, packed: Any, course: Any, place: NDArray) -> None:
+def begin_flow(case: Case, packed: Any, state: Any, place: NDArray) -> None:
     """Compute the flow at the start of a motion, at `place` (n, 3)."""
     own, inward = packed.added, packed.numbering.inward(place)
     if own.acts:
         _find_flow(case, own, packed.mass, place, inward)
         own.angle[:], own.made[:] = packed.body.angles(inward), 0.0
-        put_areas(own, course.u)
-        _blow(case, own, course)
-        energy_of_flow(own, course.v)
-        course.tally.air = -own.carried[0]
+        put_areas(own, state.u)
+        _blow(case, own, state)
+        energy_of_flow(own, state.v)
+        state.tally.air = -own.carried[0]
 
 
-def renewed_flow(case: Case, packed: Any, course: Any) -> bool:
+def renewed_flow(case: Case, packed: Any, state: Any) -> bool:
     """Compute the flow again if a hinge has turned by `TURN` since the last time; return whether.
 
     The momentum of sheet and fluid is conserved on every free dof. Scaling the deforming part of
     the velocity, which keeps the momenta, conserves their energy in excess of the undisturbed
     wind, within the bounds `SCALED`. Any remainder is counted as exchanged with the air.
     """
-    own, mass, v = packed.added, packed.mass, course.v
-    if np.abs(course.angle - own.angle).max(initial=0.0) <= TURN:
+    own, mass, v = packed.added, packed.mass, state.v
+    if np.abs(state.angle - own.angle).max(initial=0.0) <= TURN:
         return False
     line, jump = np.zeros(v.size), np.zeros(len(own.flow))
     push, change = np.zeros((2, *v.shape))
-    put_areas(own, course.u)
-    _blow(case, own, course)
+    put_areas(own, state.u)
+    _blow(case, own, state)
     before = _conserved(own, mass, v)
     flux(own, own.area, v - own.blown[0], jump)
     lost = own.flow @ jump
-    _find_flow(case, own, mass, packed.numbering.outward(course.u), course.u)
+    _find_flow(case, own, mass, packed.numbering.outward(state.u), state.u)
     press(own, lost - own.flow @ jump, push)
     solve(own, mass, push, change, line)
     v += change
-    deforming = v - _rigid_part(case, packed, course)
+    deforming = v - _rigid_part(case, packed, state)
     missed, least = before - _conserved(own, mass, v), whole_energy(own, mass, deforming)
     if least > 0.0:
         v += (math.sqrt(np.clip(1.0 + missed / least, *SCALED)) - 1.0) * deforming
     left = before - _conserved(own, mass, v)
-    course.tally.air += left
-    own.angle[:] = course.angle
+    state.tally.air += left
+    own.angle[:] = state.angle
     own.made[:] += 1.0, abs(left)
     return True
 
 
-def _blow(case: Case, own: AddedMass, course: Any) -> None:
+def _blow(case: Case, own: AddedMass, state: Any) -> None:
     """Set the wind velocity at the current time of the motion."""
     for _, history in case.wind_terms:
-        own.blown[0] = history(float(course.tally.time)) * own.wind
+        own.blown[0] = history(float(state.tally.time)) * own.wind
 
 
 def _conserved(own: AddedMass, mass: Inertia, v: NDArray) -> float:
@@ -217,10 +217,10 @@ def _conserved(own: AddedMass, mass: Inertia, v: NDArray) -> float:
     return whole_energy(own, mass, v) - energy_of_fluid(own, np.zeros_like(v) + own.blown[0])
 
 
-def _rigid_part(case: Case, packed: Any, course: Any) -> NDArray:
+def _rigid_part(case: Case, packed: Any, state: Any) -> NDArray:
     """Rigid motion (rows, 3), within the supports, with the momenta of sheet and fluid."""
-    own, by, v = packed.added, packed.numbering, course.v
-    place = case.structure.nodes + by.outward(course.u)
+    own, by, v = packed.added, packed.numbering, state.v
+    place = case.structure.nodes + by.outward(state.u)
     free = free_rigid_motions(place, case.constraints).T
     shapes = np.array([by.inward(shape.reshape(-1, 3)) for shape in free]).reshape(-1, *v.shape)
     pushes, speed = np.zeros((len(shapes), *v.shape)), np.zeros(len(own.flow))

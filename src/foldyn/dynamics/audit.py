@@ -50,7 +50,7 @@ def energy_scale(energy: NDArray, air: bool) -> float:
     return float(np.nanmax(np.abs(moving)))
 
 
-class Balance:
+class EnergyBalance:
     """Energy statistics of a motion, updated sample by sample.
 
     Parameters
@@ -117,7 +117,7 @@ class Rounding:
         turns = self._moment * ANGLE * min(strain, math.pi)
         return MARGIN * (EPS * (float(np.nanmax(np.abs(energy))) + bars) + turns)
 
-    def reveals(self, balance: Balance) -> bool:
+    def reveals(self, balance: EnergyBalance) -> bool:
         """Whether an error as large as the energies at play proves a motion unstable.
 
         In the first steps under a load that begins slowly, the relative energy error may be large:

@@ -50,18 +50,18 @@ def growth(omega, damping, dt):
 
 
 @shared
-def advance(handle, course, plan, room, stretch):
+def advance(handle, state, plan, room, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
-    `course.carry` is the acceleration, kept from one step and stretch to the next; the tally keeps
+    `state.carry` is the acceleration, kept from one step and stretch to the next; the tally keeps
     powers and energies. Each thread of a team advances its own nodes.
     """
-    course = borrowed(course)
-    team, stage, a, powers = handle.team, handle.stage, course.carry, handle.before
+    state = borrowed(state)
+    team, stage, a, powers = handle.team, handle.stage, state.carry, handle.before
     low, high = 3 * handle.own[0], 3 * handle.own[1]
-    u, v = flat(course.u)[low:high], flat(course.v)[low:high]
+    u, v = flat(state.u)[low:high], flat(state.v)[low:high]
     fa, ahead = flat(a)[low:high], flat(stage[0])[low:high]
-    begun = course.tally.steps
+    begun = state.tally.steps
     end = min(begun + stretch, plan.steps)
     post_totals(team, 0.0, 0.0, 0.0, 0)
     for step in range(begun + 1 if begun > 0 else 0, end + 1):  # step 0 only records the start
@@ -71,7 +71,7 @@ def advance(handle, course, plan, room, stretch):
         while True:  # one pass, unless contact asks for shorter steps
             dt = 0.0
             if step > 0:
-                dt = longest_step(handle, course.u, course.v, a, left, RESOLVED)
+                dt = longest_step(handle, state.u, state.v, a, left, RESOLVED)
                 dt = split_step(dt, left)
             for i in range(u.size):
                 v[i] += 0.5 * dt * fa[i]
@@ -80,7 +80,7 @@ def advance(handle, course, plan, room, stretch):
             left = 0.0 if dt == left else left - dt
             now = plan.start + step * plan.dt - left
             advance_clock(handle, span - left)
-            new = acceleration(handle, course.u, stage[0], now, a)
+            new = acceleration(handle, state.u, stage[0], now, a)
             for i in range(u.size):
                 v[i] += 0.5 * dt * fa[i]  # the kick that ends the step
                 wrong += not abs(v[i]) < np.inf
@@ -89,11 +89,11 @@ def advance(handle, course, plan, room, stretch):
             work_air += 0.5 * dt * (powers[2] + new[2])
             powers[0], powers[1], powers[2] = new
             if team.number == 0 and step > 0:
-                course.tally.evaluations += 1
+                state.tally.evaluations += 1
             if left == 0.0 or wrong > 0:
                 break
         post_totals(team, work_in, work_out, work_air, wrong)
-        outcome, hinge = observe(handle, course, plan, a, step)
+        outcome, hinge = observe(handle, state, plan, a, step)
         if outcome != Outcome.DONE:
             return outcome, hinge
     return Outcome.DONE, -1

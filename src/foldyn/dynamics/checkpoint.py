@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from foldyn import __version__
 from foldyn.cases import Case
 from foldyn.cases.document import to_document
-from foldyn.dynamics.motion_state import Course, StepPlan
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.motion_state import MotionState, StepPlan
+from foldyn.dynamics.system import PackedCase
 from foldyn.errors import ComputationError, InputError
 from foldyn.lock import LockedError, locked
 from foldyn.mechanics.inelastic_branches import HingeMemory
@@ -49,7 +49,7 @@ CHECKPOINT = "checkpoint.npz"
 _ABOUT = "about"
 KEY = "motion"
 """Attribute of a result that was kept meanwhile: what the motion is, as a digest."""
-CONSTANT = ("team", "strips", "packed", "course", "_packed", "_course", "_plan", "share")
+CONSTANT = ("team", "strips", "packed", "_packed", "_state", "_plan", "share")
 """Fields that stay what they are, or serve one evaluation."""
 
 
@@ -365,10 +365,10 @@ def _digest(array: Any) -> str | None:
     return hashlib.sha256(text + values.tobytes()).hexdigest()[:16]
 
 
-def state_parts(packed: Packed, course: Course) -> dict[str, Any]:
+def state_parts(packed: PackedCase, state: MotionState) -> dict[str, Any]:
     """Mutable state of a case and its motion, the same for all methods."""
     memory = packed.body.find(HingeMemory)
-    parts: dict[str, Any] = {"course": course}
+    parts: dict[str, Any] = {"state": state}
     if memory is not None:
         parts["branches"] = memory.own
     if packed.system.turns:

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from foldyn.algebra.banded import substitute
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.generalized_alpha import Alpha, balanced, residual
-from foldyn.dynamics.implicit.engine import Implicit
+from foldyn.dynamics.implicit.engine import ImplicitEngine
 from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.newton import SAME_STEP
 from foldyn.dynamics.implicit.scheme import Scheme
-from foldyn.dynamics.motion_state import Course, Samples, StepPlan
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.motion_state import MotionState, Samples, StepPlan
+from foldyn.dynamics.system import PackedCase
 from foldyn.dynamics.ties import follow_masters
 from foldyn.errors import ComputationError
 from foldyn.jit.compiled import kernel
@@ -39,12 +39,12 @@ STALL, ENOUGH = 0.5, 1e-3  # of the last change, and of the difference: stall at
 class Companion(NamedTuple):
     """A companion motion: its case, and its current state."""
 
-    packed: Packed
-    course: Course
+    packed: PackedCase
+    state: MotionState
 
 
-class Accompanied(Implicit):
-    """An implicit motion by fixed steps with companions; see `Implicit`.
+class Accompanied(ImplicitEngine):
+    """An implicit motion by fixed steps with companions; see `ImplicitEngine`.
 
     Parameters
     ----------
@@ -60,10 +60,11 @@ class Accompanied(Implicit):
     """
 
     def __init__(
-        self, make: Callable[[Packed, Course], Alpha], packed: Packed, course: Course,
-        plan: StepPlan, jumps: tuple[float, ...], others: Sequence[Companion], share: float,
+        self, make: Callable[[PackedCase, MotionState], Alpha], packed: PackedCase,
+        state: MotionState, plan: StepPlan, jumps: tuple[float, ...], others: Sequence[Companion],
+        share: float,
     ) -> None:  # fmt: skip
-        super().__init__(make, packed, course, plan, jumps)
+        super().__init__(make, packed, state, plan, jumps)
         self._others = [_Beside(make(*other), share) for other in others]
         self._spare: StepMatrix | None = None
         self.displacement: list[list[NDArray]] = [[] for _ in others]

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from foldyn.dynamics.audit import Balance, Rounding
+from foldyn.dynamics.audit import EnergyBalance, Rounding
 from foldyn.dynamics.motion_state import StepPlan
 
 INACCURATE = 1e-2  # relative energy error above which to warn
 
 
-def is_off(balance: Balance, rounding: Rounding) -> bool:
+def is_off(balance: EnergyBalance, rounding: Rounding) -> bool:
     """Whether the energy balance of a motion is off by more than rounding."""
     hidden = rounding.energy(balance.largest, balance.farthest)
     return balance.relative > INACCURATE and balance.scale > hidden
 
 
-def doubts(balance: Balance, rounding: Rounding, plan: StepPlan, size: float, remedy: str) -> str:
+def doubts(
+    balance: EnergyBalance, rounding: Rounding, plan: StepPlan, size: float, remedy: str
+) -> str:
     """Warning about the accuracy of a motion; empty if there is none.
 
     Parameters
     ----------
-    balance : Balance
+    balance : EnergyBalance
     rounding : Rounding
     plan : StepPlan
     size : float

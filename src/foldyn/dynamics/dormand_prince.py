@@ -137,30 +137,30 @@ def _longest(handle, q, w, a, plan, tally):
 
 
 @kernel
-def advance(handle, course, plan, room, stretch):
+def advance(handle, state, plan, room, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
     The error of a step is the worst node's, relative to the largest displacement and the largest
     velocity that the motion has had so far. Steps end at the stops of the plan, where loads may
     jump.
     """
-    course = borrowed(course)
-    tally, n = course.tally, course.u.size
-    u, v = flat(course.u), flat(course.v)
+    state = borrowed(state)
+    tally, n = state.tally, state.u.size
+    u, v = flat(state.u), flat(state.v)
     speeds, accelerations = np.empty((7, n)), np.empty((7, n))
     powers, weights = np.empty((3, 7)), np.empty(7)
-    ut, vt, a = np.empty_like(course.u), np.empty_like(course.u), np.empty_like(course.u)
+    ut, vt, a = np.empty_like(state.u), np.empty_like(state.u), np.empty_like(state.u)
     fut, fvt, fa = flat(ut), flat(vt), flat(a)
-    raw = flat(course.carry)  # acceleration at the step's start, without inertia of contacts
+    raw = flat(state.carry)  # acceleration at the step's start, without inertia of contacts
     if tally.steps == 0:
-        _keep(acceleration(handle, course.u, course.v, plan.start, a), powers, 0)
+        _keep(acceleration(handle, state.u, state.v, plan.start, a), powers, 0)
         for i in range(n):
             raw[i] = fa[i]
-        longest = _longest(handle, course.u, course.v, a, plan, tally)
+        longest = _longest(handle, state.u, state.v, a, plan, tally)
         tally.wanted = min(tally.wanted, longest)
         if tally.samples == 0:
             tally.farthest, tally.fastest = _largest(u), _largest(v)
-            outcome = sample(handle, course.u, course.v, a, plan.start)
+            outcome = sample(handle, state.u, state.v, a, plan.start)
             if outcome != Outcome.DONE:
                 return outcome, -1
     else:
@@ -183,10 +183,10 @@ def advance(handle, course, plan, room, stretch):
         stops = stops and h == goal - t
         if h < SMALLEST * max(abs(plan.end), abs(t)):
             return Outcome.STUCK, -1
-        gather_slow(handle, course.u, h, RESOLVED)
+        gather_slow(handle, state.u, h, RESOLVED)
         for i in range(n):
             accelerations[0, i] = raw[i]
-        slow_contacts_down(handle, course.v, accelerations[0])
+        slow_contacts_down(handle, state.v, accelerations[0])
         for stage in range(1, 7):
             _combine(u, speeds, A[stage], h, stage, fut)
             _combine(v, accelerations, A[stage], h, stage, fvt)
@@ -216,7 +216,7 @@ def advance(handle, course, plan, room, stretch):
             tally.wanted = h * max(0.2, min(factor, 0.9))
             tally.refused += 1
             continue
-        hinge = passed_through(handle.angle, course.angle, 0, handle.angle.size)
+        hinge = passed_through(handle.angle, state.angle, 0, handle.angle.size)
         if hinge >= 0:
             return Outcome.PENETRATION, hinge
         longest = _longest(handle, ut, vt, accelerations[6], plan, tally)
@@ -254,7 +254,7 @@ def advance(handle, course, plan, room, stretch):
         jumps = stops and handle.spent != 0
         if tally.samples > first and (handle.commit != 0 or jumps):  # its terms
             advance_clock(handle, h)
-            acceleration(handle, course.u, course.v, moment, a)
+            acceleration(handle, state.u, state.v, moment, a)
             tally.evaluations += 1
         if handle.commit != 0:
             run_at(handle.commit, (handle.case,))
@@ -265,24 +265,24 @@ def advance(handle, course, plan, room, stretch):
         tally.wanted = min(plan.dt, h * max(0.2, min(factor, 5.0)))
         if stops:
             tally.wanted = max(tally.wanted, min(wanted, plan.dt))
-            tally.work -= spent(handle, course.u)
-            _keep(acceleration(handle, course.u, course.v, after, a), powers, 0)
+            tally.work -= spent(handle, state.u)
+            _keep(acceleration(handle, state.u, state.v, after, a), powers, 0)
             tally.evaluations += 1
-            tally.work += spent(handle, course.u)  # jumped offsets, of any law
+            tally.work += spent(handle, state.u)  # jumped offsets, of any law
             work_of_offsets(handle, True)
             for i in range(n):
                 raw[i] = fa[i]
             if plan.every == 0 and tally.samples < room and due <= after + ROUNDING * h:
-                outcome = sample(handle, course.u, course.v, a, due)
+                outcome = sample(handle, state.u, state.v, a, due)
                 if outcome != Outcome.DONE:
                     return outcome, -1
             if handle.commit != 0:  # a jump takes no time
                 run_at(handle.commit, (handle.case,))
         tally.wanted = min(tally.wanted, longest)
         if plan.every > 0 and tally.steps % plan.every == 0:
-            acceleration(handle, course.u, course.v, after, a)
+            acceleration(handle, state.u, state.v, after, a)
             tally.evaluations += 1
-            outcome = sample(handle, course.u, course.v, a, after)
+            outcome = sample(handle, state.u, state.v, a, after)
             if outcome != Outcome.DONE:
                 return outcome, -1
     tally.power_in, tally.power_out, tally.power_air = powers[0, 0], powers[1, 0], powers[2, 0]

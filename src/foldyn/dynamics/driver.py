@@ -255,7 +255,7 @@ def prepare(
     if device == "gpu":
         check_taken(case, packed)
     sampler = Sampler(case, {} if sample is None else sample, u, v, plan.start)
-    state = u, v, remembered, initial.continuation if initial else None
+    start_from = u, v, remembered, initial.continuation if initial else None
     better = None
     if chosen.better:
         if chosen.better == chosen.method:
@@ -265,7 +265,7 @@ def prepare(
             tolerance, start, None, sample, kept,
         )  # fmt: skip
     return Motion(
-        case, integrator, plan, critical, force, state, origin, packed, sampler, chosen.reason,
+        case, integrator, plan, critical, force, start_from, origin, packed, sampler, chosen.reason,
         better, device,
     )  # fmt: skip
 
@@ -285,8 +285,9 @@ def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrato
 
 
 def _plan(
-    case: Case, method: Integrator, duration: float, dt: float | None, sampling: timing.Sampling,
-    critical: float, force: bool, tolerance: float | None, start: float,
+    case: Case, method: Integrator, duration: float, dt: float | None,
+    sampling: timing.SampleSpacing, critical: float, force: bool, tolerance: float | None,
+    start: float,
 ) -> StepPlan:  # fmt: skip
     """Plan of steps and samples for the arguments of `simulate`."""
     if tolerance is not None:

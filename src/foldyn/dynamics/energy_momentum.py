@@ -28,11 +28,11 @@ from scipy import sparse
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.implicit.contact_step import StepContact
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.implicit.scheme import Phase, Scheme, add_load_work, copy, drag_works, norms
+from foldyn.dynamics.implicit.scheme import Scheme, StepEnd, add_load_work, copy, drag_works, norms
 from foldyn.dynamics.inertia import times_mass
-from foldyn.dynamics.motion_state import Course
+from foldyn.dynamics.motion_state import MotionState
 from foldyn.dynamics.parts import ThreadCase
-from foldyn.dynamics.system import Packed, carry, place
+from foldyn.dynamics.system import PackedCase, carry, place
 from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, run_at
@@ -46,15 +46,15 @@ from foldyn.mechanics.term import ENERGIES
 ORDER = 2
 
 
-class Step(NamedTuple):
+class MeanStep(NamedTuple):
     """Data that the compiled functions of a step need."""
 
     case: ThreadCase
     terms: NDArray  # (k,) contexts of all but contact,
     forces: NDArray  # (k,) their mean-force kernels,
     powers: NDArray  # (3,) powers that they put in, dissipate and lose to air, W
-    old: Phase
-    new: Phase
+    old: StepEnd
+    new: StepEnd
     mean: NDArray  # (h, 3) factors of the histories
     shift: NDArray
     out: NDArray
@@ -68,8 +68,8 @@ class EnergyMomentum(Scheme):
     symmetric = False
     tolerance = 1e-11  # the remaining residual is an energy error
 
-    def __init__(self, packed: Packed, course: Course) -> None:
-        super().__init__(packed, course)
+    def __init__(self, packed: PackedCase, state: MotionState) -> None:
+        super().__init__(packed, state)
         body, touch = packed.body, None
         contact = body.find(ContactTerm)
         if contact is not None:
@@ -78,9 +78,9 @@ class EnergyMomentum(Scheme):
         self._contact, equation = touch, self.equation
         self._terms = terms = MeanForces(body, self.part)
         self._step = Context(
-            Step(
+            MeanStep(
                 equation.case.value, terms.context, terms.kernel, terms.powers, self.old, self.new,
-                np.zeros_like(self.new.factor), self.shift, self.out, course.angle,
+                np.zeros_like(self.new.factor), self.shift, self.out, state.angle,
                 np.zeros((0, 3)) if touch is None else touch.force,
             )
         )  # fmt: skip
@@ -96,14 +96,14 @@ class EnergyMomentum(Scheme):
         super().accept(h)
         self._before = h
 
-    def state(self) -> list[NDArray]:
-        """State on which the next step depends; see `Scheme.state`."""
-        return [*super().state(), np.array([self._before])]
+    def numbers(self) -> list[NDArray]:
+        """Numbers that the next step depends on; see `Scheme.numbers`."""
+        return [*super().numbers(), np.array([self._before])]
 
-    def resume(self, state: Sequence[NDArray]) -> None:
-        """Resume from such a state; see `Scheme.resume`."""
-        super().resume(state)
-        self._before = float(state[-1][0])
+    def resume(self, numbers: Sequence[NDArray]) -> None:
+        """Resume from such numbers; see `Scheme.resume`."""
+        super().resume(numbers)
+        self._before = float(numbers[-1][0])
 
     def weights(self, h: float) -> Weights:
         """Weights of the step matrix; see `Scheme.weights`."""
@@ -124,7 +124,7 @@ class EnergyMomentum(Scheme):
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
         """Fill the stiffness blocks with the tangent of the mean forces; see `Scheme.tangent`."""
         body, pattern, u0, u1 = self.packed.body, matrix.pattern, self.displacement(), self.moved()
-        start = u0, u1, self.course.angle
+        start = u0, u1, self.state.angle
         matrix.blocks.put_mean(body, pattern, *start, before, again, matrix.stiffness)
         matrix.add_following(u1, self.new.factor, 0.5)
         matrix.follow(0.5 * (u0 + u1), 1.0)

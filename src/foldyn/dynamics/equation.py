@@ -25,14 +25,14 @@ from foldyn.dynamics.motion_state import (
     OUTCOME,
     WORK,
     WRONG,
-    Course,
+    MotionState,
     Outcome,
     Samples,
     passed_through,
 )
 from foldyn.dynamics.parts import ThreadCase
 from foldyn.dynamics.record import record
-from foldyn.dynamics.system import Packed, Scratch
+from foldyn.dynamics.system import PackedCase, Scratch
 from foldyn.jit.compiled import addressed, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at, run_at, value_at
 from foldyn.jit.intrinsics import flat
@@ -87,7 +87,7 @@ class Recorder(NamedTuple):
     """A case on one thread, and where its samples go."""
 
     case: ThreadCase
-    course: Course
+    state: MotionState
     out: Samples
     fluid: int  # adds what moves the fluid; 0 without added mass
     warm: int  # evaluates the heat correction of the strain energies; 0 without heat,
@@ -152,13 +152,13 @@ def _acceleration(m, q, w, t, out, powers):
 # ------------------------------------------------------------------ what is seen of a motion
 @addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER)
 def _sample(r, u, v, a, t):
-    m, course, out, rows = r.case, r.course, r.out, r.case.s.force.shape[0]
-    k = course.tally.samples - out.first
+    m, state, out, rows = r.case, r.state, r.out, r.case.s.force.shape[0]
+    k = state.tally.samples - out.first
     out.time[k] = t
     fluid = value_at(r.fluid, (m, v, a)) if r.fluid != 0 else 0.0
     record(
         m.terms, m.system, m.mass, rows_at(u, rows), rows_at(v, rows), rows_at(a, rows),
-        course.tally, m.s, out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
+        state.tally, m.s, out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
     )  # fmt: skip
     last = out.energy.shape[1] - 1
     if r.fluid != 0:
@@ -170,8 +170,8 @@ def _sample(r, u, v, a, t):
         for g in range(r.lacking.size):
             out.energy[k, g] += r.lacking[g]
             total += r.lacking[g]
-        if course.tally.samples == 0:  # energy stored at the start is not work
-            course.tally.work -= total
+        if state.tally.samples == 0:  # energy stored at the start is not work
+            state.tally.work -= total
             out.energy[k, last] -= total
         out.energy[k, last] += total
     states_of(m.terms, out.memory[k])
@@ -180,7 +180,7 @@ def _sample(r, u, v, a, t):
         sound += out.energy[k, c]
     if not abs(sound) < np.inf:
         return float(NOT_FINITE)
-    course.tally.samples += 1
+    state.tally.samples += 1
     return float(DONE)
 
 
@@ -238,14 +238,14 @@ def sample(handle, u, v, a, t):
 
 
 @inner_scalar
-def observe(handle, course, plan, a, step):
+def observe(handle, state, plan, a, step):
     """Finish a fixed step after its `acceleration`; every team member calls it.
 
     Adds up the members' works. Ends the motion if it is no longer finite or if panels pass through
     each other; writes a sample every plan.every steps. Returns (outcome, hinge), the same for all
     members.
     """
-    team, tally = handle.team, course.tally
+    team, tally = handle.team, state.tally
     wait(team)  # for accelerations, dihedrals and notes of the other threads
     t = plan.start + step * plan.dt
     if handle.offsets != 0:
@@ -253,7 +253,7 @@ def observe(handle, course, plan, a, step):
         wait(team)
     wrong = total(team, WRONG)
     first, last = part(team, handle.angle.size)
-    hinge = passed_through(handle.angle, course.angle, first, last)
+    hinge = passed_through(handle.angle, state.angle, first, last)
     team.note[team.number, HINGE] = hinge
     wait(team)
     hinge = int(largest(team, HINGE))
@@ -267,7 +267,7 @@ def observe(handle, course, plan, a, step):
         if wrong == 0.0 and hinge < 0 and handle.commit != 0:
             run_at(handle.commit, (handle.case,))
         if wrong == 0.0 and hinge < 0 and step == tally.samples * plan.every:
-            outcome = sample(handle, course.u, course.v, a, t)
+            outcome = sample(handle, state.u, state.v, a, t)
         team.note[0, OUTCOME] = outcome
     wait(team)
     if wrong > 0.0:
@@ -296,11 +296,11 @@ class EquationOfMotion:
 
     Parameters
     ----------
-    packed : Packed
+    packed : PackedCase
     own : ThreadPart
         One of `Assembly.thread_parts`.
     s : Scratch
-    course : Course
+    state : MotionState
     slows : bool, optional
         Whether the method gives inertia to slow contacts; None if contact does not limit its steps.
 
@@ -313,11 +313,12 @@ class EquationOfMotion:
     """
 
     def __init__(
-        self, packed: Packed, own: ThreadPart, s: Scratch, course: Course, slows: bool | None
-    ) -> None:
+        self, packed: PackedCase, own: ThreadPart, s: Scratch, state: MotionState,
+        slows: bool | None,
+    ) -> None:  # fmt: skip
         limited = slows is not None
         called = [kind for kind in EVERY if limited or kind != LIMIT]
-        system, self._course = packed.system, course
+        system, self._state = packed.system, state
         self._model = model = Model(packed.body, own, called)
         self.case = case = _thread_case(packed, own, model.terms, s)
         self._heat = packed.heat and Context(
@@ -354,7 +355,7 @@ class EquationOfMotion:
             if heat:
                 lacks = warm.at(heat), heat.address, heat.value.energy
             self._recorder = recorder = Context(
-                Recorder(case.value, self._course, out, fluid, *lacks)
+                Recorder(case.value, self._state, out, fluid, *lacks)
             )
             self._sampled = Context(
                 self.still.value._replace(sample=_sample.at(recorder), recorder=recorder.address)
@@ -363,7 +364,7 @@ class EquationOfMotion:
         return self._sampled
 
 
-def _thread_case(packed: Packed, own: ThreadPart, terms: Terms, s: Scratch) -> Context:
+def _thread_case(packed: PackedCase, own: ThreadPart, terms: Terms, s: Scratch) -> Context:
     """Context of a case on a thread."""
     system, mass, added = packed.system, packed.mass, packed.added
     drag = 0.0 if added.acts else system.alpha

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from foldyn.dynamics.parts import ThreadCase, kinetic
 from foldyn.dynamics.slow_contacts import slow_down
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.system import PackedCase
 from foldyn.jit.compiled import addressed, inner_scalar
 from foldyn.jit.context import Context, rows_at, run_at, value_at
 from foldyn.mechanics.contact.candidates import Tables
@@ -85,7 +85,7 @@ def slow_contacts_down(handle, w, a):
         run_at(handle.slow_down, (handle.slow, w, a))
 
 
-def slow_contacts(packed: Packed, part: ThreadPart, case: ThreadCase) -> Context | None:
+def slow_contacts(packed: PackedCase, part: ThreadPart, case: ThreadCase) -> Context | None:
     """Context of slow contacts; None if their inertia would resist supports or planes.
 
     Boards have none either, as their contacts involve more nodes.

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.dynamics.methods import Integrator
-from foldyn.dynamics.motion_state import Course, Outcome, StepPlan
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.motion_state import MotionState, Outcome, StepPlan
+from foldyn.dynamics.system import PackedCase
 from foldyn.errors import InstabilityError, PenetrationError
 from foldyn.structures.condensed_plates import CondensedPlatesTerm
 from foldyn.structures.locking import kept_apart
@@ -26,8 +26,8 @@ class Failed(Protocol):
     method: Integrator
     plan: StepPlan
     critical: float
-    packed: Packed
-    course: Course
+    packed: PackedCase
+    state: MotionState
 
 
 def failure(
@@ -38,7 +38,7 @@ def failure(
     code : an `Outcome`.
     hinge : index of the hinge whose dihedral jumped.
     """
-    plan, tally, order = motion.plan, motion.course.tally, motion.packed.numbering.order
+    plan, tally, order = motion.plan, motion.state.tally, motion.packed.numbering.order
     hinges = motion.packed.body.hinges
     moment = f"at t = {tally.time:.6g} s (step {tally.steps})"
     rest, rows = motion.packed.body.sheet.turned()
@@ -65,7 +65,7 @@ def failure(
             f"jumped by more than pi; {_apart(motion, hinge)}"
         )
     if code == Outcome.STUCK and len(hinges):
-        closed = _from_closed(motion.course.angle)
+        closed = _from_closed(motion.state.angle)
         hinge = int(closed.argmin())
         if closed[hinge] < MET:
             j, k = order[hinges[hinge, :2]].tolist()
@@ -88,7 +88,7 @@ def smaller_step(motion: Failed) -> str:
 
 def _apart(motion: Failed, hinge: int) -> str:
     """How to keep the panels at a hinge apart; its dihedral is from the last step."""
-    angle = motion.course.angle[hinge]
+    angle = motion.state.angle[hinge]
     if motion.plan.dt > motion.critical or _from_closed(angle) > SWING:
         return f"the hinge has turned too far within a step: {smaller_step(motion)}"
     j, k = motion.packed.numbering.order[motion.packed.body.hinges[hinge, :2]].tolist()
@@ -100,7 +100,7 @@ def _reason(motion: Failed, code: int) -> str:
     plan, method = motion.plan, motion.method
     if code == Outcome.STUCK:
         return (
-            f"the error asks for a step of {float(motion.course.tally.wanted):.3g} s: a load jumps "
+            f"the error asks for a step of {float(motion.state.tally.wanted):.3g} s: a load jumps "
             "too often, or the motion is too violent; raise the tolerance, or use rk4"
         )
     if code == Outcome.NOT_CONVERGED:

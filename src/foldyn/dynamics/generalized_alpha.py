@@ -34,8 +34,8 @@ from foldyn.dynamics.implicit.scheme import (
     GO_ON,
     NOT_CONVERGED,
     Goal,
-    Phase,
     Scheme,
+    StepEnd,
     add_load_work,
     copy,
     drag_works,
@@ -43,9 +43,9 @@ from foldyn.dynamics.implicit.scheme import (
     norms,
 )
 from foldyn.dynamics.inertia import times_mass
-from foldyn.dynamics.motion_state import Course
+from foldyn.dynamics.motion_state import MotionState
 from foldyn.dynamics.parts import ThreadCase
-from foldyn.dynamics.system import Packed, carry
+from foldyn.dynamics.system import PackedCase, carry
 from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.context import Context, run_at
@@ -72,14 +72,14 @@ def parameters(spectral_radius: float) -> Parameters:
     return Parameters(am, af, 0.25 * (1.0 - am + af) ** 2, 0.5 - am + af)
 
 
-class Step(NamedTuple):
+class AlphaStep(NamedTuple):
     """Data that the compiled functions of a step need."""
 
     handle: LoopHandle
     case: ThreadCase
     p: Parameters
-    old: Phase
-    new: Phase
+    old: StepEnd
+    new: StepEnd
     shift: NDArray
     out: NDArray
     earlier: NDArray
@@ -93,13 +93,13 @@ class Alpha(Scheme):
     symmetric, tolerance = True, 1e-7
 
     def __init__(
-        self, packed: Packed, course: Course, parameters: Parameters,
+        self, packed: PackedCase, state: MotionState, parameters: Parameters,
         facts: Mapping[str, float] = Scheme.facts,
     ) -> None:  # fmt: skip
-        super().__init__(packed, course)
+        super().__init__(packed, state)
         self.parameters, self.facts, equation = parameters, facts, self.equation
         self.context = Context(
-            Step(
+            AlphaStep(
                 equation.still.value, equation.case.value, parameters, self.old, self.new,
                 self.shift, self.out, self.earlier, self.damping, self.drag,
             )
@@ -172,7 +172,7 @@ numerical damping: a linear system keeps its energy; another one may gain some w
 """
 
 
-def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[Packed, Course], Alpha]:
+def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[PackedCase, MotionState], Alpha]:
     """Make the steps of the method for a spectral radius."""
     facts = {"spectral_radius": spectral_radius}
     return partial(Alpha, parameters=parameters(spectral_radius), facts=facts)

@@ -38,7 +38,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from foldyn.dynamics.adjoint import Adjoint
-from foldyn.dynamics.implicit.engine import Implicit
+from foldyn.dynamics.implicit.engine import ImplicitEngine
 from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.newton import SAME_STEP
 from foldyn.dynamics.inertia import times_mass
@@ -57,7 +57,7 @@ FAST = 0.1  # residual reduction above which an old matrix is renewed
 STALL = 0.5  # residual reduction above which the iteration has stalled
 
 
-class State(NamedTuple):
+class Reached(NamedTuple):
     """State at the start or end of a step, without support motion."""
 
     t: float  # time of the force evaluation, s
@@ -71,21 +71,21 @@ class Taken(NamedTuple):
 
     number: int  # of the step, from 0
     h: float  # s
-    start: State
-    end: State
+    start: Reached
+    end: Reached
     begins: bool  # whether `Scheme.begin` made its start
 
 
-class Place(NamedTuple):
+class Segment(NamedTuple):
     """Start of a segment of steps, with everything that an engine needs to resume there."""
 
     number: int  # of the step
-    state: State
+    state: Reached
     begins: bool
     engine: dict[str, NDArray]
 
 
-class Retraced(Implicit):
+class Retraced(ImplicitEngine):
     """A motion by fixed implicit steps, recomputed: yields its steps from last to first."""
 
     def __init__(self, motion: Any) -> None:
@@ -102,10 +102,10 @@ class Retraced(Implicit):
         self._at, self._begins = self._reached(plan.start), True
         self._taken: list[Taken] = []
         apart = max(1, int(ROOM / (3 * self._at.q.nbytes)))
-        self._places: list[Place] = []
+        self._places: list[Segment] = []
         for first in range(0, plan.steps, apart):
             arrays = self.checkpoint_arrays()
-            self._places.append(Place(first, self._at, self._begins, arrays))
+            self._places.append(Segment(first, self._at, self._begins, arrays))
             self._taken.clear()
             self.advance(self._room, min(apart, plan.steps - first))
         self._ends = [*(place.number for place in self._places[1:]), plan.steps]
@@ -127,19 +127,19 @@ class Retraced(Implicit):
                 low, high = (bisect_left(self._taken, k, key=_number) for k in (first, last))
                 yield from reversed(self._taken[low:high])
 
-    def _parts(self) -> dict[str, Any]:
-        """State to store; see `Implicit`. The engine's own counters are left out."""
-        return {name: part for name, part in super()._parts().items() if name != "engine"}
+    def changing(self) -> dict[str, Any]:
+        """What the next steps depend on; the engine's own counters are left out."""
+        return {name: part for name, part in super().changing().items() if name != "engine"}
 
-    def _reached(self, t: float) -> State:
+    def _reached(self, t: float) -> Reached:
         old = self._scheme.old
-        return State(t, old.q.copy(), old.w.copy(), old.a.copy())
+        return Reached(t, old.q.copy(), old.w.copy(), old.a.copy())
 
     def _accept(self, h: float, end: float, jump: float | None) -> None:
         new = self._scheme.new
         t = end if jump is None else math.nextafter(min(end, jump), -math.inf)
-        reached = State(t, new.q.copy(), new.w.copy(), new.a.copy())
-        number = int(self._course.tally.steps)
+        reached = Reached(t, new.q.copy(), new.w.copy(), new.a.copy())
+        number = int(self._state.tally.steps)
         self._taken.append(Taken(number, h, self._at, reached, self._begins))
         super()._accept(h, end, jump)
         self._at = reached if jump is None else self._reached(max(end, jump))
@@ -242,7 +242,7 @@ class ImplicitAdjoint(Adjoint):
             each *= heavy
         self._z = z
 
-    def _back_to_begin(self, start: State, by_u: NDArray, by_v: NDArray) -> None:
+    def _back_to_begin(self, start: Reached, by_u: NDArray, by_v: NDArray) -> None:
         """Step backward through the acceleration -M^-1 b - alpha w at the start of a part."""
         (_, af, _, _), (t, q, w, a) = self._scheme.parameters, start
         self._forget()

@@ -19,8 +19,8 @@ from foldyn.cases.ties import check_tied
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.inertia import moving_energy
 from foldyn.dynamics.modal_damping import about
-from foldyn.dynamics.motion_state import TALLY, Course, StepPlan
-from foldyn.dynamics.system import Packed, carry_supports, place, scratch
+from foldyn.dynamics.motion_state import TALLY, MotionState, StepPlan
+from foldyn.dynamics.system import PackedCase, carry_supports, place, scratch
 from foldyn.dynamics.timing import histories
 from foldyn.errors import InputError, ModelRangeWarning, warn
 from foldyn.mechanics.following import following_force
@@ -237,8 +237,8 @@ def warn_of_standing_in_wind(case: Case, v: NDArray) -> None:
 
 def begin(
     case: Case, u: NDArray, v: NDArray, remembered: NDArray | str | None,
-    continued: Continuation | None, plan: StepPlan, packed: Packed,
-) -> Course:  # fmt: skip
+    continued: Continuation | None, plan: StepPlan, packed: PackedCase,
+) -> MotionState:  # fmt: skip
     """State of the integrators at the start of a motion with displacement u and velocity v.
 
     remembered : state of hinges with memory, see `Memory.start`.
@@ -288,7 +288,7 @@ def begin(
         there = by.inward(u)
         there.ravel()[body.hidden] = inward.ravel()[body.hidden]
         memory.start(there, remembered)
-    return Course(
+    return MotionState(
         u=inward,
         v=by.inward(w),
         carry=np.zeros_like(inward),

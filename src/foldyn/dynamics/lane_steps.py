@@ -160,7 +160,7 @@ def _is_sound(motion: Motion, lane: int, state: LaneState, step: int) -> bool:
     """Whether a motion may continue after a step: audited like a single motion."""
     if state.wrong[lane] != 0.0:
         return False
-    motion.course.tally.samples = step // motion.plan.every + 1
+    motion.state.tally.samples = step // motion.plan.every + 1
     with suppress(ComputationError):
         motion.audit()
         if step < motion.plan.steps:
@@ -172,9 +172,9 @@ def _is_sound(motion: Motion, lane: int, state: LaneState, step: int) -> bool:
 
 def _start(motions: Sequence[Motion]) -> LaneState:
     """Initial state of the models."""
-    courses = [motion.course for motion in motions]
-    dofs = side_by_side([np.stack([c.u, c.v, *np.zeros((3, *c.u.shape))]) for c in courses])
-    angle = side_by_side([course.angle for course in courses])
+    states = [motion.state for motion in motions]
+    dofs = side_by_side([np.stack([c.u, c.v, *np.zeros((3, *c.u.shape))]) for c in states])
+    angle = side_by_side([state.angle for state in states])
     return LaneState(dofs.reshape(5, -1), angle, np.zeros((4, WIDTH)), np.zeros(WIDTH))
 
 

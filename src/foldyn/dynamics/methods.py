@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,11 +17,12 @@ from foldyn.dynamics import (
     energy_momentum,
     generalized_alpha,
 )
-from foldyn.dynamics.checkpoint import restore, snapshot, state_parts
+from foldyn.dynamics.checkpoint import state_parts
+from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.equation import EquationOfMotion, accelerate
-from foldyn.dynamics.implicit.engine import Implicit
+from foldyn.dynamics.implicit.engine import ImplicitEngine
 from foldyn.dynamics.modal_damping import ModalRows, modal_rows
-from foldyn.dynamics.motion_state import Course, Samples, StepPlan
+from foldyn.dynamics.motion_state import MotionState, Samples, StepPlan
 from foldyn.dynamics.runge_kutta import RK4, Tableau, advance
 from foldyn.dynamics.stability import (
     MARGIN,
@@ -33,7 +33,7 @@ from foldyn.dynamics.stability import (
     massive,
     stability_limit,
 )
-from foldyn.dynamics.system import Packed, scratches
+from foldyn.dynamics.system import PackedCase, scratches
 from foldyn.dynamics.timing import jumps
 from foldyn.errors import InputError
 from foldyn.jit.compiled import ready
@@ -41,20 +41,17 @@ from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.threads import run_together
 from foldyn.values import of_kind
 
-if TYPE_CHECKING:
-    from foldyn.dynamics.gpu.engine import OnCard
 
-
-class Compiled:
+class ExplicitEngine(Engine):
     """An explicit method with a fully compiled loop.
 
     Parameters
     ----------
     loop : callable
         See `Integrator`.
-    packed : Packed
+    packed : PackedCase
         The case.
-    course : Course
+    state : MotionState
     plan : StepPlan
     threads : int
         Maximum number of threads; fewer if elements couple distant nodes.
@@ -65,15 +62,15 @@ class Compiled:
     """
 
     def __init__(
-        self, loop: Callable[..., tuple[int, int]], packed: Packed, course: Course, plan: StepPlan,
-        threads: int, slows: bool = False, further: tuple[Any, ...] = (),
+        self, loop: Callable[..., tuple[int, int]], packed: PackedCase, state: MotionState,
+        plan: StepPlan, threads: int, slows: bool = False, further: tuple[Any, ...] = (),
     ) -> None:  # fmt: skip
-        self._loop, self._packed, self._course, self._plan = loop, packed, course, plan
+        self._loop, self._packed, self._state, self._plan = loop, packed, state, plan
         self._further = further
         self._threads = packed.body.thread_parts(threads)
         self._scratches = scratches(packed.system, self._threads)
         self._equations = [
-            EquationOfMotion(packed, own, scratch, course, slows)
+            EquationOfMotion(packed, own, scratch, state, slows)
             for own, scratch in zip(self._threads, self._scratches, strict=True)
         ]
         self.threads = len(self._threads)
@@ -90,27 +87,20 @@ class Compiled:
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
-        case = self._course, self._plan, out.end, stretch, *self._further
+        case = self._state, self._plan, out.end, stretch, *self._further
         arguments = [(equation.sampled(out), *case) for equation in self._equations]
         return run_together(self._loop, [own.team for own in self._threads], arguments)[0]
 
     def accelerate(self) -> None:
         """Recompute the current acceleration, for methods that store it."""
-        course, equation = self._course, self._equations[0].still
-        accelerate(equation, course.u, course.v, float(course.tally.time), course.carry)
+        state, equation = self._state, self._equations[0].still
+        accelerate(equation, state.u, state.v, float(state.tally.time), state.carry)
 
-    def checkpoint_arrays(self) -> dict[str, NDArray]:
-        """Everything that the next steps depend on, apart from the case, between two stretches."""
-        return snapshot(self._parts())
-
-    def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
-        """Resume from the checkpoint arrays of an engine with the same number of threads."""
-        restore(self._parts(), arrays)
-
-    def _parts(self) -> dict[str, Any]:
+    def changing(self) -> dict[str, Any]:
+        """What the next steps depend on; see `Engine`."""
         contact = [self._packed.body.kept(own, ContactTerm) or () for own in self._threads]
         powers = [scratch.powers for scratch in self._scratches]
-        parts = state_parts(self._packed, self._course) | {"powers": powers, "contact": contact}
+        parts = state_parts(self._packed, self._state) | {"powers": powers, "contact": contact}
         if self._packed.system.touches:  # the step limit uses the end of the last step
             whole = self._scratches[0]
             parts["seen"] = [self._threads[0].angle, whole.displacement, whole.velocity]
@@ -125,7 +115,7 @@ class Compiled:
         return {"contact_lists": int(kept.counts.lists), "shortest_contact_step": shortest}
 
 
-def threads_of(packed: Packed) -> int:
+def threads_of(packed: PackedCase) -> int:
     """Fastest number of threads for a motion of a case.
 
     One if the case has parts that threads cannot share: user functions, displacement-dependent
@@ -158,7 +148,7 @@ class Integrator:
     adaptive : bool
         Whether it always controls its steps by their error.
     scheme : callable, optional
-        Of an implicit method: creates its `Scheme` from a case and a course.
+        Of an implicit method: creates its `Scheme` from a case and its state.
     massless : bool
         Whether it supports massless dofs, such as the edge rotations of a shell.
     looks : tuple of float
@@ -193,21 +183,19 @@ class Integrator:
         return self.scheme is not None
 
     def engine(
-        self, case: Case, packed: Packed, course: Course, plan: StepPlan, device: str = "cpu"
-    ) -> Compiled | Implicit | OnCard:
+        self, case: Case, packed: PackedCase, state: MotionState, plan: StepPlan,
+        device: str = "cpu",
+    ) -> Engine:  # fmt: skip
         """Create the engine for a case, with its motion and memory."""
         if device == "gpu":
-            from foldyn.dynamics.gpu.engine import OnCard
+            from foldyn.dynamics.gpu.engine import CardEngine
 
-            return OnCard(self, packed, course, plan, partial(self._compiled, packed, course, plan))
+            return CardEngine(self, packed, state, plan)
         if self.scheme is not None:
-            return Implicit(self.scheme, packed, course, plan, jumps(case))
-        return self._compiled(packed, course, plan)
-
-    def _compiled(self, packed: Packed, course: Course, plan: StepPlan) -> Compiled:
+            return ImplicitEngine(self.scheme, packed, state, plan, jumps(case))
         threads = 1 if self.adaptive else threads_of(packed)
         further = () if self.tableau is None else (self.tableau.coefficients,)
-        return Compiled(self.loop, packed, course, plan, threads, self.adaptive, further)
+        return ExplicitEngine(self.loop, packed, state, plan, threads, self.adaptive, further)
 
     def critical_step(
         self, case: Case, u: ArrayLike | None = None, modal: ModalRows | None = None

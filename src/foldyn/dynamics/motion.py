@@ -16,10 +16,11 @@ from foldyn.dynamics.added_mass import LOOK_EVERY, begin_flow, renewed_flow
 from foldyn.dynamics.audit import Rounding, audited
 from foldyn.dynamics.checkpoint import KEY, Keeping, identity, identity_digest
 from foldyn.dynamics.diagnostics import INACCURATE, doubts, is_off
+from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.failures import failure, smaller_step
 from foldyn.dynamics.initial import begin
-from foldyn.dynamics.methods import Compiled, Implicit, Integrator
-from foldyn.dynamics.motion_state import Course, Outcome, Samples, StepPlan
+from foldyn.dynamics.methods import ExplicitEngine, ImplicitEngine, Integrator
+from foldyn.dynamics.motion_state import MotionState, Outcome, Samples, StepPlan
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
@@ -31,7 +32,7 @@ from foldyn.dynamics.stability import (
     largest_frequency,
     stability_limit,
 )
-from foldyn.dynamics.system import Packed, pack, place, scratch
+from foldyn.dynamics.system import PackedCase, pack, place, scratch
 from foldyn.dynamics.timing import apart, check_room, check_samples, expected_samples, steps_taken
 from foldyn.dynamics.turned import resists_turns, turns_told
 from foldyn.errors import (
@@ -51,7 +52,7 @@ from foldyn.structures.stretching import remedy, stretch
 if TYPE_CHECKING:
     import xarray
 
-    from foldyn.dynamics.gpu.engine import InBlocks, OnCard
+    from foldyn.dynamics.gpu.engine import BlockEngine
 
 RECHECKS = 20  # checks of the critical step during a motion
 CHUNK = 256  # steps in the first stretch; later ones last about REPORT_EVERY seconds
@@ -71,35 +72,34 @@ class Motion:
     def __init__(
         self, case: Case, method: Integrator, plan: StepPlan, critical: float, force: bool,
         state: tuple[NDArray, NDArray, NDArray | str | None, Continuation | None], origin: Origin,
-        packed: Packed, sampler: Sampler, reason: str = "",
+        packed: PackedCase, sampler: Sampler, reason: str = "",
         better: Callable[[], Motion] | None = None, device: str = "cpu",
     ) -> None:  # fmt: skip
         self.device = device
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force, self.reason = critical, force, reason
-        self._state, self.origin, self.packed, self._sampler = state, origin, packed, sampler
+        self._initial, self.origin, self.packed, self._sampler = state, origin, packed, sampler
         self._better = better
         self._rounding = Rounding(packed.body)
-        self._engine: Compiled | Implicit | OnCard | InBlocks | None = None
-        self._keeping: Keeping | None = None
+        self._engine: Engine | BlockEngine | None = None
         self.seconds = 0.0
-        self._start()
-        self.at_rest = not (self.course.u.any() or self.course.v.any())
+        self.restart()
+        self.at_rest = not (self.state.u.any() or self.state.v.any())
 
     @property
     def start(self) -> tuple[NDArray, NDArray]:
         """Displacement and velocity (n, 3) at the start."""
-        return self._state[0], self._state[1]
+        return self._initial[0], self._initial[1]
 
     @property
-    def beginning(self) -> Course:
+    def beginning(self) -> MotionState:
         """A new copy of the initial state of the integrators."""
-        return begin(self.case, *self._state, self.plan, self.packed)
+        return begin(self.case, *self._initial, self.plan, self.packed)
 
     @property
     def continues(self) -> bool:
         """Whether the motion may continue an earlier one, with more than its state."""
-        return self._state[3] is not None
+        return self._initial[3] is not None
 
     @property
     def expected_samples(self) -> int:
@@ -109,7 +109,7 @@ class Motion:
     @property
     def stored(self) -> int:
         """Samples computed so far."""
-        return int(self.course.tally.samples)
+        return int(self.state.tally.samples)
 
     @property
     def recheck_after(self) -> int:
@@ -206,10 +206,11 @@ class Motion:
             f"energies at play; {ask} saves the first attempt"
         )
         warn(text, "integrators.md#integrators")
-        self._start()  # frees the memory of its samples
-        if self._keeping is not None:
-            self._keeping.remove()
-        return self._other.run(progress, self._keeping)
+        keeping = self._keeping
+        self.restart()  # frees the memory of its samples
+        if keeping is not None:
+            keeping.remove()
+        return self._other.run(progress, keeping)
 
     def _judge(self) -> None:
         if text := self.doubt():
@@ -222,50 +223,61 @@ class Motion:
 
     def integrate(
         self, progress: bool | Reporter | None = None, keeping: Keeping | None = None,
-        engine_of: Callable[[Course], Implicit] | None = None,
+        engine_of: Callable[[MotionState], ImplicitEngine] | None = None,
     ) -> None:  # fmt: skip
         """Integrate the motion; see `simulate`.
 
         engine_of : creates the engine, at the start of the motion; by default its method's engine.
         """
-        self.make_room(keeping)
+        self.restart(keeping)
+        self.make_room()
         report, close = reporter(progress)
         try:
-            begin_flow(self.case, self.packed, self.course, self._flow)
-            given = self.case, self.packed, self.course, self.plan, self.device
-            engine = engine_of(self.course) if engine_of else self.method.engine(*given)
-            continued = self._state[3] if self.case.contact is None else None
-            if isinstance(engine, Implicit) and continued and continued.method == self.method.name:
+            begin_flow(self.case, self.packed, self.state, self._flow)
+            given = self.case, self.packed, self.state, self.plan, self.device
+            engine = engine_of(self.state) if engine_of else self.method.engine(*given)
+            continued = self._initial[3] if self.case.contact is None else None
+            same = continued is not None and continued.method == self.method.name
+            if same and isinstance(engine, ImplicitEngine):
                 engine.continue_from(continued.values)
             self._engine = engine
             self._advance(engine, report)
         except KeyboardInterrupt:
             kept = self._keeping.summary if self._keeping else ""
             raise MotionInterrupted(
-                f"interrupted at t = {self.course.tally.time:.6g} s{kept}", self._dataset()
+                f"interrupted at t = {self.state.tally.time:.6g} s{kept}", self._dataset()
             ) from None
         finally:
             close()
 
-    def make_room(self, keeping: Keeping | None = None) -> None:
-        """Return to the start, with room for samples."""
-        self._keeping = keeping
+    def restart(self, keeping: Keeping | None = None) -> None:
+        """Return to the start, without samples: a motion may be integrated any number of times.
+
+        keeping : where its samples go next.
+        """
+        self.state, self._keeping, self._looked = self.beginning, keeping, False
+        self._flow = self._initial[0] if self.origin.flow is None else self.origin.flow
+        self.packed = self.packed.begun()
+        given = self.plan, self._sampler, self._branches, keeping, self.packed.heat
+        self.output = Output(self.case, *given)
+
+    def make_room(self) -> None:
+        """Make room for samples, if there is enough memory or disk."""
         size = self.expected_samples, len(self.case.structure.nodes), len(self.case.reaction_dofs)
-        if keeping is None:
+        if self._keeping is None:
             check_samples(*size)
         else:
-            check_room(*size, keeping.room)
-        self._start()
+            check_room(*size, self._keeping.room)
         self.output.begin()
 
-    def integrated_by(self, engine: InBlocks, seconds: float) -> None:
+    def integrated_by(self, engine: BlockEngine, seconds: float) -> None:
         """Take over the samples from an engine that integrated it along with others."""
         self._engine, self.seconds = engine, seconds
 
     @property
     def _origin(self) -> str:
         """What the motion started from, in words."""
-        continues = isinstance(self._engine, Implicit) and self._engine.continues
+        continues = isinstance(self._engine, ImplicitEngine) and self._engine.continues
         return "end of a motion" if continues else "rest" if self.at_rest else "state"
 
     @property
@@ -274,28 +286,20 @@ class Motion:
         memory = self.packed.body.find(HingeMemory)
         return 0 if memory is None else len(memory.own.state)
 
-    def _start(self) -> None:
-        """Return to the start."""
-        self.course = self.beginning
-        self._flow = self._state[0] if self.origin.flow is None else self.origin.flow
-        self.packed = self.packed.begun()
-        given = self.plan, self._sampler, self._branches, self._keeping, self.packed.heat
-        self.output, self._looked = Output(self.case, *given), False
-
-    def _advance(self, engine: Compiled | Implicit | OnCard, report: Reporter) -> None:
+    def _advance(self, engine: Engine, report: Reporter) -> None:
         """Advance to the end, in stretches; after each, report progress and audit the energies."""
         system, callbacks, by = self.packed.system, self.packed.callbacks, self.packed.numbering
-        plan, course, output = self.plan, self.course, self.output
+        plan, state, output = self.plan, self.state, self.output
         memory = scratch(system)
         earlier, began = self._resumed(engine), None
         length = 0  # the first call only records the start, as it may have to compile
         while True:
-            done = int(course.tally.steps)
+            done = int(state.tally.steps)
             clock = time.perf_counter()
             most = self.recheck_after - done % self.recheck_after
             if self.packed.added.acts:
                 most = min(most, LOOK_EVERY - self._looked_at(done))
-            stretch = self._fits(min(length, most))
+            stretch = output.fits(min(length, most), done, self.stored)
             code, hinge = engine.advance(output.window, stretch)
             clock = time.perf_counter() - clock
             began = time.perf_counter() if began is None else began
@@ -310,7 +314,7 @@ class Motion:
             elif code != Outcome.DONE:
                 kind, why = failure(self, code, hinge)
                 self._stop(why, kind)
-            step, now = int(course.tally.steps), float(course.tally.time)
+            step, now = int(state.tally.steps), float(state.tally.time)
             report(Progress(now - plan.start, plan.end - plan.start, step, self.audit()))
             if step == plan.steps if plan.steps else now >= plan.end:
                 return
@@ -318,7 +322,7 @@ class Motion:
                 self._renew_flow(engine)
             self._checkpoint_if_due(engine)
             if plan.steps and step % self.recheck_after == 0 and step > done:
-                place(system, course.u, course.v, now, memory)
+                place(system, state.u, state.v, now, memory)
                 self.recheck(by.outward(memory.displacement))
             growth = REPORT_EVERY / max(clock, 1e-9)
             least = 1 if self.method.implicit else CHUNK
@@ -328,16 +332,16 @@ class Motion:
         """Steps, at step number `step`, since the last check of the flow of added mass."""
         return (self.origin.looked + step) % LOOK_EVERY
 
-    def _renew_flow(self, engine: Compiled | Implicit | OnCard) -> None:
+    def _renew_flow(self, engine: Engine) -> None:
         """Recompute the flow of added mass if the sheet has folded."""
         try:
-            found = renewed_flow(self.case, self.packed, self.course)
+            found = renewed_flow(self.case, self.packed, self.state)
         except FoldynError as error:
-            why = f"at t = {self.course.tally.time:.6g} s the flow about the sheet is lost: {error}"
+            why = f"at t = {self.state.tally.time:.6g} s the flow about the sheet is lost: {error}"
             self._stop(why, ComputationError, error)
         if found:
-            self._flow = self.packed.numbering.outward(self.course.u)
-        if found and isinstance(engine, Compiled):
+            self._flow = self.packed.numbering.outward(self.state.u)
+        if found and isinstance(engine, ExplicitEngine):
             engine.accelerate()
 
     @property
@@ -351,7 +355,7 @@ class Motion:
     @property
     def reached(self) -> Origin | None:
         """Origin of the motion, with the flow at its end; None if nothing depends on it."""
-        acts, steps = self.packed.added.acts, int(self.course.tally.steps)
+        acts, steps = self.packed.added.acts, int(self.state.tally.steps)
         if not acts and not self.case.damped_at_start:
             return None
         flow, looked = (self._flow, self._looked_at(steps)) if acts else (None, 0)
@@ -366,17 +370,18 @@ class Motion:
         engine, found = self._engine, {}
         if self.case.contact is not None:
             return found
-        if isinstance(engine, Implicit) and self.stored and self.packed.callbacks.error is None:
-            if self._state[3] and engine.continues:
-                found["continued_from"] = self.output.time(0), self._state[3]
+        stopped = not self.stored or self.packed.callbacks.error is not None
+        if isinstance(engine, ImplicitEngine) and not stopped:
+            if self._initial[3] and engine.continues:
+                found["continued_from"] = self.output.time(0), self._initial[3]
             last = self.output.time(self.stored - 1)
-            if float(self.course.tally.time) == last:
+            if float(self.state.tally.time) == last:
                 end = Continuation(self.method.name, engine.continuation())
                 found["continuation"] = last, end
         return found
 
     def _identity(self) -> dict[str, Any]:
-        *state, continued = self._state
+        *state, continued = self._initial
         origin = self.origin.displacement, self.origin.time, self.origin.flow
         state += [continued.values if continued else None, *origin]
         return identity(self.case, self.method, self.plan, state, self._sampler.rows)
@@ -388,15 +393,7 @@ class Motion:
             return self._other.finished(keeping)
         return found
 
-    def _fits(self, length: int) -> int:
-        """Number of steps, at most `length`, whose samples fit into the room."""
-        fits = self.output.fits(int(self.course.tally.steps), self.stored)
-        if fits is not None and fits < 1 <= length:
-            self.output.flush(self.stored)
-            fits = self.output.fits(int(self.course.tally.steps), self.stored)
-        return length if fits is None else max(0, min(length, fits))
-
-    def _checkpoint_if_due(self, engine: Compiled | Implicit | OnCard) -> None:
+    def _checkpoint_if_due(self, engine: Engine) -> None:
         """Write a checkpoint if one is due."""
         if self._keeping is None or not self._keeping.due:
             return
@@ -404,9 +401,9 @@ class Motion:
         arrays = {f"engine.{name}": array for name, array in engine.checkpoint_arrays().items()}
         arrays |= self.output.checkpoint_arrays()
         arrays |= {"seconds": np.array(self.seconds), "flow": self._flow}
-        self._keeping.checkpoint(arrays, float(self.course.tally.time))
+        self._keeping.checkpoint(arrays, float(self.state.tally.time))
 
-    def _resumed(self, engine: Compiled | Implicit | OnCard) -> float:
+    def _resumed(self, engine: Engine) -> float:
         """Resume from the last checkpoint, if any; returns the seconds spent until then."""
         if self._keeping is None:
             return 0.0
@@ -441,7 +438,7 @@ class Motion:
         if balance.relative > EXPLODED and self._rounding.reveals(balance):
             bad = self.output.first_off(self.stored, EXPLODED)
             at = self.output.time(bad)
-            self.course.tally.samples = bad
+            self.state.tally.samples = bad
             self.output.shorten(bad)
             self._stop(
                 f"the motion is unstable: at t = {at:.6g} s the energy balance is "
@@ -458,7 +455,7 @@ class Motion:
     def doubt(self) -> str:
         """Warning about the accuracy of the motion; empty if there is none."""
         self.off()
-        size, remedy = float(self.course.tally.farthest), smaller_step(self)
+        size, remedy = float(self.state.tally.farthest), smaller_step(self)
         return doubts(self.output.balance, self._rounding, self.plan, size, remedy)
 
     def _look_between(self) -> None:
@@ -477,7 +474,7 @@ class Motion:
         # with its own memory, as this motion may continue
         packed = pack(self.case, apart(plan, self.critical), self.origin)
         motion = Motion(
-            self.case, self.method, plan, self.critical, True, self._state, self.origin, packed,
+            self.case, self.method, plan, self.critical, True, self._initial, self.origin, packed,
             sampler,
         )  # fmt: skip
         motion._looked = True
@@ -500,7 +497,7 @@ class Motion:
                 return
         limit = stability_limit(growth, omega, damping, rate)
         self._stop(
-            f"the structure has stiffened: at t = {self.course.tally.time:.6g} s the step of "
+            f"the structure has stiffened: at t = {self.state.tally.time:.6g} s the step of "
             f"{self.plan.dt:.3g} s is above the stability limit of {limit:.3g} s; use "
             f"dt = {0.5 * MARGIN * limit:.3g} or smaller"
         )
@@ -509,7 +506,7 @@ class Motion:
         """Panels that cross at the samples so far."""
         each = IMPLICIT_WORK if self.method.implicit else 1
         threads = self._engine.threads if self._engine else 1
-        work = each * int(self.course.tally.evaluations) / threads
+        work = each * int(self.state.tally.evaluations) / threads
         few = FEW // max(1, len(getattr(self.case.structure, "triangles", ())))
         looks = max(1, few, int(work / PER_LOOK))
         stride = -(-max(1, self.stored) // looks)
@@ -524,14 +521,14 @@ class Motion:
         result = trajectory_dataset(
             self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
             self._statistics(), sampled, out.memory if self._branches else None,
-            self._continuations(), self.reached and (float(self.course.tally.time), self.reached),
+            self._continuations(), self.reached and (float(self.state.tally.time), self.reached),
         )  # fmt: skip
         if self._keeping is not None:
             result.attrs[KEY] = identity_digest(self._identity())
         return crossings.recorded(self.output.whole(result, self.stored))
 
     def _statistics(self) -> dict[str, Any]:
-        plan, tally, engine = self.plan, self.course.tally, self._engine
+        plan, tally, engine = self.plan, self.state.tally, self._engine
         facts: dict[str, Any] = {
             "method": self.method.name,
             **steps_taken(plan, tally),

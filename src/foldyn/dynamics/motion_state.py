@@ -57,7 +57,7 @@ TALLY = np.dtype(
 )
 
 
-class Course(NamedTuple):
+class MotionState(NamedTuple):
     """State of a motion between two stretches of steps, updated in place."""
 
     u: NDArray  # (n, 3) displacement without support motion, m

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.dynamics.audit import Balance, audited
+from foldyn.dynamics.audit import EnergyBalance, audited
 from foldyn.dynamics.checkpoint import Keeping
 from foldyn.dynamics.motion_state import Samples, StepPlan, samples
 from foldyn.dynamics.sampling import Sampler
@@ -45,7 +45,7 @@ class Output:
     ----------
     window : Samples
         Room that compiled loops write to.
-    balance : Balance
+    balance : EnergyBalance
         Of all samples so far.
     """
 
@@ -61,7 +61,7 @@ class Output:
         if not plan.steps and not plan.every:
             at_once = math.floor(plan.dt / plan.interval) + 2
         self._at_once = at_once
-        self.balance = Balance(self._air)
+        self.balance = EnergyBalance(self._air)
         self.window = self._room(0)
         sampler.clear()
 
@@ -88,10 +88,19 @@ class Output:
         return {name: array.shape[1:] for name, array in own.items()} | self._sampler.rows
 
     # ------------------------------------------------------------------ while it runs
-    def fits(self, steps: int, stored: int) -> int | None:
-        """Number of steps whose samples fit after `stored` samples; None if all fit."""
+    def fits(self, length: int, steps: int, stored: int) -> int:
+        """Number of steps, at most `length`, whose samples fit; makes room if it is none.
+
+        steps, stored : steps and samples so far.
+        """
         if self._keeping is None:
-            return None
+            return length
+        if self._window_fits(steps, stored) < 1 <= length:
+            self.flush(stored)
+        return max(0, min(length, self._window_fits(steps, stored)))
+
+    def _window_fits(self, steps: int, stored: int) -> int:
+        """Number of steps whose samples fit into the window."""
         if self._plan.steps:
             return self.window.end * self._plan.every - 1 - steps
         return (self.window.end - stored) // self._at_once
@@ -100,7 +109,7 @@ class Output:
         """Evaluate the user's quantities at new samples; raises `SamplingError`."""
         self._sampler.take(self.window, stored)
 
-    def update_balance(self, stored: int) -> Balance:
+    def update_balance(self, stored: int) -> EnergyBalance:
         """Energy balance, updated with all new samples."""
         new = self.written(stored)
         seen = self.balance.count - new.first
@@ -123,7 +132,7 @@ class Output:
         """Drop all samples after the first `count`."""
         if self._keeping is not None and self._keeping.begun:
             self._keeping.columns.cut(min(count, self._keeping.columns.count))
-        self.balance = Balance(self._air)
+        self.balance = EnergyBalance(self._air)
         for energy, displacement in self._energies(count):
             self.balance.add(energy, displacement)
 
@@ -150,7 +159,7 @@ class Output:
         own = self.balance
         return {
             "balance_start": own.start,
-            "balance": np.array([getattr(own, name) for name in Balance.NUMBERS]),
+            "balance": np.array([getattr(own, name) for name in EnergyBalance.NUMBERS]),
         }
 
     def resume_from(self, arrays: Mapping[str, NDArray], count: int) -> None:
@@ -159,7 +168,7 @@ class Output:
         self._sampler.drop(count)
         own = self.balance
         own.start, own.count = arrays["balance_start"], count
-        for name, value in zip(Balance.NUMBERS, arrays["balance"].tolist(), strict=True):
+        for name, value in zip(EnergyBalance.NUMBERS, arrays["balance"].tolist(), strict=True):
             setattr(own, name, value)
 
     # ------------------------------------------------------------------ what there is

@@ -121,7 +121,7 @@ def next_stage(method, k, dt, u, v, ut, vt, fa, du, dv, others):
 
 
 @shared
-def advance(handle, course, plan, room, stretch, method):
+def advance(handle, state, plan, room, stretch, method):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
     method : `Coefficients`.
@@ -129,18 +129,18 @@ def advance(handle, course, plan, room, stretch, method):
     Work and dissipated energy are integrated with the method's own weights. Each thread of a team
     advances its own nodes.
     """
-    course = borrowed(course)
+    state = borrowed(state)
     team, stage = handle.team, handle.stage
     low, high = 3 * handle.own[0], 3 * handle.own[1]
     stage_u, stage_v, a = stage[0], stage[1], stage[2]
-    u, v = flat(course.u)[low:high], flat(course.v)[low:high]
+    u, v = flat(state.u)[low:high], flat(state.v)[low:high]
     ut, vt, fa = flat(stage_u)[low:high], flat(stage_v)[low:high], flat(a)[low:high]
     stages = method.weight.size
     du, dv = np.zeros_like(u), np.zeros_like(v)  # slopes of the step, and for other stages
     others = np.zeros((stages * method.mixed, 2, u.size))
     for i in range(u.size):
         ut[i], vt[i] = u[i], v[i]
-    begun = course.tally.steps
+    begun = state.tally.steps
     end = min(begun + stretch, plan.steps)
     post_totals(team, 0.0, 0.0, 0.0, 0)
     for step in range(begun, end + 1):
@@ -159,10 +159,10 @@ def advance(handle, course, plan, room, stretch, method):
                 part_air += weight * powers[2]
                 if k == 0:
                     if first:
-                        outcome, hinge = observe(handle, course, plan, a, step)
+                        outcome, hinge = observe(handle, state, plan, a, step)
                         if outcome != Outcome.DONE or step == end:
                             return outcome, hinge
-                    dt = longest_step(handle, course.u, course.v, a, left, RESOLVED)
+                    dt = longest_step(handle, state.u, state.v, a, left, RESOLVED)
                     dt = split_step(dt, left)
                 if k + 1 < stages:
                     next_stage(method, k, dt, u, v, ut, vt, fa, du, dv, others)
@@ -179,6 +179,6 @@ def advance(handle, course, plan, room, stretch, method):
             work_air += share * part_air
             left = 0.0 if dt == left or wrong > 0 else left - dt
             if team.number == 0:
-                course.tally.evaluations += stages
+                state.tally.evaluations += stages
         post_totals(team, work_in, work_out, work_air, wrong)
     return Outcome.DONE, -1

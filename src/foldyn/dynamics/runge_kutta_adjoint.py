@@ -174,7 +174,7 @@ class RungeKuttaAdjoint(Adjoint):
         self._steps, self._inertia = Context(self._plan), Context(packed.mass)
         self._moved, self._out = Context(system.moved), Context(self._by)
         part = packed.body.thread_parts(1)[0]
-        self._equation = EquationOfMotion(packed, part, self._scratch, motion.course, None)
+        self._equation = EquationOfMotion(packed, part, self._scratch, motion.state, None)
         self._times = samples["time"].values
         self._states = tuple(
             samples[name].transpose("time", "node", "axis").values

@@ -99,7 +99,7 @@ class Scratch(NamedTuple):
     pushed: NDArray  # (n, 3) displacement-dependent loads, N; or none (0, 3)
 
 
-class Packed(NamedTuple):
+class PackedCase(NamedTuple):
     """A case for compiled integrators; `callbacks` must outlive the other fields."""
 
     body: Assembly
@@ -116,7 +116,7 @@ class Packed(NamedTuple):
         """Arrays of the sheet."""
         return self.body.sheet.model
 
-    def begun(self) -> Packed:
+    def begun(self) -> PackedCase:
         """Copy for a new motion, with its own record of the heat at play."""
         if self.heat is None:
             return self
@@ -125,7 +125,7 @@ class Packed(NamedTuple):
 
 def pack(
     case: Case, span: float, start: Origin | None = None, modal: ModalRows | None = None
-) -> Packed:
+) -> PackedCase:
     """Pack a case into arrays; `span` (s) is short compared to variations of the loads.
 
     start : origin of the motion, the reference state of damping; rest by default.
@@ -181,7 +181,7 @@ def pack(
     heat = heat_of(case.structure, heated, len(histories), body.sheet.series()[1])
     if heat is not None:
         heat = heat._replace(loads=heat.loads.placed(by.rank))
-    return Packed(body, system, mass, callbacks, by, modal, added, heat)
+    return PackedCase(body, system, mass, callbacks, by, modal, added, heat)
 
 
 def _driven(case: Case, histories: list[History]) -> Assembly:

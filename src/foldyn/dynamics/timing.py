@@ -39,18 +39,18 @@ def apart(plan: StepPlan, critical: float) -> float:
     return SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
 
 
-class Sampling(NamedTuple):
+class SampleSpacing(NamedTuple):
     """Sampling rule of a motion: a step count or a time interval."""
 
     steps: int  # between samples; 0: use `interval`
     interval: float  # s; 0.0: use `steps`
 
 
-def sampling(duration: float, every_steps: int | None, interval: float | None) -> Sampling:
+def sampling(duration: float, every_steps: int | None, interval: float | None) -> SampleSpacing:
     """Sampling from the arguments of `simulate`: every step by default."""
     if interval is None:
         steps = 1 if every_steps is None else every_steps
-        return Sampling(whole("every_steps", steps, least=1, what="steps"), 0.0)
+        return SampleSpacing(whole("every_steps", steps, least=1, what="steps"), 0.0)
     if every_steps is not None:
         raise InputError(": give either every_steps or interval, not both", "every_steps")
     interval = float(number("interval", interval, above=0.0, unit="s"))
@@ -58,11 +58,11 @@ def sampling(duration: float, every_steps: int | None, interval: float | None) -
         raise InputError(
             f" = {interval:g} s: longer than the duration of {duration:g} s", "interval"
         )
-    return Sampling(0, interval)
+    return SampleSpacing(0, interval)
 
 
 def fixed_steps(
-    duration: float, dt: float | None, sampling: Sampling, critical: float, start: float
+    duration: float, dt: float | None, sampling: SampleSpacing, critical: float, start: float
 ) -> StepPlan:
     """Fit a time step and the sampling to a duration.
 
@@ -97,7 +97,7 @@ def fixed_steps(
 
 
 def variable_steps(
-    duration: float, dt: float | None, sampling: Sampling, largest: float, start: float,
+    duration: float, dt: float | None, sampling: SampleSpacing, largest: float, start: float,
     tolerance: float, floor: float, knots: NDArray,
 ) -> StepPlan:  # fmt: skip
     """Plan of a motion with error-controlled steps; `dt` is the largest step.

@@ -19,19 +19,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.system import PackedCase
 
 SHARE = 0.01  # of the energies at play: threshold of the warning
 
 
-def resists_turns(case: Case, packed: Packed) -> bool:
+def resists_turns(case: Case, packed: PackedCase) -> bool:
     """Whether a case has panels and such damping."""
     constant = case.rayleigh.beta > 0.0 or len(packed.modal.rows) > 0
     return constant and len(case.structure.triangles) > 0
 
 
 def turns_told(
-    case: Case, packed: Packed, start: NDArray, displacement: NDArray, velocity: NDArray,
+    case: Case, packed: PackedCase, start: NDArray, displacement: NDArray, velocity: NDArray,
     scale: float,
 ) -> str:  # fmt: skip
     """Warning about a motion in which panels turn far; empty otherwise.
@@ -58,7 +58,7 @@ def turns_told(
 
 
 def turned(
-    case: Case, packed: Packed, start: NDArray, displacement: NDArray, velocity: NDArray
+    case: Case, packed: PackedCase, start: NDArray, displacement: NDArray, velocity: NDArray
 ) -> tuple[float, float]:
     """Largest turn (rad) of a panel, and the energy (J) taken from all turning panels."""
     nodes, tri = case.structure.nodes, case.structure.triangles
@@ -81,7 +81,7 @@ def turned(
     return float(theta.max()), float(taken @ area) / float(area.sum())
 
 
-def _strained(case: Case, packed: Packed, there: NDArray) -> NDArray:
+def _strained(case: Case, packed: PackedCase, there: NDArray) -> NDArray:
     """F' C F (9, 9) of the displacements E x, E each unit matrix, x where C is from, `there`."""
     x = case.structure.nodes + there
     x -= x.mean(axis=0)

@@ -28,7 +28,7 @@ from foldyn.dynamics import Progress
 from foldyn.dynamics.companions import Accompanied, Companion
 from foldyn.dynamics.initial import begin, check_start
 from foldyn.dynamics.motion import Motion
-from foldyn.dynamics.motion_state import Course
+from foldyn.dynamics.motion_state import MotionState
 from foldyn.dynamics.system import pack
 from foldyn.dynamics.timing import jumps
 from foldyn.errors import ComputationError, InputError
@@ -173,14 +173,14 @@ def motions(
         packed = pack(other.case, motion.packed.system.waves.span, motion.origin)
         if not np.array_equal(packed.numbering.order, motion.packed.numbering.order):
             raise InputError(f"{NONE} a motion whose nodes are numbered otherwise")
-        course = begin(other.case, *start, None, None, motion.plan, packed)
-        beside.append(Companion(packed, course))
+        state = begin(other.case, *start, None, None, motion.plan, packed)
+        beside.append(Companion(packed, state))
     engines: list[Accompanied] = []
     scheme: Any = motion.method.scheme
     steps = motion.plan, jumps(case)
 
-    def engine_of(course: Course) -> Accompanied:
-        engines.append(Accompanied(scheme, motion.packed, course, *steps, beside, share))
+    def engine_of(state: MotionState) -> Accompanied:
+        engines.append(Accompanied(scheme, motion.packed, state, *steps, beside, share))
         return engines[-1]
 
     motion.integrate(engine_of=engine_of)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.system import PackedCase
 from foldyn.errors import InputError
 from foldyn.mechanics.pullback import Arrays, Pullback, arrays_of_body
 
@@ -42,7 +42,7 @@ def numbers_of(case: Case) -> Arrays:
     return Arrays(numbers, layout)
 
 
-def numbers_of_motion(packed: Packed, start: tuple[NDArray, NDArray]) -> Arrays:
+def numbers_of_motion(packed: PackedCase, start: tuple[NDArray, NDArray]) -> Arrays:
     """Numbers of a case as packed for motions, and its initial state."""
     arrays, system, mass = arrays_of_body(packed.body), packed.system, packed.mass
     numbers = {

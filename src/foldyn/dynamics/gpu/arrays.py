@@ -12,7 +12,7 @@ from scipy import sparse
 from foldyn.dynamics.gpu.checks import MOST_KINDS
 from foldyn.dynamics.gpu.elements import Counts, Damping, Elements
 from foldyn.dynamics.gpu.kernels import Nodes
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.system import PackedCase
 from foldyn.mechanics.constant_damping import DampingMatrix
 from foldyn.mechanics.membranes import Membranes, MembranesTerm
 from foldyn.mechanics.model import BarsHinges
@@ -35,7 +35,7 @@ class CaseArrays:
 
     Parameters
     ----------
-    cases : sequence of Packed
+    cases : sequence of PackedCase
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class CaseArrays:
         (case, row) of each row of the factors.
     """
 
-    def __init__(self, cases: Sequence[Packed]) -> None:
+    def __init__(self, cases: Sequence[PackedCase]) -> None:
         first, bodies = cases[0], [packed.body for packed in cases]
         models = [_with_force(packed.model) for packed in cases]
         model = models[0]
@@ -122,7 +122,7 @@ class CaseArrays:
             self._add(nodes, 1)
         return _stacked(own, ("dofs",))
 
-    def _damping(self, cases: Sequence[Packed]) -> Damping:
+    def _damping(self, cases: Sequence[PackedCase]) -> Damping:
         size = 3 * cases[0].system.rows
         own: list[Any] = [
             sum(
@@ -136,7 +136,7 @@ class CaseArrays:
         start, column = own[0].indptr.astype(np.int64), own[0].indices.astype(np.int64)
         return Damping(start, column, _one_or_all([matrix.data for matrix in own]))
 
-    def _nodes(self, cases: Sequence[Packed]) -> Nodes:
+    def _nodes(self, cases: Sequence[PackedCase]) -> Nodes:
         node, entry, slot = (np.concatenate(column) for column in zip(*self._entries, strict=True))
         order = np.lexsort((slot, node))
         system, rows = cases[0].system, self.counts.nodes
@@ -160,7 +160,7 @@ class CaseArrays:
         )  # fmt: skip
 
 
-def topology(packed: Packed) -> tuple[Any, ...]:
+def topology(packed: PackedCase) -> tuple[Any, ...]:
     """Properties that the cases of one launch share."""
     arrays = [getattr(packed.model, name) for name in TOPOLOGY]
     arrays += [packed.system.order, packed.system.supported]

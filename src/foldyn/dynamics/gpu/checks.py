@@ -10,7 +10,7 @@ import numpy as np
 from numba import config
 
 from foldyn.cases import Case
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.system import PackedCase
 from foldyn.errors import InputError
 from foldyn.mechanics.constant_damping import DampingMatrix
 from foldyn.mechanics.membranes import MembranesTerm
@@ -62,13 +62,13 @@ def no_card() -> str:
     return ""
 
 
-def check_taken(case: Case, packed: Packed, place: str = "device") -> None:
+def check_taken(case: Case, packed: PackedCase, place: str = "device") -> None:
     """Refuse a case that has a part without GPU kernel, and name the part."""
     if lack := lacking(case, packed):
         raise InputError(f' = "gpu": {lack} has no GPU kernel; use device = "cpu"', place)
 
 
-def lacking(case: Case, packed: Packed) -> str:
+def lacking(case: Case, packed: PackedCase) -> str:
     """Name of a part of the case that has no GPU kernel; empty if all have one.
 
     Only fields and terms listed here count as supported.

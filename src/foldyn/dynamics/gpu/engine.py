@@ -1,21 +1,22 @@
-"""GPU engines: of one motion, in place of `methods.Compiled`, and of one motion among many."""
+"""GPU engines: of one motion, in place of an `ExplicitEngine`, and of one motion among many."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.dynamics.checkpoint import restore, snapshot, state_parts
+from foldyn.dynamics.checkpoint import state_parts
+from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.gpu import card
 from foldyn.dynamics.gpu.launch import Launches, Places
-from foldyn.dynamics.motion_state import Course, Outcome, Samples, StepPlan
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.motion_state import MotionState, Outcome, Samples, StepPlan
+from foldyn.dynamics.system import PackedCase
 
 
-class OnCard:
+class CardEngine(Engine):
     """An explicit method on the card, for one motion.
 
     If a stretch fails, the CPU repeats it and reports the reason.
@@ -23,36 +24,28 @@ class OnCard:
     Parameters
     ----------
     method : methods.Integrator
-    packed : Packed
-    course : Course
+    packed : PackedCase
+    state : MotionState
     plan : StepPlan
-    on_cpu : callable
-        Returns the CPU engine, a `methods.Compiled`.
     """
 
-    threads = 1
-
-    def __init__(
-        self, method: Any, packed: Packed, course: Course, plan: StepPlan,
-        on_cpu: Callable[[], Any],
-    ) -> None:  # fmt: skip
-        self._method, self._packed, self._course, self._plan = method, packed, course, plan
-        self._on_cpu = on_cpu
+    def __init__(self, method: Any, packed: PackedCase, state: MotionState, plan: StepPlan) -> None:
+        self._method, self._packed, self._state, self._plan = method, packed, state, plan
         self._sums = np.zeros((1, 4))
         self._launches = self._launched()
         self._alone: Any = None
 
     def _launched(self) -> Launches:
         """Launches of this motion on the GPU, from its current state."""
-        course = self._course
-        one = (course.u, course.v, course.carry, course.angle)
+        state = self._state
+        one = (state.u, state.v, state.carry, state.angle)
         u, v, carry, angle = (np.array(array)[None] for array in one)
         places = Places(u, v, carry, self._sums, angle)
         return Launches([self._packed], [self._plan], self._method.name, places, wide=True)
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
-        plan, tally = self._plan, self._course.tally
+        plan, tally = self._plan, self._state.tally
         begun = int(tally.steps)
         end = min(begun + stretch, plan.steps)
         keeps = self._method.name == "central_difference" and begun > 0  # forces of its end
@@ -71,8 +64,8 @@ class OnCard:
         return int(Outcome.DONE), -1
 
     def _take(self, written: Any, out: Samples, sample: int, steps: int) -> None:
-        """Copy the results of a launch to the course and the samples."""
-        course, tally, plan = self._course, self._course.tally, self._plan
+        """Copy the results of a launch to the state and the samples."""
+        state, tally, plan = self._state, self._state.tally, self._plan
         count = written.u.shape[1]
         rows = slice(sample - out.first, sample - out.first + count)
         out.time[rows] = plan.start + np.arange(sample, sample + count) * plan.every * plan.dt
@@ -86,43 +79,41 @@ class OnCard:
         tally.time = plan.start + tally.steps * plan.dt
         tally.evaluations += self._method.evaluations * steps
         places = self._launches.places()
-        course.u[...], course.v[...], course.carry[...] = places.u[0], places.v[0], places.carry[0]
-        course.angle[...], self._sums = places.angle[0], places.sums
+        state.u[...], state.v[...], state.carry[...] = places.u[0], places.v[0], places.carry[0]
+        state.angle[...], self._sums = places.angle[0], places.sums
 
     def _again(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Repeat a stretch on the CPU, from the state where the GPU began it."""
         if self._alone is None:
-            self._alone = self._on_cpu()
-        tally = self._course.tally
+            case: Any = None  # implicit methods alone need it
+            self._alone = self._method.engine(case, self._packed, self._state, self._plan)
+        tally = self._state.tally
         self._alone.start_with(self._sums[:, :2].sum(axis=0))
         result = self._alone.advance(out, stretch)
         self._sums = np.array([[*self._alone.powers[:2], tally.work, tally.dissipated]])
         self._launches = self._launched()
         return result
 
-    def checkpoint_arrays(self) -> dict[str, NDArray]:
-        """Everything that the next steps depend on; see `methods.Compiled`."""
-        return snapshot(self._parts())
-
     def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
-        """Resume from such arrays; see `methods.Compiled`."""
+        """Resume from such arrays; see `Engine`."""
         self._sums = np.array(arrays["card_sums"])
-        restore(self._parts(), arrays)
+        super().resume_from(arrays)
         self._launches = self._launched()
 
-    def _parts(self) -> dict[str, Any]:
-        return state_parts(self._packed, self._course) | {"card_sums": self._sums}
+    def changing(self) -> dict[str, Any]:
+        """What the next steps depend on; see `Engine`."""
+        return state_parts(self._packed, self._state) | {"card_sums": self._sums}
 
     def facts(self) -> dict[str, Any]:
-        """Statistics for the result's attributes: the device; see `methods.Compiled`."""
+        """Statistics for the result's attributes: the device; see `Engine`."""
         return {"device": card.name()}
 
 
-class InBlocks:
+class BlockEngine:
     """Engine placeholder of a motion that ran with others on the GPU."""
 
     threads = 1
 
     def facts(self) -> dict[str, Any]:
-        """Statistics for the result's attributes: the device; see `methods.Compiled`."""
+        """Statistics for the result's attributes: the device; see `Engine`."""
         return {"device": card.name()}

@@ -52,7 +52,7 @@ class Nodes(NamedTuple):
     load_row: Any  # (m, l) rows of the factors
 
 
-class State(NamedTuple):
+class CardState(NamedTuple):
     """State of m models; `note` and `sums` have a row per thread, block after block."""
 
     u: Any  # (m, n, 3)

@@ -13,10 +13,10 @@ from foldyn.cases.history import CALLED
 from foldyn.cases.waveforms import waveform_table
 from foldyn.dynamics.gpu import card
 from foldyn.dynamics.gpu.arrays import CaseArrays
-from foldyn.dynamics.gpu.kernels import Span, State, Written, kernel
+from foldyn.dynamics.gpu.kernels import CardState, Span, Written, kernel
 from foldyn.dynamics.gpu.ported import SIMULATED, cuda
 from foldyn.dynamics.motion_state import StepPlan
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.system import PackedCase
 
 BLOCK = 128  # threads per block of a grid with one model
 FEWEST, MOST = 64, 256  # threads per block with one model each: few, unless there are few models
@@ -41,7 +41,7 @@ class Launches:
 
     Parameters
     ----------
-    cases : sequence of Packed
+    cases : sequence of PackedCase
     plans : sequence of StepPlan
         Their steps, which may differ between models.
     method : str
@@ -58,7 +58,7 @@ class Launches:
     """
 
     def __init__(
-        self, cases: Sequence[Packed], plans: Sequence[StepPlan], method: str, places: Places,
+        self, cases: Sequence[PackedCase], plans: Sequence[StepPlan], method: str, places: Places,
         wide: bool,
     ) -> None:  # fmt: skip
         host, self._cases, self._method, self._wide = CaseArrays(cases), cases, method, wide
@@ -146,7 +146,7 @@ class Launches:
             sums = np.zeros((threads, 4))
             sums[:: threads if self._wide else self._threads] = total
         memory, put = cuda.device_array, card.put
-        self._state = State(
+        self._state = CardState(
             u=put(places.u), v=put(places.v), first=put(places.carry), second=memory((m, n, 3)),
             ahead_u=memory(self._ahead), ahead_v=memory(self._ahead), slot=memory(self._slot),
             angle=put(places.angle), wrong=put(np.zeros(m, np.int64)),

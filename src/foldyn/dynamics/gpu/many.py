@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.gpu.arrays import topology
 from foldyn.dynamics.gpu.checks import METHODS, lacking
-from foldyn.dynamics.gpu.engine import InBlocks
+from foldyn.dynamics.gpu.engine import BlockEngine
 from foldyn.dynamics.gpu.launch import Launches, Places
 from foldyn.dynamics.motion import Motion
 from foldyn.errors import ComputationError, InputError
@@ -55,6 +55,7 @@ def _is_taken(motion: Motion) -> bool:
     if motion.method.name not in METHODS or lacking(motion.case, motion.packed):
         return False
     with suppress(InputError):  # the CPU run will report the reason
+        motion.restart()
         motion.make_room()
         return True
     return False
@@ -64,9 +65,9 @@ def _integrated(motions: Sequence[Motion]) -> NDArray:
     """Integrate motions of one topology and method; return which (m,) succeeded."""
     clock = time.perf_counter()
     plans, method = [motion.plan for motion in motions], motions[0].method
-    courses = [motion.course for motion in motions]
+    states = [motion.state for motion in motions]
     u, v, carry, angle = (
-        np.stack([getattr(course, name) for course in courses])
+        np.stack([getattr(state, name) for state in states])
         for name in ("u", "v", "carry", "angle")
     )
     places = Places(u, v, carry, np.zeros((len(motions), 4)), angle)
@@ -90,7 +91,7 @@ def _integrated(motions: Sequence[Motion]) -> NDArray:
             out.velocity[rows] = written.v[k, :count]
             out.reaction[rows], out.energy[rows] = written.reaction[k, :count], energy[k, :count]
             sample[k] += count
-            tally = courses[k].tally
+            tally = states[k].tally
             tally.steps, tally.samples = last[k], sample[k]
             tally.time = plans[k].start + last[k] * plans[k].dt
             tally.evaluations = method.evaluations * last[k]
@@ -100,7 +101,7 @@ def _integrated(motions: Sequence[Motion]) -> NDArray:
             u = launches.places().u if (done < steps).any() else u
             for k in np.flatnonzero(look).tolist():
                 sound[k] = _is_sound(motions[k], u[k])
-    share, engine = (time.perf_counter() - clock) / len(motions), InBlocks()
+    share, engine = (time.perf_counter() - clock) / len(motions), BlockEngine()
     for motion, plan in zip(motions, plans, strict=True):
         times = plan.start + np.arange(motion.stored) * plan.every * plan.dt
         motion.output.window.time[: motion.stored] = times
@@ -112,7 +113,7 @@ def _is_sound(motion: Motion, u: NDArray) -> bool:
     """Whether a motion may continue: audited in the same way as a single motion."""
     with suppress(ComputationError):
         motion.audit()
-        if motion.course.tally.steps < motion.plan.steps:
+        if motion.state.tally.steps < motion.plan.steps:
             motion.recheck(motion.packed.numbering.outward(u))
         return True
     return False

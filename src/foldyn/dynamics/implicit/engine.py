@@ -16,15 +16,16 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.actuation import note_offsets
-from foldyn.dynamics.checkpoint import restore, snapshot, state_parts
+from foldyn.dynamics.checkpoint import state_parts
+from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.equation import accelerate, write
 from foldyn.dynamics.implicit.contact_newton import TouchingNewton
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.newton import Newton
 from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Scheme
 from foldyn.dynamics.inertia import times_mass
-from foldyn.dynamics.motion_state import Course, Outcome, Samples, StepPlan
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.motion_state import MotionState, Outcome, Samples, StepPlan
+from foldyn.dynamics.system import PackedCase
 from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.threads import one_thread
 
@@ -45,15 +46,15 @@ MEASURED = ("wanted", "last", "error", "farthest")
 OUTCOMES = {SOLVED: Outcome.DONE, NOT_FINITE: Outcome.NOT_FINITE}
 
 
-class Implicit:
+class ImplicitEngine(Engine):
     """Implicit engine: advances a motion with a scheme.
 
     Parameters
     ----------
     make : callable
-        Creates the scheme from a case and a course.
-    packed : Packed
-    course : Course
+        Creates the scheme from a case and its state.
+    packed : PackedCase
+    state : MotionState
     plan : StepPlan
     jumps : tuple of float
         Times (s), in order, at which loads jump: steps end there, so that no step sees a jump.
@@ -64,14 +65,12 @@ class Implicit:
         Whether it continues from the end of another motion.
     """
 
-    threads = 1
-
     def __init__(
-        self, make: Callable[[Packed, Course], Scheme], packed: Packed, course: Course,
-        plan: StepPlan, jumps: tuple[float, ...],
+        self, make: Callable[[PackedCase, MotionState], Scheme], packed: PackedCase,
+        state: MotionState, plan: StepPlan, jumps: tuple[float, ...],
     ) -> None:  # fmt: skip
-        self._packed, self._course, self._plan, self._jumps = packed, course, plan, jumps
-        self._scheme = make(packed, course)
+        self._packed, self._state, self._plan, self._jumps = packed, state, plan, jumps
+        self._scheme = make(packed, state)
         self._matrix = StepMatrix(packed, self._scheme.symmetric)
         touches = packed.system.touches
         self._touching = TouchingNewton(self._scheme, self._matrix) if touches else None
@@ -97,7 +96,7 @@ class Implicit:
 
     def continuation(self) -> NDArray:
         """All numbers (k,) that the next steps depend on; see `continue_from`."""
-        state = [*self._state(), self._acceleration()]
+        state = [*self._numbers(), self._acceleration()]
         return np.concatenate([array.ravel() for array in state])
 
     def continue_from(self, values: NDArray) -> None:
@@ -111,8 +110,8 @@ class Implicit:
 
     def _resume(self, values: NDArray) -> bool:
         """Resume from the numbers of `continuation`; return whether the motion is the same."""
-        scheme, old, tally = self._scheme, self._scheme.old, self._course.tally
-        own = [*self._state(), old.a]
+        scheme, old, tally = self._scheme, self._scheme.old, self._state.tally
+        own = [*self._numbers(), old.a]
         if values.shape != (sum(array.size for array in own),) or not np.isfinite(values).all():
             return False
         parts = np.split(values, np.cumsum([array.size for array in own])[:-1])
@@ -126,7 +125,7 @@ class Implicit:
             old.q[:], old.w[:] = own[:2]
             scheme.begin(self._plan.start)
             return False
-        counted = len(scheme.state())
+        counted = len(scheme.numbers())
         memory, factor = self._memory, old.factor.copy()
         branches = () if memory is None else memory.snapshot()
         with one_thread():
@@ -135,7 +134,7 @@ class Implicit:
             memory.recall(branches)
         old.factor[:] = factor
         scheme.resume(state[:counted])
-        self._course.angle[:] = state[counted]
+        self._state.angle[:] = state[counted]
         *measured, self._horizon = state[counted + 1]
         for name, value in zip(MEASURED, measured, strict=True):
             tally[name] = value
@@ -146,17 +145,17 @@ class Implicit:
         memory, out = self._memory, np.zeros_like(self._scheme.old.a)
         if memory is not None:
             memory.still()
-        old, t = self._scheme.old, float(self._course.tally.time)
+        old, t = self._scheme.old, float(self._state.tally.time)
         scheme = self._scheme
         accelerate(scheme.equation.still, old.q, old.w, t, out)
         out[scheme.massless] = 0.0
         return out
 
-    def _state(self) -> list[NDArray]:
+    def _numbers(self) -> list[NDArray]:
         """State that the next steps depend on, apart from the case and the time."""
-        measured = [float(self._course.tally[name]) for name in MEASURED]
-        course = [self._course.angle.copy(), np.array([*measured, self._horizon])]
-        return [*self._scheme.state(), *course, *self._newton.state()]
+        measured = [float(self._state.tally[name]) for name in MEASURED]
+        state = [self._state.angle.copy(), np.array([*measured, self._horizon])]
+        return [*self._scheme.numbers(), *state, *self._newton.numbers()]
 
     def _contact_facts(self) -> dict[str, Any]:
         if self._touching is None:
@@ -164,14 +163,14 @@ class Implicit:
         return {"contact_lists": int(self._touching.memory.counts.lists)}
 
     def checkpoint_arrays(self) -> dict[str, NDArray]:
-        """Everything that the next steps depend on, apart from the case, between two stretches."""
+        """All arrays and numbers of `changing`, by name; see `Engine`."""
         made = np.array([self._matrix.factorized, self._matrix.factorizations])
         origin = {f"origin.{k}": array for k, array in enumerate(self._newton.origin)}
-        return snapshot(self._parts()) | {"factorized": made} | origin
+        return super().checkpoint_arrays() | {"factorized": made} | origin
 
     def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
         """Resume from checkpoint arrays."""
-        restore(self._parts(), arrays)
+        super().resume_from(arrays)
         made, count = arrays["factorized"].tolist()
         if made:
             with one_thread():
@@ -180,9 +179,10 @@ class Implicit:
         count = sum(name.startswith("origin.") for name in arrays)
         self._newton.origin = tuple(arrays[f"origin.{k}"] for k in range(count))
 
-    def _parts(self) -> dict[str, Any]:
+    def changing(self) -> dict[str, Any]:
+        """What the next steps depend on; see `Engine`."""
         own = {"engine": self, "scheme": self._scheme, "newton": self._newton}
-        return state_parts(self._packed, self._course) | own | {"matrices": self._matrix.changing}
+        return state_parts(self._packed, self._state) | own | {"matrices": self._matrix.changing}
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
@@ -190,7 +190,7 @@ class Implicit:
             return self._advance(out, stretch)
 
     def _advance(self, out: Samples, stretch: int) -> tuple[int, int]:
-        plan, tally = self._plan, self._course.tally
+        plan, tally = self._plan, self._state.tally
         if tally.samples == 0:
             outcome = self._begin(out)
             if outcome != Outcome.DONE:
@@ -210,7 +210,7 @@ class Implicit:
     def _begin(self, out: Samples) -> int:
         scheme, plan = self._scheme, self._plan
         scheme.begin(plan.start)
-        self._course.tally.farthest = _largest(scheme.displacement())
+        self._state.tally.farthest = _largest(scheme.displacement())
         if self._packed.system.varies and not plan.steps:
             self._horizon = impulse_duration(
                 scheme, self._matrix, self._packed, plan.end - plan.start
@@ -225,12 +225,12 @@ class Implicit:
 
     def _sample(self, t: float, out: Samples) -> int:
         """Write a sample."""
-        scheme, course = self._scheme, self._course
-        return write(scheme.equation.sampled(out), course.u, course.v, t, scheme.out)
+        scheme, state = self._scheme, self._state
+        return write(scheme.equation.sampled(out), state.u, state.v, t, scheme.out)
 
     def _fixed(self, out: Samples) -> tuple[int, int]:
         """Take one step of dt, subdivided at load jumps or if Newton's method fails."""
-        plan, tally = self._plan, self._course.tally
+        plan, tally = self._plan, self._state.tally
         step = int(tally.steps) + 1
         t, end, h = float(tally.time), plan.start + step * plan.dt, plan.dt
         whole = True
@@ -256,7 +256,7 @@ class Implicit:
 
     def _adaptive(self, out: Samples) -> tuple[int, int]:
         """Take one step with an error within the tolerance."""
-        plan, tally = self._plan, self._course.tally
+        plan, tally = self._plan, self._state.tally
         t = float(tally.time)
         due, waits = self._due(out)
         while True:
@@ -292,7 +292,7 @@ class Implicit:
 
     def _due(self, out: Samples) -> tuple[float, bool]:
         """Time (s) by which the next steps must end, and whether a sample is due there."""
-        plan, number = self._plan, int(self._course.tally.samples)
+        plan, number = self._plan, int(self._state.tally.samples)
         if plan.every or number == out.end:
             return plan.end, False
         time = plan.start + number * plan.interval
@@ -315,7 +315,7 @@ class Implicit:
         verdict = self._newton.solve(h, moment)
         if self._packed.callbacks.error is not None:
             return Outcome.NOT_FINITE, -1
-        turned = np.abs(self._scheme.part.angle - self._course.angle)
+        turned = np.abs(self._scheme.part.angle - self._state.angle)
         if turned.max(initial=0.0) > TURN:
             return Outcome.PENETRATION, int(turned.argmax())
         return OUTCOMES.get(verdict, Outcome.NOT_CONVERGED), -1
@@ -325,22 +325,22 @@ class Implicit:
         return h < LEAST_STEP * self._plan.dt or self._packed.callbacks.error is not None
 
     def _accept(self, h: float, end: float, jump: float | None) -> None:
-        scheme, course = self._scheme, self._course
+        scheme, state = self._scheme, self._state
         done, lost, to_air = scheme.works(h)
-        course.tally.work += done
-        course.tally.dissipated += lost
-        course.tally.air += to_air
+        state.tally.work += done
+        state.tally.dissipated += lost
+        state.tally.air += to_air
         if self._touching is not None:
             given, taken = self._touching.works()
-            course.tally.work += given
-            course.tally.dissipated += taken
+            state.tally.work += given
+            state.tally.dissipated += taken
             self._touching.begin()
-        course.angle[:] = scheme.part.angle
+        state.angle[:] = scheme.part.angle
         scheme.accept(h)
         if self._memory is not None:
             self._memory.commit()
         if jump is not None:
-            course.tally.work += scheme.settle(max(end, jump))
+            state.tally.work += scheme.settle(max(end, jump))
             scheme.begin(max(end, jump))
             system = self._packed.system
             if self._memory is not None:  # creases that turn instantly
@@ -363,7 +363,7 @@ class Implicit:
         acts as an impulse: its error is the displacement that it causes later.
         """
         scheme, matrix, plan = self._scheme, self._matrix, self._plan
-        scale = max(float(self._course.tally.farthest), _largest(scheme.moved()))
+        scale = max(float(self._state.tally.farthest), _largest(scheme.moved()))
         reference, error, force = max(scale, plan.floor), 0.0, scheme.unseen(t, t + h)
         if force is not None:
             if not matrix.factorized and not self._newton.renew(h):
@@ -415,7 +415,9 @@ def equal_step(
     return (h, goal, jump) if parts == 1 else (h, t + h, None)
 
 
-def impulse_duration(scheme: Scheme, matrix: StepMatrix, packed: Packed, duration: float) -> float:
+def impulse_duration(
+    scheme: Scheme, matrix: StepMatrix, packed: PackedCase, duration: float
+) -> float:
     """Time (s) during which an impulse acts on a motion; at most a duration.
 
     1/omega of the vibration that the histories set in motion, with omega^2 Rayleigh's quotient of

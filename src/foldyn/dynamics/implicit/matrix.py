@@ -22,7 +22,7 @@ from foldyn.algebra.banded import BandLU, Cholesky
 from foldyn.algebra.solvers import factorizer, takes_band
 from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.algebra.woodbury import Updated
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.system import PackedCase
 from foldyn.dynamics.ties import Ties, follow_masters, hand_over
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
@@ -54,7 +54,7 @@ class StepMatrix:
 
     Parameters
     ----------
-    packed : Packed
+    packed : PackedCase
     symmetric : bool
         Whether the stiffness blocks will be symmetric.
 
@@ -72,7 +72,7 @@ class StepMatrix:
         Name of the factorization.
     """
 
-    def __init__(self, packed: Packed, symmetric: bool) -> None:
+    def __init__(self, packed: PackedCase, symmetric: bool) -> None:
         mass, system = packed.mass, packed.system
         self.blocks = packed.body.blocks()
         nodes, self._following, self._symmetric = system.rows, system.following, symmetric

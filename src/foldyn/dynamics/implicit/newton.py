@@ -69,16 +69,16 @@ class Newton:
         """Factorize the matrix of the last update again, from its blocks."""
         self.matrix.factorize(self.scheme.weights(self._h))
 
-    def state(self) -> list[NDArray]:
-        """State that the next step depends on: the origin of its first matrix, if reused."""
+    def numbers(self) -> list[NDArray]:
+        """Numbers that the next step depends on: the origin of its first matrix, if reused."""
         kept = self._lasting and len(self.origin) > 0
         rest = (np.zeros(2), self.scheme.shift, *self.scheme.origin())
         origin = self.origin if kept else [np.zeros_like(array) for array in rest]
         return [np.array([float(kept)]), *origin]
 
-    def resume(self, state: Sequence[NDArray]) -> None:
-        """Restore a state: move the scheme to where the matrix was made, and make it again."""
-        (kept,), (h, again), before, *origin = state
+    def resume(self, numbers: Sequence[NDArray]) -> None:
+        """Move the scheme to where the matrix was made by such numbers, and make it again."""
+        (kept,), (h, again), before, *origin = numbers
         if kept:
             self.scheme.back(h, origin)
             self._make(h, before, bool(again))

@@ -15,8 +15,8 @@ from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.equation import EquationOfMotion, accelerate
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.inertia import kinetic_energy, moving_energy
-from foldyn.dynamics.motion_state import Course
-from foldyn.dynamics.system import Packed, Scratch, carried, place, scratch
+from foldyn.dynamics.motion_state import MotionState
+from foldyn.dynamics.system import PackedCase, Scratch, carried, place, scratch
 from foldyn.dynamics.ties import hand_over
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
@@ -68,7 +68,7 @@ def judge(goal, norm, reference, last, lowest):
     return NEW_MATRIX if norm > FAST * last else GO_ON
 
 
-class Phase(NamedTuple):
+class StepEnd(NamedTuple):
     """State at one time: arrays (n, 3); q and w exclude support motion."""
 
     q: NDArray  # m
@@ -86,9 +86,9 @@ class Scheme(ABC):
 
     Parameters
     ----------
-    packed : Packed
+    packed : PackedCase
         The case.
-    course : Course
+    state : MotionState
         Current state of the motion: q, w and a of `old` are its arrays.
 
     Attributes
@@ -105,12 +105,12 @@ class Scheme(ABC):
     tolerance: ClassVar[float]
     facts: Mapping[str, float] = {}
 
-    def __init__(self, packed: Packed, course: Course) -> None:
-        self.packed, self.course = packed, course
+    def __init__(self, packed: PackedCase, state: MotionState) -> None:
+        self.packed, self.state = packed, state
         self.part = packed.body.thread_parts(1)[0]
         self.scratch: Scratch = scratch(packed.system)
-        self.equation = EquationOfMotion(packed, self.part, self.scratch, course, None)
-        shape, histories = course.u.shape, self.scratch.factor.shape
+        self.equation = EquationOfMotion(packed, self.part, self.scratch, state, None)
+        shape, histories = state.u.shape, self.scratch.factor.shape
         self.out, self.step = np.zeros(shape), np.zeros(shape)
         self.shift = np.zeros(shape)  # new.q - old.q, stored as the difference would lose digits
         self.earlier = np.zeros(shape)  # new.q before the last iteration
@@ -121,10 +121,10 @@ class Scheme(ABC):
         self.damping, self.drag = np.flatnonzero(damps), np.flatnonzero(air)
         kept = (np.zeros(shape if len(own) else (0, 3)) for own in (self.damping, self.drag))
         rest = np.zeros(shape), np.zeros(histories), np.zeros_like(self.scratch.pushed), *kept
-        self.old = Phase(course.u, course.v, course.carry, *rest)
-        self.new = Phase(*map(np.zeros_like, self.old))
+        self.old = StepEnd(state.u, state.v, state.carry, *rest)
+        self.new = StepEnd(*map(np.zeros_like, self.old))
         # mean velocity of the last step, and its rate of change between midpoints
-        self._speed, self._growth, self._last = course.v.copy(), np.zeros(shape), 0.0
+        self._speed, self._growth, self._last = state.v.copy(), np.zeros(shape), 0.0
         self.massless = packed.mass.diagonal <= 0.0
         self.rounding = EPS * float(np.linalg.norm(packed.body.scale()))
         self.folds = np.zeros_like(self.part.fold_angle)  # fold angles at old.q, rad
@@ -262,7 +262,7 @@ class Scheme(ABC):
         unseen(packed.system.waves, first, last, self.old.factor, new.factor, self._gap)
         return self.push(new, self._gap) if self._gap.any() else None
 
-    def push(self, phase: Phase, change: NDArray) -> NDArray:
+    def push(self, phase: StepEnd, change: NDArray) -> NDArray:
         """Force (n, 3), N, due to a change (h,) of the factors at a phase; overwrites `out`."""
         s = self.scratch
         for moved, force in ((change, self._pushed), (np.zeros_like(change), self.out)):
@@ -282,26 +282,26 @@ class Scheme(ABC):
         ahead = 0.5 * (h + self._last)
         self.shift[:] = h * (self._speed + ahead * self._growth)
 
-    def state(self) -> list[NDArray]:
-        """State that the next step depends on, apart from case and time; begins with q, w and a."""
+    def numbers(self) -> list[NDArray]:
+        """Numbers that the next step depends on, apart from case and time; q, w and a first."""
         old = self.old
         return [
             array.copy()
             for array in (old.q, old.w, old.a, self._speed, self._growth, np.array([self._last]))
         ]
 
-    def resume(self, state: Sequence[NDArray]) -> None:
-        """Resume from a state, after `begin` at its displacement and velocity."""
+    def resume(self, numbers: Sequence[NDArray]) -> None:
+        """Resume from such numbers, after `begin` at its displacement and velocity."""
         own = (self.old.q, self.old.w, self.old.a, self._speed, self._growth)
-        for array, kept in zip(own, state, strict=False):
+        for array, kept in zip(own, numbers, strict=False):
             array[:] = kept
-        self._last = float(state[len(own)][0])
+        self._last = float(numbers[len(own)][0])
 
     def origin(self) -> tuple[NDArray, ...]:
         """Arguments for `back`: the state in which `tangent` makes the matrix after `residual`."""
         own, memory = self, self.packed.body.find(HingeMemory)
         kept = () if memory is None else memory.snapshot()
-        arrays = (own.old.q, own.old.factor, own.shift, own.new.factor, own.course.angle)
+        arrays = (own.old.q, own.old.factor, own.shift, own.new.factor, own.state.angle)
         return tuple(array.copy() for array in (*arrays, *kept))
 
     def back(self, h: float, origin: Sequence[NDArray]) -> None:
@@ -310,7 +310,7 @@ class Scheme(ABC):
         old, memory, s = self.old, self.packed.body.find(HingeMemory), self.scratch
         if memory is not None:
             memory.recall(kept)
-        old.q[:], old.factor[:], self.shift[:], self.course.angle[:] = q, factor, shift, angle
+        old.q[:], old.factor[:], self.shift[:], self.state.angle[:] = q, factor, shift, angle
         s.factor[:], s.time[0] = ahead, 0.0  # evaluated as if at this time
         self.residual(h, 0.0)
         s.time[0] = np.nan
