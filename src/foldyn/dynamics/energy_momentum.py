@@ -28,12 +28,18 @@ from scipy import sparse
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.implicit.contact_step import StepContact
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.implicit.scheme import Scheme, StepEnd, add_load_work, copy, drag_works, norms
+from foldyn.dynamics.implicit.scheme import (
+    Scheme,
+    StepEnd,
+    copy,
+    norms,
+    settle_massless,
+    step_works,
+)
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.motion_state import MotionState
 from foldyn.dynamics.parts import ThreadCase
 from foldyn.dynamics.system import PackedCase, carry, place
-from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, run_at
 from foldyn.jit.intrinsics import flat
@@ -147,7 +153,7 @@ class EnergyMomentum(Scheme):
     def works(self, h: float) -> tuple[float, float, float]:
         """Works of a step, exactly the works of its forces; see `Scheme.works`."""
         system = self.packed.system
-        done, lost = _works(self._step, h)
+        done, lost = step_works(self._step, h, self.new.force, self.new.force)
         put_in, taken, to_air = (h * self._terms.powers).tolist()
         if system.turns:
             done += _actuation(self._step, self.displacement(), self.moved())
@@ -170,13 +176,7 @@ def residual(step, h, t):
         w1[i] = 2.0 * d[i] / h - w0[i]
         a1[i] = (w1[i] - w0[i]) / h
         x[i] = a1[i] + system.alpha * (0.5 * (w0[i] + w1[i]))
-    for node in range(mass.diagonal.size):
-        if mass.diagonal[node] <= 0.0:  # massless: velocities would ring forever
-            for i in range(3 * node, 3 * node + 3):
-                a1[i], w1[i] = 0.0, d[i] / h
-    if system.ties.slave.size > 0:  # masters may be such nodes
-        follow_masters(system.ties, a1)
-        follow_masters(system.ties, w1)
+    settle_massless(step, h)
     if step.case.histories != 0:
         run_at(step.case.histories, (step.case, t))
     copy(s.factor, new.factor)
@@ -220,25 +220,6 @@ def mean_factors(step):
     for k in range(mean.size):
         mean[k] = 0.5 * (one[k] + other[k])
     return step.mean
-
-
-@kernel
-def _works(step, h):
-    """Work input (J) and dissipated energy (J) of a step."""
-    system, mass, s = step.case.system, step.case.mass, step.case.s
-    old, new = step.old, step.new
-    moved, bracket = system.moved, flat(new.force)
-    du, speed = flat(s.displacement), flat(s.moving)
-    for i in range(du.size):
-        du[i] = flat(step.shift)[i]
-        speed[i] = 0.5 * (flat(old.w)[i] + flat(new.w)[i])
-    done, lost = drag_works(system, mass, h, old.factor, new.factor, s.moving)
-    for k in range(moved.dof.size):
-        dof, row = moved.dof[k], moved.row[k]
-        along = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
-        du[dof] += along
-        done += bracket[dof] * along
-    return add_load_work(system.loads, old, new, s.displacement, done), lost
 
 
 @kernel

@@ -36,11 +36,11 @@ from foldyn.dynamics.implicit.scheme import (
     Goal,
     Scheme,
     StepEnd,
-    add_load_work,
     copy,
-    drag_works,
     judge,
     norms,
+    settle_massless,
+    step_works,
 )
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.motion_state import MotionState
@@ -144,7 +144,7 @@ class Alpha(Scheme):
     def works(self, h: float) -> tuple[float, float, float]:
         """Works of a step with averaged forces, exact for linear systems; see `Scheme.works`."""
         system = self.packed.system
-        done, lost = _works(self.context, h)
+        done, lost = step_works(self.context, h, self.old.force, self.new.force)
         to_air = 0.0
         if len(self.damping) or len(self.drag):
             damped, to_air = _taken(self.context)
@@ -181,8 +181,7 @@ def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[PackedCase, Mo
 @inner
 def move(step, h):
     """Set displacement, velocity and acceleration at the end of a step from its shift."""
-    old, new, mass, ties = step.old, step.new, step.case.mass, step.case.system.ties
-    beta, gamma = step.p.beta, step.p.gamma
+    old, new, beta, gamma = step.old, step.new, step.p.beta, step.p.gamma
     q0, w0, a0, d = flat(old.q), flat(old.w), flat(old.a), flat(step.shift)
     q1, w1, a1 = flat(new.q), flat(new.w), flat(new.a)
     curvature = 1.0 / (beta * h * h)
@@ -190,13 +189,7 @@ def move(step, h):
         q1[i] = q0[i] + d[i]
         a1[i] = curvature * (d[i] - h * w0[i]) - (0.5 - beta) / beta * a0[i]
         w1[i] = w0[i] + h * ((1.0 - gamma) * a0[i] + gamma * a1[i])
-    for node in range(mass.diagonal.size):
-        if mass.diagonal[node] <= 0.0:  # massless: velocities would ring forever
-            for i in range(3 * node, 3 * node + 3):
-                a1[i], w1[i] = 0.0, d[i] / h
-    if ties.slave.size > 0:  # masters may be such nodes
-        follow_masters(ties, a1)
-        follow_masters(ties, w1)
+    settle_massless(step, h)
 
 
 @inner
@@ -268,27 +261,8 @@ def _iterate(step, h, t, band, free, goal, last, lowest, most):
 
 
 @kernel
-def _works(step, h):
-    """Work put in and energy dissipated in a step."""
-    system, mass, s = step.case.system, step.case.mass, step.case.s
-    old, new, du = step.old, step.new, flat(s.displacement)
-    v0, v1, b0, b1 = flat(old.w), flat(new.w), flat(old.force), flat(new.force)
-    moved = system.moved
-    for i in range(du.size):
-        du[i] = flat(step.shift)[i]
-        flat(s.velocity)[i] = 0.5 * (v0[i] + v1[i])
-    done, lost = drag_works(system, mass, h, old.factor, new.factor, s.velocity)
-    for k in range(moved.dof.size):
-        dof, row = moved.dof[k], moved.row[k]
-        along = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
-        du[dof] += along
-        done += 0.5 * (b0[dof] + b1[dof]) * along
-    return add_load_work(system.loads, old, new, s.displacement, done), lost
-
-
-@kernel
 def _taken(step):
-    """Energies (J) dissipated by damping and lost to the air in a step, after `_works`."""
+    """Energies (J) dissipated by damping and lost to the air in a step, after `step_works`."""
     old, new, moved, s = step.old, step.new, step.case.system.moved, step.case.s
     carry(moved, new.factor[:, 0], new.q, s.product)
     carry(moved, new.factor[:, 1], new.w, s.velocity)

@@ -167,6 +167,22 @@ def substitute(m, r, a, scratch):
         solve_mass(m, r, a, scratch, 0, 1)
 
 
+@inner_scalar
+def _substitute(m, k, x):
+    """Solve with factor k in place; x is in the order of its rows before, of its columns after."""
+    first, offset = m.start[k], m.start[k] + k
+    count = m.start[k + 1] - first
+    for j in range(count):
+        value = x[j]
+        for p in range(m.lower_ptr[offset + j], m.lower_ptr[offset + j + 1]):
+            x[m.lower_row[p]] -= m.lower[p] * value
+    for j in range(count - 1, -1, -1):
+        value = x[j] * m.pivot[first + j]
+        x[j] = value
+        for p in range(m.upper_ptr[offset + j], m.upper_ptr[offset + j + 1]):
+            x[m.upper_row[p]] -= m.upper[p] * value
+
+
 @inner
 def solve_mass(m, r, a, scratch, member, members):
     """Solve without constraints; the threads of a team share the axes."""
@@ -174,22 +190,11 @@ def solve_mass(m, r, a, scratch, member, members):
         for i in range(a.shape[0]):
             a[i, c] = 0.0
         k = m.factor_of_axis[c]
-        first = m.start[k]
-        count = m.start[k + 1] - first
-        offset = first + k
-        for i in range(count):
-            scratch[m.row_order[first + i]] = r[m.nodes[first + i], c]
-        for j in range(count):
-            value = scratch[j]
-            for p in range(m.lower_ptr[offset + j], m.lower_ptr[offset + j + 1]):
-                scratch[m.lower_row[p]] -= m.lower[p] * value
-        for j in range(count - 1, -1, -1):
-            value = scratch[j] * m.pivot[first + j]
-            scratch[j] = value
-            for p in range(m.upper_ptr[offset + j], m.upper_ptr[offset + j + 1]):
-                scratch[m.upper_row[p]] -= m.upper[p] * value
-        for i in range(count):
-            a[m.nodes[first + i], c] = scratch[m.column_order[first + i]]
+        for i in range(m.start[k], m.start[k + 1]):
+            scratch[m.row_order[i]] = r[m.nodes[i], c]
+        _substitute(m, k, scratch)
+        for i in range(m.start[k], m.start[k + 1]):
+            a[m.nodes[i], c] = scratch[m.column_order[i]]
 
 
 @inner
@@ -198,20 +203,11 @@ def solve_tied(m, r, a, scratch):
     for i in range(a.size):
         a[i] = r[i]
     hand_over(m.ties, a)
-    count = m.nodes.size
-    for i in range(count):
+    for i in range(m.nodes.size):
         scratch[m.row_order[i]] = a[m.nodes[i]]
-    for j in range(count):
-        value = scratch[j]
-        for p in range(m.lower_ptr[j], m.lower_ptr[j + 1]):
-            scratch[m.lower_row[p]] -= m.lower[p] * value
-    for j in range(count - 1, -1, -1):
-        value = scratch[j] * m.pivot[j]
-        scratch[j] = value
-        for p in range(m.upper_ptr[j], m.upper_ptr[j + 1]):
-            scratch[m.upper_row[p]] -= m.upper[p] * value
+    _substitute(m, 0, scratch)
     a[:] = 0.0
-    for i in range(count):
+    for i in range(m.nodes.size):
         a[m.nodes[i]] = scratch[m.column_order[i]]
     follow_masters(m.ties, a)
 

@@ -17,7 +17,7 @@ from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.inertia import kinetic_energy, moving_energy
 from foldyn.dynamics.motion_state import MotionState
 from foldyn.dynamics.system import PackedCase, Scratch, carried, place, scratch
-from foldyn.dynamics.ties import hand_over
+from foldyn.dynamics.ties import follow_masters, hand_over
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.air_drag import AirDragTerm
@@ -366,30 +366,48 @@ def norms(system, force, inertia, factor, following):
 
 
 @inner
-def drag_works(system, mass, h, before, after, velocity):
-    """Work of moving supports against drag in a step h (s), and total energy lost to drag, J.
+def settle_massless(step, h):
+    """Set velocities and accelerations of massless nodes at the end of a step, and of slaves."""
+    mass, ties, d = step.case.mass, step.case.system.ties, flat(step.shift)
+    w1, a1 = flat(step.new.w), flat(step.new.a)
+    for node in range(mass.diagonal.size):
+        if mass.diagonal[node] <= 0.0:  # velocities would ring forever
+            for i in range(3 * node, 3 * node + 3):
+                a1[i], w1[i] = 0.0, d[i] / h
+    if ties.slave.size > 0:  # masters may be such nodes
+        follow_masters(ties, a1)
+        follow_masters(ties, w1)
 
-    velocity : (n, 3), mean over the step without support motion.
-    before, after : (h, 3) factors of the histories at its ends.
+
+@kernel
+def step_works(step, h, before, after):
+    """Work put in by loads and supports, and energy lost to drag, in a step, J.
+
+    before, after : brackets of forces (n, 3), N, whose mean acts on moving supports.
+
+    Leaves the displacement in the step in `Scratch.displacement`.
     """
-    if system.alpha == 0.0:
-        return 0.0, 0.0
-    carried = moving_energy(system.moved_mass, before) + moving_energy(system.moved_mass, after)
-    carried *= system.alpha * h
-    kinetic = kinetic_energy(mass, velocity, (0, velocity.shape[0]))
-    taken = 2.0 * system.alpha * h * kinetic
-    return carried, taken + carried
-
-
-@inner
-def add_load_work(loads, old, new, shift, work):
-    """Return `work` (J) plus the work of the loads along a shift (n, 3) between two phases."""
-    along, before, after = flat(shift), old.factor, new.factor
+    system, s, old, new = step.case.system, step.case.s, step.old, step.new
+    loads, moved, du, speed = system.loads, system.moved, flat(s.displacement), flat(s.velocity)
+    for i in range(du.size):
+        du[i] = flat(step.shift)[i]
+        speed[i] = 0.5 * (flat(old.w)[i] + flat(new.w)[i])
+    done = lost = 0.0
+    if system.alpha > 0.0:
+        done = moving_energy(system.moved_mass, old.factor)
+        done = (done + moving_energy(system.moved_mass, new.factor)) * (system.alpha * h)
+        kinetic = kinetic_energy(step.case.mass, s.velocity, (0, s.velocity.shape[0]))
+        lost = 2.0 * system.alpha * h * kinetic + done
+    for k in range(moved.dof.size):
+        dof, row = moved.dof[k], moved.row[k]
+        along = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
+        du[dof] += along
+        done += 0.5 * (flat(before)[dof] + flat(after)[dof]) * along
     for k in range(loads.dof.size):
         row = loads.row[k]
-        mean = 0.5 * (before[row, 0] + after[row, 0])
-        work += loads.value[k] * mean * along[loads.dof[k]]
+        mean = 0.5 * (old.factor[row, 0] + new.factor[row, 0])
+        done += loads.value[k] * mean * du[loads.dof[k]]
     one, other = flat(old.pushed), flat(new.pushed)
     for i in range(one.size):
-        work += 0.5 * (one[i] + other[i]) * along[i]
-    return work
+        done += 0.5 * (one[i] + other[i]) * du[i]
+    return done, lost
