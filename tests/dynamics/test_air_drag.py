@@ -9,7 +9,7 @@ from foldyn.dynamics.dampers import air_terms
 from foldyn.dynamics.methods import METHODS
 from foldyn.errors import InputError
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.term import Model, evaluate
+from foldyn.mechanics.term import ThreadTerms, evaluate
 
 SHEET = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.25, thickness=1e-3, density=300.0)
 FLUID = {"density": 20.0, "added_mass": False, "drag_coefficient": 1.2}
@@ -112,7 +112,7 @@ def forces(case, v):
     """Forces (n, 3) of drag at rest with velocities v, and minus their derivative (3n, 3n)."""
     (term,) = air_terms(case, [])
     body = Assembly(case.structure.body.sheet, term)
-    model, force = Model(body, body.thread_parts(1)[0]), np.zeros_like(v)
+    model, force = ThreadTerms(body, body.thread_parts(1)[0]), np.zeros_like(v)
     evaluate(model.terms, np.zeros_like(v), v, force, np.zeros(0))
     return force, term.damping(np.zeros(v.size)).toarray()
 

@@ -14,9 +14,8 @@ import foldyn as fd
 from contact_sheets import SHEET, crossing, on_a_panel
 from foldyn.dynamics import prepare
 from foldyn.dynamics.equation import EquationOfMotion
-from foldyn.dynamics.explicit_contact import slow_contacts
+from foldyn.dynamics.explicit_contact import slow_contacts, slow_down
 from foldyn.dynamics.motion_state import TALLY, MotionState
-from foldyn.dynamics.slow_contacts import slow_down
 from foldyn.dynamics.system import pack, scratch
 from foldyn.jit.context import Context
 from foldyn.mechanics.contact.inertia import added_inertia, room_for

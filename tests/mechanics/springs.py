@@ -22,7 +22,7 @@ from foldyn.materials import hinge_law
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.sheet_term import SheetTerm
 from foldyn.mechanics.step_tangent import SparseBlocks
-from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Folds, energies, forces
+from foldyn.mechanics.term import ENERGIES, FORCES, CompiledTerm, Folds, energies, forces
 from foldyn.mechanics.threads import Team, team
 from foldyn.structures.discretized import Discretized
 
@@ -109,9 +109,9 @@ class SpringsTerm(SheetTerm):
         own = np.array([0, self.rows])
         return [SpringsScratch(np.zeros(0), np.zeros(0), own, team(1)[0])]
 
-    def compiled(self, part, kept: SpringsScratch, group: int) -> Compiled:
+    def compiled(self, part, kept: SpringsScratch, group: int) -> CompiledTerm:
         own = Context(SpringsContext(self.model, np.zeros((self.rows, 3))))
-        return Compiled(own, {FORCES: _forces, ENERGIES: _energies})
+        return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies})
 
     @property
     def folds(self) -> Folds:

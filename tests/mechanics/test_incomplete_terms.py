@@ -10,7 +10,7 @@ import pytest
 import foldyn as fd
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.springs import SpringsTerm
-from foldyn.mechanics.term import FORCES, Compiled, Term
+from foldyn.mechanics.term import FORCES, CompiledTerm, Term
 
 NONE = np.zeros(0, np.int64), np.zeros(0, np.int64)
 
@@ -32,9 +32,9 @@ def test_a_kind_that_lacks_a_part_is_refused_when_it_is_defined(parts, said):
 class Silent(SpringsTerm):
     """Springs that have an energy, and no kernel for it."""
 
-    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         found = super().compiled(part, kept, group)
-        return Compiled(found.context, {FORCES: found.kernels[FORCES]})
+        return CompiledTerm(found.context, {FORCES: found.kernels[FORCES]})
 
 
 def test_an_energy_without_a_kernel_is_refused():

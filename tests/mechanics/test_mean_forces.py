@@ -26,7 +26,7 @@ from foldyn.mechanics.discrete_gradient import (
 )
 from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.mechanics.mean_forces import MeanForces
-from foldyn.mechanics.term import FORCES, MEAN_FORCES, Compiled, Term, forces
+from foldyn.mechanics.term import FORCES, MEAN_FORCES, CompiledTerm, Term, forces
 from pairwise import in_pairs
 
 SHEET = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.3, thickness=0.01, density=1.0)
@@ -86,7 +86,7 @@ def halfway(body: Assembly) -> Assembly:
     """The same with a sheet whose mean forces are made of its forces and energies."""
 
     class Sheet(type(body.sheet)):
-        def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+        def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
             own = super().compiled(part, kept, group)
             kernels = {k: v for k, v in own.kernels.items() if k != MEAN_FORCES}
             return own._replace(kernels=kernels)
@@ -263,9 +263,9 @@ class Drag(Term):
     def __init__(self, coefficient: float) -> None:
         self.coefficient = coefficient
 
-    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         own = DragContext(self.coefficient, int(part.own[1]))
-        return Compiled(Context(own), {FORCES: _drag})
+        return CompiledTerm(Context(own), {FORCES: _drag})
 
 
 class Dragged(Net):

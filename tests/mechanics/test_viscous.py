@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import foldyn as fd
 from foldyn.dynamics.dampers import dampers, damping_matrix
-from foldyn.mechanics.term import Model, evaluate
+from foldyn.mechanics.term import ThreadTerms, evaluate
 from foldyn.mechanics.viscous import WIDTH, Viscous, ViscousTerm, put_gradients
 from resisted import resisted
 
@@ -43,7 +43,7 @@ def scalars(case: fd.Case, q: np.ndarray) -> np.ndarray:
     x = case.structure.nodes + q.reshape(-1, 3)[:n]
     lengths = [np.linalg.norm(x[b] - x[a]) for a, b in case.dashpots[0][1].between]
     part = case.body.thread_parts(1)[0]
-    model, moved = Model(case.body, part), case.body.in_rows(q)
+    model, moved = ThreadTerms(case.body, part), case.body.in_rows(q)
     evaluate(model.terms, moved, 0.0 * moved, 0.0 * moved, np.zeros(0))
     hinges = case.body.sheet.fold_hinges()
     angles = part.fold_angle

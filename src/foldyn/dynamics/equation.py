@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from foldyn.dynamics import parts
 from foldyn.dynamics.added_mass import observe_fluid, solve_with_fluid, turn_flow
 from foldyn.dynamics.explicit_contact import contact_parts, slow_contacts
-from foldyn.dynamics.inertia import lumped_energy
+from foldyn.dynamics.inertia import kinetic_energy, lumped_energy, moving_energy, times_mass
 from foldyn.dynamics.motion_state import (
     AIR,
     DISSIPATED,
@@ -31,9 +31,9 @@ from foldyn.dynamics.motion_state import (
     passed_through,
 )
 from foldyn.dynamics.parts import ThreadCase
-from foldyn.dynamics.record import record
-from foldyn.dynamics.system import PackedCase, Scratch
-from foldyn.jit.compiled import addressed, inner_scalar, kernel
+from foldyn.dynamics.system import PackedCase, Scratch, carry
+from foldyn.dynamics.ties import add_reactions
+from foldyn.jit.compiled import addressed, inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at, run_at, value_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.heat import Warm, warm
@@ -43,8 +43,10 @@ from foldyn.mechanics.term import (
     EVERY,
     LIMIT,
     NUMBER,
-    Model,
     Terms,
+    ThreadTerms,
+    dissipated_by,
+    energies_of,
     forces_of,
     obstacles_to,
     states_of,
@@ -150,16 +152,51 @@ def _acceleration(m, q, w, t, out, powers):
 
 
 # ------------------------------------------------------------------ what is seen of a motion
+@inner
+def _record(m, tally, q, w, a, out, k):
+    """Write row k of the samples after `acceleration` at q and w (n, 3).
+
+    The reaction is the force of the supports: M (a + alpha v) + F_int + beta K0 v - p there. The
+    energies are the strain energies, the energy lost to air if there is any, the kinetic energy,
+    the dissipated energy and the work.
+    """
+    system, s, reactions = m.system, m.s, m.system.ties.reactions
+    displacement, velocity = out.displacement[k], out.velocity[k]
+    reaction, energy = out.reaction[k], out.energy[k]
+    carry(system.moved, s.factor[:, 0], q, s.displacement)
+    carry(system.moved, s.factor[:, 1], w, s.velocity)
+    carry(system.moved, s.factor[:, 2], a, s.moving)
+    for i in range(system.order.size):
+        for c in range(3):
+            displacement[system.order[i], c] = s.displacement[i, c]
+            velocity[system.order[i], c] = s.velocity[i, c]
+    product = flat(s.product)
+    times_mass(m.mass, s.moving, s.product)
+    reaction[:] = 0.0
+    add_reactions(reactions, product, 1.0, reaction)
+    add_reactions(reactions, flat(s.force), 1.0, reaction)
+    groups, last = s.energy.size, energy.size - 1
+    energy[last - 2] = kinetic_energy(m.mass, s.velocity, (0, s.velocity.shape[0]))
+    times_mass(m.mass, s.velocity, s.product)
+    add_reactions(reactions, product, system.alpha, reaction)
+    energies_of(m.terms, s.displacement, s.energy)
+    for g in range(groups):
+        energy[g] = s.energy[g]
+    if last - 2 > groups:
+        energy[groups] = tally.air
+    energy[last - 1] = tally.dissipated + dissipated_by(m.terms)
+    # work includes the energy that accelerated moving supports, which may come in jolts
+    energy[last] = tally.work + moving_energy(system.moved_mass, s.factor)
+
+
 @addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER)
 def _sample(r, u, v, a, t):
+    """See `sample`; r is the `Recorder`."""
     m, state, out, rows = r.case, r.state, r.out, r.case.s.force.shape[0]
     k = state.tally.samples - out.first
     out.time[k] = t
     fluid = value_at(r.fluid, (m, v, a)) if r.fluid != 0 else 0.0
-    record(
-        m.terms, m.system, m.mass, rows_at(u, rows), rows_at(v, rows), rows_at(a, rows),
-        state.tally, m.s, out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
-    )  # fmt: skip
+    _record(m, state.tally, rows_at(u, rows), rows_at(v, rows), rows_at(a, rows), out, k)
     last = out.energy.shape[1] - 1
     if r.fluid != 0:
         out.energy[k, last - 3] += m.added.carried[0]
@@ -319,13 +356,13 @@ class EquationOfMotion:
         limited = slows is not None
         called = [kind for kind in EVERY if limited or kind != LIMIT]
         system, self._state = packed.system, state
-        self._model = model = Model(packed.body, own, called)
-        self.case = case = _thread_case(packed, own, model.terms, s)
+        self._held = held = ThreadTerms(packed.body, own, called)
+        self.case = case = _thread_case(packed, own, held.terms, s)
         self._heat = packed.heat and Context(
             Warm(packed.heat, s.displacement, s.factor, np.zeros(system.energies))
         )
         self._slow = slow = slow_contacts(packed, own, case.value) if slows else None
-        remembers = model.terms.kernel[:, ADVANCE_CLOCK].any()
+        remembers = held.terms.kernel[:, ADVANCE_CLOCK].any()
         self.still = Context(
             LoopHandle(
                 acceleration=_acceleration.at(case),

@@ -17,7 +17,7 @@ from scipy import sparse
 from foldyn.algebra.solvers import factorized
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.cases import Case
-from foldyn.dynamics.diagnostics import INACCURATE
+from foldyn.dynamics.audit import INACCURATE
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.dynamics.methods import METHODS, lacking
 from foldyn.dynamics.modal_damping import ModalRows

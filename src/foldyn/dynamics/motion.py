@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case, Continuation, Origin, State
 from foldyn.dynamics.added_mass import LOOK_EVERY, begin_flow, renewed_flow
-from foldyn.dynamics.audit import Rounding, audited
+from foldyn.dynamics.audit import INACCURATE, Rounding, audited, doubts, is_off
 from foldyn.dynamics.checkpoint import KEY, Keeping, identity, identity_digest
-from foldyn.dynamics.diagnostics import INACCURATE, doubts, is_off
 from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.failures import failure, smaller_step
 from foldyn.dynamics.initial import begin

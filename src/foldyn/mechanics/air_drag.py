@@ -21,7 +21,14 @@ from foldyn.jit.compiled import inner_scalar
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.block_matrix import pairs_within, places_of
 from foldyn.mechanics.model import ranks
-from foldyn.mechanics.term import FORCES, PLACE_OBSTACLES, Compiled, Term, forces, place_obstacles
+from foldyn.mechanics.term import (
+    FORCES,
+    PLACE_OBSTACLES,
+    CompiledTerm,
+    Term,
+    forces,
+    place_obstacles,
+)
 
 
 class AirDrag(NamedTuple):
@@ -124,12 +131,12 @@ class AirDragTerm(Term):
         """The drag in a wind that follows row `row` of these histories."""
         return AirDragTerm(self.air, self.half, row, histories)
 
-    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         rows = int(part.own[1])
         own = Context(_Context(self.air, self.half, self.row, self.histories, rows))
         kernels = {FORCES: _forces} | ({PLACE_OBSTACLES: _place} if self.histories else {})
-        return Compiled(own, kernels)
+        return CompiledTerm(own, kernels)
 
     def blow(self, factor: float) -> None:
         """Set the wind factor for the next evaluations."""

@@ -30,10 +30,10 @@ from foldyn.mechanics.tangent import Sparsity, entry_slots, joined
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
-    Compiled,
-    Model,
+    CompiledTerm,
     Strains,
     Term,
+    ThreadTerms,
     Unstrained,
     evaluate,
     in_rows,
@@ -160,10 +160,10 @@ class Assembly:
         return self if len(own) == len(self.others) else Assembly(self.sheet, *own)
 
     @cached_property
-    def _evaluated(self) -> Model:
+    def _evaluated(self) -> ThreadTerms:
         """Model for single evaluations from Python."""
         part = self._parts(1)[0]._replace(kept=tuple(term.memory for term in self.others))
-        return Model(self, part, [FORCES])
+        return ThreadTerms(self, part, [FORCES])
 
     def _at(self, q: NDArray, energy: NDArray) -> NDArray:
         """Internal forces (m,) at q; fills `energy` by group unless it is empty."""
@@ -250,7 +250,7 @@ class Assembly:
         scratch = found[0].scratch._replace(angle=own, fold_angle=own)
         return [found[0]._replace(angle=angle, fold_angle=own, scratch=scratch)]
 
-    def compiled(self, part: ThreadPart) -> list[Compiled]:
+    def compiled(self, part: ThreadPart) -> list[CompiledTerm]:
         """Compiled terms for a thread."""
         found, group = [self.sheet.compiled(part, part.scratch, 0)], len(self.sheet.energy_groups)
         for term, kept in zip(self.others, part.kept, strict=True):

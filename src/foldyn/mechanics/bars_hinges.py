@@ -13,7 +13,7 @@ from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
     MEAN_FORCES,
-    Compiled,
+    CompiledTerm,
     energies,
     forces,
     mean_forces,
@@ -46,7 +46,7 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
     add_hinge_forces(own.model, start, end, numbers_at(before, angle.size), angle, out)
 
 
-def bars_hinges_kernels(model: BarsHinges, scratch: ForceScratch, groups: int) -> Compiled:
+def bars_hinges_kernels(model: BarsHinges, scratch: ForceScratch, groups: int) -> CompiledTerm:
     """Compiled bars and hinges, with `groups` energy groups."""
     own = Context(_Context(model, scratch, groups))
-    return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
+    return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})

@@ -27,7 +27,7 @@ from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
     MEAN_FORCES,
-    Compiled,
+    CompiledTerm,
     Strains,
     Term,
     Unstrained,
@@ -248,10 +248,10 @@ class ClampsTerm(Term):
     def __init__(self, clamps: Clamps) -> None:
         self.clamps = clamps
 
-    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Kernels for a thread; the clamps' dihedrals are last in its angles. See `Term`."""
         own = Context(_Context(self.clamps, part.angle, int(part.own[1])))
-        return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
+        return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     def arrays(self) -> Arrays:
         """Arrays that its forces depend on; see `Term`."""

@@ -15,7 +15,7 @@ from scipy import sparse
 from foldyn.jit.context import Context, numbers_at
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.pullback import Arrays, Pulled, pullback
-from foldyn.mechanics.term import FORCES, Compiled, Term, forces
+from foldyn.mechanics.term import FORCES, CompiledTerm, Term, forces
 from foldyn.mechanics.threads import Team, wait
 
 
@@ -104,12 +104,12 @@ class DampingMatrix(Term):
     def __init__(self, matrix: sparse.csr_array) -> None:
         self.matrix = matrix
 
-    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         start, column = self.matrix.indptr.astype(np.int64), self.matrix.indices.astype(np.int64)
         rows = np.asarray(part.own)
         own = _Matrix(start, column, self.matrix.data, rows, part.team)
-        return Compiled(Context(own), {FORCES: _of_matrix})
+        return CompiledTerm(Context(own), {FORCES: _of_matrix})
 
     def arrays(self) -> Arrays:
         """Arrays that its forces depend on; see `Term`."""
@@ -146,9 +146,9 @@ class DampingRows(Term):
     def __init__(self, rows: NDArray) -> None:
         self.rows = rows
 
-    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
-        return Compiled(Context(_Rows(self.rows)), {FORCES: _of_rows})
+        return CompiledTerm(Context(_Rows(self.rows)), {FORCES: _of_rows})
 
     def arrays(self) -> Arrays:
         """Arrays that its forces depend on; see `Term`."""

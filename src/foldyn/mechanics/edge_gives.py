@@ -26,7 +26,7 @@ from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
     MEAN_FORCES,
-    Compiled,
+    CompiledTerm,
     energies,
     forces,
     mean_forces,
@@ -255,15 +255,15 @@ def _balanced_energies(own, u, out):
         numbers_at(out, GROUP + 1)[GROUP] += 0.5 * pull[k] * g[k]
 
 
-def gives_kernels(gives: EdgeGives, rows: int, first: int) -> Compiled:
+def gives_kernels(gives: EdgeGives, rows: int, first: int) -> CompiledTerm:
     """Kernels for gives as dofs from `first` on."""
     context = _Context(gives, rows, first, np.zeros((2, gives.count)), NO_FACTOR)
-    return Compiled(
+    return CompiledTerm(
         Context(context), {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
     )
 
 
-def balanced_kernels(gives: EdgeGives, rows: int) -> Compiled:
+def balanced_kernels(gives: EdgeGives, rows: int) -> CompiledTerm:
     """Kernels for gives in balance."""
     context = _Context(gives, rows, 3 * rows, np.zeros((2, gives.count)), gives.factor())
-    return Compiled(Context(context), {FORCES: _balanced_forces, ENERGIES: _balanced_energies})
+    return CompiledTerm(Context(context), {FORCES: _balanced_forces, ENERGIES: _balanced_energies})

@@ -13,7 +13,7 @@ from foldyn.mechanics.edge_gives import EdgeGives, balanced_kernels, gives_kerne
 from foldyn.mechanics.edge_gives_pullback import balanced_pulled, gives_pulled
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of
-from foldyn.mechanics.term import Compiled, Term, Unstrained, Way, nodal
+from foldyn.mechanics.term import CompiledTerm, Term, Unstrained, Way, nodal
 
 
 class EdgeGivesTerm(Term):
@@ -33,7 +33,7 @@ class EdgeGivesTerm(Term):
     def __init__(self, gives: EdgeGives, rows: int, first: int) -> None:
         self.gives, self.rows, self.first = gives, rows, first
 
-    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         return gives_kernels(self.gives, self.rows, self.first)
 
@@ -92,7 +92,7 @@ class BalancedGivesTerm(EdgeGivesTerm):
 
     owns_hidden: ClassVar[bool] = False
 
-    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         return balanced_kernels(self.gives, self.rows)
 

@@ -28,7 +28,7 @@ from foldyn.mechanics.term import (
     FORCES,
     MEAN_FORCES,
     STEP_ERROR,
-    Compiled,
+    CompiledTerm,
     advance_clock,
     branch_states,
     commit,
@@ -329,10 +329,10 @@ def _step_error(term, scale):
     return straightness_error(term.own, scale)
 
 
-def memory_kernels(own: MemoryHinges, offset: NDArray, rows: int, groups: int) -> Compiled:
+def memory_kernels(own: MemoryHinges, offset: NDArray, rows: int, groups: int) -> CompiledTerm:
     """Kernels of hinges with memory, with `groups` energy groups."""
     context = Context(_Context(own, offset, rows, groups))
-    return Compiled(
+    return CompiledTerm(
         context,
         {
             FORCES: _forces, ENERGIES: _energies, ADVANCE_CLOCK: _advance_clock, COMMIT: _commit,

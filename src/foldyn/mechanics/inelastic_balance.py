@@ -24,7 +24,7 @@ from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.inelastic import MemoryHinges, evaluate_branches, make_last
 from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.mechanics.sheet_term import SheetTerm
-from foldyn.mechanics.term import ADDRESS, FORCES, Compiled, forces
+from foldyn.mechanics.term import ADDRESS, FORCES, CompiledTerm, forces
 from foldyn.mechanics.viscous import hinge_gradient
 
 ROUNDS = 200  # maximum iterations for the turns of creases in a given state
@@ -89,10 +89,10 @@ class BalancedMemory(HingeMemory):
         super().__init__(own, settles, sheet)
         self._sheet = sheet
 
-    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         found = super().compiled(part, kept, group)
-        return Compiled(found.context, {**found.kernels, FORCES: _forces})
+        return CompiledTerm(found.context, {**found.kernels, FORCES: _forces})
 
     def start(self, q: NDArray, state: NDArray | str | None = None) -> None:
         """Start as `HingeMemory.start`; in a given state, creases turn until in balance."""

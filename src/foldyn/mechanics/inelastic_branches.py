@@ -20,7 +20,7 @@ from foldyn.mechanics.inelastic import (
     memory_tangents,
 )
 from foldyn.mechanics.sheet_term import SheetTerm
-from foldyn.mechanics.term import Compiled, Term, Way, in_rows
+from foldyn.mechanics.term import CompiledTerm, Term, Way, in_rows
 from foldyn.mechanics.viscous import WIDTH, coupled
 
 
@@ -95,7 +95,7 @@ class HingeMemory(Term):
         return rates
 
     # ------------------------------------------------------------------ as a term
-    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """See `Term`; the energy belongs to groups of the sheet."""
         return memory_kernels(self.own, self._offset, self._rows, group)
 

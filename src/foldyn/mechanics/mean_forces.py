@@ -25,7 +25,7 @@ from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.term import ContactTerm
-from foldyn.mechanics.term import ENERGIES, FORCES, MEAN_FORCES, Compiled, Term, mean_forces
+from foldyn.mechanics.term import ENERGIES, FORCES, MEAN_FORCES, CompiledTerm, Term, mean_forces
 from foldyn.mechanics.threads import ThreadPart
 
 NOISE = 16.0 * float(np.finfo(float).eps)  # of an energy: smaller differences are rounding errors
@@ -105,7 +105,7 @@ class MeanForces:
         self.context = np.array([context.address for _, context, _ in self._held], np.int64)
         self.kernel = np.array([kernel.at(context) for _, context, kernel in self._held], np.int64)
 
-    def _of(self, term: Term, own: Compiled) -> tuple[Context, Addressed]:
+    def _of(self, term: Term, own: CompiledTerm) -> tuple[Context, Addressed]:
         """Context and kernel of a term."""
         if MEAN_FORCES in own.kernels:
             return own.context, own.kernels[MEAN_FORCES]

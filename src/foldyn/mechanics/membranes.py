@@ -31,7 +31,7 @@ from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
     MEAN_FORCES,
-    Compiled,
+    CompiledTerm,
     Strains,
     Term,
     Unstrained,
@@ -414,11 +414,11 @@ class MembranesTerm(Term):
         """See `Term`."""
         return packed(self.membranes)
 
-    def compiled(self, part: Any, kept: Packed, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Packed, group: int) -> CompiledTerm:
         """See `Term`."""
         low, high = (int(end) for end in part.own)
         context = _Context(kept, self.membranes, low, high, self.rows, part.team)
-        return Compiled(
+        return CompiledTerm(
             Context(context), {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
         )
 

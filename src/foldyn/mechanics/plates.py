@@ -36,7 +36,7 @@ from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
     MEAN_FORCES,
-    Compiled,
+    CompiledTerm,
     energies,
     forces,
     mean_forces,
@@ -337,7 +337,7 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
 
 def plates_kernels(
     model: BarsPlates, scratch: PlatesScratch, rows: int, groups: tuple[int, int, int]
-) -> Compiled:
+) -> CompiledTerm:
     """Bars, folds and plates, whose dofs fill so many rows, with the groups of their energies."""
     own = Context(_Context(model, scratch, rows, np.array(groups), np.zeros(3)))
-    return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
+    return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})

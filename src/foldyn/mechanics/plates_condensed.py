@@ -31,7 +31,7 @@ from foldyn.mechanics.plates import (
     turn_hinges,
     turn_moments,
 )
-from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, energies, forces
+from foldyn.mechanics.term import ENERGIES, FORCES, CompiledTerm, energies, forces
 from foldyn.mechanics.threads import Team
 
 STEPS = 100  # of Newton's method, at most
@@ -287,7 +287,7 @@ def _energies(own, u, out):
     condensed_energy(own.model, moved, own.scratch, numbers_at(out, 3))
 
 
-def condensed_kernels(model: CondensedPlates, scratch: CondensedScratch) -> Compiled:
+def condensed_kernels(model: CondensedPlates, scratch: CondensedScratch) -> CompiledTerm:
     """Bars, folds and plates with their rotations in balance."""
     own = Context(_Context(model, scratch))
-    return Compiled(own, {FORCES: _forces, ENERGIES: _energies})
+    return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies})

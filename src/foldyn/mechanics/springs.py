@@ -26,7 +26,7 @@ from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
     MEAN_FORCES,
-    Compiled,
+    CompiledTerm,
     Term,
     Unstrained,
     energies,
@@ -268,10 +268,10 @@ class SpringsTerm(Term):
     def __init__(self, springs: Springs) -> None:
         self.springs = springs
 
-    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         own = Context(_Context(self.springs, group, int(part.own[1])))
-        return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
+        return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     def arrays(self) -> Arrays:
         """Arrays that its forces depend on; see `Term`."""

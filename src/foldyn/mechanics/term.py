@@ -81,7 +81,7 @@ PARTS = {
 WHOLE = {"stiffness": "tangent", "damping": "damping"}  # may replace both parts
 
 
-class Compiled(NamedTuple):
+class CompiledTerm(NamedTuple):
     """A term as compiled loops see it: its context, and its kernels by kind."""
 
     context: Context
@@ -159,7 +159,7 @@ class Term(ABC):
 
     # ------------------------------------------------------------------ what is compiled
     @abstractmethod
-    def compiled(self, part: ThreadPart, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: ThreadPart, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels of the term for a thread.
 
         part : the thread's, one of `Assembly.thread_parts`.
@@ -323,7 +323,7 @@ class Terms(NamedTuple):
     powers: NDArray  # (3,) scratch of `forces_of`
 
 
-class Model:
+class ThreadTerms:
     """Terms of a body on one thread; keeps their arrays and contexts alive.
 
     Parameters

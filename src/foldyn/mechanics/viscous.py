@@ -25,7 +25,7 @@ from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.dihedral import dihedral_gradient, dihedral_rates
 from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
 from foldyn.mechanics.sheet_term import NO_DOF
-from foldyn.mechanics.term import FORCES, Compiled, Term, forces
+from foldyn.mechanics.term import FORCES, CompiledTerm, Term, forces
 
 WIDTH = 14  # largest number of dofs of an element: four nodes, and two hidden dofs
 
@@ -277,10 +277,10 @@ class ViscousTerm(Term):
     def __init__(self, elements: Viscous) -> None:
         self.elements = elements
 
-    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         own = Context(_Context(self.elements, 3 * int(part.own[1])))
-        return Compiled(own, {FORCES: _forces})
+        return CompiledTerm(own, {FORCES: _forces})
 
     def arrays(self) -> Arrays:
         """Arrays that its forces depend on; see `Term`."""

@@ -23,7 +23,7 @@ from foldyn.mechanics.block_matrix import pairs_within, places_of
 from foldyn.mechanics.membranes import Membranes
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
-from foldyn.mechanics.term import FORCES, Compiled, Term, forces, nodal
+from foldyn.mechanics.term import FORCES, CompiledTerm, Term, forces, nodal
 
 
 class ViscousPanels(NamedTuple):
@@ -183,10 +183,10 @@ class ViscousPanelsTerm(Term):
     def __init__(self, panels: ViscousPanels) -> None:
         self.panels = panels
 
-    def compiled(self, part: Any, kept: Any, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         own = Context(_Context(self.panels, int(part.own[1])))
-        return Compiled(own, {FORCES: _forces})
+        return CompiledTerm(own, {FORCES: _forces})
 
     def arrays(self) -> Arrays:
         """Arrays that its forces depend on; see `Term`."""

@@ -19,7 +19,7 @@ from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
 from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of
 from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges, SheetTerm, SoftHinges, largest_turn
 from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_mean_tangent, put_tangent
-from foldyn.mechanics.term import Compiled, Folds, Strains, Unstrained
+from foldyn.mechanics.term import CompiledTerm, Folds, Strains, Unstrained
 from foldyn.values import writable
 
 GROUPS: Mapping[str, str] = {
@@ -103,7 +103,7 @@ class BarsHingesTerm(SheetTerm):
         """Scratch for each thread; see `SheetTerm`."""
         return mechanics.force_scratches(self.model, threads)
 
-    def compiled(self, part: Any, kept: mechanics.ForceScratch, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: mechanics.ForceScratch, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         return bars_hinges_kernels(self.model, kept, len(GROUPS))
 

@@ -35,7 +35,7 @@ from foldyn.mechanics.sheet_term import (
 )
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
-from foldyn.mechanics.term import Compiled, Folds, Unstrained
+from foldyn.mechanics.term import CompiledTerm, Folds, Unstrained
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm, stretch
 from foldyn.values import writable
 
@@ -139,7 +139,7 @@ class BarsPlatesTerm(SheetTerm):
         """See `SheetTerm`."""
         return [plates_scratch(self.model)]
 
-    def compiled(self, scratch: Any, kept: PlatesScratch, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: PlatesScratch, group: int) -> CompiledTerm:
         """See `Term`."""
         return plates_kernels(self.model, kept, self.rows, self._groups)
 

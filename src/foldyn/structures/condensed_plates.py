@@ -26,7 +26,7 @@ from foldyn.mechanics.plates_condensed_pullback import condensed_pulled
 from foldyn.mechanics.pullback import Arrays, Pulled
 from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges
 from foldyn.mechanics.step_tangent import SparseBlocks
-from foldyn.mechanics.term import Compiled, Unstrained
+from foldyn.mechanics.term import CompiledTerm, Unstrained
 from foldyn.structures.bars_plates import BarsPlatesTerm
 
 
@@ -56,7 +56,7 @@ class CondensedPlatesTerm(BarsPlatesTerm):
         push = np.append(np.zeros(self.size), self._push)
         return Assembly(self._full).dofs(np.ravel(q)[: self.size], push)
 
-    def compiled(self, part: Any, kept: CondensedScratch, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: CondensedScratch, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         return condensed_kernels(self.condensed, kept)
 

@@ -34,10 +34,6 @@ def _cube_root(x):
     return math.copysign(abs(x) ** (1.0 / 3.0), x) if SIMULATED else cuda.libdevice.cbrt(x)
 
 
-def _unknown_law(*_):
-    return math.nan
-
-
 def on_device(function: Callable[..., Any]) -> Any:
     """Compile a function for the device; the simulator calls it unchanged."""
     return function if SIMULATED else cuda.jit(device=True)(function)

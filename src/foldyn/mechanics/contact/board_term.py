@@ -29,7 +29,7 @@ from foldyn.mechanics.contact.ride import (
     step_jacobian,
 )
 from foldyn.mechanics.contact.term import ContactTerm, contact_tangent
-from foldyn.mechanics.term import Compiled, nodal
+from foldyn.mechanics.term import CompiledTerm, nodal
 
 STRAIGHT = 0.1  # rad: for smaller turns, points move nearly along straight lines
 MOST = 64  # such pieces per step
@@ -59,7 +59,7 @@ class BoardContactTerm(ContactTerm):
         """Contact data as arrays, with boards' points; see `ContactTerm`."""
         return board_tables(self.sheets, *self._riding, self._guarded.hinges)
 
-    def compiled(self, part: Any, kept: Memory, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Memory, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         return board_kernels(self.ride, self.tables, kept, part.angle, group)
 

@@ -28,7 +28,7 @@ from foldyn.mechanics.term import (
     FORCES,
     LIMIT,
     PLACE_OBSTACLES,
-    Compiled,
+    CompiledTerm,
     energies,
     forces,
     limit,
@@ -119,7 +119,7 @@ def _board_limit(own, u, v, a, dt, beta, energy, lightness):
 
 def board_kernels(
     ride: Ride, tables: Tables, memory: Memory, angle: NDArray, group: int
-) -> Compiled:
+) -> CompiledTerm:
     """Contact kernels for points that ride on a mesh."""
     histories = 1 + int(tables.planes[:, HISTORY].max(initial=-1.0))
     shape = ride.rest.shape
@@ -131,10 +131,10 @@ def board_kernels(
         )
     )  # fmt: skip
     kernels = {FORCES: _board_forces, ENERGIES: _energies, LIMIT: _board_limit}
-    return Compiled(own, kernels | ({PLACE_OBSTACLES: _place} if histories else {}))
+    return CompiledTerm(own, kernels | ({PLACE_OBSTACLES: _place} if histories else {}))
 
 
-def contact_kernels(tables: Tables, memory: Memory, angle: NDArray, group: int) -> Compiled:
+def contact_kernels(tables: Tables, memory: Memory, angle: NDArray, group: int) -> CompiledTerm:
     """Contact kernels for these tables, with their energy group.
 
     The energy belongs to the last force evaluation, after which all team members have synchronized.
@@ -143,4 +143,4 @@ def contact_kernels(tables: Tables, memory: Memory, angle: NDArray, group: int) 
     rows = len(tables.rest)
     own = Context(_Context(tables, memory, angle, group, rows, histories))
     kernels = {FORCES: _forces, ENERGIES: _energies, LIMIT: _limit}
-    return Compiled(own, kernels | ({PLACE_OBSTACLES: _place} if histories else {}))
+    return CompiledTerm(own, kernels | ({PLACE_OBSTACLES: _place} if histories else {}))

@@ -30,7 +30,7 @@ from foldyn.mechanics.contact.tangent import (
     plane_tangents,
     touching_pairs,
 )
-from foldyn.mechanics.term import Compiled, Term, Unstrained, nodal
+from foldyn.mechanics.term import CompiledTerm, Term, Unstrained, nodal
 
 GROUP = "contact"
 
@@ -110,7 +110,7 @@ class ContactTerm(Term):
         return type(self)(replace(self.sheets, planes=planes), self._guarded)
 
     # ------------------------------------------------------------------ as a term
-    def compiled(self, part: Any, kept: Memory, group: int) -> Compiled:
+    def compiled(self, part: Any, kept: Memory, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         return contact_kernels(self.tables, kept, part.angle, group)
 
