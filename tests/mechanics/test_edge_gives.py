@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 import foldyn as fd
 from foldyn.checks import gradient_error, tangent_error
-from foldyn.mechanics.edge_gives_term import EdgeGivesTerm
+from foldyn.mechanics.edge_gives import EdgeGivesTerm
 from foldyn.mechanics.following import following_force
 from foldyn.structures.membranes import energies
 

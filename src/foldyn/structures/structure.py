@@ -25,8 +25,7 @@ from foldyn.materials import (
 from foldyn.materials.plate_superlinear import onset_parameters
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.clamps import RIDES, ClampsTerm
-from foldyn.mechanics.edge_gives import EdgeGives
-from foldyn.mechanics.edge_gives_term import BalancedGivesTerm, EdgeGivesTerm
+from foldyn.mechanics.edge_gives import BalancedGivesTerm, EdgeGives, EdgeGivesTerm
 from foldyn.mechanics.following import Following, joined, moments, pushes, tensions
 from foldyn.mechanics.membranes import MembranesTerm
 from foldyn.patterns import Pattern
