@@ -24,7 +24,7 @@ from foldyn.mechanics.discrete_gradient import (
     mean_moment,
     mean_stress,
 )
-from foldyn.mechanics.inelastic_branches import HingeMemory
+from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.mechanics.mean_forces import MeanForces
 from foldyn.mechanics.term import FORCES, MEAN_FORCES, CompiledTerm, Term, forces
 from pairwise import in_pairs

@@ -19,7 +19,7 @@ from foldyn.dynamics.methods import suited, with_mass
 from foldyn.dynamics.motion_state import Outcome
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.errors import ComputationError, InputError, MotionInterrupted, told_once
-from foldyn.mechanics.inelastic_branches import HingeMemory
+from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import variable
 from foldyn.values import choice, number, of_kind

@@ -30,7 +30,7 @@ from foldyn.dynamics.motion_state import MotionState, StepPlan
 from foldyn.dynamics.system import PackedCase
 from foldyn.errors import ComputationError, InputError
 from foldyn.lock import LockedError, locked
-from foldyn.mechanics.inelastic_branches import HingeMemory
+from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.program import program
 from foldyn.results.columns import Columns
 from foldyn.results.netcdf import check_target, load, save

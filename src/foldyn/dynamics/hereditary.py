@@ -8,8 +8,8 @@ from scipy import sparse
 
 from foldyn.cases import Case
 from foldyn.mechanics.assembly import Assembly, Numbering
+from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.mechanics.inelastic_balance import BalancedMemory
-from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.structures.condensed_plates import CondensedPlatesTerm
 from foldyn.structures.inelastic_hinges import memory
 

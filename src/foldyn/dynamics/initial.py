@@ -24,7 +24,7 @@ from foldyn.dynamics.system import PackedCase, carry_supports, place, scratch
 from foldyn.dynamics.timing import histories
 from foldyn.errors import InputError, ModelRangeWarning, warn
 from foldyn.mechanics.following import following_force
-from foldyn.mechanics.inelastic_branches import HingeMemory
+from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.results.contents import check_variable
 from foldyn.results.quantities import CONTINUATIONS, ORIGIN
 from foldyn.values import whole

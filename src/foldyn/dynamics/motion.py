@@ -43,7 +43,7 @@ from foldyn.errors import (
     StretchWarning,
     warn,
 )
-from foldyn.mechanics.inelastic_branches import HingeMemory
+from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.results import trajectory_dataset
 from foldyn.results.crossings import Crossings, crossings_of
 from foldyn.structures.stretching import remedy, stretch

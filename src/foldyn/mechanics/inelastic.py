@@ -1,4 +1,4 @@
-"""Hinges with memory on a model: the forces of the branches of their laws.
+"""Hinges with memory: the forces of the branches of their laws, added to the elastic parts.
 
 The branches store the state at the last accepted step. Every evaluation computes a trial state from
 it, from the dihedrals then and now, and from the elapsed time; only `commit` accepts the trial
@@ -7,10 +7,13 @@ state. A step that is rejected or repeated leaves no trace.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
@@ -19,6 +22,7 @@ from foldyn.materials.branch_switch import mean_moment, update
 from foldyn.materials.crease_damper import CODE as DAMPER
 from foldyn.mechanics.dihedral import add_hessian
 from foldyn.mechanics.discrete_gradient import discrete_gradient
+from foldyn.mechanics.sheet_term import SheetTerm
 from foldyn.mechanics.term import (
     ADVANCE_CLOCK,
     BRANCH_STATES,
@@ -29,16 +33,19 @@ from foldyn.mechanics.term import (
     MEAN_FORCES,
     STEP_ERROR,
     CompiledTerm,
+    Term,
+    Way,
     advance_clock,
     branch_states,
     commit,
     dissipated,
     energies,
     forces,
+    in_rows,
     mean_forces,
     step_error,
 )
-from foldyn.mechanics.viscous import hinge_gradient
+from foldyn.mechanics.viscous import WIDTH, coupled, hinge_gradient
 
 
 class MemoryHinges(NamedTuple):
@@ -115,10 +122,10 @@ def add_memory_forces(own, offset, u, v, force):
 def add_mean_memory_forces(own, offset, start, end, h, out):
     """Add forces whose work in a step h equals the energy that branches store and dissipate.
 
-    `start`, `end` and `out` are flat. Offsets have their end values; returns the work of their
+    `start`, `end` and `out` are flat. Offsets have their end values; returns the scratch of their
     change, and by how much the dissipation falls short of the laws, J.
     """
-    work, lost, lacking, g = 0.0, 0.0, 0.0, own.gradient
+    scratch, lost, lacking, g = 0.0, 0.0, 0.0, own.gradient
     one, other, gradient = np.empty((2, 4, 3)), np.empty((2, 4, 3)), np.empty((4, 3))
     own.elapsed[0] = h
     for e in range(own.rest.size):
@@ -141,9 +148,9 @@ def add_mean_memory_forces(own, offset, start, end, h, out):
             out[dofs[c]] += moment * gradient[c // 3, c % 3]
         for c in range(2):
             out[dofs[12 + c]] -= moment * hidden[c]
-        work += moment * (own.turned[e] - own.angle[e] - (after - before))
+        scratch += moment * (own.turned[e] - own.angle[e] - (after - before))
     own.lost[1] = lost
-    return work, lacking
+    return scratch, lacking
 
 
 @inner
@@ -292,11 +299,11 @@ def _energies(term, u, out):
 @mean_forces
 def _mean_forces(term, u0, u1, before, h, t, force, powers):
     start, end, out = rows_at(u0, term.rows), rows_at(u1, term.rows), rows_at(force, term.rows)
-    work, lacking = add_mean_memory_forces(
+    scratch, lacking = add_mean_memory_forces(
         term.own, term.offset, flat(start), flat(end), h, flat(out)
     )
     both = numbers_at(powers, 2)
-    both[0] += work / h
+    both[0] += scratch / h
     both[1] -= lacking / h
 
 
@@ -340,3 +347,110 @@ def memory_kernels(own: MemoryHinges, offset: NDArray, rows: int, groups: int) -
             MEAN_FORCES: _mean_forces,
         },
     )  # fmt: skip
+
+
+class HingeMemory(Term):
+    """Branches of hinges, added to the elastic parts of their laws on a sheet; see `Term`.
+
+    Their state changes in place, and terms derived from this one share it.
+
+    Parameters
+    ----------
+    own : MemoryHinges
+    settles : ndarray of bool, shape (b,)
+        Branches that are settled at the start of a motion by default.
+    sheet : SheetTerm
+    """
+
+    undifferentiated = "creases that yield, creep, relax or, beside panels that give way, damp"
+
+    def __init__(self, own: MemoryHinges, settles: NDArray, sheet: SheetTerm) -> None:
+        self.own, self.settles = own, settles
+        self._offset, self._rows = sheet.series()[1], sheet.rows
+
+    def start(self, q: NDArray, state: NDArray | str | None = None) -> None:
+        """Start at the dofs q (m,) or (rows, 3) in a state (b, 2), "fresh", or the default."""
+        own, offset, q = self.own, self._offset, in_rows(q, self._rows)
+        for array in (own.angle, own.state, own.moment, own.elapsed, own.lost):
+            array[:] = 0.0
+        offset[own.row, 1] = 0.0  # other motions of the sheet have left their values
+        evaluate_at(own, offset, q)  # turned instantly from rest
+        make_last(own)
+        own.lost[:] = 0.0
+        if isinstance(state, np.ndarray):
+            own.state[:] = state
+        elif state is None:
+            own.state[self.settles] = 0.0
+        evaluate_at(own, offset, q)
+
+    def resists(self, state: NDArray | str | None) -> bool:
+        """Whether a start in such a state counts as an instant turn, neither relaxed nor given."""
+        return isinstance(state, str) or (state is None and not self.settles.all())
+
+    def commit(self) -> None:
+        """Accept the step that ends at the last evaluation."""
+        make_last(self.own)
+
+    def still(self) -> None:
+        """Set the next evaluation to the time of the last accepted step."""
+        self.own.elapsed[0] = 0.0
+
+    def snapshot(self) -> tuple[NDArray, ...]:
+        """Copy of the last accepted step, for `recall`."""
+        return tuple(array.copy() for array in self._kept)
+
+    def recall(self, snapshot: Sequence[NDArray]) -> None:
+        """Return to an accepted step."""
+        for array, kept in zip(self._kept, snapshot, strict=True):
+            array[:] = kept
+        self.still()
+
+    @property
+    def _kept(self) -> tuple[NDArray, ...]:
+        return self.own.angle, self.own.state, self.own.lost
+
+    def gradients(self, q: NDArray, size: int) -> sparse.csr_array:
+        """Gradients (h, size) of the hinge angles at the dofs q (m,)."""
+        out = np.zeros((len(self.own.rest), WIDTH))
+        memory_gradients(self.own, np.ascontiguousarray(q, float), out)
+        row = np.repeat(np.arange(len(out)), WIDTH)
+        entries = (out.ravel(), (row, self.own.dofs.ravel()))
+        rates = sparse.csr_array(sparse.coo_array(entries, shape=(len(out), size)))
+        rates.eliminate_zeros()
+        return rates
+
+    # ------------------------------------------------------------------ as a term
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
+        """See `Term`; the energy belongs to groups of the sheet."""
+        return memory_kernels(self.own, self._offset, self._rows, group)
+
+    @cached_property
+    def _coupled(self) -> tuple[NDArray, NDArray, NDArray]:
+        mine = np.ones(self.own.dofs.shape, bool)
+        mine[:, 12:] = self.own.hidden_turn != 0.0
+        return coupled(self.own.dofs, mine)
+
+    @property
+    def places(self) -> tuple[NDArray, NDArray]:
+        """Rows and columns (k,) of its tangent entries; see `Term`."""
+        return self._coupled[1:]
+
+    def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
+        """Tangent entries; the elastic part of a hinge has a slope of 1 per unit stiffness."""
+        own, u = self.own, in_rows(q, self._rows)
+        out = np.empty((len(own.rest), WIDTH, WIDTH))
+        evaluate_at(own, self._offset, u)
+        np.maximum(own.slope, (floor - 1.0) * own.stiffness, out=own.slope)
+        memory_tangents(own, u, out)
+        return out[self._coupled[0]]
+
+    def mean_entries(self, q0: NDArray, q1: NDArray, way: Way, floor: float) -> NDArray:
+        """See `Term`."""
+        out = np.empty((len(self.own.rest), WIDTH, WIDTH))
+        ends = in_rows(q0, self._rows), in_rows(q1, self._rows)
+        mean_memory_tangents(self.own, 0.5 * (floor - 1.0), *ends, out)
+        return out[self._coupled[0]]
+
+    def on(self, sheet: SheetTerm) -> Self:
+        """The branches on another sheet; they keep their own rest angles. See `Term`."""
+        return type(self)(self.own, self.settles, sheet)

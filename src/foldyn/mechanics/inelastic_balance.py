@@ -21,8 +21,7 @@ from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.crease_damper import CODE as DAMPER
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.inelastic import MemoryHinges, evaluate_branches, make_last
-from foldyn.mechanics.inelastic_branches import HingeMemory
+from foldyn.mechanics.inelastic import HingeMemory, MemoryHinges, evaluate_branches, make_last
 from foldyn.mechanics.sheet_term import SheetTerm
 from foldyn.mechanics.term import ADDRESS, FORCES, CompiledTerm, forces
 from foldyn.mechanics.viscous import hinge_gradient

@@ -1,10 +1,15 @@
 """Plates whose rotations are in balance at every displacement: for methods that need mass.
 
 The rotations x (r,) of `mechanics.plates` balance the forces on them, which curling panels and
-moments of creases exert. Newton's method finds them at every evaluation, from those of the last
-one. Their stiffness is that of the plates, which is constant, and of the folds, which couple the
-two rotations beside them; it is factorized as a band (Cholesky), once where the law of the folds is
-linear.
+moments of creases exert. Newton's method finds them at every evaluation, starting from the last
+ones. Their stiffness consists of the constant stiffness of the plates and of the folds, which
+couple the two rotations beside them. It is factorized as a band (Cholesky), only once if the law of
+the folds is linear.
+
+The pullback (`mechanics.pullback`) holds the forces on the rotations at the push s, f(u, x) = s.
+With y = -f_x^-1 f_u w, the rates of the rotations if the nodes move by the weights w, its
+derivatives are those of the forces on nodes and rotations (`mechanics.plates_pullback`) for the
+weights (w, y), and -y with respect to s.
 """
 
 from __future__ import annotations
@@ -21,6 +26,7 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_slope
+from foldyn.mechanics.bars_hinges import pull_bars_hinges
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.plates import (
     BarsPlates,
@@ -28,9 +34,18 @@ from foldyn.mechanics.plates import (
     plates_energy,
     plates_force,
     plates_scratch,
+    turn_folds,
     turn_hinges,
     turn_moments,
 )
+from foldyn.mechanics.plates_pullback import (
+    Back,
+    back_of,
+    gradients,
+    pull_turns,
+    rate_hinges,
+)
+from foldyn.mechanics.pullback import Pulled, pullback
 from foldyn.mechanics.term import ENERGIES, FORCES, CompiledTerm, energies, forces
 from foldyn.mechanics.threads import Team
 
@@ -291,3 +306,71 @@ def condensed_kernels(model: CondensedPlates, scratch: CondensedScratch) -> Comp
     """Bars, folds and plates with their rotations in balance."""
     own = Context(_Context(model, scratch))
     return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies})
+
+
+@inner
+def rate_couples(model, scratch, back, out):
+    """Rates of the forces on rotations with those of the dihedrals alone, to out (r,)."""
+    out[:], p = 0.0, model.fold_parameters
+    for f in range(model.fold_rest.size):
+        scratch.slope[f] = model.fold_stiffness[f] * hinge_slope(
+            model.code, scratch.fold_angle[f], model.fold_rest[f],
+            p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[2],
+        )  # fmt: skip
+        for rotation in model.fold_rotations[f]:
+            if rotation >= 0:
+                out[rotation] -= model.per_reach * scratch.slope[f] * back.rate[f]
+    for p in range(model.start.size - 1):
+        count = model.start[p + 1] - model.start[p]
+        for k in range(count):
+            rotation = -1 - model.angle[model.start[p] + k]
+            if rotation < 0:
+                continue
+            for m in range(count):
+                h = model.angle[model.start[p] + m]
+                if h >= 0:
+                    stiff = model.stiffness[model.entry[p] + k * count + m]
+                    out[rotation] += model.per_reach * stiff * back.rate[h]
+
+
+@inner
+def rate_rotations(model, scratch, back, y):
+    """Rates y (r,) of the rotations in balance."""
+    turn_folds(model.plates, scratch.x, scratch.plates)
+    rate_couples(model.plates, scratch.plates, back, y)
+    if not model.constant:
+        factorize(model, scratch)
+    for k in range(y.size):
+        scratch.step[model.rank[k]] = -y[k]
+    solve_band(scratch.factor, scratch.step)
+    for k in range(y.size):
+        y[k] = scratch.step[model.rank[k]]
+
+
+class _Backward(NamedTuple):
+    model: CondensedPlates
+    scratch: CondensedScratch
+    back: Back
+    y: NDArray  # (r,) rates of the rotations, m
+    push: NDArray  # (r,) gradient
+
+
+@pullback
+def _pullback(own, u, v, t, weight, product, rate):
+    model, scratch, plates = own.model, own.scratch, own.model.plates
+    rows = plates.bars.rest.shape[0]
+    here, w, out = rows_at(u, rows), rows_at(weight, rows), rows_at(product, rows)
+    balance(model, here, scratch)
+    rate_hinges(plates, here, w, scratch.plates, own.back)
+    rate_rotations(model, scratch, own.back, own.y)
+    pull_bars_hinges(plates.bars, here, w, own.back.bars, own.back.out.bars, out)
+    pull_turns(plates, scratch.x, own.y, scratch.plates, own.back, out, scratch.couple)
+    for k in range(own.y.size):
+        own.push[k] -= own.y[k]
+
+
+def condensed_pulled(model: CondensedPlates) -> Pulled:
+    """Bars, folds and plates with their rotations in balance, differentiated."""
+    back, (y, push) = back_of(model.plates), np.zeros((2, model.plates.rotations))
+    own = Context(_Backward(model, condensed_scratch(model), back, y, push))
+    return Pulled(own, _pullback, {**gradients(back.out), "push": push})

@@ -20,12 +20,8 @@ from numpy.typing import NDArray
 from foldyn.jit.compiled import inner
 from foldyn.jit.context import Context, rows_at
 from foldyn.materials.series import series_derivatives
-from foldyn.mechanics import bars_hinges_pullback as of_bars
-from foldyn.mechanics.bars_hinges_pullback import (
-    PullbackScratch,
-    pull_bars_hinges,
-    pullback_scratch,
-)
+from foldyn.mechanics import bars_hinges as of_bars
+from foldyn.mechanics.bars_hinges import PullbackScratch, pull_bars_hinges, pullback_scratch
 from foldyn.mechanics.dihedral import dihedral_rates
 from foldyn.mechanics.plates import (
     BarsPlates,

@@ -1,9 +1,16 @@
-"""Stiffness of flat triangles: constant in-plane strain, constant curvature."""
+"""Stiffness of flat triangles: constant strain and curvature, and quadratic displacements.
+
+Quadratic triangles, in plane stress, have corners and side midpoints. They are computed for eight
+models of one topology at once, as in `mechanics.lanes`.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+
+from foldyn.jit.compiled import inner_scalar, kernel
+from foldyn.jit.eights import COUNT, eight, put
 
 
 def triangle_stiffness(
@@ -46,3 +53,85 @@ def triangle_stiffness(
     membrane = np.einsum("tak,ab,tbl,t->tkl", strain, elastic, strain, area * stretching)
     curved = np.einsum("tak,ab,tbl,t->tkl", across, elastic, across, area * bending)
     return membrane, curved
+
+
+MIDDLES = 0.5 * (np.ones((3, 3)) - np.eye(3))  # of the sides: three points integrate exactly
+
+
+def products() -> NDArray:
+    """Integrals (6, 2, 6, 2) of products of shape function slopes, over twice the area.
+
+    In the coordinates that are 1 at the second and at the third corner.
+    """
+    out, linear = np.zeros((6, 2, 6, 2)), np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+    for place in MIDDLES:
+        after = np.roll(np.eye(3), -1, axis=0)
+        corners = (4 * place - 1)[:, None] * np.eye(3)
+        middles = 4 * (np.roll(place, -1)[:, None] * np.eye(3) + place[:, None] * after)
+        shapes = np.concatenate([corners, middles]) @ linear
+        out += np.einsum("ar,bs->arbs", shapes, shapes) / 6.0
+    return out
+
+
+PRODUCTS = products()
+
+
+def squares(corners: NDArray, stiffness: NDArray) -> NDArray:
+    """Slope products (nt, 4, 4, 8) of the coordinates, integrated, for `add_triangles`.
+
+    corners : (nt, 3, 2, 8), counter-clockwise.
+    stiffness : (nt, 8) E t/(1 - nu^2).
+    """
+    (a, b), (c, d) = np.moveaxis(corners[:, 1:] - corners[:, :1], (1, 2), (0, 1))
+    twice = a * d - b * c
+    slopes = np.stack([d, -b, -c, a], axis=1)
+    return (stiffness / twice)[:, None, None] * slopes[:, :, None] * slopes[:, None]
+
+
+@inner_scalar
+def turned(products, a, b, numbers, at):
+    """Sum of four slope products at two points of a triangle."""
+    return (
+        products[a, 0, b, 0] * eight(numbers, at)
+        + products[a, 0, b, 1] * eight(numbers, at + COUNT)
+        + products[a, 1, b, 0] * eight(numbers, at + 4 * COUNT)
+        + products[a, 1, b, 1] * eight(numbers, at + 5 * COUNT)
+    )
+
+
+@kernel
+def add_triangles(elements, starts, places, shapes, squares, products, ratio, numbers):
+    """Add the stiffness of triangles to `numbers`.
+
+    elements : (nt, 6) their points.
+    starts : (n + 1,) start of each point's unknowns; each has two eights in `shapes`.
+    places : positions in `numbers` of the entries of all triangles in turn, for ordered pairs of
+    points and of their unknowns; negative for entries to skip, such as one of both halves.
+    squares, ratio : see `squares`; (8,) Poisson's ratio.
+    """
+    nu, k = eight(ratio, 0), 0
+    shear = 0.5 - 0.5 * nu
+    for e in range(elements.shape[0]):
+        for a in range(6):
+            one = elements[e, a]
+            for b in range(6):
+                other, at = elements[e, b], 16 * COUNT * e
+                xx = turned(products, a, b, squares, at)
+                xy = turned(products, a, b, squares, at + 2 * COUNT)
+                yx = turned(products, a, b, squares, at + 8 * COUNT)
+                yy = turned(products, a, b, squares, at + 10 * COUNT)
+                first, last = xx + shear * yy, yy + shear * xx
+                across, back = nu * xy + shear * yx, nu * yx + shear * xy
+                for i in range(starts[one], starts[one + 1]):
+                    at = 2 * COUNT * i
+                    x, y = eight(shapes, at), eight(shapes, at + COUNT)
+                    left, right = x * first + y * back, x * across + y * last
+                    for j in range(starts[other], starts[other + 1]):
+                        at = np.int64(places[k])
+                        k += 1
+                        if at >= 0:
+                            x, y = (
+                                eight(shapes, 2 * COUNT * j),
+                                eight(shapes, 2 * COUNT * j + COUNT),
+                            )
+                            put(numbers, at, eight(numbers, at) + left * x + right * y)

@@ -12,8 +12,7 @@ from scipy import sparse
 
 from foldyn import mechanics
 from foldyn.materials import BarLaw, HingeLaw, Superlinear
-from foldyn.mechanics.bars_hinges import bars_hinges_kernels
-from foldyn.mechanics.bars_hinges_pullback import bars_hinges_pulled
+from foldyn.mechanics.bars_hinges import bars_hinges_kernels, bars_hinges_pulled
 from foldyn.mechanics.energy import gradients
 from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
 from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of

@@ -20,9 +20,9 @@ from foldyn.mechanics.plates_condensed import (
     CondensedScratch,
     condensed_kernels,
     condensed_plates,
+    condensed_pulled,
     condensed_scratch,
 )
-from foldyn.mechanics.plates_condensed_pullback import condensed_pulled
 from foldyn.mechanics.pullback import Arrays, Pulled
 from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges
 from foldyn.mechanics.step_tangent import SparseBlocks

@@ -13,8 +13,7 @@ from foldyn.materials.law import PARAMETERS
 from foldyn.materials.prony import CODE as MAXWELL
 from foldyn.materials.prony import CreaseDampers, in_series, maxwell
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.inelastic import MemoryHinges
-from foldyn.mechanics.inelastic_branches import HingeMemory
+from foldyn.mechanics.inelastic import HingeMemory, MemoryHinges
 from foldyn.mechanics.sheet_term import FoldHinges
 from foldyn.mechanics.viscous import WIDTH, hinge_dofs
 

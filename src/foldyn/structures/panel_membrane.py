@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from foldyn.algebra.condensing import Condensing
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.jit.eights import COUNT
-from foldyn.mechanics.quadratic_triangles import PRODUCTS, add_triangles, squares
+from foldyn.mechanics.triangle import PRODUCTS, add_triangles, squares
 from foldyn.structures.graded import ROOM, Grading, graded
 from foldyn.structures.panel_plate import Outline, across_edges, meshed, sides_of
 from foldyn.structures.shared import shared

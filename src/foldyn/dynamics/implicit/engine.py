@@ -26,7 +26,7 @@ from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Scheme
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.motion_state import MotionState, Outcome, Samples, StepPlan
 from foldyn.dynamics.system import PackedCase
-from foldyn.mechanics.inelastic_branches import HingeMemory
+from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.threads import one_thread
 
 LEAST_STEP = 2.0**-20  # of the wanted step: if Newton's method fails below, the motion fails

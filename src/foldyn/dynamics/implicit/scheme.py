@@ -25,7 +25,7 @@ from foldyn.mechanics.constant_damping import DampingMatrix
 from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import following_force
-from foldyn.mechanics.inelastic_branches import HingeMemory
+from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.mechanics.viscous import ViscousTerm
 
 EPS = float(np.finfo(float).eps)

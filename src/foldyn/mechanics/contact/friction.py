@@ -27,8 +27,7 @@ from foldyn.mechanics.contact.ties import lay_ties, take_ties
 class Friction:
     """Anchors and ties of the friction springs, which change in place.
 
-    Its `commit`, `snapshot` and `recall` work like those in
-    `mechanics.inelastic_branches.HingeMemory`.
+    Its `commit`, `snapshot` and `recall` work as in `mechanics.inelastic.HingeMemory`.
 
     Parameters
     ----------
