@@ -3,9 +3,9 @@
 from foldyn.cases import histories, loads, waveforms
 from foldyn.cases.air import Air
 from foldyn.cases.case import Case
+from foldyn.cases.connectors import Dashpot
 from foldyn.cases.contact import Contact, Plane
 from foldyn.cases.damping import CreaseDamping, ModalDamping, Rayleigh, StrainDamping
-from foldyn.cases.dashpots import Dashpot
 from foldyn.cases.histories import *  # noqa: F403 - what it lists
 from foldyn.cases.history import Formula, Function, as_history
 from foldyn.cases.loads import *  # noqa: F403

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.clamped_edges import Straight, supported_points
+from foldyn.cases.connectors import Dashpot
 from foldyn.cases.constraints import Constraints
 from foldyn.cases.damping import CreaseDamping, Damping, ModalDamping, Rayleigh, StrainDamping
-from foldyn.cases.dashpots import Dashpot
 from foldyn.cases.directions import AXES, unit_vector
 from foldyn.cases.history import History
 from foldyn.cases.loads import Gravity, Load

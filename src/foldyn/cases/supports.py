@@ -9,12 +9,11 @@ from typing import Annotated, Any, get_args
 import numpy as np
 
 from foldyn.arguments import Check, Flag, Key
-from foldyn.cases.dashpots import Dashpot
+from foldyn.cases.connectors import Dashpot, Spring
 from foldyn.cases.decode import Factor, Part, PartOf
 from foldyn.cases.directions import AXES, Axes, Axis, Direction
 from foldyn.cases.history import STEADY
 from foldyn.cases.selection import Nodes
-from foldyn.cases.springs import Spring
 from foldyn.errors import InputError
 from foldyn.values import indices, number, number_or_list, one_or_each, show
 
