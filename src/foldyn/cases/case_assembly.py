@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from foldyn.cases.clamped_edges import Straight, supported_points
 from foldyn.cases.connectors import Dashpot
-from foldyn.cases.constraints import Constraints
+from foldyn.cases.constraints import Constraints, equations_of, values_of
 from foldyn.cases.damping import CreaseDamping, Damping, ModalDamping, Rayleigh, StrainDamping
 from foldyn.cases.directions import AXES, unit_vector
 from foldyn.cases.history import History
 from foldyn.cases.loads import Gravity, Load
 from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
-from foldyn.cases.ties import equations_of, values_of
 from foldyn.errors import Faults, InputError
 from foldyn.mechanics.following import Following
 from foldyn.mechanics.term import Term

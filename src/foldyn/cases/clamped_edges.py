@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.regions import edges_between
-from foldyn.cases.selection import resolve_nodes
+from foldyn.cases.selection import edges_between, resolve_nodes
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.patterns.selection import select

@@ -20,12 +20,10 @@ from foldyn.cases.folding import (
     dihedrals,
     within_reach,
 )
-from foldyn.cases.following_loads import CreaseMoment, Pressure
 from foldyn.cases.history import STEADY
 from foldyn.cases.load import Load, check_held
+from foldyn.cases.region_loads import CreaseMoment, LineLoad, Pressure, Temperature, TotalForce
 from foldyn.cases.selection import Creases, Nodes, resolve_creases, resolve_nodes
-from foldyn.cases.shared_loads import LineLoad, TotalForce
-from foldyn.cases.temperature import Temperature
 from foldyn.errors import InputError, within
 from foldyn.values import show, vector
 

@@ -1,4 +1,7 @@
-"""Selections: nodes by number or by place (`patterns.selection`); creases by number or name."""
+"""Selections: nodes by number or by place (`patterns.selection`); creases, edges and panels.
+
+Also how much of an edge or a panel belongs to each node.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,9 @@ from foldyn.arguments import Check
 from foldyn.errors import InputError
 from foldyn.patterns.crease_data import crease_rows
 from foldyn.patterns.selection import check_expression, given_as, select
-from foldyn.values import indices, show
+from foldyn.patterns.topology import edge_lookup, edge_of
+from foldyn.structures.mesh import double_areas
+from foldyn.values import indices, listed, show
 
 _WORDS = 'one of "all", "mountain", "valley", or a family of the pattern'
 
@@ -110,3 +115,116 @@ def resolve_creases(structure: Any, creases: Any, name: str = "creases") -> NDAr
 
 Nodes = Annotated[int | str | Sequence[int], Check(check_nodes)]
 Creases = Annotated[int | str | Sequence[int], Check(check_creases)]
+
+
+PAIRS = 'pairs of vertices, as in [[0, 1], [1, 2]], or a selection such as "xmin"'
+
+
+def check_edges(name: str, edges: Any) -> str | tuple[tuple[int, int], ...]:
+    """Return a selection as text, or edges as a tuple of (low, high); but for their range."""
+    if isinstance(edges, str):
+        return str(check_nodes(name, edges))
+    given = listed(name, edges, PAIRS)
+    if not given:
+        raise InputError(f" = {show(edges)}: give {PAIRS}", name)
+    pairs = []
+    for k, edge in enumerate(given):
+        ends = indices(f"{name}[{k}]", edge, "vertex", "the two ends of an edge")
+        if len(ends) != 2:
+            raise InputError(f" = {show(edge)}: give {PAIRS}", f"{name}[{k}]")
+        if edge_of(*ends) in pairs:
+            raise InputError(f" = {show(edge)}: is listed twice", f"{name}[{k}]")
+        pairs.append(edge_of(*ends))
+    return tuple(pairs)
+
+
+def resolve_edges(structure: Any, edges: Any, name: str) -> NDArray[np.int64]:
+    """Nodes (k, p) along each of some edges, p two or what a shell has along an edge.
+
+    edges : as `check_edges` returns them; a selection means the edges of which it has both ends.
+
+    Raises
+    ------
+    InputError
+        The pattern has no such edge.
+    """
+    if structure.pattern is None:
+        raise InputError(
+            f"{name} = {show(edges)}: this structure has no pattern with edges; give nodes"
+        )
+    if isinstance(edges, str):
+        found = edges_between(structure, resolve_nodes(structure, edges, name))
+        if not len(found):
+            raise InputError(
+                f' = "{edges}": selects no edge, which needs both of its ends; give {PAIRS}', name
+            )
+        return found
+    along = structure.edge_nodes
+    rows = edge_lookup(along[:, [0, -1]])
+    for pair in edges:
+        if pair not in rows:
+            raise InputError(
+                f" = {show(edges)}: the pattern has no edge from vertex {pair[0]} to {pair[1]}",
+                name,
+            )
+    return along[[rows[pair] for pair in edges]]
+
+
+def edges_between(structure: Any, nodes: NDArray) -> NDArray[np.int64]:
+    """Nodes (k, p) along each of the edges of which both ends are among some nodes."""
+    along = structure.edge_nodes
+    return along[np.isin(along[:, [0, -1]], nodes).all(axis=1)]
+
+
+def check_panels(name: str, panels: Any) -> str | tuple[int, ...]:
+    """Return "all" or a tuple of panel numbers, checked but for their range."""
+    if isinstance(panels, str):
+        if panels != "all":
+            raise InputError(f' = {show(panels)}: give panel numbers, or "all"', name)
+        return panels
+    return indices(name, panels, "panel", 'or "all"')
+
+
+def resolve_panels(structure: Any, panels: Any, name: str) -> NDArray[np.int64]:
+    """Triangles (k,) of a structure that lie in panels, as `check_panels` returns them."""
+    if not len(structure.triangles):
+        raise InputError(f"{name} = {show(panels)}: this structure has no panels")
+    if panels == "all":
+        return np.arange(len(structure.triangles))
+    chosen = in_range(name, panels, int(structure.triangle_panel.max()) + 1, "panel")
+    return np.flatnonzero(np.isin(structure.triangle_panel, chosen))
+
+
+Edges = Annotated[str | Sequence[Sequence[int]], Check(check_edges)]
+Panels = Annotated[int | str | Sequence[int], Check(check_panels)]
+
+
+def length_at_nodes(structure: Any, along: NDArray) -> NDArray[np.float64]:
+    """Length (n,), m, at each node of edges (k, p): half of each piece for either end."""
+    x, length = structure.nodes, np.zeros(len(structure.nodes))
+    pieces = np.linalg.norm(np.diff(x[along], axis=1), axis=2)
+    for ends in (along[:, :-1], along[:, 1:]):
+        np.add.at(length, ends, 0.5 * pieces)
+    return length
+
+
+def area_at_nodes(structure: Any, triangles: NDArray) -> NDArray[np.float64]:
+    """Area (n,), m2, at each node of some triangles (k,): a third of each for each corner."""
+    corners = structure.triangles[triangles]
+    area = 0.5 * np.linalg.norm(double_areas(structure.nodes, corners), axis=1)
+    count = len(structure.nodes)
+    return np.bincount(corners.ravel(), np.repeat(area / 3.0, 3), count).astype(float)
+
+
+def tributary_area(structure: Any) -> NDArray[np.float64]:
+    """Area (n,), m2, of the sheet that belongs to each vertex, whatever the model.
+
+    A panel gives each of its corners an equal part of its area. Further nodes of a structure have
+    none; without a pattern, a triangle gives a third to each corner.
+    """
+    if structure.pattern is None:
+        return area_at_nodes(structure, np.arange(len(structure.triangles)))
+    area = np.zeros(len(structure.nodes))
+    for face, whole in zip(structure.pattern.faces, structure.pattern.face_areas, strict=True):
+        area[list(face)] += whole / len(face)
+    return area

@@ -13,9 +13,8 @@ from scipy import sparse
 from foldyn.algebra.solvers import factorized
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.cases import Case, Continuation, Origin, State
-from foldyn.cases.constraints import AGREES
+from foldyn.cases.constraints import AGREES, check_tied
 from foldyn.cases.contact_checks import check_contact, check_driven
-from foldyn.cases.ties import check_tied
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.inertia import moving_energy
 from foldyn.dynamics.modal_damping import about

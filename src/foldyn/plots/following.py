@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from foldyn import mechanics
 from foldyn.cases import Case, CreaseMoment, Pressure, Temperature
-from foldyn.cases.regions import resolve_panels
+from foldyn.cases.selection import resolve_panels
 
 if TYPE_CHECKING:
     from foldyn.plots.scene import Points

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Gravity, State
+from foldyn.cases.constraints import check_tied
 from foldyn.cases.contact_checks import check_contact, check_driven
-from foldyn.cases.ties import check_tied
 from foldyn.errors import InputError
 from foldyn.ram_limit import check_memory
 from foldyn.statics.equilibrium import AdaptiveLoad, OrigamiProblem, drives, is_actuated

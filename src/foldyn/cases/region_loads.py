@@ -1,0 +1,375 @@
+"""Loads on edges, panels and creases: forces to share, pressure, moments, temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.arguments import Check, Key
+from foldyn.cases.decode import Factor
+from foldyn.cases.history import STEADY
+from foldyn.cases.load import Load, check_held
+from foldyn.cases.selection import (
+    Creases,
+    Edges,
+    Nodes,
+    Panels,
+    area_at_nodes,
+    length_at_nodes,
+    resolve_creases,
+    resolve_edges,
+    resolve_nodes,
+    resolve_panels,
+    tributary_area,
+)
+from foldyn.errors import InputError
+from foldyn.mechanics.following import Following, joined, moments, pressures, pushes
+from foldyn.mechanics.sheet_term import NO_DOF
+from foldyn.structures import Laminate
+from foldyn.structures.laminate import check_layers
+from foldyn.structures.swelling import Swelling
+from foldyn.values import number, number_or_list, one_or_each, show, vector
+
+
+class Spread(Load):
+    """A force on nodes of which each gets a part by its share of a length or an area."""
+
+    arrows = True
+
+    def measure(self, structure: Any, place: str) -> NDArray[np.float64]:
+        """Length (m) or area (m2) that belongs to each node (n,)."""
+        raise NotImplementedError
+
+    def total_of(self, measure: float) -> NDArray[np.float64]:
+        """Force (3,), N, on a length or an area."""
+        raise NotImplementedError
+
+    def loaded(self, structure: Any, place: str) -> NDArray[np.int64]:
+        """See `Load`; vertices of the pattern where it acts on others too."""
+        nodes = np.flatnonzero(self.measure(structure, place))
+        pattern = structure.pattern
+        return nodes if pattern is None else nodes[nodes < len(pattern.vertices)]
+
+    def forces(self, structure: Any, place: str) -> NDArray[np.float64]:
+        """See `Load`."""
+        measure = self.measure(structure, place)
+        whole = float(measure.sum())
+        return (measure / whole)[:, None] * self.total_of(whole)
+
+
+@dataclass(frozen=True)
+class TotalForce(Spread):
+    """A total force, shared by nodes, edges or panels, times a history.
+
+    Parameters
+    ----------
+    total : sequence of float, shape (3,)
+        Sum of the forces (N).
+    nodes : int, sequence of int, or str, optional
+        Vertices by number, or an expression ("xmin"). Each gets its part by the area of the sheet
+        that belongs to it: a panel gives each of its corners an equal part.
+    edges : sequence of (vertex, vertex), or str, optional
+        Edges of the pattern; an expression means those of which it selects both ends. Each gets
+        its part by its length, evenly along it: half of a piece of an edge for either end.
+    panels : int, sequence of int, or "all", optional
+        Panels by number. Each gets its part by its area at rest, evenly over it: a third of each
+        of the triangles into which it is cut for each corner.
+    history : History or callable, optional
+        Factor of time; constant by default.
+
+    Raises
+    ------
+    InputError
+        Not exactly one of nodes, edges and panels is given.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> fd.TotalForce((0, 0, -2.0), edges="xmax")
+    TotalForce(total=(0.0, 0.0, -2.0), edges='xmax', history=Constant())
+    """
+
+    total: Annotated[Sequence[float], Check(vector, unit="N")]
+    nodes: Nodes | None = None
+    edges: Edges | None = None
+    panels: Panels | None = None
+    history: Factor = STEADY
+
+    apart = "a total force is a load of its own"
+
+    def agree(self) -> None:
+        """Ask for one place where it acts."""
+        given = self.given("nodes", "edges", "panels")
+        if len(given) != 1:
+            what = "is given" if not given else f"are given, {' and '.join(given)}"
+            raise InputError(
+                f": give one of nodes, edges and panels; {len(given) or 'none'} {what}", "total"
+            )
+
+    def measure(self, structure: Any, place: str) -> NDArray[np.float64]:
+        """See `Spread`."""
+        if self.edges is not None:
+            along = resolve_edges(structure, self.edges, f"{place}.edges")
+            return length_at_nodes(structure, along)
+        if self.panels is not None:
+            triangles = resolve_panels(structure, self.panels, f"{place}.panels")
+            return area_at_nodes(structure, triangles)
+        nodes = resolve_nodes(structure, self.nodes, f"{place}.nodes")  # type: ignore[arg-type]
+        area, out = tributary_area(structure), np.zeros(len(structure.nodes))
+        without = nodes[area[nodes] == 0.0]
+        if without.size:
+            raise InputError(
+                f" = {show(self.nodes)}: no part of the sheet belongs to node {without[0]}; give "
+                "vertices of panels, or edges or panels in place of nodes",
+                f"{place}.nodes",
+            )
+        out[nodes] = area[nodes]
+        return out
+
+    def total_of(self, measure: float) -> NDArray[np.float64]:
+        """See `Spread`."""
+        return np.array(self.total)
+
+    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
+        """Refuse a force that acts on held axes only; warn of one on nodes that does in part."""
+        nodes = np.flatnonzero(self.measure(structure, place))
+        what, acts = f"the force {show(self.total)}", np.flatnonzero(self.total)
+        check_held(what, nodes, acts, fixed, place, told=self.nodes is not None)
+
+
+@dataclass(frozen=True)
+class LineLoad(Spread):
+    """A force per length along edges, times a history.
+
+    Parameters
+    ----------
+    edges : sequence of (vertex, vertex), or str
+        Edges of the pattern; an expression ("xmin") means those of which it selects both ends.
+    force_per_length : sequence of float, shape (3,)
+        Force (N/m) per length at rest: half of that of each piece of an edge for either end.
+    history : History or callable, optional
+        Factor of time; constant by default.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> fd.LineLoad([[0, 1]], (0, 0, -5.0))
+    LineLoad(edges=((0, 1),), force_per_length=(0.0, 0.0, -5.0), history=Constant())
+    """
+
+    edges: Edges
+    force_per_length: Annotated[Sequence[float], Check(vector, unit="N/m"), Key("per_length")]
+    history: Factor = STEADY
+
+    apart = "acts along edges"
+
+    def measure(self, structure: Any, place: str) -> NDArray[np.float64]:
+        """See `Spread`."""
+        return length_at_nodes(structure, resolve_edges(structure, self.edges, f"{place}.edges"))
+
+    def total_of(self, measure: float) -> NDArray[np.float64]:
+        """See `Spread`."""
+        return measure * np.array(self.force_per_length)
+
+    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
+        """Refuse a load that acts on held axes only."""
+        nodes = np.flatnonzero(self.measure(structure, place))
+        what = f"the force per length {show(self.force_per_length)}"
+        check_held(what, nodes, np.flatnonzero(self.force_per_length), fixed, place, told=False)
+
+
+@dataclass(frozen=True)
+class Pressure(Load):
+    """Pressure on panels, which stays normal to them as they move, times a history.
+
+    It acts along the normal of the panels' fronts: a positive pressure inflates a closed body whose
+    fronts are outside. The force on a triangle is the pressure times its present area.
+
+    Parameters
+    ----------
+    pressure : float
+        Pa; negative towards the front.
+    panels : int, sequence of int, or "all"
+        Panels by number; all by default.
+    history : History or callable, optional
+        Factor of time; constant by default.
+    """
+
+    pressure: Annotated[float, Check(number, unit="Pa")]
+    panels: Panels = "all"
+    history: Factor = STEADY
+
+    apart = "a pressure acts on panels"
+
+    def following(self, structure: Any, place: str) -> Following:
+        """See `Load`."""
+        chosen = resolve_panels(structure, self.panels, f"{place}.panels")
+        pressure = np.full(len(chosen), self.pressure)
+        return pressures(structure.nodes, structure.triangles[chosen], pressure)
+
+    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
+        """Refuse a pressure on panels whose nodes are all held."""
+        nodes = np.unique(self.following(structure, place).triangles)
+        if fixed[nodes].all():
+            raise InputError(
+                f".panels = {show(self.panels)}: supports hold all nodes of these panels along "
+                "all axes; load other panels, or free these",
+                place,
+            )
+
+
+@dataclass(frozen=True)
+class CreaseMoment(Load):
+    """Moments of creases, times a history: pairs of equal and opposite moments on their panels.
+
+    The moment does work as the dihedral grows: a positive one opens a valley. A crease whose fold
+    law is linear, M = k (angle - rest), comes to rest at rest + moment / k.
+
+    Parameters
+    ----------
+    creases : int, sequence of int, or str
+        Numbers in the order of `pattern.creases`, or a name: "mountain", "valley", "all", which
+        are all but the flat ones, or a family of the pattern (`Pattern.families`), as "zigzag".
+    moment : float or sequence of float
+        N m of each whole crease, of all these creases or of each.
+    history : History or callable, optional
+        Factor of time; constant by default.
+    """
+
+    creases: Creases
+    moment: Annotated[float | Sequence[float], Check(number_or_list, what="crease", unit="N m")]
+    history: Factor = STEADY
+
+    apart = "acts on creases"
+
+    def of_creases(self, structure: Any, place: str) -> tuple[NDArray, NDArray]:
+        """Its creases (k,), and the moment (k,), N m, of each."""
+        creases = resolve_creases(structure, self.creases, f"{place}.creases")
+        return creases, one_or_each(f"{place}.moment", self.moment, len(creases), "creases")
+
+    def following(self, structure: Any, place: str) -> Following:
+        """See `Load`; a shell's pieces of a crease take their part of it by their length."""
+        creases, moment = self.of_creases(structure, place)
+        each = np.zeros(len(structure.folds))
+        each[creases] = moment
+        pieces = structure.body.sheet.fold_hinges()
+        chosen = np.isin(pieces.fold, creases)
+        part = (each[pieces.fold] * pieces.share)[chosen]
+        turning = moments(pieces.corners[chosen], pieces.nodes[chosen], part)
+        hidden, back = pieces.hidden[chosen], -part[:, None] * pieces.hidden_turn[chosen]
+        there = hidden != NO_DOF
+        return joined([(turning, 0), (pushes(hidden[there], back[there]), 0)])
+
+    def turns(self, structure: Any, place: str) -> NDArray | None:
+        """See `Load`: the panels beside a crease give way to all of its moment."""
+        sheet = structure.body.sheet
+        if not sheet.offsets:
+            return None
+        creases, moment = self.of_creases(structure, place)
+        each = np.zeros(len(structure.folds))
+        each[creases] = moment
+        angles = np.zeros(len(sheet.rest_angles) - sheet.offsets)
+        return np.append(angles, sheet.offsets_under(each))
+
+    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
+        """Refuse moments of creases between panels that are held."""
+        creases, _ = self.of_creases(structure, place)
+        pieces = structure.body.sheet.fold_hinges()
+        held = fixed[pieces.nodes].all(axis=(1, 2)) & (pieces.hidden == NO_DOF).all(axis=1)
+        still = np.intersect1d(creases, pieces.fold[held])
+        if still.size:
+            raise InputError(
+                f".creases = {show(self.creases)}: supports hold the panels on both sides of "
+                f"crease {still[0]}; leave it out, or free these",
+                place,
+            )
+
+
+MOST_STRAIN = 0.2  # free strain beyond which the laws of the sheet say nothing
+
+
+@dataclass(frozen=True)
+class Temperature(Load):
+    """Panels that are warmer than at rest, times a history.
+
+    Free panels would stretch by `expansion` times the change, and curl towards their front by
+    `curvature` times it, without any stress; where they may not, they push. Other causes of free
+    strains act in the same way: moisture, growth, a swelling gel.
+
+    Bars and hinges get the rest angles of a paraboloid of that curvature; both models are exact for
+    small slopes. Between the factors 0 and 1 the free strain is proportional to the factor to the
+    first order in the strain.
+
+    Parameters
+    ----------
+    change : float
+        Change of the temperature, K, at factor 1.
+    expansion : float
+        Free strain per kelvin, 1/K.
+    curvature : float
+        Free curvature per kelvin, 1/(m K), positive where the sheet bends as at a valley.
+    panels : int, sequence of int, or "all"
+        Panels by number; all by default.
+    layers : sequence of (float, float, float), optional
+        Instead of expansion and curvature: thickness (m), Young's modulus (Pa) and expansion (1/K)
+        of bonded layers from the back to the front, as of `Laminate`. The stiffness of the panels
+        stays that of their sheet; `Laminate.sheet` gives the one that fits the layers.
+    history : History or callable, optional
+        Factor of time; constant by default.
+    """
+
+    change: Annotated[float, Check(number, unit="K"), Key("temperature")]
+    expansion: Annotated[float | None, Check(number, unit="1/K")] = None
+    curvature: Annotated[float | None, Check(number, unit="1/(m K)")] = None
+    panels: Panels = "all"
+    layers: Annotated[Sequence[Sequence[float]] | None, Check(check_layers)] = None
+    history: Factor = STEADY
+
+    apart = "a temperature acts on panels"
+
+    def agree(self) -> None:
+        """Ask for what says how the panels deform, and refuse strains that are too large."""
+        given = self.given("expansion", "curvature")
+        if self.layers is not None and given:
+            raise InputError(f": the layers give the {given[0]}; leave it out", given[0])
+        if self.layers is None and not given:
+            raise InputError(
+                ": give expansion (1/K), curvature (1/(m K)), or both, or the layers", "expansion"
+            )
+        strain = self.change * self._per_kelvin[0]
+        if abs(strain) > MOST_STRAIN:
+            raise InputError(
+                f" = {self.change:g}: a free strain of {strain:.3g}; the laws of the sheet hold "
+                f"up to about {MOST_STRAIN:g}: check the units (K, 1/K)",
+                "change",
+            )
+
+    @property
+    def _per_kelvin(self) -> tuple[float, float]:
+        """Expansion (1/K) and curvature (1/(m K))."""
+        if self.layers is not None:
+            laminate = Laminate(self.layers)
+            return laminate.expansion, laminate.curvature
+        return self.expansion or 0.0, self.curvature or 0.0
+
+    def swelling(self, structure: Any, place: str) -> Swelling:
+        """See `Load`."""
+        if structure.pattern is None:
+            raise InputError(f"{place}: this structure has no pattern with panels")
+        chosen = np.zeros(len(structure.pattern.faces))
+        triangles = resolve_panels(structure, self.panels, f"{place}.panels")
+        chosen[structure.triangle_panel[triangles]] = self.change
+        expansion, curvature = self._per_kelvin
+        return structure.swollen(chosen * expansion, chosen * curvature)
+
+    def following(self, structure: Any, place: str) -> Following:
+        """See `Load`."""
+        return self.swelling(structure, place).forces
+
+    def turns(self, structure: Any, place: str) -> NDArray[np.float64]:
+        """See `Load`."""
+        return self.swelling(structure, place).turns
