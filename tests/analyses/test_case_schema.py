@@ -8,7 +8,7 @@ import tomllib
 import pytest
 
 from case_texts import HELD_MIURA_TEXT, MODES_TEXT, changed
-from foldyn.analyses.case_schema import case_schema
+from foldyn.analyses.registry import case_schema
 from foldyn.cli.main import main
 from foldyn.errors import InputError
 from foldyn.studies import find_case, shipped_cases

@@ -8,7 +8,7 @@ import pytest
 import foldyn as fd
 from case_texts import HELD_FOLD_TEXT as FOLD
 from foldyn.analyses import read_case
-from foldyn.analyses.path_page import path_sections
+from foldyn.analyses.path import path_sections
 from foldyn.plots import moved_supports
 from foldyn.report.album import Album
 from foldyn.report.charts import Charts

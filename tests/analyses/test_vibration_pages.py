@@ -9,7 +9,7 @@ import foldyn as fd
 from case_texts import HELD_MIURA_TEXT, changed
 from foldyn import plots
 from foldyn.analyses import read_case
-from foldyn.analyses.frf_page import driven_direction
+from foldyn.analyses.frf import driven_direction
 from foldyn.analyses.modes import shown_modes
 from foldyn.linear import peaks_of
 from foldyn.plots.frf import curves_of

@@ -26,3 +26,9 @@ def bar(shown: bool, **options: Any) -> Any:
     from tqdm import tqdm
 
     return tqdm(leave=False, **options)
+
+
+def share_bar(shown: bool, text: str) -> Any:
+    """Bar of a computation that reports the share that is done, from 0 to 1."""
+    layout = "{desc}: {percentage:3.0f} %|{bar}| [{elapsed}<{remaining}]"
+    return bar(shown, total=1.0, desc=text, bar_format=layout)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
+from foldyn import __version__, tables
 from foldyn.analyses.bands import BandsAnalysis
 from foldyn.analyses.casefile import Analysis
 from foldyn.analyses.fidelity import FidelityAnalysis
@@ -16,7 +17,8 @@ from foldyn.analyses.response import ResponseAnalysis
 from foldyn.analyses.sections import CaseSchema
 from foldyn.arguments import Check
 from foldyn.errors import InputError
-from foldyn.tables import check_table
+from foldyn.json_schema import Schema, any_of, described, summary
+from foldyn.tables import check_table, table_under
 from foldyn.values import choice
 
 ANALYSES: Mapping[str, type[Analysis]] = {
@@ -57,3 +59,29 @@ def schema_of(document: Mapping[str, Any]) -> type[CaseSchema]:
     if isinstance(kind, str) and kind in ANALYSES:
         return ANALYSES[kind].schema
     return UnknownSchema
+
+
+def case_schema() -> Schema:
+    """Schema (draft 7) of case files: of all kinds of analysis, and then of the kind at hand."""
+    definitions: dict[str, Schema] = {}
+    listed: list[dict[str, Schema]] = []
+    kinds: list[Schema] = []
+    for kind, analysis in ANALYSES.items():
+        whole: Schema = tables.schema_of(analysis.schema, definitions)
+        listed.append(definitions[analysis.schema.__name__]["properties"])
+        own: Any = table_under("analysis", analysis.schema)
+        named = described({"enum": [kind]}, summary(analysis))
+        definitions[own.__name__]["properties"]["kind"] = named
+        at_hand = {"required": ["kind"], "properties": {"kind": {"enum": [kind]}}}
+        condition = {"required": ["analysis"], "properties": {"analysis": at_hand}}
+        kinds.append({"if": condition, "then": whole})
+    keys = dict.fromkeys(key for one in listed for key in one)
+    return {
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": f"Case file of Foldyn {__version__}",
+        "type": "object",
+        "required": ["analysis"],
+        "properties": {key: any_of(one[key] for one in listed if key in one) for key in keys},
+        "allOf": kinds,
+        "definitions": definitions,
+    }

@@ -9,7 +9,7 @@ import numpy as np
 import xarray
 
 from foldyn import plots
-from foldyn.analyses.bars import bar
+from foldyn.analyses.bars import share_bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
 from foldyn.analyses.sections import AnalysisSection, CaseSchema, Count, whole_number
 from foldyn.analyses.vibration import bar_closed
@@ -89,9 +89,7 @@ class ResponseAnalysis(Analysis):
             def tell(now: Progress) -> None:
                 reached.update(now.time - reached.n)
 
-            layout = "{desc}: {percentage:3.0f} %|{bar}| [{elapsed}<{remaining}]"
-            shown = bar(progress, total=1.0, desc="response curve", bar_format=layout)
-            with bar_closed(shown, keeps=True) as reached:
+            with bar_closed(share_bar(progress, "response curve"), keeps=True) as reached:
                 return response_curve(case, progress=tell, **given)
 
         return compute

@@ -327,7 +327,7 @@ def _call(given: argparse.Namespace) -> None:
 
         print(info())
     elif given.command == "schema":
-        from foldyn.analyses.case_schema import case_schema
+        from foldyn.analyses.registry import case_schema
 
         print(json.dumps(case_schema(), indent=1))
     elif given.command in OTHERS:
