@@ -16,7 +16,7 @@ from foldyn.analyses.bands import BandsAnalysis
 from foldyn.analyses.reading import case_of_document, read_as
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.band_gaps import legs
-from foldyn.live.view_requests import computed, offered
+from foldyn.live.case_session import computed, offered
 from foldyn.report.album import Album
 from foldyn.report.sections import Picture
 

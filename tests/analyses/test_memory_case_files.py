@@ -11,7 +11,7 @@ import foldyn as fd
 from case_texts import HELD_FOLD_TEXT
 from foldyn.errors import ComputationError, InputError
 from foldyn.exports.creased_shell import fold_slopes
-from foldyn.viewer.fields import fields
+from foldyn.viewer.states import fields
 
 FOLD = f"""{HELD_FOLD_TEXT.replace("= 60", "= 120")}[[loads]]
 nodes = [0, 1]

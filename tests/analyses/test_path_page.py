@@ -11,7 +11,7 @@ from foldyn.analyses import read_case
 from foldyn.analyses.path import path_sections
 from foldyn.plots import moved_supports
 from foldyn.report.album import Album
-from foldyn.report.charts import Charts
+from foldyn.report.sections import Charts
 
 
 @pytest.fixture

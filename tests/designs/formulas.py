@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.designs.methods import METHODS, Settings
-from foldyn.designs.problem import problem_of
+from foldyn.designs.problem import problem_of, space_of
 from foldyn.designs.result import Design
 from foldyn.designs.run_design import Plan, designed
-from foldyn.designs.space import space_of
 from foldyn.errors import ComputationError
 
 

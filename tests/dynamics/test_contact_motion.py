@@ -17,7 +17,7 @@ from foldyn.dynamics import METHODS, driver
 from foldyn.dynamics.system import pack
 from foldyn.errors import ComputationError, FoldynWarning, InputError, PenetrationError
 from foldyn.mechanics.contact import term
-from foldyn.viewer.fields import fields
+from foldyn.viewer.states import fields
 
 ALPHA, CONSERVING = "generalized_alpha", "energy_momentum"
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from fit_cases import refused
 
-from foldyn.analyses.keys import parts, replaced, value_at
-from foldyn.analyses.ties import Tie
+from foldyn.analyses.keys import Tie, parts, replaced, value_at
 from foldyn.errors import InputError
 from foldyn.experiment import Parameter
 from foldyn.experiment.calibration.parameters import space

@@ -8,7 +8,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.exports.vtkhdf import BAR, CELLS, PANEL
-from foldyn.viewer.fields import fields
+from foldyn.viewer.states import fields
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import pytest
 from live_samples import FOLD, MIURA, write
 
 import foldyn as fd
-from foldyn.live import view_requests
+from foldyn.live import case_session
 from foldyn.live.case_session import CaseSession
 
 
@@ -62,7 +62,7 @@ def test_a_response_curve_plays_its_motions(tmp_path, monkeypatch):
     assert not any("in the span" in note for note in answer["notes"])
     for kind in KINDS:
         assert "error" not in own.compute(wish(kind)), kind
-    monkeypatch.setattr(view_requests, "MOST_FREE", 1)
+    monkeypatch.setattr(case_session, "MOST_FREE", 1)
     assert "in the span of 6 modes" in own.compute(wish("response"))["notes"][0]
 
 
@@ -93,7 +93,7 @@ def test_a_defect_is_told_as_one(session, monkeypatch):
 
 
 def test_warnings_are_notes(session, monkeypatch):
-    monkeypatch.setattr(view_requests, "MOST_WORK", 1000.0)
+    monkeypatch.setattr(case_session, "MOST_WORK", 1000.0)
     answer = session.compute(wish("dynamics"))
     (note,) = [note for note in answer["notes"] if "so that it is computed soon" in note]
     assert "of 2 s, so that it is computed soon" in note
@@ -116,7 +116,7 @@ def test_a_wrong_file_is_refused(tmp_path):
 
 def test_a_curve_has_the_loads_without_their_histories(tmp_path):
     path = write(tmp_path)
-    _, result = view_requests.computed(path, tomllib.loads(FOLD), "statics")
+    _, result = case_session.computed(path, tomllib.loads(FOLD), "statics")
     assert float(result["load_factor"][-1]) == 1.0
-    wanted = fd.trace(fd.case_of(result), steps=view_requests.STEPS)
+    wanted = fd.trace(fd.case_of(result), steps=case_session.STEPS)
     assert np.allclose(result["displacement"], wanted["displacement"], atol=1e-12)

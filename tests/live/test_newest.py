@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from foldyn.live.newest import Newest
+from foldyn.live.case_session import Newest
 
 SOON = 20.0  # s, in which what must happen has happened
 

@@ -18,7 +18,7 @@ from foldyn.dynamics import initial_state
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment import TrackedModel
 from foldyn.results import netcdf, trajectory_dataset
-from foldyn.results.sandbox import apart
+from foldyn.results.netcdf import apart
 from foldyn.results.stored_case import case_variables, document_of
 
 SEAL = 80  # bytes at the end

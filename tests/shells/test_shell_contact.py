@@ -12,7 +12,7 @@ from foldyn.errors import CrossingWarning, InputError
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.tangent import guard_tangents
 from foldyn.mechanics.contact.term import ContactTerm
-from foldyn.viewer.fields import fields
+from foldyn.viewer.states import fields
 
 T, G = SHEET.thickness, 9.81
 EXPLICIT, IMPLICIT = (

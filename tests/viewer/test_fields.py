@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import foldyn as fd
-from foldyn.viewer.fields import fields
+from foldyn.viewer.states import fields
 
 SHEET = fd.Sheet(1e9, 0.3, 1e-3, density=700.0)
 SUPPORTS = [fd.Fix([0, 1, 2], axes="xyz")]

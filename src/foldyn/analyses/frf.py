@@ -32,8 +32,7 @@ from foldyn.linear.frf import METHODS, PER_FORCE, quantity_of
 from foldyn.linear.internal_modes import check_internal
 from foldyn.plots.charts import Chart, Curve
 from foldyn.report.album import Album, ByRule, by_mass_rule, listed, rules, shown_nodes
-from foldyn.report.charts import Charts
-from foldyn.report.sections import Heading, Section, Table, Text, cell
+from foldyn.report.sections import Charts, Heading, Section, Table, Text, cell
 from foldyn.tables import ListOf, check_keys
 from foldyn.values import number, show, whole
 

@@ -38,8 +38,7 @@ from foldyn.report.album import (
     shown_nodes,
     visible_scale,
 )
-from foldyn.report.charts import Charts
-from foldyn.report.sections import Heading, Picture, Table, Text, cell
+from foldyn.report.sections import Charts, Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
 from foldyn.signals.spectrum import MINIMUM_SAMPLES
 from foldyn.values import number, show

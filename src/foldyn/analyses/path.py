@@ -45,8 +45,7 @@ from foldyn.report.album import (
     shown_nodes,
     visible_scale,
 )
-from foldyn.report.charts import Charts
-from foldyn.report.sections import Heading, Picture, Section, Table, Text, cell
+from foldyn.report.sections import Charts, Heading, Picture, Section, Table, Text, cell
 from foldyn.statics import METHODS, Landscape, Point, Settings, landscape, trace
 from foldyn.statics.newton import settings_of
 from foldyn.statics.reached import UNTIL, Reached

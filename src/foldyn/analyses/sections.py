@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any
 
+from foldyn.analyses.keys import Tie, ties_of
 from foldyn.analyses.pattern_section import PatternOf
 from foldyn.analyses.ranges import SAMPLINGS, Varied, varied
-from foldyn.analyses.ties import Tie, ties_of
 from foldyn.arguments import Check, Placed, arguments
 from foldyn.cases.air import Air
 from foldyn.cases.contact import Contact

@@ -52,7 +52,7 @@ def add_design(commands: Any) -> None:
 
 def run_design(given: argparse.Namespace) -> Path:
     """Run `foldyn design`; return the results folder."""
-    from foldyn.designs.case_files import planned, write_case
+    from foldyn.designs.run_design import planned, write_case
     from foldyn.studies import find_case
 
     clock = Clock.now()

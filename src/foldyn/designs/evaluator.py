@@ -17,7 +17,7 @@ from foldyn.analyses import CaseFile
 from foldyn.analyses.keys import parts, replaced
 from foldyn.analyses.reading import read_document, validated
 from foldyn.cases import Case
-from foldyn.designs.space import Space
+from foldyn.designs.problem import Space
 from foldyn.errors import ComputationError, FoldynError, InputError, Told, within
 from foldyn.gradients.measures import derivative_of, one_number
 from foldyn.gradients.run_sensitivity import FUNCTIONS, case_file_at, sensitivity

@@ -19,9 +19,8 @@ from foldyn.designs.run_design import Plan
 from foldyn.errors import FoldynError
 from foldyn.plots.design_charts import convergence_charts, slope_chart
 from foldyn.report.album import Album
-from foldyn.report.charts import Charts
 from foldyn.report.page import write_report
-from foldyn.report.sections import Heading, Listing, Picture, Section, Table, Text, cell
+from foldyn.report.sections import Charts, Heading, Listing, Picture, Section, Table, Text, cell
 from foldyn.viewer import Stage, stage
 from foldyn.writing import whole
 

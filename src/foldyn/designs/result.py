@@ -15,9 +15,8 @@ import xarray as xr
 
 import foldyn
 from foldyn.arguments import brief
-from foldyn.designs.problem import Problem
+from foldyn.designs.problem import Problem, Space
 from foldyn.designs.search import Row
-from foldyn.designs.space import Space
 from foldyn.errors import InputError
 from foldyn.results import netcdf
 from foldyn.values import show, suggest

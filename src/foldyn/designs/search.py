@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.designs.evaluator import JACOBIAN, VALUES, Point
-from foldyn.designs.problem import Problem
-from foldyn.designs.space import Space
+from foldyn.designs.problem import Problem, Space
 from foldyn.errors import FoldynError
 from foldyn.sweeps.evaluations import Evaluations
 

@@ -26,8 +26,8 @@ from foldyn.results import shapes_of
 from foldyn.results.netcdf import fill
 from foldyn.structures import Structure
 from foldyn.structures.discretized import Discretized
-from foldyn.viewer.fields import Field, fields, folding_fields
 from foldyn.viewer.sheet import KINDS, edge_pieces
+from foldyn.viewer.states import Field, fields, folding_fields
 from foldyn.writing import whole
 
 VERSION = (2, 0)

@@ -2,20 +2,77 @@
 
 from __future__ import annotations
 
+import threading
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextvars import copy_context
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
+import numpy as np
 import tomli_w
+import xarray as xr
+from numpy.typing import NDArray
 
+from foldyn.analyses import CaseFile
+from foldyn.analyses.conversion import converted
 from foldyn.analyses.reading import case_of_document, read_document
-from foldyn.errors import FoldynError, FoldynWarning, InputError
+from foldyn.dynamics import prepare
+from foldyn.errors import FoldynError, FoldynWarning, InputError, warn
 from foldyn.live.controls import changed, controls
-from foldyn.live.newest import Newest
-from foldyn.live.view_requests import computed, offered
+from foldyn.values import choice
 from foldyn.viewer import stage
+
+Wish = TypeVar("Wish")
+Answer = TypeVar("Answer")
+
+
+class Newest(Generic[Wish, Answer]):
+    """A thread that computes the newest request.
+
+    There is no queue: a newer request replaces one that has not begun, and discards the result of
+    one being computed.
+
+    Parameters
+    ----------
+    compute : callable
+        Returns the answer to a request; it runs only in this thread and raises nothing.
+    """
+
+    def __init__(self, compute: Callable[[Wish], Answer]) -> None:
+        self._compute = compute
+        self._changed = threading.Condition()
+        self._count = 0
+        self._waiting: tuple[int, Wish] | None = None
+        self._ready: tuple[int, Answer] | None = None
+        run = copy_context().run
+        threading.Thread(target=run, args=(self._work,), name="newest wish", daemon=True).start()
+
+    def answer(self, wish: Wish) -> Answer | None:
+        """Wait for the answer to a request; None as soon as a newer one arrives."""
+        with self._changed:
+            self._count += 1
+            mine = self._count
+            self._waiting = mine, wish
+            self._changed.notify_all()
+            self._changed.wait_for(
+                lambda: self._count > mine or (self._ready is not None and self._ready[0] == mine)
+            )
+            ready = self._ready
+            return None if self._count > mine or ready is None else ready[1]
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                while self._waiting is None:
+                    self._changed.wait()
+                (number, wish), self._waiting = self._waiting, None
+            answer = self._compute(wish)
+            with self._changed:
+                self._ready = number, answer
+                self._changed.notify_all()
+
 
 Message = dict[str, Any]
 
@@ -94,3 +151,157 @@ def told(path: Path, answer: Callable[[], Message]) -> Message:
         return {"error": "this needs more memory than there is: take a smaller sheet"}
     except Exception as error:  # a defect of ours: the page stays open and reports it
         return {"error": f"this could not be computed ({type(error).__name__}: {error})"}
+
+
+KINDS: Mapping[str, str] = {
+    "modes": "Modes",
+    "frf": "Frequency response",
+    "statics": "Static curve",
+    "dynamics": "Short motion",
+    "bands": "Bands",
+    "response": "Response curve",
+}
+"""Analyses that can be computed, with their names on the page."""
+STEPS, PERIODS, FREQUENCIES, COUNT = 10, 10.0, 200, 6
+"""Of analyses that the file does not ask for: steps of a static curve, periods of the first mode
+that a motion lasts, frequencies of a response, modes."""
+SAMPLES, STEPS_A_SAMPLE = 250, 4
+"""Samples of a motion, and steps between them where they are ours: a hundred in a period."""
+MOST_WORK = 1e7
+"""Most steps times dofs of a motion with fixed steps, about a second of computing; longer motions
+are cut."""
+MOST_FREE, MODES = 60, 6
+"""Most free dofs of a response curve, about 0.1 s per point, and the number of modes that larger
+sheets are reduced to."""
+
+Document = dict[str, Any]
+
+
+def offered(document: Document) -> dict[str, str]:
+    """Kinds of analysis that a case file allows, its own first."""
+    own = document["analysis"]["kind"]
+    driven = any("force" in load for load in document.get("loads", ())) or "drive" in document
+    imposed = any("displacement" in support for support in document.get("supports", ()))
+    based = any("base" in support for support in document.get("supports", ()))
+    possible = {
+        "modes": True,
+        "frf": driven or based,
+        "statics": bool(document.get("loads")) or (imposed and not based),
+        "dynamics": bool(document.get("loads")) or imposed or based,
+        "bands": False,  # only for files of this kind: few patterns repeat
+        "response": False,  # likewise: curves take seconds or more
+    }
+    kinds = [kind for kind in KINDS if kind == own or possible[kind]]
+    return {kind: KINDS[kind] for kind in sorted(kinds, key=lambda kind: kind != own)}
+
+
+def computed(path: Path, document: Document, kind: str) -> tuple[CaseFile, xr.Dataset]:
+    """Return the case file as one of a kind, and its result under its first mass rule.
+
+    Raises
+    ------
+    InputError, ComputationError
+        As in `CaseFile.run`, or the file does not allow this kind.
+    """
+    choice("compute", kind, offered(document))
+    case_file = case_of_document(path, _as_kind(path, document, kind))
+    if kind == "response":
+        return case_file, _curve_of_motions(case_file)
+    if kind != "dynamics":
+        return case_file, case_file.run()
+    asked = case_file.analysis.arguments
+    work = prepare(case_file.case(), **asked).plan.steps * case_file.case().body.size
+    if work <= MOST_WORK:
+        return case_file, case_file.run()
+    duration = asked["duration"] * MOST_WORK / work
+    warn(
+        f"the motion is shown for {duration:.3g} s of {asked['duration']:g} s, so that it is "
+        "computed soon; foldyn run computes the whole",
+        "pages.md#change-parameters-in-the-viewer",
+    )
+    return case_file, case_file.run(duration=duration, interval=duration / SAMPLES)
+
+
+def _curve_of_motions(case_file: CaseFile) -> xr.Dataset:
+    """Response curve; of a large sheet it is reduced to a few modes."""
+    free = len(case_file.case().free_dofs)
+    if free <= MOST_FREE or case_file.analysis.arguments.get("modes"):
+        return case_file.run()
+    warn(
+        f"the curve is computed in the span of {MODES} modes, so that it is there soon, instead of "
+        f"with {free} free dofs; foldyn run takes all of them",
+        "pages.md#change-parameters-in-the-viewer",
+    )
+    return case_file.run(modes=MODES)
+
+
+def _as_kind(path: Path, document: Document, kind: str) -> Document:
+    """Convert the document to a kind; if it is not its own, with settings that compute quickly."""
+    if document["analysis"]["kind"] == kind == "bands":  # a single state: sliders vary it
+        analysis = {k: value for k, value in document["analysis"].items() if k != "vary"}
+        return {**document, "analysis": analysis}
+    if document["analysis"]["kind"] == kind:
+        return document
+    make = {"modes": _modes, "frf": _response, "statics": _curve, "dynamics": _motion}[kind]
+    with warnings.catch_warnings():  # settings without meaning for this kind are left out
+        warnings.simplefilter("ignore", FoldynWarning)
+        return make(path, document)
+
+
+def _modes(path: Path, document: Document) -> Document:
+    return converted(path, document, "modes", "rest")
+
+
+def _response(path: Path, document: Document) -> Document:
+    """Frequency response under the file's drive, over its lowest modes."""
+    lowest = _frequencies(path, document)
+    out = converted(path, document, "frf", "rest")
+    range_ = {"first": 0.3 * lowest[0], "last": 1.2 * lowest[-1], "count": FREQUENCIES}
+    return {**out, "analysis": {"kind": "frf", "frequencies": range_, "method": "modal"}}
+
+
+def _curve(_: Path, document: Document) -> Document:
+    """Equilibrium path under the same loads without histories, with the base at rest."""
+    timeless = {
+        name: [
+            {key: value for key, value in each.items() if key != "history"}
+            for each in document.get(name, ())
+            if "base" not in each
+        ]
+        for name in ("loads", "supports")
+    }
+    model = dict(document.get("model", {}))
+    if isinstance(model.get("mass"), list):
+        model["mass"] = model["mass"][0]
+    own = {"model": model, "analysis": {"kind": "statics", "steps": STEPS}}
+    return {**_kept(document), **timeless, **own}
+
+
+def _motion(path: Path, document: Document) -> Document:
+    """Motion under the file's loads and supports; loads without a history act from the start."""
+    duration = PERIODS / float(_frequencies(path, document)[0])
+    steps = {"method": "generalized_alpha", "dt": duration / (SAMPLES * STEPS_A_SAMPLE)}
+    shown = _kept(document)
+    return {
+        **shown,
+        "output": {**shown["output"], "every_steps": STEPS_A_SAMPLE},
+        "analysis": {"kind": "dynamics", "duration": duration, **steps},
+    }
+
+
+def _kept(document: Document) -> Document:
+    """Sections shared by all kinds of analysis, and the nodes to show."""
+    own = {key: value for key, value in document.items() if key not in ("drive", "initial")}
+    nodes = document.get("output", {}).get("nodes")
+    return {**own, "output": {} if nodes is None else {"nodes": nodes}}
+
+
+def _frequencies(path: Path, document: Document) -> NDArray[np.float64]:
+    """Lowest natural frequencies (Hz) above 0."""
+    about = {**_modes(path, document), "analysis": {"kind": "modes", "count": COUNT}}
+    found = case_of_document(path, about).run()
+    values = found["frequency"].values[~found["rigid"].values]
+    values = values[np.isfinite(values) & (values > 0.0)]
+    if not len(values):
+        raise InputError("no mode of the sheet oscillates, so there is no time scale; choose modes")
+    return values

@@ -122,10 +122,10 @@ def add_memory_forces(own, offset, u, v, force):
 def add_mean_memory_forces(own, offset, start, end, h, out):
     """Add forces whose work in a step h equals the energy that branches store and dissipate.
 
-    `start`, `end` and `out` are flat. Offsets have their end values; returns the scratch of their
+    `start`, `end` and `out` are flat. Offsets have their end values; returns the work of their
     change, and by how much the dissipation falls short of the laws, J.
     """
-    scratch, lost, lacking, g = 0.0, 0.0, 0.0, own.gradient
+    work, lost, lacking, g = 0.0, 0.0, 0.0, own.gradient
     one, other, gradient = np.empty((2, 4, 3)), np.empty((2, 4, 3)), np.empty((4, 3))
     own.elapsed[0] = h
     for e in range(own.rest.size):
@@ -148,9 +148,9 @@ def add_mean_memory_forces(own, offset, start, end, h, out):
             out[dofs[c]] += moment * gradient[c // 3, c % 3]
         for c in range(2):
             out[dofs[12 + c]] -= moment * hidden[c]
-        scratch += moment * (own.turned[e] - own.angle[e] - (after - before))
+        work += moment * (own.turned[e] - own.angle[e] - (after - before))
     own.lost[1] = lost
-    return scratch, lacking
+    return work, lacking
 
 
 @inner
@@ -299,11 +299,11 @@ def _energies(term, u, out):
 @mean_forces
 def _mean_forces(term, u0, u1, before, h, t, force, powers):
     start, end, out = rows_at(u0, term.rows), rows_at(u1, term.rows), rows_at(force, term.rows)
-    scratch, lacking = add_mean_memory_forces(
+    work, lacking = add_mean_memory_forces(
         term.own, term.offset, flat(start), flat(end), h, flat(out)
     )
     both = numbers_at(powers, 2)
-    both[0] += scratch / h
+    both[0] += work / h
     both[1] -= lacking / h
 
 

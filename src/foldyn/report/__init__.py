@@ -1,9 +1,8 @@
 """Reports: one self-contained HTML page of text, tables and pictures."""
 
 from foldyn.plots.charts import Chart, Curve
-from foldyn.report.charts import Charts
 from foldyn.report.page import write_report
-from foldyn.report.sections import Heading, Listing, Picture, Section, Table, Text
+from foldyn.report.sections import Charts, Heading, Listing, Picture, Section, Table, Text
 
 __all__ = [
     "Chart",

@@ -12,8 +12,7 @@ import xarray
 from foldyn import plots
 from foldyn.cases import Case
 from foldyn.plots.law_charts import law_charts
-from foldyn.report.charts import Charts
-from foldyn.report.sections import Heading, Picture, Section, Table, Text
+from foldyn.report.sections import Charts, Heading, Picture, Section, Table, Text
 from foldyn.shells import Shell
 from foldyn.writing import whole
 

@@ -8,8 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from foldyn.errors import InputError
-from foldyn.report.charts import Charts
-from foldyn.report.sections import Heading, Section, Table
+from foldyn.report.sections import Charts, Heading, Section, Table
 from foldyn.viewer import Stage, scripts
 from foldyn.writing import write_text
 

@@ -1,8 +1,9 @@
-"""Sections of a report: headings, text, tables and pictures, each written as HTML."""
+"""Sections of a report: headings, text, tables, pictures and charts, each written as HTML."""
 
 from __future__ import annotations
 
 import base64
+import json
 import math
 import re
 from collections.abc import Sequence
@@ -15,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from foldyn.errors import InputError
-from foldyn.report.charts import Charts
+from foldyn.plots.charts import Chart
 
 _WIDE = 1200  # pixels; wider pictures scroll on a phone, where they would be too small to read
 
@@ -201,6 +202,27 @@ class Picture:
     def _name(self) -> str:
         is_path = isinstance(self.source, str | PathLike)
         return str(self.source) if is_path else f"an object of type {type(self.source).__name__}"
+
+
+@dataclass(frozen=True)
+class Charts:
+    """Charts side by side, with a caption below them."""
+
+    charts: Sequence[Chart]
+    caption: str = ""
+
+    def html(self) -> str:
+        """Write as HTML; the page must have the script."""
+        caption = f"<figcaption>{escape(self.caption)}</figcaption>" if self.caption else ""
+        inside = "\n".join(map(_html, self.charts))
+        return f'<figure><div class="plots">{inside}</div>{caption}</figure>'
+
+
+def _html(chart: Chart) -> str:
+    title = f"<h3>{escape(chart.title)}</h3>" if chart.title else ""
+    note = f"<p>{escape(chart.note)}</p>" if chart.note else ""
+    text = json.dumps(chart.about(), separators=(",", ":"))
+    return f'<div>{title}<div class="plot" data-plot="{escape(text)}"></div>{note}</div>'
 
 
 Section = Heading | Text | Table | Listing | Picture | Charts

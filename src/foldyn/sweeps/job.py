@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from foldyn.analyses import CaseFile
 from foldyn.analyses.casefile import Moving
-from foldyn.analyses.keys import files_of, replaced
+from foldyn.analyses.keys import Tie, files_of, replaced
 from foldyn.analyses.reading import case_of_document
-from foldyn.analyses.ties import Tie
 from foldyn.errors import ComputationError, InputError, Told
 from foldyn.program import program
 from foldyn.sweeps.evaluations import Evaluation

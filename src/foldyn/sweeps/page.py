@@ -16,9 +16,8 @@ from foldyn.analyses.provenance import Call, cost_rows, inputs_table
 from foldyn.errors import InputError
 from foldyn.plots.sweep_charts import effect_charts, line_chart
 from foldyn.report.album import Album
-from foldyn.report.charts import Charts
 from foldyn.report.page import write_report
-from foldyn.report.sections import Heading, Listing, Section, Table, Text, cell
+from foldyn.report.sections import Charts, Heading, Listing, Section, Table, Text, cell
 from foldyn.results.sweep_dataset import (
     POINT,
     SALTELLI,

@@ -9,12 +9,11 @@ from typing import Any
 
 from foldyn.analyses import CaseFile
 from foldyn.analyses.casefile import Compute
-from foldyn.analyses.keys import parts
+from foldyn.analyses.keys import parts, ties_of
 from foldyn.analyses.motion import MotionAnalysis
 from foldyn.analyses.ranges import SAMPLINGS, Varied, varied
 from foldyn.analyses.reading import case_of_document, read_document, validated
 from foldyn.analyses.sections import SweepSection
-from foldyn.analyses.ties import ties_of
 from foldyn.arguments import Placed
 from foldyn.dynamics.gpu.choice import DEVICES
 from foldyn.errors import Faults, InputError, within

@@ -23,10 +23,10 @@ from foldyn.structures import Sheet, discretize
 from foldyn.threads import one_thread
 from foldyn.viewer.arrays import Arrays
 from foldyn.viewer.backdrop import Backdrop
-from foldyn.viewer.fields import Field, energies, fields, folding_fields
 from foldyn.viewer.orbits import about_orbits, orbits
 from foldyn.viewer.scripts import in_page
 from foldyn.viewer.sheet import bare_sheet, sheet
+from foldyn.viewer.states import Field, energies, fields, folding_fields
 from foldyn.viewer.waves import about_waves, waves
 
 OF_SIZE, OF_LARGEST, OF_COLORS = 5e-5, 1e-3, 4e-3

@@ -26,9 +26,8 @@ from foldyn.experiment.calibration.modal import ModalParameters, ModeShapes
 from foldyn.experiment.calibration.mode_tables import modes_table, shapes_table
 from foldyn.experiment.calibration.responses import FrequencyResponse
 from foldyn.report.album import Album
-from foldyn.report.charts import Charts
 from foldyn.report.page import write_report
-from foldyn.report.sections import Heading, Listing, Section, Table, Text, cell
+from foldyn.report.sections import Charts, Heading, Listing, Section, Table, Text, cell
 from foldyn.viewer import Stage, stage
 
 

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.analyses.keys import number_keys, parts, value_at
-from foldyn.analyses.ties import Tie
+from foldyn.analyses.keys import Tie, number_keys, parts, value_at
 from foldyn.arguments import brief
 from foldyn.errors import InputError
 from foldyn.values import number, show, suggest, whole

@@ -20,9 +20,8 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots.along import AXES, way
 from foldyn.plots.track_charts import track_charts
-from foldyn.report.charts import Charts
 from foldyn.report.page import write_report
-from foldyn.report.sections import Heading, Picture, Section, Table, Text, cell
+from foldyn.report.sections import Charts, Heading, Picture, Section, Table, Text, cell
 from foldyn.shells import shell
 from foldyn.viewer import Backdrop, Stage, projection, stage
 
