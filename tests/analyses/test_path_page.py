@@ -8,7 +8,7 @@ import pytest
 import foldyn as fd
 from case_texts import HELD_FOLD_TEXT as FOLD
 from foldyn.analyses import read_case
-from foldyn.analyses.path import path_sections
+from foldyn.analyses.path import PathAnalysis
 from foldyn.plots import moved_supports
 from foldyn.report.album import Album
 from foldyn.report.sections import Charts
@@ -72,7 +72,7 @@ def test_a_path_through_two_states_shows_its_landscape(tmp_path):
     case_file = read_case(fd.studies.find_case("gallery/kresling"))
     path = case_file.run()
     found, results = fd.landscape(path), {case_file.masses[0]: path}
-    drawn = list(path_sections(case_file, results, Album(tmp_path, "svg")))
+    drawn = list(PathAnalysis.sections(case_file, results, Album(tmp_path, "svg")))
     assert (tmp_path / "landscape.svg").exists()
     (table,) = [one for one in drawn if getattr(one, "caption", "").startswith("States without")]
     assert [row[:3] for row in table.rows] == [
@@ -83,7 +83,7 @@ def test_a_path_through_two_states_shows_its_landscape(tmp_path):
         [found.barrier(0, 1), None], [None, None], [None, found.barrier(1, 0)],
     ]  # fmt: skip
     (chart,) = [
-        one.charts[0] for one in path_sections(case_file, results, Album(tmp_path, None))
+        one.charts[0] for one in PathAnalysis.sections(case_file, results, Album(tmp_path, None))
         if isinstance(one, Charts) and one.charts[0].xlabel == "stroke (m)"
     ]  # fmt: skip
     assert chart.curves[1].x.tolist() == [one.stroke for one in found.states]
