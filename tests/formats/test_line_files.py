@@ -12,7 +12,7 @@ import pytest
 from foldyn.errors import InputError
 from foldyn.formats import cp, dxf, opx
 from foldyn.formats.building import built
-from foldyn.formats.curves import CHORD
+from foldyn.formats.chords import CHORD
 from foldyn.formats.files import FORMATS
 from foldyn.patterns import miura
 

@@ -11,7 +11,7 @@ import pytest
 from foldyn.errors import InputError
 from foldyn.formats import svg
 from foldyn.formats.building import built
-from foldyn.formats.curves import CHORD
+from foldyn.formats.chords import CHORD
 from foldyn.formats.line_colors import COLORS, nearest
 
 SAMPLES = Path(__file__).parents[3] / "shared" / "patterns"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fuzz_target import Target
 
-from foldyn.formats import cp, dxf, svg_writer
+from foldyn.formats import cp, dxf, svg
 from foldyn.formats.files import diagnose
 from foldyn.patterns import miura, simple_fold
 
@@ -54,7 +54,7 @@ def _flat() -> list:
 
 
 def _svg(_: Path) -> list[bytes]:
-    return [STYLED.encode(), *(svg_writer.write(pattern).encode() for pattern in _flat())]
+    return [STYLED.encode(), *(svg.write(pattern).encode() for pattern in _flat())]
 
 
 def _cp(_: Path) -> list[bytes]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from fuzz_target import Target
 
 from foldyn.errors import InputError
-from foldyn.formats import Frame, diagnose, fold_writer, obj
+from foldyn.formats import Frame, diagnose, fold, obj
 from foldyn.patterns import GENERATORS, miura
 
 FOLD_WORDS = (
@@ -36,9 +36,9 @@ def _patterns() -> list:
 
 
 def _fold(_: Path) -> list[bytes]:
-    texts = [fold_writer.write(pattern).replace('"m"', '"mm"') for pattern in _patterns()]
+    texts = [fold.write(pattern).replace('"m"', '"mm"') for pattern in _patterns()]
     flat, folded = miura(dihedral=180), miura()
-    texts.append(fold_writer.write(flat, [Frame("a", folded.vertices), Frame("b", flat.vertices)]))
+    texts.append(fold.write(flat, [Frame("a", folded.vertices), Frame("b", flat.vertices)]))
     lines = json.loads(texts[-1])
     del lines["faces_vertices"]
     return [text.encode() for text in (*texts, json.dumps(lines).replace("]]", ",]]"))]

@@ -9,13 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.formats.cuts import opened
 from foldyn.formats.diagnosis import Diagnosis
-from foldyn.formats.drawing import Drawing
+from foldyn.formats.drawing import Drawing, Notes, count
 from foldyn.formats.lines import MOST_LINES, Lines, too_many
 from foldyn.formats.listed_panels import listed_panels
-from foldyn.formats.notes import Notes, count
-from foldyn.formats.panels import Panels
+from foldyn.formats.panels import Panels, opened
 from foldyn.patterns import Pattern
 from foldyn.patterns.flat_foldability import flat_foldability
 from foldyn.patterns.geometry import CLOSED, LAYERS

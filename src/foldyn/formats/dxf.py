@@ -21,11 +21,10 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError, optional
 from foldyn.formats.chords import Chords
-from foldyn.formats.drawing import METERS, Drawing
+from foldyn.formats.drawing import METERS, Drawing, count
 from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
 from foldyn.formats.lines import MOST_LINES, too_many
-from foldyn.formats.notes import count
-from foldyn.formats.svg_writer import NAMES, PER_METER
+from foldyn.formats.svg import NAMES, PER_METER
 from foldyn.formats.writers import flat_points, letters, warn_of_angles
 from foldyn.input_files import DEEPEST
 from foldyn.patterns import Pattern

@@ -11,11 +11,10 @@ from typing import Any, Literal
 import numpy as np
 
 from foldyn.errors import InputError, warn, within
-from foldyn.formats import cp, dxf, fold, fold_writer, obj, opx, stl, svg, svg_writer
+from foldyn.formats import cp, dxf, fold, obj, opx, stl, svg
 from foldyn.formats.building import Built, built
 from foldyn.formats.drawing import METERS, Drawing
-from foldyn.formats.facets import with_convex_panels, with_facets
-from foldyn.formats.slips import without_slips
+from foldyn.formats.facets import with_convex_panels, with_facets, without_slips
 from foldyn.formats.writers import warn_of_boards
 from foldyn.input_files import path_of, read_text
 from foldyn.patterns import Pattern
@@ -67,9 +66,9 @@ class Format:
 
 
 _FORMATS = (
-    Format("FOLD", (".fold",), read=fold.read, write=fold_writer.write, frames=True),
+    Format("FOLD", (".fold",), read=fold.read, write=fold.write, frames=True),
     Format("OBJ", (".obj",), read=obj.read, write=obj.write),
-    Format("SVG", (".svg",), read=svg.read, write=svg_writer.write),
+    Format("SVG", (".svg",), read=svg.read, write=svg.write),
     Format("CP", (".cp",), read=cp.read, write=cp.write),
     Format("OPX", (".opx",), read=opx.read),
     Format("DXF", (".dxf",), read=dxf.read, write=dxf.write),

@@ -6,11 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.formats import gaps
+from foldyn.formats.drawing import Notes, count
 from foldyn.formats.lines import Lines, single, without_points
-from foldyn.formats.notes import Notes, count
 from foldyn.formats.panels import Panels, compact, with_inner_borders
-from foldyn.formats.planar import check_crowding, joined, on_lines, points_on, split, tolerance_of
+from foldyn.formats.planar import (
+    GAP,
+    check_crowding,
+    joined,
+    on_lines,
+    points_on,
+    split,
+    tolerance_of,
+    without_gaps,
+)
 from foldyn.formats.regions import areas, enclosed, sheet, straightened
 
 _SAME = 1e-9  # of the size: larger distances between ends are reported
@@ -50,7 +58,7 @@ def flat_panels(lines: Lines, notes: Notes, tolerance: float | None = None) -> P
     if len(pieces.ends) < len(parted.ends):
         more = len(parted.ends) - len(pieces.ends)
         notes.repairs.append(f"left out {count(more, 'end')} of lines upon others, within these")
-    pieces, moved, farthest = gaps.closed(pieces, tolerance)
+    pieces, moved, farthest = without_gaps(pieces, tolerance)
     if moved:
         notes.repairs.append(
             f"drew {count(moved, 'open end')} on to the next line, by up to {1e3 * farthest:.3g} mm"
@@ -168,7 +176,7 @@ def _on_lines(lines: Lines, tolerance: float, notes: Notes) -> Lines:
 
 def _tell_loose(loose: Lines, lines: Lines, notes: Notes) -> None:
     """Report lines that bound no panel; long pieces of creases were meant to divide panels."""
-    folds = np.isin(loose.letters, ("M", "V", "U")) & (loose.lengths > 2 * gaps.GAP * lines.size)
+    folds = np.isin(loose.letters, ("M", "V", "U")) & (loose.lengths > 2 * GAP * lines.size)
     slits = loose.letters == "C"
     for which, told, noun, what in (
         (~slits & ~folds, notes.repairs, "line", "or parts of them that bound no panel"),

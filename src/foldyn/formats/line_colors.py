@@ -9,7 +9,7 @@ from __future__ import annotations
 import colorsys
 from collections.abc import Mapping
 
-from foldyn.formats.notes import count
+from foldyn.formats.drawing import count
 
 RGB = tuple[int, int, int]
 

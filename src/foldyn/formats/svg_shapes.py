@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.formats.curves import arc_chords, bezier
+from foldyn.formats.chords import arc_chords, bezier
 from foldyn.formats.xml_text import local
 from foldyn.values import show
 
