@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import Results, drawing, held
-from foldyn.cli.options import BOTH, add_figures, add_results, integer
+from foldyn.cli.options import add_figures, add_results, integer
 from foldyn.cli.stamp import Owner
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
-from foldyn.errors import InputError
 from foldyn.plots import FIGURES
 
 if TYPE_CHECKING:
@@ -56,8 +55,6 @@ def run_design(given: argparse.Namespace) -> Path:
     from foldyn.studies import find_case
 
     clock = Clock.now()
-    if given.figures and given.no_figures:
-        raise InputError(BOTH)
     path = find_case(given.case)
     changes = {name: getattr(given, name) for name in ("method", "searches", "seed")}
     changes = {name: value for name, value in changes.items() if value is not None}

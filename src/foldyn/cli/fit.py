@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import Results, drawing, held
-from foldyn.cli.options import BOTH, add_figures, add_results, integer, number
+from foldyn.cli.options import add_figures, add_results, integer, number
 from foldyn.cli.stamp import Owner
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import InputError
@@ -79,8 +79,6 @@ def add_fit(commands: Any) -> None:
 def run_fit(given: argparse.Namespace) -> Path:
     """Run `foldyn fit`; return the results folder."""
     clock = Clock.now()
-    if given.figures and given.no_figures:
-        raise InputError(BOTH)
     plan = plan_of(given)
     folder = Path(f"{plan.path.stem}-fit" if given.out is None else given.out)
     names = [*WRITTEN, *([] if given.no_figures else ["report.html"])]

@@ -293,6 +293,8 @@ def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
         with warnings.catch_warnings():
             warnings.simplefilter("always", FoldynWarning)
             warnings.showwarning = _Warnings(getattr(given, "case", ""))
+            if getattr(given, "figures", None) and given.no_figures:
+                raise InputError("--figures: draws figures; leave out --no-figures")
             told = given.command in ("info", "schema")
             most = 1.0 if told or given.force else HALF
             with at_most(most), noticed(getattr(given, "quiet", False)):

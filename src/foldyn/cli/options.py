@@ -59,10 +59,6 @@ def frame_of(given: str | None) -> int | str | None:
     return int(given)
 
 
-BOTH = "--figures: draws figures; leave out --no-figures"
-"""Message if both options are given."""
-
-
 def add_figures(command: argparse.ArgumentParser) -> None:
     """Add options for figures in publication formats."""
     command.add_argument("--figures", choices=FIGURES, help="draw figures too, beside the page")

@@ -10,20 +10,21 @@ from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from foldyn.analyses import ANALYSES, CaseFile, Computation, read_case
 from foldyn.analyses.casefile import Kept
 from foldyn.analyses.provenance import Call, mesh_error
 from foldyn.analyses.reading import read_as
+from foldyn.arguments import arguments
 from foldyn.cli.folder import Results, drawing, held
-from foldyn.cli.options import BOTH
 from foldyn.cli.stamp import Owner
 from foldyn.cli.streams import Clock, noted_warnings, speech
 from foldyn.dynamics import SECONDS, Keeping
 from foldyn.errors import ComputationError, InputError, MotionInterrupted, Told
 from foldyn.plots import FIGURES
 from foldyn.studies import find_case
+from foldyn.tables import table_under
 from foldyn.values import number
 
 if TYPE_CHECKING:
@@ -52,8 +53,6 @@ def run(given: Namespace) -> Path:
     clock = Clock.now()
     path, page = find_case(given.case), not given.no_figures
     command, suffix = given.command, "results" if given.command == "run" else given.command
-    if given.figures and not page:
-        raise InputError(BOTH)
     if given.model is not None:
         command, suffix = f"{command} --model {given.model}", f"{given.model}-{suffix}"
     folder = Path(f"{path.stem}-{suffix}" if given.out is None else given.out)
@@ -135,24 +134,16 @@ def _device(case_file: CaseFile, device: str | None) -> dict[str, str]:
 
 def _read(path: Path, given: Namespace) -> CaseFile:
     """Read a case file as the kind of analysis that the command stands for."""
-    if given.command == "fidelity":
-        names = ("count", "divisions", "models", "secant", "vertex_radius")
-        keys = {key: getattr(given, key) for key in names}
-        return read_as(path, given.command, keys)
-    if given.command == "response":
-        names = ("frequencies", "amplitudes", "harmonics", "modes", "branches")
-        keys = {key: getattr(given, key) for key in names}
-        return read_as(path, given.command, keys)
     if given.command == "run":
         return read_case(path, model=given.model, divisions=given.divisions)
-    names = ("count", "method", "state", "secant", "internal", "path", "points", "zone")
-    names += ("attenuation",)
-    keys = {key: getattr(given, key, None) for key in names}
-    if getattr(given, "frequencies", None) is not None:
+    own: Any = table_under("analysis", ANALYSES[given.command].schema)
+    keys = {key: value for key, value in vars(given).items() if key in arguments(own)}
+    if given.command == "frf" and given.frequencies is not None:
         first, last, count = given.frequencies
         whole = int(count) if count.is_integer() else count
         keys["frequencies"] = {"first": first, "last": last, "count": whole}
-    return read_as(path, given.command, keys, given.model, given.divisions)
+    divisions = None if "divisions" in keys else getattr(given, "divisions", None)
+    return read_as(path, given.command, keys, given.model, divisions)
 
 
 def _computed(

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import Results, drawing, held
-from foldyn.cli.options import BOTH, add_figures, add_results, integer
+from foldyn.cli.options import add_figures, add_results, integer
 from foldyn.cli.stamp import Owner
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import ComputationError, InputError
@@ -109,8 +109,6 @@ def run_sweep(given: argparse.Namespace) -> Path:
     from foldyn.studies import find_case
 
     clock = Clock.now()
-    if given.figures and given.no_figures:
-        raise InputError(BOTH)
     path = find_case(given.case)
     plan = _plan(path, given)
     folder = Path(f"{path.stem}-sweep" if given.out is None else given.out)

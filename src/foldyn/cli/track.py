@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import check_folder, drawing, rescued
-from foldyn.cli.options import BOTH, add_figures, add_switches
+from foldyn.cli.options import add_figures, add_switches
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import ComputationError, InputError
@@ -83,8 +83,6 @@ def track(given: Namespace) -> Path:
     from foldyn.experiment.tracking.tracks_page import write_tracks_page
 
     clock = Clock.now()
-    if given.figures and given.no_figures:
-        raise InputError(BOTH)
     experiment.opencv()  # fail first if OpenCV is missing
     out = Path(given.out)
     if out.suffix != ".nc":
