@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from case_texts import FOLD_TEXT, changed
-from foldyn.cli import stamp
+from foldyn.cli.folder import STAMP
 from foldyn.cli.main import main
 from foldyn.cli.run import DRAWN
 
@@ -110,7 +110,7 @@ class Workplace:
 
     def contents(self) -> dict[str, bytes | None]:
         """All but the stamps of results folders, which have tests of their own."""
-        paths = sorted(path for path in self.folder.rglob("*") if path.name != stamp.NAME)
+        paths = sorted(path for path in self.folder.rglob("*") if path.name != STAMP)
         name = {path: path.relative_to(self.folder).as_posix() for path in paths}
         return {name[p]: p.read_bytes() if p.is_file() else None for p in paths}
 

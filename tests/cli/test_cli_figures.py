@@ -15,7 +15,7 @@ import pytest
 import foldyn as fd
 from case_texts import HELD_MIURA_TEXT
 from foldyn.analyses import motion
-from foldyn.cli import stamp
+from foldyn.cli.folder import STAMP
 from foldyn.cli.main import main
 from foldyn.errors import InputError
 from foldyn.plots.writers import find_ffmpeg
@@ -111,7 +111,7 @@ def test_a_page_without_figures(workplace, edited) -> None:
     code += "sys.exit(status or 10 * len(unused))"
     assert subprocess.call([sys.executable, "-c", code, "run", "case.toml", "--quiet"]) == 0
     folder = Path("case-results")
-    assert {path.name for path in folder.iterdir()} == {stamp.NAME, "report.html", "result.nc"}
+    assert {path.name for path in folder.iterdir()} == {STAMP, "report.html", "result.nc"}
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert page.count("data-foldyn=") == 1 and "<img " not in page
     plots = [json.loads(unescape(text)) for text in re.findall(r'data-plot="(.*?)"', page)]

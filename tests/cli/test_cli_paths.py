@@ -13,7 +13,7 @@ import pytest
 import foldyn as fd
 from case_texts import FOLD_TEXT, begins, changed, rows
 from foldyn.analyses import path as paths
-from foldyn.cli import stamp
+from foldyn.cli.folder import STAMP
 from foldyn.cli.main import main
 from foldyn.cli.run import DRAWN
 
@@ -217,7 +217,7 @@ def test_figures_of_an_earlier_motion_go(workplace, tmp_path) -> None:
     (folder / "notes.txt").write_text("mine")
     workplace.write(CELL)
     assert main(["run", "case.toml", "--no-figures"]) == 0
-    assert {path.name for path in folder.iterdir()} == {"notes.txt", "result.nc", stamp.NAME}
+    assert {path.name for path in folder.iterdir()} == {"notes.txt", "result.nc", STAMP}
 
 
 def test_a_single_point_is_drawn(workplace) -> None:

@@ -16,7 +16,7 @@ from processes import COMMAND, children, ended, running, start, wait_for, wait_f
 from test_cli_fit import CASE, FIT
 
 import foldyn as fd
-from foldyn.cli import stamp
+from foldyn.cli.folder import STAMP
 from foldyn.cli.main import main
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
@@ -63,7 +63,7 @@ def test_signals_keep_what_was_computed_and_of_two_at_once_one_runs(tmp_path, ed
         reason, kept = err.splitlines()[-2:]
         assert reason.startswith("foldyn: case.toml: interrupted at t = ")
         assert kept == f"{KEPT}{others[number]}/result.nc"
-        assert names(folder)[:2] == [stamp.NAME, "result.nc"]  # and samples, to resume from
+        assert names(folder)[:2] == [STAMP, "result.nc"]  # and samples, to resume from
         assert names(folder)[2:] in ([], ["result.nc.unfinished"])
         assert "interrupted" in fd.load(folder / "result.nc").attrs["stopped_because"]
 
@@ -81,11 +81,11 @@ def test_a_kill_between_rules_leaves_no_old_result(workplace, tmp_path, edited) 
     killed.wait()
     assert not (folder / "result-centroid.nc").exists()
     assert fd.load(folder / "result-panel.nc").sizes["time"] > 11
-    assert '"state": "running"' in (folder / stamp.NAME).read_text()
+    assert '"state": "running"' in (folder / STAMP).read_text()
     (folder / f".result-centroid.nc.{killed.pid}.tmp.nc").write_text("cut")
     workplace.write(text)
     assert main(["run", "case.toml", "--no-figures"]) == 0
-    assert names(folder) == [stamp.NAME, "result-centroid.nc", "result-panel.nc"]
+    assert names(folder) == [STAMP, "result-centroid.nc", "result-panel.nc"]
 
 
 @pytest.mark.matrix

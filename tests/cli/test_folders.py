@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 import foldyn as fd
-from foldyn.cli import stamp
-from foldyn.cli.folder import LOCK
+from foldyn.cli.folder import LOCK, STAMP
 from foldyn.cli.main import main
 from foldyn.dynamics import Motion
 from foldyn.lock import locked
@@ -20,7 +19,7 @@ OLD = ("case-results/result-panel.nc", "case-results/result-centroid.nc")
 
 
 def stamped(folder: str = "case-results") -> dict:
-    return json.loads(Path(folder, stamp.NAME).read_text())
+    return json.loads(Path(folder, STAMP).read_text())
 
 
 def test_the_stamp_says_what_the_folder_is_of(workplace, edited) -> None:
@@ -37,7 +36,7 @@ def test_results_of_rules_that_are_no_longer_asked_for_go(workplace, edited, miu
     workplace.write(miura)
     assert main(["run", "case.toml", "--no-figures"]) == 0
     names = {path.name for path in Path("case-results").iterdir()}
-    assert names == {stamp.NAME, "result.nc"}
+    assert names == {STAMP, "result.nc"}
 
 
 def test_an_interruption_leaves_old_or_new_and_no_mixture(workplace, edited, monkeypatch) -> None:
@@ -103,7 +102,7 @@ def test_what_fails_before_its_first_result_leaves_the_others(
 )
 def test_a_damaged_stamp_is_none(workplace, miura, content) -> None:
     Path("case-results").mkdir()
-    Path("case-results", stamp.NAME).write_bytes(content)
+    Path("case-results", STAMP).write_bytes(content)
     assert workplace.run(miura).status == 0
     assert stamped()["state"] == "complete"
 
@@ -113,14 +112,14 @@ def test_a_stamp_does_not_reach_beyond_its_folder(workplace, miura) -> None:
     Path("case-results").mkdir()
     told = {"command": "run", "source": "../case.toml", "state": "complete"}
     told |= {"results": ["../notes.txt"], "outdated": []}
-    Path("case-results", stamp.NAME).write_text(json.dumps(told))
+    Path("case-results", STAMP).write_text(json.dumps(told))
     assert workplace.run(miura).status == 0
     assert Path("notes.txt").read_text() == "mine"
 
 
 def test_results_without_a_stamp_that_would_stay_beside_new_ones(workplace, edited, miura) -> None:
     workplace.run(edited(RULES))
-    Path("case-results", stamp.NAME).unlink()
+    Path("case-results", STAMP).unlink()
     workplace.write(miura)
     line = workplace.refused("run", "case.toml")
     assert "holds result-centroid.nc, which this run does not write" in line

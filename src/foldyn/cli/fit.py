@@ -8,9 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.folder import Results, drawing, held
+from foldyn.cli.folder import Owner, Results, drawing, held
 from foldyn.cli.options import add_figures, add_results, integer, number
-from foldyn.cli.stamp import Owner
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import InputError
 from foldyn.plots import FIGURES

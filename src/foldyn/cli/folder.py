@@ -1,23 +1,120 @@
-"""The results folder: checked before anything runs, locked by one run, written to."""
+"""The results folder: checked before anything runs, locked by one run, stamped, written to."""
 
 from __future__ import annotations
 
+import json
+import os
 import re
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
-from foldyn.cli import stamp
+from foldyn import __version__
 from foldyn.cli.signals import ENDINGS
-from foldyn.cli.stamp import Owner
 from foldyn.errors import ComputationError, FoldynError, InputError
+from foldyn.input_files import file_digest
 from foldyn.lock import LockedError, locked
-from foldyn.writing import remove_leftovers
+from foldyn.studies import shipped_cases
+from foldyn.writing import remove_leftovers, write_bytes, write_text
 
 LOCK = ".foldyn.lock"
 _RESULT = re.compile(r"result(-\w+)?\.nc")
+
+
+STAMP = ".foldyn.json"
+
+
+@dataclass(frozen=True)
+class Owner:
+    """The command and source file that a results folder belongs to.
+
+    Attributes
+    ----------
+    command : str
+        The command that makes the results, "run" or "run --model shell".
+    source : str
+        The name of a shipped case, or the path of the file relative to the folder.
+    digest : str
+        Digest of the file's content.
+    """
+
+    command: str
+    source: str
+    digest: str = ""
+
+    @classmethod
+    def of(cls, command: str, file: Path, folder: Path) -> Owner:
+        """Return the owner of a results folder for a file."""
+        shipped = [name for name, path in shipped_cases().items() if path == file]
+        digest = file_digest(file)
+        with suppress(ValueError, OSError):  # on another drive, where no relative path exists
+            file = Path(os.path.relpath(os.path.realpath(file), os.path.realpath(folder)))
+        source = shipped[0] if shipped else file.as_posix()
+        return cls(command, source, digest)
+
+    def same(self, stamp: dict[str, Any]) -> bool:
+        """Whether a stamp names this owner; the file's content may have changed."""
+        return (stamp["command"], stamp["source"]) == (self.command, self.source)
+
+
+def read_stamp(folder: Path) -> dict[str, Any] | None:
+    """Read the stamp of a folder; None if missing or unreadable."""
+    try:
+        found = json.loads(raw_stamp(folder) or b"")
+        texts = [found[key] for key in ("command", "source", "state")]
+        files = [*found["results"], *found["outdated"]]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+    sound = all(isinstance(text, str) for text in (*texts, *files))
+    return found if sound and all(Path(name).name == name for name in files) else None
+
+
+def raw_stamp(folder: Path) -> bytes | None:
+    """Return the raw content of the stamp; None if there is none."""
+    try:
+        return (folder / STAMP).read_bytes()
+    except OSError:
+        return None
+
+
+def restore_stamp(folder: Path, content: bytes | None) -> None:
+    """Restore an earlier stamp."""
+    if content is None:
+        (folder / STAMP).unlink(missing_ok=True)
+    else:
+        write_bytes(folder / STAMP, content)
+
+
+def write_stamp(
+    folder: Path, owner: Owner, state: str, results: Sequence[str], outdated: Sequence[str] = ()
+) -> None:
+    """Stamp a folder.
+
+    Parameters
+    ----------
+    folder : Path
+    owner : Owner
+    state : {"running", "stopped", "complete"}
+        "running" without a live process means that the run was cut off.
+    results, outdated : sequence of str
+        Files of this run, and files of an earlier run, which are removed once this run saves its
+        first.
+    """
+    stamp = {"foldyn_version": __version__, **asdict(owner), "state": state}
+    stamp |= {"results": list(results), "outdated": list(outdated)}
+    write_text(folder / STAMP, json.dumps(stamp, indent=1) + "\n")
+
+
+def named_owner(stamp: dict[str, Any], folder: Path) -> str:
+    """Name the owner in a stamp as a user would type it."""
+    source = stamp["source"]
+    if source.startswith("..") or source.endswith(".toml"):
+        source = os.path.normpath(folder / source)
+    return f"foldyn {stamp['command']} {source}"
 
 
 def check_folder(folder: Path, out: str | None, names: Sequence[str]) -> None:
@@ -87,7 +184,7 @@ class Results:
         self.kept: list[str] = []
         self.resumable = False
         self._old, self._new = old, list[str]()
-        self._before = stamp.raw(folder)
+        self._before = raw_stamp(folder)
         self._begun = self._cleared = False
 
     def begin(self, name: str) -> None:
@@ -137,7 +234,7 @@ class Results:
             if self._new:
                 self._stamp(state)
             elif self._begun:
-                stamp.restore(self.folder, self._before)
+                restore_stamp(self.folder, self._before)
 
     def summary(self) -> str:
         """List what was kept, for the end of a message."""
@@ -147,7 +244,7 @@ class Results:
         return f"\nfoldyn: kept what was computed: {', '.join(self.kept)}{further}"
 
     def _stamp(self, state: str) -> None:
-        stamp.write(self.folder, self.owner, state, self._new, self._old)
+        write_stamp(self.folder, self.owner, state, self._new, self._old)
         self._begun = True
 
 
@@ -243,7 +340,7 @@ def _naming(results: Results) -> Iterator[None]:
 
 def _old(folder: Path, place: str, names: Sequence[str], owner: Owner, replace: bool) -> list[str]:
     """Return results in the folder that this run replaces; refuse another owner's results."""
-    found = stamp.read(folder)
+    found = read_stamp(folder)
     if found is None:
         there = [path.name for path in folder.iterdir() if _RESULT.fullmatch(path.name)]
         strange = sorted(set(there) - set(names))
@@ -256,7 +353,7 @@ def _old(folder: Path, place: str, names: Sequence[str], owner: Owner, replace: 
     old = [name for name in (*found["results"], *found["outdated"]) if (folder / name).exists()]
     if old and not owner.same(found) and not replace:
         raise InputError(
-            f"{place}: holds the results of {stamp.named(found, folder)}; name another folder, or "
+            f"{place}: holds the results of {named_owner(found, folder)}; name another folder, or "
             "replace them with --replace"
         )
     return list(dict.fromkeys(old))

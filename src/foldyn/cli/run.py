@@ -17,8 +17,7 @@ from foldyn.analyses.casefile import Kept
 from foldyn.analyses.provenance import Call, mesh_error
 from foldyn.analyses.reading import read_as
 from foldyn.arguments import arguments
-from foldyn.cli.folder import Results, drawing, held
-from foldyn.cli.stamp import Owner
+from foldyn.cli.folder import Owner, Results, drawing, held
 from foldyn.cli.streams import Clock, noted_warnings, speech
 from foldyn.dynamics import SECONDS, Keeping
 from foldyn.errors import ComputationError, InputError, MotionInterrupted, Told

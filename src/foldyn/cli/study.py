@@ -8,9 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.folder import Results, held
+from foldyn.cli.folder import Owner, Results, held
 from foldyn.cli.options import add_results, flag
-from foldyn.cli.stamp import Owner
 from foldyn.cli.streams import Clock, progress_bar, speech
 from foldyn.errors import ComputationError, FoldynError, InputError, Told
 

@@ -10,9 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.folder import Results, drawing, held
+from foldyn.cli.folder import Owner, Results, drawing, held
 from foldyn.cli.options import add_figures, add_results, integer
-from foldyn.cli.stamp import Owner
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import ComputationError, InputError
 from foldyn.plots import FIGURES
