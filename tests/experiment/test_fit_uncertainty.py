@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foldyn.experiment.calibration.uncertainty import Uncertainty
+from foldyn.experiment.calibration.fitted import Uncertainty
 
 ONE = np.ones(2)
 FREE = np.zeros(2, dtype=bool)

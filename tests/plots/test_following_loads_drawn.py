@@ -10,7 +10,7 @@ from pictures import keys
 
 import foldyn as fd
 from foldyn.plots import draw_structure, following, plot_load_history, style
-from foldyn.plots.dashpots import REACH, dashpot_lines
+from foldyn.plots.attachments import REACH, dashpot_lines
 from foldyn.plots.scene import View
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)

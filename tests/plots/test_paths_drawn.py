@@ -22,7 +22,7 @@ from foldyn.plots import (
     style,
     total_reaction,
 )
-from foldyn.plots.along import evenly, main_direction, stretches, way
+from foldyn.plots.readings import evenly, main_direction, stretches, way
 from foldyn.plots.scene import Sheet3D
 from foldyn.plots.sheet import DrawnSheet
 from foldyn.results import path_dataset

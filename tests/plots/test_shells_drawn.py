@@ -22,7 +22,7 @@ from foldyn.plots import (
     plot_path_energies,
 )
 from foldyn.plots.scene import Sheet3D, View
-from foldyn.plots.visibility import split_edges
+from foldyn.plots.sheet import split_edges
 
 ABOVE = View(elevation=90.0, azimuth=-90.0)
 DIVISIONS = 3

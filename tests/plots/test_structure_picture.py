@@ -9,7 +9,7 @@ from pictures import assert_white_rim, keys, pixels, shafts
 
 from foldyn import cases, patterns, structures
 from foldyn.errors import InputError
-from foldyn.plots import draw_structure, plot_load_history, style, ties
+from foldyn.plots import attachments, draw_structure, plot_load_history, style
 from foldyn.plots.scene import View
 
 
@@ -167,14 +167,14 @@ def test_directions_and_links_are_marked(structure):
     texts = keys(figure)
     assert "link (nodes tied together)" in texts
     assert "moved 0.05 m along (0.707, 0, -0.707) on node 7" in texts
-    held = ties.direction_triangles(case, cases.Fix, structure.nodes, 0.1, View())
+    held = attachments.direction_triangles(case, cases.Fix, structure.nodes, 0.1, View())
     np.testing.assert_allclose(held[:, 0], structure.nodes[[6, 8]])
     inward = held[:, 0] - held[:, 1:].mean(axis=1)
     np.testing.assert_allclose(inward, np.tile(0.1 * normal, (2, 1)), atol=1e-12)
-    pushed = ties.direction_triangles(case, cases.Impose, structure.nodes, 0.1, View())
+    pushed = attachments.direction_triangles(case, cases.Impose, structure.nodes, 0.1, View())
     pushes = (pushed[0, 0] - pushed[0, 1:].mean(axis=0)) / 0.1
     np.testing.assert_allclose(pushes, np.array([1.0, 0.0, -1.0]) / np.sqrt(2.0), atol=1e-12)
-    (drawn,) = ties.links(case, structure.nodes)
+    (drawn,) = attachments.links(case, structure.nodes)
     assert len(drawn.lines[0]) == 1 + 3
     labels = [t.get_text() for t in plot_load_history(case, 1.0).legends[0].get_texts()]
     assert labels[0].startswith("moved 0.05 m along (0.707, 0, -0.707) on node 7")

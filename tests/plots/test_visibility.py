@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from foldyn import patterns
-from foldyn.plots import visibility
+from foldyn.plots import sheet as drawn_sheet
 from foldyn.plots.scene import Sheet3D, View, pieces
-from foldyn.plots.visibility import hidden_points
+from foldyn.plots.sheet import hidden_points
 
 PATTERNS = {
     "fold": patterns.simple_fold(dihedral=60),
@@ -54,7 +54,7 @@ def test_little_memory_gives_the_same(monkeypatch):
     sheet, view = Sheet3D.of(PATTERNS["miura"]), View()
     points = pieces(sheet.nodes, sheet.triangles).mean(axis=1)
     at_once = hidden_points(points, sheet.nodes, sheet.triangles, view, sheet.size)
-    monkeypatch.setattr(visibility, "_CHUNK", 7)
+    monkeypatch.setattr(drawn_sheet, "_CHUNK", 7)
     by_and_by = hidden_points(points, sheet.nodes, sheet.triangles, view, sheet.size)
     np.testing.assert_array_equal(at_once, by_and_by)
 
@@ -78,5 +78,5 @@ def test_the_pairs_tested_grow_like_the_triangles():
         seen = sheet.nodes @ view.basis.T
         corners = seen[sheet.triangles].transpose(1, 0, 2)[..., :2]
         points = corners.mean(axis=0)
-        counts.append(sum(len(pair[0]) for pair in visibility._near_pairs(points, corners)))
+        counts.append(sum(len(pair[0]) for pair in drawn_sheet._near_pairs(points, corners)))
     assert counts[1] < 5.0 * counts[0]

@@ -9,7 +9,7 @@ import numpy as np
 
 from foldyn import plots
 from foldyn.analyses.provenance import Call, cost_rows, inputs_table
-from foldyn.plots.along import evenly
+from foldyn.plots.readings import evenly
 from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Picture, Section, Table, Text
 from foldyn.results.contents import pattern_of

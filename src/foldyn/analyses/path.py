@@ -35,8 +35,8 @@ from foldyn.cases.directions import DIRECTIONS
 from foldyn.cases.loads import LOAD
 from foldyn.cases.supports import SUPPORT
 from foldyn.errors import ComputationError, InputError
-from foldyn.plots.along import along, critical_word, evenly, is_loose, main_direction
 from foldyn.plots.charts import Chart, Curve
+from foldyn.plots.readings import along, critical_word, evenly, is_loose, main_direction
 from foldyn.report.album import (
     Album,
     ByRule,

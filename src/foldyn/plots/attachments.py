@@ -1,4 +1,4 @@
-"""Marks of attachments to a sheet: springs, clamped edges, point masses."""
+"""Marks of attachments to a sheet: springs, clamped edges, masses, dashpots, and tied nodes."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 from matplotlib.patches import Patch
 
+from foldyn.cases import Case, Dashpot, Fix, Impose, Link, resolve_nodes
+from foldyn.cases.directions import unit_vector
 from foldyn.cases.supports import Spring
 from foldyn.mechanics.springs import GROUND
 from foldyn.patterns.topology import around, edge_of
-from foldyn.plots import style
+from foldyn.plots import marks, style
 from foldyn.plots.marks import Mark
 from foldyn.plots.scene import Points, Sheet3D, View
 
@@ -108,3 +110,100 @@ def _hatched(sheet: Sheet3D, points: Points, edges: Any, size: float) -> Points:
             start = points[a] + share * along
             lines.append([start, start + outward - 0.5 * size * unit])
     return np.array(lines).reshape(-1, 2, 3)
+
+
+def direction_triangles(case: Case, kind: type, points: Points, size: float, sight: View) -> Points:
+    """Triangles (k, 3, 3) at nodes that `Fix` or `Impose`, the kind, holds along directions."""
+    middle, found = points.mean(axis=0), []
+    for support in case.supports:
+        if not isinstance(support, Fix | Impose) or type(support) is not kind:
+            continue
+        if support.direction is None:
+            continue
+        nodes, unit = resolve_nodes(case.structure, support.nodes), unit_vector(support.direction)
+        for node, value in zip(nodes, _values(support, len(nodes)), strict=True):
+            # it pushes a moving node; else it stands below the sheet, or outside
+            outward = unit[2] if abs(unit[2]) > 1e-9 else unit @ (middle - points[node])
+            along = unit * (np.sign(value) or np.sign(outward) or 1.0)
+            found.append(marks.billboard(points[node], along, size, 0.38 * size, sight))
+    return np.array(found).reshape(-1, 3, 3)
+
+
+def _values(support: Fix | Impose, count: int) -> Points:
+    return np.broadcast_to(getattr(support, "value", 0.0), (count,))
+
+
+def links(case: Case, points: Points) -> list[Mark]:
+    """Lines from the first of some linked nodes to the others, or from riders to carriers."""
+    segments, tied = [], []
+    for support in case.supports:
+        if isinstance(support, Link):
+            nodes = resolve_nodes(case.structure, support.nodes).tolist()
+            first, others = ([nodes[0]], nodes[1:]) if support.to is None else (support.to, nodes)
+            segments += [[points[a], points[b]] for a in first for b in others]
+            tied += [points[node] for node in nodes]
+    if not tied:
+        return []
+    look = {"marker": "o", "markersize": 5.0, "markerfacecolor": "none"}
+    key = style.key("link (nodes tied together)", color=style.LINK, linestyle="dotted", **look)
+    lines, dots = np.array(segments), np.array(tied)
+    return [
+        Mark(style.LINK, [key], [lines], dots=dots, zorder=6.5, width=1.4, dashes="dotted",
+             look=look)
+    ]  # fmt: skip
+
+
+CUP = (-0.5, 0.5)  # start and end of the cup along the line, relative to its length
+PISTON = 0.1  # position of the piston
+SHARE = 0.4  # largest part of the line that the cup takes
+HALF = 0.45  # width of the cup, relative to twice its length
+REACH = 1.8  # length of the line from a node to the ground, in cups
+
+
+def dashpot_lines(case: Case, points: Points, size: float, view: View) -> Points:
+    """Segments (k, 2, 3) of all dashpots of a case, at node positions (n, 3).
+
+    size : length of a cup, m.
+    """
+    segments: list[Points] = []
+    for place, dashpot in case.dashpots:
+        for a, b in dashpot.ends(case.structure, place).tolist():
+            grounded = b == GROUND
+            end = _grounded_end(dashpot, points[a], size) if grounded else points[b]
+            segments += _symbol(points[a], end, size, view, grounded)
+    return np.array(segments).reshape(-1, 2, 3)
+
+
+def describe_dashpot(dashpot: Dashpot) -> str:
+    """Describe a dashpot in words: how strong it is, and what it connects."""
+    to = "to the ground" if dashpot.between is None else "between nodes"
+    return f"dashpot {dashpot.coefficient:.4g} N s/m {to}"
+
+
+def _grounded_end(dashpot: Dashpot, node: Points, size: float) -> Points:
+    """Position of the ground: along the direction, or below."""
+    down = np.array([0.0, 0.0, -1.0])
+    along = down if dashpot.direction is None else unit_vector(dashpot.direction)
+    return node + REACH * size * along
+
+
+def _symbol(start: Points, end: Points, size: float, view: View, grounded: bool) -> list[Points]:
+    length = float(np.linalg.norm(end - start))
+    if length <= 0.0:
+        return []
+    along = (end - start) / length
+    cup = min(size, SHARE * length)
+    middle, half = 0.5 * (start + end), HALF * cup * view.across(along)
+    bottom, top = (middle + at * cup * along for at in CUP)
+    piston = middle + PISTON * cup * along
+    lines = [
+        (start, bottom),
+        (bottom - half, bottom + half),
+        (bottom - half, top - half),
+        (bottom + half, top + half),
+        (piston - 0.7 * half, piston + 0.7 * half),
+        (piston, end),
+    ]
+    if grounded:
+        lines.append((end - 1.3 * half, end + 1.3 * half))
+    return [np.array(line) for line in lines]

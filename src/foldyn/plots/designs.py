@@ -17,8 +17,7 @@ from foldyn.plots import scene, style
 from foldyn.plots.chart_figures import figure_of
 from foldyn.plots.design_charts import convergence_charts
 from foldyn.plots.scene import Sheet3D, View
-from foldyn.plots.sheet import DrawnSheet
-from foldyn.plots.visibility import split_edges
+from foldyn.plots.sheet import DrawnSheet, split_edges
 from foldyn.values import choice, of_kind
 
 COLORS = "coolwarm"

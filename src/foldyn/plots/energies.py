@@ -15,11 +15,19 @@ from foldyn.errors import InputError
 from foldyn.mechanics.contact.term import GROUP as CONTACT
 from foldyn.mechanics.springs import GROUP
 from foldyn.plots import style
-from foldyn.plots.along import along, asked, check_path, way
 from foldyn.plots.chart_figures import figure_of
 from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.given import alone
-from foldyn.plots.readings import energy_shares, parts_of, stacked, strain_name
+from foldyn.plots.readings import (
+    along,
+    asked,
+    check_path,
+    energy_shares,
+    parts_of,
+    stacked,
+    strain_name,
+    way,
+)
 
 COLORS: Mapping[str, str] = {
     "strain_bars": style.VERMILLION,

@@ -18,10 +18,9 @@ from foldyn.linear import convert
 from foldyn.linear.frf import PER_FORCE, quantity_of
 from foldyn.linear.peaks_of import resonances
 from foldyn.plots import style
-from foldyn.plots.along import AXES, check_nodes_of, directions
 from foldyn.plots.given import by_label
 from foldyn.plots.modes import hertz
-from foldyn.plots.readings import along_drive, unit_of
+from foldyn.plots.readings import AXES, along_drive, check_nodes_of, directions, unit_of
 from foldyn.values import number
 
 _APART = 0.07  # of the frequency axis: peaks closer than that share one label

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.plots.along import AXES, check_nodes_of, directions
 from foldyn.plots.chart_figures import figure_of
 from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.given import by_label
+from foldyn.plots.readings import AXES, check_nodes_of, directions
 from foldyn.signals import sampling_interval, spectrum
 from foldyn.values import number
 

@@ -13,18 +13,19 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.plots import style
-from foldyn.plots.along import (
+from foldyn.plots.given import by_label, case_from_result
+from foldyn.plots.readings import (
     CRITICAL,
     along,
     asked,
     check_path,
+    chosen_points,
     critical_word,
     displacements,
     is_loose,
     stretches,
+    total_reaction,
 )
-from foldyn.plots.given import by_label, case_from_result
-from foldyn.plots.readings import chosen_points, total_reaction
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import rest_keys, side_by_side
 from foldyn.structures import Structure

@@ -14,9 +14,15 @@ from numpy.typing import ArrayLike
 from foldyn.cases import Case, Fix, Impose, Pressure, Temperature
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
-from foldyn.plots import dashpots, following, marks, scene, style, ties
+from foldyn.plots import following, marks, scene, style
 from foldyn.plots import load_curves as histories
-from foldyn.plots.attachments import attachments
+from foldyn.plots.attachments import (
+    attachments,
+    dashpot_lines,
+    describe_dashpot,
+    direction_triangles,
+    links,
+)
 from foldyn.plots.marks import Mark
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, panel_keys, rest_keys
@@ -95,7 +101,7 @@ def draw_structure(
     arrows += _dashpots(sheet, points, 0.5 * length, sight) if supports else []
     arrows += _loads(sheet, points, length, sight) if loads else []
     others = _warm(sheet, points) if loads else []
-    others += ties.links(sheet.case, points) if supports and sheet.case else []
+    others += links(sheet.case, points) if supports and sheet.case else []
     shown = [*(group.mark for group in groups), *attached, *arrows, *others]
     triangles = np.concatenate([np.zeros((0, 3, 3)), *(group.mark.triangles for group in groups)])
     # The names of held directions stand beyond the feet of the triangles.
@@ -159,7 +165,7 @@ def _supports(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[
     groups = []
     for kind, mask, color, ink, text in kinds:
         straight, axes = marks.support_triangles(points, mask, size, sight, moves)
-        oblique = ties.direction_triangles(sheet.case, kind, points, size, sight)
+        oblique = direction_triangles(sheet.case, kind, points, size, sight)
         if len(straight) or len(oblique):
             triangles, keys = (
                 np.concatenate([straight, oblique]),
@@ -189,10 +195,10 @@ def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list
 
 def _dashpots(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[Mark]:
     """Lines of the dashpots."""
-    lines = dashpots.dashpot_lines(sheet.case, points, size, sight)
+    lines = dashpot_lines(sheet.case, points, size, sight)
     if not len(lines):
         return []
-    texts = dict.fromkeys(dashpots.describe_dashpot(one) for _, one in sheet.case.dashpots)
+    texts = dict.fromkeys(describe_dashpot(one) for _, one in sheet.case.dashpots)
     keys = [style.key(text, color=style.DASHPOT, linewidth=1.8) for text in texts]
     return [Mark(style.DASHPOT, keys[:_MOST_LOADS_LISTED], [lines])]
 

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.along import AXES, check_nodes_of
 from foldyn.plots.chart_figures import figure_of
 from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.given import alone
+from foldyn.plots.readings import AXES, check_nodes_of
 from foldyn.plots.track_charts import dimension, track_charts
 from foldyn.values import choice
 

@@ -16,8 +16,7 @@ from foldyn.cases import Case
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import character, mac
 from foldyn.patterns import Pattern
-from foldyn.plots.along import displacements, stretches, way
-from foldyn.plots.readings import moved_supports, total_reaction
+from foldyn.plots.readings import displacements, moved_supports, stretches, total_reaction, way
 from foldyn.results.contents import pattern_of
 from foldyn.structures import Sheet, discretize
 from foldyn.threads import one_thread

@@ -10,27 +10,64 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from foldyn.errors import ComputationError, FoldynWarning, InputError, warn
-from foldyn.experiment.calibration.fit_evaluation import (
-    PREDICTED,
-    SLOPES,
-    Point,
-    evaluate,
-    stamp,
-)
 from foldyn.experiment.calibration.fit_problem import Finer, Problem, problem
-from foldyn.experiment.calibration.fitted import Descent, Fit, score
+from foldyn.experiment.calibration.fitted import Descent, Fit, Uncertainty, score
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter
-from foldyn.experiment.calibration.uncertainty import Uncertainty
-from foldyn.sweeps.evaluations import Evaluations
+from foldyn.sweeps.evaluations import Evaluation, Evaluations
 from foldyn.sweeps.pool import Pool, pool_of
 from foldyn.values import number, whole
+
+PREDICTED = "predicted"
+"""Name of an evaluation's predictions."""
+SLOPES = "slopes"
+"""Name of their derivatives with respect to the parameters."""
+
+
+class Point(NamedTuple):
+    """A point to evaluate.
+
+    Attributes
+    ----------
+    values : tuple of float
+        Values of the parameters.
+    runs : tuple of int, optional
+        Runs to compute, without derivatives; by default all runs, with derivatives.
+    second : bool
+        Whether derivatives have second-order accuracy, as intervals need.
+    """
+
+    values: tuple[float, ...]
+    runs: tuple[int, ...] | None = None
+    second: bool = False
+
+
+def stamp(digest: str, point: Point) -> list[Any]:
+    """Everything that an evaluation depends on."""
+    return [digest, *point]
+
+
+def evaluate(problem: Problem, point: Point) -> Evaluation:
+    """Predictions at a point, with derivatives if requested."""
+    began, values = time.perf_counter(), np.array(point.values)
+    try:
+        if point.runs is None:
+            found = problem.differentiate(values, point.second)
+            parts = dict(zip((PREDICTED, SLOPES), found, strict=True))
+        else:
+            parts = {PREDICTED: problem.predict(values, point.runs)}
+        found, why = {name: np.concatenate(part) for name, part in parts.items()}, ""
+    except (InputError, ComputationError) as error:
+        found, why = {}, str(error)
+    return Evaluation(found, why, seconds=time.perf_counter() - began)
+
 
 STEP = 1e-3
 """Change of a parameter, in its scale, for a difference quotient: well above the solvers' noise."""

@@ -18,7 +18,7 @@ from foldyn import __version__
 from foldyn.analyses.provenance import Call, cost_rows, inputs_table
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.plots.along import AXES, way
+from foldyn.plots.readings import AXES, way
 from foldyn.plots.track_charts import track_charts
 from foldyn.report.page import write_report
 from foldyn.report.sections import Charts, Heading, Picture, Section, Table, Text, cell
