@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.patterns.convex import what_was_cut
+from foldyn.patterns.facets import what_was_cut
 from foldyn.patterns.topology import around
 from sheets_with_facets import STEEL, crossed_miura, elastic
 

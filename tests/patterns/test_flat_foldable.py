@@ -7,8 +7,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.errors import ComputationError, InputError
-from foldyn.patterns.flat_foldability import flat_foldability
-from foldyn.patterns.flat_foldable import flat_foldable
+from foldyn.patterns.flat_foldability import flat_foldability, flat_foldable
 
 
 def flat_miura():

@@ -24,8 +24,7 @@ from foldyn.cases.models import MODELS, SHELL
 from foldyn.errors import Faults, FoldynWarning, InputError, warn, within
 from foldyn.input_files import from_toml, path_of, read_text
 from foldyn.patterns import GENERATORS, Pattern, convex, thicken, welded
-from foldyn.patterns.convex import what_was_cut
-from foldyn.patterns.facets import HINGE, LINE, WELD
+from foldyn.patterns.facets import HINGE, LINE, WELD, what_was_cut
 from foldyn.structures import Sheet
 from foldyn.tables import read, told
 from foldyn.values import LARGEST, MOST, SMALLEST, show

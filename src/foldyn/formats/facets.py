@@ -15,10 +15,8 @@ from foldyn.errors import ComputationError, InputError, within
 from foldyn.formats.diagnosis import LISTED
 from foldyn.formats.drawing import count
 from foldyn.patterns import Pattern, convex, welded
-from foldyn.patterns.convex import what_was_cut
-from foldyn.patterns.facets import COPLANAR, FACETS, HINGE, WELD
-from foldyn.patterns.flat_foldability import flat_foldability
-from foldyn.patterns.flat_foldable import flat_foldable, slips
+from foldyn.patterns.facets import COPLANAR, FACETS, HINGE, WELD, what_was_cut
+from foldyn.patterns.flat_foldability import flat_foldability, flat_foldable, slips
 from foldyn.patterns.topology import Edge, edge_lookup
 from foldyn.values import choice
 

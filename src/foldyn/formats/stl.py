@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.patterns import Pattern
-from foldyn.patterns.convex import triangles_of
+from foldyn.patterns.facets import triangles_of
 
 PER_METER = 1e3
 

@@ -5,23 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from foldyn.patterns.boards import Boards
-from foldyn.patterns.convex import convex
-from foldyn.patterns.facets import welded
-from foldyn.patterns.flat_foldability import FlatFoldability
-from foldyn.patterns.flat_foldable import flat_foldable
+from foldyn.patterns.facets import convex, welded
+from foldyn.patterns.flat_foldability import FlatFoldability, flat_foldable
 from foldyn.patterns.generators.arc_miura import arc_miura
 from foldyn.patterns.generators.curved_pleat import curved_pleat
 from foldyn.patterns.generators.eggbox import eggbox
 from foldyn.patterns.generators.flasher import flasher
 from foldyn.patterns.generators.kresling import kresling
 from foldyn.patterns.generators.miura import miura
-from foldyn.patterns.generators.miura_tube import miura_tube
+from foldyn.patterns.generators.miura_tube import miura_tube, zipper_tubes
 from foldyn.patterns.generators.resch import resch
 from foldyn.patterns.generators.simple_fold import simple_fold
 from foldyn.patterns.generators.square_twist import square_twist
 from foldyn.patterns.generators.waterbomb import waterbomb
 from foldyn.patterns.generators.yoshimura import yoshimura
-from foldyn.patterns.generators.zipper_tubes import zipper_tubes
 from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.screw import Screw
 from foldyn.patterns.thick import thicken

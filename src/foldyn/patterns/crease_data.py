@@ -12,10 +12,10 @@ from foldyn.errors import InputError
 from foldyn.patterns.topology import edge_lookup, vertex_pair
 from foldyn.values import listed, show, single, suggest
 
+# Words for creases of every pattern, and the letters that each selects.
 ASSIGNED: Mapping[str, str] = {
     "all": "MVU", "mountain": "M", "valley": "V", "flat": "F", "unassigned": "U",
 }  # fmt: skip
-"""Words for creases of every pattern, and the letters that each selects."""
 
 
 class Named(NamedTuple):
@@ -131,10 +131,7 @@ def families(
         pairs = [vertex_pair(place, member) for member in members]
         strange = [pair for pair in pairs if pair not in row]
         if strange:
-            raise InputError(
-                f": {strange[0]} is not {what}; name the two vertices of each",
-                place,
-            )
+            raise InputError(f": {strange[0]} is not {what}; name the two vertices of each", place)
         rows[name] = np.array(sorted({row[pair] for pair in pairs}), dtype=np.int64)
         rows[name].setflags(write=False)
     return rows

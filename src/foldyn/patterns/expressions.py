@@ -10,10 +10,8 @@ from foldyn.errors import InputError
 from foldyn.values import shortened
 
 _UNDERSCORED = re.compile(r"(?<![\w.])\d[\d.]*_")
-LONGEST = 1000
-"""Most characters of an expression."""
-DEEPEST = 50
-"""Most nested operations."""
+LONGEST = 1000  # most characters of an expression
+DEEPEST = 50  # most nested operations
 
 
 def parse(text: str) -> ast.expr:

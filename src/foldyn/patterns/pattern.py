@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -122,32 +122,6 @@ class Pattern(Transforms):
     -----
     A vertex that no face uses is kept.
     """
-
-    vertices: NDArray[np.float64]
-    faces: tuple[tuple[int, ...], ...]
-    assignments: tuple[str, ...]
-    name: str
-    boards: Boards | None
-    fold_angles: NDArray[np.float64]
-    families: Mapping[str, NDArray[np.int64]]
-    custom: Mapping[str, Any]
-    welds: NDArray[np.int64]
-    periods: tuple[NDArray[np.int64], ...]
-    rim_families: Mapping[str, NDArray[np.int64]]
-    unlettered: NDArray[np.bool_] = field(init=False)
-    flipped: tuple[bool, ...] = field(init=False)
-    edges: NDArray[np.int64] = field(init=False)
-    creases: NDArray[np.int64] = field(init=False)
-    boundary: NDArray[np.int64] = field(init=False)
-    crease_faces: NDArray[np.int64] = field(init=False)
-    weld_faces: NDArray[np.int64] = field(init=False)
-    dihedrals: NDArray[np.float64] = field(init=False)
-    weld_dihedrals: NDArray[np.float64] = field(init=False)
-    flat_dihedrals: NDArray[np.float64] = field(init=False)
-    face_areas: NDArray[np.float64] = field(init=False)
-    face_normals: NDArray[np.float64] = field(init=False)
-    face_planarity: NDArray[np.float64] = field(init=False)
-    size: float = field(init=False)
 
     def __init__(
         self,

@@ -11,22 +11,18 @@ from numpy.typing import NDArray
 
 from foldyn.patterns.palette import CREASES, PAPER
 
-WIDTH, HEIGHT, MARGIN = 520.0, 300.0, 8.0
-"""Pixels."""
-VIEW = (28.0, -60.0)
-"""Elevation above the xy plane and azimuth around z (degrees) of the view."""
-MOST_PANELS = 600
-"""Most panels of a picture in a notebook; larger patterns have none."""
-MOST_WORDS = 200
-"""Most letters of the caption."""
+WIDTH, HEIGHT, MARGIN = 520.0, 300.0, 8.0  # pixels
+VIEW = (28.0, -60.0)  # elevation above the xy plane and azimuth around z (degrees) of the view
+MOST_PANELS = 600  # most panels of a picture in a notebook; larger patterns have none
+MOST_WORDS = 200  # most letters of the caption
 FRONT, BACK = bytes.fromhex(PAPER[1:]), (217, 195, 154)
+# Color, width and dashes of edges by their letter, "B" for boundaries.
 LINES = {
     "M": (CREASES["M"], "1.6", ""), "V": (CREASES["V"], "1.6", "5 3"),
     "F": (CREASES["F"], "1.2", "1.5 2"),
     "U": ("#B8578E", "1.4", "5 2 1 2"),  # as on the page: thin lines need a darker purple
     "B": ("#444", "1.1", ""),
 }  # fmt: skip
-"""Color, width and dashes of edges by their letter, "B" for boundaries."""
 
 
 def picture(pattern: Any, words: str = "") -> str | None:

@@ -24,7 +24,7 @@ SPREAD = 1e-6  # of their size: how far points must extend across a line to dete
 STILL = 1e-9  # rad: smaller rotations count as none
 
 
-def _direction(name: str, value: ArrayLike) -> tuple[float, float, float]:
+def direction(name: str, value: ArrayLike) -> tuple[float, float, float]:
     """Return a direction: an axis by its name, or a nonzero vector."""
     if isinstance(value, str):
         if value not in ("x", "y", "z"):
@@ -60,7 +60,7 @@ class Screw(Checked):
     [[0.0, 1.0, 1.5]]
     """
 
-    axis: Annotated[str | Sequence[float], Check(_direction)]
+    axis: Annotated[str | Sequence[float], Check(direction)]
     angle: Annotated[float, Check(number, unit="degrees")]
     shift: Annotated[float, Check(number, unit="m")]
     point: Annotated[Sequence[float], Check(vector, unit="m")] = (0.0, 0.0, 0.0)

@@ -25,8 +25,7 @@ from foldyn.errors import InputError
 from foldyn.patterns.expressions import parse, written
 from foldyn.values import shortened
 
-TOLERANCE = 1e-9
-"""Tolerance of a selection relative to the size of the pattern."""
+TOLERANCE = 1e-9  # tolerance of a selection relative to the size of the pattern
 
 _AXES = {"x": 0, "y": 1, "z": 2}
 _REMEDY = 'write for example "xmin", "zmax and y>0" or "not (x<1 or z==0)"'

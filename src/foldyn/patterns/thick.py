@@ -31,8 +31,7 @@ from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.values import SHORTEST, number, number_or_list, show
 
 SAME = 1e-9  # of the pattern's size: positions and heights within this are equal
-SIDES = {"V": 0.5, "M": -0.5, "F": 0.0}
-"""Height of a hinge line, in thicknesses, by assignment."""
+SIDES = {"V": 0.5, "M": -0.5, "F": 0.0}  # height of a hinge line, in thicknesses, by assignment
 CONDITIONS = (
     "hinge lines at different heights do not meet in a point, and boards of one thickness around "
     "such a vertex cannot fold (Chen, Peng and You, Science 349, 2015); give offsets that are the "

@@ -15,8 +15,7 @@ from foldyn.errors import InputError
 from foldyn.patterns.topology import Faces, around, edge_lookup, edge_of
 
 PARALLEL = 1e-3  # rad: periods within this angle count as one direction
-MOST_EDGES = 600
-"""Most boundary edges in a search for periods."""
+MOST_EDGES = 600  # most boundary edges in a search for periods
 
 
 class Glued(NamedTuple):
@@ -88,9 +87,7 @@ def glue(vertices: Sequence[NDArray], edges: Sequence[NDArray], tolerance: float
     rank[np.argsort(first)] = np.arange(len(first))
     number = rank[label]
     return Glued(
-        points[np.sort(first)],
-        [number[start:end] for start, end in pairwise(starts)],
-        joined,
+        points[np.sort(first)], [number[start:end] for start, end in pairwise(starts)], joined
     )
 
 

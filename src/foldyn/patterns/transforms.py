@@ -5,7 +5,8 @@ from __future__ import annotations
 import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Self
+from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import FoldynWarning, InputError, warn
 from foldyn.patterns.boards import Boards
 from foldyn.patterns.generators.arguments import check_size
+from foldyn.patterns.screw import direction
 from foldyn.patterns.tiling import glue, half_edges
 from foldyn.patterns.tiling import periods as periods_of
 from foldyn.patterns.topology import around, edge_lookup, edge_of
@@ -20,33 +22,39 @@ from foldyn.values import number, numbers, show, vector, whole
 
 FLAT = 1e-6  # rad from pi: a crease between copies that gets no letter from its dihedral
 TURNED = {"M": "V", "V": "M"}
+# Key of a pattern's custom data with the order of its layers, as in FOLD.
 FACE_ORDERS = "faceOrders"
-"""Key of a pattern's custom data with the order of its layers, as in FOLD."""
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class Transforms:
-    """Transformations of a `Pattern`; every method returns a new pattern."""
+    """Fields of a `Pattern`, and transformations, which return a new pattern."""
 
-    if TYPE_CHECKING:
-        vertices: NDArray[np.float64]
-        faces: tuple[tuple[int, ...], ...]
-        assignments: tuple[str, ...]
-        unlettered: NDArray[np.bool_]
-        name: str
-        boards: Boards | None
-        fold_angles: NDArray[np.float64]
-        families: Mapping[str, NDArray[np.int64]]
-        custom: Mapping[str, Any]
-        flipped: tuple[bool, ...]
-        creases: NDArray[np.int64]
-        boundary: NDArray[np.int64]
-        welds: NDArray[np.int64]
-        periods: tuple[NDArray[np.int64], ...]
-        rim_families: Mapping[str, NDArray[np.int64]]
-        crease_faces: NDArray[np.int64]
-        dihedrals: NDArray[np.float64]
-        size: float
+    vertices: NDArray[np.float64]
+    faces: tuple[tuple[int, ...], ...]
+    assignments: tuple[str, ...]
+    name: str
+    boards: Boards | None
+    fold_angles: NDArray[np.float64]
+    families: Mapping[str, NDArray[np.int64]]
+    custom: Mapping[str, Any]
+    welds: NDArray[np.int64]
+    periods: tuple[NDArray[np.int64], ...]
+    rim_families: Mapping[str, NDArray[np.int64]]
+    unlettered: NDArray[np.bool_]
+    flipped: tuple[bool, ...]
+    edges: NDArray[np.int64]
+    creases: NDArray[np.int64]
+    boundary: NDArray[np.int64]
+    crease_faces: NDArray[np.int64]
+    weld_faces: NDArray[np.int64]
+    dihedrals: NDArray[np.float64]
+    weld_dihedrals: NDArray[np.float64]
+    flat_dihedrals: NDArray[np.float64]
+    face_areas: NDArray[np.float64]
+    face_normals: NDArray[np.float64]
+    face_planarity: NDArray[np.float64]
+    size: float
 
     def scaled(self, factor: float) -> Self:
         """Return the pattern with all lengths scaled, including its boards.
@@ -115,10 +123,7 @@ class Transforms:
         return self._placed(lambda x: (x - center) @ reflection.T + center, turned=True)
 
     def repeated(
-        self,
-        counts: Sequence[int],
-        periods: ArrayLike | None = None,
-        tolerance: float = 1e-6,
+        self, counts: Sequence[int], periods: ArrayLike | None = None, tolerance: float = 1e-6
     ) -> Self:
         """Return copies of the pattern side by side as one sheet, glued edge to edge.
 
@@ -356,9 +361,5 @@ def _thin(pattern: Transforms) -> None:
 
 def _direction(name: str, given: Any) -> NDArray[np.float64]:
     """Unit vector (3,) of an axis given by name or coordinates."""
-    if isinstance(given, str) and given in AXES:
-        return np.array(AXES[given])
-    if isinstance(given, str):
-        raise InputError(f' = {show(given)}: give "x", "y", "z" or three numbers', name)
-    direction = np.array(vector(name, given, nonzero=True))
-    return direction / np.linalg.norm(direction)
+    along = np.array(direction(name, given))
+    return along / np.linalg.norm(along)

@@ -1,11 +1,13 @@
-"""A tube of two Miura-ori strips."""
+"""A tube of two Miura-ori strips, and two such tubes coupled as a zipper."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import within
+from foldyn.errors import InputError, within
 from foldyn.patterns.generators.arguments import acute, check_size, fold_dihedral, sizes
 from foldyn.patterns.generators.assembly import assembled
 from foldyn.patterns.generators.miura import miura
@@ -91,3 +93,102 @@ def tube_panels(stations: int, first: int = 0) -> tuple[list[tuple[int, ...]], d
             faces += [(here[c], there[c], there[c - 3], here[c - 3]) for c in range(4)]
             families["zigzag"] += [(here[c], there[c]) for c in range(4)]
     return faces, families
+
+
+TIES = "foldyn:ties"
+
+
+def zipper_tubes(
+    cells: int = 3,
+    a: float = 1.0,
+    *,
+    b: float = 1.0,
+    panel_angle: float = 60.0,
+    dihedral: float = 90.0,
+) -> Pattern:
+    """Two tubes as in `miura_tube` whose zigzag walls fit together, like the rows of a zipper.
+
+    The second tube is the first one turned by 180 degrees about an axis at right angles to the wall
+    between its corners 2 and 3 of each station, and shifted so that one of its own walls lies in
+    that wall. The panels of the two walls lie in the same planes and lean opposite ways, so they
+    overlap only in part, and do so throughout the folding: their corners lie on common lines, at
+    constant distances. Vertex k of the second tube has the number of the first one's plus
+    4 (2 cells + 1).
+
+    A pattern cannot say that walls are joined, so the tubes are two until a case ties them: the
+    entries of `pattern.custom["foldyn:ties"]` are pairs of a vertex of the second tube and three
+    of the first one in whose plane it lies::
+
+        links = [fd.Link([node], to=corners) for node, corners in pattern.custom["foldyn:ties"]]
+
+    Parameters
+    ----------
+    cells, a, b, panel_angle, dihedral
+        Arguments of each tube, as in `miura_tube`; b cos(panel_angle) must be less than a for the
+        walls to overlap.
+
+    Returns
+    -------
+    Pattern
+        8 (2 cells + 1) vertices and 16 cells faces, fronts outside. Families: "zigzag" and "ring",
+        as in `miura_tube`; "zigzag_1", "ring_1", "zigzag_2" and "ring_2" are those of each tube.
+
+    Raises
+    ------
+    InputError
+        An argument of the wrong type or out of range.
+
+    Notes
+    -----
+    E. T. Filipov, T. Tachi, G. H. Paulino, Origami tubes assembled into stiff, yet reconfigurable
+    structures and metamaterials, PNAS 112, 2015: coupled in this way they fold as softly as one
+    tube, and are much stiffer in all other ways.
+    """
+    with within("zipper_tubes: "):
+        one = tube(cells, a, b, panel_angle, dihedral)
+        lean = b * math.cos(math.radians(panel_angle)) / a
+        if lean >= 1.0:
+            raise InputError(
+                f" = {b:g}: walls that lean by {lean:.3g} of their width do not overlap; must be "
+                f"below {b / lean:.4g} m with these a and panel_angle",
+                "b",
+            )
+    stations = len(one) // 4
+    other, first = _turned(one, lean), len(one)
+    faces, families = tube_panels(stations)
+    more, more_families = tube_panels(stations, first)
+    named = {f"{name}_1": pairs for name, pairs in families.items()}
+    named |= {f"{name}_2": pairs for name, pairs in more_families.items()}
+    both = {name: [*families[name], *more_families[name]] for name in families}
+    ties = [
+        [first + 4 * (stations - 1 - i) + c, _corners(i, stations)]
+        for i in range(stations)
+        for c in (0, 1)
+    ]
+    vertices, custom = np.concatenate([one, other]), {TIES: ties}
+    along = [(c, first - 4 + c) for c in range(4)]
+    along += [(2 * first - 4 + c, first + c) for c in range(4)]  # the second tube runs backwards
+    return assembled(
+        "zipper tubes", vertices, [*faces, *more], {**both, **named}, custom=custom,
+        periods=[along],
+    )  # fmt: skip
+
+
+def _turned(one: NDArray, lean: float) -> NDArray[np.float64]:
+    """The second tube, with its wall of corners 0 and 1 placed in the first one's wall of 3 and 2.
+
+    Along the walls' edges, the corners of even stations lie at 0 and 1 of their length in the first
+    tube, those of odd ones at `lean` and 1 + lean; in the second one both the other way round.
+    """
+    edge = one[1] - one[0]
+    x = one - one[0]
+    along = x @ edge / (edge @ edge)
+    turned = x - 2.0 * along[:, None] * edge
+    turned[:, 0] = one[-4, 0] - one[:, 0]
+    return one[3] + (1.0 + lean) * edge + turned
+
+
+def _corners(i: int, stations: int) -> list[int]:
+    """Three corners of a panel in the first tube's wall, two of them at station i."""
+    beside = i + 1 if i + 1 < stations else i - 1
+    return [4 * i + 3, 4 * i + 2, 4 * beside + 3]

@@ -17,12 +17,12 @@ from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.topology import Edge
 from foldyn.values import length
 
+# Distances of the middles of a star's sides and of its corners from its center, in sides a.
 MIDDLE, TIP = 1.0 / math.sqrt(3.0), 2.0 / math.sqrt(3.0)
-"""Distances of the middles of a star's sides and of its corners from its center, in sides a."""
 STEP = math.radians(10.0)  # step from one solution to the next
 LETTERS = {"tile": "M", "tuck": "V", "star": "M"}
+# Fold angles (rad) of the closed state.
 CLOSED = {"tile": -math.pi / 2, "tuck": math.pi, "star": -math.pi / 3}
-"""Fold angles (rad) of the closed state."""
 
 
 def resch(cells: Sequence[int] = (3, 3), a: float = 1.0, *, dihedral: float = 120.0) -> Pattern:

@@ -16,11 +16,7 @@ LETTERS = {"diagonal": "V", "middle": "M", "side": "M", "row": "M"}
 
 
 def waterbomb(
-    cells: Sequence[int] = (4, 5),
-    a: float = 1.0,
-    *,
-    b: float = 1.0,
-    dihedral: float = 120.0,
+    cells: Sequence[int] = (4, 5), a: float = 1.0, *, b: float = 1.0, dihedral: float = 120.0
 ) -> Pattern:
     """Waterbomb tessellation: rows of waterbomb bases, each row shifted by half a base.
 

@@ -15,11 +15,7 @@ from foldyn.patterns.topology import Edge
 
 
 def yoshimura(
-    cells: Sequence[int] = (6, 4),
-    a: float = 0.5,
-    *,
-    b: float = 1.0,
-    dihedral: float = 160.0,
+    cells: Sequence[int] = (6, 4), a: float = 0.5, *, b: float = 1.0, dihedral: float = 160.0
 ) -> Pattern:
     """Yoshimura pattern: rows of equal isosceles triangles, which roll up as they fold.
 
