@@ -1,15 +1,8 @@
 # Public names and where they live; loaded when they are first used (facade.py)
 
 from foldyn.experiment.calibration.fit import Course as Course, fit as fit
-from foldyn.experiment.calibration.fitted import (
-    Descent as Descent,
-    Fit as Fit,
-    Score as Score,
-)
-from foldyn.experiment.calibration.histories import (
-    Spectrum as Spectrum,
-    TimeHistory as TimeHistory,
-)
+from foldyn.experiment.calibration.fitted import Descent as Descent, Fit as Fit, Score as Score
+from foldyn.experiment.calibration.histories import Spectrum as Spectrum, TimeHistory as TimeHistory
 from foldyn.experiment.calibration.measured import (
     ForceDisplacement as ForceDisplacement,
     Shapes as Shapes,

@@ -20,12 +20,12 @@ _TERMS = 6  # degree in r^2 of the polynomial that inverts the distortion
 _REACH = 1.08  # part of the half diagonal up to which it is fitted
 _LARGEST_SPREAD = 0.02  # allowed spread of the lengths that define a scale
 
+# Unit vectors by name: "x", "-x", "+z".
 DIRECTIONS = {
     f"{sign}{axis}": (1.0 if sign != "-" else -1.0) * np.eye(3)[k]
     for k, axis in enumerate("xyz")
     for sign in ("", "+", "-")
 }
-"""Unit vectors by name: "x", "-x", "+z"."""
 
 
 def opencv() -> Any:

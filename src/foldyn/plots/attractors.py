@@ -18,11 +18,11 @@ from foldyn.plots.given import alone
 from foldyn.plots.readings import check_nodes_of
 from foldyn.values import choice
 
+# Looks of both sweep directions.
 _WAYS: dict[str, dict[str, Any]] = {
     "up": {"color": style.BLUE, "linestyle": style.DASHES[0]},
     "down": {"color": style.VERMILLION, "linestyle": style.DASHES[1]},
 }
-"""Looks of both sweep directions."""
 _MOST = 8  # attractors named in the legend
 _PALE = 0.55  # share of white in the color of a basin
 
@@ -50,9 +50,8 @@ def plot_amplitudes(result: xr.Dataset, title: str = "") -> Figure:
     """
     _check("result", result, "bifurcation_diagram", "swept_sine")
     along = _along(result)
-    figure = style.new_figure(7.0, 4.0, title)
-    axes = figure.subplots()
-    style.frame(axes, _named(result[along]), _named(result["amplitude"]))
+    labels = _named(result[along]), _named(result["amplitude"])
+    figure, axes = style.single((7.0, 4.0), title, *labels)
     keys = []
     for way in result["sweep"].values:
         one = result.sel(sweep=way)
@@ -94,9 +93,8 @@ def plot_bifurcation_diagram(diagram: xr.Dataset, title: str = "") -> Figure:
     """
     _check("diagram", diagram, "bifurcation_diagram")
     along = _along(diagram)
-    figure = style.new_figure(7.0, 4.2, title)
-    axes = figure.subplots()
-    style.frame(axes, _named(diagram[along]), _named(diagram["section"]))
+    labels = _named(diagram[along]), _named(diagram["section"])
+    figure, axes = style.single((7.0, 4.2), title, *labels)
     keys = []
     for way in diagram["sweep"].values:
         section = diagram["section"].sel(sweep=way).transpose(along, "record").values
@@ -137,10 +135,9 @@ def plot_poincare_section(
     choice("axis", axis, AXES)
     (number,) = check_nodes_of({"": section}, node)[:1]
     here = section.sel(node=number, axis=axis)
-    figure = style.new_figure(5.2, 4.6, title)
-    axes = figure.subplots()
     of = f"of node {number} along {axis}"
-    style.frame(axes, f"displacement {of} (m)", f"velocity {of} (m/s)")
+    labels = f"displacement {of} (m)", f"velocity {of} (m/s)"
+    figure, axes = style.single((5.2, 4.6), title, *labels)
     count = section.sizes["time"]
     size = 6.0 if count < 50 else 2.2 if count < 3000 else 1.2
     look = {"linestyle": "none", "marker": ".", "markersize": size, "color": style.BLUE}
@@ -182,9 +179,7 @@ def plot_basins(
     rest = [name for name in names if name != across]
     upward = rest[0] if y is None else choice("y", y, rest)
     labels = basins["basin"].transpose(upward, across).values
-    figure = style.new_figure(6.2, 4.8, title)
-    axes = figure.subplots()
-    style.frame(axes, _named(basins[across]), _named(basins[upward]))
+    figure, axes = style.single((6.2, 4.8), title, _named(basins[across]), _named(basins[upward]))
     axes.grid(False)
     colors = [style.GRAY, *(_pale(k) for k in range(basins.sizes["attractor"]))]
     axes.pcolormesh(
@@ -221,9 +216,7 @@ def plot_lyapunov_exponent(found: xr.Dataset, title: str = "") -> Figure:
         Another result.
     """
     _check("found", found, "lyapunov_exponent")
-    figure = style.new_figure(7.0, 3.6, title)
-    axes = figure.subplots()
-    style.frame(axes, "time (s)", "largest Lyapunov exponent (1/s)")
+    figure, axes = style.single((7.0, 3.6), title, "time (s)", "largest Lyapunov exponent (1/s)")
     last, error = float(found["exponent"]), float(found["error"])
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     axes.axhspan(last - 2.0 * error, last + 2.0 * error, color=style.SKY, alpha=0.35, linewidth=0)

@@ -42,9 +42,7 @@ def plot_bands(bands: xr.Dataset, gaps: bool = True, *, title: str = "") -> Figu
     """
     frequencies_of(bands)
     along, label = _along(bands)
-    figure = style.new_figure(6.4, 4.4, title)
-    axes = figure.add_subplot()
-    style.frame(axes, label, "frequency (Hz)")
+    figure, axes = style.single((6.4, 4.4), title, label, "frequency (Hz)")
     if flag("gaps", gaps):
         found = band_gaps(bands)
         for k in np.flatnonzero(found["direction"].values == ALL):
@@ -53,9 +51,7 @@ def plot_bands(bands: xr.Dataset, gaps: bool = True, *, title: str = "") -> Figu
     if "polarization" in bands:
         lines = _colored(along, values, bands["polarization"].values[..., 2])
         axes.add_collection(lines)
-        bar = figure.colorbar(lines, ax=axes, pad=0.02)
-        bar.set_label("share of motion along z", **style.TEXT)
-        bar.ax.tick_params(labelsize=style.TICK)
+        style.color_bar(figure, lines, "share of motion along z", ax=axes, pad=0.02)
         axes.set_ylim(0.0, 1.05 * float(np.nanmax(values)))
     else:
         for band, line in enumerate(values.T):
@@ -108,9 +104,8 @@ def plot_iso_frequency(
     values = frequency[:, band - 1].reshape(*shape)
     x, y, z = (_closed(each) for each in (phases[..., 0], phases[..., 1], values))
     x[-1], y[:, -1] = np.pi, np.pi
-    figure = style.new_figure(5.2, 4.4, title)
-    axes = figure.add_subplot()
-    style.frame(axes, "phase along period 1 (rad)", "phase along period 2 (rad)")
+    labels = "phase along period 1 (rad)", "phase along period 2 (rad)"
+    figure, axes = style.single((5.2, 4.4), title, *labels)
     lines = axes.contour(x, y, z, levels=whole("levels", levels, least=1), cmap="viridis")
     axes.clabel(lines, fontsize=7)
     axes.set_aspect("equal")

@@ -14,8 +14,8 @@ from foldyn.plots import style
 from foldyn.plots.charts import Chart, Curve
 
 TIME = "time (s)"
+# Most points of a line with markers, if no other curve has dots; more dots are drawn smaller.
 FEW = 60
-"""Most points of a line with markers, if no other curve has dots; more dots are drawn smaller."""
 
 
 def figure_of(

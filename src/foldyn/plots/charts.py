@@ -11,10 +11,8 @@ from numpy.typing import ArrayLike
 
 from foldyn.errors import InputError
 
-DIGITS = 5
-"""Significant digits of the numbers in a page."""
-MOST_POINTS = 2000
-"""Most points of a curve in a page; of more, every k-th."""
+DIGITS = 5  # significant digits of the numbers in a page
+MOST_POINTS = 2000  # most points of a curve in a page; of more, every k-th
 
 
 @dataclass(frozen=True)

@@ -91,12 +91,8 @@ def draw_sensitivity(
         colors = scene.shades(sheet.nodes, sheet.triangles, own)
         scene.add_panels(axes, sheet.nodes[sheet.triangles], colors, zorder=1.2)
     high = figure.get_size_inches()[1]
-    bar = figure.colorbar(
-        scale, cax=figure.add_axes((0.2, 0.5 / high, 0.6, 0.1 / high)), orientation="horizontal"
-    )
-    bar.set_label(label, **style.TEXT)
-    bar.ax.tick_params(labelsize=style.TICK, labelcolor=style.BLACK, color=style.GRAY)
-    bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
+    there = figure.add_axes((0.2, 0.5 / high, 0.6, 0.1 / high))
+    style.color_bar(figure, scale, label, cax=there, orientation="horizontal")
     return figure
 
 

@@ -17,8 +17,7 @@ from foldyn.plots.readings import AXES, check_nodes_of, directions
 from foldyn.signals import sampling_interval, spectrum
 from foldyn.values import number
 
-VISIBLE = 0.02
-"""Share of a curve's height that is visible."""
+VISIBLE = 0.02  # share of a curve's height that is visible
 ROUND = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 

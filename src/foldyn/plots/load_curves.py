@@ -16,11 +16,10 @@ from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.following import Share, moments, on_panels
 
 K = TypeVar("K")
-POINTS = 1001
-"""Points of a curve."""
+POINTS = 1001  # points of a curve
 _LISTED = 3
+# Most curves of one history; imposed displacements and rest angles may differ everywhere.
 _MOST_CURVES = 4
-"""Most curves of one history; imposed displacements and rest angles may differ everywhere."""
 
 
 def load_charts(case: Case, start: float, duration: float) -> list[Chart]:

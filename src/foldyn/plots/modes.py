@@ -23,7 +23,6 @@ from foldyn.plots.sheet import rest_keys, side_by_side
 from foldyn.structures import Structure
 from foldyn.values import length, numbers
 
-"""Most modes in one figure."""
 _AMPLITUDE = 0.12  # largest displacement, relative to the sheet's size
 _STRETCH = 0.4  # largest relative displacement of a bar's ends, relative to its length
 _SHADES = LinearSegmentedColormap.from_list("mac", ["#FFFFFF", "#9CC7E4", style.BLUE, "#00304A"])
@@ -246,8 +245,5 @@ def plot_mac(
             text = f"{value:.2f}" if value >= 0.005 else "0"
             ink = "white" if value > 0.5 else style.BLACK
             axes.text(column, row, text, ha="center", va="center", fontsize=style.NOTE, color=ink)
-    bar = figure.colorbar(image, ax=axes, fraction=0.08, shrink=0.9)
-    bar.set_label("MAC", **style.TEXT)
-    bar.ax.tick_params(labelsize=style.TICK, labelcolor=style.BLACK, color=style.GRAY)
-    bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
+    style.color_bar(figure, image, "MAC", ax=axes, fraction=0.08, shrink=0.9)
     return style.finish(figure)

@@ -149,9 +149,7 @@ class _Curve(NamedTuple):
 
 def _draw(curves: list[_Curve], title: str, xlabel: str, ylabel: str) -> Figure:
     """Draw curves, with a legend of the marks that occur."""
-    figure = style.new_figure(6.5, 4.4, title)
-    axes = figure.subplots()
-    style.frame(axes, xlabel, ylabel)
+    figure, axes = style.single((6.5, 4.4), title, xlabel, ylabel)
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     colors = [style.CYCLE[index % len(style.CYCLE)] for index in range(len(curves))]
     for index, curve in enumerate(curves):

@@ -25,8 +25,8 @@ from foldyn.structures.bars_hinges import GROUPS as OF_BARS_AND_HINGES
 from foldyn.values import choice
 
 AXES = ("x", "y", "z")
+# Kinds of points marked in figures, and their names.
 CRITICAL = {"limit": "limit point", "bifurcation": "bifurcation"}
-"""Kinds of points marked in figures, and their names."""
 
 
 def check_nodes_of(
@@ -176,6 +176,7 @@ def asked(
     return numbers, main_direction(paths, numbers) if direction is None else direction
 
 
+# Names of strain energies, stacked in this order from the bottom up: folds on top.
 STRAIN: Mapping[str, str] = {
     "strain_bars": "bars",
     "strain_membrane": "membrane",
@@ -185,10 +186,9 @@ STRAIN: Mapping[str, str] = {
     GROUP: "springs",
     CONTACT: "contact",
 }
-"""Names of strain energies, stacked in this order from the bottom up: folds on top."""
 MOST_MODES = 12
+# Variables of modes that figures need.
 NEEDED = ("frequency", "eigenvalue", "shape", "rigid", "displacement")
-"""Variables of modes that figures need."""
 _NONE = 1e-9  # of the largest energy: smaller energies have no shares
 
 

@@ -54,9 +54,7 @@ def plot_response_curve(
         raise InputError(": some vary the frequency, some the amplitude; draw them apart", "curves")
     along = "frequency" if kinds.pop() == "frequencies" else "level"
     xlabel = "frequency of the drive (Hz)" if along == "frequency" else "factor on the drive"
-    figure = style.new_figure(*SIZE, title)
-    axes = figure.subplots()
-    style.frame(axes, xlabel, _amplitude(next(iter(labeled.values()))))
+    figure, axes = style.single(SIZE, title, xlabel, _amplitude(next(iter(labeled.values()))))
     keys, kept = [], set()
     for index, (label, curve) in enumerate(labeled.items()):
         color = style.CYCLE[index % len(style.CYCLE)]

@@ -24,14 +24,11 @@ from foldyn.plots import style
 from foldyn.results import case_of
 from foldyn.values import show
 
-Points = NDArray[np.float64]
-"""Points or vectors, shape (..., 3), or (..., 2) as seen on the screen."""
-Indices = NDArray[np.int64]
-"""Node numbers: an edge or a triangle per row."""
+Points = NDArray[np.float64]  # points or vectors, shape (..., 3), or (..., 2) as seen on the screen
+Indices = NDArray[np.int64]  # node numbers: an edge or a triangle per row
+# Colors of panels that differ from the sheet, in turn.
 PAPERS = ("#CFB387", "#B9CBB0", "#C9B4C6", "#A9BFCC")
-"""Colors of panels that differ from the sheet, in turn."""
-WIDTH = 7.0
-"""Width of a figure, in inches."""
+WIDTH = 7.0  # width of a figure, in inches
 # Margins around the box seen, and its largest height, in inches.
 _LEFT, _RIGHT, _TICKS, _TALLEST = 0.8, 0.8, 0.5, 5.0
 _LABEL_PADS = 6.0, 6.0, 4.0  # points; the label of z would leave the margin with more

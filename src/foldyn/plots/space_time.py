@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
@@ -83,16 +81,16 @@ def drawn_cells(found: xr.Dataset, quantity: str, limit: float | None, title: st
     if limit is None:
         later = shown.values[:, len(places) // 4 if quantity == "strain" else 0 :]
         limit = float(np.abs(later).max()) or 1.0
-    figure = style.new_figure(6.2, 4.6, title)
-    axes = figure.subplots()
-    style.frame(axes, "cell", "time (s)")
+    figure, axes = style.single((6.2, 4.6), title, "cell", "time (s)")
     mesh = axes.pcolormesh(
         places, found["time"].values, shown.values, cmap=SIGNED, vmin=-limit, vmax=limit,
         shading="nearest", rasterized=True,
     )  # fmt: skip
     name = quantity if quantity == "strain" else f"{found.attrs['component']} {quantity}"
     units = shown.attrs["units"]
-    _scale(figure, axes, mesh, name if units == "1" else f"{name} ({units})", "both")
+    label = name if units == "1" else f"{name} ({units})"
+    style.color_bar(figure, mesh, label, ax=axes, extend="both")
+    axes.grid(False)
     return style.finish(figure)
 
 
@@ -135,14 +133,13 @@ def plot_wave_spectrum(
     if max_frequency is not None:
         top = number("max_frequency", max_frequency, above=0.0, unit="Hz")
     level = np.log10(np.maximum(size / (size.max() or 1.0), 10.0**-DECADES))
-    figure = style.new_figure(6.2, 4.6, title)
-    axes = figure.subplots()
-    style.frame(axes, "phase (rad per cell)", "frequency (Hz)")
+    figure, axes = style.single((6.2, 4.6), title, "phase (rad per cell)", "frequency (Hz)")
     mesh = axes.pcolormesh(
         spectrum["phase"].values, frequency, level, cmap=STRENGTH, vmin=-DECADES, vmax=0.0,
         shading="nearest", rasterized=True,
     )  # fmt: skip
-    _scale(figure, axes, mesh, "amplitude over the largest (decades)")
+    style.color_bar(figure, mesh, "amplitude over the largest (decades)", ax=axes)
+    axes.grid(False)
     keys = []
     if bands is not None:
         if "wave_vector" not in alone("bands", bands) or bands["wave_vector"].shape[1] != 1:
@@ -215,11 +212,3 @@ def plot_transmission(
         keys.append(style.key("waves of the repeated chain", **look))
     lower.set_ylim(-0.05 * top, 1.25 * top or 1.0)
     return style.finish(figure, keys)
-
-
-def _scale(figure: Figure, axes: Axes, mesh: Any, label: str, extend: str = "neither") -> None:
-    bar = figure.colorbar(mesh, ax=axes, extend=extend)
-    bar.set_label(label, **style.TEXT)
-    bar.ax.tick_params(labelsize=style.TICK, labelcolor=style.BLACK, color=style.GRAY)
-    bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
-    axes.grid(False)

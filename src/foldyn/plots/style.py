@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
@@ -55,8 +56,8 @@ DPI = 150
 FAMILY = "DejaVu Sans"  # shipped with matplotlib: the same everywhere
 TITLE, LABEL, TICK, NOTE = 10.5, 9.0, 8.0, 7.5
 TEXT: dict[str, Any] = {"fontsize": LABEL, "color": BLACK}
+# Look of labels, and of notes inside a frame.
 FINE: dict[str, Any] = {"fontsize": NOTE, "color": BLACK}
-"""Look of labels, and of notes inside a frame."""
 
 
 def new_figure(width: float, height: float, title: str = "", constrained: bool = True) -> Figure:
@@ -128,6 +129,24 @@ def rows(
         frame(row, xlabel if row is axes[-1] else "", ylabels[k])
     figure.align_ylabels(list(axes))
     return figure, axes
+
+
+def single(
+    size: tuple[float, float], title: str, xlabel: str, ylabel: str, heading: str = ""
+) -> tuple[Figure, Axes]:
+    """Return a figure of a size (inches) with one frame; see `new_figure` and `frame`."""
+    figure = new_figure(*size, title)
+    axes = figure.subplots()
+    frame(axes, xlabel, ylabel, heading)
+    return figure, axes
+
+
+def color_bar(figure: Figure, drawn: ScalarMappable, label: str, **place: Any) -> None:
+    """Add a bar with the colors of what is drawn; its place is as for `Figure.colorbar`."""
+    bar = figure.colorbar(drawn, **place)
+    bar.set_label(label, **TEXT)
+    bar.ax.tick_params(labelsize=TICK, labelcolor=BLACK, color=GRAY)
+    bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
 
 
 def line_style(index: int) -> dict:

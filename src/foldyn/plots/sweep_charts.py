@@ -22,10 +22,8 @@ from foldyn.results.sweep_dataset import (
 )
 from foldyn.values import choice
 
-MOST_LINES = 12
-"""Most curves in one chart."""
-RATIO = 30.0
-"""Least ratio of the largest to the smallest value for a logarithmic axis."""
+MOST_LINES = 12  # most curves in one chart
+RATIO = 30.0  # least ratio of the largest to the smallest value for a logarithmic axis
 
 
 def line_chart(

@@ -24,13 +24,7 @@ from foldyn.plots.sweep_charts import (
     named,
     places,
 )
-from foldyn.results.sweep_dataset import (
-    SobolIndices,
-    is_grid,
-    label,
-    measured,
-    parameters_of,
-)
+from foldyn.results.sweep_dataset import SobolIndices, is_grid, label, measured, parameters_of
 from foldyn.values import choice
 
 COLUMNS = 3
@@ -78,9 +72,7 @@ def plot_sweep_map(
     first, second = _two(sweep, x, y, at)
     if is_grid(sweep):
         check_left(found, (first, second))
-    figure = style.new_figure(6.2, 4.4, title)
-    axes = figure.subplots()
-    style.frame(axes, label(sweep[first]), label(sweep[second]))
+    figure, axes = style.single((6.2, 4.4), title, label(sweep[first]), label(sweep[second]))
     axes.grid(False)
     across, down = _places(axes, sweep[first], "x"), _places(axes, sweep[second], "y")
     if is_grid(sweep):
@@ -103,10 +95,7 @@ def plot_sweep_map(
         drawn = axes.scatter(across[there], down[there], linewidths=0.5, **look)
         missing = np.flatnonzero(~there)
         axes.plot(across[missing], down[missing], **_FAILED)
-    bar = figure.colorbar(drawn, ax=axes)
-    bar.set_label(named(found), **style.TEXT)
-    bar.ax.tick_params(labelsize=style.TICK, labelcolor=style.BLACK, color=style.GRAY)
-    bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
+    style.color_bar(figure, drawn, named(found), ax=axes)
     return style.finish(figure, [style.key("no value", **_FAILED)] if len(missing) else ())
 
 
@@ -207,9 +196,8 @@ def plot_sobol_indices(indices: SobolIndices, title: str = "") -> Figure:
     if not isinstance(indices, SobolIndices):
         raise InputError("indices: give what foldyn.results.sobol_indices returns")
     places = np.arange(len(indices.names))
-    figure = style.new_figure(max(3.6, 1.2 + 0.9 * len(places)), 3.4, title)
-    axes = figure.subplots()
-    style.frame(axes, "", "share of the variance")
+    size = max(3.6, 1.2 + 0.9 * len(places)), 3.4
+    figure, axes = style.single(size, title, "", "share of the variance")
     keys = []
     for k, (name, values, interval, color) in enumerate((
         ("alone (first order)", indices.first, indices.first_interval, style.BLUE),

@@ -22,8 +22,7 @@ from foldyn.values import number
 from foldyn.values import whole as whole_number
 from foldyn.writing import whole
 
-DPI = {".gif": 100, ".mp4": 200}
-"""Dots per inch of an animation by the file's suffix."""
+DPI = {".gif": 100, ".mp4": 200}  # dots per inch of an animation by the file's suffix
 _FASTEST = {".gif": 50, ".mp4": 60}  # viewers slow down GIFs with shorter frames
 _COLORS = 128  # for all pictures of a GIF: 256 per picture would take three times the space
 _SAMPLES = 8  # number of pictures that these colors are taken from
@@ -100,8 +99,8 @@ class Mp4Writer(FFMpegWriter):
         return find_ffmpeg()
 
 
+# Writers of an animation by the file's suffix.
 WRITERS = dict(zip((f".{kind}" for kind in ANIMATIONS), (GifWriter, Mp4Writer), strict=True))
-"""Writers of an animation by the file's suffix."""
 
 
 def checked_file(path: str | PathLike[str], frames: int, fps: int) -> Path:

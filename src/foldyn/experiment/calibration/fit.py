@@ -25,10 +25,8 @@ from foldyn.sweeps.evaluations import Evaluation, Evaluations
 from foldyn.sweeps.pool import Pool, pool_of
 from foldyn.values import number, whole
 
-PREDICTED = "predicted"
-"""Name of an evaluation's predictions."""
-SLOPES = "slopes"
-"""Name of their derivatives with respect to the parameters."""
+PREDICTED = "predicted"  # name of an evaluation's predictions
+SLOPES = "slopes"  # name of their derivatives with respect to the parameters
 
 
 class Point(NamedTuple):
@@ -69,14 +67,12 @@ def evaluate(problem: Problem, point: Point) -> Evaluation:
     return Evaluation(found, why, seconds=time.perf_counter() - began)
 
 
+# Change of a parameter, in its scale, for a difference quotient: well above the solvers' noise.
 STEP = 1e-3
-"""Change of a parameter, in its scale, for a difference quotient: well above the solvers' noise."""
-ENOUGH = 1e-5
-"""Relative change of the parameters at which a search ends."""
-LEVEL = 1e-8
-"""Relative decrease of the cost at which a search ends."""
-TRIED = 60
-"""Most steps of a search."""
+ENOUGH = 1e-5  # relative change of the parameters at which a search ends
+LEVEL = 1e-8  # relative decrease of the cost at which a search ends
+TRIED = 60  # most steps of a search
+# Reasons for the end of a search, by the status of `least_squares`.
 WHY = {
     0: f"given up after {TRIED} steps",
     1: "the cost has no slope left",
@@ -84,15 +80,11 @@ WHY = {
     3: "the parameters move no more",
     4: "neither cost nor parameters move any more",
 }
-"""Reasons for the end of a search, by the status of `least_squares`."""
 
-MOST_PROCESSES = 1024
-"""Most parallel processes; a larger number is a typing error."""
+MOST_PROCESSES = 1024  # most parallel processes; a larger number is a typing error
 
-COUNTED = ("computed", "found")
-"""Counts of a `Course`."""
-Outcome = NDArray[np.float64] | str
-"""All predictions in a row, or the reason for their absence."""
+COUNTED = ("computed", "found")  # counts of a `Course`
+Outcome = NDArray[np.float64] | str  # all predictions in a row, or the reason for their absence
 
 
 @dataclass(frozen=True)

@@ -36,13 +36,13 @@ CLASSES = {
         ModeShapes, FrequencyResponse,
     )
 }  # fmt: skip
+# Fields of measurements that come from their file, or have another name in a fit file.
 MADE = (
     "kind", "case", "changes", "held_out", "displacement", "force", "values", "time", "frequency",
     "axes", "mode", "damping_ratio",
 )  # fmt: skip
-"""Fields of measurements that come from their file, or have another name in a fit file."""
+# Kinds whose nodes a fit file must name.
 NAMED = (TimeHistory.kind, Spectrum.kind, FrequencyResponse.kind)
-"""Kinds whose nodes a fit file must name."""
 
 
 def _case(name: str, value: Any, folder: Path, find: Callable[[str], Path] | None) -> Path:

@@ -233,8 +233,7 @@ def _draw(name: str, *arguments: Any) -> Any:
     return getattr(fit_figures, name)(*arguments)
 
 
-FLOOR = 1e-300
-"""Magnitude that represents zero in decibels."""
+FLOOR = 1e-300  # magnitude that represents zero in decibels
 
 
 def charts_of(one: Measurement, result: Any, case: Case) -> list[Chart]:

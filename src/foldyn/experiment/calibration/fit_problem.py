@@ -36,16 +36,13 @@ from foldyn.input_files import path_of
 from foldyn.program import program
 from foldyn.values import listed, show
 
+# Fields of measurements that do not affect predictions.
 ASIDE = ("name", "label", "sigma", "held_out", "case", "force")
-"""Fields of measurements that do not affect predictions."""
+# Tables of a case file that define its structure.
 STRUCTURAL = "pattern", "sheet", "model", "supports"
-"""Tables of a case file that define its structure."""
-VIBRATIONS = ("modes", "frf")
-"""Analyses whose results are examined before a search."""
-MESH_ORDER = 2
-"""Order of convergence of a shell's elements."""
-Predicted = dict[int, NDArray[np.float64]]
-"""Predictions by the number of the measurement."""
+VIBRATIONS = ("modes", "frf")  # analyses whose results are examined before a search
+MESH_ORDER = 2  # order of convergence of a shell's elements
+Predicted = dict[int, NDArray[np.float64]]  # predictions by the number of the measurement
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,10 +24,10 @@ from foldyn.experiment.calibration.measurement import Measurement, spread
 from foldyn.results import netcdf
 from foldyn.writing import plain, write_json, write_text
 
+# Singular value, relative to the largest, below which a direction is not determined at all.
 WEAK = 1e-5
-"""Singular value, relative to the largest, below which a direction is not determined at all."""
+# Component of a parameter along such a direction above which it counts as not determined.
 PART = 0.1
-"""Component of a parameter along such a direction above which it counts as not determined."""
 
 
 @dataclass(frozen=True)
@@ -190,8 +190,7 @@ class Uncertainty:
         return tuple(Estimate(*row) for row in rows)
 
 
-RARE = 0.01
-"""Probability of a misfit by noise alone, below which there must be another cause."""
+RARE = 0.01  # probability of a misfit by noise alone, below which there must be another cause
 
 
 @brief

@@ -20,8 +20,7 @@ from foldyn.signals import sampling_interval, spectrum
 from foldyn.values import choice, number, numbers, show
 
 DETRENDS = (None, "constant", "linear")
-REFINED = 8
-"""Newton steps that refine the time shift: they converge quadratically."""
+REFINED = 8  # Newton steps that refine the time shift: they converge quadratically
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -15,13 +15,10 @@ from foldyn.errors import InputError
 from foldyn.experiment.calibration.measurement import AtNodes, NodeValues, check_axes, column
 from foldyn.values import choice
 
-IMPOSED = "imposed"
-"""Selects all nodes that supports of the case move along the axis."""
+IMPOSED = "imposed"  # selects all nodes that supports of the case move along the axis
 QUANTITIES = ("displacement", "position")
-MOST = 8
-"""Most nodes, and shapes, in pages and figures."""
-POINTS = 25
-"""Points of the curve through measured forces."""
+MOST = 8  # most nodes, and shapes, in pages and figures
+POINTS = 25  # points of the curve through measured forces
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -282,6 +282,7 @@ def _texts(given: Any) -> bool:
     return isinstance(given, list | tuple) and all(isinstance(one, str) for one in given)
 
 
+# Function that reads each kind of measurement: ``reader(file, **arguments)`` returns it.
 READERS: Mapping[str, Any] = {
     ForceDisplacement.kind: force_displacement,
     Shapes.kind: shapes,
@@ -292,4 +293,3 @@ READERS: Mapping[str, Any] = {
     ModeShapes.kind: mode_shapes,
     FrequencyResponse.kind: frf,
 }
-"""Function that reads each kind of measurement: ``reader(file, **arguments)`` returns it."""

@@ -23,12 +23,9 @@ from foldyn.experiment.calibration.measurement import (
 from foldyn.linear import mac, pair_modes
 from foldyn.values import numbers, show
 
-LEAST = 0.5
-"""Least MAC of a partner."""
-CLOSE = 0.1
-"""Least difference of the MAC with two modes of the model for a unique partner."""
-FEWEST = 2
-"""Least number of components of a shape: a single one resembles any other."""
+LEAST = 0.5  # least MAC of a partner
+CLOSE = 0.1  # least difference of the MAC with two modes of the model for a unique partner
+FEWEST = 2  # least number of components of a shape: a single one resembles any other
 
 
 class Pairing(NamedTuple):

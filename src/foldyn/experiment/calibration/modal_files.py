@@ -30,15 +30,15 @@ from foldyn.results.netcdf import read
 from foldyn.results.quantities import RESPONSES
 from foldyn.values import choice, indices, show
 
+# Unit that each kind of modal value is converted to.
 UNIT: Mapping[str, str] = {"frequency": "Hz", "damping_ratio": "-"}
-"""Unit that each kind of modal value is converted to."""
+# Units of each quantity of a response in a CSV file.
 UNITS_OF: Mapping[str, Sequence[str]] = {
     **{name: tuple(UNITS[name]) for name in PER_FORCE},
     MOTION: tuple(UNITS["number without unit"]),
 }
-"""Units of each quantity of a response in a CSV file."""
+# Parts of a response in columns such as "node 8 x real".
 PARTS = ("real", "imag", "magnitude", "sigma")
-"""Parts of a response in columns such as "node 8 x real"."""
 
 
 def frequencies(

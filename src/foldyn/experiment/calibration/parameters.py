@@ -15,17 +15,15 @@ from foldyn.arguments import brief
 from foldyn.errors import InputError
 from foldyn.values import number, show, suggest, whole
 
-NEAR = 1e-4
-"""Change of a scaled parameter for differences of neighboring solutions."""
+NEAR = 1e-4  # change of a scaled parameter for differences of neighboring solutions
 FIRST = ((0, -1.0), (1, 1.0)), ((0, 1.0), (-1, -1.0))
+# Steps and weights of difference quotients by order; later ones apply if a bound is near.
 SECOND = (
     ((1, 0.5), (-1, -0.5)),
     ((0, -1.5), (1, 2.0), (2, -0.5)),
     ((0, 1.5), (-1, -2.0), (-2, 0.5)),
 )
-"""Steps and weights of difference quotients by order; later ones apply if a bound is near."""
-MOST_SEARCHES = 100_000
-"""Most searches; a larger number is a typing error."""
+MOST_SEARCHES = 100_000  # a larger number is a typing error
 
 
 @dataclass(frozen=True)

@@ -25,15 +25,14 @@ from foldyn.linear.modes import spectrum_of
 from foldyn.patterns import Pattern
 from foldyn.values import show
 
-STEADY = "generalized_alpha"
-"""Integrator of a fit if the case file does not choose one."""
+STEADY = "generalized_alpha"  # integrator of a fit if the case file does not choose one
+# Relative change at which iterations for differences of motions end: in a search, at its end.
 SHARES = 1e-4, 1e-6
-"""Relative change at which iterations for differences of motions end: in a search, at its end."""
+# Analyses whose neighbors are computed more accurately than the result, so that it is recomputed as
+# one.
 REFINED = "statics", "modes"
-"""Analyses whose neighbors are computed more accurately than the result, so that it is recomputed
-as one."""
+# Number of coordinates above which modes are as quick to compute as differences to neighbors.
 MANY = 2000
-"""Number of coordinates above which modes are as quick to compute as differences to neighbors."""
 
 
 @dataclass(frozen=True, eq=False)

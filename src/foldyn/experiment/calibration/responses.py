@@ -18,8 +18,7 @@ from foldyn.linear.frf import METHODS
 from foldyn.results.quantities import RESPONSES
 from foldyn.values import choice, show
 
-MOTION = "transmissibility"
-"""The quantity of a moving base; the others are per force."""
+MOTION = "transmissibility"  # the quantity of a moving base; the others are per force
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

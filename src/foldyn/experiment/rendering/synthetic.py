@@ -20,8 +20,8 @@ from foldyn.experiment.rendering.picture import Look, Sensor, Studio
 from foldyn.results import case_of
 from foldyn.values import number
 
+# Codec by the file's suffix: FFV1 is lossless, mp4v is lossy.
 CODECS = {".mkv": "FFV1", ".avi": "FFV1", ".mp4": "mp4v"}
-"""Codec by the file's suffix: FFV1 is lossless, mp4v is lossy."""
 
 
 @brief

@@ -18,11 +18,10 @@ from foldyn.experiment.camera import opencv
 from foldyn.input_files import check_file
 from foldyn.values import number
 
+# Suffixes of photographs; all other files are films.
 PHOTOS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp")
-"""Suffixes of photographs; all other files are films."""
 
-Box = tuple[int, int, int, int]
-"""Column and row of the first pixel, width and height."""
+Box = tuple[int, int, int, int]  # column and row of the first pixel, width and height
 
 
 @dataclass(frozen=True)

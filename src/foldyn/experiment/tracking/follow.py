@@ -29,11 +29,10 @@ _SURE = 0.3  # the same for its neighbors, so that a guide is trusted for a lost
 _CLEAR = 0.55  # share of the allowed error for a corner of few edges to be found again
 _MOST_MISSES = 3  # frames after which a lost corner of two edges is found again only with a guide
 
+# Maps the positions of points (p, 2), NaN if lost, to their predicted positions.
+#
+# A prediction is NaN if unknown, infinite if the point is hidden.
 Guide = Callable[[Array], Array]
-"""Maps the positions of points (p, 2), NaN if lost, to their predicted positions.
-
-A prediction is NaN if unknown, infinite if the point is hidden.
-"""
 
 
 @dataclass(frozen=True)

@@ -25,12 +25,9 @@ from foldyn.report.sections import Charts, Heading, Picture, Section, Table, Tex
 from foldyn.shells import shell
 from foldyn.viewer import Backdrop, Stage, projection, stage
 
-MOST = 3
-"""Most nodes in charts."""
-ROOM = 4_000_000
-"""Most bytes of the pictures of a page."""
-SEEN = 0.9
-"""Relative to the frames of the best-measured node: nodes with fewer are not shown."""
+MOST = 3  # most nodes in charts
+ROOM = 4_000_000  # most bytes of the pictures of a page
+SEEN = 0.9  # relative to the frames of the best-measured node: nodes with fewer are not shown
 FILLED = (
     "Dots are what was measured. The sheet in three dimensions is filled where nothing was: a node "
     "that was lost for some frames moves evenly between them, one that was never seen moves as its "

@@ -136,12 +136,7 @@ class View:
 
 
 def fit_view(
-    view: View,
-    points: Array,
-    uv: Array,
-    scaled: bool,
-    placed: bool,
-    shapes: Array | None = None,
+    view: View, points: Array, uv: Array, scaled: bool, placed: bool, shapes: Array | None = None
 ) -> tuple[View, float, float]:
     """Fit a view to points and their pixels.
 
