@@ -8,9 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from foldyn.studies.fidelity import motion_results as motions
-from foldyn.studies.fidelity.internal import first_table
+from foldyn.studies.fidelity.compare import RESULTS, columns, first_table, read, summary
 from foldyn.studies.fidelity.mixed_models import counted, gap_table, mixed_table
-from foldyn.studies.fidelity.stored import RESULTS, columns, read, summary
 
 PAGE = Path(__file__).with_name("fidelity.md")
 SHOWN = ("plate, consistent", "n5b8e, condensed", "standard, mixed_voronoi")

@@ -12,7 +12,7 @@ from foldyn.errors import StretchWarning
 from foldyn.structures.stretching import stretch, stretching
 from foldyn.studies import find_case
 from foldyn.studies.fidelity.compare import structure_of
-from foldyn.studies.fidelity.gaps import gaps
+from foldyn.studies.fidelity.mixed import gaps
 from foldyn.studies.fidelity.references import read_references, stored
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)

@@ -14,20 +14,28 @@ from foldyn.linear.small_loads import small_loads
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
 from foldyn.studies.fidelity import __main__ as command
 from foldyn.studies.fidelity import independent
-from foldyn.studies.fidelity.cases import FidelityCase, documented, polygons, supports
-from foldyn.studies.fidelity.compare import MODELS, compare, first_modes, reference
-from foldyn.studies.fidelity.drawn import drawn, sheets
-from foldyn.studies.fidelity.internal import AMPLITUDES
-from foldyn.studies.fidelity.large import twisted, under_loads
-from foldyn.studies.fidelity.statics import study
-from foldyn.studies.fidelity.stored import (
+from foldyn.studies.fidelity.cases import (
+    FidelityCase,
+    documented,
+    drawn,
+    polygons,
+    sheets,
+    supports,
+)
+from foldyn.studies.fidelity.compare import (
+    AMPLITUDES,
+    MODELS,
     RESULTS,
     Modes,
+    compare,
+    first_modes,
     read,
+    reference,
     summary,
     summary_of,
     write,
 )
+from foldyn.studies.fidelity.statics import study, twisted, under_loads
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 SETS = ("documented", "drawn")

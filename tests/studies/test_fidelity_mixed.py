@@ -9,6 +9,7 @@ import pytest
 
 from foldyn.patterns.topology import edge_lookup
 from foldyn.studies.fidelity import mixed_models
+from foldyn.studies.fidelity.compare import NEAR, RESULTS, read
 from foldyn.studies.fidelity.mixed import KINDS, LARGE, SETS, SUPPORTS, mixed, quads
 from foldyn.studies.fidelity.references import (
     case_sets,
@@ -18,7 +19,6 @@ from foldyn.studies.fidelity.references import (
     read_references,
     stored,
 )
-from foldyn.studies.fidelity.stored import NEAR, RESULTS, read
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,6 @@ from foldyn.linear.reference import elastic as modes_of
 from foldyn.linear.reference import modes_at_rest
 from foldyn.studies.fidelity import motions
 from foldyn.studies.fidelity.cases import documented
-from foldyn.studies.fidelity.large import LAWS
 from foldyn.studies.fidelity.motion_results import (
     SHELL,
     STORED,
@@ -29,8 +28,17 @@ from foldyn.studies.fidelity.motion_results import (
     untold,
     write,
 )
-from foldyn.studies.fidelity.motions import Motion, Started, released, runs, structures
-from foldyn.studies.fidelity.release import Release, fold_of, vertex_mass
+from foldyn.studies.fidelity.motions import (
+    Motion,
+    Release,
+    Started,
+    fold_of,
+    released,
+    runs,
+    structures,
+    vertex_mass,
+)
+from foldyn.studies.fidelity.statics import LAWS
 from foldyn.studies.fidelity.stretching import pressed, sheet, stiffness, tower
 
 

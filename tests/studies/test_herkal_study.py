@@ -171,19 +171,19 @@ def test_other_settings_and_damaged_files_are_computed_again(tmp_path):
     job = Job("case1", "panel", "motion", SHORT)
     for damage in (b"cut short", None):
         if damage is None:  # one bit
-            sound = (tmp_path / job.file).read_bytes()
+            sound = job.file(tmp_path).read_bytes()
             damage = sound[:3000] + bytes([sound[3000] ^ 1]) + sound[3001:]
-        (tmp_path / job.file).write_bytes(damage)
-        with pytest.warns(FoldynWarning, match=f"{job.file}: is damaged.*computed again"):
-            assert runs.stored(tmp_path, job) is None
+        job.file(tmp_path).write_bytes(damage)
+        with pytest.warns(FoldynWarning, match=f"{job.name}.nc: is damaged.*computed again"):
+            assert job.result(tmp_path) is None
         with pytest.warns(FoldynWarning, match="computed again"):
             pool.run([job], tmp_path, processes=1)
-        assert runs.stored(tmp_path, job) is not None
+        assert job.result(tmp_path) is not None
     finer = replace(job, numerics=replace(SHORT, divisions=4, dt=0.01))
-    assert runs.stored(tmp_path, finer) is not None  # of the shell alone
+    assert finer.result(tmp_path) is not None  # of the shell alone
     longer = replace(job, numerics=replace(SHORT, duration=0.6))
-    assert runs.stored(tmp_path, longer) is None
-    assert runs.stored(tmp_path, replace(job, variant=LINEAR)) is None
+    assert longer.result(tmp_path) is None
+    assert replace(job, variant=LINEAR).result(tmp_path) is None
     for model in (REFERENCE, "n5b8e"):  # these have steps of their own
         coarse, fine = (Job("case1", model, "motion", n) for n in (SHORT, finer.numerics))
         assert coarse.settings() != fine.settings()
@@ -207,7 +207,7 @@ def test_one_failure_does_not_stop_the_others(tmp_path, monkeypatch):
 def test_results_are_those_of_the_vertices(tmp_path):
     job = Job("case2", REFERENCE, "path", SHORT)
     pool.run([job], tmp_path, processes=1)
-    found = runs.stored(tmp_path, job)
+    found = job.result(tmp_path)
     assert found.sizes["node"] == 9
     case_file = fd.read_case(fd.studies.find_case("herkal/case2"))
     whole = fd.trace(case_with(case_file, REFERENCE, divisions=2), steps=runs.STEPS)
@@ -236,7 +236,7 @@ def small(tmp_path_factory):
     shell = Job("case1", REFERENCE, "motion", plan.numerics)
     pool.run([job for job in plan.jobs() if job != shell], folder, processes=1)
     panel = study.result("case1", "panel", "motion")
-    runs.KEPT.keep(folder / shell.file, shell.settings(), panel)
+    shell.store.keep(shell.file(folder), shell.settings(), panel)
     return Study(plan, study.folder)
 
 

@@ -1,34 +1,79 @@
-"""Tasks run in processes; each keeps its own result, so that interrupted work resumes."""
+"""Tasks run in processes; each keeps its own result, so that interrupted work resumes.
+
+A file records the settings of its task and a digest of the program's sources: results of another
+program are recomputed.
+"""
 
 from __future__ import annotations
 
 import time
 import warnings
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Protocol
+from typing import Any, ClassVar
+
+import xarray
 
 from foldyn.errors import OF_MODELS, FoldynError, FoldynWarning
+from foldyn.store import Store
 from foldyn.sweeps.pool import pool_of
 
+SETTINGS = "study_settings"
 
-class Task(Protocol):
-    """A computation; it is hashable and can be sent to another process."""
+
+class Task(ABC):
+    """A computation whose result is a file, `name` with a `suffix`, in a `store`.
+
+    It is hashable and can be sent to another process.
+    """
+
+    store: ClassVar[Store[Any]]
+    suffix: ClassVar[str] = ".nc"
 
     @property
+    @abstractmethod
     def name(self) -> str:
-        """Name of the task."""
-        ...
+        """Name of the task, and of its file."""
+
+    @abstractmethod
+    def settings(self) -> dict[str, Any]:
+        """Everything that its result depends on."""
+
+    @abstractmethod
+    def compute(self, folder: Path) -> Any:
+        """Compute its result, which may depend on others in the folder."""
+
+    def file(self, folder: Path) -> Path:
+        """File of its result in a folder."""
+        return folder / f"{self.name}{self.suffix}"
+
+    def result(self, folder: Path) -> Any:
+        """Its result in a folder; None if missing or computed with other settings."""
+        return self.store.find(self.file(folder), self.settings())
 
     def there(self, folder: Path) -> bool:
         """Whether its result is in a folder."""
-        ...
+        return self.result(folder) is not None
 
     def make(self, folder: Path) -> None:
         """Compute its result into a folder."""
-        ...
+        self.store.keep(self.file(folder), self.settings(), self.compute(folder))
+
+
+def datasets(read: Callable[[Path], xarray.Dataset], write: Callable[..., Any]) -> Store:
+    """Store of datasets that are read and written by these functions."""
+
+    def stamped(file: Path) -> tuple[str, xarray.Dataset]:
+        found = read(file)
+        return found.attrs.get(SETTINGS, ""), found
+
+    def stamp(file: Path, settings: str, result: xarray.Dataset) -> None:
+        write(result.assign_attrs({SETTINGS: settings}), file)
+
+    return Store(stamped, stamp)
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,17 @@ import argparse
 import sys
 from pathlib import Path
 
-from foldyn.studies.fidelity.cases import documented
-from foldyn.studies.fidelity.compare import reference
-from foldyn.studies.fidelity.drawn import COUNT, COUNT_SHEETS, SEED, drawn, sheets
-from foldyn.studies.fidelity.internal import first_table, modes_first
-from foldyn.studies.fidelity.large import large_table
-from foldyn.studies.fidelity.statics import statics_table
-from foldyn.studies.fidelity.stored import RESULTS, modes_below, table, write
+from foldyn.studies.fidelity.cases import COUNT, COUNT_SHEETS, SEED, documented, drawn, sheets
+from foldyn.studies.fidelity.compare import (
+    RESULTS,
+    first_table,
+    modes_below,
+    modes_first,
+    reference,
+    table,
+    write,
+)
+from foldyn.studies.fidelity.statics import large_table, statics_table
 
 
 def main(arguments: list[str] | None = None) -> int:

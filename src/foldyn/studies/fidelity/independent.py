@@ -20,7 +20,7 @@ from foldyn.algebra.extrapolation import extrapolated
 from foldyn.materials import EnhancedLinear
 from foldyn.structures import discretize
 from foldyn.studies.fidelity.cases import FidelityCase, documented
-from foldyn.studies.fidelity.stored import RESULTS, read
+from foldyn.studies.fidelity.compare import RESULTS, read
 from foldyn.studies.herkal.opensees.model import PanelShells
 
 STORED = RESULTS / "opensees.csv"

@@ -16,24 +16,29 @@ from pathlib import Path
 import numpy as np
 
 from foldyn.structures.plate_frequency import BELOW
-from foldyn.studies.fidelity.compare import FIRST, Row, all_rows
-from foldyn.studies.fidelity.mixed import SETS, SUPPORTS, MixedCase
-from foldyn.studies.fidelity.references import (
-    Stored,
-    case_sets,
-    certain,
-    read_references,
-    stored,
+from foldyn.studies.fidelity.compare import (
+    ERRORS,
+    FIRST,
+    RESULTS,
+    Modes,
+    Row,
+    all_rows,
+    columns,
+    markdown,
+    read,
+    summary_of,
+    write,
 )
-from foldyn.studies.fidelity.stored import RESULTS, Modes, columns, read, summary_of, write
+from foldyn.studies.fidelity.mixed import SETS, SUPPORTS, MixedCase
+from foldyn.studies.fidelity.references import Stored, case_sets, certain, read_references, stored
 
+# Compared models and their internal amplitudes, by name in the table.
 BESIDE = {
     "plate": ("plate, consistent", 0),
     "n5b8e": ("n5b8e, condensed", 0),
     "n5b8e, internal": ("n5b8e, condensed", 3),
     "n5b8e, bars": ("n5b8e, condensed, bars", 0),
 }
-"""Compared models and their internal amplitudes, by name in the table."""
 
 
 def references(name: str, folder: Path = RESULTS) -> list[tuple[MixedCase, Stored]]:
@@ -53,10 +58,7 @@ def compared(case: MixedCase, true: Stored) -> Modes:
 
 def mixed_table(found: Sequence[tuple[MixedCase, Modes]]) -> str:
     """Errors by support in Markdown, towers apart."""
-    lines = [
-        "| held | modes | model | median | 90th percentile | within 5 % | MAC above 0.95 | lost |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
+    lines = []
     sheets = [(case, modes) for case, modes in found if case.kind != "kresling"]
     groups = {
         "all, below 0.6": ([modes for _, modes in sheets], True),
@@ -68,20 +70,20 @@ def mixed_table(found: Sequence[tuple[MixedCase, Modes]]) -> str:
         for name in BESIDE:
             rows = [row for modes in group for row in modes.rows[name] if counts(row, low)]
             if rows:
-                lines.append(f"| {title} | {len(rows)} | `{name}` | {columns(summary_of(rows))} |")
-    return "\n".join(lines)
+                lines.append([title, len(rows), f"`{name}`", columns(summary_of(rows))])
+    return markdown(["held", "modes", "model", *ERRORS], lines)
 
 
 def gap_table(found: Sequence[Modes]) -> str:
     """Errors of each case in Markdown: of low modes, and of the first five."""
     models = list(BESIDE)[:3]
     heads = [*(f"{name}, below 0.6" for name in models[:2]), *(f"{name}, f1-f5" for name in models)]
-    lines = [f"| | {' | '.join(heads)} |", "|---|" + "---|" * len(heads)]
+    rows = []
     for modes in found:
         cells = [_span(modes.rows[name], low=True) for name in models[:2]]
         cells += [_span(modes.rows[name], low=False) for name in models]
-        lines.append(f"| {modes.case} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        rows.append([modes.case, *cells])
+    return markdown(["", *heads], rows)
 
 
 def _span(rows: Sequence[Row], low: bool) -> str:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foldyn.studies.fidelity.cases import documented
-from foldyn.studies.fidelity.stored import ALIKE, NEAR, RESULTS
+from foldyn.studies.fidelity.compare import ALIKE, NEAR, RESULTS, markdown
 
 STORED = RESULTS / "motions.csv"
 SHELL = "shell"
@@ -166,25 +166,22 @@ def size(start: str) -> str:
 
 def summaries(found: list[Run]) -> str:
     """Errors by model and amplitude, in Markdown."""
-    lines = [
-        "| start | model | runs | period within 5 % | median error | 90th percentile "
-        "| median MAC | MAC above 0.95 |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
     models = compared(found)
     starts = dict.fromkeys(size(b.start) for b in next(iter(models.values()), []))
+    rows = []
     for chosen in [*starts, "all"]:
-        for model, rows in models.items():
-            kept = [b for b in rows if chosen in (size(b.start), "all")]
-            lines.append(f"| {chosen} | {model} | {_summary(kept)} |")
-    return "\n".join(lines)
+        for model, every in models.items():
+            kept = [b for b in every if chosen in (size(b.start), "all")]
+            rows.append([chosen, model, *_summary(kept)])
+    heads = ["start", "model", "runs", "period within 5 %", "median error", "90th percentile"]
+    return markdown([*heads, "median MAC", "MAC above 0.95"], rows)
 
 
-def _summary(rows: list[Beside]) -> str:
+def _summary(rows: list[Beside]) -> list[str]:
     error = np.abs([b.error for b in rows])
     alike = np.array([b.mac for b in rows])
     median, ninetieth = np.percentile(error, [50, 90], method="higher")
     shares = [100 * (error < NEAR).mean(), 100 * median, 100 * ninetieth]
     near, middle, most = (f"{value:.3g} %" for value in shares)
     good = f"{100 * (alike > ALIKE).mean():.0f} %"
-    return f"{len(rows)} | {near} | {middle} | {most} | {np.median(alike):.3f} | {good}"
+    return [str(len(rows)), near, middle, most, f"{np.median(alike):.3f}", good]

@@ -31,10 +31,8 @@ from foldyn.linear.reference import SAME_PLACE, reference_modes
 from foldyn.patterns import Pattern
 from foldyn.shells import shell
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
-from foldyn.studies.fidelity.compare import COMPARED, FIRST
-from foldyn.studies.fidelity.gaps import gaps
-from foldyn.studies.fidelity.mixed import FINE, SETS, MixedCase, mixed
-from foldyn.studies.fidelity.stored import RESULTS
+from foldyn.studies.fidelity.compare import COMPARED, FIRST, RESULTS
+from foldyn.studies.fidelity.mixed import FINE, SETS, MixedCase, gaps, mixed
 
 STEPS = 127  # resolution of a byte, relative to a shape's largest component
 CERTAIN = 0.015  # largest estimated error of a reference

@@ -27,6 +27,7 @@ from foldyn.statics import trace
 from foldyn.structures import Sheet, discretize
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.presets import resolved
+from foldyn.studies.fidelity.compare import markdown
 
 MODELS: Mapping[str, Mapping[str, Any]] = {
     "standard": {"preset": "herkal", "bend_law": "linear"},
@@ -123,24 +124,24 @@ def pressed(held: Held, way: float = PRESSED, steps: int = STEPS) -> dict[str, N
     return _errors(held, measure)
 
 
-def _line(what: str, found: Mapping[str, NDArray], k: int, unit: str) -> str:
-    errors = " | ".join(f"{100 * found[name][k]:+.1f} %" for name in MODELS)
-    return f"| {what} | {found['shell'][k]:.3g} {unit} | {errors} |"
+def _row(what: str, found: Mapping[str, NDArray], k: int, unit: str) -> list[str]:
+    errors = [f"{100 * found[name][k]:+.1f} %" for name in MODELS]
+    return [what, f"{found['shell'][k]:.3g} {unit}", *errors]
 
 
 def tables() -> str:
     """Both tables in Markdown."""
-    lines = [f"| | shell | {' | '.join(MODELS)} |", "|---|---|" + "---|" * len(MODELS)]
+    rows = []
     held = sheet()
     for axis, what in ENDS.items():
-        lines.append(_line(f"{held.name}, {what}", stiffness(held, axis), 0, "N/m"))
+        rows.append(_row(f"{held.name}, {what}", stiffness(held, axis), 0, "N/m"))
     for held in (tower(1e-3), tower(3e-4)):
-        lines.append(_line(f"{held.name}, pressed", stiffness(held, "z"), 0, "N/m"))
+        rows.append(_row(f"{held.name}, pressed", stiffness(held, "z"), 0, "N/m"))
     held = tower(1e-3)
     found = pressed(held)
-    lines.append(_line(f"{held.name}: force at which it snaps", found, 0, "N"))
-    lines.append(_line(f"{held.name}: energy at {1e3 * PRESSED:g} mm", found, 1, "J"))
-    return "\n".join(lines)
+    rows.append(_row(f"{held.name}: force at which it snaps", found, 0, "N"))
+    rows.append(_row(f"{held.name}: energy at {1e3 * PRESSED:g} mm", found, 1, "J"))
+    return markdown(["", "shell", *MODELS], rows)
 
 
 if __name__ == "__main__":

@@ -30,8 +30,8 @@ from foldyn.studies import find_case
 from foldyn.writing import write_text
 
 FOLDS = {"sheet.length_scale_ratio": 2.7, "model.fold_law.theta1": 75.0}
+# Damping found in the paper, and the truth behind the synthetic data.
 DAMPING = {"damping.alpha": 14.4, "damping.beta": 4.1e-4}
-"""Damping found in the paper, and the truth behind the synthetic data."""
 MIRRORED = {"model.fold_law.theta2": "360 - model.fold_law.theta1"}
 FOLD_RANGES = (
     experiment.Parameter("sheet.length_scale_ratio", 2.0, 0.5, 10.0),
@@ -45,8 +45,8 @@ FULL = 0.056  # m, displacement of the top in the shipped case
 WEIGHTS = (0.125, 0.226, 0.312)  # N
 TOP = tuple(range(7))
 WATCHED = 8  # the paper's node 9
+# Nodes seen by a camera in front of the specimen, without the bottom row, which stands still.
 FRONT = tuple(7 * i + j for i in range(8) for j in (1, 3, 5))
-"""Nodes seen by a camera in front of the specimen, without the bottom row, which stands still."""
 SYNTHETIC = "synthetic"
 FORCE_ERROR = 2e-4  # N: scales read to 0.02 g
 STATIC_ERROR = 5e-5  # m: a corner in a photograph
@@ -57,6 +57,8 @@ TURNED = 0.05  # s from the release to the first turning point
 SEEN = 0.6  # s: length of the decaying free vibration
 STEP = 0.001  # s: step of the simulation
 BOTTOM = list(range(56, 63))
+# Supports of the bottom: a smooth plate (the static test's, ideal); the plate with node 59 glued to
+# it, as in the paper's text; the glue alone, without a plate.
 SUPPORTS: Mapping[str, list[dict[str, Any]]] = {
     "plate": [
         {"nodes": BOTTOM, "axes": "x"},
@@ -66,14 +68,11 @@ SUPPORTS: Mapping[str, list[dict[str, Any]]] = {
     "glued": [{"nodes": BOTTOM, "axes": "x"}, {"nodes": [59], "axes": "yz"}],
     "glue alone": [{"nodes": [59], "axes": "xyz"}],
 }
-"""Supports of the bottom: a smooth plate (the static test's, ideal); the plate with node 59 glued
-to it, as in the paper's text; the glue alone, without a plate."""
+# Displacement of the top before the release (m).
+#
+# From the 20 mm of the smallest weight this damping lets nothing swing: K0 stays what it was at
+# rest, and resists the large turns of the panels.
 PRESSED = 0.005
-"""Displacement of the top before the release (m).
-
-From the 20 mm of the smallest weight this damping lets nothing swing: K0 stays what it was at
-rest, and resists the large turns of the panels.
-"""
 
 
 def pressed(factors: Sequence[float] | NDArray, changes: Mapping[str, Any] | None = None) -> Any:

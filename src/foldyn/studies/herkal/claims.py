@@ -101,6 +101,7 @@ def best_overall(study: Study) -> float:
     return means["circumcenter"] / min(means.values()) if known else NO_VALUE
 
 
+# Claims by the key of their row, with the function that measures each; nan if it cannot.
 CLAIMS: Mapping[str, Callable[[Study], float]] = {
     # how differently the two nodes of the free edge move: two heavy corners lie across each panel
     "asymmetry_equi_inertial": partial(_asymmetry, models=("equi_inertial",)),
@@ -122,7 +123,6 @@ CLAIMS: Mapping[str, Callable[[Study], float]] = {
     "best_case4": partial(_over_best, case="case4", model="circumcenter"),
     "best_overall": best_overall,
 }
-"""Claims by the key of their row, with the function that measures each; nan if it cannot."""
 
 
 def claims(study: Study) -> list[Verdict]:

@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foldyn import plots
-from foldyn.analyses.provenance import Call
+from foldyn.analyses.provenance import Call, computed, inputs, inputs_table
 from foldyn.cases import Force
 from foldyn.plots import style
-from foldyn.report import Heading, Section, Table, Text, write_report
+from foldyn.report import Heading, Listing, Section, Table, Text, write_report
 from foldyn.report.album import Album
 from foldyn.report.sections import cell
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
@@ -25,19 +25,20 @@ from foldyn.studies.herkal.claims import claims, paper_table, table1, tolerance
 from foldyn.studies.herkal.metric import FAR, LEAST_MAC, best
 from foldyn.studies.herkal.runs import SECANT, reported
 from foldyn.studies.herkal.sheet_models import (
+    AS_FILED,
     REFERENCE,
     case_study,
+    case_with,
     label,
     model_of,
     paper_rules,
 )
 from foldyn.studies.herkal.specimen import page as specimen_page
 from foldyn.studies.herkal.specimen.page import NO_BREAK
-from foldyn.studies.herkal.stages import inputs_of, stage_of
 from foldyn.studies.herkal.study import FULL, RESULTS, Study, mean_ranks, second_table
 from foldyn.studies.herkal.variations import Variations, likeness, rank_correlation
 from foldyn.studies.targets import Verdict
-from foldyn.viewer import Stage
+from foldyn.viewer import Stage, stage
 
 TITLE = "Dynamic behavior of origami structures: the case studies of Herkal et al."
 CHOSEN_BY = "case1_"  # rows of the targets that the assumptions were chosen to match
@@ -78,22 +79,20 @@ def write_sensitivity(folder: Path, varied: Variations) -> Path:
 def _opening(study: Study) -> str:
     n = study.plan.numerics
     text = (
-        "The paper compares ways of sharing the mass of a panel among its nodes: it moves bars and "
-        "hinges and shell elements by the same pulse and measures how far the frequency content of "
-        "the displacements is from that of the shell. This page does the same with Foldyn's own "
-        "shell as the reference.\n\n"
-        "The metric: per reported node, the norm of the difference of the amplitude spectra up to "
-        "5 Hz over the norm of the shell's spectrum; then the mean over the nodes. 0 is equal; 1 "
-        "is as far away as no motion at all."
+        "The paper compares ways of sharing a panel's mass among its nodes. The same pulse moves "
+        "bars and hinges and a shell, and their displacement spectra are compared. Here the "
+        "reference is Foldyn's shell.\n\n"
+        "The metric: for each reported node, the norm of the difference of the amplitude spectra "
+        "up to 5 Hz over the norm of the shell's, averaged over the nodes. 0 means equal, 1 is the "
+        "error of no motion at all."
     )
     if study.data is not None:
-        text += "\n\nThe last part is the paper's specimen, from a film to a calibrated model."
+        text += "\n\nThe last part calibrates a model of the paper's specimen from a film."
     if n != FULL.numerics:
         text += (
             f"\n\nThis is a coarse run: {n.divisions} divisions of the shell instead of "
             f"{FULL.numerics.divisions}, steps of {n.dt:g} s instead of {FULL.numerics.dt:g} s, "
-            f"{n.duration:g} s of motion. The shell is too soft to compare its numbers with the "
-            "paper's: they show what the study does."
+            f"{n.duration:g} s of motion. It only shows what the study does: the shell is too soft."
         )
     return text
 
@@ -111,11 +110,11 @@ def verdict(study: Study, varied: Variations | None = None) -> str:
     chosen = [v.holds for v in rows if v.target.key.startswith(CHOSEN_BY)]
     others = [v.holds for v in rows if not v.target.key.startswith(CHOSEN_BY)]
     parts = [
-        f"{coarse}Of the {len(rows)} numbers of the paper's Table 1 that were computed, "
-        f"{sum(map(bool, chosen + others))} come out within {tolerance():.0%}: "
-        f"{sum(map(bool, chosen))} of {len(chosen)} in case 1, by whose row we chose what the "
-        "paper leaves unsaid, so that they are no evidence, and "
-        f"{sum(map(bool, others))} of {len(others)} in the other cases. {_why_so_wide(varied)}"
+        f"{coarse}Of {len(rows)} computed numbers of the paper's Table 1, "
+        f"{sum(map(bool, chosen + others))} agree within {tolerance():.0%}: "
+        f"{sum(map(bool, chosen))} of {len(chosen)} in case 1, to which we tuned what the paper "
+        f"does not state (so they are no evidence), and {sum(map(bool, others))} of {len(others)} "
+        f"in the other cases. {_why_so_wide(varied)}"
     ]
     for case, row in study.table(models=names).items():
         known = {m: row[m] for m in names if math.isfinite(row[m])}
@@ -124,9 +123,8 @@ def verdict(study: Study, varied: Variations | None = None) -> str:
         ours, theirs = best(known), best({m: paper[case][m] for m in names})
         same = "as in the paper" if ours == theirs else f"in the paper {label(theirs)}"
         parts.append(
-            f"Case {case[-1]}: the smallest error is that of {label(ours)}, {same}; the order of "
-            "the distributions has a rank correlation of "
-            f"{rank_correlation(known, paper[case]):+.1f} with the paper's."
+            f"Case {case[-1]}: {label(ours)} has the smallest error, {same}; the rank correlation "
+            f"with the paper's order is {rank_correlation(known, paper[case]):+.1f}."
         )
     judged = [v for v in claims(study) if v.holds is not None]
     failing = [f"{v.target.what}: {v.computed:.3g}" for v in judged if v.holds is False]
@@ -155,24 +153,23 @@ def _why_so_wide(varied: Variations | None) -> str:
     if not moved:
         return ""
     return (
-        "The bound is ours, and narrow beside what the paper leaves open, how long the pulse is "
-        f"and where it acts: half of the numbers change by more than {', '.join(moved)}. Agreement "
-        "says that our reading of the paper is near to what was computed there, and no more."
+        "The bound is ours, and narrow: the paper does not state how long the pulse is and where "
+        f"it acts, and half of the numbers change by more than {', '.join(moved)}. Agreement only "
+        "means that our reading of the paper is close to what was computed there."
     )
 
 
 def _differences() -> str:
     return (
-        "Known to differ from the paper's computation. The shell: the paper's has transverse "
-        "shear, a mesh of 0.1 m and connectors at the nodes of the creases; ours has no shear and "
-        "exact creases. What another shell changes is in the table below. Bars and hinges: the "
-        "paper's were presumably computed with MERLIN2, which orders some bend stiffnesses and bar "
-        "areas otherwise (the calibration merlin2); ours have those of the published formulas.\n\n"
-        "Not said in the paper: density, supports, damping, direction and history of the load, "
-        "the length of the motion. Ours were chosen once, so that the paper's second peaks and its "
-        "row of case 1 come out; these are therefore no evidence. Pulse, loaded nodes, law and "
-        "calibration of the bends and the heavy corners of equi-inertial masses are varied below; "
-        "supports, damping and the length of the motion are not."
+        "Known differences. The paper's shell has transverse shear, a mesh of 0.1 m and connectors "
+        "at the crease nodes; ours has no shear and exact creases. The table below shows the "
+        "effect of another shell. The paper's bars and hinges probably come from MERLIN2, which "
+        "orders some bend stiffnesses and bar areas differently (the calibration merlin2); ours "
+        "follow the published formulas.\n\n"
+        "The paper does not state density, supports, damping, direction and history of the load, "
+        "and the length of the motion. We chose them once to match its second peaks and its row of "
+        "case 1, which are therefore no evidence. Below, pulse, loaded nodes, law and calibration "
+        "of the bends and the heavy corners of equi-inertial masses vary; the rest does not."
     )
 
 
@@ -187,8 +184,8 @@ def _second(study: Study) -> list[Section]:
     table = Table(
         ["case", "shell, divisions", *map(label, study.plan.models)],
         rows,
-        "The same errors against another shell: triangles of OpenSees, with transverse shear and "
-        "springs between the nodes of creases. Its motions come with the package.",
+        "The same errors against a shell of OpenSees: triangles with transverse shear and springs "
+        "between crease nodes. Its motions come with the package.",
         digits=3,
     )
     return [table] if found else []
@@ -204,9 +201,9 @@ def _table_1(study: Study) -> Table:
     return Table(
         ["case", "", *[label(m) if model_of(m).paper else f"{label(m)} (ours)" for m in models]],
         rows,
-        "Table 1 of the paper and ours: mean error of the frequency content against the shell. "
-        "Models marked as ours are not the paper's, which has no errors of theirs; plate and n5b8e "
-        "differ in stiffness, all others in the distribution of the mass alone.",
+        "Table 1 of the paper and ours: mean error of the frequency content against the shell. The "
+        "paper lacks the models marked as ours. Plate and n5b8e differ in stiffness, all others "
+        "only in the distribution of the mass.",
         digits=3,
     )
 
@@ -225,10 +222,10 @@ def rank_table(study: Study) -> Table:
         ["model", "mean rank, paper", "mean rank, here", "among all here",
          "error of low frequencies (%)", "of all (%)"],
         rows,
-        f"Mean rank over {len(study.plan.cases)} cases (1 is best), and a measure that does not "
-        "depend on the load: mean size of the deviation of the shell's first five frequencies, of "
-        f"modes that have a partner: of those below {BELOW:g} of the frequency of a free plate, "
-        "above which the panels themselves vibrate, and of all.",
+        f"Mean rank over {len(study.plan.cases)} cases (1 is best), and a measure without a load: "
+        "mean absolute deviation from the shell's first five frequencies, for modes with a "
+        f"partner. Low ones lie below {BELOW:g} of a free plate's frequency, above which the "
+        "panels themselves vibrate.",
         digits=3,
     )  # fmt: skip
 
@@ -253,9 +250,8 @@ def _claims(study: Study) -> Table:
     return Table(
         ["claim, what is measured, and source", "paper, or our bound", "here", ""],
         rows,
-        "The paper's claims on the case studies. Bounds (at least, at most) are ours: they say in "
-        "a number what a claim in words means. Rows that are only shown beside are not judged. In "
-        "brackets where the paper has it.",
+        "The paper's claims on the case studies, with their place in brackets. Bounds (at least, "
+        'at most) are ours: they turn words into numbers. Rows marked "beside" are not judged.',
     )
 
 
@@ -325,8 +321,8 @@ def _statics(found: Mapping[str, NDArray], nodes: list[int], force: float) -> Ta
         ["model", *[f"node {n} (m)" for n in nodes], *[f"node {n} (% off)" for n in nodes],
          "stiffness (N/m)"],
         rows,
-        "Displacement at full load, its deviation from the shell's, and the force on a loaded node "
-        "over the largest of these displacements.",
+        "Displacement at full load, its deviation from the shell's, and the force on a node over "
+        "the largest displacement.",
         digits=3,
     )  # fmt: skip
 
@@ -378,10 +374,10 @@ def _modes(study: Study, case: str) -> Table:
     return Table(
         ["model", *[f"mode {k + 1}" for k in range(count)], "mean error (%)"],
         rows,
-        "Frequencies at rest of the shell's first modes and of their partners: Hz, deviation, and "
-        f"how alike the shapes are at the vertices (MAC, 1 is equal; at least {LEAST_MAC:g}, and "
-        f"frequencies less than {FAR:g} times apart). Bends are superlinear and have no stiffness "
-        f"at rest: taken for turns of {SECANT:g} degree; those of plate and n5b8e are linear.",
+        "Frequencies at rest of the shell's first modes and of their partners: Hz, deviation and "
+        f"MAC at the vertices. Partners have a MAC of at least {LEAST_MAC:g} and frequencies less "
+        f"than {FAR:g} times apart. Superlinear bends have no stiffness at rest: theirs is that of "
+        f"turns of {SECANT:g} degree. Plate and n5b8e have linear bends.",
         digits=2,
     )
 
@@ -395,9 +391,42 @@ def _how(study: Study) -> str:
         f"method with steps of {n.dt:g} s, as for n5b8e. Other bars and hinges: N5B8, the settings "
         "of the shipped case files herkal/case1 to case4, RK4. "
         f"Motions of {n.duration:g} s sampled every 0.01 s. "
-        "Panels of the paper's models stretch too little in their plane and have no modes of their "
-        "own: what Foldyn warns of elsewhere is what is compared here. "
-        "Results are in the folder runs, one NetCDF file each, with what happens at the pattern's "
-        "vertices; a study that is started again computes what is missing, and what was computed "
-        "with other settings or by another version of the program."
+        "Panels of the paper's models are too stiff in their plane and have no modes of their own: "
+        "Foldyn's warnings about this are off. The folder runs has the results at the vertices, a "
+        "NetCDF file each. A study that is started again computes what is missing or was computed "
+        "with other settings or another version."
     )
+
+
+def stage_of(study: Study, case: str) -> Stage | None:
+    """Stage of a case's motions with the shell and all models, in step; None if there are none.
+
+    Motions are stored at the pattern's vertices, which are the nodes of the coarsest shell.
+    """
+    shown = {label(m): found[["displacement"]] for m, found in _motions(study, case).items()}
+    if not shown:
+        return None
+    case_file = case_study(case)
+    coarse = case_with(case_file, REFERENCE, AS_FILED, divisions=1)
+    return stage(shown, dict.fromkeys(shown, coarse), case_file.heading, reported(case)[0])
+
+
+def inputs_of(study: Study, call: Call | None) -> list[Section]:
+    """Inputs of each case, and the total computing time."""
+    sections: list[Section] = []
+    every: dict[str, xarray.Dataset] = {}
+    for case in study.plan.cases:
+        found = _motions(study, case)
+        if found:
+            case_file = case_study(case)
+            table = inputs_table(inputs(case_file, case_file.case(), found))
+            sections += [Heading(case_file.heading, level=3), table]
+            sections.append(Listing(f"The case file {case_file.path.name}", case_file.text))
+        every |= {f"{case}-{m}": motion for m, motion in found.items()}
+    return [*sections, inputs_table(computed(every, call or Call()))] if every else []
+
+
+def _motions(study: Study, case: str) -> dict[str, xarray.Dataset]:
+    """The stored motions of a case by model, starting with the shell."""
+    motions = {m: study.result(case, m, "motion") for m in (REFERENCE, *study.plan.models)}
+    return {m: motion for m, motion in motions.items() if motion is not None}

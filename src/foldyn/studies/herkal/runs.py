@@ -1,8 +1,4 @@
-"""The computations of the case studies, each kept in its own file.
-
-So an interrupted study resumes. A file records its settings and a digest of the program's sources:
-results of another program are recomputed.
-"""
+"""The computations of the case studies, each kept in its own file."""
 
 from __future__ import annotations
 
@@ -18,7 +14,6 @@ from foldyn.input_files import file_digest
 from foldyn.linear import modes
 from foldyn.results import load, save
 from foldyn.statics import trace
-from foldyn.store import Store
 from foldyn.studies import find_case
 from foldyn.studies.herkal.metric import UP_TO
 from foldyn.studies.herkal.sheet_models import (
@@ -29,12 +24,12 @@ from foldyn.studies.herkal.sheet_models import (
     case_with,
     model_of,
 )
+from foldyn.studies.pool import Task, datasets
 
+# Files that the results of the case studies depend on, in addition to the solvers.
 COMPUTING = tuple(
     f"studies/herkal/{name}.py" for name in ("sheet_models", "runs", "metric", "sensitivity")
 )
-"""Files that the results of the case studies depend on, in addition to the solvers."""
-SETTINGS = "study_settings"
 INTERVAL = 0.01  # s, between samples, unless the case file sets it
 STEPS = 10  # steps of a path's load
 SHELL_MODES, RULE_MODES = 5, 12  # modes of the reference; candidates for partners
@@ -61,7 +56,7 @@ class Numerics:
 
 
 @dataclass(frozen=True)
-class Job:
+class Job(Task):
     """One computation.
 
     Attributes
@@ -80,16 +75,12 @@ class Job:
     kind: Literal["path", "modes", "motion"]
     numerics: Numerics = field(default_factory=Numerics)
     variant: Variant = AS_FILED
+    store = datasets(load, save)
 
     @property
     def name(self) -> str:
         """Name of the computation."""
         return "-".join(filter(None, (self.case, self.model, self.kind, self.variant.name)))
-
-    @property
-    def file(self) -> str:
-        """Name of its file."""
-        return f"{self.name}.nc"
 
     def settings(self) -> dict[str, Any]:
         """Everything that its result depends on."""
@@ -108,13 +99,9 @@ class Job:
             **numerics,
         }
 
-    def there(self, folder: Path) -> bool:
-        """Whether its result is in a folder."""
-        return stored(folder, self) is not None
-
-    def make(self, folder: Path) -> None:
-        """Compute its result into a folder."""
-        KEPT.keep(folder / self.file, self.settings(), compute(self))
+    def compute(self, folder: Path) -> xarray.Dataset:
+        """Run it; the result covers the pattern's vertices, which all models share."""
+        return compute(self)
 
 
 def program() -> str:
@@ -154,20 +141,3 @@ def compute(job: Job) -> xarray.Dataset:
         "not_rerunnable_because": "a study keeps what happens at the pattern's vertices only",
     }
     return kept
-
-
-def _read(file: Path) -> tuple[str, xarray.Dataset]:
-    found = load(file)
-    return found.attrs.get(SETTINGS, ""), found
-
-
-def _write(file: Path, stamp: str, result: xarray.Dataset) -> None:
-    save(result.assign_attrs({SETTINGS: stamp}), file)
-
-
-KEPT: Store[xarray.Dataset] = Store(_read, _write)
-
-
-def stored(folder: Path, job: Job) -> xarray.Dataset | None:
-    """Result of a job in a folder; None if missing or computed with other settings."""
-    return KEPT.find(folder / job.file, job.settings())

@@ -32,16 +32,16 @@ from foldyn.studies.herkal.sheet_models import (
     rules,
 )
 from foldyn.studies.herkal.variations import Variations
+from foldyn.studies.pool import Task
 from foldyn.writing import write_text
 
 PULSES = (0.1, 0.25, 0.5, 1.0)  # s
 BEND_LAWS = ("superlinear", "linear")
 CALIBRATIONS = ("standard", "merlin2")
+# Models compared with the shell: the distributions, and equi-inertial in the other orientation.
 MODELS = (*rules(), *OTHERS)
-"""Models compared with the shell: the distributions, and equi-inertial in the other orientation."""
 
-MOST = 64
-"""Largest stored file (MiB)."""
+MOST = 64  # largest stored file (MiB)
 
 
 def stiffnesses(load: Variant = AS_FILED) -> list[Variant]:
@@ -76,7 +76,7 @@ KEPT: Store[list[dict[str, Any]]] = Store(_read, _write)
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(Task):
     """All models compared with the shell, kept as rows of a JSON file with its settings.
 
     Attributes
@@ -91,6 +91,8 @@ class Comparison:
     case: str
     numerics: Numerics = field(default_factory=Numerics)
     load: Variant | None = None
+    store = KEPT
+    suffix = ".json"
 
     @property
     def name(self) -> str:
@@ -108,18 +110,9 @@ class Comparison:
             **asdict(self.numerics),
         }
 
-    def there(self, folder: Path) -> bool:
-        """Whether its result is in a folder."""
-        return self.result(folder) is not None
-
-    def result(self, folder: Path) -> list[dict[str, Any]] | None:
-        """Rows in a folder; None if missing or computed with other settings."""
-        return KEPT.find(folder / f"{self.name}.json", self.settings())
-
-    def make(self, folder: Path) -> None:
-        """Compute its result into a folder."""
-        rows = self._frequencies() if self.load is None else self._errors(self.load)
-        KEPT.keep(folder / f"{self.name}.json", self.settings(), list(rows))
+    def compute(self, folder: Path) -> list[dict[str, Any]]:
+        """Its rows."""
+        return list(self._frequencies() if self.load is None else self._errors(self.load))
 
     def _errors(self, load: Variant) -> Iterator[dict[str, Any]]:
         """Errors of the frequency content under one load."""

@@ -30,6 +30,7 @@ LOADED = {"file": "as filed", "edge": "whole edge"}
 SIDES = {"superlinear": (-0.3, style.BLUE), "linear": (0.08, style.ORANGE)}
 TURNED = next(iter(OTHERS))
 STIFFNESSES = tuple(product(BEND_LAWS, CALIBRATIONS))
+# Settings that are changed one at a time.
 CHANGES: Mapping[str, Mapping[str, Any]] = {
     "nothing": {},
     "pulse of 0.1 s instead of 0.5 s": {"pulse": 0.1},
@@ -39,7 +40,6 @@ CHANGES: Mapping[str, Mapping[str, Any]] = {
     "linear bends": {"bend_law": "linear"},
     "calibration merlin2": {"calibration": "merlin2"},
 }
-"""Settings that are changed one at a time."""
 
 
 def sections(found: Variations, album: Album, tolerance: float) -> list[Section]:
@@ -49,18 +49,17 @@ def sections(found: Variations, album: Album, tolerance: float) -> list[Section]
     return [
         Heading("How far this reaches"),
         Text(
-            "The paper does not say for how long the load acts, on which nodes, or with which law "
-            "and calibration bends resist. Here all combinations of these are tried, with every "
-            "distribution, against a shell under the same load. The density is not among them: it "
-            "only rescales time, that of the pulse, the damping and the record together.\n\n"
-            f"{opinion(found)}\n\nComputed with: {found.about}. What a coarser shell than that of "
-            "the study changes by itself is in the first row of the first table."
+            "The paper does not state how long the load acts, on which nodes, and with which law "
+            "and calibration bends resist. Here are all combinations of these, with every "
+            "distribution, against a shell under the same load. The density does not matter: it "
+            "rescales the time of pulse, damping and record together.\n\n"
+            f"{opinion(found)}\n\nComputed with: {found.about}. The first row of the first table "
+            "shows the effect of the coarser shell."
         ),
         *album.figure(
             "sensitivity",
-            "Errors of the distributions under every combination, a dot each: above each line with "
-            "superlinear bends, below it with linear ones. Rings: the case files as they are. "
-            "Crosses: the paper's Table 1.",
+            "Errors of the distributions, a dot for each combination: superlinear bends above the "
+            "line, linear ones below. Rings: the case files as they are. Crosses: the paper.",
             lambda: plot_sensitivity(found, (*rules(), TURNED), paper_table()),
         ),
         one_at_a_time(found, tolerance),
@@ -133,10 +132,9 @@ def opinion(found: Variations) -> str:
             else "Each of the five comes last in some combination."
         )
         parts.append(
-            f"With {law} bends the distribution that the paper finds best for a case is the best "
-            f"of the five in {hits} of {len(rows)} combinations. The best mean rank is that of "
-            f"{label(first)} ({ranked[first].mean_rank:.1f} of 5, between 1 and "
-            f"{ranked[first].worst_rank}). {last}"
+            f"With {law} bends the paper's best distribution of a case is also the best of the "
+            f"five in {hits} of {len(rows)} combinations. {label(first)} has the best mean "
+            f"rank: {ranked[first].mean_rank:.1f}, between 1 and {ranked[first].worst_rank}. {last}"
         )
     return " ".join(parts)
 
@@ -160,9 +158,9 @@ def one_at_a_time(found: Variations, tolerance: float) -> Table:
          "cases with its best", "rank correlation with it", "median change (%)",
          "largest change (%)"],
         rows,
-        "One thing changed at a time: how near the five distributions come to the paper's Table 1 "
-        "(mean of the cases' rank correlations: 1 is its order, -1 the reverse), and by how much "
-        "the numbers change from those of the case files as they are.",
+        "One change at a time: agreement of the five distributions with the paper's Table 1 "
+        "(rank correlation: 1 for the same order, -1 for the reverse, averaged over the cases), "
+        "and the change from the case files as they are.",
         digits=2,
     )  # fmt: skip
 
@@ -192,8 +190,8 @@ def by_load(found: Variations) -> Table:
         found,
         ["loaded nodes", "pulse (s)"],
         [*tables, ("paper", None, paper_table())],
-        "Which of the paper's five has the smallest error (and the error), by load; superlinear "
-        "bends, standard calibration. In case 1 the file loads the whole edge.",
+        "The best of the paper's five, with its error, by load; superlinear bends, standard "
+        "calibration. In case 1 the file loads the whole edge.",
     )
 
 
@@ -221,9 +219,8 @@ def over_all(found: Variations, law: str) -> Table:
         ["distribution", "mean rank of the five", "worst", f"best of {len(chosen)}",
          "mean rank of all", "median error", "largest"],
         rows,
-        f"All combinations with {law} bends: ranks among the paper's five and among all (mean over "
-        "the cases of the mean over the combinations of each), how often a distribution is the "
-        "best of the five, and its errors.",
+        f"All combinations with {law} bends: mean rank (all cases count equally) among the paper's "
+        "five and among all, how often a distribution is the best of the five, and its errors.",
         digits=2,
     )  # fmt: skip
 
@@ -239,9 +236,8 @@ def orientations(found: Variations) -> Table:
     return Table(
         ["case", "obtuse", "acute", "paper", "acute is nearer in"],
         rows,
-        "Equi-inertial masses with the larger share at the obtuse or the acute corners: errors "
-        "with the case files as they are, and in how many combinations the second is nearer to "
-        "the shell.",
+        "Equi-inertial masses with the larger share at the obtuse or at the acute corners: errors "
+        "of the case files as they are, and how often acute is nearer to the shell.",
         digits=3,
     )
 
@@ -259,9 +255,8 @@ def frequencies(found: Variations) -> Table:
         ["distribution", *map(", ".join, STIFFNESSES)],
         [[label(m), *[cell(100.0 * means[m]) for means, _ in columns]] for m in names],
         "A measure without a load: mean deviation (%) of the frequencies at rest from the shell's, "
-        "by law and calibration of the bends, over those of its first five modes that have a "
-        "partner of like shape (MAC) with every distribution: "
-        f"{', '.join(str(count) for _, count in columns)} of 20. Superlinear bends, which have no "
-        "stiffness at rest, are taken for turns of 1 degree.",
+        "by law and calibration of the bends, for modes with a partner in every distribution: "
+        f"{', '.join(str(count) for _, count in columns)} of the first five of each case, 20 in "
+        "all. Superlinear bends have the stiffness of turns of 1 degree.",
         digits=2,
     )

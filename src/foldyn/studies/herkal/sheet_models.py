@@ -64,8 +64,7 @@ class Variant:
         return replace(self, bend_law=None, calibration=None)
 
 
-AS_FILED = Variant()
-"""The unchanged case file."""
+AS_FILED = Variant()  # the unchanged case file
 
 
 @dataclass(frozen=True)
@@ -125,6 +124,7 @@ def _stiffness(name: str, implicit: bool = False) -> SheetModel:
     return SheetModel(name, name, structure, statics=name, implicit=implicit)
 
 
+# The reference and the models compared with it, in the order of the tables.
 MODELS: Mapping[str, SheetModel] = {
     model.name: model
     for model in (
@@ -140,12 +140,11 @@ MODELS: Mapping[str, SheetModel] = {
         _stiffness("n5b8e", implicit=True),  # its edges have no mass of their own
     )
 }
-"""The reference and the models compared with it, in the order of the tables."""
 
+# Models used only for the sensitivity.
 OTHERS: Mapping[str, SheetModel] = {
-    "equi_inertial_acute": _rule("equi_inertial_acute", "equi-inertial, other corners"),
+    "equi_inertial_acute": _rule("equi_inertial_acute", "equi-inertial, other corners")
 }
-"""Models used only for the sensitivity."""
 
 
 def model_of(name: str) -> SheetModel:

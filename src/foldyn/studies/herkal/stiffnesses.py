@@ -18,15 +18,14 @@ from foldyn.studies.fidelity import statics
 from foldyn.studies.herkal import vibration
 from foldyn.studies.herkal.runs import case_file_digest
 from foldyn.studies.herkal.sensitivity import KEPT
+from foldyn.studies.pool import Task
 
+# Files that the results depend on, in addition to the solvers.
 COMPUTING = (
     "studies/fidelity/statics.py", "studies/herkal/stiffnesses.py", "studies/herkal/vibration.py",
 )  # fmt: skip
-"""Files that the results depend on, in addition to the solvers."""
-OWN = "own"
-"""The model of the specimen's case file."""
-BESIDE = ("standard", "plate", "n5b8e")
-"""Other models whose modes are computed."""
+OWN = "own"  # the model of the specimen's case file
+BESIDE = ("standard", "plate", "n5b8e")  # other models whose modes are computed
 PEAKED = (OWN, "plate", "n5b8e")
 SPECIMEN = ("specimen-modes", "specimen-frf")
 MODES = 5
@@ -36,7 +35,7 @@ Rows = list[dict[str, Any]]
 
 
 @dataclass(frozen=True)
-class Stiffness:
+class Stiffness(Task):
     """A computation with these models.
 
     Attributes
@@ -52,6 +51,8 @@ class Stiffness:
     kind: Literal["small-loads", "modes", "peaks"]
     of: str = "specimen"
     divisions: tuple[int, int] = MESHES
+    store = KEPT
+    suffix = ".json"
 
     @property
     def name(self) -> str:
@@ -69,17 +70,9 @@ class Stiffness:
             **mesh,
         }
 
-    def there(self, folder: Path) -> bool:
-        """Whether its result is in a folder."""
-        return self.result(folder) is not None
-
-    def result(self, folder: Path) -> Rows | None:
-        """Rows in a folder; None if missing or computed with other settings."""
-        return KEPT.find(folder / f"{self.name}.json", self.settings())
-
-    def make(self, folder: Path) -> None:
-        """Compute its result into a folder."""
-        KEPT.keep(folder / f"{self.name}.json", self.settings(), ROWS[self.kind](self))
+    def compute(self, folder: Path) -> Rows:
+        """Its rows."""
+        return ROWS[self.kind](self)
 
 
 def tasks(cases: Sequence[str], divisions: tuple[int, int] = MESHES) -> list[Stiffness]:
@@ -146,9 +139,9 @@ def specimen_peaks(model: str) -> Rows:
     ]
 
 
+# Computation of each kind.
 ROWS: Mapping[str, Callable[[Stiffness], Rows]] = {
     "small-loads": _small_loads,
     "modes": lambda asked: specimen_modes(asked.divisions),
     "peaks": lambda asked: specimen_peaks(asked.of),
 }
-"""Computation of each kind."""

@@ -17,8 +17,8 @@ from foldyn.studies.herkal.study import Study
 from foldyn.studies.herkal.vibration import ORDINALS
 from foldyn.studies.targets import read_targets
 
+# Models of the fidelity study by the label of their path.
 SMALL = {f"{BARS_AND_HINGES}, linear bends": "standard", "plate": "plate", "n5b8e": "n5b8e"}
-"""Models of the fidelity study by the label of their path."""
 PATHS = (BARS_AND_HINGES, *SMALL)
 LABELS = {OWN: "as filed (superlinear bends)", "standard": "standard, linear bends"}
 
@@ -32,11 +32,10 @@ def sections(study: Study) -> list[Section]:
     return [
         Heading("Models beyond the paper: plate and n5b8e"),
         Text(
-            "The paper varies the mass and keeps the stiffness. Two of our models change the "
-            "stiffness: in plate, panels bend and twist as plates do, with the same nodes and a "
-            "consistent mass; in n5b8e their edges give way as well, and the mass follows the "
-            "plate's shape. Bends are linear in both. Nothing in them is fitted to this paper. "
-            "They stand in the tables above and below beside the distributions."
+            "The paper varies only the mass. Two of our models change the stiffness: in plate, "
+            "panels bend and twist as plates, with the same nodes and a consistent mass; in n5b8e "
+            "their edges give way too, and the mass follows the plate's shape. Both have linear "
+            "bends, and nothing in them is fitted to this paper."
         ),
         *shown,
     ]
@@ -71,10 +70,9 @@ def _statics(study: Study) -> Table | None:
     return Table(
         ["case", "loads", "shell (mm)", *PATHS],
         rows,
-        "Static displacement of the loaded nodes along the paper's loads, and as much of them as "
-        "leaves the stiffness what it is at rest (scaled up; of shells of 8 and 16 divisions, "
-        "extrapolated). Without a word bars and hinges have superlinear bends, which have no "
-        "stiffness at rest.",
+        "Static displacement of the loaded nodes along their load: under the paper's loads, and "
+        "under small ones, scaled up (shell: extrapolated from 8 and 16 divisions). Bars and "
+        "hinges have superlinear bends, without stiffness at rest, unless the column says linear.",
         digits=3,
     )
 
@@ -105,9 +103,8 @@ def _modes(modes: Rows) -> Table:
     return Table(
         ["model", *[f"mode {row['mode']}" for row in first]],
         rows,
-        "The paper specimen: its first modes beside those of a shell (two meshes, extrapolated), "
-        "frequency (Hz), deviation and MAC. Bends as filed have the slope of turns of half a "
-        "degree.",
+        "The paper specimen: first modes, with deviation from a shell (extrapolated from two "
+        "meshes) and MAC. Bends as filed have the stiffness of turns of half a degree.",
     )
 
 
@@ -139,8 +136,8 @@ def _peak_table(peaks: Mapping[str, Rows]) -> Table:
     return Table(
         ["model", *[f"{which} peak" for which in ORDINALS]],
         rows,
-        "The paper specimen: peaks (Hz) of the response at a corner of the top to a sine of 1 mN "
-        "on each of its nodes, and their deviation from the paper's measurement.",
+        "The paper specimen: peaks (Hz) of a top corner's response to a sine of 1 mN on each top "
+        "node, and their deviation from the paper's measurement.",
     )
 
 
@@ -158,8 +155,8 @@ def verdict(peaks: Mapping[str, Rows]) -> str:
         if off[OWN] < min(others):
             text += (
                 " The model as filed is nearer to this experiment, although the others are nearer "
-                "to a shell of the same sheet: at this amplitude its superlinear bends are softer "
-                "than plates, as the folded sheet seems to be."
+                "to a shell: at this amplitude superlinear bends are softer than plates, as the "
+                "folded sheet seems to be."
             )
         else:
             text += " The models that are nearer to the shell are nearer to the experiment, too."

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.studies.herkal import metric, stiffnesses
 from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
-from foldyn.studies.herkal.runs import Job, Numerics, reported, stored
+from foldyn.studies.herkal.runs import Job, Numerics, reported
 from foldyn.studies.herkal.sheet_models import (
     AS_FILED,
     CASES,
@@ -132,7 +132,7 @@ class Study:
         """Result of a computation, or None if missing."""
         job = Job(case, model, kind, self.plan.numerics, variant)  # type: ignore[arg-type]
         if self._read.get(job) is None:
-            self._read[job] = stored(self.folder / RESULTS, job)
+            self._read[job] = job.result(self.folder / RESULTS)
         return self._read[job]
 
     def rows(self, kind: str, of: str = "specimen") -> Rows | None:

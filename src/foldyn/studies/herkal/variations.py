@@ -17,19 +17,16 @@ from foldyn.store import warn_of_damage
 from foldyn.studies.herkal.metric import best, ranks
 from foldyn.writing import whole
 
-STORED = Path(__file__).with_name("results")
-"""Tables that come with the package."""
+STORED = Path(__file__).with_name("results")  # tables that come with the package
 METRIC, FREQUENCIES = "sensitivity.csv", "frequencies.csv"
-WORDS = ("case", "loads", "bend_law", "calibration", "model")
-"""Columns with text."""
+WORDS = ("case", "loads", "bend_law", "calibration", "model")  # columns with text
+# Settings of the case files.
 FILED = {
     "pulse": 0.5, "loads": "file", "bend_law": "superlinear", "calibration": "standard",
 }  # fmt: skip
-"""Settings of the case files."""
 
 Row = Mapping[str, Any]
-Errors = Mapping[str, Mapping[str, Any]]
-"""Errors by case and model."""
+Errors = Mapping[str, Mapping[str, Any]]  # errors by case and model
 
 
 @dataclass(frozen=True, eq=False)

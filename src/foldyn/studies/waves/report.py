@@ -52,12 +52,11 @@ def _opening(study: Study) -> str:
         "rarefaction solitary wave creation, Science Advances 5, eaau2835, 2019), and the bands of "
         "Miura and eggbox sheets of Pratapa, Suryanarayana and Paulino (Bloch wave framework for "
         "structures with nonlocal interactions, J. Mech. Phys. Solids 118, 2018).\n\n"
-        "Dimensions, masses and stiffnesses of the papers were not at hand. All parameters are "
-        "ours and stand in the last table, so that claims can be compared and numbers cannot. "
-        "Those of the Kresling chain come from a search for one in which the rarefaction overtakes "
-        "the compression: they show that it can happen, not how often it does. Models are those "
-        "of the papers, trusses and sheets without the panels' own vibrations, beyond what Foldyn "
-        "would warn of elsewhere."
+        "The papers' dimensions, masses and stiffnesses were not available. All parameters, in the "
+        "last table, are ours: compare claims, not numbers. For the Kresling chain we searched "
+        "for a case in which the rarefaction overtakes the compression: it can happen, which does "
+        "not say how often. As in the papers, models are trusses and sheets whose panels do not "
+        "vibrate, of which Foldyn would otherwise warn."
     )
     if study.plan != FULL:
         text += "\n\nThis is a coarse run with fewer fold states, phases and cells."
@@ -81,18 +80,17 @@ def _dispersion(
     found: list[Any] = [
         Heading("Kresling chain: small waves"),
         Text(
-            "A cell between rigid plates has two degrees of freedom, its elongation and its twist, "
-            "and the chain the frequencies omega = 2 |sin(kappa/2)| sqrt(eig(K, M)). With the "
-            "static stiffness K of one cell and without creases this agrees with the bands of the "
-            f"chain to {100 * free:.2g} %, because the springs of the plates give way. The "
-            "creases at the plates are folds between two cells, which the unit does not have: with "
-            f"them the slow band deviates by up to {100 * slow:.2g} %, the fast one by "
-            f"{100 * fast:.2g} %."
+            "A cell between rigid plates has two degrees of freedom, elongation and twist, and the "
+            "chain has the frequencies omega = 2 |sin(kappa/2)| sqrt(eig(K, M)), K the static "
+            "stiffness of a cell. Without creases the chain's bands agree with this to "
+            f"{100 * free:.2g} %, as the springs of its plates give way. Creases at the plates, "
+            "folds between two cells, are missing in the unit: with them the slow band deviates by "
+            f"up to {100 * slow:.2g} %, the fast one by {100 * fast:.2g} %."
         ),
     ]
     found += album.figure(
         "dispersion",
-        "Bands of the Kresling chain and of the two-dof unit, and what they are apart.",
+        "Bands of the Kresling chain and of the two-dof unit, and their difference.",
         lambda: _plot_dispersion(lines),
     )
     if small is not None:
@@ -139,10 +137,7 @@ def _plot_spectrum(small: xarray.Dataset, lines: xarray.Dataset) -> Figure:
 
 def _impact(album: Album, hit: xarray.Dataset, small: xarray.Dataset | None) -> list[Any]:
     passed = kresling.overtaking(hit)
-    found: list[Any] = [
-        Heading("Kresling chain: an impact"),
-        Text(verdict(hit, passed)),
-    ]
+    found: list[Any] = [Heading("Kresling chain: an impact"), Text(verdict(hit, passed))]
     found += album.figure(
         "impact",
         f"Strain of the cells after an impact of {hit.attrs['velocity']:g} m/s on the first "
@@ -157,8 +152,7 @@ def _impact(album: Album, hit: xarray.Dataset, small: xarray.Dataset | None) -> 
         )
     found += album.figure(
         "arrivals",
-        "Arrival of the highest compression and of the highest tension in each cell, and strains "
-        "there.",
+        "Arrival and size of the highest compression and tension in each cell.",
         lambda: _plot_arrivals(passed),
     )
     slow, fast = np.asarray(hit.attrs["long_waves"]).tolist()
@@ -173,7 +167,7 @@ def _impact(album: Album, hit: xarray.Dataset, small: xarray.Dataset | None) -> 
         Table(
             ["wave", "speed (cells/s)", "peak strain", "width (ms)"],
             rows,
-            "Pulses, the median over the cells in the middle of the chain, and long waves.",
+            "Pulses (medians over the middle of the chain) and long waves.",
             digits=3,
         )
     )
@@ -186,10 +180,7 @@ def _middle(passed: kresling.Overtaking) -> slice:
 
 
 def _of(pulse: Pulse, cells: slice) -> tuple[float, float]:
-    return (
-        float(np.nanmedian(pulse.peak[cells])),
-        1e3 * float(np.nanmedian(pulse.width[cells])),
-    )
+    return (float(np.nanmedian(pulse.peak[cells])), 1e3 * float(np.nanmedian(pulse.width[cells])))
 
 
 def verdict(hit: xarray.Dataset, passed: kresling.Overtaking) -> str:
@@ -209,8 +200,8 @@ def verdict(hit: xarray.Dataset, passed: kresling.Overtaking) -> str:
         else "does not agree with the paper: no rarefaction overtakes the compression"
     )
     return (
-        "The first plate of a free chain gets a velocity. It presses its cell, which springs back "
-        "and pulls: a rarefaction starts behind the compression. Cells soften in compression and "
+        "An impact gives the first plate of a free chain a velocity. Its cell is pressed and "
+        "springs back: a rarefaction follows the compression. Cells soften in compression and "
         f"stiffen in tension. What happens {ahead}. It travels at {rare.speed / slow:.3g} times "
         f"the speed of slow long waves, the compression at {press.speed / slow:.3g} times. The "
         f"first cell is pressed by {100 * abs(float(hit['strain'].values[:, 0].min())):.2g} %; in "
@@ -227,10 +218,9 @@ def _first(passed: kresling.Overtaking) -> str:
     """Whether the far part of the chain feels tension first."""
     does = "holds" if passed.before < FELT else "does not hold strictly"
     return (
-        f"That the latter part of the chain feels tension first {does}: compression of "
-        f"{100 * passed.before:.2g} % of the highest tension comes before it (median of the last "
-        "third of the cells that are judged), as ripples and a front that the rarefaction has not "
-        "yet passed."
+        f"That the end of the chain feels tension first {does}: before it comes a compression of "
+        f"{100 * passed.before:.2g} % of the highest tension (median of the last third of the "
+        "judged cells), ripples and a front that the rarefaction has not yet passed."
     )
 
 
@@ -280,7 +270,7 @@ def _sheet(album: Album, kind: str, states: xarray.Dataset) -> list[Any]:
         Table(
             ["direction", "fold states with a gap", "widest at (degrees)", "from (Hz)", "to (Hz)"],
             rows,
-            "Gaps for waves along x, and for all waves of the zone; the widest by its middle.",
+            "Gaps for waves along x and for all waves of the zone; widest relative to its middle.",
             digits=4,
         )
     )
@@ -315,9 +305,7 @@ def _plot_bands(states: xarray.Dataset) -> Figure:
 
 
 def _plot_gaps(states: xarray.Dataset) -> Figure:
-    figure = style.new_figure(6.2, 3.8)
-    axes = figure.subplots()
-    style.frame(axes, "dihedral (degrees)", "frequency (kHz)")
+    figure, axes = style.single((6.2, 3.8), "", "dihedral (degrees)", "frequency (kHz)")
     keys = []
     for direction, color in (("along x", style.SKY), ("all", style.BLUE)):
         bottom, top = (1e-3 * states[k].sel(direction=direction).values for k in ("bottom", "top"))

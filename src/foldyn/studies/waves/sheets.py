@@ -17,8 +17,8 @@ from foldyn.linear import UnitCell, band_gaps, bands
 from foldyn.patterns import eggbox, miura
 from foldyn.structures import Sheet, discretize
 
+# Generators, and the angle (degrees) of their panels.
 PATTERNS = {"miura": (miura, 60.0), "eggbox": (eggbox, 60.0)}
-"""Generators, and the angle (degrees) of their panels."""
 EDGE = 0.025  # m
 PAPER = Sheet(1.219e9, 0.2, 2.4e-4, 667.0, length_scale_ratio=2.7)
 PATH = "G-X-M-Y-G"

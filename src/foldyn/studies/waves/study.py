@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,12 +13,10 @@ import xarray
 
 from foldyn.program import program
 from foldyn.results.netcdf import read, write
-from foldyn.store import Store
-from foldyn.studies.pool import Done, run
+from foldyn.studies.pool import Done, Task, datasets, run
 from foldyn.studies.waves import kresling, sheets
 
 RESULTS = "runs"
-STAMP = "study_settings"
 COMPUTING = tuple(f"studies/waves/{name}.py" for name in ("kresling", "sheets"))
 
 
@@ -55,11 +54,12 @@ QUICK = Plan(dihedrals=7, phases=31, cells=60)
 
 
 @dataclass(frozen=True)
-class Part:
+class Part(Task):
     """One computation: bands of a sheet or of the chain, or the chain's impact."""
 
     kind: Literal["miura", "eggbox", "dispersion", "impact", "small_impact"]
     plan: Plan
+    store = datasets(partial(read, unreadable="the study"), write)
 
     @property
     def name(self) -> str:
@@ -70,19 +70,7 @@ class Part:
         """Everything that its result depends on."""
         return {"kind": self.kind, "program": program(*COMPUTING), **asdict(self.plan)}
 
-    def result(self, folder: Path) -> xarray.Dataset | None:
-        """Its result in a folder; None if missing or computed with other settings."""
-        return KEPT.find(folder / f"{self.kind}.nc", self.settings())
-
-    def there(self, folder: Path) -> bool:
-        """Whether its result is in a folder."""
-        return self.result(folder) is not None
-
-    def make(self, folder: Path) -> None:
-        """Compute its result into a folder."""
-        KEPT.keep(folder / f"{self.kind}.nc", self.settings(), self.compute())
-
-    def compute(self) -> xarray.Dataset:
+    def compute(self, folder: Path) -> xarray.Dataset:
         """Compute its result."""
         plan = self.plan
         if self.kind in sheets.PATTERNS:
@@ -95,16 +83,6 @@ class Part:
         return kresling.impact(plan.unit, plan.cells, velocity, plan.duration)
 
 
-def _read(file: Path) -> tuple[str, xarray.Dataset]:
-    found = read(file, "the study")
-    return found.attrs.get(STAMP, ""), found
-
-
-def _write(file: Path, stamp: str, result: xarray.Dataset) -> None:
-    write(result.assign_attrs({STAMP: stamp}), file)
-
-
-KEPT: Store[xarray.Dataset] = Store(_read, _write)
 KINDS = ("impact", "small_impact", "miura", "eggbox", "dispersion")
 
 

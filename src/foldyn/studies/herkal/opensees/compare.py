@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from foldyn.dynamics import simulate
 from foldyn.linear import modes
 from foldyn.statics import trace
+from foldyn.studies.fidelity.compare import markdown
 from foldyn.studies.herkal.metric import AXES
 from foldyn.studies.herkal.opensees import stored
 from foldyn.studies.herkal.opensees.run import DT, SAMPLES
@@ -79,13 +80,6 @@ def motion_away(motion: stored.Moved, reference: stored.Moved) -> float:
     return float(difference / np.linalg.norm(wanted))
 
 
-def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """A table in Markdown."""
-    lines = [list(head)]
-    lines += [["---"] * len(lines[0]), *map(list, rows)]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
 def percent(value: float) -> str:
     """Format 0.0123 as 1.23."""
     return f"{100.0 * value:.2f}"
@@ -114,7 +108,7 @@ def still_table(
             worst = [float(np.abs(frequency[:count]).max()) for count in (3, COUNT)]
             row += [""] * 3 if reference is still else map(percent, (moved, *worst))
         rows.append(row)
-    return table(head, rows)
+    return markdown(head, rows)
 
 
 def motion_table(
@@ -128,7 +122,7 @@ def motion_table(
         for reference in (one[number] for one in references):
             row.append("" if reference is motion else percent(motion_away(motion, reference)))
         rows.append(row)
-    return table(head, rows)
+    return markdown(head, rows)
 
 
 def _numbered(found: Iterable[Sequence[Any]]) -> Iterator[tuple[int, Any]]:

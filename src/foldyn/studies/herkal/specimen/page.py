@@ -1,4 +1,4 @@
-"""Sections of the study's page on the specimen."""
+"""Sections of the study's page on the specimen, with figures of its film and its model."""
 
 from __future__ import annotations
 
@@ -9,28 +9,138 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from foldyn import plots
 from foldyn.linear import character
+from foldyn.plots import style
 from foldyn.report import Heading, Picture, Section, Table, Text
 from foldyn.report.album import Album
 from foldyn.report.sections import cell
 from foldyn.results import case_of, load, netcdf
 from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import BAND, DAMPING, FOLDS, WATCHED
-from foldyn.studies.herkal.specimen import figures, synthetic, tasks
+from foldyn.studies.herkal.specimen import synthetic, tasks
 from foldyn.studies.herkal.specimen.evaluation import (
     FILM_SUPPORT,
     NEAR,
+    content,
     content_misfit,
     misfit,
     vibration_of,
 )
-from foldyn.studies.herkal.specimen.figures import SUPPORT_NAMES
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.tasks import Part
-from foldyn.studies.herkal.vibration import ORDINALS, TARGETS, Response
+from foldyn.studies.herkal.vibration import CORNER, ORDINALS, TARGETS, Response
 from foldyn.studies.targets import Target, read_targets
+
+WIDTH = 9.0  # inches
+COLUMNS = 3  # front nodes per row of the pattern
+SUPPORT_NAMES = {
+    "glued": "plate, node 59 glued",
+    "plate": "plate alone (ideal)",
+    "glue alone": "node 59 alone",
+}
+
+
+def plot_front(front: xr.Dataset, support: str, label: str, note: str) -> Figure:
+    """Draw all front nodes of the film and of the model over time, one frame each."""
+    measured, model = front["measured"], front["model"].sel(support=support)
+    curves = {
+        node: (front["time"].values, measured.sel(node=node).values, model.sel(node=node).values)
+        for node in front["node"].values.tolist()
+    }
+    return _grid(curves, ("time (s)", "x (mm)"), label, note)
+
+
+def plot_front_content(front: xr.Dataset, support: str, label: str, note: str) -> Figure:
+    """Draw amplitude spectra of all front nodes of the film and of the model, one frame each."""
+    step = sampling_interval(front["time"].values)
+    curves = {}
+    for node in front["node"].values.tolist():
+        film = content(front["whole"].sel(node=node).values, step)
+        said = content(front["model"].sel(node=node, support=support).values, step)
+        if film is not None and said is not None:
+            curves[node] = (*film, said[1])
+    return _grid(curves, ("frequency (Hz)", "x (mm)"), label, note)
+
+
+def _grid(
+    curves: Mapping[int, tuple[NDArray, NDArray, NDArray]],
+    labels: tuple[str, str],
+    label: str,
+    note: str,
+) -> Figure:
+    rows = -(-len(curves) // COLUMNS)
+    figure = style.new_figure(WIDTH, 0.8 + 1.15 * rows, note)
+    frames = figure.subplots(rows, COLUMNS, squeeze=False, sharex=True, sharey="row").ravel()
+    lines = []
+    for k, (frame, (node, (along, film, model))) in enumerate(
+        zip(frames, curves.items(), strict=False)
+    ):
+        below = labels[0] if k >= len(curves) - COLUMNS else ""
+        style.frame(frame, below, labels[1] if k % COLUMNS == 0 else "", f"node {node}")
+        mark = {"marker": ".", "markersize": 2.5, "linestyle": "none", "label": label}
+        lines = frame.plot(along, 1e3 * film, color=style.VERMILLION, **mark)
+        lines += frame.plot(along, 1e3 * model, color=style.BLUE, linewidth=1.0, label="model")
+        frame.margins(x=0.01)
+        frame.locator_params(axis="y", nbins=4)
+    for frame in frames[len(curves) :]:
+        frame.set_visible(False)
+    style.legend_below(figure, lines, columns=2)
+    return style.finish(figure)
+
+
+def plot_supports(front: xr.Dataset, label: str, note: str) -> Figure:
+    """Draw the watched node of the film and of the model with each support, and their spectra."""
+    figure = style.new_figure(WIDTH, 3.6, note)
+    left, right = figure.subplots(1, 2)
+    style.frame(left, "time (s)", "x displacement (mm)", f"node {WATCHED}")
+    style.frame(right, "frequency (Hz)", "x amplitude (mm)")
+    time, step = front["time"].values, sampling_interval(front["time"].values)
+    film = front["measured"].sel(node=WATCHED).values
+    look = {"color": style.BLACK, "marker": ".", "markersize": 3.5, "linestyle": "none"}
+    handles = left.plot(time, 1e3 * film, **look, label=label)
+    _plot_content(right, front["whole"].sel(node=WATCHED).values, step, look)
+    for k, (support, name) in enumerate(SUPPORT_NAMES.items()):
+        x = front["model"].sel(node=WATCHED, support=support).values
+        curve = style.line_style(k) | {"linewidth": 1.4}
+        handles += left.plot(time, 1e3 * x, **curve, label=f"model: {name}")
+        _plot_content(right, x, step, curve)
+    right.set_xlim(0.0, 25.0)
+    left.margins(x=0.01)
+    style.legend_below(figure, handles, columns=4)
+    return style.finish(figure)
+
+
+def _plot_content(axes: Axes, x: NDArray[np.float64], step: float, look: Mapping) -> None:
+    found = content(x, step)
+    if found is not None:
+        axes.plot(found[0], 1e3 * found[1], **look)
+
+
+def plot_responses(
+    responses: Mapping[str, xr.Dataset], peaks: Sequence[float], note: str
+) -> Figure:
+    """Draw the magnitude of responses of a corner of the top along x, and the paper's peaks."""
+    labels = "frequency (Hz)", "receptance (mm/N)", f"node {CORNER} along x"
+    figure, axes = style.single((7.0, 3.8), note, *labels)
+    for k, (name, found) in enumerate(responses.items()):
+        size = 1e3 * np.abs(found["receptance"].sel(node=CORNER, axis="x").values)
+        axes.plot(found["frequency"].values, size, **style.line_style(k), label=name)
+        spots = Response.of(found).frequencies
+        heights = np.interp(spots, found["frequency"].values, size)
+        axes.plot(spots, heights, "o", color=style.CYCLE[k], markersize=4)
+    for k, frequency in enumerate(peaks):
+        name = "peaks of the paper" if k == 0 else None
+        axes.axvline(frequency, color=style.GRAY, linestyle=(0, (1, 1.5)), label=name)
+    axes.margins(x=0.0)
+    axes.set_ylim(bottom=0.0)
+    style.legend_below(figure, axes.get_legend_handles_labels()[0], columns=3)
+    return style.finish(figure)
+
 
 TITLE = "The paper specimen: from photographs and a film to a calibrated model"
 NO_BREAK = "\N{NO-BREAK SPACE}"
@@ -77,14 +187,13 @@ def _opening(data: Data) -> str:
         return f"Measured data were given. {'; '.join(named)}."
     return (
         "The paper's raw data are not public. Everything in this part is SYNTHETIC: photographs "
-        "and a film that Foldyn rendered of a simulated sheet with the paper's parameters. So that "
-        "the model that is fitted is wrong, as models are, that sheet is 3 % softer than the "
-        "model's, has a consistent mass where the model has circumcenter masses, and creases that "
-        f"relax: for a short time they are {synthetic.RATIO:.0%} stiffer than for long, with a "
-        f"relaxation time of {synthetic.TIME:g} s, so that it drifts back when it is released. "
-        "Lens, blur and noise are a camera's. What comes out shows "
-        "how well the method works, and nothing about the paper's sheet. A film, its tracks, or "
-        "tables of one's own take its place: foldyn study herkal --data FILE ..."
+        "and a film that Foldyn rendered, with lens, blur and noise, of a simulated sheet with the "
+        "paper's parameters. Models are never exact, so this sheet differs from the fitted model: "
+        "it is 3 % softer, has a consistent mass instead of circumcenter masses, and its creases "
+        f"relax: at first they are {synthetic.RATIO:.0%} stiffer, with a relaxation time of "
+        f"{synthetic.TIME:g} s, so that it drifts back after its release. The results show how "
+        "well the method works, and nothing about the paper's sheet. For your own film, tracks or "
+        "tables: foldyn study herkal --data FILE ..."
     )
 
 
@@ -95,22 +204,19 @@ def _static(folder: Path, found: dict[str, Any], data: Data) -> list[Section]:
     shapes = folder / "folds" / "data-1.png"
     photograph = Picture(
         folder / "photograph.png",
-        "The synthetic photograph under 0.312 N, the nodes that were recognized, and the model "
-        "over it.",
+        "The synthetic photograph under 0.312 N with the recognized nodes and the model.",
     )
     corners = Picture(shapes, "Deformed shapes of the model over the corners in the photographs.")
     softer = Text(
-        "That the sheet is softer than the model, which the fit cannot know, goes into both "
-        "numbers. The intervals take what is left for random errors of single values: they need "
-        "not contain the truth."
+        "The fit cannot know that the sheet is softer than the model, which shifts both numbers. "
+        "The intervals only reflect random errors, so they need not contain the truth."
     )
     return [
         Heading("Static test: the creases", 3),
         *([photograph] if data.synthetic else []),
         Table(
             ["displacement of the top (mm)", "weight (N)"], rows,
-            "What is fitted: displacements of the top, imposed on the model, and the weights that "
-            "its reaction must equal.",
+            "Fitted data: displacements imposed on the top, and the weights that it carries.",
         ),
         _estimates({"": found["folds"]}, FOLDS, data),
         *_doubt(found["folds"], "weights"),
@@ -163,34 +269,34 @@ def _release(folder: Path, found: dict[str, Any], fit: Part, album: Album) -> li
         *([frame] if filmed else []),
         Picture(
             folder / "steps.png",
-            f"Node {WATCHED} (the paper's node 9) as it is prepared: window, first turning point, "
+            f"Preparation of node {WATCHED} (the paper's node 9): window, first turning point, "
             "final position, trend.",
         ),
         Text(
-            f"Before the release the top stands {1e3 * found['press']:.2f} mm below its rest: that "
-            "much is imposed on the model, on the smooth plate, for the state from which it is "
-            f"released. Alpha and beta are fitted to node {WATCHED} along x alone; all other front "
-            "nodes are held out."
+            f"Before the release the top is {1e3 * found['press']:.2f} mm below its rest position. "
+            "The model starts from the equilibrium on the smooth plate with this displacement. "
+            f"Alpha and beta are fitted to node {WATCHED} along x; the other front nodes are held "
+            "out."
         ),
         _estimates(found["damping"], DAMPING, data),
         *_doubt(found["damping"][FILM_SUPPORT], f"node {WATCHED}"),
         *album.figure(
             "specimen-supports",
-            f"Node {WATCHED}: the film, and the model on three supports (left), and their spectra "
-            "(right). The model by the glue alone has the damping of the first.",
-            lambda: figures.plot_supports(front, label, note),
+            f"Node {WATCHED} in the film and in the model on three supports (left), with spectra "
+            "(right). The model on the glue alone has the damping of the first.",
+            lambda: plot_supports(front, label, note),
         ),
         *_vibrations(front, data),
         *album.figure(
             "specimen-front",
             f"All front nodes that were tracked, the model on the {SUPPORT_NAMES[FILM_SUPPORT]}. "
             f"Only node {WATCHED} was fitted.",
-            lambda: figures.plot_front(front, FILM_SUPPORT, label, note),
+            lambda: plot_front(front, FILM_SUPPORT, label, note),
         ),
         *album.figure(
             "specimen-front-frequency",
             "Their amplitude spectra. Nodes that were lost for long have none.",
-            lambda: figures.plot_front_content(front, FILM_SUPPORT, label, note),
+            lambda: plot_front_content(front, FILM_SUPPORT, label, note),
         ),
         _agreement(front),
     ]
@@ -232,9 +338,9 @@ def _tracked(front: xr.Dataset) -> list[Section]:
     off = (front["measured"] - front["true"]).values
     return [
         Text(
-            f"The front nodes were measured in {np.isfinite(off).mean():.1%} of the frames, to "
-            f"within {1e6 * math.sqrt(np.nanmean(off**2)):.0f} micrometres (root mean square; "
-            "constant and linear parts, which the preparation takes off, are not counted)."
+            f"The front nodes were measured in {np.isfinite(off).mean():.1%} of the frames, with "
+            f"an error of {1e6 * math.sqrt(np.nanmean(off**2)):.0f} micrometres (root mean square "
+            "without constant and linear parts, which the preparation removes)."
         )
     ]
 
@@ -244,10 +350,9 @@ def _glue(held: float, alone: float, paper: float) -> str:
     if not math.isfinite(held) or not math.isfinite(alone):
         return "With one of the supports the model has no peak where it is sought."
     text = (
-        "The paper glued node 59 and let the specimen stand on the plate. The model has its peak "
-        f"at {alone:.1f} Hz when it is held at node 59 alone, with nothing below the other nodes "
-        f"of the bottom, and at {held:.1f} Hz with the row kept in x by the plate; the paper found "
-        f"{paper:g} Hz."
+        "The paper glued node 59 and let the specimen stand on the plate. The model's peak is at "
+        f"{alone:.1f} Hz when only node 59 is held, and at {held:.1f} Hz when the plate holds the "
+        f"bottom row in x; the paper found {paper:g} Hz."
     )
     if abs(held - paper) < 0.5 * abs(alone - paper):
         text += " So the plate held the row, whatever the glue did."
@@ -270,9 +375,9 @@ def _agreement(front: xr.Dataset) -> Table:
         ["node", "", "time: glued (%)", "time: ideal (%)", "frequency: glued (%)",
          "frequency: ideal (%)"],
         rows,
-        "Misfit of the front nodes, as a part of what was measured (root mean squares), over time "
-        f"and of the amplitude spectra up to {BAND[1]:g} Hz: on the plate with node 59 glued, and "
-        "on the plate alone (ideal), each with its own damping.",
+        "Misfit of the front nodes relative to the measured values (root mean squares), over time "
+        f"and of amplitude spectra up to {BAND[1]:g} Hz: with node 59 glued to the plate, and on "
+        "the plate alone (ideal), each with its own damping.",
         digits=3,
     )  # fmt: skip
 
@@ -294,7 +399,7 @@ def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
         *album.figure(
             "specimen-response",
             "Response of a corner of the top to a sine of 1 mN on each of its nodes.",
-            lambda: figures.plot_responses(
+            lambda: plot_responses(
                 {labels[name]: one for name, one in responses.items()}, peaks, note
             ),
         ),
@@ -318,8 +423,7 @@ def _air_table(modes: xr.Dataset, in_air: xr.Dataset, names: Sequence[str]) -> T
     ]
     return Table(
         ["mode", "in vacuum (Hz)", "in air (Hz)", "share of the air (%)"], rows,
-        "Modes with the fitted folds, in vacuum and in air, and the part of the modal mass that is "
-        "air.",
+        "Modes with the fitted folds in vacuum and in air, and the share of air in the modal mass.",
         digits=3,
     )  # fmt: skip
 
@@ -337,8 +441,8 @@ def _response_table(responses: Mapping[str, xr.Dataset], paper: Mapping[str, Tar
         rows.append([f"{target.what} (%)", target.value, *values])
     return Table(
         ["", "paper", "the paper's parameters, here", "the same in air", "fitted parameters"], rows,
-        "Peaks of the response, and damping by the half-power points as the paper has it, in "
-        "vacuum but for one column.",
+        "Peaks of the response, and damping from half-power points as in the paper. One column is "
+        "in air.",
         digits=3,
     )  # fmt: skip
 

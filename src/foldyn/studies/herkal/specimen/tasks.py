@@ -24,13 +24,14 @@ from foldyn.studies.herkal import calibration, vibration
 from foldyn.studies.herkal.specimen import evaluation, synthetic
 from foldyn.studies.herkal.specimen.measured import Data, measurement
 from foldyn.studies.herkal.specimen.synthetic import PAPERS, Shot
+from foldyn.studies.pool import Task
 from foldyn.writing import scratch, whole, write_text
 
+# Files and folders that the results depend on, in addition to the solvers.
 COMPUTING = (
     "experiment", "studies/herkal/calibration.py", "studies/herkal/vibration.py",
     "studies/herkal/specimen", "studies/herkal/cases",
 )  # fmt: skip
-"""Files and folders that the results depend on, in addition to the solvers."""
 FOLDER = "specimen"
 NOTE = "synthetic data: the specimen's own are not public"
 PHOTOS, FILM, FOUND, COMPARED = "photographs.nc", "film.nc", "found.json", "front.nc"
@@ -39,9 +40,22 @@ MODES, IN_AIR = "modes.nc", "modes-air.nc"
 RESPONSES = {"published": "frf-published.nc", "air": "frf-air.nc", "fitted": "frf-fitted.nc"}
 
 
+def _read(file: Path) -> tuple[str, dict[str, str]]:
+    settings, files = file.read_text(encoding="utf-8").splitlines()
+    return settings, {**from_json(files)}
+
+
+def _write_stamp(file: Path, stamp: str, files: dict[str, str]) -> None:
+    write_text(file, f"{stamp}\n{json.dumps(files)}\n")
+
+
+# the files of a part with their digests; `Part.result` reports damage by file name
+STAMPS: Store[dict[str, str]] = Store(_read, _write_stamp, warns=False)
+
+
 @dataclass(frozen=True)
-class Part:
-    """A part of the study.
+class Part(Task):
+    """A part of the study; its result are the digests of its files, by name.
 
     Attributes
     ----------
@@ -55,6 +69,7 @@ class Part:
     part: str
     shot: Shot = PAPERS
     data: Data = field(default_factory=Data)
+    store = STAMPS
 
     @property
     def name(self) -> str:
@@ -74,19 +89,21 @@ class Part:
             data.pop("static", None)
         return {"program": program(*COMPUTING), "data": data, "shot": shot}
 
-    def there(self, folder: Path) -> bool:
-        """Whether its result is in a folder."""
-        files = STAMPS.find(self._stamp(folder), self.settings())
-        if files is None:
-            return False
-        for name, digest in files.items():
+    def file(self, folder: Path) -> Path:
+        """File of its result in a folder."""
+        return folder / FOLDER / f".{self.part}.done"
+
+    def result(self, folder: Path) -> dict[str, str] | None:
+        """Its files; None if one is missing, damaged, or computed with other settings."""
+        files = super().result(folder)
+        for name, digest in (files or {}).items():
             if _digest(folder / FOLDER / name) != digest:
                 warn_of_damage(folder / FOLDER / name)
-                return False
-        return True
+                return None
+        return files
 
-    def make(self, folder: Path) -> None:
-        """Compute its result into a folder.
+    def compute(self, folder: Path) -> dict[str, str]:
+        """Write its files into a folder.
 
         Raises
         ------
@@ -98,31 +115,14 @@ class Part:
         missing = [one for one in self._needed() if not one.there(folder)]
         if missing:
             raise ComputationError(f"it needs {missing[0].name}, which failed")
-        self._stamp(folder).unlink(missing_ok=True)
+        self.file(folder).unlink(missing_ok=True)
         compute, names = PARTS[self.part]
         compute(self, inside)
-        kept = {name: _digest(inside / name) for name in names if (inside / name).is_file()}
-        STAMPS.keep(self._stamp(folder), self.settings(), kept)
+        return {name: _digest(inside / name) for name in names if (inside / name).is_file()}
 
     def _needed(self) -> list[Part]:
         seen, then = parts(self.shot, self.data)
         return {"fit": seen, "response": then[:1]}.get(self.part, [])
-
-    def _stamp(self, folder: Path) -> Path:
-        return folder / FOLDER / f".{self.part}.done"
-
-
-def _read(file: Path) -> tuple[str, dict[str, str]]:
-    settings, files = file.read_text(encoding="utf-8").splitlines()
-    return settings, {**from_json(files)}
-
-
-def _write_stamp(file: Path, stamp: str, files: dict[str, str]) -> None:
-    write_text(file, f"{stamp}\n{json.dumps(files)}\n")
-
-
-# a part's files with digests; `there` reports damage by file name
-STAMPS: Store[dict[str, str]] = Store(_read, _write_stamp, warns=False)
 
 
 def parts(shot: Shot, data: Data) -> tuple[list[Part], list[Part]]:
@@ -248,13 +248,13 @@ def _response(part: Part, folder: Path) -> None:
         save(vibration.specimen("modes", changes=given).run(), folder / name)
 
 
+# Computation of each part, and the files that it leaves for other parts or for the page.
 PARTS: Mapping[str, tuple[Callable[[Part, Path], None], tuple[str, ...]]] = {
     "photographs": (_photographs, (PHOTOS,)),
     "film": (_film, (FILM, TRUTH)),
     "fit": (_fit, (FOUND, COMPARED)),
     "response": (_response, (*RESPONSES.values(), MODES, IN_AIR)),
 }
-"""Computation of each part, and the files that it leaves for other parts or for the page."""
 
 
 def read_found(folder: Path) -> dict[str, Any]:
