@@ -21,7 +21,7 @@ from foldyn.mechanics.block_matrix import pairs_within, places_of
 from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient, dihedral_rates
 from foldyn.mechanics.discrete_gradient import discrete_gradient
 from foldyn.mechanics.model import ranks
-from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback, zeros_for
 from foldyn.mechanics.sheet_term import unit_rows
 from foldyn.mechanics.term import (
     ENERGIES,
@@ -161,17 +161,9 @@ def clamp_blocks(clamps, u):
     return out
 
 
-class Gradient(NamedTuple):
-    """Gradients with respect to arrays of `Clamps`."""
-
-    points: NDArray
-    rest: NDArray
-    stiffness: NDArray
-
-
 class _Backward(NamedTuple):
     clamps: Clamps
-    out: Gradient
+    out: Clamps  # gradients
     points: NDArray  # (4, 3) scratch: positions of one clamp, m
     moves: NDArray  # (4, 3) weights there
     rows: int  # number of rows up to the last node
@@ -259,11 +251,11 @@ class ClampsTerm(Term):
 
     def pulled(self) -> Pulled:
         """Pullback of its forces; see `Term`."""
-        out = Gradient(*(np.zeros_like(getattr(self.clamps, name)) for name in Gradient._fields))
+        out = zeros_for(self.clamps)
         points, moves = np.zeros((2, 4, 3))
         rows = 1 + int(self.clamps.nodes.max(initial=0))
         own = Context(_Backward(self.clamps, out, points, moves, rows))
-        return Pulled(own, _pullback, out._asdict())
+        return Pulled(own, _pullback, arrays_of(out).numbers)
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:

@@ -32,7 +32,7 @@ from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.membranes import GROUP
 from foldyn.mechanics.model import ranks
-from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback, zeros_for
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
@@ -46,6 +46,8 @@ from foldyn.mechanics.term import (
     mean_forces,
     nodal,
 )
+
+WORK = ("strain", "along")  # work arrays of `EdgeGives`
 
 
 class EdgeGives(NamedTuple):
@@ -284,18 +286,9 @@ def balanced_kernels(gives: EdgeGives, rows: int) -> CompiledTerm:
     return CompiledTerm(Context(context), {FORCES: _balanced_forces, ENERGIES: _balanced_energies})
 
 
-class Gradient(NamedTuple):
-    """Gradients with respect to arrays of `EdgeGives`."""
-
-    vector: NDArray
-    per_length2: NDArray
-    across: NDArray
-    stiffness: NDArray
-
-
 class _Backward(NamedTuple):
     gives: EdgeGives
-    out: Gradient
+    out: EdgeGives  # gradients
     rows: int
     first: int  # dof of the first give
     memory: NDArray  # (3, g)
@@ -374,9 +367,9 @@ def _balanced_pullback(own, u, v, t, weight, product, rate):
 
 
 def _pulled(kernel: Addressed, gives: EdgeGives, rows: int, first: int, factor: Factor) -> Pulled:
-    out = Gradient(*(np.zeros_like(getattr(gives, name)) for name in Gradient._fields))
+    out = zeros_for(gives, *WORK)
     own = _Backward(gives, out, rows, first, np.zeros((3, gives.count)), factor)
-    return Pulled(Context(own), kernel, out._asdict())
+    return Pulled(Context(own), kernel, arrays_of(out, *WORK).numbers)
 
 
 def gives_pulled(gives: EdgeGives, rows: int, first: int) -> Pulled:
@@ -412,7 +405,7 @@ class EdgeGivesTerm(Term):
 
     def arrays(self) -> Arrays:
         """Arrays that its forces depend on; see `Term`."""
-        return arrays_of(self.gives, "strain", "along")
+        return arrays_of(self.gives, *WORK)
 
     def pulled(self) -> Pulled:
         """Pullback of its forces; see `Term`."""

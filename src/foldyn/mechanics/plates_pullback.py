@@ -12,6 +12,7 @@ of the dihedral.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +21,12 @@ from numpy.typing import NDArray
 from foldyn.jit.compiled import inner
 from foldyn.jit.context import Context, rows_at
 from foldyn.materials.series import series_derivatives
-from foldyn.mechanics import bars_hinges as of_bars
-from foldyn.mechanics.bars_hinges import PullbackScratch, pull_bars_hinges, pullback_scratch
+from foldyn.mechanics.bars_hinges import (
+    PullbackScratch,
+    gradient_of,
+    pull_bars_hinges,
+    pullback_scratch,
+)
 from foldyn.mechanics.dihedral import dihedral_rates
 from foldyn.mechanics.plates import (
     BarsPlates,
@@ -32,27 +37,14 @@ from foldyn.mechanics.plates import (
     turn_folds,
     turn_plate,
 )
-from foldyn.mechanics.pullback import Pulled, pullback
+from foldyn.mechanics.pullback import Pulled, arrays_of, pullback, zeros_for
 from foldyn.mechanics.term import parted_rows
-
-
-class Gradient(NamedTuple):
-    """Derivatives by arrays of `BarsPlates` of the same names."""
-
-    bars: of_bars.Gradient
-    per_reach: NDArray  # (1,)
-    wings: NDArray
-    fold_stiffness: NDArray
-    fold_rest: NDArray
-    fold_parameters: NDArray
-    bend_rest: NDArray
-    stiffness: NDArray
 
 
 class Back(NamedTuple):
     """Memory of the pullback of one evaluation, and what it adds to; nh = nf + nb."""
 
-    out: Gradient
+    out: BarsPlates  # gradients; of `bars` a `bars_hinges.Gradient`, of `per_reach` (1,)
     bars: PullbackScratch
     points: NDArray  # (4, 3) of a hinge, m
     moves: NDArray  # (4, 3) weights there
@@ -67,12 +59,8 @@ class Back(NamedTuple):
 def back_of(model: BarsPlates) -> Back:
     """Memory for a model."""
     nh, most = len(model.hinges), int(np.diff(model.start).max(initial=0))
-    names = [name for name in Gradient._fields if name not in ("bars", "per_reach")]
-    out = Gradient(
-        bars=of_bars.gradient_of(model.bars),
-        per_reach=np.zeros(1),
-        **{name: np.zeros_like(getattr(model, name)) for name in names},
-    )
+    out = zeros_for(model, "bars", "per_reach")
+    out = out._replace(bars=gradient_of(model.bars), per_reach=np.zeros(1))
     points, moves, by = np.zeros((3, 4, 3))
     return Back(
         out, pullback_scratch(model.nodes), points, moves, by, np.zeros(nh), np.zeros((nh, 12)),
@@ -80,12 +68,9 @@ def back_of(model: BarsPlates) -> Back:
     )  # fmt: skip
 
 
-def gradients(out: Gradient) -> dict[str, NDArray]:
+def gradients(out: BarsPlates) -> Mapping[str, NDArray]:
     """By the names of `pullback.arrays_of` a model."""
-    of_plates = out._asdict()
-    bars = of_plates.pop("bars")._asdict()
-    of_plates["per_reach"] = out.per_reach.reshape(())
-    return {f"bars.{name}": array for name, array in bars.items()} | of_plates
+    return arrays_of(out._replace(per_reach=out.per_reach.reshape(()))).numbers
 
 
 @inner

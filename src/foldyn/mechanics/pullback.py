@@ -68,6 +68,12 @@ def arrays_of(model: Any, *but: str) -> Arrays:
     return Arrays(numbers, layout)
 
 
+def zeros_for(model: Any, *but: str) -> Any:
+    """`model` with zeros in place of its numbers, as in `arrays_of`, to which a pullback adds."""
+    numbers = arrays_of(model, *but).numbers
+    return model._replace(**{name: np.zeros_like(array) for name, array in numbers.items()})
+
+
 class Pullbacks(NamedTuple):
     """The pullbacks of a model as compiled loops see them."""
 

@@ -20,7 +20,7 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.block_matrix import blocks_of_ends, pairs_of_ends, places_of
 from foldyn.mechanics.model import ranks
-from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback, zeros_for
 from foldyn.mechanics.sheet_term import unit_rows
 from foldyn.mechanics.term import (
     ENERGIES,
@@ -163,17 +163,6 @@ def axial_blocks(springs, u, loose):
     return out
 
 
-class Gradient(NamedTuple):
-    """Gradients with respect to arrays of `Springs`."""
-
-    direction: NDArray
-    stiffness: NDArray
-    vector: NDArray
-    length: NDArray
-    stretch: NDArray
-    axial_stiffness: NDArray
-
-
 @inner
 def pull_directed(springs, u, weight, out, product):
     """Add the derivatives of weight . F of directed springs to `product` and the gradients."""
@@ -220,7 +209,7 @@ def pull_axial(springs, u, weight, out, product):
 
 class _Backward(NamedTuple):
     springs: Springs
-    out: Gradient
+    out: Springs  # gradients
     rows: int  # number of rows up to the last node
 
 
@@ -280,9 +269,9 @@ class SpringsTerm(Term):
     def pulled(self) -> Pulled:
         """Pullback of its forces; see `Term`."""
         rows = 1 + int(self._ends.max(initial=GROUND))
-        out = Gradient(*(np.zeros_like(getattr(self.springs, name)) for name in Gradient._fields))
+        out = zeros_for(self.springs)
         own = Context(_Backward(self.springs, out, rows))
-        return Pulled(own, _pullback, out._asdict())
+        return Pulled(own, _pullback, arrays_of(out).numbers)
 
     @cached_property
     def _ends(self) -> NDArray:

@@ -23,7 +23,7 @@ from foldyn.jit.context import Context, numbers_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.dihedral import dihedral_gradient, dihedral_rates
-from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback, zeros_for
 from foldyn.mechanics.sheet_term import NO_DOF
 from foldyn.mechanics.term import FORCES, CompiledTerm, Term, forces
 
@@ -178,18 +178,9 @@ def _forces(own, u, v, t, force, powers):
     numbers_at(powers, 2)[1] += power
 
 
-class Gradient(NamedTuple):
-    """Gradients with respect to arrays of `Viscous`."""
-
-    axial: NDArray
-    corners: NDArray
-    hidden_turn: NDArray
-    coefficient: NDArray
-
-
 class _Backward(NamedTuple):
     elements: Viscous
-    out: Gradient
+    out: Viscous  # gradients
     points: NDArray  # (4, 3) scratch: positions of one hinge, m
     moves: NDArray  # (14,) velocities of the dofs of one element
     by: NDArray  # (14,)
@@ -288,11 +279,11 @@ class ViscousTerm(Term):
 
     def pulled(self) -> Pulled:
         """Pullback of its forces; see `Term`."""
-        out = Gradient(*(np.zeros_like(getattr(self.elements, name)) for name in Gradient._fields))
+        out = zeros_for(self.elements, "gradient")
         moves, by = np.zeros((2, WIDTH))
         size = 1 + int(self.elements.dofs.max(initial=0))
         own = Context(_Backward(self.elements, out, np.zeros((4, 3)), moves, by, size))
-        return Pulled(own, _pullback, out._asdict())
+        return Pulled(own, _pullback, arrays_of(out, "gradient").numbers)
 
     @cached_property
     def _coupled(self) -> tuple[NDArray, NDArray, NDArray]:

@@ -22,8 +22,10 @@ from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.block_matrix import pairs_within, places_of
 from foldyn.mechanics.membranes import Membranes
 from foldyn.mechanics.model import ranks
-from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback, zeros_for
 from foldyn.mechanics.term import FORCES, CompiledTerm, Term, forces, nodal
+
+WORK = ("along", "rate")  # work arrays of `ViscousPanels`
 
 
 class ViscousPanels(NamedTuple):
@@ -100,17 +102,9 @@ def _forces(own, u, v, t, force, powers):
     numbers_at(powers, 2)[1] += power
 
 
-class Gradient(NamedTuple):
-    """Gradients with respect to arrays of `ViscousPanels`."""
-
-    vector: NDArray
-    per_length2: NDArray
-    resistance: NDArray
-
-
 class _Backward(NamedTuple):
     panels: ViscousPanels
-    out: Gradient
+    out: ViscousPanels  # gradients
     growth: NDArray  # (2, b) memory of one panel: rates of its bars' lengths, times length,
     stress: NDArray  # (2, b) and C and C^T times those of strains, by the weights and velocities
     rows: int  # number of rows up to the last node
@@ -190,15 +184,15 @@ class ViscousPanelsTerm(Term):
 
     def arrays(self) -> Arrays:
         """Arrays that its forces depend on; see `Term`."""
-        return arrays_of(self.panels, "along", "rate")
+        return arrays_of(self.panels, *WORK)
 
     def pulled(self) -> Pulled:
         """Pullback of its forces; see `Term`."""
-        out = Gradient(*(np.zeros_like(getattr(self.panels, name)) for name in Gradient._fields))
+        out = zeros_for(self.panels, *WORK)
         growth, stress = np.zeros((2, 2, len(self.panels.rate)))
         rows = 1 + int(self.panels.nodes.max(initial=0))
         own = Context(_Backward(self.panels, out, growth, stress, rows))
-        return Pulled(own, _pullback, out._asdict())
+        return Pulled(own, _pullback, arrays_of(out, *WORK).numbers)
 
     @cached_property
     def damping_places(self) -> tuple[NDArray, NDArray]:
