@@ -66,7 +66,7 @@ class Lone(NamedTuple):
         kernel = np.zeros((1, 9), np.int64)
         kernel[0, FORCES] = held.kernels[FORCES].at(held.context)
         context = np.array([held.context.address])
-        evaluate(Terms(context, kernel, None, np.zeros(3)), u, speed, force, np.zeros(0))
+        evaluate(Terms(context, kernel, np.zeros(3)), u, speed, force, np.zeros(0))
         return force.ravel()[: self.size]
 
     def _memory(self) -> tuple[Any, Any]:

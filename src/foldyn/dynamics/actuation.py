@@ -18,6 +18,7 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.materials.series import series_moment, series_rest_slope
 from foldyn.materials.switch import move_rest
 from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.term import Folds
 
 
 class Actuators(NamedTuple):
@@ -27,7 +28,8 @@ class Actuators(NamedTuple):
     the factor of history row, rad.
     """
 
-    hinge: NDArray  # (a,) row of `Folds`, or of offsets after those
+    folds: Folds  # all hinges that can be actuated
+    hinge: NDArray  # (a,) row of these, or of offsets after those
     lowest: NDArray  # (a,) lowest node of the hinge, in increasing order
     is_offset: NDArray  # (a,) bool
     start: NDArray  # (a,)
@@ -64,6 +66,7 @@ def actuators(
     start = offset[hinge, 0]
     start[~is_offset] = body.sheet.turned()[0][hinge[~is_offset]]
     return body, Actuators(
+        folds=body.sheet.folds,
         hinge=hinge,
         lowest=lowest,
         is_offset=is_offset,
@@ -88,15 +91,15 @@ def turned_by(actuators, factor, k, derivative):
 
 
 @kernel
-def turn(folds, actuators, factor):
+def turn(actuators, factor):
     """Set the rest angles for the factors (h, 3); one outside 0..2 pi becomes nan."""
-    turn_part(folds, actuators, factor, 0, actuators.hinge.size)
+    turn_part(actuators, factor, 0, actuators.hinge.size)
 
 
 @inner
-def turn_part(folds, actuators, factor, first, last):
+def turn_part(actuators, factor, first, last):
     """Set the rest angles of the actuators first to last - 1; see `turn`."""
-    rest_angle, p = folds.rest, folds.parameters
+    rest_angle, p = actuators.folds.rest, actuators.folds.parameters
     for k in range(first, last):
         e, value = actuators.hinge[k], actuators.start[k] + turned_by(actuators, factor, k, 0)
         if actuators.is_offset[k]:
@@ -107,14 +110,15 @@ def turn_part(folds, actuators, factor, first, last):
 
 
 @inner
-def actuator_power(folds, actuators, factor, angle):
+def actuator_power(actuators, factor, angle):
     """Power (W) that the actuators put into the structure; `angle` (nh,) are the dihedrals, rad."""
-    return power_of_part(folds, actuators, factor, angle, 0, actuators.hinge.size)
+    return power_of_part(actuators, factor, angle, 0, actuators.hinge.size)
 
 
 @inner
-def power_of_part(folds, actuators, factor, angle, first, last):
+def power_of_part(actuators, factor, angle, first, last):
     """Power (W) of the actuators first to last - 1, without offsets; `angle` (nh,): all hinges."""
+    folds = actuators.folds
     rest_angle, p, stiffness = folds.rest, folds.parameters, folds.stiffness
     power = 0.0
     for k in range(first, last):
@@ -130,17 +134,18 @@ def power_of_part(folds, actuators, factor, angle, first, last):
 
 
 @kernel
-def note_offsets(folds, actuators, angle):
+def note_offsets(actuators, angle):
     """Store the offsets after they have jumped, at dihedrals `angle` (nh,)."""
-    offset_work(folds, actuators, angle, 0, actuators.hinge.size, True)
+    offset_work(actuators, angle, 0, actuators.hinge.size, True)
 
 
 @inner
-def offset_work(folds, actuators, angle, first, last, accepted):
+def offset_work(actuators, angle, first, last, accepted):
     """Work (J) of offsets since the last accepted step, for the actuators first to last - 1.
 
     accepted : whether the step that ends in the present state is accepted.
     """
+    folds = actuators.folds
     rest_angle, p, stiffness = folds.rest, folds.parameters, folds.stiffness
     work, offset = 0.0, actuators.offset
     for k in range(first, last):

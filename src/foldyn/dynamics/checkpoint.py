@@ -372,7 +372,7 @@ def state_parts(packed: PackedCase, state: MotionState) -> dict[str, Any]:
     if memory is not None:
         parts["branches"] = memory.own
     if packed.system.turns:
-        parts["folds"] = [packed.body.sheet.folds, packed.body.sheet.series()[1]]
+        parts["folds"] = [packed.system.actuators.folds, packed.system.actuators.offset]
     if packed.added.acts:
         own = packed.added
         parts["added_mass"] = [own.flow, own.resistance, own.guess, own.angle, own.made]

@@ -188,11 +188,11 @@ def residual(step, h, t):
     middle = t - 0.5 * h
     for k in range(step.terms.size):
         if system.turns:  # terms that remember the step's start need the end
-            turn(step.case.terms.folds, system.actuators, mean if k == 0 else new.factor)
+            turn(system.actuators, mean if k == 0 else new.factor)
         ends = step.terms[k], s.displacement, s.velocity
         run_at(step.forces[k], (*ends, step.before, h, middle, new.force, step.powers))
     if system.turns:  # for the tangent
-        turn(step.case.terms.folds, system.actuators, mean)
+        turn(system.actuators, mean)
     touch = flat(step.touch)
     for i in range(touch.size):
         bracket[i] += touch[i]
@@ -227,12 +227,12 @@ def _actuation(step, u0, u1):
     """Work (J) of the actuators in a step: energy change as rest angles turn at its two ends."""
     terms, old, new = step.case.terms, step.old, step.new
     done, mean, system, s = 0.0, mean_factors(step), step.case.system, step.case.s
-    turn(terms.folds, system.actuators, old.factor)
+    turn(system.actuators, old.factor)
     done -= _energy_of_sheet(terms, u0, s.energy)
-    turn(terms.folds, system.actuators, mean)
+    turn(system.actuators, mean)
     done += _energy_of_sheet(terms, u0, s.energy)
     done -= _energy_of_sheet(terms, u1, s.energy)
-    turn(terms.folds, system.actuators, new.factor)
+    turn(system.actuators, new.factor)
     return done + _energy_of_sheet(terms, u1, s.energy)
 
 

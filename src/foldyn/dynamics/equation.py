@@ -40,16 +40,17 @@ from foldyn.mechanics.heat import Warm, warm
 from foldyn.mechanics.term import (
     ADDRESS,
     ADVANCE_CLOCK,
+    BRANCH_STATES,
     EVERY,
     LIMIT,
     NUMBER,
+    PLACE_OBSTACLES,
     Terms,
     ThreadTerms,
     dissipated_by,
     energies_of,
     forces_of,
-    obstacles_to,
-    states_of,
+    run_each,
 )
 from foldyn.mechanics.threads import Team, ThreadPart, largest, part, total, wait
 
@@ -110,7 +111,7 @@ def _acceleration(m, q, w, t, out, powers):
     if m.carry != 0:
         run_at(m.carry, (m, q, w))
     if system.presses:
-        obstacles_to(m.terms, factor)
+        run_each(m.terms, PLACE_OBSTACLES, (factor,))
     u = m.s.displacement if m.carry != 0 else rows_at(q, rows)
     v = m.s.velocity if m.carry != 0 else rows_at(w, rows)
     wait(m.team)  # for q and w of the other threads
@@ -211,7 +212,7 @@ def _sample(r, u, v, a, t):
             state.tally.work -= total
             out.energy[k, last] -= total
         out.energy[k, last] += total
-    states_of(m.terms, out.memory[k])
+    run_each(m.terms, BRANCH_STATES, (out.memory[k],))
     sound = 0.0
     for c in range(out.energy.shape[1]):
         sound += out.energy[k, c]

@@ -288,11 +288,11 @@ def _taken_by(step, numbers, before, after):
 @kernel
 def _actuation(step, angle0, angle1):
     """Work (J) of the actuators in a step between the dihedrals angle0 and angle1."""
-    folds, system, old, new = step.case.terms.folds, step.case.system, step.old, step.new
+    actuators, old, new = step.case.system.actuators, step.old, step.new
     change = np.zeros_like(new.factor)
     change[:, 1] = 0.5 * (new.factor[:, 0] - old.factor[:, 0])
-    turn(folds, system.actuators, old.factor)
-    done = actuator_power(folds, system.actuators, change, angle0)
-    turn(folds, system.actuators, new.factor)
-    done += actuator_power(folds, system.actuators, change, angle1)
-    return done + offset_work(folds, system.actuators, angle1, 0, system.actuators.hinge.size, True)
+    turn(actuators, old.factor)
+    done = actuator_power(actuators, change, angle0)
+    turn(actuators, new.factor)
+    done += actuator_power(actuators, change, angle1)
+    return done + offset_work(actuators, angle1, 0, actuators.hinge.size, True)

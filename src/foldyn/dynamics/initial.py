@@ -273,7 +273,7 @@ def begin(
     tally.time, tally.wanted, tally.error, tally.shortest = plan.start, first, 1e-4, np.inf
     inward, memory = by.inward(q), body.find(HingeMemory)
     if system.turns:
-        turn(body.sheet.folds, system.actuators, s.factor)
+        turn(system.actuators, s.factor)
         system.actuators.offset[:, 2] = system.actuators.offset[:, 0]
         system.actuators.offset[:, 3] = np.nan  # no moment known yet
     if len(body.hidden):  # massless dofs start in balance

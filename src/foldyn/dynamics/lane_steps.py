@@ -6,7 +6,6 @@ All take the same steps; each is checked along the way like a single motion.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +13,6 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.motion_state import Samples
-from foldyn.errors import ComputationError
 from foldyn.jit.compiled import inner, shared
 from foldyn.jit.eights import eight, put
 from foldyn.jit.intrinsics import borrowed
@@ -157,17 +155,11 @@ def integrate(motions: Sequence[tuple[int, Motion]], out: Samples) -> set[int]:
 
 
 def _is_sound(motion: Motion, lane: int, state: LaneState, step: int) -> bool:
-    """Whether a motion may continue after a step: audited like a single motion."""
+    """Whether a motion may continue after a step."""
     if state.wrong[lane] != 0.0:
         return False
     motion.state.tally.samples = step // motion.plan.every + 1
-    with suppress(ComputationError):
-        motion.audit()
-        if step < motion.plan.steps:
-            u = state.dofs[0, lane::WIDTH].reshape(-1, 3)
-            motion.recheck(motion.packed.numbering.outward(u))
-        return True
-    return False
+    return motion.may_continue(step, state.dofs[0, lane::WIDTH].reshape(-1, 3))
 
 
 def _start(motions: Sequence[Motion]) -> LaneState:

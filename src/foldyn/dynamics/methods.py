@@ -68,7 +68,7 @@ class ExplicitEngine(Engine):
         self._loop, self._packed, self._state, self._plan = loop, packed, state, plan
         self._further = further
         self._threads = packed.body.thread_parts(threads)
-        self._scratches = scratches(packed.system, self._threads)
+        self._scratches = scratches(packed.system, [own.own for own in self._threads])
         self._equations = [
             EquationOfMotion(packed, own, scratch, state, slows)
             for own, scratch in zip(self._threads, self._scratches, strict=True)

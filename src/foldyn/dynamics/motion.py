@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -23,14 +24,7 @@ from foldyn.dynamics.motion_state import MotionState, Outcome, Samples, StepPlan
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
-from foldyn.dynamics.stability import (
-    MARGIN,
-    damper_rate,
-    frequency_bound,
-    is_stable,
-    largest_frequency,
-    stability_limit,
-)
+from foldyn.dynamics.stability import MARGIN, limit_below
 from foldyn.dynamics.system import PackedCase, pack, place, scratch
 from foldyn.dynamics.timing import apart, check_room, check_samples, expected_samples, steps_taken
 from foldyn.dynamics.turned import resists_turns, turns_told
@@ -484,22 +478,27 @@ class Motion:
         balance = self.output.balance
         balance.scale = max(balance.scale, motion.output.balance.scale)
 
+    def may_continue(self, step: int, u: NDArray) -> bool:
+        """Whether audit and `recheck` let a motion continue after a step, at u (n, 3) in memory."""
+        with suppress(ComputationError):
+            self.audit()
+            if step < self.plan.steps:
+                self.recheck(self.packed.numbering.outward(u))
+            return True
+        return False
+
     def recheck(self, u: NDArray) -> None:
         """Stop if the structure has stiffened so much that the step exceeds the stability limit."""
-        growth, damping = self.method.growth, self.case.rayleigh
+        growth, dt = self.method.growth, self.plan.dt
         if self.force or growth is None:
             return
-        rate = damper_rate(self.case, u) + self.packed.modal.rate
-        for frequency in (frequency_bound, largest_frequency):  # the first is cheaper
-            omega = frequency(self.case, u)
-            if np.isfinite(omega) and is_stable(growth, omega, damping, self.plan.dt, rate):
-                return
-        limit = stability_limit(growth, omega, damping, rate)
-        self._stop(
-            f"the structure has stiffened: at t = {self.state.tally.time:.6g} s the step of "
-            f"{self.plan.dt:.3g} s is above the stability limit of {limit:.3g} s; use "
-            f"dt = {0.5 * MARGIN * limit:.3g} or smaller"
-        )
+        limit = limit_below(growth, self.case, u, dt, self.packed.modal.rate)
+        if limit is not None:
+            self._stop(
+                f"the structure has stiffened: at t = {self.state.tally.time:.6g} s the step of "
+                f"{dt:.3g} s is above the stability limit of {limit:.3g} s; use "
+                f"dt = {0.5 * MARGIN * limit:.3g} or smaller"
+            )
 
     def _crossings(self) -> Crossings:
         """Panels that cross at the samples so far."""

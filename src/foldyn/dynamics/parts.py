@@ -21,12 +21,13 @@ from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.following import push_following
 from foldyn.mechanics.term import (
     ADDRESS,
+    ADVANCE_CLOCK,
+    COMMIT,
     NUMBER,
     Terms,
-    clock_to,
-    commit_all,
     dissipated_by,
     energies_of,
+    run_each,
     step_error_of,
 )
 from foldyn.mechanics.threads import Team, wait
@@ -71,7 +72,7 @@ def histories(m, t):
 @addressed()
 def turn(m):
     """Set the rest angles from the histories."""
-    turn_part(m.terms.folds, m.system.actuators, m.s.factor, m.s.turned[0], m.s.turned[1])
+    turn_part(m.system.actuators, m.s.factor, m.s.turned[0], m.s.turned[1])
 
 
 @addressed(ADDRESS, ADDRESS)
@@ -127,7 +128,7 @@ def moving_power(m):
 def turning_power(m):
     """Power (W) of turning rest angles."""
     return power_of_part(
-        m.terms.folds, m.system.actuators, m.s.factor, m.fold_angle, m.s.turned[0],
+        m.system.actuators, m.s.factor, m.fold_angle, m.s.turned[0],
         m.s.turned[1],
     )  # fmt: skip
 
@@ -136,7 +137,7 @@ def turning_power(m):
 def offsets(m, accepted):
     """Work (J) of offsets since the last step; see `actuation.offset_work`."""
     return offset_work(
-        m.terms.folds, m.system.actuators, m.fold_angle, m.s.turned[0], m.s.turned[1],
+        m.system.actuators, m.fold_angle, m.s.turned[0], m.s.turned[1],
         accepted > 0.0,
     )  # fmt: skip
 
@@ -152,13 +153,13 @@ def spent(m, q):
 @addressed(NUMBER)
 def clock(m, since):
     """Set the time (s) from the last accepted step to the next evaluation."""
-    clock_to(m.terms, since)
+    run_each(m.terms, ADVANCE_CLOCK, (since,))
 
 
 @addressed()
 def commit(m):
     """Accept the step that ends at the last evaluation."""
-    commit_all(m.terms)
+    run_each(m.terms, COMMIT, ())
 
 
 @addressed(NUMBER)

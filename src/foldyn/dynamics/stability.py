@@ -76,6 +76,21 @@ def stability_limit(growth: Growth, omega: float, damping: Rayleigh, rate: float
     return low
 
 
+def limit_below(
+    growth: Growth, case: Case, u: NDArray, dt: float, rate: float = 0.0
+) -> float | None:
+    """Stability limit (s) of a case at u (n, 3) if steps of dt are above it, else None.
+
+    rate : largest rate of modal damping, 1/s.
+    """
+    rate += damper_rate(case, u)
+    for frequency in (frequency_bound, largest_frequency):  # the first is cheaper
+        omega = frequency(case, u)
+        if np.isfinite(omega) and is_stable(growth, omega, case.rayleigh, dt, rate):
+            return None
+    return stability_limit(growth, omega, case.rayleigh, rate)
+
+
 def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     """Largest angular frequency (rad/s) of a case about displacement u (n, 3), rest by default.
 

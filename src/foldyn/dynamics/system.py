@@ -39,7 +39,6 @@ from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.following import Following, joined
 from foldyn.mechanics.heat import Heat
-from foldyn.mechanics.threads import ThreadPart
 
 ROUNDING = 1e-14  # of support motion: smaller motions of other nodes are zero
 
@@ -235,35 +234,34 @@ def _moved_mass(mass: sparse.csr_array, moves, histories) -> NDArray:
 
 def scratch(system: System) -> Scratch:
     """Scratch of a single thread."""
-    nodes, histories = system.rows, len(system.waves.code)
-    force, product, displacement, velocity, moving = np.zeros((5, nodes, 3))
-    line = np.zeros(3 * nodes if len(system.ties.slave) else nodes)
-    energy, factor = np.zeros(system.energies), np.tile([1.0, 0.0, 0.0], (histories, 1))
-    never = np.full(1, np.nan)
-    counts = len(system.loads.dof), len(system.moved.dof), len(system.actuators.hinge)
-    loads, moved, turned = (np.array([0, count]) for count in counts)
-    stage, powers = np.zeros((3, nodes, 3)), np.zeros(3)
-    pushed = np.zeros((nodes if system.follows else 0, 3))
-    return Scratch(
-        force, product, line, energy, never, factor, displacement, velocity, moving, stage, loads,
-        moved, turned, powers, pushed,
-    )  # fmt: skip
+    return scratches(system, [np.array([0, system.rows])])[0]
 
 
-def scratches(system: System, threads: Sequence[ThreadPart]) -> list[Scratch]:
-    """Scratch of each thread of a team."""
-    whole = scratch(system)
+def scratches(system: System, owned: Sequence[NDArray]) -> list[Scratch]:
+    """Scratch of each thread of a team, which own the rows owned[k][0] to owned[k][1] - 1."""
+    rows, histories = system.rows, len(system.waves.code)
+    force, product, displacement, velocity, moving = np.zeros((5, rows, 3))
+    energy, stage = np.zeros(system.energies), np.zeros((3, rows, 3))
+    pushed = np.zeros((rows if system.follows else 0, 3))
     return [
-        whole._replace(
+        Scratch(
+            force=force,
+            product=product,
+            line=np.zeros(3 * rows if len(system.ties.slave) else rows),
+            energy=energy,
+            time=np.full(1, np.nan),
+            factor=np.tile([1.0, 0.0, 0.0], (histories, 1)),
+            displacement=displacement,
+            velocity=velocity,
+            moving=moving,
+            stage=stage,
+            loads=np.searchsorted(system.loads.dof, 3 * own),
+            moved=np.searchsorted(system.moved.dof, 3 * own),
+            turned=np.searchsorted(system.actuators.lowest, own),
             powers=np.zeros(3),
-            time=whole.time.copy(),
-            factor=whole.factor.copy(),
-            line=np.empty_like(whole.line),
-            loads=np.searchsorted(system.loads.dof, 3 * part.own),
-            moved=np.searchsorted(system.moved.dof, 3 * part.own),
-            turned=np.searchsorted(system.actuators.lowest, part.own),
+            pushed=pushed,
         )
-        for part in threads
+        for own in owned
     ]
 
 

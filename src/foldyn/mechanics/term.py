@@ -319,7 +319,6 @@ class Terms(NamedTuple):
 
     context: NDArray  # (k,) addresses
     kernel: NDArray  # (k, 9) addresses, or 0
-    folds: Folds
     powers: NDArray  # (3,) scratch of `forces_of`
 
 
@@ -343,7 +342,7 @@ class ThreadTerms:
         self._held = terms = body.compiled(part)
         kernel = np.zeros((len(terms), len(EVERY)), np.int64)
         context = np.array([term.context.address for term in terms], np.int64)
-        self.terms = Terms(context, kernel, body.sheet.folds, np.zeros(3))
+        self.terms = Terms(context, kernel, np.zeros(3))
         self.call(kinds)
 
     def call(self, kinds: Sequence[int]) -> None:
@@ -373,8 +372,8 @@ def forces_of(terms, u, v, t, force):
 
 
 @inner_scalar
-def _run_each(terms, kind, given):
-    """Run the kernels of a kind for all terms that have one."""
+def run_each(terms, kind, given):
+    """Run the kernels of a kind for all terms that have one, with the arguments `given`."""
     for k in range(terms.context.size):
         if terms.kernel[k, kind] != 0:
             run_at(terms.kernel[k, kind], (terms.context[k],) + given)  # noqa: RUF005 - for Numba
@@ -383,7 +382,7 @@ def _run_each(terms, kind, given):
 @inner_scalar
 def energies_of(terms, u, out):
     """Strain energies (J) by group, into `out`; some terms report their last force evaluation."""
-    _run_each(terms, ENERGIES, (u, out))
+    run_each(terms, ENERGIES, (u, out))
 
 
 @inner_scalar
@@ -397,24 +396,6 @@ def limit_of(terms, u, v, a, dt, beta, energy, lightness):
 
 
 @inner_scalar
-def obstacles_to(terms, factor):
-    """Set moving obstacles to the factors (h, 3) of histories and their derivatives."""
-    _run_each(terms, PLACE_OBSTACLES, (factor,))
-
-
-@inner_scalar
-def clock_to(terms, since):
-    """Tell terms with memory the time (s) from the last accepted step to the next evaluation."""
-    _run_each(terms, ADVANCE_CLOCK, (since,))
-
-
-@inner_scalar
-def commit_all(terms):
-    """Tell terms that the step that ends at the last evaluation is accepted."""
-    _run_each(terms, COMMIT, ())
-
-
-@inner_scalar
 def dissipated_by(terms):
     """Energy (J) dissipated by all terms up to their last evaluation."""
     lost = 0.0
@@ -422,12 +403,6 @@ def dissipated_by(terms):
         if terms.kernel[k, DISSIPATED] != 0:
             lost += value_at(terms.kernel[k, DISSIPATED], (terms.context[k],))
     return lost
-
-
-@inner_scalar
-def states_of(terms, out):
-    """Write the branch states (b, 2) at the last evaluation to `out`."""
-    _run_each(terms, BRANCH_STATES, (out,))
 
 
 @inner_scalar

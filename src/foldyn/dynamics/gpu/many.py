@@ -15,7 +15,7 @@ from foldyn.dynamics.gpu.checks import METHODS, lacking
 from foldyn.dynamics.gpu.engine import BlockEngine
 from foldyn.dynamics.gpu.launch import Launches, Places
 from foldyn.dynamics.motion import Motion
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import InputError
 
 AT_ONCE = 16384  # models per launch: more are no faster
 
@@ -100,20 +100,10 @@ def _integrated(motions: Sequence[Motion]) -> NDArray:
         if look.any():
             u = launches.places().u if (done < steps).any() else u
             for k in np.flatnonzero(look).tolist():
-                sound[k] = _is_sound(motions[k], u[k])
+                sound[k] = motions[k].may_continue(int(done[k]), u[k])
     share, engine = (time.perf_counter() - clock) / len(motions), BlockEngine()
     for motion, plan in zip(motions, plans, strict=True):
         times = plan.start + np.arange(motion.stored) * plan.every * plan.dt
         motion.output.window.time[: motion.stored] = times
         motion.integrated_by(engine, share)
     return sound
-
-
-def _is_sound(motion: Motion, u: NDArray) -> bool:
-    """Whether a motion may continue: audited in the same way as a single motion."""
-    with suppress(ComputationError):
-        motion.audit()
-        if motion.state.tally.steps < motion.plan.steps:
-            motion.recheck(motion.packed.numbering.outward(u))
-        return True
-    return False

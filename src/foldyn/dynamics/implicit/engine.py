@@ -346,9 +346,7 @@ class ImplicitEngine(Engine):
             if self._memory is not None:  # creases that turn instantly
                 self._memory.commit()
             if system.turns:
-                note_offsets(
-                    self._packed.body.sheet.folds, system.actuators, scheme.part.fold_angle
-                )
+                note_offsets(system.actuators, scheme.part.fold_angle)
             if self._touching is not None:
                 self._touching.begin()
 

@@ -215,7 +215,7 @@ class Scheme(ABC):
         start = settled = np.ravel(s.displacement)[: body.size]
         before = body.energies(start)
         if system.turns:
-            turn(body.sheet.folds, system.actuators, s.factor)
+            turn(system.actuators, s.factor)
         if follows:
             push = following_force(system.following, start, s.factor)
             turns = sparse.csr_array((0, len(hidden))) if viscous is None else viscous.turns(hidden)
