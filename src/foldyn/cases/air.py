@@ -12,6 +12,7 @@ from foldyn.arguments import Check, Flag
 from foldyn.cases.decode import Factor, Part
 from foldyn.cases.history import STEADY
 from foldyn.errors import InputError
+from foldyn.structures.discretized import Discretized
 from foldyn.structures.mesh import double_areas
 from foldyn.values import flag, number, show, vector, whole
 
@@ -85,7 +86,7 @@ class Air(Part):
         """Whether it acts on a sheet that stands still."""
         return any(self.velocity)
 
-    def coefficient(self, structure: Any) -> float:
+    def coefficient(self, structure: Discretized) -> float:
         """Drag coefficient of the panels of a structure.
 
         That of a flat plate, interpolated over the ratio of its shorter to its longer side. The
@@ -96,7 +97,7 @@ class Air(Part):
         return float(np.interp(_side_ratio(structure), SHORTER_TO_LONGER, PLATE_DRAG))
 
 
-def _side_ratio(structure: Any) -> float:
+def _side_ratio(structure: Discretized) -> float:
     """Shorter over longer side of a rectangle with the second moments of a sheet at rest."""
     corners = structure.nodes[structure.triangles]
     area = np.linalg.norm(double_areas(structure.nodes, structure.triangles), axis=1)

@@ -33,7 +33,7 @@ from foldyn.mechanics.contact.boards import BoardSheets
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.patterns.picture import picture
 from foldyn.structures.boundary_elements import BoundaryElements
-from foldyn.structures.discretized import read_only
+from foldyn.structures.discretized import Discretized, read_only
 from foldyn.structures.inelastic_hinges import Remembering, remembering
 from foldyn.structures.mass import center_of_mass, inertia_tensor, row_sums
 from foldyn.values import objects, show
@@ -113,7 +113,7 @@ class Case(Loaded, Damped):
         A force acts on held axes in part.
     """
 
-    structure: Any
+    structure: Discretized
     supports: Sequence[Support] = ()
     loads: Sequence[Load] = ()
     damping: Damping | Sequence[Damping] = field(default_factory=Rayleigh)

@@ -21,7 +21,7 @@ from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
 from foldyn.errors import Faults, InputError
 from foldyn.mechanics.following import Following
 from foldyn.mechanics.term import Term
-from foldyn.structures.discretized import read_only
+from foldyn.structures.discretized import Discretized, read_only
 from foldyn.structures.swelling import Swelling
 
 Terms = tuple[tuple[NDArray[np.float64], History], ...]
@@ -31,7 +31,7 @@ Summands = Iterable[tuple[NDArray[np.float64], Any]]
 class Supported:
     """Supports of a case, which has `structure` and `supports`; see `Case`."""
 
-    structure: Any
+    structure: Discretized
     supports: Sequence[Any]
 
     @cached_property
@@ -182,7 +182,7 @@ class Supported:
 class Loaded:
     """Loads of a case, which has `structure`, `loads` and `nodal_mass`; see `Case`."""
 
-    structure: Any
+    structure: Discretized
     loads: Sequence[Load]
     nodal_mass: Any
 

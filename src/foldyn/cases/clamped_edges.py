@@ -18,11 +18,12 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.selection import select
 from foldyn.patterns.topology import edge_lookup, edge_of
 from foldyn.structures.clamps import boundary_edges
+from foldyn.structures.discretized import Discretized
 from foldyn.values import show
 
 
 def supported_points(
-    structure: Any, support: Any, place: str
+    structure: Discretized, support: Any, place: str
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Nodes (k,) of a Fix, an Impose or a Link, and the values (k,) of an Impose there, m.
 
@@ -43,7 +44,7 @@ def supported_points(
     return np.concatenate([named, inner]), np.concatenate([value, between.ravel()])
 
 
-def _edges(structure: Any, support: Any, named: NDArray, place: str) -> NDArray[np.int64]:
+def _edges(structure: Discretized, support: Any, named: NDArray, place: str) -> NDArray[np.int64]:
     """Nodes (k, p) along the edges between those that a support names."""
     if structure.pattern is None:
         raise InputError(
@@ -92,7 +93,7 @@ def straightened(options: Any, pattern: Pattern, supports: Iterable[Any]) -> dic
     return {"straight": tuple(straight)}
 
 
-def _between(structure: Any, edges: NDArray, vector: NDArray) -> NDArray[np.float64]:
+def _between(structure: Discretized, edges: NDArray, vector: NDArray) -> NDArray[np.float64]:
     """Values (k, p - 2, ...) at the inner points of edges (k, p), linear between their ends."""
     x = structure.nodes[edges]
     share = np.linalg.norm(x - x[:, :1], axis=2)
@@ -110,7 +111,7 @@ class Straight:
         Dofs for which supports are given: these are not changed.
     """
 
-    def __init__(self, structure: Any, stated: NDArray[np.bool_]) -> None:
+    def __init__(self, structure: Discretized, stated: NDArray[np.bool_]) -> None:
         self._structure, self._stated = structure, stated
 
     def held(self) -> NDArray[np.bool_]:

@@ -15,6 +15,7 @@ from foldyn.cases.directions import Direction, Pairs, unit_vector
 from foldyn.cases.selection import Nodes, resolve_nodes
 from foldyn.errors import InputError
 from foldyn.mechanics.springs import GROUND, Springs, SpringsTerm
+from foldyn.structures.discretized import Discretized
 from foldyn.values import number
 
 NEAR = 1e-9  # of the structure's size: nodes closer than that have no line between them
@@ -45,7 +46,7 @@ class Connector(Part):
         if (self.nodes is None) == (self.between is None):
             raise InputError(f": give {self.asked}", "nodes" if self.between is None else "between")
 
-    def ends(self, structure: Any, place: str) -> NDArray[np.int64]:
+    def ends(self, structure: Discretized, place: str) -> NDArray[np.int64]:
         """Ends (k, 2); `GROUND` in place of the second.
 
         Raises
@@ -125,12 +126,12 @@ class Spring(Connector):
             )
 
     @classmethod
-    def term(cls, parts: Sequence[tuple[str, Any]], structure: Any) -> SpringsTerm:
+    def term(cls, parts: Sequence[tuple[str, Any]], structure: Discretized) -> SpringsTerm:
         """See `Part`."""
         return SpringsTerm(packed(parts, structure))
 
 
-def packed(parts: Iterable[tuple[str, Spring]], structure: Any) -> Springs:
+def packed(parts: Iterable[tuple[str, Spring]], structure: Discretized) -> Springs:
     """Arrays of springs, each with its place for messages.
 
     Raises

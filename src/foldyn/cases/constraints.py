@@ -23,6 +23,7 @@ from foldyn.cases.directions import AXES, unit_vector
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.supports import Fix, Impose, Link
 from foldyn.errors import InputError
+from foldyn.structures.discretized import Discretized
 from foldyn.structures.rigid_plates import OFF_PLANE, on_plate
 from foldyn.values import show
 
@@ -248,7 +249,7 @@ def _is_direction(equation: Equation) -> bool:
     return len({dof // 3 for dof in equation.dofs}) == 1
 
 
-def equations_of(structure: Any, supports: Iterable[tuple[str, Any]]) -> list[Equation]:
+def equations_of(structure: Discretized, supports: Iterable[tuple[str, Any]]) -> list[Equation]:
     """Equations of a structure's rigid panels and of supports, these with their places.
 
     Those of supports come first, so that of equations that say the same theirs is the one that
@@ -300,7 +301,7 @@ def _along(support: Fix | Impose, owner: str, nodes: NDArray) -> list[Equation]:
     return [Equation(owner, [3 * node + k for k in axes], values) for node in nodes.tolist()]
 
 
-def _link(structure: Any, link: Link, place: str, nodes: NDArray) -> list[Equation]:
+def _link(structure: Discretized, link: Link, place: str, nodes: NDArray) -> list[Equation]:
     if link.to is None:
         if len(nodes) < 2:
             raise InputError(
@@ -335,7 +336,7 @@ def _link(structure: Any, link: Link, place: str, nodes: NDArray) -> list[Equati
     return _riding(place, nodes, corners, weights)
 
 
-def _rigid(structure: Any) -> list[Equation]:
+def _rigid(structure: Discretized) -> list[Equation]:
     return [
         equation
         for plate in structure.plates

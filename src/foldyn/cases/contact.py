@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from foldyn.mechanics.contact.candidates import (
     Sheets,
 )
 from foldyn.mechanics.contact.potential import STIFFNESS
+from foldyn.structures.discretized import Discretized
 from foldyn.tables import ListOf
 from foldyn.values import length, number, objects, vector
 
@@ -114,7 +115,7 @@ class Contact(Part):
         if not self.panels and not self.planes:
             raise InputError(": without planes nothing touches; give planes, or True", "panels")
 
-    def sheets(self, structure: Any, held: NDArray[np.bool_]) -> Sheets:
+    def sheets(self, structure: Discretized, held: NDArray[np.bool_]) -> Sheets:
         """What may touch of a structure whose nodes are held along all axes, or not (n,)."""
         # copies: arrays that may be written to and those that may not have kernels of their own
         panel = np.array(structure.triangle_panel)

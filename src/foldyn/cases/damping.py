@@ -18,6 +18,7 @@ from foldyn.cases.decode import Part
 from foldyn.cases.selection import Creases, resolve_creases
 from foldyn.errors import InputError, within
 from foldyn.json_schema import Schema, any_of
+from foldyn.structures.discretized import Discretized
 from foldyn.tables import ListOf, Section, read, schema_of
 from foldyn.values import choice, number, number_or_list, numbers, show, whole
 
@@ -173,7 +174,7 @@ class CreaseDamping(Part):
     key: ClassVar[str] = "creases"
     several: ClassVar[bool] = True
 
-    def per_length(self, structure: Any, place: str) -> NDArray[np.float64]:
+    def per_length(self, structure: Discretized, place: str) -> NDArray[np.float64]:
         """Coefficients (nf,) of all folds, N m s/rad per m."""
         damped = np.zeros(len(structure.folds))
         damped[resolve_creases(structure, self.creases, f"{place}.creases")] = self.coefficient

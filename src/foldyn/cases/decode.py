@@ -20,6 +20,7 @@ from foldyn.cases.history import as_history
 from foldyn.errors import Faults, InputError, within
 from foldyn.json_schema import Schema, any_of, of_call
 from foldyn.mechanics.term import Term
+from foldyn.structures.discretized import Discretized
 from foldyn.tables import check_keys, check_table, needs, read, schema_of
 from foldyn.values import choice, plain, show
 
@@ -158,7 +159,7 @@ class Part(Checked):
     apart: ClassVar[str] = ""
 
     @classmethod
-    def term(cls, parts: Sequence[tuple[str, Any]], structure: Any) -> Term | None:
+    def term(cls, parts: Sequence[tuple[str, Any]], structure: Discretized) -> Term | None:
         """What all of a kind, each with its place for messages, add to the energy of a case."""
         return None
 

@@ -33,6 +33,7 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS, HingeLaw
 from foldyn.patterns import Boards, Pattern
 from foldyn.structures import Sheet, discretize
+from foldyn.structures.discretized import Discretized
 from foldyn.tables import read
 from foldyn.values import plain
 
@@ -231,7 +232,7 @@ class _Writer:
             ]
         return section
 
-    def _model(self, structure: Any) -> dict[str, Any]:
+    def _model(self, structure: Discretized) -> dict[str, Any]:
         section: dict[str, Any] = {}
         options = structure.options
         for option in dataclasses.fields(options):

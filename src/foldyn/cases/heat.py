@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +10,15 @@ from numpy.typing import NDArray
 from foldyn.mechanics import angles
 from foldyn.mechanics.following import joined
 from foldyn.mechanics.heat import Heat
+from foldyn.structures.discretized import Discretized
+from foldyn.structures.structure import Structure
 from foldyn.structures.swelling import Swelling
 
 IN_PLANE, BENDING = ("strain_membrane", "strain_bars"), ("strain_bending", "strain_bends")
 
 
 def heat_of(
-    structure: Any, parts: Sequence[tuple[Swelling, int]], histories: int, offset: NDArray
+    structure: Discretized, parts: Sequence[tuple[Swelling, int]], histories: int, offset: NDArray
 ) -> Heat | None:
     """Heat of swollen states with the numbers of their histories; None of none.
 
@@ -33,6 +34,7 @@ def heat_of(
                 quadratic[g, i, j] += one.push[g] @ other.free[g]
     count, code, addresses, volume = len(loads.moment), 0, None, np.zeros(0)
     if len(parts[0][0].stress):
+        assert isinstance(structure, Structure)
         code, addresses = structure.bar_law.code, structure.bar_law.addresses
         volume = structure.sheet.youngs_modulus * structure.bar_area * structure.bar_length
     names = list(structure.energy_groups)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from foldyn.cases.decode import Part
 from foldyn.errors import InputError, warn
 from foldyn.mechanics.following import Following
+from foldyn.structures.discretized import Discretized
 from foldyn.structures.swelling import Swelling
 
 
@@ -34,36 +35,36 @@ class Load(Part):
     moves: ClassVar[bool] = False
     history: Any
 
-    def forces(self, structure: Any, place: str) -> NDArray[np.float64] | None:
+    def forces(self, structure: Discretized, place: str) -> NDArray[np.float64] | None:
         """Forces (n, 3), N, on all nodes; None if it is not a force."""
         return None
 
-    def loaded(self, structure: Any, place: str) -> NDArray[np.int64]:
+    def loaded(self, structure: Discretized, place: str) -> NDArray[np.int64]:
         """Nodes on which it acts; none if it acts on all, or on creases."""
         return np.zeros(0, np.int64)
 
     def rest_changes(
-        self, structure: Any, place: str
+        self, structure: Discretized, place: str
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
         """Creases that it actuates, and the change (rad) of their rest angles; None if none."""
         return None
 
-    def turns(self, structure: Any, place: str) -> NDArray[np.float64] | None:
+    def turns(self, structure: Discretized, place: str) -> NDArray[np.float64] | None:
         """Changes, rad, of `SheetTerm.rest_angles`, or of the first of them; None if none.
 
         Those of creases by `rest_changes` are apart.
         """
         return None
 
-    def following(self, structure: Any, place: str) -> Following | None:
+    def following(self, structure: Discretized, place: str) -> Following | None:
         """Forces that depend on the displacement, at factor 1; None if it has none."""
         return None
 
-    def swelling(self, structure: Any, place: str) -> Swelling | None:
+    def swelling(self, structure: Discretized, place: str) -> Swelling | None:
         """How panels would stretch and curl at factor 1; None if they would not."""
         return None
 
-    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
+    def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse what the structure or its held dofs (n, 3) do not allow."""
 
 

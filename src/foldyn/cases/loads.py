@@ -25,6 +25,7 @@ from foldyn.cases.load import Load, check_held
 from foldyn.cases.region_loads import CreaseMoment, LineLoad, Pressure, Temperature, TotalForce
 from foldyn.cases.selection import Creases, Nodes, resolve_creases, resolve_nodes
 from foldyn.errors import InputError, within
+from foldyn.structures.discretized import Discretized
 from foldyn.values import show, vector
 
 __all__ = [
@@ -65,17 +66,17 @@ class Force(Load):
     apart = "acts on some nodes"
     arrows = True
 
-    def loaded(self, structure: Any, place: str) -> NDArray[np.int64]:
+    def loaded(self, structure: Discretized, place: str) -> NDArray[np.int64]:
         """See `Load`."""
         return resolve_nodes(structure, self.nodes, f"{place}.nodes")
 
-    def forces(self, structure: Any, place: str) -> NDArray[np.float64]:
+    def forces(self, structure: Discretized, place: str) -> NDArray[np.float64]:
         """See `Load`."""
         forces = np.zeros((len(structure.nodes), 3))
         forces[self.loaded(structure, place)] = self.vector
         return forces
 
-    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
+    def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse a force that acts on held axes only; warn of one that does so in part."""
         nodes, acts = self.loaded(structure, place), np.flatnonzero(self.vector)
         check_held(f"the force {show(self.vector)}", nodes, acts, fixed, place)
@@ -163,7 +164,7 @@ class Actuate(Load):
             raise InputError(f": give only one of {' and '.join(given)}", given[1])
 
     def rest_changes(
-        self, structure: Any, place: str
+        self, structure: Discretized, place: str
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """See `Load`; refuses angles that the fold law cannot be free of stress at."""
         creases = resolve_creases(structure, self.creases, f"{place}.creases")
@@ -188,7 +189,7 @@ class Actuate(Load):
         return creases, np.radians(angles) - structure.fold_rest[creases]
 
 
-def _of_creases(structure: Any, creases: NDArray[np.int64]) -> tuple[NDArray, NDArray]:
+def _of_creases(structure: Discretized, creases: NDArray[np.int64]) -> tuple[NDArray, NDArray]:
     """Assignments of creases, and their dihedrals (degrees) where the panels are flat."""
     pattern, count = structure.pattern, len(structure.folds)
     if pattern is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from foldyn.arguments import Check
 from foldyn.cases.decode import Part, PartOf
 from foldyn.cases.selection import Nodes, resolve_nodes
+from foldyn.structures.discretized import Discretized
 from foldyn.values import number
 
 
@@ -34,7 +35,7 @@ class PointMass(Part):
     mass: Annotated[float, Check(number, above=0.0, unit="kg")]
 
 
-def nodal_masses(masses: Sequence[PointMass], structure: Any) -> NDArray[np.float64]:
+def nodal_masses(masses: Sequence[PointMass], structure: Discretized) -> NDArray[np.float64]:
     """Sum (n,) of point masses on each node, kg."""
     total = np.zeros(len(structure.nodes))
     for i, part in enumerate(masses):

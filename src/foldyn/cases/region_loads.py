@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from foldyn.errors import InputError
 from foldyn.mechanics.following import Following, joined, moments, pressures, pushes
 from foldyn.mechanics.sheet_term import NO_DOF
 from foldyn.structures import Laminate
+from foldyn.structures.discretized import Discretized
 from foldyn.structures.laminate import check_layers
 from foldyn.structures.swelling import Swelling
 from foldyn.values import number, number_or_list, one_or_each, show, vector
@@ -40,7 +41,7 @@ class Spread(Load):
 
     arrows = True
 
-    def measure(self, structure: Any, place: str) -> NDArray[np.float64]:
+    def measure(self, structure: Discretized, place: str) -> NDArray[np.float64]:
         """Length (m) or area (m2) that belongs to each node (n,)."""
         raise NotImplementedError
 
@@ -48,13 +49,13 @@ class Spread(Load):
         """Force (3,), N, on a length or an area."""
         raise NotImplementedError
 
-    def loaded(self, structure: Any, place: str) -> NDArray[np.int64]:
+    def loaded(self, structure: Discretized, place: str) -> NDArray[np.int64]:
         """See `Load`; vertices of the pattern where it acts on others too."""
         nodes = np.flatnonzero(self.measure(structure, place))
         pattern = structure.pattern
         return nodes if pattern is None else nodes[nodes < len(pattern.vertices)]
 
-    def forces(self, structure: Any, place: str) -> NDArray[np.float64]:
+    def forces(self, structure: Discretized, place: str) -> NDArray[np.float64]:
         """See `Load`."""
         measure = self.measure(structure, place)
         whole = float(measure.sum())
@@ -110,7 +111,7 @@ class TotalForce(Spread):
                 f": give one of nodes, edges and panels; {len(given) or 'none'} {what}", "total"
             )
 
-    def measure(self, structure: Any, place: str) -> NDArray[np.float64]:
+    def measure(self, structure: Discretized, place: str) -> NDArray[np.float64]:
         """See `Spread`."""
         if self.edges is not None:
             along = resolve_edges(structure, self.edges, f"{place}.edges")
@@ -134,7 +135,7 @@ class TotalForce(Spread):
         """See `Spread`."""
         return np.array(self.total)
 
-    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
+    def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse a force that acts on held axes only; warn of one on nodes that does in part."""
         nodes = np.flatnonzero(self.measure(structure, place))
         what, acts = f"the force {show(self.total)}", np.flatnonzero(self.total)
@@ -167,7 +168,7 @@ class LineLoad(Spread):
 
     apart = "acts along edges"
 
-    def measure(self, structure: Any, place: str) -> NDArray[np.float64]:
+    def measure(self, structure: Discretized, place: str) -> NDArray[np.float64]:
         """See `Spread`."""
         return length_at_nodes(structure, resolve_edges(structure, self.edges, f"{place}.edges"))
 
@@ -175,7 +176,7 @@ class LineLoad(Spread):
         """See `Spread`."""
         return measure * np.array(self.force_per_length)
 
-    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
+    def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse a load that acts on held axes only."""
         nodes = np.flatnonzero(self.measure(structure, place))
         what = f"the force per length {show(self.force_per_length)}"
@@ -205,13 +206,13 @@ class Pressure(Load):
 
     apart = "a pressure acts on panels"
 
-    def following(self, structure: Any, place: str) -> Following:
+    def following(self, structure: Discretized, place: str) -> Following:
         """See `Load`."""
         chosen = resolve_panels(structure, self.panels, f"{place}.panels")
         pressure = np.full(len(chosen), self.pressure)
         return pressures(structure.nodes, structure.triangles[chosen], pressure)
 
-    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
+    def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse a pressure on panels whose nodes are all held."""
         nodes = np.unique(self.following(structure, place).triangles)
         if fixed[nodes].all():
@@ -246,12 +247,12 @@ class CreaseMoment(Load):
 
     apart = "acts on creases"
 
-    def of_creases(self, structure: Any, place: str) -> tuple[NDArray, NDArray]:
+    def of_creases(self, structure: Discretized, place: str) -> tuple[NDArray, NDArray]:
         """Its creases (k,), and the moment (k,), N m, of each."""
         creases = resolve_creases(structure, self.creases, f"{place}.creases")
         return creases, one_or_each(f"{place}.moment", self.moment, len(creases), "creases")
 
-    def following(self, structure: Any, place: str) -> Following:
+    def following(self, structure: Discretized, place: str) -> Following:
         """See `Load`; a shell's pieces of a crease take their part of it by their length."""
         creases, moment = self.of_creases(structure, place)
         each = np.zeros(len(structure.folds))
@@ -264,7 +265,7 @@ class CreaseMoment(Load):
         there = hidden != NO_DOF
         return joined([(turning, 0), (pushes(hidden[there], back[there]), 0)])
 
-    def turns(self, structure: Any, place: str) -> NDArray | None:
+    def turns(self, structure: Discretized, place: str) -> NDArray | None:
         """See `Load`: the panels beside a crease give way to all of its moment."""
         sheet = structure.body.sheet
         if not sheet.offsets:
@@ -275,7 +276,7 @@ class CreaseMoment(Load):
         angles = np.zeros(len(sheet.rest_angles) - sheet.offsets)
         return np.append(angles, sheet.offsets_under(each))
 
-    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
+    def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse moments of creases between panels that are held."""
         creases, _ = self.of_creases(structure, place)
         pieces = structure.body.sheet.fold_hinges()
@@ -356,7 +357,7 @@ class Temperature(Load):
             return laminate.expansion, laminate.curvature
         return self.expansion or 0.0, self.curvature or 0.0
 
-    def swelling(self, structure: Any, place: str) -> Swelling:
+    def swelling(self, structure: Discretized, place: str) -> Swelling:
         """See `Load`."""
         if structure.pattern is None:
             raise InputError(f"{place}: this structure has no pattern with panels")
@@ -366,10 +367,10 @@ class Temperature(Load):
         expansion, curvature = self._per_kelvin
         return structure.swollen(chosen * expansion, chosen * curvature)
 
-    def following(self, structure: Any, place: str) -> Following:
+    def following(self, structure: Discretized, place: str) -> Following:
         """See `Load`."""
         return self.swelling(structure, place).forces
 
-    def turns(self, structure: Any, place: str) -> NDArray[np.float64]:
+    def turns(self, structure: Discretized, place: str) -> NDArray[np.float64]:
         """See `Load`."""
         return self.swelling(structure, place).turns

@@ -16,6 +16,7 @@ from foldyn.errors import InputError
 from foldyn.patterns.crease_data import crease_rows
 from foldyn.patterns.selection import check_expression, given_as, select
 from foldyn.patterns.topology import edge_lookup, edge_of
+from foldyn.structures.discretized import Discretized
 from foldyn.structures.mesh import double_areas
 from foldyn.values import indices, listed, show
 
@@ -23,7 +24,7 @@ _WORDS = 'one of "all", "mountain", "valley", or a family of the pattern'
 
 
 def resolve_nodes(
-    structure: Any, nodes: int | Sequence[int] | ArrayLike | str, field: str = "nodes"
+    structure: Discretized, nodes: int | Sequence[int] | ArrayLike | str, field: str = "nodes"
 ) -> NDArray[np.int64]:
     """Numbers of nodes of a structure from a number, several, or an expression.
 
@@ -81,7 +82,9 @@ def check_creases(name: str, creases: Any) -> str | tuple[int, ...]:
     return indices(name, creases, "crease", f"or {_WORDS}")
 
 
-def resolve_creases(structure: Any, creases: Any, name: str = "creases") -> NDArray[np.int64]:
+def resolve_creases(
+    structure: Discretized, creases: Any, name: str = "creases"
+) -> NDArray[np.int64]:
     """Numbers of creases of a structure from numbers or a word.
 
     Parameters
@@ -138,7 +141,7 @@ def check_edges(name: str, edges: Any) -> str | tuple[tuple[int, int], ...]:
     return tuple(pairs)
 
 
-def resolve_edges(structure: Any, edges: Any, name: str) -> NDArray[np.int64]:
+def resolve_edges(structure: Discretized, edges: Any, name: str) -> NDArray[np.int64]:
     """Nodes (k, p) along each of some edges, p two or what a shell has along an edge.
 
     edges : as `check_edges` returns them; a selection means the edges of which it has both ends.
@@ -170,7 +173,7 @@ def resolve_edges(structure: Any, edges: Any, name: str) -> NDArray[np.int64]:
     return along[[rows[pair] for pair in edges]]
 
 
-def edges_between(structure: Any, nodes: NDArray) -> NDArray[np.int64]:
+def edges_between(structure: Discretized, nodes: NDArray) -> NDArray[np.int64]:
     """Nodes (k, p) along each of the edges of which both ends are among some nodes."""
     along = structure.edge_nodes
     return along[np.isin(along[:, [0, -1]], nodes).all(axis=1)]
@@ -185,7 +188,7 @@ def check_panels(name: str, panels: Any) -> str | tuple[int, ...]:
     return indices(name, panels, "panel", 'or "all"')
 
 
-def resolve_panels(structure: Any, panels: Any, name: str) -> NDArray[np.int64]:
+def resolve_panels(structure: Discretized, panels: Any, name: str) -> NDArray[np.int64]:
     """Triangles (k,) of a structure that lie in panels, as `check_panels` returns them."""
     if not len(structure.triangles):
         raise InputError(f"{name} = {show(panels)}: this structure has no panels")
@@ -199,7 +202,7 @@ Edges = Annotated[str | Sequence[Sequence[int]], Check(check_edges)]
 Panels = Annotated[int | str | Sequence[int], Check(check_panels)]
 
 
-def length_at_nodes(structure: Any, along: NDArray) -> NDArray[np.float64]:
+def length_at_nodes(structure: Discretized, along: NDArray) -> NDArray[np.float64]:
     """Length (n,), m, at each node of edges (k, p): half of each piece for either end."""
     x, length = structure.nodes, np.zeros(len(structure.nodes))
     pieces = np.linalg.norm(np.diff(x[along], axis=1), axis=2)
@@ -208,7 +211,7 @@ def length_at_nodes(structure: Any, along: NDArray) -> NDArray[np.float64]:
     return length
 
 
-def area_at_nodes(structure: Any, triangles: NDArray) -> NDArray[np.float64]:
+def area_at_nodes(structure: Discretized, triangles: NDArray) -> NDArray[np.float64]:
     """Area (n,), m2, at each node of some triangles (k,): a third of each for each corner."""
     corners = structure.triangles[triangles]
     area = 0.5 * np.linalg.norm(double_areas(structure.nodes, corners), axis=1)
@@ -216,7 +219,7 @@ def area_at_nodes(structure: Any, triangles: NDArray) -> NDArray[np.float64]:
     return np.bincount(corners.ravel(), np.repeat(area / 3.0, 3), count).astype(float)
 
 
-def tributary_area(structure: Any) -> NDArray[np.float64]:
+def tributary_area(structure: Discretized) -> NDArray[np.float64]:
     """Area (n,), m2, of the sheet that belongs to each vertex, whatever the model.
 
     A panel gives each of its corners an equal part of its area. Further nodes of a structure have

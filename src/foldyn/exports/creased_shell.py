@@ -8,7 +8,6 @@ crease against their share of its stiffness.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,6 +127,7 @@ def creased_shell(case: Case, divisions: int | None = None) -> CreasedShell:
     held = _shell_case(case, divisions)
     _check(held)
     shell = held.structure
+    assert isinstance(shell, Shell)
     sheets, kind = shell.sheet.kinds(len(shell.pattern.faces))
     part = _components(shell.pattern.weld_faces, len(shell.pattern.faces))
     split = _Split(shell, part)
@@ -266,7 +266,7 @@ def _shell_case(case: Case, divisions: int | None) -> Case:
 
 def _check(case: Case) -> None:
     """Refuse anything that springs, plain supports and constant forces cannot represent."""
-    structure: Any = case.structure
+    structure: Discretized = case.structure
     wrong = (
         (structure.sheet.density is None, "sheet.density", "is missing; give it (kg/m3)"),
         (structure.pattern.boards is not None, "pattern", "has thick panels; give the thin one"),

@@ -34,6 +34,7 @@ from foldyn.input_files import path_of
 from foldyn.linear import frf, modes
 from foldyn.statics import trace
 from foldyn.structures import Structure
+from foldyn.structures.discretized import Discretized
 from foldyn.sweeps.job import ASIDE
 from foldyn.sweeps.measure import of_callable
 from foldyn.values import choice, listed, of_kind, show
@@ -267,15 +268,16 @@ def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, N
             )
 
     def build(**arrays: NDArray) -> Case:
+        bars: Any = case.structure
         if LENGTH in arrays:  # no structure has bars that do not fit: see `_by_lengths`
-            share = arrays.pop(LENGTH) / case.structure.bar_length
-            arrays["bar_area"] = arrays.get("bar_area", case.structure.bar_area) * share
-        return replace(case, structure=replace(case.structure, **arrays))
+            share = arrays.pop(LENGTH) / bars.bar_length
+            arrays["bar_area"] = arrays.get("bar_area", bars.bar_area) * share
+        return replace(case, structure=replace(bars, **arrays))
 
     return build, checked(values)
 
 
-def _check_acts(structure: Any, name: str) -> None:
+def _check_acts(structure: Discretized, name: str) -> None:
     """Refuse arrays that have no effect in a structure."""
     if not isinstance(structure, Structure):
         raise InputError(": a shell has no such arrays; give a function that builds it", name)

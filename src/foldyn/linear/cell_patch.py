@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.cases.air import refuse_air
-from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
+from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.cell_supports import Repeated, tied_vertices
 from foldyn.linear.lattice import Lattice, Panel, Site, Vertex, edge_between, kinds_of, minus
@@ -28,6 +28,9 @@ from foldyn.materials.inelastic_law import memory_of
 from foldyn.patterns import Pattern
 from foldyn.patterns.crease_data import ASSIGNED
 from foldyn.patterns.topology import around, edge_of
+from foldyn.shells import Shell
+from foldyn.structures import Structure
+from foldyn.structures.discretized import Discretized
 from foldyn.structures.sheet import Sheet
 
 
@@ -244,7 +247,9 @@ def _edges(
 
 
 # ---------------------------------------------------------------------- nodes and hidden dofs
-def node_sites(structure: Any, vertices: Sequence[Vertex], panels: Sequence[Panel]) -> list[Site]:
+def node_sites(
+    structure: Discretized, vertices: Sequence[Vertex], panels: Sequence[Panel]
+) -> list[Site]:
     """Sites of the nodes of a structure: vertices, points of edges, and points inside panels."""
     sites: dict[int, Site] = {
         v: (step, ("vertex", kind)) for v, (step, kind) in enumerate(vertices)
@@ -263,7 +268,7 @@ def node_sites(structure: Any, vertices: Sequence[Vertex], panels: Sequence[Pane
     return [sites[node] for node in range(len(structure.nodes))]
 
 
-def hidden_sites(structure: Any, unit: NDArray, step: NDArray) -> list[Site]:
+def hidden_sites(structure: Discretized, unit: NDArray, step: NDArray) -> list[Site]:
     """Sites of the hidden dofs of a structure: rotations about sides, and gives of edges.
 
     unit, step : unit and R of its nodes, (n,), (n, d).
@@ -283,12 +288,14 @@ def hidden_sites(structure: Any, unit: NDArray, step: NDArray) -> list[Site]:
             times[pair] += 1
         return found
 
-    if structure.kind == SHELL:
+    if isinstance(structure, Shell):
         sides = structure.sides
         ends = np.stack([structure.triangles, np.roll(structure.triangles, -1, axis=1)], axis=2)
         about = np.zeros((sides.rotations, 2), np.int64)
         about[sides.rotation[sides.rotation >= 0]] = np.sort(ends[sides.rotation >= 0], axis=1)
         return turns(about.tolist())
+    assert isinstance(structure, Structure)
+    assert structure.pattern is not None
     found: list[Site] = []
     if structure.edge_plates is not None:
         axes = np.concatenate([structure.folds, structure.bends])[:, :2]

@@ -19,6 +19,7 @@ from foldyn.errors import InputError
 from foldyn.linear.lattice import Lattice, Site, Step, Vertex, kinds_of, minus, plus
 from foldyn.linear.unit_cell import rotation
 from foldyn.patterns.crease_data import ASSIGNED
+from foldyn.structures.discretized import Discretized
 
 SAME_AXES = 1e-9  # tolerance for axes that a screw preserves
 
@@ -58,7 +59,7 @@ class Repeated:
 
     case: Case
     lattice: Lattice
-    structure: Any
+    structure: Discretized
     own: Sequence[Site]
     sites: Sequence[Site]
 

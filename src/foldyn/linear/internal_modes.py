@@ -28,6 +28,7 @@ from foldyn.errors import InputError
 from foldyn.mechanics.assembly import Assembly
 from foldyn.structures import Structure
 from foldyn.structures.bars_plates import BarsPlatesTerm
+from foldyn.structures.discretized import Discretized
 from foldyn.structures.mass import condensed_panels
 from foldyn.structures.panel_modes import TURNS, panel_modes
 from foldyn.structures.panel_plate import TRIANGLE_MASS
@@ -94,7 +95,7 @@ class Amplitudes(NamedTuple):
         return sparse.csr_array(self.behind(matrix) + self.mass) if self.count else matrix
 
 
-def check_internal(structure: Any, internal: Any) -> int:
+def check_internal(structure: Discretized, internal: Any) -> int:
     """Return the checked number of internal amplitudes of each panel of a structure.
 
     Raises
@@ -127,7 +128,7 @@ def check_internal(structure: Any, internal: Any) -> int:
     return count
 
 
-def amplitudes(structure: Any, body: Assembly, q: NDArray, count: int) -> Amplitudes:
+def amplitudes(structure: Discretized, body: Assembly, q: NDArray, count: int) -> Amplitudes:
     """Internal amplitudes of a structure, if any, in the state q (m,).
 
     Parameters
@@ -146,6 +147,7 @@ def amplitudes(structure: Any, body: Assembly, q: NDArray, count: int) -> Amplit
         whose, share = np.zeros(0, np.int64), np.zeros(0)
         return Amplitudes(none, none, np.zeros((0, 3)), rows, rows, whose, share, 0)
     displacement = q[: structure.nodes.size].reshape(-1, 3)
+    assert isinstance(structure, Structure)
     plates, surface, sheet = structure.edge_plates, structure.surface, structure.sheet
     assert plates is not None
     assert isinstance(body.sheet, BarsPlatesTerm)

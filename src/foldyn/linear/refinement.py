@@ -12,6 +12,7 @@ from foldyn.algebra.extrapolation import convergence
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.linear.reference import MeshModes, mesh_modes, same_modes, touched_clamp
+from foldyn.structures.discretized import Discretized
 
 MODES = 3
 FINE = 16  # pieces: beyond, the estimate is expensive
@@ -105,7 +106,7 @@ def _meshes(divisions: int) -> tuple[int, ...]:
     return tuple(sorted([*coarser, *(divisions << k + 1 for k in range(3 - len(coarser)))]))
 
 
-def _modes(case: Case, structure: Any, count: int) -> MeshModes:
+def _modes(case: Case, structure: Discretized, count: int) -> MeshModes:
     """Elastic modes of a case on another mesh, without loads, contact and air."""
     if structure.sheet.density is None:
         structure = replace(structure, sheet=replace(structure.sheet, density=1.0))

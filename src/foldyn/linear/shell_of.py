@@ -13,6 +13,7 @@ from foldyn.errors import InputError, warn, within
 from foldyn.linear.reference import DIVISIONS
 from foldyn.patterns import Pattern
 from foldyn.shells import Shell, ShellOptions, shell
+from foldyn.structures.discretized import Discretized
 from foldyn.values import of_kind, show, whole
 
 MOST_TRIANGLES = 15_000
@@ -96,7 +97,7 @@ def shell_of(case: Case, divisions: int, vertex_radius: float | None = None) -> 
     return with_structure(case, mesh)
 
 
-def with_structure(case: Case, structure: Any) -> Case:
+def with_structure(case: Case, structure: Discretized) -> Case:
     """The case with another structure and without damping, which modes at rest do not need."""
     return case.altered(structure=structure, damping=Rayleigh())
 

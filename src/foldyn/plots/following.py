@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from foldyn import mechanics
 from foldyn.cases import Case, CreaseMoment, Pressure, Temperature
 from foldyn.cases.selection import resolve_panels
+from foldyn.structures.discretized import Discretized
 
 if TYPE_CHECKING:
     from foldyn.plots.scene import Points
@@ -46,7 +47,7 @@ def moments(case: Case) -> list[Share]:
     return found
 
 
-def panel_middles(structure: Any, points: Points, share: Share) -> Points:
+def panel_middles(structure: Discretized, points: Points, share: Share) -> Points:
     """Mean corners (k, 3) of panels."""
     faces = structure.pattern.faces
     return np.array([points[list(faces[panel])].mean(axis=0) for panel in share.numbers])

@@ -13,6 +13,7 @@ from foldyn.cases.decode import Part, PartOf
 from foldyn.cases.directions import AXES, Axis
 from foldyn.cases.selection import resolve_nodes
 from foldyn.errors import InputError
+from foldyn.structures.discretized import Discretized
 from foldyn.values import number, whole
 
 
@@ -50,7 +51,7 @@ UNTIL = PartOf((Reached,), "analysis.until", "node, axis and displacement")
 """End condition of a path, in a case file and as an argument."""
 
 
-def until_of(given: Any, structure: Any) -> Callable[[NDArray, float], bool] | None:
+def until_of(given: Any, structure: Discretized) -> Callable[[NDArray, float], bool] | None:
     """End condition of a path: a function as given, a table as `Reached`."""
     if given is None:
         return None

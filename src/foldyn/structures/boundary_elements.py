@@ -16,6 +16,7 @@ from scipy import sparse
 
 from foldyn.errors import InputError
 from foldyn.patterns.topology import edge_lookup, edge_of
+from foldyn.structures.discretized import Discretized
 
 ROUNDING = 1e-9  # weights and, over squared lengths, areas that count as zero
 
@@ -65,7 +66,9 @@ class _Corners(NamedTuple):
     edges: int
 
 
-def boundary_elements(structure: Any, resolution: int, alone: bool = False) -> BoundaryElements:
+def boundary_elements(
+    structure: Discretized, resolution: int, alone: bool = False
+) -> BoundaryElements:
     """Boundary elements of a structure, or shell.
 
     Parameters
@@ -191,7 +194,7 @@ def _numbered(corners: _Corners, half: int, panels: int) -> tuple[NDArray, int]:
     return out, grids + own.size
 
 
-def _places(corners: _Corners, half: int, structure: Any) -> NDArray:
+def _places(corners: _Corners, half: int, structure: Discretized) -> NDArray:
     """Positions (c, half + 1, half + 1, 3) of the points of each grid at rest, m."""
     steps = np.arange(half + 1) / half
     by_kind = np.array([steps, 1.0 - np.cos(0.5 * np.pi * steps)])  # even, graded
@@ -226,7 +229,7 @@ def _cut(numbers: NDArray) -> NDArray:
     return np.stack([one, two], axis=3).reshape(-1, 3)
 
 
-def _located(structure: Any, points: NDArray, panel: NDArray) -> list[NDArray]:
+def _located(structure: Discretized, points: NDArray, panel: NDArray) -> list[NDArray]:
     """Points (k,), the triangles (k,) of their panels that contain them at rest, weights (k, 3).
 
     Triangles that share a point share its weight equally.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple, Self, cast
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -95,6 +95,10 @@ class Discretized:
         Model for solvers.
     kind : str
         Its name in case files.
+    hinge_kinds : tuple of HingeKind
+        Its folds, then other hinges, each with their law.
+    membranes : sequence
+        Of its panels, where these resist as membranes.
     energy_groups : mapping of str to str
         Parts of its strain energy, with descriptions.
     plates : tuple of Plate
@@ -127,14 +131,17 @@ class Discretized:
     fill: Fill
     energy_groups: ClassVar[Mapping[str, str]]
     kind: ClassVar[str]
+    hinge_kinds: Any  # tuple of HingeKind, each model's own property
+    membranes: Sequence[Any]
     massless: ClassVar[str] = ""
     clamped_nodes: Sequence[NDArray] = ()
     bowed_edges: Collection[Edge] = ()
     as_made: bool = False
+    __dataclass_fields__: ClassVar[dict[str, Any]]
     plates: tuple[Plate, ...] = ()
 
     def __post_init__(self) -> None:
-        for item in fields(cast(Any, self)):
+        for item in fields(self):
             value = getattr(self, item.name)
             if isinstance(value, np.ndarray):
                 object.__setattr__(self, item.name, read_only(np.array(value)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.inelastic import HingeMemory, MemoryHinges
 from foldyn.mechanics.sheet_term import FoldHinges
 from foldyn.mechanics.viscous import WIDTH, hinge_dofs
+from foldyn.structures.discretized import Discretized
 
 LEAST = 1e-9  # stiffness of a crease over its panels': used for a crease without stiffness
 
@@ -74,7 +75,7 @@ class Remembering(NamedTuple):
 
 
 def remembering(
-    structure: Any, body: Assembly | None = None, damping: NDArray | None = None
+    structure: Discretized, body: Assembly | None = None, damping: NDArray | None = None
 ) -> tuple[Remembering, ...]:
     """Hinges with memory of a structure: its folds, its bends, both or none.
 

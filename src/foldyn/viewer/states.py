@@ -19,6 +19,7 @@ from foldyn.mechanics import angles
 from foldyn.mechanics.following import following_force, joined
 from foldyn.mechanics.heat import free_energies
 from foldyn.structures import Structure, membranes
+from foldyn.structures.discretized import Discretized
 from foldyn.structures.mesh import double_areas
 
 
@@ -123,7 +124,7 @@ def _warm(acting: Sequence[tuple[SomeLoads, NDArray]], samples: int) -> list[NDA
     return [np.sum([np.outer(factor, of[k]) for factor, of in kinds], axis=0) for k in range(3)]
 
 
-def hinge_angles(structure: Any, hinges: NDArray, displacement: NDArray) -> NDArray:
+def hinge_angles(structure: Discretized, hinges: NDArray, displacement: NDArray) -> NDArray:
     """Dihedrals (samples, k) of hinges (k, 4), rad."""
     rows = hinges.astype(np.uint32)
     return np.array([angles(structure.nodes + u, rows) for u in displacement]).reshape(
@@ -131,14 +132,14 @@ def hinge_angles(structure: Any, hinges: NDArray, displacement: NDArray) -> NDAr
     )
 
 
-def bar_strain(structure: Any, displacement: NDArray) -> NDArray:
+def bar_strain(structure: Discretized, displacement: NDArray) -> NDArray:
     """Elongation of bars over their length (samples, nb)."""
     i, j = structure.bars.T
     apart = structure.nodes[j] - structure.nodes[i] + displacement[:, j] - displacement[:, i]
     return np.linalg.norm(apart, axis=2) / structure.bar_length - 1.0
 
 
-def energy_density(structure: Any, displacement: NDArray, found: States) -> NDArray:
+def energy_density(structure: Discretized, displacement: NDArray, found: States) -> NDArray:
     """Strain energy over the area of each panel (samples, m), J/m2.
 
     The energy of a bar or hinge is split equally between the adjacent triangles; springs, and

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.experiment.camera import Camera, opencv
+from foldyn.structures.discretized import Discretized
 from foldyn.values import number, whole
 
 _TILE = 512  # side of the grain tile in texels, repeated over the paper
@@ -79,7 +80,7 @@ class Paper:
     dark: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, structure: Any, rng: np.random.Generator) -> Paper:
+    def of(cls, structure: Discretized, rng: np.random.Generator) -> Paper:
         """Paper of a `Structure`; the grain of each panel starts at a random place."""
         triangles = np.asarray(structure.triangles, dtype=np.int64)
         panels = np.asarray(structure.triangle_panel, dtype=np.int64)

@@ -398,7 +398,7 @@ def pulsed(name: str, divisions: int = DIVISIONS[0]) -> Started:
     limit = extrapolated(coarse, fine, DIVISIONS[1] / divisions)
     skipped = round(PULSE_END / PULSE_STEP)
 
-    def move(structure: Any) -> Motion:
+    def move(structure: Discretized) -> Motion:
         moved = _motion(replace(given, structure=structure), PULSE_LENGTH, PULSE_STEP)
         vertices = moved.displacement.values[:, : len(force)]
         dt = float(moved.time[1])
