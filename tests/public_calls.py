@@ -292,7 +292,7 @@ def solved(folder: Path) -> Calls:
             "pattern": fd.Pattern(POINTS, PANELS, {(1, 2): "V"}), "fraction": 0.5, "angles": None,
             "steps": 2, "initial": "auto", "panels": "whole", "progress": None,
         }),
-        "critical_step": (fd.critical_step, {"case": case(), "method": "rk4", "u": None}),
+        "critical_step": (fd.critical_step, {"case": case(), "method": "rk4", "state": None}),
         "initial_state": (fd.initial_state, {"result": run, "at": 1}),
         "mac": (fd.mac, {"a": found, "b": found, "mass": [1.0, 2.0], "nodes": [4, 5]}),
         "case_of": (fd.case_of, {"ds": run}),

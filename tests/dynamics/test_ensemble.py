@@ -95,7 +95,7 @@ def test_a_start_in_a_stiffer_state_limits_the_step():
     """Bars that are pulled far are stiffer than at rest: the shared step is too long for them."""
     limit = fd.critical_step(FIRST, "central_difference")
     far = fd.State(0.5 * FIRST.structure.nodes * ~FIRST.fixed)
-    own = fd.critical_step(FIRST, "central_difference", u=far.displacement)
+    own = fd.critical_step(FIRST, "central_difference", state=far)
     assert own < 0.95 * limit
     dt = 0.5 * (own + limit)
     with pytest.raises(InputError, match=r"above the critical step of .* of cases\[1\]"):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.cases import Case, Origin
+from foldyn.cases import Case, Origin, State
 from foldyn.cases.history import CALLED
 from foldyn.dynamics import (
     central_difference,
@@ -27,7 +27,6 @@ from foldyn.dynamics.runge_kutta import RK4, Tableau, advance
 from foldyn.dynamics.stability import (
     MARGIN,
     Growth,
-    checked_place,
     damper_rate,
     largest_frequency,
     massive,
@@ -284,7 +283,7 @@ def compiled(name: str) -> bool:
     return ready(method_of(name).loop)
 
 
-def critical_step(case: Case, method: str = "rk4", *, u: ArrayLike | None = None) -> float:
+def critical_step(case: Case, method: str = "rk4", *, state: State | None = None) -> float:
     """Critical time step (s) of an explicit method for a case: 0.9 of its stability limit.
 
     Parameters
@@ -292,8 +291,8 @@ def critical_step(case: Case, method: str = "rk4", *, u: ArrayLike | None = None
     case : Case
     method : str
         One of `foldyn.dynamics.METHODS`; inf for an implicit one, whose step only accuracy limits.
-    u : (n, 3), optional
-        Displacement (m) about which the stiffness is taken; rest by default.
+    state : State, optional
+        About which the stiffness is taken; rest by default.
 
     Notes
     -----
@@ -303,5 +302,8 @@ def critical_step(case: Case, method: str = "rk4", *, u: ArrayLike | None = None
     1``.
     """
     of_kind("case", case, Case)
-    chosen, place = suited(method, case), checked_place(case, u)
+    chosen, place = suited(method, case), None
+    if state is not None:
+        shape = case.structure.nodes.shape
+        place = of_kind("state", state, State).of_nodes("displacement", shape, "state")
     return chosen.critical_step(with_mass(chosen, case), place)

@@ -20,8 +20,8 @@ from foldyn.cases import Case, Rayleigh
 from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.hereditary import instant_stiffness
 from foldyn.dynamics.inertia import is_lumped
-from foldyn.errors import ComputationError, InputError
-from foldyn.values import numbers, of_kind
+from foldyn.errors import ComputationError
+from foldyn.values import of_kind
 
 MARGIN = 0.9  # of the stability limit, to allow for stiffening
 _DENSE = 60  # dofs below which a dense eigensolver is faster and safer
@@ -97,8 +97,7 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     Hinges count with at least their nominal stiffness, so that superlinear bends, which have none
     at rest, do not lower the result. Laws with memory count with their instant stiffness.
     """
-    u = checked_place(of_kind("case", case, Case), u)
-    case = massive(case)
+    case = massive(of_kind("case", case, Case))
     return float(np.sqrt(max(_largest_quotient(case, _tangent(case, u)), 0.0)))
 
 
@@ -106,16 +105,6 @@ def massive(case: Case) -> Case:
     """The case without massless dofs, if its structure can condense them."""
     other = case.structure.condensed
     return case if other is None else case.altered(structure=other)
-
-
-def checked_place(case: Case, u: ArrayLike | None) -> NDArray[np.float64] | None:
-    """Displacements (n, 3), m, of the nodes of a case."""
-    if u is None:
-        return None
-    place, shape = numbers("u", u), case.structure.nodes.shape
-    if place.shape != shape:
-        raise InputError(f": shape {place.shape}; give displacements {shape} of all nodes", "u")
-    return place
 
 
 def frequency_bound(case: Case, u: ArrayLike | None = None) -> float:

@@ -98,7 +98,7 @@ class Landscape:
         """The stable states."""
         return tuple(state for state in self.states if state.stable)
 
-    def barrier(self, start: int = 0, end: int = 1) -> float:
+    def barrier(self, source: int = 0, target: int = 1) -> float:
         """Energy barrier (J) from one stable state to another, given by their numbers.
 
         Raises
@@ -107,14 +107,14 @@ class Landscape:
             A number is not that of a stable state.
         """
         stable = self.stable
-        for number in (start, end):
+        for number in (source, target):
             if not 0 <= number < len(stable):
                 raise InputError(
                     f"barrier: the landscape has {len(stable)} stable states, there is no {number}"
                 )
-        places = sorted(self.states.index(stable[number]) for number in (start, end))
+        places = sorted(self.states.index(stable[number]) for number in (source, target))
         between = self.states[places[0] : places[1] + 1]
-        return max(state.energy for state in between) - stable[start].energy
+        return max(state.energy for state in between) - stable[source].energy
 
 
 def landscape(
