@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable
 from itertools import combinations, product
 from typing import Any
 
 import pytest
 
-SHARE = 1 if int(os.environ.get("DRAWS", "500")) >= 500 else 8
-"""With fewer draws, one in so many of the rows beyond pairs is tried."""
+FEW = int(os.environ.get("DRAWS", "500")) < 500
+"""Whether a part of the matrix is tried, as in CI."""
 
 
-def beyond(rows: Sequence[tuple[Any, ...]]) -> list[Any]:
-    """Rows of the matrix."""
-    return [pytest.param(*row, marks=pytest.mark.matrix) for row in rows[::SHARE]]
+def beyond(rows: Iterable[Any], one_in: int = 8) -> list[Any]:
+    """Rows of the matrix, or values of one parameter; with few draws one in so many of them."""
+    chosen = [*rows][:: one_in if FEW else 1]
+    return [
+        pytest.param(*(row if isinstance(row, tuple) else (row,)), marks=pytest.mark.matrix)
+        for row in chosen
+    ]
 
 
 def in_pairs(*options: Collection[Any]) -> list[Any]:

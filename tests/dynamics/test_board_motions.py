@@ -8,6 +8,7 @@ from measured import drift, momenta
 
 import foldyn as fd
 from foldyn.mechanics.contact.term import ContactTerm
+from pairwise import beyond
 from strips import overlap, section, strip
 
 T = 0.1
@@ -41,19 +42,18 @@ def deepest(case: fd.Case, motion) -> float:
     )
 
 
-@pytest.mark.matrix
+SLAMS = [
+    ("dormand_prince", None, 2e-4, 1e-8),
+    ("rk4", None, 3e-2, 1e-5),
+    ("central_difference", None, 1e-2, 1e-12),
+    ("newmark", 5e-4, 3e-2, 3e-3),
+    ("generalized_alpha", 5e-4, 0.2, 3e-3),
+    ("energy_momentum", 1e-3, 1e-10, 1e-10),
+]
+
+
 @pytest.mark.filterwarnings("ignore:the energy balance")
-@pytest.mark.parametrize(
-    ("method", "dt", "balance", "turn"),
-    [
-        ("dormand_prince", None, 2e-4, 1e-8),
-        ("rk4", None, 3e-2, 1e-5),
-        ("central_difference", None, 1e-2, 1e-12),
-        ("newmark", 5e-4, 3e-2, 3e-3),
-        ("generalized_alpha", 5e-4, 0.2, 3e-3),
-        ("energy_momentum", 1e-3, 1e-10, 1e-10),
-    ],
-)
+@pytest.mark.parametrize(("method", "dt", "balance", "turn"), beyond(SLAMS, 2))
 def test_boards_rebound_and_keep_energy_and_momenta(method, dt, balance, turn):
     case, initial = slammed()
     motion = fd.simulate(case, 0.4, method=method, dt=dt, interval=0.01, initial=initial)

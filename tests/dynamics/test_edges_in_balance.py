@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -145,9 +146,9 @@ def test_damped_creases_are_of_order_two(damping):
     assert balance(runs[1]) < 1e-6
 
 
-@pytest.mark.matrix
-@pytest.mark.parametrize("kind", ["strong", "damped eyring"])
-@pytest.mark.parametrize("method", EXPLICIT)
+@pytest.mark.parametrize(
+    ("method", "kind"), beyond(product(EXPLICIT, ["strong", "damped eyring"]), 3)
+)
 def test_a_state_holds_what_damped_creases_remember(method, kind):
     law, damping = RESISTING[kind]
     made = case([moment(SMOOTH)], law, damping=damping)
@@ -176,9 +177,12 @@ JUMPS = (
 MIURA = fd.patterns.miura()
 
 
-@pytest.mark.matrix
-@pytest.mark.parametrize("jump", JUMPS)
-@pytest.mark.parametrize(("method", "error"), [(ALPHA, 1e-2), ("energy_momentum", 1e-3)])
+@pytest.mark.parametrize(
+    ("method", "error", "jump"),
+    beyond(
+        [(*way, jump) for jump in JUMPS for way in ((ALPHA, 1e-2), ("energy_momentum", 1e-3))], 3
+    ),
+)
 def test_edge_angles_jump_beside_damped_creases(method, error, jump):
     """But for the turn of these; if they did not, they would ring from step to step."""
     held, damping = fd.Fix(list(MIURA.faces[0])), fd.CreaseDamping(0.5, [2, 3])

@@ -15,6 +15,7 @@ import foldyn as fd
 from foldyn.cases import Function
 from foldyn.dynamics import METHODS
 from foldyn.errors import FoldynWarning, InputError, InstabilityError
+from pairwise import beyond
 
 OMEGA = 4.0
 SPRING, PERIOD = spring(OMEGA), 2.0 * np.pi / OMEGA
@@ -80,8 +81,7 @@ def random_pulses(count: int, seed: int):
         yield pulse(str(rng.choice([*SHAPES])), float(rng.uniform(0.0, 2.0)), length)
 
 
-@pytest.mark.matrix
-@pytest.mark.parametrize("method", [*METHODS, "auto"])
+@pytest.mark.parametrize("method", beyond([*METHODS, "auto"], 2))
 def test_random_pulses_on_an_oscillator_at_rest(method):
     """The response is Duhamel's integral to the tolerance, or the method says that it is not."""
     for history in random_pulses(6, seed=20):
@@ -107,7 +107,7 @@ def test_random_pulses_on_a_moving_oscillator(method):
     ("kind", "method"),
     [
         *(("bars", name) for name in METHODS),
-        *(pytest.param("shell", name, marks=pytest.mark.matrix) for name in SHELLS),
+        *beyond([("shell", name) for name in SHELLS], 2),
     ],
 )
 def test_the_impulse_arrives_on_a_free_sheet(kind, method):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from itertools import product
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import foldyn as fd
 from foldyn.checks import observed_order
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import frf, peaks_of
+from pairwise import beyond
 
 F = np.arange(0.25, 4.01, 0.25)
 PUSH = fd.Force([1], (1e-6, 0, 0))  # N: the motion is small against the bars
@@ -46,9 +48,9 @@ def test_simulated_motions_write_no_document_and_discretize_nothing(monkeypatch)
 
 
 # ------------------------------------------------------------------------ linear structures
-@pytest.mark.parametrize("method", TIMED)
 @pytest.mark.parametrize(
-    "integrator", [pytest.param("rk4", marks=pytest.mark.matrix), "dormand_prince"]
+    ("method", "integrator"),
+    [*product(TIMED, ["dormand_prince"]), *beyond(product(TIMED, ["rk4"]), 2)],
 )
 def test_the_response_of_the_matrices(method, integrator):
     """Alpha and beta both; at the default step, half the critical one, and at a smaller one."""
@@ -157,8 +159,7 @@ def test_a_motion_that_has_not_died_away_or_settled_is_told():
 
 
 # ------------------------------------------------------------------------ base motion
-@pytest.mark.matrix
-@pytest.mark.parametrize("method", TIMED)
+@pytest.mark.parametrize("method", beyond(TIMED, 2))
 def test_transmissibility_from_motions(method):
     case, base = chain(**DAMPING), fd.BaseMotion("x", value=1e-6)
     exact = frf(case, base, frequencies=F).transmissibility.values

@@ -18,6 +18,7 @@ from foldyn.linear.shell_of import meshes, shell_of, triangle_count
 from foldyn.linear.small_loads import forces_alone, rest_forces, small_loads
 from foldyn.results import fidelity_dataset
 from foldyn.studies.fidelity.compare import RESULTS, read
+from pairwise import beyond
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
 PLATE = {"calibration": "plate", "mass": "consistent", "bend_law": "linear"}
@@ -64,8 +65,7 @@ def quick():
     return case, fd.fidelity(case, 5, divisions=(3, 6))
 
 
-@pytest.mark.matrix
-@pytest.mark.parametrize("support", SUPPORTS)
+@pytest.mark.parametrize("support", beyond(SUPPORTS))
 def test_errors_are_those_of_the_study(support, miura):
     """The same shell, models and pairing as the stored tables, on which nothing of this ran."""
     name = f"miura, cells 1x1, a 1, b 1, panel_angle 60, dihedral 60, {support}, L* 1"

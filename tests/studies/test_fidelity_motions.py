@@ -40,6 +40,7 @@ from foldyn.studies.fidelity.motions import (
 )
 from foldyn.studies.fidelity.statics import LAWS
 from foldyn.studies.fidelity.stretching import pressed, sheet, stiffness, tower
+from pairwise import beyond
 
 
 def elastic(case, structure, count):
@@ -256,8 +257,7 @@ def test_the_force_at_which_a_tower_snaps():
     assert found["plate, bars"].min() > 3.0
 
 
-@pytest.mark.matrix
-@pytest.mark.parametrize("axis", ["x", "y", "z"])
+@pytest.mark.parametrize("axis", beyond("xyz"))
 def test_sheets_between_two_rims(axis):
     found = stiffness(sheet(3, (4, 8)), axis)
     assert 0.0 < found["plate"][0] < 0.15
