@@ -13,8 +13,9 @@ DEMO_FLAGS ?=
 PYTEST_FLAGS ?=
 DRAWS ?= 500
 OLDEST ?= .venv-oldest
-# of mechanics only a few: the others compile long and ask nothing else of the oldest versions
-OLDEST_TESTS := tests/jit tests/materials tests/results \
+# of results and mechanics only some: others compile long and ask nothing else of these versions
+OLDEST_TESTS := tests/jit tests/materials \
+  $(addprefix tests/results/test_,damaged_files.py missing.py pattern_states.py results.py) \
   $(addprefix tests/mechanics/test_,assembly.py dihedral.py invariance.py) \
   $(addprefix tests/analyses/test_,casefile.py casefile_messages.py limits.py)
 WORKERS ?= -n auto --maxprocesses 4 --dist worksteal
