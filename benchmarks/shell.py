@@ -24,9 +24,9 @@ from collections.abc import Callable
 import machine
 import numpy as np
 
-from foldyn.studies.herkal.opensees import compare, run
 from foldyn.studies.herkal.opensees.stored import Moved, read_motion, stored_motions
 from foldyn.studies.herkal.sheet_models import CASES
+from verification.opensees import compare, run
 
 Motion = Callable[[], Moved]
 

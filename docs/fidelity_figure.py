@@ -1,6 +1,6 @@
 """The figure of large motions in fidelity.md, from the stored results.
 
-`python docs/fidelity_figure.py` writes images/fidelity-motions.png: the frequency of each cycle.
+`python -m docs.fidelity_figure` writes images/fidelity-motions.png: the frequency of each cycle.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from foldyn.plots.style import BLACK, finish, frame, key, line_style, new_figure
-from foldyn.studies.fidelity.motion_results import SHELL, Run, grouped, read
+from verification.fidelity.motion_results import SHELL, Run, grouped, read
 
 IMAGES = Path(__file__).with_name("images")
 CASES = {

@@ -1,15 +1,15 @@
 """The tables of errors in fidelity.md, from the stored results.
 
-`python docs/fidelity_tables.py` writes them anew; a test compares them with what the page shows.
+`python -m docs.fidelity_tables` writes them anew; a test compares them with what the page shows.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from foldyn.studies.fidelity import motion_results as motions
-from foldyn.studies.fidelity.compare import RESULTS, columns, first_table, read, summary
-from foldyn.studies.fidelity.mixed_models import counted, gap_table, mixed_table
+from verification.fidelity import motion_results as motions
+from verification.fidelity.compare import RESULTS, columns, first_table, read, summary
+from verification.fidelity.mixed_models import counted, gap_table, mixed_table
 
 PAGE = Path(__file__).with_name("fidelity.md")
 SHOWN = ("plate, consistent", "n5b8e, condensed", "standard, mixed_voronoi")

@@ -17,8 +17,8 @@ from foldyn.linear.fidelity import MODELS, comparison
 from foldyn.linear.shell_of import meshes, shell_of, triangle_count
 from foldyn.linear.small_loads import forces_alone, rest_forces, small_loads
 from foldyn.results import fidelity_dataset
-from foldyn.studies.fidelity.compare import RESULTS, read
 from pairwise import beyond
+from verification.fidelity.compare import RESULTS, read
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
 PLATE = {"calibration": "plate", "mass": "consistent", "bend_law": "linear"}

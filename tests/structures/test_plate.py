@@ -11,7 +11,7 @@ from case_texts import HELD_MIURA_TEXT
 from foldyn.errors import InputError
 from foldyn.structures.plate import COMPLIANCE, POLYGON, TRIANGLE
 from foldyn.structures.quad_plates import flexibilities
-from foldyn.studies.fidelity.cases import polygons
+from verification.fidelity.cases import polygons
 
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=1.0)
 G = SHEET.bending_modulus

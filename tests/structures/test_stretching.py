@@ -11,9 +11,9 @@ import foldyn as fd
 from foldyn.errors import StretchWarning
 from foldyn.structures.stretching import stretch, stretching
 from foldyn.studies import find_case
-from foldyn.studies.fidelity.compare import structure_of
-from foldyn.studies.fidelity.mixed import gaps
-from foldyn.studies.fidelity.references import read_references, stored
+from verification.fidelity.compare import structure_of
+from verification.fidelity.mixed import gaps
+from verification.fidelity.references import read_references, stored
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
 LINEAR = {"bar_law": "linear", "fold_law": "linear", "bend_law": "linear"}

@@ -12,9 +12,11 @@ import foldyn as fd
 from foldyn.linear.pairing import likeness, pairs
 from foldyn.linear.small_loads import small_loads
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
-from foldyn.studies.fidelity import __main__ as command
-from foldyn.studies.fidelity import independent
-from foldyn.studies.fidelity.cases import (
+from foldyn.studies.herkal.stiffnesses import softness
+from pairwise import beyond
+from verification.fidelity import __main__ as command
+from verification.fidelity import independent
+from verification.fidelity.cases import (
     FidelityCase,
     documented,
     drawn,
@@ -22,7 +24,7 @@ from foldyn.studies.fidelity.cases import (
     sheets,
     supports,
 )
-from foldyn.studies.fidelity.compare import (
+from verification.fidelity.compare import (
     AMPLITUDES,
     MODELS,
     RESULTS,
@@ -35,8 +37,7 @@ from foldyn.studies.fidelity.compare import (
     summary_of,
     write,
 )
-from foldyn.studies.fidelity.statics import study, twisted, under_loads
-from pairwise import beyond
+from verification.fidelity.statics import twisted, under_loads
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 SETS = ("documented", "drawn")
@@ -180,7 +181,7 @@ def test_summary_counts_a_lost_mode_as_an_infinite_error():
 @pytest.mark.parametrize("case", ["case1", "case2", "case3", "case4"])
 def test_small_displacements(case):
     """Within 5 % of the shell under small loads; the standard calibration is at least 10 % off."""
-    found = study(case)
+    found = softness(case)
     assert abs(found.error["plate"]) < 0.05
     assert found.error["standard"] < -0.1
 

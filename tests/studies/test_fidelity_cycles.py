@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipj, ellipk
 
-from foldyn.studies.fidelity.cycles import NoCyclesError, cycles, demodulated, fundamental
+from verification.fidelity.cycles import NoCyclesError, cycles, demodulated, fundamental
 
 DT = 0.01
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from foldyn.patterns.topology import edge_lookup
-from foldyn.studies.fidelity import mixed_models
-from foldyn.studies.fidelity.compare import NEAR, RESULTS, read
-from foldyn.studies.fidelity.mixed import KINDS, LARGE, SETS, SUPPORTS, mixed, quads
-from foldyn.studies.fidelity.references import (
+from pairwise import beyond
+from verification.fidelity import mixed_models
+from verification.fidelity.compare import NEAR, RESULTS, read
+from verification.fidelity.mixed import KINDS, LARGE, SETS, SUPPORTS, mixed, quads
+from verification.fidelity.references import (
     case_sets,
     certain,
     computed,
@@ -19,7 +20,6 @@ from foldyn.studies.fidelity.references import (
     read_references,
     stored,
 )
-from pairwise import beyond
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,10 @@ import foldyn as fd
 from foldyn.errors import ComputationError
 from foldyn.linear.reference import elastic as modes_of
 from foldyn.linear.reference import modes_at_rest
-from foldyn.studies.fidelity import motions
-from foldyn.studies.fidelity.cases import documented
-from foldyn.studies.fidelity.motion_results import (
+from pairwise import beyond
+from verification.fidelity import motions
+from verification.fidelity.cases import documented
+from verification.fidelity.motion_results import (
     SHELL,
     STORED,
     Run,
@@ -28,7 +29,7 @@ from foldyn.studies.fidelity.motion_results import (
     untold,
     write,
 )
-from foldyn.studies.fidelity.motions import (
+from verification.fidelity.motions import (
     Motion,
     Release,
     Started,
@@ -38,9 +39,8 @@ from foldyn.studies.fidelity.motions import (
     structures,
     vertex_mass,
 )
-from foldyn.studies.fidelity.statics import LAWS
-from foldyn.studies.fidelity.stretching import pressed, sheet, stiffness, tower
-from pairwise import beyond
+from verification.fidelity.statics import LAWS
+from verification.fidelity.stretching import pressed, sheet, stiffness, tower
 
 
 def elastic(case, structure, count):

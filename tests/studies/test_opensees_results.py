@@ -14,8 +14,6 @@ import pytest
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.studies import find_case
-from foldyn.studies.herkal.opensees import compare, model
-from foldyn.studies.herkal.opensees.model import panel_mesh
 from foldyn.studies.herkal.opensees.stored import (
     Moved,
     read_motion,
@@ -26,6 +24,8 @@ from foldyn.studies.herkal.opensees.stored import (
     write_still,
 )
 from foldyn.studies.herkal.sheet_models import CASES
+from verification.opensees import compare, model
+from verification.opensees.model import panel_mesh
 
 FINEST = 32
 

@@ -8,28 +8,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
 
 from foldyn import program as programs
+from foldyn.algebra.extrapolation import extrapolated
+from foldyn.analyses import read_case
 from foldyn.linear.fidelity import MODELS, fidelity
-from foldyn.studies.fidelity import statics
+from foldyn.linear.small_loads import small_loads
+from foldyn.shells import shell
+from foldyn.structures import discretize
+from foldyn.structures.discretized import Discretized
+from foldyn.studies import find_case
 from foldyn.studies.herkal import vibration
 from foldyn.studies.herkal.runs import case_file_digest
 from foldyn.studies.herkal.sensitivity import KEPT
 from foldyn.studies.pool import Task
 
 # Files that the results depend on, in addition to the solvers.
-COMPUTING = (
-    "studies/fidelity/statics.py", "studies/herkal/stiffnesses.py", "studies/herkal/vibration.py",
-)  # fmt: skip
+COMPUTING = "studies/herkal/stiffnesses.py", "studies/herkal/vibration.py"
 OWN = "own"  # the model of the specimen's case file
 BESIDE = ("standard", "plate", "n5b8e")  # other models whose modes are computed
 PEAKED = (OWN, "plate", "n5b8e")
 SPECIMEN = ("specimen-modes", "specimen-frf")
 MODES = 5
 MESHES = (6, 12)  # divisions of the specimen's shells
+STUDIED = (8, 16)  # and of those of the case studies
 
 Rows = list[dict[str, Any]]
 
@@ -82,9 +89,44 @@ def tasks(cases: Sequence[str], divisions: tuple[int, int] = MESHES) -> list[Sti
     return found + [Stiffness("peaks", model) for model in PEAKED]
 
 
+class Softness(NamedTuple):
+    """Displacement under small loads, with relative errors by model.
+
+    Attributes
+    ----------
+    case : str
+    shell : float
+        Displacement of the loaded nodes along their load, by the shell, m.
+    error : mapping of str to float
+    """
+
+    case: str
+    shell: float
+    error: Mapping[str, float]
+
+
+def between(values: Callable[[int], Any], meshes: tuple[int, int]) -> Any:
+    """What a shell would give with ever finer meshes, from its values with two of them."""
+    coarse, fine = (np.asarray(values(n)) for n in meshes)
+    return extrapolated(coarse, fine, meshes[1] / meshes[0])
+
+
+def softness(name: str) -> Softness:
+    """One of the paper's case studies."""
+    given = read_case(find_case(f"herkal/{name}")).case("circumcenter")
+    pattern, sheet = given.structure.pattern, given.structure.sheet
+
+    def of(structure: Discretized) -> float:
+        return small_loads(replace(given, structure=structure)).displacement
+
+    true = float(between(lambda n: of(shell(pattern, sheet, divisions=n)), STUDIED))
+    bars = {m: of(discretize(pattern, sheet, **o)) for m, o in MODELS.items()}
+    return Softness(name, true, {model: found / true - 1.0 for model, found in bars.items()})
+
+
 def _small_loads(asked: Stiffness) -> Rows:
     """Displacement (m) of the shell and relative errors, as in the fidelity study."""
-    found = statics.study(asked.of)
+    found = softness(asked.of)
     return [{"shell": found.shell, **found.error}]
 
 

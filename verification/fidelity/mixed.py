@@ -18,7 +18,7 @@ from foldyn.errors import InputError
 from foldyn.patterns import GENERATORS, Pattern, miura
 from foldyn.structures import PanelSheet, Sheet
 from foldyn.structures.graded import grading
-from foldyn.studies.fidelity.cases import (
+from verification.fidelity.cases import (
     FidelityCase,
     Held,
     documented,

@@ -18,7 +18,7 @@ from foldyn.shells import shell
 from foldyn.structures import Structure, discretize
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
 from foldyn.structures.presets import resolved
-from foldyn.studies.fidelity.cases import FidelityCase
+from verification.fidelity.cases import FidelityCase
 
 # Options of `discretize`; all bends are linear. `circumcenter` is refused on many panels, and is
 # `mixed_voronoi` on all others.

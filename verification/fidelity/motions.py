@@ -1,6 +1,6 @@
 """Large motions by the shell and the models: sheets released from a fold, the paper's pulses.
 
-    python -m foldyn.studies.fidelity.motions --out FOLDER
+    python -m verification.fidelity.motions --out FOLDER
 
 writes motions.csv, by default into the folder of stored results, and prints its summaries.
 """
@@ -35,11 +35,11 @@ from foldyn.structures import discretize
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.presets import resolved
 from foldyn.studies import find_case
-from foldyn.studies.fidelity.cases import FidelityCase, documented
-from foldyn.studies.fidelity.compare import reference
-from foldyn.studies.fidelity.cycles import Cycles, NoCyclesError, cycles
-from foldyn.studies.fidelity.motion_results import SHELL, STORED, Run, summaries, write
-from foldyn.studies.fidelity.statics import LAWS, STUDIES
+from verification.fidelity.cases import FidelityCase, documented
+from verification.fidelity.compare import reference
+from verification.fidelity.cycles import Cycles, NoCyclesError, cycles
+from verification.fidelity.motion_results import SHELL, STORED, Run, summaries, write
+from verification.fidelity.statics import LAWS, STUDIES
 
 FIRST_STEP = 0.1  # of the load that would fold a linear shell to the largest amplitude
 MOST_STEPS = 80  # most steps on the way there

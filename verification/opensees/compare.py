@@ -1,6 +1,6 @@
 """Our shell compared with stored results of OpenSees, as tables in Markdown.
 
-    python -m foldyn.studies.herkal.opensees.compare --divisions 16 32 64 [--motion 16 32 64]
+    python -m verification.opensees.compare --divisions 16 32 64 [--motion 16 32 64]
 
 prints the convergence of both, and how far our results are from those of OpenSees.
 """
@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from foldyn.dynamics import simulate
 from foldyn.linear import modes
 from foldyn.statics import trace
-from foldyn.studies.fidelity.compare import markdown
 from foldyn.studies.herkal.metric import AXES
 from foldyn.studies.herkal.opensees import stored
-from foldyn.studies.herkal.opensees.run import DT, SAMPLES
 from foldyn.studies.herkal.runs import reported
 from foldyn.studies.herkal.sheet_models import CASES, REFERENCE, case_study, case_with
+from verification.fidelity.compare import markdown
+from verification.opensees.run import DT, SAMPLES
 
 COUNT = 5  # number of frequencies
 

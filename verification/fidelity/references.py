@@ -1,6 +1,6 @@
 """Shell modes of the mixed sets and known gaps, stored to compare models without the shell.
 
-    python -m foldyn.studies.fidelity.references [--out FOLDER] [--until HH:MM]
+    python -m verification.fidelity.references [--out FOLDER] [--until HH:MM]
 
 computes missing cases, alternating between sets, and appends them one by one. Meshes are graded
 toward vertices, down to the thickness. A line of a file has the frequencies of three meshes, and
@@ -31,8 +31,8 @@ from foldyn.linear.reference import SAME_PLACE, reference_modes
 from foldyn.patterns import Pattern
 from foldyn.shells import shell
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
-from foldyn.studies.fidelity.compare import COMPARED, FIRST, RESULTS
-from foldyn.studies.fidelity.mixed import FINE, SETS, MixedCase, gaps, mixed
+from verification.fidelity.compare import COMPARED, FIRST, RESULTS
+from verification.fidelity.mixed import FINE, SETS, MixedCase, gaps, mixed
 
 STEPS = 127  # resolution of a byte, relative to a shape's largest component
 CERTAIN = 0.015  # largest estimated error of a reference

@@ -1,6 +1,6 @@
 """Stretching panels: stiffness of held sheets, and a tower pressed to its snap-through.
 
-    python -m foldyn.studies.fidelity.stretching
+    python -m verification.fidelity.stretching
 
 prints both tables (about three minutes). Edges are held and moved along their whole length; the
 shell has a vertex radius of its thickness, and results of two meshes are extrapolated.
@@ -27,7 +27,7 @@ from foldyn.statics import trace
 from foldyn.structures import Sheet, discretize
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.presets import resolved
-from foldyn.studies.fidelity.compare import markdown
+from verification.fidelity.compare import markdown
 
 MODELS: Mapping[str, Mapping[str, Any]] = {
     "standard": {"preset": "herkal", "bend_law": "linear"},

@@ -1,6 +1,6 @@
-"""`python -m foldyn.studies.fidelity`: compute the tables of the fidelity study.
+"""`python -m verification.fidelity`: compute the tables of the fidelity study.
 
-    python -m foldyn.studies.fidelity --out FOLDER
+    python -m verification.fidelity --out FOLDER
 
 writes documented.csv, drawn.csv and sheets.csv, and for the first two sets the first five modes of
 each case with internal amplitudes, by default into the folder of stored results, and prints
@@ -13,8 +13,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from foldyn.studies.fidelity.cases import COUNT, COUNT_SHEETS, SEED, documented, drawn, sheets
-from foldyn.studies.fidelity.compare import (
+from verification.fidelity.cases import COUNT, COUNT_SHEETS, SEED, documented, drawn, sheets
+from verification.fidelity.compare import (
     RESULTS,
     first_table,
     modes_below,
@@ -23,7 +23,7 @@ from foldyn.studies.fidelity.compare import (
     table,
     write,
 )
-from foldyn.studies.fidelity.statics import large_table, statics_table
+from verification.fidelity.statics import large_table, statics_table
 
 
 def main(arguments: list[str] | None = None) -> int:

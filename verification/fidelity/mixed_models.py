@@ -1,6 +1,6 @@
 """Models of bars and hinges compared with the stored modes of the mixed sets.
 
-    python -m foldyn.studies.fidelity.mixed_models [--out FOLDER]
+    python -m verification.fidelity.mixed_models [--out FOLDER]
 
 compares models with the results stored by `references`, computes no shell, writes a table for each
 set and prints summaries (a few minutes).
@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from foldyn.structures.plate_frequency import BELOW
-from foldyn.studies.fidelity.compare import (
+from verification.fidelity.compare import (
     ERRORS,
     FIRST,
     RESULTS,
@@ -29,8 +29,8 @@ from foldyn.studies.fidelity.compare import (
     summary_of,
     write,
 )
-from foldyn.studies.fidelity.mixed import SETS, SUPPORTS, MixedCase
-from foldyn.studies.fidelity.references import Stored, case_sets, certain, read_references, stored
+from verification.fidelity.mixed import SETS, SUPPORTS, MixedCase
+from verification.fidelity.references import Stored, case_sets, certain, read_references, stored
 
 # Compared models and their internal amplitudes, by name in the table.
 BESIDE = {

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.algebra.extrapolation import extrapolated
 from foldyn.analyses import read_case
 from foldyn.cases import Case, Fix, Force, Impose
 from foldyn.errors import FoldynWarning
@@ -23,45 +22,12 @@ from foldyn.statics import trace
 from foldyn.structures import Sheet, discretize
 from foldyn.structures.discretized import Discretized
 from foldyn.studies import find_case
-from foldyn.studies.fidelity.compare import markdown
+from foldyn.studies.herkal.stiffnesses import Softness, between, softness
+from verification.fidelity.compare import markdown
 
 STUDIES = ("case1", "case2", "case3", "case4")
 STEEL = Sheet(2e11, 0.3, 1e-4, density=7850.0)
-MESHES = {"studies": (8, 16), "steel": (4, 8)}  # divisions of the shell meshes
-
-
-class Softness(NamedTuple):
-    """Displacement under small loads, with relative errors by model.
-
-    Attributes
-    ----------
-    case : str
-    shell : float
-        Displacement of the loaded nodes along their load, by the shell, m.
-    error : mapping of str to float
-    """
-
-    case: str
-    shell: float
-    error: Mapping[str, float]
-
-
-def _extrapolated(values: Callable[[int], Any], meshes: tuple[int, int]) -> Any:
-    coarse, fine = (np.asarray(values(n)) for n in meshes)
-    return extrapolated(coarse, fine, meshes[1] / meshes[0])
-
-
-def study(name: str) -> Softness:
-    """One of the paper's case studies."""
-    given = read_case(find_case(f"herkal/{name}")).case("circumcenter")
-    pattern, sheet = given.structure.pattern, given.structure.sheet
-
-    def of(structure: Discretized) -> float:
-        return small_loads(replace(given, structure=structure)).displacement
-
-    true = float(_extrapolated(lambda n: of(shell(pattern, sheet, divisions=n)), MESHES["studies"]))
-    bars = {m: of(discretize(pattern, sheet, **o)) for m, o in MODELS.items()}
-    return Softness(name, true, {model: found / true - 1.0 for model, found in bars.items()})
+MESHES = (4, 8)  # divisions of the shell of steel
 
 
 def steel_case(structure: Discretized) -> Case:
@@ -88,9 +54,7 @@ def steel() -> tuple[Softness, NDArray, Mapping[str, NDArray]]:
             small_loads(case).displacement, modes(replace(case, loads=()), 3)["frequency"]
         )
 
-    fine = _extrapolated(
-        lambda n: of(shell(pattern, STEEL, divisions=n, mass="consistent")), MESHES["steel"]
-    )
+    fine = between(lambda n: of(shell(pattern, STEEL, divisions=n, mass="consistent")), MESHES)
     bars = {m: of(discretize(pattern, STEEL, **o)) for m, o in MODELS.items()}
     error = {model: float(found[0] / fine[0] - 1.0) for model, found in bars.items()}
     frequency = {model: found[1:] for model, found in bars.items()}
@@ -101,7 +65,7 @@ def statics_table() -> str:
     """Both tables in Markdown."""
     sheet, shell_frequency, frequency = steel()
     rows = []
-    for found in [*map(study, STUDIES), sheet]:
+    for found in [*map(softness, STUDIES), sheet]:
         errors = [f"{100 * value:+.1f} %" for value in found.error.values()]
         rows.append([found.case, f"{1e3 * found.shell:.4g} mm", *errors])
     for k, true in enumerate(shell_frequency):

@@ -1,6 +1,6 @@
 """The shell's frequencies compared with OpenSees, which shares no code with it.
 
-    python -m foldyn.studies.fidelity.independent
+    python -m verification.fidelity.independent
 
 computes and stores the documented cases that the model of the case studies supports (panels of four
 corners, supports of vertices, nothing free); it needs the extra `opensees`.
@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.materials import EnhancedLinear
 from foldyn.structures import discretize
-from foldyn.studies.fidelity.cases import FidelityCase, documented
-from foldyn.studies.fidelity.compare import RESULTS, read
-from foldyn.studies.herkal.opensees.model import PanelShells
+from verification.fidelity.cases import FidelityCase, documented
+from verification.fidelity.compare import RESULTS, read
+from verification.opensees.model import PanelShells
 
 STORED = RESULTS / "opensees.csv"
 MESHES = (8, 16)  # divisions

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foldyn.studies.fidelity.cases import documented
-from foldyn.studies.fidelity.compare import ALIKE, NEAR, RESULTS, markdown
+from verification.fidelity.cases import documented
+from verification.fidelity.compare import ALIKE, NEAR, RESULTS, markdown
 
 STORED = RESULTS / "motions.csv"
 SHELL = "shell"

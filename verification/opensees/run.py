@@ -1,6 +1,6 @@
 """Run cases with OpenSees and store the results.
 
-    python -m foldyn.studies.herkal.opensees.run case1 case2 --divisions 16 --motion --dt 0.005
+    python -m verification.opensees.run case1 case2 --divisions 16 --motion --dt 0.005
 
 writes statics and frequencies, and with `--motion` the motion instead, to `--out`, by default the
 folder of stored results.
@@ -18,8 +18,8 @@ from typing import Any
 from foldyn.analyses import CaseFile
 from foldyn.errors import FoldynError
 from foldyn.studies.herkal.opensees import stored
-from foldyn.studies.herkal.opensees.model import PanelShells
 from foldyn.studies.herkal.sheet_models import CASES, case_study
+from verification.opensees.model import PanelShells
 
 DT = 0.005  # s
 SAMPLES = 0.01  # s: interval of stored samples

@@ -1,6 +1,6 @@
 """Coverage of a fit's intervals: how often they contain the truth, over draws of the noise.
 
-`python -m foldyn.studies.herkal.coverage [DRAWS] [FOLDER]` fits the folds and the damping of the
+`python -m verification.coverage [DRAWS] [FOLDER]` fits the folds and the damping of the
 paper specimen to synthetic data as `studies.herkal.calibration` makes them, each time with other
 noise, and writes coverage.json next to this module: every estimate with its interval. Each draw is
 fitted in full; draws share evaluations of the model at equal points, such as the start of the
