@@ -57,7 +57,7 @@ class TouchingNewton(Newton):
         body = scheme.packed.body
         self._contact = body.term(ContactTerm)
         self._tables = self._contact.tables
-        self._memory = body.kept(scheme.work, ContactTerm)
+        self._memory = body.kept(scheme.part, ContactTerm)
         self._memory.counts.lagged = 1
         self._free = np.zeros(3 * scheme.packed.system.rows, bool)
         self._free[matrix.free] = True
