@@ -61,6 +61,7 @@ class _Context(NamedTuple):
 
 @forces
 def _forces(own, u, v, t, force, powers):
+    """Forces of bars and hinges; the first term of all, it overwrites `force`."""
     rows = own.model.rest.shape[0]
     internal_force(own.model, rows_at(u, rows), rows_at(force, rows), own.scratch)
 

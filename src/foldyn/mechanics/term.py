@@ -315,7 +315,7 @@ class Folds(NamedTuple):
 
 
 class Terms(NamedTuple):
-    """A model as compiled loops see it: of one type for any terms."""
+    """Terms of a body as compiled loops see them: of one type for any of them."""
 
     context: NDArray  # (k,) addresses
     kernel: NDArray  # (k, 9) addresses, or 0
