@@ -229,10 +229,11 @@ class Motion:
             begin_flow(self.case, self.packed, self.state, self._flow)
             given = self.case, self.packed, self.state, self.plan, self.device
             engine = engine_of(self.state) if engine_of else self.method.engine(*given)
-            continued = self._initial[3] if self.case.contact is None else None
-            same = continued is not None and continued.method == self.method.name
-            if same and isinstance(engine, ImplicitEngine):
-                engine.continue_from(continued.values)
+            known = self._initial[3] if self.case.contact is None else None
+            if known and known.method != self.method.name:
+                known = None
+            if known and isinstance(engine, ImplicitEngine):
+                engine.continue_from(known.values)
             self._engine = engine
             self._advance(engine, report)
         except KeyboardInterrupt:

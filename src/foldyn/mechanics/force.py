@@ -63,7 +63,7 @@ def force_scratches(model: BarsHinges, threads: int) -> list[ForceScratch]:
     parts = strips(model, threads)
     angle = np.empty(len(model.hinges))
     return [
-        ForceScratch(*_aligned(part.rows), angle, angle, part, member)
+        ForceScratch._make([*_aligned(part.rows), angle, angle, part, member])
         for part, member in zip(parts, team(len(parts)), strict=True)
     ]
 
