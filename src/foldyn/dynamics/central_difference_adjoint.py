@@ -96,5 +96,5 @@ class CentralDifferenceAdjoint(Adjoint):
 
     def _acceleration(self, step: int, u: NDArray, v: NDArray) -> NDArray:
         out, t = np.zeros_like(u), self._plan.start + step * self._plan.dt
-        accelerate(self._equation.still, u, v, t, out)
+        accelerate(self._equation.handle, u, v, t, out)
         return out

@@ -346,8 +346,8 @@ class EquationOfMotion:
     ----------
     case : Context
         `ThreadCase`.
-    still : Context
-        `LoopHandle` without samples.
+    handle : Context
+        `LoopHandle`, without samples.
     """
 
     def __init__(
@@ -364,7 +364,7 @@ class EquationOfMotion:
         )
         self._slow = slow = slow_contacts(packed, own, case.value) if slows else None
         remembers = held.terms.kernel[:, ADVANCE_CLOCK].any()
-        self.still = Context(
+        self.handle = Context(
             LoopHandle(
                 acceleration=_acceleration.at(case),
                 case=case.address,
@@ -384,8 +384,8 @@ class EquationOfMotion:
         )
         self._out: Samples | None = None
 
-    def sampled(self, out: Samples) -> Context:
-        """`LoopHandle` with `out` as the destination of samples."""
+    def recording(self, out: Samples) -> Context:
+        """`LoopHandle` that writes samples to `out`."""
         if self._out is not out:  # Python fills contexts: once per window of samples
             case, heat = self.case, self._heat
             fluid = observe_fluid.at(case) if case.value.added.acts else 0
@@ -396,7 +396,7 @@ class EquationOfMotion:
                 Recorder(case.value, self._state, out, fluid, *lacks)
             )
             self._sampled = Context(
-                self.still.value._replace(sample=_sample.at(recorder), recorder=recorder.address)
+                self.handle.value._replace(sample=_sample.at(recorder), recorder=recorder.address)
             )
             self._out = out
         return self._sampled

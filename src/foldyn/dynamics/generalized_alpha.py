@@ -100,7 +100,7 @@ class Alpha(Scheme):
         self.parameters, self.facts, equation = parameters, facts, self.equation
         self.context = Context(
             AlphaStep(
-                equation.still.value, equation.case.value, parameters, self.old, self.new,
+                equation.handle.value, equation.case.value, parameters, self.old, self.new,
                 self.shift, self.out, self.earlier, self.damping, self.drag,
             )
         )  # fmt: skip

@@ -87,13 +87,13 @@ class ExplicitEngine(Engine):
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
         case = self._state, self._plan, out.end, stretch, *self._further
-        arguments = [(equation.sampled(out), *case) for equation in self._equations]
+        arguments = [(equation.recording(out), *case) for equation in self._equations]
         return run_together(self._loop, [own.team for own in self._threads], arguments)[0]
 
     def accelerate(self) -> None:
         """Recompute the current acceleration, for methods that store it."""
-        state, equation = self._state, self._equations[0].still
-        accelerate(equation, state.u, state.v, float(state.tally.time), state.carry)
+        state, handle = self._state, self._equations[0].handle
+        accelerate(handle, state.u, state.v, float(state.tally.time), state.carry)
 
     def changing(self) -> dict[str, Any]:
         """What the next steps depend on; see `Engine`."""

@@ -225,7 +225,7 @@ class RungeKuttaAdjoint(Adjoint):
 
     def _retrace(self, u: NDArray, v: NDArray, first: int, count: int, stages: NDArray) -> None:
         """Recompute steps; see `retrace`."""
-        retrace(self._equation.still, u, v, self._steps, self._method, first, count, stages)
+        retrace(self._equation.handle, u, v, self._steps, self._method, first, count, stages)
 
 
 def steps_at_once(stages: int, rows: int) -> int:

@@ -147,7 +147,7 @@ class ImplicitEngine(Engine):
             memory.still()
         old, t = self._scheme.old, float(self._state.tally.time)
         scheme = self._scheme
-        accelerate(scheme.equation.still, old.q, old.w, t, out)
+        accelerate(scheme.equation.handle, old.q, old.w, t, out)
         out[scheme.massless] = 0.0
         return out
 
@@ -226,7 +226,7 @@ class ImplicitEngine(Engine):
     def _sample(self, t: float, out: Samples) -> int:
         """Write a sample."""
         scheme, state = self._scheme, self._state
-        return write(scheme.equation.sampled(out), state.u, state.v, t, scheme.out)
+        return write(scheme.equation.recording(out), state.u, state.v, t, scheme.out)
 
     def _fixed(self, out: Samples) -> tuple[int, int]:
         """Take one step of dt, subdivided at load jumps or if Newton's method fails."""

@@ -190,7 +190,7 @@ class Scheme(ABC):
     def begin(self, t: float) -> None:
         """Make `old` the start of a motion, or of its part after a jump, at t (s)."""
         old, s = self.old, self.scratch
-        accelerate(self.equation.still, old.q, old.w, t, old.a)
+        accelerate(self.equation.handle, old.q, old.w, t, old.a)
         old.a[self.massless] = 0.0
         self._speed[:], self._last = old.w, 0.0
         self._growth[:] = 0.0
@@ -268,7 +268,7 @@ class Scheme(ABC):
         for moved, force in ((change, self._pushed), (np.zeros_like(change), self.out)):
             s.factor[:], s.time[0] = phase.factor, 0.0  # evaluated as if at this time
             s.factor[:, 0] += moved
-            accelerate(self.equation.still, phase.q, phase.w, 0.0, self.earlier)
+            accelerate(self.equation.handle, phase.q, phase.w, 0.0, self.earlier)
             force[:] = s.force
         s.time[0] = np.nan
         self._pushed -= self.out
