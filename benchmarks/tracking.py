@@ -68,7 +68,13 @@ def film_of_specimen(motion: xr.Dataset, kind: str) -> ex.SyntheticFilm:
     middle = 0.5 * (rest.min(axis=0) + rest.max(axis=0))
     middle[2] = rest[:, 2].max()
     camera = ex.Camera.looking_at(
-        middle, DISTANCE, SCALE, SIZE, k1=0.03, k2=-0.01, turned=(2.0, -1.5, 1.0)
+        middle,
+        DISTANCE,
+        metres_per_pixel=SCALE,
+        size=SIZE,
+        k1=0.03,
+        k2=-0.01,
+        turned=(2.0, -1.5, 1.0),
     )
     return ex.film_of(motion, camera, rate=RATE, duration=DURATION, sensor=SENSORS[kind], seed=1)
 

@@ -35,27 +35,28 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> float:
 def gradient_error(
     energy: Callable[[NDArray], float],
     force: Callable[[NDArray], NDArray],
-    u: ArrayLike,
+    *,
+    at: ArrayLike,
     seed: int = 0,
     size: float | None = None,
 ) -> float:
-    """Relative difference of a force and the central difference of its energy at u.
+    """Relative difference of a force and the central difference of its energy.
 
     Along random directions, extrapolated from two steps (error of order h^4).
 
     Parameters
     ----------
     energy, force : callable
-        Functions of u; the force has the shape of u.
-    u : array_like
-        State, of any shape.
+        Functions of an array; the force has its shape.
+    at : array_like
+        Where they are compared, of any shape.
     seed : int
         Of the random directions.
     size : float, optional
-        Scale of u; steps are a thousandth of it. By default the largest entry of u, or 1e-3 if all
-        are zero.
+        Scale of the array; steps are a thousandth of it. By default its largest entry, or 1e-3 if
+        all are zero.
     """
-    point = np.asarray(u, float)
+    point = np.asarray(at, float)
     found, exact = [], []
     rng = np.random.default_rng(seed)
     h = 1e-3 * (size or _size(point))
@@ -69,16 +70,17 @@ def gradient_error(
 def tangent_error(
     force: Callable[[NDArray], NDArray],
     tangent: Callable[[NDArray], object],
-    u: ArrayLike,
+    *,
+    at: ArrayLike,
     seed: int = 0,
     size: float | None = None,
 ) -> float:
-    """Relative difference of a tangent and the central difference of its force at u.
+    """Relative difference of a tangent and the central difference of its force.
 
-    The tangent is a matrix on flattened u. Along a random direction, extrapolated as in
+    The tangent is a matrix on the flattened array. Along a random direction, extrapolated as in
     `gradient_error`.
     """
-    point = np.asarray(u, float)
+    point = np.asarray(at, float)
     d = np.random.default_rng(seed).standard_normal(point.shape)
     found = _slope(force, point, d, 1e-3 * (size or _size(point)))
     exact = (tangent(point) @ d.ravel()).reshape(point.shape)  # type: ignore[operator]

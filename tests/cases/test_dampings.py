@@ -182,7 +182,7 @@ def test_springs_and_dashpots_take_ends_alike(kind):
 
 def test_the_pair_of_the_paper():
     """13.5 % at 9.3 Hz and 9 % at 16.7 Hz (Herkal et al., section 7): 14.4 1/s and 4.1e-4 s."""
-    damping = fd.Rayleigh.from_ratios(9.3, 0.135, 16.7, 0.09)
+    damping = fd.Rayleigh.from_ratios(9.3, 0.135, f2=16.7, z2=0.09)
     assert (damping.alpha, damping.beta) == pytest.approx((14.4, 4.1e-4), rel=2e-3)
 
 
@@ -192,23 +192,23 @@ def test_the_ratios_come_back(seed):
     alpha, beta = random.uniform(0.0, 30.0), random.uniform(0.0, 1e-2)
     f1, f2 = random.uniform(0.1, 50.0, 2)
     z1, z2 = (alpha / (4 * np.pi * f) + beta * np.pi * f for f in (f1, f2))
-    found = fd.Rayleigh.from_ratios(f1, z1, f2, z2, "initial")
+    found = fd.Rayleigh.from_ratios(f1, z1, f2=f2, z2=z2, state="initial")
     assert (found.alpha, found.beta) == pytest.approx((alpha, beta), rel=1e-9, abs=1e-12)
     assert found.state == "initial"
 
 
 def test_alone():
     """Ratios as of one of the two: exactly zero, or its rounding, for the other."""
-    one = fd.Rayleigh.from_ratios(2.0, 0.1, 4.0, 0.05)
+    one = fd.Rayleigh.from_ratios(2.0, 0.1, f2=4.0, z2=0.05)
     assert one.beta == pytest.approx(0.0, abs=1e-17) and one.alpha == pytest.approx(0.8 * np.pi)
-    other = fd.Rayleigh.from_ratios(4.0, 0.1, 2.0, 0.05)
+    other = fd.Rayleigh.from_ratios(4.0, 0.1, f2=2.0, z2=0.05)
     assert other.alpha == pytest.approx(0.0, abs=1e-15)
 
 
 def test_modes_have_them():
     held = [fd.Fix("xmin", "xyz")]
     f = fd.modes(fd.Case(S, held), 3).frequency.values
-    damping = fd.Rayleigh.from_ratios(f[0], 0.02, f[2], 0.05)
+    damping = fd.Rayleigh.from_ratios(f[0], 0.02, f2=f[2], z2=0.05)
     ratios = fd.modes(fd.Case(S, held, damping=damping), 3).damping_ratio.values
     assert ratios[[0, 2]] == pytest.approx([0.02, 0.05], rel=1e-9)
     assert ratios[1] < 0.05
@@ -227,4 +227,4 @@ def test_modes_have_them():
 )
 def test_ratios_that_cannot_be_had(given, words):
     with pytest.raises(InputError, match=words):
-        fd.Rayleigh.from_ratios(*given)
+        fd.Rayleigh.from_ratios(*given[:2], f2=given[2], z2=given[3])

@@ -279,7 +279,7 @@ def test_the_tangent_of_a_warm_strip_is_exact() -> None:
         residual, tangent = (partial(of, factor=1.0) for of in (problem.residual, problem.tangent))
         start = problem.start()
         start = start + 1e-4 * np.random.default_rng(0).standard_normal(len(start))
-        assert tangent_error(residual, tangent, start) < 1e-6
+        assert tangent_error(residual, tangent, at=start) < 1e-6
 
 
 def test_a_case_with_layers_survives_a_file(kept) -> None:

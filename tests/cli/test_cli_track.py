@@ -37,7 +37,7 @@ def folder(tmp_path_factory):
     (folder / "case.toml").write_text(CASE, "utf-8")
     structure = fd.read_case(folder / "case.toml").case().structure
     middle = 0.5 * (structure.nodes.min(axis=0) + structure.nodes.max(axis=0))
-    camera = Camera.looking_at(middle, 0.4, 1.7e-4, (560, 600))
+    camera = Camera.looking_at(middle, 0.4, metres_per_pixel=1.7e-4, size=(560, 600))
     studio = Studio.of(structure, camera, Look(), Sensor(samples=4), 0)
 
     def motion(times):

@@ -153,6 +153,6 @@ def test_tangents_are_exact(kind):
         def tangent(x, start=start):
             return pair.step(start, x.reshape(4, 3), True)[1]
 
-        errors.append(tangent_error(force, tangent, end.ravel(), size=1e-2))
+        errors.append(tangent_error(force, tangent, at=end.ravel(), size=1e-2))
     # kinks of closest points within the differences, where the tangent has none
     assert np.quantile(errors, 0.8) < 1e-6

@@ -56,7 +56,12 @@ def camera(rest: Any = None, **options: Any) -> Any:
     middle = 0.5 * (rest.min(axis=0) + rest.max(axis=0))
     middle[2] = rest[:, 2].max()
     return Camera.looking_at(
-        middle, DISTANCE, SCALE, SIZE, turned=(1.5, -1.0, 0.8), **({"k1": 0.02} | options)
+        middle,
+        DISTANCE,
+        metres_per_pixel=SCALE,
+        size=SIZE,
+        turned=(1.5, -1.0, 0.8),
+        **({"k1": 0.02} | options),
     )
 
 

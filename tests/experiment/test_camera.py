@@ -16,7 +16,7 @@ POINTS = moving_states(70.0)[0]
 
 
 def test_the_target_is_in_the_middle_at_its_scale():
-    one = Camera.looking_at([0.1, 0.2, 0.3], 0.5, 1e-4, (400, 300))
+    one = Camera.looking_at([0.1, 0.2, 0.3], 0.5, metres_per_pixel=1e-4, size=(400, 300))
     np.testing.assert_allclose(one.project([0.1, 0.2, 0.3]), [199.5, 149.5])
     # up = -x: x runs down; seen from +z, y runs to the right
     np.testing.assert_allclose(one.project([0.101, 0.2, 0.3]), [199.5, 159.5])
@@ -42,7 +42,9 @@ def test_distortion_is_browns():
 
 @pytest.mark.parametrize(("k1", "k2"), [(0.0, 0.0), (0.05, -0.02), (-0.1, 0.03)])
 def test_rays_go_back_to_where_they_came_from(k1, k2):
-    one = Camera.looking_at(POINTS.mean(axis=0), 0.2, SCALE, (580, 620), k1=k1, k2=k2)
+    one = Camera.looking_at(
+        POINTS.mean(axis=0), 0.2, metres_per_pixel=SCALE, size=(580, 620), k1=k1, k2=k2
+    )
     back = one.on_plane(one.project(POINTS), one.depth(POINTS))
     np.testing.assert_allclose(back, POINTS, atol=1e-12)
     # the polynomial of the renderer alone, over the whole picture

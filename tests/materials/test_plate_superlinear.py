@@ -76,8 +76,8 @@ def test_force_and_tangent_are_derivatives(scale):
     """Small and large motions, bends with onsets of their own: central differences."""
     s = structure(scheme="n5b8")
     u = scale * 0.1 * np.random.default_rng(1).standard_normal(s.nodes.shape)
-    assert checks.gradient_error(s.energy, s.internal_force, u) < 1e-6
-    assert checks.tangent_error(s.internal_force, s.tangent, u) < 1e-5
+    assert checks.gradient_error(s.energy, s.internal_force, at=u) < 1e-6
+    assert checks.tangent_error(s.internal_force, s.tangent, at=u) < 1e-5
 
 
 def test_modes_at_rest_are_those_of_linear_bends():

@@ -61,8 +61,8 @@ def test_a_fold_is_its_crease_and_its_panels_in_series(law, rest, stiff):
         energy = stiff * float(own.energy(phi, start)) + 0.5 * (theta - phi) ** 2 / SOFTNESS
         u = at(theta)
         assert structure.energies(u)["strain_folds"] == pytest.approx(energy, rel=1e-9, abs=1e-12)
-        assert checks.gradient_error(structure.energy, structure.internal_force, u) < 1e-6
-        assert checks.tangent_error(structure.internal_force, structure.tangent, u) < 1e-5
+        assert checks.gradient_error(structure.energy, structure.internal_force, at=u) < 1e-6
+        assert checks.tangent_error(structure.internal_force, structure.tangent, at=u) < 1e-5
 
 
 def test_a_law_that_locks_does_so_where_panels_meet():

@@ -154,8 +154,8 @@ def test_forces_are_the_gradient_and_tangents_their_derivative():
         def force(q):
             return contact.contact(q)[1].ravel()
 
-        assert gradient_error(lambda q: contact.contact(q)[0], force, q, size=1e-6) < 1e-6
-        assert tangent_error(force, contact.tangent, q, size=1e-7) < 1e-6
+        assert gradient_error(lambda q: contact.contact(q)[0], force, at=q, size=1e-6) < 1e-6
+        assert tangent_error(force, contact.tangent, at=q, size=1e-7) < 1e-6
         matrix = contact.tangent(q)
         assert abs(matrix - matrix.T).max() < 1e-14 * abs(matrix).max()
         own = free.contact_term.contact(q)[1]

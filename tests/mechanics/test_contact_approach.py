@@ -149,7 +149,7 @@ def test_the_tangent_of_lagged_friction_is_exact(stretch):
         return contact_tangent(body.tables, kept, made.body.size)
 
     assert np.abs(force(u.ravel())[0::3]).max() > 0.0
-    assert tangent_error(force, tangent, u.ravel(), size=1e-9) < 1e-6
+    assert tangent_error(force, tangent, at=u.ravel(), size=1e-9) < 1e-6
     matrix = tangent(u.ravel())
     assert abs(matrix - matrix.T).max() < 1e-12 * abs(matrix).max()
 

@@ -114,8 +114,8 @@ def test_forces_and_tangents_are_exact(amid, kind):
         energy, force = of(u)
         if energy == 0.0:
             continue
-        gradient = gradient_error(lambda u: of(u)[0], lambda u: of(u)[1], u, size=2e-2)
-        errors.append((gradient, tangent_error(lambda u: of(u)[1], tangent, u, size=2e-2)))
+        gradient = gradient_error(lambda u: of(u)[0], lambda u: of(u)[1], at=u, size=2e-2)
+        errors.append((gradient, tangent_error(lambda u: of(u)[1], tangent, at=u, size=2e-2)))
         pushed = force.reshape(10, 3)
         assert np.abs(pushed.sum(axis=0)).max() < 1e-13 * np.abs(pushed).max()
         assert np.abs(np.cross(x, pushed).sum(axis=0)).max() < 1e-12 * np.abs(pushed).max()

@@ -51,9 +51,9 @@ def test_every_edge_between_two_panels_gives_way_at_both_ends(structure) -> None
 
 def test_forces_are_the_gradient_and_the_tangent_that_of_forces(structure, state) -> None:
     body, tangent = structure.body, structure.body.tangent(state)
-    error = gradient_error(lambda q: body.energies(q).sum(), body.internal, state, size=1e-5)
+    error = gradient_error(lambda q: body.energies(q).sum(), body.internal, at=state, size=1e-5)
     assert error < 1e-6
-    assert tangent_error(body.internal, body.tangent, state, size=1e-5) < 1e-6
+    assert tangent_error(body.internal, body.tangent, at=state, size=1e-5) < 1e-6
     assert abs(tangent - tangent.T).max() < 1e-12 * abs(tangent).max()
 
 

@@ -65,7 +65,7 @@ def test_the_tangent_is_the_derivative_of_the_force(kind, x, u) -> None:
     error = tangent_error(
         lambda q: -following_force(loads, q, FACTOR),
         lambda q: following_tangent(loads, q, FACTOR),
-        u,
+        at=u,
     )
     assert error < 1e-9
 
@@ -92,7 +92,7 @@ def test_bars_have_the_potential_of_a_constant_tension(x, u) -> None:
         now, rest = at[ends[:, 1]] - at[ends[:, 0]], x[ends[:, 1]] - x[ends[:, 0]]
         return 0.5 * 0.6 * float(np.array([1.5, -2.0]) @ ((now**2).sum(1) - (rest**2).sum(1)))
 
-    assert gradient_error(potential, lambda q: -following_force(loads, q, FACTOR), u) < 1e-9
+    assert gradient_error(potential, lambda q: -following_force(loads, q, FACTOR), at=u) < 1e-9
     force = following_force(joined([(bars(x), 1)]), np.zeros_like(u), FACTOR)[: 3 * NODES]
     # a tension pulls the ends together
     assert force.reshape(-1, 3)[0] @ (x[5] - x[0]) > 0.0

@@ -188,7 +188,7 @@ def test_the_derivatives_by_the_state(name, seed) -> None:
     if isinstance(own.term, DampingMatrix | DampingRows):
         assert not by_q.any()
         return
-    error = gradient_error(lambda q: float(w @ own.force(q, v)), lambda _: by_q, q, seed)
+    error = gradient_error(lambda q: float(w @ own.force(q, v)), lambda _: by_q, at=q, seed=seed)
     assert error < 1e-8
 
 
@@ -241,8 +241,10 @@ def test_the_gradients_are_those_of_differences(each, seed) -> None:
         return float(w @ own.changed(key, allowed(values)).force(q, v))
 
     size = float(np.abs(array).max())
-    assert gradient_error(weighted, lambda _: gradient, array, seed, size) < 1e-7
-    assert gradient_error(weighted, lambda _: 1.001 * gradient, array, seed, size) > 1e-4
+    assert gradient_error(weighted, lambda _: gradient, at=array, seed=seed, size=size) < 1e-7
+    assert (
+        gradient_error(weighted, lambda _: 1.001 * gradient, at=array, seed=seed, size=size) > 1e-4
+    )
 
     along = size * np.random.default_rng(seed).standard_normal(array.shape)
     steps, at = 3e-3 / np.array([1, 10, 100, 1000]), weighted(array)

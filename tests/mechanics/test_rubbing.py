@@ -103,7 +103,9 @@ class Rubbing:
         def force(u):
             return self.force(u.reshape(10, 3)).ravel()
 
-        return tangent_error(force, lambda u: self.tangent(u.reshape(10, 3)), x.ravel(), size=size)
+        return tangent_error(
+            force, lambda u: self.tangent(u.reshape(10, 3)), at=x.ravel(), size=size
+        )
 
     def state(self, x) -> tuple[float, bool]:
         """Energy of the spring, and whether it slips."""
@@ -137,7 +139,7 @@ def test_what_sticks_has_a_potential(pair):
         assert not pair.state(x)[1]
         gradient = gradient_error(
             lambda u: pair.state(u.reshape(10, 3))[0],
-            lambda u: pair.force(u.reshape(10, 3)).ravel(), x.ravel(), size=1e-3,
+            lambda u: pair.force(u.reshape(10, 3)).ravel(), at=x.ravel(), size=1e-3,
         )  # fmt: skip
         errors.append((gradient, pair.tangent_error(x, 1e-3)))
     assert (np.median(errors, axis=0) < [1e-8, 1e-8]).all()

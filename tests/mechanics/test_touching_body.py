@@ -93,8 +93,8 @@ def test_forces_of_a_stack_are_the_gradient_and_tangents_exact(stack):
     # differences of 1e-9 m straddle kinks of a few among hundreds of pairs, hence the median
     errors = [
         (
-            gradient_error(lambda u: stack.contact(u)[0], force, u, size=2e-6),
-            tangent_error(force, stack.tangent, u, size=2e-6),
+            gradient_error(lambda u: stack.contact(u)[0], force, at=u, size=2e-6),
+            tangent_error(force, stack.tangent, at=u, size=2e-6),
         )
         for u in states(5)
     ]
@@ -129,7 +129,7 @@ def test_guards_keep_dihedrals_between_0_and_360(dihedral):
     angle = np.degrees(s.body.angles((x - body.tables.rest).ravel())[body.tables.hinge_row])
     assert min(angle.min(), 360.0 - angle.max()) == pytest.approx(1.0, rel=1e-9)
     assert guard(rest)[0] > 0.0 == guard((body.tables.rest - x).ravel())[0]
-    error = gradient_error(lambda u: guard(u)[0], lambda u: guard(u)[1], rest, size=1e-6)
+    error = gradient_error(lambda u: guard(u)[0], lambda u: guard(u)[1], at=rest, size=1e-6)
     assert error < 1e-8
 
 

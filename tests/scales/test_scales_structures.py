@@ -107,11 +107,11 @@ def test_checkers_of_gradients_take_steps_of_the_size_of_the_state():
     for by in (ONE, *SCALES):
         s = miura(by)
         u = noise(s.nodes, 0.02 * by.length, 2)
-        assert checks.gradient_error(s.energy, s.internal_force, u) < 1e-6
-        assert checks.tangent_error(s.internal_force, s.tangent, u) < 1e-6
+        assert checks.gradient_error(s.energy, s.internal_force, at=u) < 1e-6
+        assert checks.tangent_error(s.internal_force, s.tangent, at=u) < 1e-6
         stiff = fd.discretize(s.pattern, s.sheet, bend_law="linear")
         force, tangent, size = stiff.internal_force, stiff.tangent, 0.01 * by.length
-        assert checks.tangent_error(force, tangent, np.zeros_like(u), size=size) < 1e-6
+        assert checks.tangent_error(force, tangent, at=np.zeros_like(u), size=size) < 1e-6
 
 
 def test_shells():

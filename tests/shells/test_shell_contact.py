@@ -64,9 +64,9 @@ def test_forces_are_the_gradient_and_tangents_exact():
         blocks = np.zeros((len(stack.tables.hinge_limit), 4, 3, 4, 3))
         assert guard_tangents(stack.tables, stack.tables.rest, blocks).any()
         size = 3e-5
-        assert gradient_error(lambda q: stack.contact(q)[0], contact, q, size=size) < 1e-10
-        assert tangent_error(contact, stack.tangent, q, size=size) < 1e-8
-        assert tangent_error(body.internal, body.tangent, q, size=size) < 1e-8
+        assert gradient_error(lambda q: stack.contact(q)[0], contact, at=q, size=size) < 1e-10
+        assert tangent_error(contact, stack.tangent, at=q, size=size) < 1e-8
+        assert tangent_error(body.internal, body.tangent, at=q, size=size) < 1e-8
 
 
 @pytest.mark.parametrize("divisions", [2, 5])

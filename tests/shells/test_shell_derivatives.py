@@ -133,9 +133,14 @@ def test_parts_of_the_energy_are_of_one_size_in_these_tests(model):
 @pytest.mark.parametrize("seed", range(2))
 def test_forces_are_the_gradient_and_the_tangent_their_derivative(model, seed):
     q = random_state(model, seed)
-    error = gradient_error(lambda q: model.energy(*split(model, q)), lambda q: forces(model, q), q)
+    error = gradient_error(
+        lambda q: model.energy(*split(model, q)), lambda q: forces(model, q), at=q
+    )
     assert error < 1e-9
-    assert tangent_error(lambda q: forces(model, q), lambda q: tangent(model, q), q, seed) < 1e-9
+    assert (
+        tangent_error(lambda q: forces(model, q), lambda q: tangent(model, q), at=q, seed=seed)
+        < 1e-9
+    )
     matrix = tangent(model, q)
     assert abs(matrix - matrix.T).max() < 1e-14 * abs(matrix).max()
 

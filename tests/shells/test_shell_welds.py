@@ -70,8 +70,8 @@ def test_energy_force_and_tangent():
     made = fd.shell(fd.welded(half_pipe(4)), STEEL, divisions=2)
     body, rng = made.body, np.random.default_rng(1)
     q = 1e-3 * rng.standard_normal(body.size)
-    assert checks.gradient_error(lambda z: body.energies(z).sum(), body.internal, q) < 1e-6
-    assert checks.tangent_error(body.internal, body.tangent, q) < 1e-6
+    assert checks.gradient_error(lambda z: body.energies(z).sum(), body.internal, at=q) < 1e-6
+    assert checks.tangent_error(body.internal, body.tangent, at=q) < 1e-6
 
 
 def test_a_curved_sheet_of_facets():

@@ -114,7 +114,7 @@ def test_tangents_with_plates_are_exact(pressed):
     u = problem.state(path.displacement.values[at], factor)
     assert len(u) == case.structure.nodes.size + 1  # the planes are one dof more
     error = tangent_error(
-        lambda v: problem.residual(v, factor), lambda v: problem.tangent(v, factor), u, size=1e-7
+        lambda v: problem.residual(v, factor), lambda v: problem.tangent(v, factor), at=u, size=1e-7
     )
     assert error < 1e-5  # of the differences: elements switch on and off within them
 

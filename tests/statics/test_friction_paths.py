@@ -146,7 +146,7 @@ def test_tangents_with_friction_are_exact(surface, size, slips):
     u = u + size * np.random.default_rng(1).normal(size=u.size)
     assert problem.slips(u) == slips
     error = tangent_error(
-        lambda v: problem.residual(v, 0.3), lambda v: problem.tangent(v, 0.3), u, size=1e-9
+        lambda v: problem.residual(v, 0.3), lambda v: problem.tangent(v, 0.3), at=u, size=1e-9
     )
     assert error < (1e-6 if surface == "plane" else 1e-5)  # of the differences
 

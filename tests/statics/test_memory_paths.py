@@ -126,7 +126,7 @@ def test_tangents_of_bodies_with_memory_are_exact(law, options):
     q0, q1 = 3e-3 * random.normal(size=(2, body.size))
     branches.start(q0)
     branches.own.elapsed[0] = 0.1
-    assert checks.tangent_error(whole.internal, whole.tangent, q1, size=1e-3) < 1e-7
+    assert checks.tangent_error(whole.internal, whole.tangent, at=q1, size=1e-3) < 1e-7
     assert np.abs(branches.own.moment).min() > 0.0
 
 

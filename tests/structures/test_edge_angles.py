@@ -112,19 +112,19 @@ def test_edges_of_a_square_give_way_to_the_moment_of_a_crease():
 def test_forces_and_tangent(law):
     s = miura(fold_law=law)
     body, q = s.body, displaced(s)
-    assert gradient_error(lambda v: body.energies(v).sum(), body.internal, q) < 1e-7
-    assert tangent_error(body.internal, body.tangent, q) < 1e-7
+    assert gradient_error(lambda v: body.energies(v).sum(), body.internal, at=q) < 1e-7
+    assert tangent_error(body.internal, body.tangent, at=q) < 1e-7
     # with edge angles in balance: derivatives of the least energy
     u = q[: s.nodes.size].reshape(-1, 3)
-    assert gradient_error(s.energy, s.internal_force, u) < 1e-6
-    assert tangent_error(s.internal_force, s.tangent, u) < 1e-6
+    assert gradient_error(s.energy, s.internal_force, at=u) < 1e-6
+    assert tangent_error(s.internal_force, s.tangent, at=u) < 1e-6
     assert np.abs(body.internal(body.dofs(u))[body.hidden]).max() < 1e-9
 
 
 def test_polygons_and_triangles():
     s = edged(fd.patterns.kresling(sides=5, radius=1.0, height=0.9, twist=30))
     q = displaced(s, size=0.01)
-    assert tangent_error(s.body.internal, s.body.tangent, q) < 1e-7
+    assert tangent_error(s.body.internal, s.body.tangent, at=q) < 1e-7
     assert len(s.body.hidden) == 4 * len(s.pattern.creases)  # angles, and gives at both ends
 
 

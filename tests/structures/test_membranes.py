@@ -165,8 +165,8 @@ def test_forces_and_tangents_are_derivatives_of_the_energy(options, pattern):
     body = structure.body
     shift = np.random.default_rng(1).standard_normal(structure.nodes.shape)
     q = body.dofs(0.02 * np.ptp(structure.nodes) * shift)
-    assert checks.gradient_error(lambda z: body.energies(z).sum(), body.internal, q) < 1e-7
-    assert checks.tangent_error(body.internal, body.tangent, q) < 1e-7
+    assert checks.gradient_error(lambda z: body.energies(z).sum(), body.internal, at=q) < 1e-7
+    assert checks.tangent_error(body.internal, body.tangent, at=q) < 1e-7
 
 
 def test_turned_as_a_whole_or_folded_along_diagonals_it_has_no_strain():

@@ -96,8 +96,10 @@ def test_energy_force_and_tangent(pattern):
     made, random = fd.discretize(fd.welded(pattern), STEEL), np.random.default_rng(2)
     for body, size in ((made.body, 1e-3), (made.condensed.body, 1e-4)):
         q = size * random.standard_normal(body.size)
-        assert checks.gradient_error(lambda z, b=body: b.energies(z).sum(), body.internal, q) < 1e-6
-        assert checks.tangent_error(body.internal, body.tangent, q) < 1e-5
+        assert (
+            checks.gradient_error(lambda z, b=body: b.energies(z).sum(), body.internal, at=q) < 1e-6
+        )
+        assert checks.tangent_error(body.internal, body.tangent, at=q) < 1e-5
     force = made.internal_force(q).ravel()
     np.testing.assert_allclose(body.internal(q), force, rtol=1e-7, atol=1e-6)
     body, rest = made.body, made.body.sheet.model.bars.rest

@@ -98,7 +98,9 @@ def page(kind, folder):
 
 
 def camera():
-    return Camera.looking_at((0.7, 0.5, 0.3), 4.0, 5e-3, (640, 480), turned=(10, 30, 5))
+    return Camera.looking_at(
+        (0.7, 0.5, 0.3), 4.0, metres_per_pixel=5e-3, size=(640, 480), turned=(10, 30, 5)
+    )
 
 
 def film():

@@ -52,7 +52,7 @@ class Rayleigh(Part):
 
     @classmethod
     def from_ratios(
-        cls, f1: float, z1: float, f2: float, z2: float, state: str = "rest"
+        cls, f1: float, z1: float, *, f2: float, z2: float, state: str = "rest"
     ) -> Rayleigh:
         """Damping that has the ratios z1 and z2 at the frequencies f1 and f2.
 
@@ -76,7 +76,7 @@ class Rayleigh(Part):
         Examples
         --------
         >>> import foldyn as fd
-        >>> damping = fd.Rayleigh.from_ratios(9.3, 0.135, 16.7, 0.09)
+        >>> damping = fd.Rayleigh.from_ratios(9.3, 0.135, f2=16.7, z2=0.09)
         >>> print(f"{damping.alpha:.1f} 1/s, {damping.beta:.1e} s")
         14.4 1/s, 4.1e-04 s
         """
@@ -322,4 +322,4 @@ class DampingSection(Rayleigh, Section):
             return Rayleigh(self.alpha, self.beta, self.state)
         (f1, z1), (f2, z2) = self.ratios
         with within(f".ratios = {show(self.ratios)}: "):
-            return Rayleigh.from_ratios(f1, z1, f2, z2, self.state)
+            return Rayleigh.from_ratios(f1, z1, f2=f2, z2=z2, state=self.state)

@@ -312,6 +312,7 @@ class Table(Formula):
     def from_csv(
         cls,
         path: str | os.PathLike[str],
+        *,
         time: str | None = None,
         value: str | None = None,
         unit: str = "-",

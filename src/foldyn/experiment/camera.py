@@ -112,6 +112,7 @@ class Camera:
         cls,
         target: ArrayLike,
         distance: float,
+        *,
         metres_per_pixel: float,
         size: tuple[int, int],
         up: str = "-x",

@@ -343,7 +343,7 @@ class Shell(Discretized):
         return self.forces(u, self.balanced(u))[0]
 
     def tangent(
-        self, u: ArrayLike, rotation: ArrayLike | None = None, floor: float = -np.inf
+        self, u: ArrayLike, rotation: ArrayLike | None = None, *, floor: float = -np.inf
     ) -> sparse.csr_array:
         """Second derivative (3n + r, 3n + r) of the energy: 3 node + axis, then the rotations."""
         u, x = self._state(u, rotation)

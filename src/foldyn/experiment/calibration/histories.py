@@ -200,6 +200,7 @@ class Spectrum(NodeValues):
         cls,
         history: TimeHistory,
         band: tuple[float, float],
+        *,
         detrend: str | None = "constant",
         taper: str | None = None,
     ) -> Spectrum:

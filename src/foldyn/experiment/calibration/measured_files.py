@@ -131,7 +131,7 @@ def spectrum(
     """Spectra of histories within a required band (Hz); other arguments as in `history`."""
     chosen = limits("band", band, "frequencies (Hz)")
     detrend = known.pop("detrend", "constant")
-    return Spectrum.of(history(file, **known), chosen, detrend, taper)
+    return Spectrum.of(history(file, **known), chosen, detrend=detrend, taper=taper)
 
 
 def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:

@@ -75,7 +75,7 @@ class Shot:
         middle = 0.5 * (rest.min(axis=0) + rest.max(axis=0))
         middle[2] = rest[:, 2].max()
         return experiment.Camera.looking_at(
-            middle, self.distance, self.metres_per_pixel, self.size,
+            middle, self.distance, metres_per_pixel=self.metres_per_pixel, size=self.size,
             k1=0.02, k2=-0.01, turned=(-1.5, 2.0, -0.8),
         )  # fmt: skip
 
