@@ -37,6 +37,7 @@ import numpy as np
 import foldyn as fd
 from foldyn.dynamics import METHODS
 from foldyn.errors import ComputationError, FoldynError
+from foldyn.structures import hinge_angles
 
 CLOSE = 1e-11  # relative difference that rounding may make
 SHORT, LONG = 1e-3, 5e-3  # s, steps of explicit and implicit methods
@@ -238,7 +239,7 @@ def sampled(case: fd.Case, start: fd.State | None, **options: Any) -> Any:
     s = case.structure
 
     def angle(u: np.ndarray, v: np.ndarray, t: float) -> np.ndarray:
-        return fd.structures.hinge_angles(s.nodes + u, s.folds)
+        return hinge_angles(s.nodes + u, s.folds)
 
     return fd.simulate(case, initial=start, sample={"angle": angle}, **options)
 

@@ -7,6 +7,7 @@ import runpy
 import shutil
 import subprocess
 import sys
+from importlib import import_module
 from itertools import product
 from pathlib import Path
 
@@ -87,10 +88,10 @@ def test_shipped_cases_are_in_the_package():
 )
 def test_every_registry_row_has_a_docs_row(page, registry):
     module, name = registry.split(".")
-    __import__(f"foldyn.{module}")
+    registry = getattr(import_module(f"foldyn.{module}"), name)
     text = (ROOT / "docs" / page).read_text("utf-8")
     rows = [line.split("|")[1] for line in text.splitlines() if line.startswith("| `")]
-    missing = [key for key in getattr(getattr(fd, module), name) if f"`{key}`" not in "".join(rows)]
+    missing = [key for key in registry if f"`{key}`" not in "".join(rows)]
     assert not missing, f"docs/{page} has no row for {missing}"
 
 

@@ -1,32 +1,18 @@
 # Public names and where they live; loaded when they are first used (facade.py)
 
 from foldyn import (
-    analyses as analyses,
-    attractors as attractors,
-    cases as cases,
     checks as checks,
-    designs as designs,
-    dynamics as dynamics,
     errors as errors,
     experiment as experiment,
-    exports as exports,
     formats as formats,
-    gradients as gradients,
     linear as linear,
-    live as live,
     materials as materials,
-    mechanics as mechanics,
     patterns as patterns,
-    periodic as periodic,
     plots as plots,
-    report as report,
     results as results,
-    shells as shells,
     signals as signals,
     statics as statics,
-    structures as structures,
     studies as studies,
-    sweeps as sweeps,
 )
 from foldyn.analyses import read_case as read_case
 from foldyn.attractors import (
@@ -126,7 +112,7 @@ from foldyn.results import (
     load as load,
     save as save,
 )
-from foldyn.shells import Shell as Shell, shell as shell
+from foldyn.shells import Shell as Shell, ShellOptions as ShellOptions, shell as shell
 from foldyn.statics import (
     Folding as Folding,
     fold as fold,
@@ -136,12 +122,13 @@ from foldyn.statics import (
 )
 from foldyn.structures import (
     Laminate as Laminate,
+    ModelOptions as ModelOptions,
     PanelSheet as PanelSheet,
     Sheet as Sheet,
     Structure as Structure,
     discretize as discretize,
 )
 
-from foldyn.sweeps import sweep as sweep
+from foldyn.sweeps import Measure as Measure, sweep as sweep
 
 __version__: str

@@ -81,7 +81,7 @@ def test_the_keys_of_a_shell(filed):
 
 def test_defaults_of_a_shell(filed):
     case_file = read_case(filed(f'model.kind = "shell"; {MOTION}'))
-    assert case_file.case().structure.options == fd.shells.ShellOptions()
+    assert case_file.case().structure.options == fd.ShellOptions()
     assert case_file.masses == ["lumped"]
     assert case_file.analysis.arguments["method"] == "auto"
     plain = read_case(filed(MOTION))

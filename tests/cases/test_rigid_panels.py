@@ -168,14 +168,14 @@ def test_rigid_panels_do_not_shorten_the_step() -> None:
     steps = []
     for rigid in (None, "all"):
         s = fd.discretize(pattern, sheet, rigid=rigid, preset="herkal")
-        steps.append(fd.dynamics.critical_step(fd.Case(s, [fd.Fix([0])])))
+        steps.append(fd.critical_step(fd.Case(s, [fd.Fix([0])])))
     assert 1.1 < steps[1] / steps[0] < 1.6
 
 
 def test_a_shell_of_rigid_panels_alone_takes_explicit_methods() -> None:
     s, supports = folding_cell("shell")
     assert (s.rotations, s.massless) == (0, "")
-    assert fd.dynamics.critical_step(fd.Case(s, supports)) > 0.0
+    assert fd.critical_step(fd.Case(s, supports)) > 0.0
     some, whole = (folding_cell("shell", rigid=rigid)[0] for rigid in ([0, 1], None))
     assert 0 < some.rotations < whole.rotations
 

@@ -55,7 +55,7 @@ def test_a_total_force_is_the_sum_of_its_parts(make) -> None:
 @pytest.mark.parametrize("make", MODELS)
 def test_vertices_share_by_the_area_that_belongs_to_them_whatever_the_model(make) -> None:
     s = make()
-    row = fd.cases.select(MIURA, "xmax")
+    row = fd.patterns.select(MIURA, "xmax")
     found = forces(s, fd.TotalForce((0, 0, 4.0), nodes="xmax"))[:, 2]
     # of panels that are all alike, the end vertices touch one and the middle one touches two
     np.testing.assert_allclose(found[row], [1.0, 2.0, 1.0], rtol=1e-12)

@@ -11,6 +11,7 @@ from processes import ended, start
 import foldyn as fd
 from case_texts import changed
 from foldyn.cli.main import main
+from foldyn.dynamics import prepare
 from foldyn.structures import MASS_RULES
 from foldyn.studies import find_case, shipped_cases
 
@@ -116,7 +117,7 @@ def test_the_shipped_cases_are_what_they_say(workplace) -> None:
         ratios.append(sheet.length_scale_ratio)
         forces.append([(load.nodes, load.vector) for load in found.case().loads])
         for rule in found.masses:
-            fd.dynamics.prepare(found.case(rule), **found.analysis.arguments)
+            prepare(found.case(rule), **found.analysis.arguments)
     # design, section 7 (the paper's table of cases) and section 5 (directions: our assumptions)
     assert ratios == [1.0, 1.0, 1.0, 5.0]
     assert forces[1] == forces[3] == [((7,), (0.01, 0.0, 0.0))]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from foldyn.dynamics import system
 from foldyn.dynamics.audit import Rounding
 from foldyn.errors import ComputationError, FoldynWarning
 
@@ -52,7 +53,7 @@ def test_displacements_that_rounding_hides_from_the_hinges(load, density, method
 
 def rounding_of(size):
     case = fd.Case(fold(0.01 * size, 1.0, size), SUPPORTS)
-    return Rounding(fd.dynamics.system.pack(case, 1.0).body)
+    return Rounding(system.pack(case, 1.0).body)
 
 
 @pytest.mark.parametrize("size", [1e-6, 1e3])

@@ -98,7 +98,7 @@ def test_some_nodes_and_samples(tmp_path):
 
 def test_nodes_by_place(tmp_path):
     where = fd.case_of(motion()).structure.pattern
-    chosen = fd.cases.select(where, "xmax")
+    chosen = fd.patterns.select(where, "xmax")
     frame = table(motion(), tmp_path, nodes="xmax", fields=["velocity"])
     assert frame.node.unique().tolist() == chosen.tolist()
     assert table(motion(), tmp_path, nodes="4 1").node.tolist()[:2] == [4, 1]

@@ -45,7 +45,7 @@ READERS = {
 OTHERS = {
     "percent": lambda n: fd.Actuate("all", fraction=f"{n}%"),
     "measure": lambda n: asked(f"frequency[{n}]", MEASURES),
-    "selection": lambda n: fd.cases.select([[0, 0, 0], [9, 9, 9]], f"x<{n}"),
+    "selection": lambda n: fd.patterns.select([[0, 0, 0], [9, 9, 9]], f"x<{n}"),
 }
 
 

@@ -150,7 +150,7 @@ def test_rigid_panels_are_those_of_n5b8():
     u = displaced(own, size=0.1)
     force = own.body.internal(u)
     assert own.condensed.body.internal(u) == pytest.approx(force, abs=1e-12 * np.abs(force).max())
-    assert np.isfinite(fd.dynamics.critical_step(fd.Case(own), "rk4"))
+    assert np.isfinite(fd.critical_step(fd.Case(own), "rk4"))
 
 
 def test_modes_beside_the_shell():

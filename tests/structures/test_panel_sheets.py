@@ -13,6 +13,7 @@ from case_texts import MIURA_TEXT
 from foldyn.analyses.provenance import provenance
 from foldyn.errors import InputError
 from foldyn.plots.scene import Sheet3D
+from foldyn.structures import MASS_RULES
 
 E, NU, T, RHO = 2e9, 0.3, 1e-3, 1200.0
 SHEET = fd.Sheet(E, NU, T, RHO, length_scale_ratio=2.0)
@@ -86,9 +87,9 @@ def test_a_crease_between_different_panels_is_two_springs_in_series():
     assert both == pytest.approx(1.0 / soft, rel=1e-13)
 
 
-@pytest.mark.parametrize("mass", [*fd.structures.MASS_RULES, "lumped", "shell"])
+@pytest.mark.parametrize("mass", [*MASS_RULES, "lumped", "shell"])
 def test_mass_of_each_panel_by_every_rule(mass):
-    if mass in fd.structures.MASS_RULES:
+    if mass in MASS_RULES:
         s = fd.discretize(PAIR, MIXED, mass=mass)
     else:
         rule = "consistent" if mass == "shell" else mass

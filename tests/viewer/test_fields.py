@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import foldyn as fd
+from foldyn.structures import hinge_angles
 from foldyn.viewer.states import fields
 
 SHEET = fd.Sheet(1e9, 0.3, 1e-3, density=700.0)
@@ -110,7 +111,7 @@ def test_a_crease_bears_the_moment_of_its_flap_and_turns_by_it_alone(model, clam
     turn = np.degrees(force * a / stiffness)
     assert found["turn"].values[-1, 0] == pytest.approx(-turn, rel=4e-3)
     if model != "herkal":  # whose creases are as stiff as they are with their panels
-        dihedral = fd.structures.hinge_angles(s.nodes + path["displacement"].values[-1], s.folds)
+        dihedral = hinge_angles(s.nodes + path["displacement"].values[-1], s.folds)
         assert abs(np.degrees(dihedral[0] - np.pi)) > 1.02 * turn
 
 

@@ -76,7 +76,7 @@ def simulate(
     duration : float
         Simulated time (s). The last step is the last that does not go beyond it.
     method : str, default "auto"
-        Integrator, a name of `foldyn.dynamics.METHODS`. "auto" picks the one expected to be
+        Integrator, one of those that `foldyn info` lists. "auto" picks the one expected to be
         fastest, and switches to another if its energies do not balance; the documentation has a
         page on integrators.
     dt : float, optional

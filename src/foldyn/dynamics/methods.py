@@ -290,7 +290,7 @@ def critical_step(case: Case, method: str = "rk4", *, state: State | None = None
     ----------
     case : Case
     method : str
-        One of `foldyn.dynamics.METHODS`; inf for an implicit one, whose step only accuracy limits.
+        Integrator, as of `simulate`; inf for an implicit one, whose step only accuracy limits.
     state : State, optional
         About which the stiffness is taken; rest by default.
 

@@ -121,7 +121,7 @@ def export(
     path : path-like
         The file to make or to replace; its folder must exist.
     format : str, optional
-        Name of a format, one of `foldyn.exports.EXPORTS`; by default the path's suffix chooses it.
+        Name of a format; by default the path's suffix chooses it.
     **options
         Options of the format; None selects its default.
 

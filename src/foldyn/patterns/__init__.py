@@ -21,6 +21,7 @@ from foldyn.patterns.generators.waterbomb import waterbomb
 from foldyn.patterns.generators.yoshimura import yoshimura
 from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.screw import Screw
+from foldyn.patterns.selection import select
 from foldyn.patterns.thick import thicken
 
 GENERATORS: dict[str, Callable[..., Pattern]] = {
@@ -59,6 +60,7 @@ __all__ = [
     "miura",
     "miura_tube",
     "resch",
+    "select",
     "simple_fold",
     "square_twist",
     "thicken",

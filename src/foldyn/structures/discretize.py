@@ -67,7 +67,7 @@ def discretize(
         way at their edges (see `foldyn.structures.edge_angles`); it takes calibration = "plate",
         linear bends and implicit methods of motion.
     mass : str
-        Mass rule, one of `foldyn.structures.MASS_RULES`.
+        Mass rule, as "consistent"; the page on mass rules has all.
     bar_law : {"ogden", "linear"} or BarLaw
         Law of bars.
     fold_law, bend_law : {"linear", "superlinear", "enhanced", "plate_superlinear"} or HingeLaw
@@ -101,7 +101,7 @@ def discretize(
         and for supported sheets (see `foldyn.structures.membranes`). "panel" needs `bar_law`
         "linear"; another bar law, without a given membrane, implies "bars".
     preset : {"plate", "n5b8e", "herkal", "merlin2"}, optional
-        Model that supplies options that are not given, one of `foldyn.structures.PRESETS`. The
+        Model that supplies options that are not given. The
         default is "plate"; "n5b8e" if its scheme is given or the pattern has welds; and "herkal",
         the paper's, if a calibration other than "plate" is given, or `bend_law="superlinear"` and
         no calibration.

@@ -83,7 +83,7 @@ def sweep(
         ``"1e-3:1:7:log"``, and with `samples` ``"1:5"`` or ``"1e-3:1:log"``. Replaces the whole
         [sweep] table except its measures.
     measures : sequence or mapping, optional
-        Names of `foldyn.sweeps.MEASURES` with their arguments, ``"peak_frequency[8]"``; functions
+        Names of measures with their arguments, ``"peak_frequency[8]"``; functions
         of a result and its case, which give a number or an array; `Measure` objects. A mapping
         names its functions.
     samples : int, optional
