@@ -93,7 +93,7 @@ def main() -> None:
         for cells in chosen.cells:
             result, case = moving(tuple(map(int, cells.split("x"))))
             part = stage({"motion": result}, {"motion": case}, cells, [0])
-            path = write_report(Path(folder) / f"{cells}.html", cells, [part])
+            path = write_report([part], Path(folder) / f"{cells}.html", title=cells)
             for asked in ("webgl", "plain"):
                 tab = browser.new_page(viewport={"width": 1400, "height": 900})
                 tab.goto(f"file://{path}?{asked}")

@@ -50,14 +50,14 @@ def test_a_link_stays_one(tmp_path) -> None:
         (tmp_path / "link.txt").symlink_to("true.txt")
     except OSError:
         pytest.skip("no links here")
-    write_text(tmp_path / "link.txt", "new")
+    write_text("new", tmp_path / "link.txt")
     assert (tmp_path / "link.txt").is_symlink()
     assert (tmp_path / "true.txt").read_text() == "new"
 
 
 def test_names_of_any_length_and_letters_that_are_none(tmp_path) -> None:
     file = tmp_path / ("折" * 80 + ".txt")
-    write_text(file, "a\udcffb")
+    write_text("a\udcffb", file)
     assert file.read_text(encoding="utf-8") == "a\\udcffb"
 
 

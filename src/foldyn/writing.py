@@ -37,18 +37,18 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
             part.unlink(missing_ok=True)
 
 
-def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
+def write_bytes(content: bytes, path: str | os.PathLike[str]) -> None:
     """Write a file atomically."""
     with whole(path) as part:
         part.write_bytes(content)
 
 
-def write_text(path: str | os.PathLike[str], text: str) -> None:
+def write_text(text: str, path: str | os.PathLike[str]) -> None:
     r"""Write a UTF-8 text file atomically.
 
     Characters that UTF-8 cannot encode, such as raw bytes of file names, are escaped, "\udcff".
     """
-    write_bytes(path, text.encode("utf-8", "backslashreplace"))
+    write_bytes(text.encode("utf-8", "backslashreplace"), path)
 
 
 def plain(value: Any) -> Any:
@@ -62,9 +62,9 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def write_json(path: str | os.PathLike[str], value: Any) -> None:
+def write_json(value: Any, path: str | os.PathLike[str]) -> None:
     """Write a value as a JSON file; see `plain`."""
-    write_text(path, json.dumps(plain(value), indent=2, allow_nan=False) + "\n")
+    write_text(json.dumps(plain(value), indent=2, allow_nan=False) + "\n", path)
 
 
 @contextmanager

@@ -65,7 +65,7 @@ def _gif(width=2, height=2):
 
 
 def _write(tmp_path, *sections, title="Report"):
-    path = write_report(tmp_path / "report.html", title, sections)
+    path = write_report(sections, tmp_path / "report.html", title=title)
     return _Page(path.read_text(encoding="utf-8"))
 
 
@@ -111,7 +111,9 @@ def test_figures_are_drawn_as_png(tmp_path):
 
 
 def test_page_refers_to_nothing_outside(tmp_path):
-    path = write_report(tmp_path / "r.html", "R", [Heading("A"), Heading("B"), Picture(_png())])
+    path = write_report(
+        [Heading("A"), Heading("B"), Picture(_png())], tmp_path / "r.html", title="R"
+    )
     text = path.read_text(encoding="utf-8")
     page = _Page(text)
     assert all(link.startswith("#") for link in page.links)
@@ -154,7 +156,7 @@ def test_a_column_of_numbers_holds_nothing_but_the_numbers():
 
 
 def test_points_of_a_column_stand_below_each_other(tmp_path, browser):
-    write_report(tmp_path / "page.html", "Numbers", [COLUMNS])
+    write_report([COLUMNS], tmp_path / "page.html", title="Numbers")
     tab = browser.new_page()
     tab.goto((tmp_path / "page.html").as_uri())
     copied = tab.evaluate(
@@ -223,13 +225,13 @@ def test_empty_lines_part_paragraphs(tmp_path):
 )
 def test_wrong_sections_write_nothing(tmp_path, section, words):
     with pytest.raises(InputError, match=words):
-        write_report(tmp_path / "r.html", "R", [section])
+        write_report([section], tmp_path / "r.html", title="R")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_wrong_arguments(tmp_path):
     with pytest.raises(InputError, match="no directory"):
-        write_report(tmp_path / "missing" / "r.html", "R", [])
+        write_report([], tmp_path / "missing" / "r.html", title="R")
     with pytest.raises(InputError, match="level"):
         Heading("x", level=1)
     with pytest.raises(InputError, match=r"rows\[1\]: 1 cells under 2"):

@@ -148,7 +148,7 @@ def test_opensees_computes_what_is_stored(tmp_path):
     found = independent.frequencies(case, 3)
     np.testing.assert_allclose(found[:2], [one.opensees for one in stored], rtol=1e-5)
     assert [one.case for one in stored] == [case.name] * 2
-    independent.write(tmp_path / "again.csv", stored)
+    independent.write(stored, tmp_path / "again.csv")
     assert independent.read_stored(tmp_path / "again.csv") == stored
 
 
@@ -160,7 +160,7 @@ def test_tables_of_the_page_are_those_of_the_results():
 
 def test_tables_survive_writing_and_reading(tmp_path):
     results = read(RESULTS / "drawn.csv")
-    write(tmp_path / "again.csv", results)
+    write(results, tmp_path / "again.csv")
     assert (tmp_path / "again.csv").read_text("utf-8") == (RESULTS / "drawn.csv").read_text("utf-8")
 
 

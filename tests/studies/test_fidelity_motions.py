@@ -182,7 +182,7 @@ def test_sizes():
 
 
 def test_runs_survive_writing_and_reading(tmp_path):
-    write(tmp_path / "again.csv", read())
+    write(read(), tmp_path / "again.csv")
     assert (tmp_path / "again.csv").read_text("utf-8") == STORED.read_text("utf-8")
 
 

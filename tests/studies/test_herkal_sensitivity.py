@@ -175,7 +175,7 @@ def test_tables_are_read_as_they_were_written(tmp_path):
     assert variations.read(tmp_path) is None
     frequency = {"case": "case1", "model": "a", "mode": 1.0, "frequency": math.nan, "mac": 0.5}
     given = Variations("shells, of 2", [row("case1", (1.5, 2.25, 1e-3))], [frequency])
-    variations.write(tmp_path, given)
+    variations.write(given, tmp_path)
     found = variations.read(tmp_path)
     assert found.about == given.about and found.motions == given.motions
     assert math.isnan(found.frequencies[0].pop("frequency"))
@@ -221,7 +221,7 @@ def test_stored_tables_know_what_cannot_differ(stored):
 
 
 def test_page_of_the_sensitivity(stored, tmp_path):
-    page = report.write_sensitivity(tmp_path, stored).read_text("utf-8")
+    page = report.write_sensitivity(stored, tmp_path).read_text("utf-8")
     assert page.count("<img") == 1 and stored.about in page
     for text in ("load on every node of the edge", "merlin2", "other corners", "best of 56"):
         assert text in page

@@ -244,7 +244,7 @@ def test_a_missing_package_is_told(monkeypatch):
 # ------------------------------------------------------------------ files
 def test_results_come_back_as_they_were_written(tmp_path):
     still = stored("case1")
-    assert write_still(tmp_path, still).name == "case1-d32.json"
+    assert write_still(still, tmp_path).name == "case1-d32.json"
     again = read_still("case1", 32, tmp_path)
     for name in ("node", "load_factor", "displacement", "frequency"):
         np.testing.assert_array_equal(getattr(again, name), getattr(still, name))
@@ -253,7 +253,7 @@ def test_results_come_back_as_they_were_written(tmp_path):
         np.array([4]), np.array([0.0, 0.01]), np.full((2, 1, 3), 0.1),
         {"case": "case1", "divisions": 8, "dt": 0.0025},
     )  # fmt: skip
-    write_motion(tmp_path, motion)
+    write_motion(motion, tmp_path)
     assert stored_motions("case1", tmp_path) == [(8, 0.0025)]
     found = read_motion("case1", 8, 0.0025, tmp_path)
     np.testing.assert_allclose(found.displacement, motion.displacement, rtol=1e-7)

@@ -94,7 +94,7 @@ def page(kind, folder):
     shown = results("motion" if kind == "film" else kind)
     cases = {name: fd.case_of(result) for name, result in shown.items()}
     part = stage(shown, cases, f"A {kind}", [0], film() if kind == "film" else None)
-    return write_report(folder / f"{kind}.html", f"A {kind}", [part])
+    return write_report([part], folder / f"{kind}.html", title=f"A {kind}")
 
 
 def camera():

@@ -44,10 +44,10 @@ def main(arguments: list[str] | None = None) -> int:
                 first.append(modes_first(case, true))
             count = len(next(iter(below[-1].rows.values())))
             print(f"{case.name}: {count} modes", file=sys.stderr, flush=True)
-        write(chosen.out / f"{name}.csv", below)
+        write(below, chosen.out / f"{name}.csv")
         print(f"\n{name}: {len(cases)} cases\n\n{table(below)}\n")
         if first:
-            write(chosen.out / f"{name}_internal.csv", first)
+            write(first, chosen.out / f"{name}_internal.csv")
             print(f"{name}, internal amplitudes\n\n{first_table(first)}\n")
     print(statics_table(), large_table(), sep="\n\n")
     return 0

@@ -139,7 +139,7 @@ def modes_below(case: FidelityCase, true: Reference) -> Modes:
     return Modes(case.name, {model: compare(case, true, model) for model in MODELS})
 
 
-def write(path: Path, results: Sequence[Modes]) -> None:
+def write(results: Sequence[Modes], path: Path) -> None:
     """Write a table: case, mode, frequency (Hz), frequency relative to the plate's, errors, MAC."""
     heads = [f"{what}: {model}" for model in results[0].rows for what in ("error", "mac")]
     with path.open("w", encoding="utf-8", newline="") as file:

@@ -70,7 +70,7 @@ def computed() -> list[Independent]:
     return found
 
 
-def write(path: Path, found: list[Independent]) -> None:
+def write(found: list[Independent], path: Path) -> None:
     """Write a table."""
     with path.open("w", encoding="utf-8", newline="") as file:
         out = csv.writer(file, lineterminator="\n")
@@ -97,7 +97,7 @@ def errors(found: list[Independent]) -> dict[str, NDArray]:
 
 if __name__ == "__main__":
     results = computed()
-    write(STORED, results)
+    write(results, STORED)
     for what, error in errors(results).items():
         median, ninetieth = np.percentile(np.abs(error), [50, 90], method="higher")
         print(

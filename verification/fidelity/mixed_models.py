@@ -118,7 +118,7 @@ def main(arguments: list[str] | None = None) -> int:
     for name, cases in case_sets().items():
         known = references(name, given.out)
         print(f"{name}: {len(known)} of {len(cases)} cases are stored", flush=True)
-        write(given.out / f"{name}.csv", [compared(case, true) for case, true in known])
+        write([compared(case, true) for case, true in known], given.out / f"{name}.csv")
         for case, true in known:
             if not certain(case, true):
                 print(f"known to {100 * np.max(true.doubt):.1f} % only: {case.name}", flush=True)

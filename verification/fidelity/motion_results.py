@@ -74,7 +74,7 @@ class Beside(NamedTuple):
     mac: float
 
 
-def write(path: Path, found: Iterable[Run]) -> None:
+def write(found: Iterable[Run], path: Path) -> None:
     """Write a table."""
     with path.open("w", encoding="utf-8", newline="") as file:
         out = csv.writer(file, lineterminator="\n")

@@ -451,7 +451,7 @@ def main(arguments: list[str] | None = None) -> int:
     for started in every(chosen.cases, chosen.studies):
         print(f"{started.case}: {started.start}", file=sys.stderr, flush=True)
         found += runs(started)
-        write(chosen.out / STORED.name, found)
+        write(found, chosen.out / STORED.name)
     print(summaries(found))
     return 0
 

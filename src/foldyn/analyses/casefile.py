@@ -163,7 +163,7 @@ class Analysis(ABC):
             *filled(self.sections(case_file, results, Album(folder, figures))),
             *provenance(case_file, results, call),
         ]
-        return write_report(folder / "report.html", case_file.heading, sections)
+        return write_report(sections, folder / "report.html", title=case_file.heading)
 
     def check(self, computations: Sequence[Compute], figures: bool) -> None:  # noqa: B027
         """Refuse computations of several mass rules that cannot run, or be drawn, together."""

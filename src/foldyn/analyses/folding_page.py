@@ -21,15 +21,15 @@ MOST_ROWS = 12
 
 
 def write_folding_page(
-    path: str | PathLike[str], folding: Folding, title: str, call: Call | None = None
+    folding: Folding, path: str | PathLike[str], title: str, call: Call | None = None
 ) -> Path:
     """Write the page of a folding.
 
     Parameters
     ----------
+    folding : Folding
     path : path-like
         File to write, in an existing directory.
-    folding : Folding
     title : str
     call : Call, optional
         How it was asked for, and its cost.
@@ -50,7 +50,7 @@ def write_folding_page(
         Heading("How it was computed"),
         _computed(folding, call or Call()),
     ]
-    return write_report(path, title, sections)
+    return write_report(sections, path, title=title)
 
 
 def _states(folding: Folding) -> Section:

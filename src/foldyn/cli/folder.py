@@ -86,7 +86,7 @@ def restore_stamp(folder: Path, content: bytes | None) -> None:
     if content is None:
         (folder / STAMP).unlink(missing_ok=True)
     else:
-        write_bytes(folder / STAMP, content)
+        write_bytes(content, folder / STAMP)
 
 
 def write_stamp(
@@ -106,7 +106,7 @@ def write_stamp(
     """
     stamp = {"foldyn_version": __version__, **asdict(owner), "state": state}
     stamp |= {"results": list(results), "outdated": list(outdated)}
-    write_text(folder / STAMP, json.dumps(stamp, indent=1) + "\n")
+    write_text(json.dumps(stamp, indent=1) + "\n", folder / STAMP)
 
 
 def named_owner(stamp: dict[str, Any], folder: Path) -> str:

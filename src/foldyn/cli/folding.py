@@ -187,7 +187,7 @@ def _drawn(folding: Folding, out: Path, name: str, given: Namespace, call: Call)
     from foldyn import plots
     from foldyn.analyses.folding_page import write_folding_page
 
-    page = write_folding_page(out.with_suffix(".html"), folding, f"{name}, folded", call)
+    page = write_folding_page(folding, out.with_suffix(".html"), f"{name}, folded", call)
     films = []
     if given.film:
         films.append(plots.animate_folding(folding, out.with_suffix(f".{given.film}")))

@@ -151,10 +151,10 @@ def _vary(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence[
     compute = partial(pool.run, tasks, inside)
     ended = _computed(compute, len(tasks), results, report.SENSITIVITY, say, given.quiet)
     found = sensitivity.variations(inside, CASES, numerics)
-    variations.write(inside, found)
+    variations.write(found, inside)
     if not found.motions:
         return inside, ended
-    return report.write_sensitivity(results.folder, found), ended
+    return report.write_sensitivity(found, results.folder), ended
 
 
 def _computed(

@@ -79,7 +79,9 @@ def write_design(
     sections += [Heading("How it was computed"), inputs_table(_rows(found, plan, case_file, call))]
     if text := (case_file.text or case_file.path.read_text("utf-8")):
         sections.append(Listing(f"The case file {case_file.path.name}", text))
-    return write_report(Path(folder) / "report.html", f"{case_file.heading}: a design", sections)
+    return write_report(
+        sections, Path(folder) / "report.html", title=f"{case_file.heading}: a design"
+    )
 
 
 def _stages(

@@ -119,7 +119,7 @@ class Design:
         if not path.parent.is_dir():
             raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
         if path.suffix == ".json":
-            write_json(path, self.summary())
+            write_json(self.summary(), path)
         elif path.suffix == ".nc":
             netcdf.write(self.history, path)
         elif path.suffix == ".csv":
@@ -128,7 +128,7 @@ class Design:
             table = csv.writer(text, lineterminator="\n")
             table.writerow(columns)
             table.writerows(zip(*columns.values(), strict=True))
-            write_text(path, text.getvalue())
+            write_text(text.getvalue(), path)
         else:
             raise InputError(
                 f"{path}: a design is written as .json, .nc or .csv; choose one of them"

@@ -351,4 +351,4 @@ def write_case(case_file: CaseFile, parameters: Mapping[str, Any], path: Path) -
     document = replaced(read_document(case_file.path), plain)
     way = os.path.relpath(case_file.path.parent.resolve(), path.parent.resolve())
     text = f"# Designed by Foldyn {foldyn.__version__} from {case_file.path.name}.\n"
-    write_text(path, text + tomli_w.dumps(files_moved(document, way)))
+    write_text(text + tomli_w.dumps(files_moved(document, way)), path)

@@ -53,7 +53,7 @@ def write(
     count = 6 if modes is None else whole("modes", modes, least=1)
     kind = ELEMENTS[0] if element is None else choice("element", element, ELEMENTS)
     shell = creased_shell(case, divisions)
-    write_text(path, "\n".join(chain(_deck(shell, count, kind), [""])))
+    write_text("\n".join(chain(_deck(shell, count, kind), [""])), path)
     return [path]
 
 

@@ -160,7 +160,7 @@ def write(
         if times[-1] > 0.0:
             times *= (seconds or (times[-1] if timed else PATH_SECONDS)) / times[-1]
         animations = [Animation("motion" if timed else "path", times, np.eye(len(times)))]
-    write_bytes(path, _content(case, shapes, animations).glb())
+    write_bytes(_content(case, shapes, animations).glb(), path)
     return [path]
 
 

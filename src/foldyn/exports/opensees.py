@@ -127,7 +127,7 @@ def write(
     count = 6 if modes is None else whole("modes", modes, least=1)
     shell = creased_shell(case, divisions)
     lines = _script(shell, len(case.structure.pattern.vertices), count)
-    write_text(path, "\n".join(chain(lines, [""])))
+    write_text("\n".join(chain(lines, [""])), path)
     return [path]
 
 

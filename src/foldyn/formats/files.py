@@ -252,7 +252,7 @@ def write_pattern(
     with within("", file):
         content = fmt.write(pattern, *((frames,) if fmt.frames else ())).encode()
     try:
-        write_bytes(file, content)
+        write_bytes(content, file)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(

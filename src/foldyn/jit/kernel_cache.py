@@ -111,7 +111,7 @@ class Kept(_Cache):
         try:
             content = dumps(data._reduce())
             path.parent.mkdir(parents=True, exist_ok=True)
-            write_bytes(path, hashlib.sha256(content).digest() + content)
+            write_bytes(hashlib.sha256(content).digest() + content, path)
             self._remove_old()
             remove_leftovers(path.parent)
         except OSError as error:

@@ -67,7 +67,7 @@ class View:
         InputError
             There is no such folder.
         """
-        return write_report(path, self.title, [self.stage])
+        return write_report([self.stage], path, title=self.title)
 
     def _repr_html_(self) -> str:
         """The page in a frame that can neither access the notebook nor load anything."""

@@ -91,19 +91,19 @@ body:has(main > .foldyn) :is(figure, .plots) { max-width: 60rem; }
 
 
 def write_report(
-    path: str | PathLike[str], title: str, sections: Iterable[Section | Stage]
+    sections: Iterable[Section | Stage], path: str | PathLike[str], *, title: str
 ) -> Path:
     """Write a report as one HTML page, pictures inside.
 
     Parameters
     ----------
+    sections : iterable of Heading, Text, Table, Listing, Picture, Charts or Stage
+        In the order of the page. With two or more headings of level 2 the page begins with a list
+        of them, or with its Stages if they come first.
     path : path-like
         File to write, in an existing directory.
     title : str
         Title of the page.
-    sections : iterable of Heading, Text, Table, Listing, Picture, Charts or Stage
-        In the order of the page. With two or more headings of level 2 the page begins with a list
-        of them, or with its Stages if they come first.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def write_report(
     path = Path(path)
     if not path.parent.is_dir():
         raise InputError(f"path: there is no directory {path.parent}; make it first")
-    write_text(path, report_html(title, sections))
+    write_text(report_html(title, sections), path)
     return path
 
 

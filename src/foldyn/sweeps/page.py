@@ -67,7 +67,7 @@ def write_sweep(
     sections += [Heading("How it was computed"), inputs_table(_rows(sweep, case_file, call))]
     sections.append(Listing("The case file, with its sweep", str(sweep["case_file"].values)))
     title = f"{case_file.heading}: a sweep"
-    return write_report(Path(folder) / "report.html", title, sections)
+    return write_report(sections, Path(folder) / "report.html", title=title)
 
 
 def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]:

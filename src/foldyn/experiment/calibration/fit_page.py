@@ -93,7 +93,7 @@ def write_fit(
         elif isinstance(one, ModeShapes):
             sections.append(shapes_table(one, *model))
     sections += [Heading("The search"), _searches(fit), *_provenance(fit, runs, call or Call())]
-    return write_report(folder / "report.html", title, sections)
+    return write_report(sections, folder / "report.html", title=title)
 
 
 def _runs(fit: Fit) -> list[_Run]:

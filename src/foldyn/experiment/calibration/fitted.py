@@ -357,7 +357,7 @@ class Fit:
         path = Path(path)
         moved = os.path.relpath(self.problem.path.parent.resolve(), path.parent.resolve())
         text = f"# Fitted by Foldyn {foldyn.__version__} from {self.problem.path.name}.\n"
-        write_text(path, text + tomli_w.dumps(files_moved(self.document(), moved)))
+        write_text(text + tomli_w.dumps(files_moved(self.document(), moved)), path)
 
     def summary(self) -> dict[str, Any]:
         """All numbers except measured and predicted values, as JSON types (nan is null)."""
@@ -416,7 +416,7 @@ class Fit:
         if not path.parent.is_dir():
             raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
         if path.suffix == ".json":
-            write_json(path, self.summary())
+            write_json(self.summary(), path)
         elif path.suffix == ".nc":
             netcdf.write(self.dataset(), path)
         else:

@@ -78,7 +78,7 @@ def write_tracks_page(
     rows = [("seen", ", ".join(map(str, footage.files))), *footage.settings.items()]
     sections += [Heading("How it was computed"), inputs_table([*rows, *_found(tracks)])]
     sections.append(inputs_table(cost_rows(__version__, call or Call())))
-    return write_report(path.with_suffix(".html"), title, sections)
+    return write_report(sections, path.with_suffix(".html"), title=title)
 
 
 def spread(count: int, encoded: Callable[[int], bytes]) -> dict[int, bytes]:

@@ -166,7 +166,7 @@ def released_case(
         "output": {"nodes": [WATCHED], "axis": "x", "interval": step},
     }
     path = folder / "released.toml"
-    write_text(path, tomli_w.dumps(document))
+    write_text(tomli_w.dumps(document), path)
     return path
 
 

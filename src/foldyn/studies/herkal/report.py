@@ -66,14 +66,14 @@ def write(study: Study, call: Call | None = None) -> Path:
     if study.data is not None:
         sections += specimen_page.sections(study.folder / RESULTS, study.parts[1], album)
     sections += [Heading("How it was computed"), Text(_how(study)), *inputs_of(study, call)]
-    return write_report(study.folder / "report.html", TITLE, sections)
+    return write_report(sections, study.folder / "report.html", title=TITLE)
 
 
-def write_sensitivity(folder: Path, varied: Variations) -> Path:
+def write_sensitivity(varied: Variations, folder: Path) -> Path:
     """Write sensitivity.html, the page of the sensitivity only; return its path."""
     page = folder / "sensitivity.html"
     sections = sensitivity_page.sections(varied, Album(folder), tolerance())
-    return write_report(page, f"{TITLE}: sensitivity", sections)
+    return write_report(sections, page, title=f"{TITLE}: sensitivity")
 
 
 def _opening(study: Study) -> str:

@@ -69,7 +69,7 @@ def _read(file: Path) -> tuple[str, list[dict[str, Any]]]:
 
 def _write(file: Path, stamp: str, rows: list[dict[str, Any]]) -> None:
     kept = {"settings": json.loads(stamp), "rows": rows, "rows_sha256": _digest(rows)}
-    write_text(file, json.dumps(kept, indent=1) + "\n")
+    write_text(json.dumps(kept, indent=1) + "\n", file)
 
 
 KEPT: Store[list[dict[str, Any]]] = Store(_read, _write)

@@ -68,7 +68,7 @@ class Variations:
         return found
 
 
-def write(folder: Path, variations: Variations) -> None:
+def write(variations: Variations, folder: Path) -> None:
     """Write the tables into a folder; their first line records how they were computed."""
     for name, rows in ((METRIC, variations.motions), (FREQUENCIES, variations.frequencies)):
         with whole(folder / name) as part, part.open("w", encoding="utf-8", newline="") as file:

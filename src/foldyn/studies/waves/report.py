@@ -42,7 +42,7 @@ def write(study: Study) -> Path:
         if states is not None:
             found += _sheet(album, kind, states)
     found += [Heading("What was computed"), _inputs(study)]
-    return write_report(study.folder / "report.html", TITLE, found)
+    return write_report(found, study.folder / "report.html", title=TITLE)
 
 
 def _opening(study: Study) -> str:

@@ -59,7 +59,7 @@ class Moved:
     about: dict[str, Any]
 
 
-def write_still(folder: Path, result: Still) -> Path:
+def write_still(result: Still, folder: Path) -> Path:
     """Write statics and frequencies; return the file."""
     about = result.about
     path = folder / f"{about['case']}-d{about['divisions']}.json"
@@ -75,7 +75,7 @@ def read_still(case: str, divisions: int, folder: Path = RESULTS) -> Still:
     return Still(**{name: np.array(value) for name, value in found.items()}, about=about)
 
 
-def write_motion(folder: Path, result: Moved) -> Path:
+def write_motion(result: Moved, folder: Path) -> Path:
     """Write a motion, in single precision; return the file."""
     about = result.about
     path = folder / f"{about['case']}-d{about['divisions']}-dt{about['dt']:g}.npz"

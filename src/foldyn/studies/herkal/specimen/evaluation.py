@@ -251,7 +251,7 @@ def motions(released: Released) -> dict[str, xr.Dataset]:
     for support, case in released.cases.items():
         damping = released.fits.get(support, released.fits[FILM_SUPPORT]).values
         document = replaced(read_document(case), damping)
-        write_text(case.with_name("fitted.toml"), tomli_w.dumps(document))
+        write_text(tomli_w.dumps(document), case.with_name("fitted.toml"))
         found[support] = case_of_document(case, document).run()
     return found
 

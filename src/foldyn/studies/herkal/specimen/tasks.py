@@ -46,7 +46,7 @@ def _read(file: Path) -> tuple[str, dict[str, str]]:
 
 
 def _write_stamp(file: Path, stamp: str, files: dict[str, str]) -> None:
-    write_text(file, f"{stamp}\n{json.dumps(files)}\n")
+    write_text(f"{stamp}\n{json.dumps(files)}\n", file)
 
 
 # the files of a part with their digests; `Part.result` reports damage by file name
@@ -220,7 +220,7 @@ def _fit(part: Part, folder: Path) -> None:
         }
         changes |= released.fits[evaluation.FILM_SUPPORT].values
     found["changes"] = changes
-    write_text(folder / FOUND, json.dumps(found, indent=2) + "\n")
+    write_text(json.dumps(found, indent=2) + "\n", folder / FOUND)
 
 
 def _draw(figure: Figure, picture: Path) -> None:
