@@ -50,3 +50,11 @@ def test_third_arguments_are_given_by_name():
         if len(given) > 2 and name.partition(".")[2] not in CONTRACTS:
             several[name] = given
     assert not several
+
+
+def test_both_models_have_the_same_defaults():
+    bars, shell = (inspect.signature(make).parameters for make in (fd.discretize, fd.shell))
+    shared = bars.keys() & shell.keys()
+    assert len(shared) > 6
+    assert {key: bars[key].default for key in shared} == {key: shell[key].default for key in shared}
+    assert fd.ShellOptions().fold_law == fd.ModelOptions().fold_law

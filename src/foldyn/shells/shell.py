@@ -372,8 +372,8 @@ def shell(
     sheet: Sheet,
     *,
     divisions: int = 16,
-    mass: str = "lumped",
-    fold_law: str | HingeLaw = EnhancedLinear(),
+    mass: str | None = None,
+    fold_law: str | HingeLaw | None = None,
     crease_stiffness: PerCrease = None,
     crease_rest: PerCrease = None,
     clamped: str | Sequence[Sequence[int]] = (),
@@ -393,7 +393,7 @@ def shell(
     divisions : int, default 16
         Pieces of every edge; the number of triangles grows with its square. Frequencies of the
         case studies are right to 1 % from 16 on.
-    mass : {"lumped", "consistent"}
+    mass : {"lumped", "consistent"}, default "lumped"
         A third of each triangle to its corners, or rho A t / 12 [2 1 1; 1 2 1; 1 1 2].
     fold_law, crease_stiffness, crease_rest
         As in `discretize`.
@@ -430,13 +430,14 @@ def shell(
     doubt_units(pattern, sheet)
     radius = None if vertex_radius is None else length("vertex_radius", vertex_radius)
     divisions = whole("divisions", divisions, least=1)
-    choice("mass", mass, MASSES)
-    hinge_law(fold_law, "fold_law")
+    mass = ShellOptions.mass if mass is None else choice("mass", mass, MASSES)
+    law = ShellOptions.fold_law if fold_law is None else fold_law
+    hinge_law(law, "fold_law")
     edges = boundary_edges(clamped, pattern, "clamped")
     plates = checked_panels(rigid, len(pattern.faces))
     check_welds(plates, pattern)
     options = ShellOptions(
-        divisions, mass, fold_law, crease_stiffness, crease_rest, edges, plates, radius
+        divisions, mass, law, crease_stiffness, crease_rest, edges, plates, radius
     )
     graded = None if radius is None else grading(pattern, divisions, radius)
     if graded:
