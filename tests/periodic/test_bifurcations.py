@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from foldyn.periodic.bifurcations import events
 from foldyn.periodic.continuation import Step, Stride, point_at, steps
+from foldyn.periodic.response import events
 
 
 class Curve:

@@ -5,11 +5,9 @@ import pytest
 from duffing import oscillator
 
 import foldyn as fd
-from foldyn.periodic.balance import Balance
-from foldyn.periodic.drive import Drive
-from foldyn.periodic.equation import Equation
+from foldyn.periodic.balance import Balance, Fourier
+from foldyn.periodic.equation import Drive, Equation
 from foldyn.periodic.families import ByFrequency, ByLevel, Free, InResonance
-from foldyn.periodic.fourier import Fourier
 from foldyn.periodic.motion import balance_of
 
 STEP = 1e-4

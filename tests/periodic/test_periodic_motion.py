@@ -8,7 +8,7 @@ from duffing import NODE, K, mass, oscillator
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.periodic.start import equilibrium
+from foldyn.periodic.motion import equilibrium
 
 PANEL = {"a": 1.0, "b": 1.0, "dihedral": 60}
 

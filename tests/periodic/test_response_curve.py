@@ -8,10 +8,9 @@ from scipy.optimize import fsolve
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError, MotionInterrupted
-from foldyn.periodic.bifurcations import Event
 from foldyn.periodic.continuation import Stride
 from foldyn.periodic.motion import balance_of
-from foldyn.periodic.response import _Tracer
+from foldyn.periodic.response import Event, _Tracer
 
 ALPHA, FORCE = 0.1, 0.5
 

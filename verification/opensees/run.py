@@ -80,9 +80,9 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         for divisions, name in product(chosen.divisions, chosen.cases):
             if chosen.motion:
-                path = stored.write_motion(chosen.out, motion(name, divisions, chosen.dt))
+                path = stored.write_motion(motion(name, divisions, chosen.dt), chosen.out)
             else:
-                path = stored.write_still(chosen.out, still(name, divisions))
+                path = stored.write_still(still(name, divisions), chosen.out)
             print(path.name, flush=True)
     except FoldynError as error:
         print(error, file=sys.stderr)

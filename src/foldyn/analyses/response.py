@@ -17,7 +17,7 @@ from foldyn.arguments import Check
 from foldyn.dynamics import Progress
 from foldyn.errors import InputError
 from foldyn.periodic import response_curve
-from foldyn.periodic.drive import Drive
+from foldyn.periodic.equation import Drive
 from foldyn.report.album import Album, ByRule, by_mass_rule
 from foldyn.report.sections import Heading, Table
 from foldyn.report.sections import Section as PageSection

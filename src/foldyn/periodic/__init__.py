@@ -1,7 +1,5 @@
 """Nonlinear vibration: periodic motions, their stability, and how they change."""
 
-from foldyn.periodic.motion import periodic_motion
-from foldyn.periodic.normal_modes import backbone
-from foldyn.periodic.response import response_curve
+from foldyn.facade import lazy
 
-__all__ = ["backbone", "periodic_motion", "response_curve"]
+__getattr__, __dir__, __all__ = lazy(__name__, __file__)

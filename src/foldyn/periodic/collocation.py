@@ -10,6 +10,11 @@ Integration, 2nd ed. 2006, section II.1). Radau's IIA, of order 5, damps motions
 steps, such as vibrations of a sheet's bars: it is used for shooting (Hairer and Wanner, Solving
 Ordinary Differential Equations II, 2nd ed. 1996, section IV.5). Derivatives of a step are exact:
 they are derivatives of its own equations.
+
+Floquet multipliers are the growth factors of small deviations from a periodic motion, per period:
+the eigenvalues of the monodromy matrix, which integrates the equation linearized about the motion,
+M y'' + C y' + K(t) y = 0, over one period. The motion is unstable if one of them exceeds 1 in
+modulus (Nayfeh and Balachandran, Applied Nonlinear Dynamics, 1995, chapter 3).
 """
 
 from __future__ import annotations
@@ -18,10 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
+from foldyn.periodic.balance import values_of
 from foldyn.periodic.equation import Equation
+from foldyn.threads import one_thread
 
 STAGES = 3
 ROOT15, ROOT6 = np.sqrt(15.0), np.sqrt(6.0)
+STEPS = 64  # in a period of the drive
+NEUTRAL = 1e-6  # above 1: round-off in an undamped motion
 
 
 class Tableau:
@@ -181,3 +190,37 @@ class Shooting:
         motion = stages.tangent_step(factors, stiffness, motion)
         end = np.concatenate([x + h * v + h**2 * RADAU.ba @ a, v + h * RADAU.b @ a])
         return end, motion, a
+
+
+def multipliers(
+    equation: Equation, amplitudes: NDArray, omega: float, multiple: int = 1, level: float = 1.0,
+    steps: int = STEPS,
+) -> NDArray:  # fmt: skip
+    """Multipliers (2k,) of a motion, the largest first.
+
+    Parameters
+    ----------
+    equation : Equation
+    amplitudes : ndarray, shape (h + 1, k)
+        Complex amplitudes of the unknowns.
+    omega : float
+        Frequency of the drive, rad/s.
+    multiple : int
+        Periods of the drive in one period of the motion.
+    level : float
+        Factor on all varying terms.
+    steps : int
+        Integration steps in a period of the drive.
+    """
+    phase = stage_phases(multiple * steps)
+    at = equation.at(multiple * phase.ravel(), level)
+    tangents = at.tangents(values_of(amplitudes, phase.ravel()))
+    stiffness = tangents.reshape(*phase.shape, equation.size, equation.size)
+    with one_thread(STAGES * equation.size):
+        found = np.linalg.eigvals(monodromy(equation, stiffness, omega / multiple, equation.alpha))
+    return found[np.argsort(-np.abs(found), kind="stable")]
+
+
+def is_stable(found: NDArray) -> bool:
+    """Whether no small deviation grows."""
+    return bool(np.abs(found).max() <= 1.0 + NEUTRAL)

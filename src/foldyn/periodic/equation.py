@@ -2,29 +2,250 @@
 
     M x'' + C x' + f(x, theta) + W^2 s2(theta) + W s1(theta) = 0
 
-f contains the internal forces minus the loads, W = 2 pi times the frequency of the drive, and s2,
-s1 are the effect of moving supports: M and C times the derivatives of their motion with respect to
-theta. Displacements of all dofs are u = u0 + B x + U(theta), forces on the unknowns B' times the
-forces on all dofs.
+theta = 2 pi f t is the phase of the drive, with f the lowest frequency of the `Harmonic` histories;
+the others have multiples of it. A level scales all varying terms, and leaves constant ones.
+
+f(x, theta) contains the internal forces minus the loads, W = 2 pi f, and s2, s1 are the effect of
+moving supports: M and C times the derivatives of their motion with respect to theta. Displacements
+of all dofs are u = u0 + B x + U(theta), forces on the unknowns B' times the forces on all dofs.
 """
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.cases import Case, Origin
+from foldyn.attractors.drive import check_harmonic, lowest_frequency
+from foldyn.cases import Case, Constant, Harmonic, Origin
+from foldyn.cases.air import refuse_air
 from foldyn.dynamics.dampers import damping_terms
 from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of, modal_rows
+from foldyn.errors import InputError
+from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.constant_damping import DampingMatrix, DampingRows
 from foldyn.mechanics.following import following_force, following_tangent, joined
-from foldyn.periodic.drive import Drive, check_damping, check_held, check_smooth
-from foldyn.periodic.tangents import Tangents
+from foldyn.mechanics.tangent import add_tangent
+from foldyn.mechanics.term import Term, nodal
+from foldyn.statics.rigid import free_rigid_motions
+from foldyn.structures.bars_hinges import BarsHingesTerm
 
 EPS = float(np.finfo(float).eps)
+Terms = list[tuple[Any, Any]]
+
+
+class Tangents:
+    """Tangents of a body with respect to the unknowns, or along vectors of them.
+
+    Entries are added directly in their places; terms with unknown places, such as contact, and
+    sheets other than bars and hinges go through sparse matrices.
+
+    Parameters
+    ----------
+    body : Assembly
+    basis : sparse (m, k)
+        Displacements of all dofs per unknown.
+    vectors : ndarray, shape (k, r), optional
+        Vectors on which tangents are projected.
+    """
+
+    def __init__(
+        self, body: Assembly, basis: sparse.csr_array, vectors: NDArray | None = None
+    ) -> None:
+        self._basis, self._vectors, size = basis, vectors, basis.shape[1]
+        places: dict[int, tuple[NDArray, NDArray]] = {}  # of the sheet (-1) and of terms
+        if isinstance(body.sheet, BarsHingesTerm):
+            places[-1] = _of_blocks(body.sheet)
+        for k, term in enumerate(body.others):
+            if type(term).tangent is Term.tangent:
+                places[k] = term.places
+        spread = {k: _spread(basis, *at) for k, at in places.items()}
+        every = [np.zeros(0, np.int64), *(place for place, _, _ in spread.values())]
+        self._union = union = np.unique(np.concatenate(every))
+        self._own = {
+            k: sparse.csr_array(
+                (weight, (np.searchsorted(union, place), entry)), (len(union), len(places[k][0]))
+            )
+            for k, (place, entry, weight) in spread.items()
+        }
+        row, column = np.divmod(self._union, max(size, 1))
+        ends = np.searchsorted(row, np.arange(size + 1))
+        zeros = np.zeros(len(column))
+        self._matrix = sparse.csr_array((zeros, column, ends), (size, size))
+
+    def of(self, body: Assembly) -> Tangents:
+        """Tangents of another body with respect to the same unknowns."""
+        return Tangents(body, self._basis, self._vectors)
+
+    def put(self, body: Assembly, u: NDArray, out: NDArray) -> None:
+        """Write the tangent at displacements u (m,) into `out`."""
+        data, sheet, rest = np.zeros(len(self._union)), body.sheet, None
+        if -1 in self._own and isinstance(sheet, BarsHingesTerm):
+            blocks = np.zeros((len(sheet.sparsity.indices), 3, 3))
+            add_tangent(sheet.model, sheet.sparsity, nodal(u), -np.inf, blocks)
+            data += self._own[-1] @ blocks.ravel()
+        else:
+            rest = sheet.tangent(u)
+        for k, term in enumerate(body.others):
+            if k in self._own:
+                data += self._own[k] @ term.entries(u)
+            else:
+                found = term.tangent(u)
+                if found.nnz:  # without contact there is no stiffness
+                    rest = found if rest is None else rest + found
+        if self._vectors is None:
+            out[:] = 0.0
+            out.reshape(-1)[self._union] = data
+            if rest is not None:
+                out += (self._basis.T @ rest @ self._basis).toarray()
+            return
+        self._matrix.data = data
+        along = self._matrix @ self._vectors
+        if rest is not None:
+            along += self._basis.T @ (rest @ (self._basis @ self._vectors))
+        out[:] = self._vectors.T @ along
+
+
+def _of_blocks(sheet: BarsHingesTerm) -> tuple[NDArray, NDArray]:
+    """Row and column of each entry of the blocks of a sheet's tangent."""
+    pattern, axis = sheet.sparsity, np.arange(3)
+    node = np.repeat(np.arange(len(pattern.indptr) - 1), np.diff(pattern.indptr))
+    row = np.broadcast_to((3 * node[:, None] + axis)[:, :, None], (len(node), 3, 3))
+    column = np.broadcast_to((3 * pattern.indices[:, None] + axis)[:, None], row.shape)
+    return row.ravel(), column.ravel()
+
+
+def _spread(
+    basis: sparse.csr_array, row: NDArray, column: NDArray
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Contributions of entries at rows and columns (e,) to a matrix of the k unknowns.
+
+    Returns their places k row + column in it, the numbers of the entries, and factors on these.
+    """
+    one, other = basis[row], basis[column]
+    width = np.diff(other.indptr)
+    count = np.diff(one.indptr) * width
+    entry = np.repeat(np.arange(len(row)), count)
+    turn = np.arange(len(entry)) - np.repeat(np.cumsum(count) - count, count)
+    i = one.indptr[entry] + turn // width[entry]
+    j = other.indptr[entry] + turn % width[entry]
+    place = one.indices[i].astype(np.int64) * basis.shape[1] + other.indices[j]
+    return place, entry, one.data[i] * other.data[j]
+
+
+def check_smooth(case: Case, name: str) -> None:
+    """Refuse parts of a case that the analysis `name` cannot treat exactly.
+
+    Raises
+    ------
+    InputError
+        The case has friction, laws with memory, or unknowns without mass.
+    """
+    case.check_movable()
+    if case.contact is not None and case.contact.rubs:
+        raise InputError(
+            f": {name} takes forces that depend on where the sheet is, and friction on how it got "
+            "there; give friction = 0.0, or simulate the motion",
+            "contact.friction",
+        )
+    refuse_air(case, name)
+    if case.remembering:
+        raise InputError(
+            f"structure: {name} takes forces that depend on where the sheet is, and some of its "
+            "hinges remember (prony, plastic or damped creases that give way); take an elastic "
+            "law, or simulate the motion"
+        )
+    if len(case.body.hidden):
+        raise InputError(
+            f"structure: {name} takes bars and hinges, and this model has unknowns without mass "
+            'beside them; take scheme = "n5b8" or "n4b5"'
+        )
+
+
+def check_held(case: Case, name: str) -> None:
+    """Refuse supports that let the whole drift, without a place to return to."""
+    nodes, body = case.structure.nodes, case.body
+    if free_rigid_motions(nodes, case.constraints, body.holds(np.zeros(body.size))).shape[1]:
+        raise InputError(
+            f": {name} needs supports that hold the whole in place, or it drifts; fix more nodes",
+            "supports",
+        )
+
+
+def check_damping(terms: list[Term], name: str) -> None:
+    """Refuse damping whose matrix depends on the displacement."""
+    if any(not isinstance(term, DampingMatrix | DampingRows) for term in terms):
+        raise InputError(
+            f": {name} takes damping with a constant matrix; take Rayleigh or ModalDamping in "
+            "place of CreaseDamping and StrainDamping, and dashpots with a direction",
+            "damping",
+        )
+
+
+class Drive:
+    """Histories of the loads and supports of a case.
+
+    Attributes
+    ----------
+    frequency : float
+        Lowest frequency of the harmonic histories (Hz); 0.0 without any.
+    highest : int
+        Highest of their frequencies, as a multiple of the lowest.
+    loads, moves, turns, planes : list of (ndarray, Constant or Harmonic)
+        Forces (n, 3), N; displacements (n, 3) of supports and of nodes tied to them, m; changes
+        (nr,) of rest angles, rad; displacements (p, 3) of contact planes, m: each at factor 1.
+    """
+
+    def __init__(self, case: Case) -> None:
+        self.loads: Terms = list(case.load_terms)
+        self.moves: Terms = [*case.imposed_terms, *case.base_terms]
+        self.turns: Terms = list(case.rest_terms)
+        self.following: Terms = list(case.following_terms)
+        self.planes: Terms = [_plane(case, number, own) for number, own in case.obstacle_terms]
+        every = (*self.loads, *self.moves, *self.turns, *self.planes, *self.following)
+        check_harmonic(case, "a periodic motion")
+        found = [one.frequency for _, one in every if isinstance(one, Harmonic)]
+        self.frequency = lowest_frequency(found)
+        self.highest = round(max(found) / self.frequency) if found else 0
+
+    @property
+    def varies(self) -> bool:
+        """Whether anything drives the case."""
+        return self.frequency > 0.0
+
+    def factors(self, terms: Terms, phase: NDArray, level: float) -> NDArray:
+        """Factors (3, s, k) of some terms, and their first two derivatives, at phases (s,)."""
+        out = np.zeros((3, len(phase), len(terms)))
+        for k, (_, history) in enumerate(terms):
+            if isinstance(history, Constant):
+                out[0, :, k] = 1.0
+                continue
+            order = round(history.frequency / self.frequency)
+            angle = order * phase + math.radians(history.phase)
+            out[0, :, k] = level * np.sin(angle)
+            out[1, :, k] = level * order * np.cos(angle)
+            out[2, :, k] = -level * order**2 * np.sin(angle)
+        return out
+
+    def sums(self, terms: Terms, phase: NDArray, level: float, size: int) -> NDArray:
+        """Sums (3, s, size) of some terms, and their first two derivatives, at phases (s,)."""
+        shapes = np.zeros((len(terms), size))
+        for shape, (vector, _) in zip(shapes, terms, strict=True):
+            shape[: vector.size] = vector.ravel()
+        return self.factors(terms, phase, level) @ shapes
+
+
+def _plane(case: Case, number: int, history: Any) -> tuple[NDArray, Any]:
+    """Displacements (p, 3), m, of the contact planes as one of them moves, and its history."""
+    assert case.contact is not None
+    moved = np.zeros((len(case.contact.planes), 3))
+    moved[number] = case.contact.planes[number].motion
+    return moved, history
 
 
 class Equation:
@@ -104,6 +325,15 @@ class Equation:
         """B' K B (k, k) of a matrix of all dofs."""
         found = self.basis.T @ (matrix @ self.basis)
         return found.toarray() if sparse.issparse(found) else found
+
+    def responses(self, tangent: NDArray, w: float, forces: NDArray, first: int) -> NDArray:
+        """Linear responses (h, k) of harmonics `first` and on of w rad/s to forces (h, k)."""
+        return np.array(
+            [
+                np.linalg.solve(tangent - (j * w) ** 2 * self.mass + 1j * j * w * self.damping, one)
+                for j, one in enumerate(forces, first)
+            ]
+        )
 
     def unknowns(self, displacement: NDArray, instants: Instants) -> NDArray:
         """Unknowns (s, k) of displacements (s, n, 3) of all nodes at some instants."""

@@ -1,19 +1,97 @@
-"""Families of periodic motions that continuation follows; see `continuation.Family`."""
+"""Families of periodic motions that continuation follows; see `continuation.Family`.
+
+Free motions about an equilibrium are accurate for arbitrarily small amplitudes. Dihedrals are
+computed from node positions, and lose the digits by which these exceed the motion. So near the
+equilibrium x0 forces f and energies V are integrated from tangents K,
+
+    f(x) = int_0^1 K d ds,    V(x) = V(x0) + int_0^1 (1 - s) d' K d ds,
+
+with d = x - x0 and K at x0 + s d. The integrals count only if they agree with the plain values to
+within the accuracy lost, which fails where laws bend in between. About the rest position only the
+hinges are integrated: bars are accurate there for small displacements.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.periodic.about_rest import AboutRest
+from foldyn.mechanics.assembly import Assembly
 from foldyn.periodic.balance import Balance
-from foldyn.periodic.equation import Instants
+from foldyn.periodic.equation import EPS, Equation, Instants
 from foldyn.periodic.orbit import Orbit
 
 TURN = 2.0 * np.pi
 PROBE = 1e-4  # of the level, or of the frequency: step of central differences
 LITTLE = 1e-4  # level at which forces of a drive are proportional to it
 LEAST = 1e-12  # of the sheet's length: least size of a motion
+SMALL = 1e-3  # of the sheet: largest motion that counts as small
+LOST = 100.0  # times the rounding of positions over the motion: largest loss of accuracy of forces
+SHARES = np.array([0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)])  # Gauss's
+WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
+
+
+class AboutRest(Instants):
+    """The equation without its drive, about an equilibrium; see the module docstring.
+
+    Parameters
+    ----------
+    place : ndarray, shape (k,)
+        x0.
+    """
+
+    def __init__(self, equation: Equation, phase: NDArray, place: NDArray) -> None:
+        super().__init__(equation, phase, 0.0)
+        self._place = place
+        self._still = self.displacements(np.tile(place, (len(phase), 1)))[0]
+        body = self.bodies[0]
+        self._part: Assembly = body if self._still.any() else body.hinges_alone or body
+        self._tangents = equation.tangents.of(self._part)
+
+    def forces(self, x: NDArray) -> NDArray:
+        """Forces f (s, k), N; see `Instants`."""
+        plain, found = super().forces(x), self._summed(x)
+        return plain if found is None else plain + found[0]
+
+    def energies(self, x: NDArray) -> NDArray:
+        """Energies (s,), J, above the equilibrium."""
+        found = self._summed(x)
+        if found is None:
+            return super().energies(x) - super().energies(np.tile(self._place, (len(x), 1)))
+        others = np.array([self._others(u) for u in (self._still, *self.displacements(x))])
+        return found[1] + others[1:] - others[0]
+
+    def _summed(self, x: NDArray) -> tuple[NDArray, NDArray] | None:
+        """Correction (s, k) of the forces, and integrated energies (s,) above x0.
+
+        None if motions are not small, or the integrals do not agree with the forces.
+        """
+        d, equation, part = x - self._place, self.equation, self._part
+        size = float(np.abs(d @ equation.basis.T).max())
+        if not 0.0 < size < SMALL * equation.length:
+            return None
+        force, energy, stiffness = np.zeros_like(d), np.zeros(len(d)), np.zeros((d.shape[1],) * 2)
+        for share, weight in zip(SHARES, WEIGHTS, strict=True):
+            for j, u in enumerate(self.displacements(self._place + share * d)):
+                self._tangents.put(part, u, stiffness)
+                pull = weight * (stiffness @ d[j])
+                force[j] += pull
+                energy[j] += (1.0 - share) * (d[j] @ pull)
+        most = LOST * EPS * equation.length / size * np.linalg.norm(force)
+        if part is self.bodies[0]:
+            lost = force - super().forces(x)
+            most += LOST * equation.rounding
+        else:
+            plain = np.array([part.internal(u) for u in self.displacements(x)])
+            lost = force - plain @ equation.basis
+        return (lost, energy) if np.linalg.norm(lost) <= most else None
+
+    def _others(self, u: NDArray) -> float:
+        """Energy (J) of the parts not integrated, at displacements (m,)."""
+        body, part = self.bodies[0], self._part
+        summed = dict(zip(part.energy_groups, part.energies(u), strict=True))
+        every = zip(body.energy_groups, body.energies(u), strict=True)
+        return float(sum(value - summed.get(name, 0.0) for name, value in every))
 
 
 class _OfBalance:
@@ -39,9 +117,35 @@ class _OfBalance:
         moving = float(np.linalg.norm(self.coefficients(z)[1:]))
         return max(moving, LEAST * self.balance.equation.length)
 
-    def orbit_at(self, z: NDArray, omega: float, level: float) -> Orbit:
+    def own(self, z: NDArray, p: float) -> tuple[NDArray, float, float]:
+        """Coefficients (c, k), frequency of the drive (rad/s) and its level."""
+        raise NotImplementedError
+
+    def at(self, z: NDArray, p: float) -> tuple[NDArray, float, Instants]:
+        """Coefficients (c, k), frequency of the drive (rad/s) and the equation at its level."""
+        x, omega, level = self.own(z, p)
+        return x, omega, self.instants(level)
+
+    def residual(self, z: NDArray, p: float) -> NDArray:
+        """Residual R (n,); see `Family`."""
+        return self.balance.residual(*self.at(z, p)).ravel()
+
+    def jacobian(self, z: NDArray, p: float) -> NDArray:
+        """Derivative (n, n) of R by z; see `Family`."""
+        return self.balance.jacobian(*self.at(z, p))
+
+    def by_level(self, z: NDArray, p: float) -> NDArray:
+        """Derivative (c k,) of the balance by p, which sets the level, from differences."""
+        up, down = (
+            self.balance.residual(x, omega, self.balance.instants(level))
+            for x, omega, level in (self.own(z, p + PROBE), self.own(z, p - PROBE))
+        )
+        return (up - down).ravel() / (2.0 * PROBE)
+
+    def orbit(self, z: NDArray, p: float) -> Orbit:
         """The motion."""
-        amplitudes = self.balance.fourier.complex_of(self.coefficients(z))
+        x, omega, level = self.own(z, p)
+        amplitudes = self.balance.fourier.complex_of(x)
         return Orbit(self.balance.equation, amplitudes, omega, self.balance.multiple, level)
 
 
@@ -50,24 +154,13 @@ class ByFrequency(_OfBalance):
 
     level = 1.0
 
-    def residual(self, z: NDArray, p: float) -> NDArray:
-        """Residual R (n,); see `Family`."""
-        x, at = self.coefficients(z), self.instants(self.level)
-        return self.balance.residual(x, TURN * p, at).ravel()
-
-    def jacobian(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n, n) of R by z; see `Family`."""
-        x, at = self.coefficients(z), self.instants(self.level)
-        return self.balance.jacobian(x, TURN * p, at)
+    def own(self, z: NDArray, p: float) -> tuple[NDArray, float, float]:
+        """Coefficients, frequency and level; see `_OfBalance`."""
+        return self.coefficients(z), TURN * p, self.level
 
     def slope(self, z: NDArray, p: float) -> NDArray:
         """Derivative (n,) of R by p; see `Family`."""
-        x, at = self.coefficients(z), self.instants(self.level)
-        return TURN * self.balance.frequency_slope(x, TURN * p, at).ravel()
-
-    def orbit(self, z: NDArray, p: float) -> Orbit:
-        """The motion."""
-        return self.orbit_at(z, TURN * p, self.level)
+        return TURN * self.balance.frequency_slope(*self.at(z, p)).ravel()
 
 
 class ByLevel(_OfBalance):
@@ -77,28 +170,13 @@ class ByLevel(_OfBalance):
         super().__init__(balance, span, tolerance)
         self.omega = TURN * frequency
 
-    def residual(self, z: NDArray, p: float) -> NDArray:
-        """Residual R (n,); see `Family`."""
-        return self.balance.residual(self.coefficients(z), self.omega, self.instants(p)).ravel()
-
-    def jacobian(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n, n) of R by z; see `Family`."""
-        return self.balance.jacobian(self.coefficients(z), self.omega, self.instants(p))
+    def own(self, z: NDArray, p: float) -> tuple[NDArray, float, float]:
+        """Coefficients, frequency and level; see `_OfBalance`."""
+        return self.coefficients(z), self.omega, p
 
     def slope(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n,) of R by p; from differences, exact for loads proportional to it."""
-        x, (up, down) = (
-            self.coefficients(z),
-            (self.balance.instants(p + d) for d in (PROBE, -PROBE)),
-        )
-        change = self.balance.residual(x, self.omega, up) - self.balance.residual(
-            x, self.omega, down
-        )
-        return change.ravel() / (2.0 * PROBE)
-
-    def orbit(self, z: NDArray, p: float) -> Orbit:
-        """The motion."""
-        return self.orbit_at(z, self.omega, p)
+        """Derivative (n,) of R by p, exact for loads proportional to it."""
+        return self.by_level(z, p)
 
 
 class Free(ByFrequency):
@@ -164,20 +242,20 @@ class InResonance(_OfBalance):
         force /= np.linalg.norm(force)
         return float((force * self.coefficients(z)).sum()), force
 
-    def _own(self, z: NDArray, level: float) -> tuple[NDArray, float, Instants]:
-        return self.coefficients(z), TURN * self.frequency(z), self.instants(level)
+    def own(self, z: NDArray, p: float) -> tuple[NDArray, float, float]:
+        """Coefficients, frequency and level; see `_OfBalance`."""
+        return self.coefficients(z), TURN * self.frequency(z), float(np.exp(p))
 
     def residual(self, z: NDArray, p: float) -> NDArray:
         """Residual R (n,); see `Family`."""
-        left = self.balance.residual(*self._own(z, np.exp(p)))
-        return np.append(left.ravel(), self._heavy * self._reactive(z)[0])
+        return np.append(super().residual(z, p), self._heavy * self._reactive(z)[0])
 
     def jacobian(self, z: NDArray, p: float) -> NDArray:
         """Derivative (n, n) of R by z; see `Family`."""
-        own, n = self._own(z, np.exp(p)), len(z) - 1
+        at, n = self.at(z, p), len(z) - 1
         out = np.empty((n + 1, n + 1))
-        out[:n, :n] = self.balance.jacobian(*own)
-        out[:n, n] = TURN * self.unit * self.balance.frequency_slope(*own).ravel()
+        out[:n, :n] = self.balance.jacobian(*at)
+        out[:n, n] = TURN * self.unit * self.balance.frequency_slope(*at).ravel()
         out[n, :n] = self._heavy * self._reactive(z)[1].ravel()
         step = np.zeros(n + 1)
         step[n] = PROBE * z[-1]
@@ -187,13 +265,4 @@ class InResonance(_OfBalance):
 
     def slope(self, z: NDArray, p: float) -> NDArray:
         """Derivative (n,) of R by p; see `Family`."""
-        x, omega, _ = self._own(z, np.exp(p))
-        up, down = (
-            self.balance.residual(x, omega, self.balance.instants(np.exp(p + d)))
-            for d in (PROBE, -PROBE)
-        )
-        return np.append((up - down).ravel() / (2.0 * PROBE), 0.0)
-
-    def orbit(self, z: NDArray, p: float) -> Orbit:
-        """The motion."""
-        return self.orbit_at(z, TURN * self.frequency(z), float(np.exp(p)))
+        return np.append(self.by_level(z, p), 0.0)

@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.attractors.drive import HARMONIC
-from foldyn.cases import Case, State
+from foldyn.cases import Case, Constant, Impose, Origin, State
+from foldyn.cases.contact_checks import check_contact
+from foldyn.dynamics import initial
 from foldyn.errors import ComputationError, InputError, warn
-from foldyn.periodic.balance import Balance, newton
-from foldyn.periodic.collocation import Shooting
+from foldyn.linear.linearized import equivalent_slope
+from foldyn.periodic.balance import AtFrequency, Balance, Converged, Fourier, newton, values_of
+from foldyn.periodic.collocation import STEPS, Shooting, is_stable
+from foldyn.periodic.continuation import Step, Stride, point_at, steps
 from foldyn.periodic.equation import Equation
-from foldyn.periodic.floquet import STEPS, is_stable, multipliers
-from foldyn.periodic.fourier import Fourier, values_of
+from foldyn.periodic.families import ByLevel
 from foldyn.periodic.orbit import SHOWN, Orbit
 from foldyn.periodic.reduction import reduced
-from foldyn.periodic.start import balanced, coefficients, equilibrium, orbit_of, origin_of
 from foldyn.ram_limit import check_memory
 from foldyn.results.periodic_dataset import periodic_dataset
+from foldyn.statics import trace
+from foldyn.statics.equilibrium import drives
+from foldyn.statics.tracing import displacement_of
 from foldyn.values import choice, number, of_kind, whole
-
-if TYPE_CHECKING:
-    import xarray
 
 METHODS = ("harmonic_balance", "shooting")
 TRUNCATED = 1e-3  # of the motion: effect of twice as many harmonics above which to warn
@@ -34,7 +37,13 @@ REDUCED = 0.05  # of the motion: effect of the omitted dofs above which to warn
 NAMED = 5  # frequencies listed in a warning
 FEW = 3  # harmonics of the motion from which shooting starts
 ROUNDING = 1e-14  # of the motion: harmonics of a shooting result that count as zero
-TURN = 2.0 * math.pi
+FLOOR = float(equivalent_slope(0.0, np.radians(1.0)))
+"""Slope of superlinear hinges at rest in a first guess, for a swing of one degree."""
+LITTLE = 1e-4  # of the drive, whose forces are proportional to it
+SMALL = 0.05  # of the drive: level from which a motion is followed to the full drive
+GROWING = Stride(0.05, 0.5, 200)
+TURN = 2.0 * np.pi
+PLACES = "None, a State, or a result of periodic_motion or response_curve"
 
 
 def periodic_motion(
@@ -130,20 +139,20 @@ def periodic_motion(
     steps = whole("steps", steps, least=4)
     periods = whole("periods", periods, least=1)
     balance = balance_of(case, "fd.periodic_motion", harmonics, periods, modes, guess, steps)
-    omega = TURN * frequency_of(balance, frequency)
+    if frequency is None:
+        frequency = balance.equation.drive.frequency
+    omega = TURN * number("frequency", frequency, above=0.0, unit="Hz")
     with balance.threads:
         if method == "shooting":
-            orbit, floquet, spent = _shot(balance, guess, omega, steps, tolerance)
+            orbit, spent = _shot(balance, guess, omega, steps, tolerance)
         else:
             x = coefficients(balance, guess, omega)
             found = balanced(balance, x, omega, tolerance)
             orbit, spent = orbit_of(balance, found.x, omega), found.iterations
-            floquet = multipliers(balance.equation, orbit.amplitudes, omega, periods, steps=steps)
+        floquet = orbit.multipliers(steps)
     truncation = orbit.truncation()
-    warn_of_truncation(truncation, len(orbit.amplitudes) - 1, "harmonics")
-    warn_of_crossing([orbit])
     reduction = None if modes is None else orbit.reduction()
-    warn_of_reduction(reduction)
+    warn_of_errors([orbit], len(orbit.amplitudes) - 1, truncation, reduction)
     phase = TURN * np.arange(SHOWN) / SHOWN
     motion = {"displacement": orbit.displacement(phase), "velocity": orbit.velocity(phase)}
     facts = {
@@ -166,54 +175,59 @@ def periodic_motion(
 
 def balance_of(
     case: Case, name: str, harmonics: int, periods: int = 1, modes: int | None = None,
-    guess: Any = None, steps: int = STEPS,
+    guess: Any = None, steps: int = STEPS, driven: bool = True,
 ) -> Balance:  # fmt: skip
-    """Balance of a driven case; raises `InputError` without a drive, or if memory is too small."""
+    """Balance of a case; of free motions, with an even series, if it is not to be driven.
+
+    Raises
+    ------
+    InputError
+        Nothing drives a case that is to be driven, or memory is too small.
+    """
     harmonics = whole("harmonics", harmonics, least=1)
-    equation = Equation(case, name, origin=origin_of(case, guess))
-    if not equation.drive.varies:
+    equation = Equation(case, name, driven, origin_of(case, guess) if driven else None)
+    if driven and not equation.drive.varies:
         raise InputError(
             f"case: nothing drives it: {name} follows the period of a load or support; give one "
             f"the history {HARMONIC}"
         )
-    equation = on_modes(equation, modes, guess)
-    fourier, size = Fourier(harmonics), (2 * harmonics + 1) * equation.size
-    needed = fourier.memory(equation.size)
+    if modes is not None:
+        count = whole("modes", modes, least=1)
+        if isinstance(guess, State):
+            place = guess.of_nodes("displacement", case.structure.nodes.shape)
+        else:
+            place = equilibrium(case)
+        equation = reduced(equation, count, place)
+    fourier = Fourier(harmonics, even=not driven)
+    size, needed = len(fourier.order) * equation.size, fourier.memory(equation.size)
     check_memory("harmonics", f"a matrix of {size} unknowns", needed, "take fewer")
-    instants, each = 3.0 * steps * periods, equation.size**2 + 4 * equation.body.size
-    period = f"a period of {steps * periods:.3g} steps"
-    check_memory("steps", period, 8.0 * instants * each, "take fewer")
+    if driven:
+        instants, each = 3.0 * steps * periods, equation.size**2 + 4 * equation.body.size
+        period = f"a period of {steps * periods:.3g} steps"
+        check_memory("steps", period, 8.0 * instants * each, "take fewer")
     return Balance(equation, fourier, periods)
 
 
-def on_modes(equation: Equation, modes: int | None, guess: Any) -> Equation:
-    """The equation reduced to modes about a guess; itself if `modes` is None."""
-    if modes is None:
-        return equation
-    count, case = whole("modes", modes, least=1), equation.case
-    if isinstance(guess, State):
-        return reduced(equation, count, guess.of_nodes("displacement", case.structure.nodes.shape))
-    return reduced(equation, count, equilibrium(case))
+def warn_of_errors(
+    orbits: Sequence[Orbit], harmonics: int, truncation: float, reduction: Any
+) -> None:
+    """Warn of motions that need more harmonics or modes, or pass through contacts.
 
-
-def frequency_of(balance: Balance, given: float | None) -> float:
-    """Frequency (Hz) of the drive: given, or of the case."""
-    own = balance.equation.drive.frequency
-    return own if given is None else number("frequency", given, above=0.0, unit="Hz")
-
-
-def warn_of_truncation(truncation: float, harmonics: int, field: str) -> None:
-    """Warn if a motion needs more harmonics."""
+    reduction : effects of the omitted dofs; None without `modes`.
+    """
     if truncation > TRUNCATED:
         warn(
-            f"{field} = {harmonics}: twice as many would change the motion by about "
+            f"harmonics = {harmonics}: twice as many would change the motion by about "
             f"{truncation:.1g} of it; give more",
             "nonlinear-vibration.md#one-motion",
         )
-
-
-def warn_of_reduction(reduction: Any) -> None:
-    """Warn if modes omit much of the motions, given their `reduction` or None."""
+    crossed = [f"{orbit.omega / TURN:.6g} Hz" for orbit in orbits if orbit.crosses()]
+    if crossed:
+        warn(
+            f"contact: the motion at {', '.join(crossed[:NAMED])} passes through what it touches, "
+            "so that it is not valid; give another guess, or give more harmonics",
+            "nonlinear-vibration.md#one-motion",
+        )
     most = 0.0 if reduction is None else float(np.max(reduction))
     if most > REDUCED:
         warn(
@@ -223,21 +237,10 @@ def warn_of_reduction(reduction: Any) -> None:
         )
 
 
-def warn_of_crossing(orbits: Sequence[Orbit]) -> None:
-    """Warn of motions that pass through contacts."""
-    crossed = [f"{orbit.omega / TURN:.6g} Hz" for orbit in orbits if orbit.crosses()]
-    if crossed:
-        warn(
-            f"contact: the motion at {', '.join(crossed[:NAMED])} passes through what it touches, "
-            "so that it is not valid; give another guess, or give more harmonics",
-            "nonlinear-vibration.md#one-motion",
-        )
-
-
 def _shot(
     balance: Balance, guess: Any, omega: float, steps: int, tolerance: float
-) -> tuple[Orbit, NDArray, int]:
-    """Motion by shooting from one of few harmonics, its multipliers, and the iterations spent."""
+) -> tuple[Orbit, int]:
+    """Motion by shooting from one of few harmonics, and the iterations spent."""
     equation, longer = balance.equation, balance.multiple
     few = Balance(equation, Fourier(min(balance.fourier.harmonics, FEW * longer)), longer)
     near = orbit_of(few, balanced(few, coefficients(few, guess, omega), omega, 1e-3).x, omega)
@@ -256,6 +259,150 @@ def _shot(
     size = np.linalg.norm(amplitudes, axis=1)
     tail = np.sqrt(np.cumsum(size[::-1] ** 2)[::-1])  # norm of each harmonic and all higher ones
     kept = max(int((tail > ROUNDING * tail[0]).sum()), 2)
-    orbit = Orbit(equation, amplitudes[:kept], omega, longer)
-    floquet = multipliers(equation, orbit.amplitudes, omega, longer, steps=steps)
-    return orbit, floquet, found.iterations
+    return Orbit(equation, amplitudes[:kept], omega, longer), found.iterations
+
+
+def still_case(case: Case) -> Case:
+    """The case without varying loads, its swinging supports held in place."""
+    loads = [load for load in case.loads if load.history == Constant()]
+    supports = []
+    for support in case.supports:
+        if getattr(support, "history", None) in (None, Constant()):
+            supports.append(support)
+        elif isinstance(support, Impose):
+            supports.append(replace(support, value=0.0, history=Constant()))
+    contact = case.contact
+    if contact is not None:
+        planes = [
+            plane
+            if plane.history in (None, Constant())
+            else replace(plane, motion=None, history=None)
+            for plane in contact.planes
+        ]
+        contact = replace(contact, planes=planes)
+    return case.altered(loads=loads, supports=supports, contact=contact)
+
+
+def equilibrium(case: Case) -> NDArray:
+    """Displacement (n, 3), m, under the constant loads, near rest."""
+    still = still_case(case)
+    if not drives(still, ()):
+        return np.zeros_like(case.structure.nodes)
+    return trace(still, "newton", load_factors=[0.0, 1.0])["displacement"].values[-1]
+
+
+def origin_of(case: Case, guess: Any) -> Origin | None:
+    """State of damping that is defined at the guess; None without such damping.
+
+    It is the state or the result from which the search begins, or the equilibrium.
+    """
+    if not case.damped_at_start:
+        return None
+    if isinstance(guess, State):
+        return guess.origin_of(case.structure.nodes.shape, field="guess")
+    found = initial.origin_of(guess, "guess: ") if isinstance(guess, xarray.Dataset) else None
+    return found or Origin(equilibrium(case))
+
+
+def coefficients(balance: Balance, guess: Any, omega: float, level: float = 1.0) -> NDArray:
+    """Initial coefficients (c, k): from a given motion, or of small motions about a state."""
+    equation = balance.equation
+    if isinstance(guess, xarray.Dataset):
+        return _of_result(balance, guess, level)
+    if guess is None:
+        place = equilibrium(equation.case)
+    else:
+        place = displacement_of(guess, equation.case, "guess", PLACES)
+    mean = equation.at(np.zeros(1), 0.0)
+    check_contact(equation.case, place, mean.planes[0])
+    x = np.zeros(balance.shape)
+    x[0] = equation.unknowns(place[None], mean)[0]
+    return x + linear_response(balance, x, omega, level)
+
+
+def linear_response(balance: Balance, x: NDArray, omega: float, level: float) -> NDArray:
+    """First Newton step (c, k) of small motions about a state, with slopes for soft hinges."""
+    equation, fourier = balance.equation, balance.fourier
+    still, little = (
+        balance.residual(x, omega, balance.instants(share * level)) for share in (0.0, LITTLE)
+    )
+    residual = still + (little - still) / LITTLE
+    u = equation.basis @ x[0] + equation.offset
+    tangent = equation.projected(equation.body.tangent(u, FLOOR))
+    w = omega / balance.multiple
+    amplitudes = fourier.complex_of(residual)
+    for j in range(len(amplitudes)):
+        matrix = tangent - (j * w) ** 2 * equation.mass + 1j * j * w * equation.damping
+        amplitudes[j] = np.linalg.lstsq(matrix, -amplitudes[j], rcond=None)[0]
+    return fourier.real_of(amplitudes)
+
+
+def _of_result(balance: Balance, guess: xarray.Dataset, level: float) -> NDArray:
+    """Coefficients (c, k) of a motion from an earlier result."""
+    found = guess.variables.get("coefficient")
+    n = len(balance.equation.case.structure.nodes)
+    if found is None or found.dims != ("harmonic", "node", "axis") or found.shape[1:] != (n, 3):
+        raise InputError(
+            f": must be {PLACES} of this case (of a curve one point, as curve.isel(point=3))",
+            "guess",
+        )
+    given, longer = np.asarray(found), balance.multiple
+    if not np.isfinite(given).all():
+        raise InputError(": its coefficients must be finite", "guess")
+    own = int(guess.get("periods", 1))
+    if own != longer:  # the same motion in a longer period
+        if longer % own:
+            raise InputError(
+                f": its period is {own} of the drive; give periods = {own}, or a multiple", "guess"
+            )
+        spread = np.zeros(((len(given) - 1) * (longer // own) + 1, n, 3), complex)
+        spread[:: longer // own] = given
+        given = spread
+    phase = balance.fourier.phase
+    at = balance.instants(level)
+    return balance.fourier.fit @ balance.equation.unknowns(values_of(given, phase), at)
+
+
+def balanced(
+    balance: Balance, x: NDArray, omega: float, tolerance: float, level: float = 1.0
+) -> Converged:
+    """The motion near coefficients (c, k), or the one that grows with the drive from rest.
+
+    Raises
+    ------
+    ComputationError
+        Neither is found.
+    """
+    found = newton(AtFrequency(balance, omega, level), x.ravel(), tolerance)
+    return _grown(balance, x, omega, tolerance, level) if found is None else found
+
+
+def _grown(balance: Balance, x: NDArray, omega: float, tolerance: float, level: float) -> Converged:
+    """Follow the motion from a small drive to the full one, around folds."""
+    family = ByLevel(balance, level, tolerance, omega / TURN)
+    still = np.zeros(balance.shape)
+    still[0] = x[0]
+    begin = (still + SMALL * (x - still)).ravel()
+    first, share = newton(AtFrequency(balance, omega, SMALL * level), begin, tolerance), 0.0
+    if first is not None:
+        spent, ahead = first.iterations, np.append(np.zeros(x.size), 1.0)
+        top = point_at(family, first.x, SMALL * level, ahead)  # point of the largest drive
+        for step in steps(family, top, GROWING, lambda point: point.p / level - 1.0):
+            if not isinstance(step, Step) or step.after.p < 0.0:
+                break
+            spent += step.after.iterations
+            top = max(top, step.after, key=lambda point: point.p)
+        found, share = newton(AtFrequency(balance, omega, level), top.z, tolerance), top.p / level
+        if found is not None:
+            return Converged(found.x, spent + found.iterations)
+    raise ComputationError(
+        f"frequency = {omega / TURN:g} Hz: no periodic motion is found; the search ends at "
+        f"{share:.2g} of the drive. Remedies: another guess (a motion at a frequency nearby, or a "
+        "State), fd.response_curve from a frequency off resonance, or more damping"
+    )
+
+
+def orbit_of(balance: Balance, x: NDArray, omega: float, level: float = 1.0) -> Orbit:
+    """Orbit of coefficients (c k,)."""
+    amplitudes = balance.fourier.complex_of(x.reshape(balance.shape))
+    return Orbit(balance.equation, amplitudes, omega, balance.multiple, level)

@@ -16,22 +16,20 @@ from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter, reporter
 from foldyn.errors import ComputationError, InputError, MotionInterrupted, warn
-from foldyn.periodic.about_rest import AboutRest
-from foldyn.periodic.balance import Balance
+from foldyn.periodic.balance import Balance, Fourier, values_of
+from foldyn.periodic.collocation import STEPS, is_stable
 from foldyn.periodic.continuation import LOST, Point, Step, Stride, corrected, point_at, steps
 from foldyn.periodic.equation import Equation
-from foldyn.periodic.families import Free, InResonance
-from foldyn.periodic.floquet import STEPS, is_stable, multipliers
-from foldyn.periodic.fourier import Fourier, values_of
+from foldyn.periodic.families import AboutRest, Free, InResonance
 from foldyn.periodic.motion import (
+    FLOOR,
     balance_of,
-    on_modes,
-    warn_of_crossing,
-    warn_of_reduction,
-    warn_of_truncation,
+    balanced,
+    equilibrium,
+    linear_response,
+    warn_of_errors,
 )
 from foldyn.periodic.orbit import SHOWN, Orbit, along
-from foldyn.periodic.start import FLOOR, balanced, equilibrium, linear_response
 from foldyn.ram_limit import check_memory
 from foldyn.results.periodic_dataset import points_dataset
 from foldyn.statics.tracing import displacement_of
@@ -148,16 +146,13 @@ def backbone(
     stride = Stride(FIRST * longest, longest, whole("most_points", most_points, least=2))
     tolerance = number("tolerance", tolerance, above=0.0, below=1.0)
     damped = flag("damped", damped)
-    if damped:
-        balance = balance_of(case, "fd.backbone", harmonics, modes=modes, guess=state)
-        if not balance.equation.damping.any():
-            raise InputError(
-                ": nothing damps the sheet, which in resonance swings without bound; give the case "
-                "damping, or leave damped out",
-                "damped",
-            )
-    else:
-        balance = _undamped(case, whole("harmonics", harmonics, least=1), modes, state)
+    balance = balance_of(case, "fd.backbone", harmonics, modes=modes, guess=state, driven=damped)
+    if damped and not balance.equation.damping.any():
+        raise InputError(
+            ": nothing damps the sheet, which in resonance swings without bound; give the case "
+            "damping, or leave damped out",
+            "damped",
+        )
     with balance.threads:
         place, frequency, shape = _mode(balance.equation, state, mode)
         begin = _resonant if damped else _free
@@ -190,23 +185,13 @@ def backbone(
         values |= along(orbits)
         values["frequency"] = np.array([orbit.omega / TURN for orbit in orbits])
         values["amplitude"] = np.array([_largest(orbit, place) for orbit in orbits])
-    warn_of_truncation(float(values["truncation"].max()), balance.fourier.harmonics, "harmonics")
-    warn_of_crossing(orbits)
-    warn_of_reduction(values.get("reduction"))
+    truncation = float(values["truncation"].max())
+    warn_of_errors(orbits, balance.fourier.harmonics, truncation, values.get("reduction"))
     facts["wall_seconds"] = time.perf_counter() - began
     found = points_dataset("backbone", case, values, facts, origin=balance.equation.origin)
     if interrupted:
         raise MotionInterrupted(f"interrupted after {len(kept)} points", found)
     return found
-
-
-def _undamped(case: Case, harmonics: int, modes: int | None, state: Any) -> Balance:
-    """Balance of the undamped case without drive, with an even series."""
-    equation = on_modes(Equation(case, "fd.backbone", driven=False), modes, state)
-    fourier, size = Fourier(harmonics, even=True), (harmonics + 1) * equation.size
-    needed = fourier.memory(equation.size)
-    check_memory("harmonics", f"a matrix of {size} unknowns", needed, "take fewer")
-    return Balance(equation, fourier)
 
 
 def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, NDArray]:
@@ -375,12 +360,7 @@ def _values(orbits: list[Orbit], place: NDArray) -> dict[str, Any]:
 
 def _damped_values(orbits: list[Orbit]) -> dict[str, Any]:
     """Levels, multipliers and stability of motions in phase resonance."""
-    floquet = np.array(
-        [
-            multipliers(one.equation, one.amplitudes, one.omega, level=one.level, steps=STEPS)
-            for one in orbits
-        ]
-    )
+    floquet = np.array([orbit.multipliers(STEPS) for orbit in orbits])
     return {
         "level": np.array([orbit.level for orbit in orbits]),
         "floquet": floquet,

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from foldyn.attractors.run import Stretch, measured, swing
 from foldyn.mechanics.contact.term import ContactTerm
-from foldyn.periodic.balance import Balance
+from foldyn.periodic.balance import Balance, Fourier, values_of
+from foldyn.periodic.collocation import multipliers
 from foldyn.periodic.equation import Equation
-from foldyn.periodic.fourier import Fourier, values_of
 from foldyn.results import Quantity
 from foldyn.results.crossings import crossings_of
 
@@ -85,6 +85,12 @@ class Orbit:
             for here, step, moved, moves in parts
         )
 
+    def multipliers(self, steps: int) -> NDArray:
+        """Floquet multipliers (2k,), the largest first, from steps in a period of the drive."""
+        return multipliers(
+            self.equation, self.amplitudes, self.omega, self.multiple, self.level, steps
+        )
+
     def truncation(self) -> float:
         """Estimated effect of twice as many harmonics, as a fraction of the motion.
 
@@ -100,12 +106,9 @@ class Orbit:
         missing = fourier.complex_of(left)[kept + 1 :]
         few = equation.at(self.multiple * fourier.phase[::4], self.level)
         mean = few.tangents(fourier.values[::4] @ x).mean(axis=0)
-        w, added = self.omega / self.multiple, 0.0
-        for j, left in enumerate(missing, kept + 1):
-            matrix = mean - (j * w) ** 2 * equation.mass + 1j * j * w * equation.damping
-            added += float(np.linalg.norm(np.linalg.solve(matrix, left)) ** 2)
+        added = equation.responses(mean, self.omega / self.multiple, missing, kept + 1)
         size = float(np.linalg.norm(self.amplitudes[1:]))
-        return np.sqrt(added) / size if size else 0.0
+        return float(np.linalg.norm(added)) / size if size else 0.0
 
     def reduction(self) -> float:
         """Estimated effect of the omitted unknowns, as a fraction of the motion; see `truncation`.
@@ -122,13 +125,8 @@ class Orbit:
         x = fourier.fit @ states
         left = fourier.complex_of(balance.residual(x, self.omega, at))
         few = whole.at(self.multiple * phase[::4], self.level)
-        mean, w = few.tangents(states[::4]).mean(axis=0), self.omega / self.multiple
-        added = np.array(
-            [
-                np.linalg.solve(mean - (j * w) ** 2 * whole.mass + 1j * j * w * whole.damping, one)
-                for j, one in enumerate(left)
-            ]
-        )
+        mean = few.tangents(states[::4]).mean(axis=0)
+        added = whole.responses(mean, self.omega / self.multiple, left, 0)
         return float(np.linalg.norm(added) / np.linalg.norm(fourier.complex_of(x)[1:]))
 
 

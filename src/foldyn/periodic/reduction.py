@@ -20,8 +20,7 @@ from scipy.linalg import cho_factor, cho_solve, eigh
 
 from foldyn.cases.contact_checks import check_contact
 from foldyn.errors import ComputationError, InputError
-from foldyn.periodic.equation import Equation, Instants
-from foldyn.periodic.tangents import Tangents
+from foldyn.periodic.equation import Equation, Instants, Tangents
 
 PROBE = 1e-3  # of the sheet's size: step of the largest node for derivatives
 LITTLE = 1e-4  # of the drive, for its static response

@@ -1,11 +1,17 @@
-"""`response_curve`: periodic motions along the frequency or the amplitude of the drive."""
+"""`response_curve`: periodic motions along the frequency or the amplitude of the drive.
+
+Bifurcations between two points of the curve are detected, located and named. As the parameter
+changes, multipliers cross the unit circle at 1 (fold, or pitchfork if another branch crosses), at
+-1 (period doubling) or in complex pairs (Neimark-Sacker): Kuznetsov, Elements of Applied
+Bifurcation Theory, 3rd ed. 2004, chapters 4 and 5.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +21,8 @@ from foldyn.cases import Case, State
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter, reporter
 from foldyn.errors import InputError, MotionInterrupted, warn
-from foldyn.periodic.balance import Balance
-from foldyn.periodic.bifurcations import DOUBLING, FOLD, PITCHFORK, Event, events
+from foldyn.periodic.balance import Balance, Fourier
+from foldyn.periodic.collocation import STEPS, is_stable
 from foldyn.periodic.continuation import (
     LONG,
     LOST,
@@ -24,21 +30,13 @@ from foldyn.periodic.continuation import (
     Step,
     Stride,
     branch_point,
+    located,
     point_at,
     steps,
 )
 from foldyn.periodic.families import ByFrequency, ByLevel
-from foldyn.periodic.floquet import STEPS, is_stable, multipliers
-from foldyn.periodic.fourier import Fourier
-from foldyn.periodic.motion import (
-    NAMED,
-    balance_of,
-    warn_of_crossing,
-    warn_of_reduction,
-    warn_of_truncation,
-)
+from foldyn.periodic.motion import NAMED, balance_of, balanced, coefficients, warn_of_errors
 from foldyn.periodic.orbit import along, amplitude
-from foldyn.periodic.start import balanced, coefficients
 from foldyn.results import Quantity
 from foldyn.results.periodic_dataset import points_dataset
 from foldyn.values import number, numbers, of_kind, show, whole
@@ -51,6 +49,11 @@ AWAY = 0.05  # of the motion: distance at which a branch is entered
 APART = 1e-2  # least distance from 1 of the multipliers at a spurious fold
 LARGEST = "largest displacement"  # of any node along an axis: shown without a measure
 MEETS = 1e-4  # of the range of the parameter: distance below which branches meet at one point
+FOLD, PITCHFORK = "fold", "pitchfork"
+DOUBLING, TORUS = "period doubling", "Neimark-Sacker"
+SURE = {FOLD: 1e-6, PITCHFORK: 1e-3, DOUBLING: 1e-3, TORUS: 1e-3}
+"""How close to zero the test function of a bifurcation must come."""
+REAL = 1e-9  # largest imaginary part of a real multiplier
 
 
 @dataclass(eq=False)
@@ -219,13 +222,6 @@ class _Tracer:
         ahead = np.append(np.zeros(len(z)), np.sign(self.ends[1] - self.ends[0]))
         return point_at(family, z, p, ahead)
 
-    def multipliers(self, family: Any, point: Point) -> NDArray:
-        """Floquet multipliers of a point."""
-        orbit = family.orbit(point.z, point.p)
-        return multipliers(
-            orbit.equation, orbit.amplitudes, orbit.omega, orbit.multiple, orbit.level, self.count
-        )
-
     def follow(
         self, family: Any, first: Point, depth: int, report: Reporter, origin: Point | None = None
     ) -> None:
@@ -238,7 +234,7 @@ class _Tracer:
 
         def of(point: Point) -> NDArray:
             if id(point) not in known:
-                known[id(point)] = point, self.multipliers(family, point)
+                known[id(point)] = point, family.orbit(point.z, point.p).multipliers(self.count)
             return known[id(point)][1]
 
         def keep(point: Point, name: str = "") -> None:
@@ -358,9 +354,8 @@ def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
     }
     _warn_of_folds(tracer.found)
     harmonics = tracer.found[0].family.balance.fourier.harmonics
-    warn_of_truncation(float(values["truncation"].max()), harmonics, "harmonics")
-    warn_of_crossing(orbits)
-    warn_of_reduction(values.get("reduction"))
+    truncation = float(values["truncation"].max())
+    warn_of_errors(orbits, harmonics, truncation, values.get("reduction"))
     facts = {
         "by": tracer.by,
         "harmonics": harmonics,
@@ -372,3 +367,67 @@ def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
     units = "m" if measure is None else measure.units
     origin = orbits[0].equation.origin
     return points_dataset("response_curve", case, values, facts, units, origin)
+
+
+class Event(NamedTuple):
+    """A bifurcation and its location."""
+
+    name: str
+    point: Point
+
+
+Found = NDArray[np.complex128]
+Multipliers = Callable[[Point], Found]
+
+
+def events(family: Any, step: Step, of: Multipliers) -> list[Event]:
+    """Bifurcations within a step, in order along it.
+
+    of : multipliers (2k,) of a point.
+    """
+    one, other = step.before, step.after
+    found: list[tuple[str, Callable[[Point], float]]] = []
+    if one.side != other.side:
+        found.append((PITCHFORK, lambda point: point.side * _nearest(of(point), 1.0)))
+    elif one.tangent[-1] * other.tangent[-1] < 0.0:
+        found.append((FOLD, lambda point: float(point.tangent[-1])))
+    if _parity(of(one)) != _parity(of(other)):
+        found.append((DOUBLING, lambda point: _parity(of(point)) * _nearest(of(point), -1.0)))
+    moduli = _moduli(of(one)), _moduli(of(other))
+    counts = [int((pairs > 1.0).sum()) for pairs in moduli]
+    # a pair that crosses has not met on the real axis: it exists at both ends
+    if counts[0] != counts[1] and min(map(len, moduli)) >= max(counts):
+        found.append((TORUS, lambda point: _modulus(_moduli(of(point)), max(counts)) - 1.0))
+    events = []
+    for name, value in found:
+        point = located(family, one, other, step.length, value)
+        if abs(value(point)) <= SURE[name]:  # pairs may meet on the real axis instead
+            events.append((name, point))
+    along = [_along(one, point) for _, point in events]
+    return [Event(*events[k]) for k in np.argsort(along, kind="stable")]
+
+
+def _along(one: Point, point: Point) -> float:
+    return float(np.append(point.z - one.z, point.p - one.p) @ one.tangent)
+
+
+def _nearest(found: Found, value: float) -> float:
+    """Distance of the nearest real multiplier from a value; of any multiplier if none is real."""
+    real = found[np.abs(found.imag) <= REAL].real
+    return float(np.abs((real if len(real) else found) - value).min())
+
+
+def _parity(found: Found) -> float:
+    """Sign of det(monodromy + 1): -1 with an odd number of multipliers below -1."""
+    real = found[np.abs(found.imag) <= REAL].real
+    return -1.0 if np.count_nonzero(real < -1.0) % 2 else 1.0
+
+
+def _moduli(found: Found) -> NDArray:
+    """Moduli of the multipliers with a positive imaginary part, the largest first."""
+    return -np.sort(-np.abs(found[found.imag > REAL]))
+
+
+def _modulus(moduli: NDArray, place: int) -> float:
+    """Modulus at a place, counted from 1; 0 if there are fewer."""
+    return float(moduli[place - 1]) if len(moduli) >= place else 0.0

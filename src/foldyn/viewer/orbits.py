@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from foldyn.periodic.fourier import Fourier, values_of
+from foldyn.periodic.balance import Fourier, values_of
 from foldyn.viewer.arrays import Arrays
 
 OF_MOTIONS = 1e-4
