@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import foldyn as fd
 from foldyn.algebra.extrapolation import convergence
 from foldyn.errors import FoldynWarning
-from foldyn.linear.pairing import pairs
+from foldyn.linear.mac import pairs
 from foldyn.linear.reference import MeshModes, mesh_modes, same_modes
 from foldyn.patterns import Pattern
 

@@ -15,7 +15,7 @@ from foldyn import plots
 from foldyn.analyses.bands import BandsAnalysis
 from foldyn.analyses.reading import case_of_document, read_as
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear.band_gaps import legs
+from foldyn.linear.band_structure import legs
 from foldyn.live.case_session import computed, offered
 from foldyn.report.album import Album
 from foldyn.report.sections import Picture

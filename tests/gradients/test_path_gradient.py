@@ -12,8 +12,7 @@ from scipy.sparse.linalg import splu
 
 import foldyn as fd
 from foldyn.errors import InputError
-from foldyn.gradients import equilibrium
-from foldyn.gradients.equilibrium import Balance
+from foldyn.gradients.path import Balance
 from foldyn.statics import landscape
 from foldyn.sweeps.measures import MEASURES
 
@@ -137,7 +136,7 @@ def test_numbers_of_one_equilibrium_share_the_factors(monkeypatch: pytest.Monkey
         count.append(1)
         return splu(block)
 
-    monkeypatch.setattr(equilibrium, "splu", factorized)
+    monkeypatch.setattr("foldyn.gradients.path.splu", factorized)
     measures = [f"displacement[{TIP},{axis}]" for axis in "xyz"]
     fd.sensitivity(
         tower,

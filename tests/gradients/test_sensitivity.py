@@ -10,8 +10,7 @@ from differences import Design
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.gradients.numbers import numbers_of
-from foldyn.gradients.parameters import Columns, Parameters, Slope
+from foldyn.gradients.parameters import Columns, Parameters, Slope, numbers_of
 from foldyn.mechanics.pullback import Arrays
 
 MODES = {"kind": "modes", "count": 3}

@@ -12,8 +12,7 @@ import foldyn as fd
 from foldyn.dynamics import modal_damping
 from foldyn.errors import InputError
 from foldyn.linear import linearize
-from foldyn.linear.matched import matched
-from foldyn.linear.reference import elastic, modes_at_rest, reference_modes
+from foldyn.linear.reference import elastic, matched, modes_at_rest, reference_modes
 from foldyn.structures.bars_plates import BarsPlatesTerm
 from foldyn.structures.panel_modes import TURNS
 

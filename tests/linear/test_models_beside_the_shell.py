@@ -11,11 +11,9 @@ import pytest
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import fidelity as compare_models
-from foldyn.linear.advice import SCOPE, percent, reach
-from foldyn.linear.compared import legend
-from foldyn.linear.fidelity import MODELS, comparison
+from foldyn.linear.compared import SCOPE, legend, percent, reach
+from foldyn.linear.fidelity import MODELS, comparison, forces_alone, rest_forces, small_loads
 from foldyn.linear.shell_of import meshes, shell_of, triangle_count
-from foldyn.linear.small_loads import forces_alone, rest_forces, small_loads
 from foldyn.results import fidelity_dataset
 from pairwise import beyond
 from verification.fidelity.compare import RESULTS, read

@@ -7,7 +7,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.errors import InputError
-from foldyn.linear.band_gaps import ALL
+from foldyn.linear.band_structure import ALL
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.linear.pairing import likeness, pairs
-from foldyn.linear.small_loads import small_loads
+from foldyn.linear.fidelity import small_loads
+from foldyn.linear.mac import likeness, pairs
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
 from foldyn.studies.herkal.stiffnesses import softness
 from pairwise import beyond

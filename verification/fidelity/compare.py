@@ -12,8 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from foldyn.errors import FoldynWarning
-from foldyn.linear.matched import SPARE, Shown, matched
-from foldyn.linear.reference import DIVISIONS, Reference, modes_at_rest, reference_modes
+from foldyn.linear.reference import (
+    DIVISIONS,
+    SPARE,
+    Reference,
+    Shown,
+    matched,
+    modes_at_rest,
+    reference_modes,
+)
 from foldyn.shells import shell
 from foldyn.structures import Structure, discretize
 from foldyn.structures.plate_frequency import BELOW, plate_frequency

@@ -25,7 +25,8 @@ from foldyn.cases import Case, Force, State
 from foldyn.dynamics import simulate
 from foldyn.errors import ComputationError, FoldynWarning, InstabilityError, PenetrationError
 from foldyn.linear import linearize, mac, modes
-from foldyn.linear.reference import DIVISIONS, elastic, modes_at_rest
+from foldyn.linear.reference import elastic, modes_at_rest
+from foldyn.linear.shell_of import DIVISIONS
 from foldyn.patterns import Pattern
 from foldyn.patterns.geometry import face_geometry
 from foldyn.patterns.topology import Edge

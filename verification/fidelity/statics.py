@@ -14,8 +14,7 @@ from foldyn.analyses import read_case
 from foldyn.cases import Case, Fix, Force, Impose
 from foldyn.errors import FoldynWarning
 from foldyn.linear import modes
-from foldyn.linear.fidelity import MODELS
-from foldyn.linear.small_loads import small_loads
+from foldyn.linear.fidelity import MODELS, small_loads
 from foldyn.patterns import Pattern, miura
 from foldyn.shells import shell
 from foldyn.statics import trace

@@ -24,7 +24,7 @@ from foldyn.cases import Case
 from foldyn.cases.loads import Actuate
 from foldyn.errors import InputError
 from foldyn.linear import UnitCell, attenuation, band_gaps, bands, damped_bands, modes
-from foldyn.linear.band_gaps import ALL
+from foldyn.linear.band_structure import ALL
 from foldyn.patterns.screw import Screw
 from foldyn.report.album import Album, ByRule, by_mass_rule
 from foldyn.report.sections import Heading, Table

@@ -18,8 +18,7 @@ from foldyn.cases import Case
 from foldyn.cases.models import SHELL
 from foldyn.errors import InputError
 from foldyn.linear import Fidelity, fidelity
-from foldyn.linear.advice import percent
-from foldyn.linear.compared import legend
+from foldyn.linear.compared import legend, percent
 from foldyn.linear.fidelity import MODELS, comparison, named
 from foldyn.linear.shell_of import checked_divisions
 from foldyn.report.album import Album, ByRule

@@ -48,7 +48,7 @@ from foldyn.report.album import (
 from foldyn.report.sections import Charts, Heading, Picture, Section, Table, Text, cell
 from foldyn.statics import METHODS, Landscape, Point, Settings, landscape, trace
 from foldyn.statics.newton import settings_of
-from foldyn.statics.reached import UNTIL, Reached
+from foldyn.statics.tracing import UNTIL, Reached
 from foldyn.tables import ListOf, TableOf
 from foldyn.values import indices, number, number_or_list, show
 

@@ -13,7 +13,7 @@ import numpy as np
 from foldyn.arguments import arguments
 from foldyn.cases import Contact, History
 from foldyn.cases.units import units
-from foldyn.linear.advice import percent
+from foldyn.linear.compared import percent
 from foldyn.linear.reference import NO_LIMIT
 from foldyn.materials.law import Law
 from foldyn.plots.load_curves import history_name

@@ -1,31 +1,41 @@
-"""`basins`: where motions from a grid of starts end."""
+"""`basins`: where motions from a grid of starts end.
+
+The ends can be stored in a folder, so that an interrupted grid can continue.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import itertools
+import json
 import math
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn import writing
 from foldyn.attractors.diagram import repeats_after
 from foldyn.attractors.drive import drive_frequency
-from foldyn.attractors.kept import KeptEnds
 from foldyn.attractors.run import PER_PERIOD, check_relaxing, divisor, step_of
 from foldyn.cases import Case, State
+from foldyn.cases.document import to_document
 from foldyn.dynamics import initial_state, prepare, simulate_many
 from foldyn.dynamics.ensemble import device_for
 from foldyn.dynamics.gpu.choice import DEVICES
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.errors import InputError, told_once, warn
+from foldyn.program import program
 from foldyn.ram_limit import check_memory
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import PLACE, variable
+from foldyn.results.seal import seal, sound
+from foldyn.store import Store, name_of
 from foldyn.values import choice, number, numbers, of_kind, show, whole
 
 if TYPE_CHECKING:
@@ -293,9 +303,9 @@ def _size(
     if not len(every):
         return 0.0
     size = float(np.ptp(every[:, :-1, 0], axis=(0, 1)).max())
-    whole = float(np.ptp(every, axis=(0, 1)).max())
-    if not driven or size < same * whole:
-        size = whole
+    widest = float(np.ptp(every, axis=(0, 1)).max())
+    if not driven or size < same * widest:
+        size = widest
     return max(size, LEAST * float(case.structure.bar_length.max()))
 
 
@@ -329,3 +339,84 @@ def told_apart(
             kept.append(k)
             periods.append(repeats)
     return label, kept, periods
+
+
+class KeptEnds:
+    """Ends of motions, each batch stored in a file of its own.
+
+    Parameters
+    ----------
+    folder : path or None
+        Folder of the files; None stores nothing.
+    case : Case
+    how : mapping
+        All else that the ends depend on, as JSON data.
+
+    Raises
+    ------
+    InputError
+        The case cannot be written down, so that stored ends might belong to another one.
+    """
+
+    def __init__(
+        self, folder: str | os.PathLike[str] | None, case: Case, how: Mapping[str, Any]
+    ) -> None:
+        self._folder = None
+        if folder is None:
+            return
+        if not isinstance(folder, str | os.PathLike):
+            raise InputError(f" = {show(folder)}: give the path of a folder", "folder")
+        document = to_document(case)
+        if document.obstacles:
+            raise InputError(
+                f": nothing of this case can be kept: {document.obstacles[0]}; leave it out",
+                "folder",
+            )
+        arrays = {name: _digest([array]) for name, array in document.arrays.items()}
+        self._about = {
+            "program": program("attractors"), "case": document.sections, "arrays": arrays, **how,
+        }  # fmt: skip
+        self._folder = writing.made_folder(folder)
+
+    def of(self, starts: Sequence[State], compute: Callable[[], NDArray]) -> NDArray[np.float64]:
+        """Ends of motions from some starts, stored or computed."""
+        if self._folder is None:
+            return compute()
+        numbers = [
+            part
+            for one in starts
+            for part in (one.displacement, one.velocity, one.origin and one.origin.displacement)
+        ]
+        about = json.loads(json.dumps({**self._about, "starts": _digest(numbers)}, default=str))
+        name = name_of(about)
+        file = self._folder / f"{name}.npz"
+        found = _KEPT.find(file, name)
+        if found is None:
+            found = compute()
+            _KEPT.keep(file, name, found)
+        return found
+
+
+def _digest(arrays: Sequence[Any]) -> str:
+    """Digest of arrays, some of which may be None."""
+    found = hashlib.sha256()
+    for array in arrays:
+        values = np.zeros(0) if array is None else np.ascontiguousarray(array)
+        found.update(f"{values.dtype}{values.shape}".encode() + values.tobytes())
+    return found.hexdigest()
+
+
+def _read(file: Path) -> tuple[str, NDArray[np.float64]]:
+    if not sound(file):
+        raise ValueError
+    with np.load(file) as kept:
+        return str(kept["stamp"]), kept["ends"]
+
+
+def _write(file: Path, stamp: str, ends: NDArray[np.float64]) -> None:
+    with writing.whole(file) as part:
+        np.savez(part, stamp=np.array(stamp), ends=ends)
+        seal(part)
+
+
+_KEPT: Store[NDArray[np.float64]] = Store(_read, _write, warns=False)

@@ -14,8 +14,7 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.gradients.expressions import Expression
 from foldyn.gradients.measures import Derivative, Seeds
-from foldyn.gradients.numbers import Gradient
-from foldyn.gradients.parameters import SHORTER, Parameters
+from foldyn.gradients.parameters import SHORTER, Gradient, Parameters
 from foldyn.mechanics.pullback import Arrays
 from foldyn.sweeps.measure import Asked
 

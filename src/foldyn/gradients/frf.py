@@ -26,7 +26,7 @@ from foldyn.cases import Case, Rayleigh, State
 from foldyn.cases.directions import AXES
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.gradients.linearized import Products, refuse
-from foldyn.gradients.numbers import Gradient, numbers_of
+from foldyn.gradients.parameters import Gradient, numbers_of
 from foldyn.linear.excitation import drive_of, drive_terms
 from foldyn.linear.frequency_domain import dynamic_stiffness
 from foldyn.linear.frf import frf, quantity_of

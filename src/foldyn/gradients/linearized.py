@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.dynamics.modal_damping import soft_at_rest
-from foldyn.gradients.equilibrium import Balance
-from foldyn.gradients.numbers import nothing
+from foldyn.gradients.parameters import nothing
+from foldyn.gradients.path import Balance
 from foldyn.linear.linearized import Linearized
 from foldyn.materials import HingeLaw
 from foldyn.materials.series import in_series

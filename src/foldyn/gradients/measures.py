@@ -13,7 +13,7 @@ from foldyn.cases import Case
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.gradients.expressions import TIE
-from foldyn.gradients.numbers import Gradient
+from foldyn.gradients.parameters import Gradient
 from foldyn.linear.frf import quantity_of
 from foldyn.signals.peaks import magnitude_curve
 from foldyn.statics import Equilibrium, Landscape

@@ -28,7 +28,7 @@ from scipy.sparse.linalg import splu
 from foldyn.cases import Case, Rayleigh
 from foldyn.errors import InputError
 from foldyn.gradients.linearized import Products, refuse
-from foldyn.gradients.numbers import Gradient, numbers_of
+from foldyn.gradients.parameters import Gradient, numbers_of
 from foldyn.linear.modes import nodes_translated, spectrum_of, unit_translations
 from foldyn.mechanics.pullback import Arrays
 from foldyn.statics.stability import oriented

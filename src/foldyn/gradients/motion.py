@@ -17,7 +17,7 @@ from foldyn.dynamics.methods import with_mass
 from foldyn.dynamics.runge_kutta_adjoint import RungeKuttaAdjoint, segment
 from foldyn.dynamics.system import pack
 from foldyn.errors import InputError
-from foldyn.gradients.numbers import Gradient, numbers_of_motion
+from foldyn.gradients.parameters import Gradient, numbers_of_motion
 from foldyn.mechanics.pullback import Arrays
 
 KNOWN = ("displacement", "velocity")

@@ -27,8 +27,7 @@ from foldyn.gradients.frf import FrfGradient
 from foldyn.gradients.measures import Derivative, Seeds, derivative_of, one_number
 from foldyn.gradients.modes import ModesGradient
 from foldyn.gradients.motion import MotionGradient
-from foldyn.gradients.numbers import Gradient
-from foldyn.gradients.parameters import Parameters, Slope, Values, checked
+from foldyn.gradients.parameters import Gradient, Parameters, Slope, Values, checked
 from foldyn.gradients.path import PathGradient
 from foldyn.input_files import path_of
 from foldyn.linear import frf, modes

@@ -1,13 +1,11 @@
 """Small vibrations about an equilibrium: modes and frequency response."""
 
 from foldyn.linear.absorbing_ends import LongWaves, absorbing_end, long_waves
-from foldyn.linear.band_gaps import band_gaps
-from foldyn.linear.band_structure import bands
+from foldyn.linear.band_structure import band_gaps, bands, damped_bands
 from foldyn.linear.cell_equilibrium import relaxed
 from foldyn.linear.cell_motions import space_time, transmission, wave_spectrum
 from foldyn.linear.character import character
 from foldyn.linear.compared import ComparedMode, Fidelity
-from foldyn.linear.damped_bands import damped_bands
 from foldyn.linear.evanescent import attenuation
 from foldyn.linear.fidelity import fidelity
 from foldyn.linear.frequency_domain import Modal
@@ -17,8 +15,8 @@ from foldyn.linear.linearized import Linearized, equivalent_slope, linearize
 from foldyn.linear.mac import Pairs, mac, pair_modes
 from foldyn.linear.modes import modes
 from foldyn.linear.peaks_of import Peak, peaks_of
-from foldyn.linear.refinement import Refinement, refinement
-from foldyn.linear.stepped_sine import SteppedSine
+from foldyn.linear.reference import Refinement, refinement
+from foldyn.linear.time_domain import SteppedSine
 from foldyn.linear.transients import BurstRandom, Impulse
 from foldyn.linear.unit_cell import UnitCell
 

@@ -23,10 +23,9 @@ from foldyn.cases import Case, Dashpot, State
 from foldyn.cases.selection import Nodes, resolve_nodes
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.bloch import Bloch, null_space
-from foldyn.linear.group_velocity import Waves
 from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.unit_cell import UnitCell
-from foldyn.linear.wave_solver import WaveSolver
+from foldyn.linear.wave_solver import Waves, WaveSolver
 from foldyn.values import numbers, of_kind, vector
 
 PHASE = 1e-3  # rad per cell: a long wave

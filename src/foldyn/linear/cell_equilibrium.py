@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from foldyn.cases import State
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.cell_patch import cell_patch
-from foldyn.linear.cell_reach import CellReach
-from foldyn.linear.linearized_cell import ROUNDING, deformed_motions, folded_body, spread
+from foldyn.linear.linearized_cell import ROUNDING, CellReach, deformed_motions, folded_body, spread
 from foldyn.linear.unit_cell import UnitCell, check_commuting, images
 from foldyn.patterns.screw import Screw, of_twist, translation
 from foldyn.statics.tracing import displacement_of

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from textwrap import fill
 from typing import NamedTuple
@@ -12,13 +13,176 @@ import numpy as np
 import xarray
 
 from foldyn.errors import InputError
-from foldyn.linear.advice import OWN, advice, percent
-from foldyn.linear.matched import LEAST
+from foldyn.linear.reference import LEAST, NO_LIMIT
 from foldyn.values import choice
 
 ABREAST, WIDE = 4, 79  # models side by side in plain text, and characters of a line
 
 __all__ = ["OWN", "ComparedMode", "Fidelity"]
+OWN = "own"
+"""Name of the case's own model."""
+GOOD, LARGEST = 0.02, 0.10  # errors: of a model that is kept, and of one that can be used
+MESH = 0.02  # mesh error above which it is mentioned
+SHELL = " (--model shell on the command line, fd.shell)"
+SCOPE = (
+    "Only small vibrations about rest and small loads were compared: motions and loads that turn "
+    "creases far are not covered."
+)
+
+
+class Reach(NamedTuple):
+    """Range in which a model follows the shell: the lowest modes with errors of at most 10 %.
+
+    Attributes
+    ----------
+    model : str
+    count : int
+        Number of these modes.
+    worst : float
+        Largest error among them; infinite without any.
+    """
+
+    model: str
+    count: int
+    worst: float
+
+
+def advice(result: xarray.Dataset) -> str:
+    """Advice in sentences from a comparison; see `foldyn.fidelity`."""
+    return " ".join(_sentences(result))
+
+
+def percent(value: float) -> str:
+    """Format a fraction with its sign: "+2.1 %", "-34 %"."""
+    return f"{100.0 * value:+.{0 if abs(value) >= 0.1 else 1}f} %"
+
+
+def size(value: float) -> str:
+    """Format the size of a fraction, without a sign."""
+    return percent(abs(value))[1:]
+
+
+def _sentences(result: xarray.Dataset) -> Iterator[str]:
+    """Sentences of the advice, in order."""
+    frequency, limit = result["frequency"].values, float(result.attrs["limit"])
+    below = int((frequency < limit).sum())
+    reaches = [reach(result, model, below) for model in result["model"].values.tolist()]
+    own, best = reaches[0], min(reaches, key=lambda one: (-one.count, one.worst))
+    if own.count == best.count and own.worst <= max(GOOD, best.worst):
+        best = own
+    if below:
+        yield from _vibrations(result, below, best)
+    else:
+        yield (
+            f"The lowest mode of the shell, {frequency[0]:.4g} Hz, lies above {limit:.4g} Hz, 0.6 "
+            "of the plate frequency: panels vibrate as plates there, which bars and hinges do not. "
+            f"Take the shell{SHELL}."
+        )
+    if "deflection" in result:
+        yield _statics(result, best)
+    yield from _mesh(result, below)
+    yield SCOPE
+
+
+def _vibrations(result: xarray.Dataset, below: int, best: Reach) -> Iterator[str]:
+    """Sentences on the modes below the limit, for the recommended model."""
+    frequency, limit = result["frequency"].values, float(result.attrs["limit"])
+    if not best.count:
+        yield (
+            f"No model has the lowest mode, {frequency[0]:.4g} Hz, within {size(LARGEST)} of the "
+            f"shell: take the shell{SHELL}."
+        )
+    else:
+        top, whole = float(frequency[best.count - 1]), best.count == below
+        upto = f"{top:.4g} Hz"
+        if whole and below < len(frequency):
+            upto = f"{limit:.4g} Hz, 0.6 of the plate frequency"
+        elif whole:
+            upto += ", the highest mode compared"
+        ratio = float(result["cost_ratio"].sel(model=best.model))
+        yield (
+            f"{_called(result, best.model)} is within {size(best.worst)} of the shell up to "
+            f"{upto}, at 1/{ratio:.0f} of its cost{'' if best.model == OWN else ': use it'}."
+        )
+        if not whole:
+            yield (
+                f"The next mode, {frequency[best.count]:.4g} Hz, {_missed(result, best)}: take the "
+                f"shell from there{SHELL}."
+            )
+    if best.model != OWN:
+        yield from _own(result, below)
+
+
+def _own(result: xarray.Dataset, below: int) -> Iterator[str]:
+    """Errors of the case's own model below the limit."""
+    error = np.abs(result["error"].sel(model=OWN).values[:below])
+    lost = int(np.isinf(error).sum())
+    parts = []
+    if lost < below:
+        parts.append(f"is off by up to {size(float(error[np.isfinite(error)].max()))}")
+    if lost:
+        parts.append(f"has no partner of {lost} of {below} modes")
+    yield f"{_called(result, OWN)} {' and '.join(parts)} there."
+    soft = int(result["soft_hinges"].sel(model=OWN))
+    if soft:
+        yield (
+            f"{soft} of its hinges are superlinear and have no stiffness at rest: take linear "
+            "bends, or judge it with a secant amplitude (secant = 1, in degrees)."
+        )
+
+
+def _statics(result: xarray.Dataset, best: Reach) -> str:
+    """Displacements of the recommended model, and of the case's own."""
+    errors = result["deflection_error"]
+    told = {one: float(errors.sel(model=one)) for one in dict.fromkeys([best.model, OWN])}
+    texts = (
+        f"{percent(error)} ({model})" if np.isfinite(error) else f"no stiffness at all ({model})"
+        for model, error in told.items()
+    )
+    mesh = np.isnan(result["deflection_mesh_error"])
+    uncertain = "; the shell's have not converged" if mesh else ""
+    return f"Displacements under its forces, if those are small: {', '.join(texts)}{uncertain}."
+
+
+def reach(result: xarray.Dataset, model: str, below: int) -> Reach:
+    """Range in which a model follows the shell among the lowest modes."""
+    error = np.abs(result["error"].sel(model=model).values[:below])
+    bad = np.flatnonzero(error > LARGEST)
+    count = int(bad[0]) if len(bad) else below
+    return Reach(model, count, float(error[:count].max()) if count else float("inf"))
+
+
+def _mesh(result: xarray.Dataset, below: int) -> Iterator[str]:
+    """Errors of the shell itself."""
+    if "touched_clamp" in result.attrs:
+        yield (
+            f"No mesh of the shell converges: {NO_LIMIT.format(result.attrs['touched_clamp'])}. "
+            "Clamp an edge of that panel, not its corner alone."
+        )
+        return
+    error = np.abs(result["mesh_error"].values[: below or None])
+    unsettled = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(error)))
+    if unsettled:
+        yield (
+            f"The meshes of the shell have not converged for mode{'s' * (',' in unsettled)} "
+            f"{unsettled}: what is said of {'them' if ',' in unsettled else 'it'} is not certain; "
+            "compare again with finer divisions."
+        )
+    elif error.max() > MESH:
+        yield (
+            f"The finer mesh of the shell is itself about {size(float(error.max()))} off what it "
+            "tends to: compare again with finer divisions."
+        )
+
+
+def _missed(result: xarray.Dataset, best: Reach) -> str:
+    error = float(result["error"].sel(model=best.model).values[best.count])
+    return "has no partner in it" if np.isinf(error) else f"is off by {size(error)} in it"
+
+
+def _called(result: xarray.Dataset, model: str) -> str:
+    name = "case's own model" if model == OWN else f'model "{model}"'
+    return f"The {name} ({result['options'].sel(model=model).item()})"
 
 
 class ComparedMode(NamedTuple):

@@ -19,8 +19,7 @@ from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
 from foldyn.linear.linearized import Linearized, linearize
 from foldyn.linear.model_range import warn_beyond
-from foldyn.linear.stepped_sine import SteppedSine, stepped_sine
-from foldyn.linear.time_domain import Rig
+from foldyn.linear.time_domain import Rig, SteppedSine, stepped_sine
 from foldyn.linear.transients import BurstRandom, Impulse, burst_random, impulse
 from foldyn.ram_limit import check_memory
 from foldyn.results import frf_dataset

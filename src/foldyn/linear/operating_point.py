@@ -17,9 +17,8 @@ from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import NO_POTENTIAL
 from foldyn.statics import OrigamiProblem, trace
 from foldyn.statics.equilibrium import drives, is_actuated
-from foldyn.statics.newton import Solver
+from foldyn.statics.newton import Balance, Solver, balance
 from foldyn.statics.path_memory import AT_REST, REFUSED
-from foldyn.statics.problem import Balance, balance
 from foldyn.statics.rigid import free_rigid_motions
 from foldyn.statics.tracing import displacement_of
 

@@ -1,11 +1,14 @@
-"""The lowest modes of a shell, extrapolated in mesh size, as the reference for models."""
+"""The lowest modes of a shell, extrapolated in mesh size: the reference for models.
+
+The modes of a model are paired with them, and the convergence of one's own mesh is estimated alike.
+"""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 import xarray
@@ -14,13 +17,13 @@ from numpy.typing import NDArray
 from foldyn.algebra.extrapolation import convergence, limits
 from foldyn.arguments import Unit, brief
 from foldyn.cases import Case
-from foldyn.errors import FoldynWarning
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.linear.mac import pairs
 from foldyn.linear.modes import modes
-from foldyn.linear.pairing import pairs
+from foldyn.linear.shell_of import with_structure
 from foldyn.structures.discretized import Discretized
 
-DIVISIONS = (6, 12)  # of every edge in the two finer meshes; a third one is half as fine
-SPARE = 3  # extra modes of each mesh, which may swap with the ones compared
+SWAPPED = 3  # extra modes of each mesh, which may swap with the ones compared
 RIGID = 6  # most modes without stiffness of a sheet
 SAME_PLACE = 1e-6  # of the pattern's size: largest distance of a matching node
 FLAT = np.cos(np.radians(5.0))  # of the normals of panels nearly in one plane
@@ -28,6 +31,10 @@ NO_LIMIT = (
     "a panel touches a clamped edge at vertex {} alone, folded against it, where frequencies have "
     "no limit: meshes and programs differ by 20 %"
 )
+LEAST = 0.5  # least MAC of a partner
+SPARE = 10  # extra modes of a model among which partners are sought
+MODES = 3
+FINE = 16  # pieces: beyond, the estimate is expensive
 
 
 class MeshModes(NamedTuple):
@@ -63,8 +70,8 @@ def mesh_modes(case: Case, count: int) -> MeshModes:
     if not len(case.free_dofs):  # in a coarse mesh
         still = np.zeros((0, *structure.nodes.shape))
         return MeshModes(structure, np.zeros(0), still, xarray.Dataset())
-    found = modes_at_rest(case, count + SPARE)
-    return MeshModes(structure, *elastic(found, count + SPARE), found)
+    found = modes_at_rest(case, count + SWAPPED)
+    return MeshModes(structure, *elastic(found, count + SWAPPED), found)
 
 
 def same_modes(own: MeshModes, meshes: Sequence[MeshModes], count: int) -> NDArray[np.float64]:
@@ -195,3 +202,173 @@ def _normal(corners: NDArray) -> NDArray:
     """Unit normal (3,) of a panel with corners (k, 3)."""
     twice = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
     return twice / np.linalg.norm(twice)
+
+
+class Shown(Protocol):
+    """Modes of a shell."""
+
+    @property
+    def frequency(self) -> NDArray:
+        """Increasing, Hz."""
+        ...
+
+    def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
+        """Which points (m, 3) have shapes (j,), and the shapes (k, j, 3)."""
+        ...
+
+
+class Matched(NamedTuple):
+    """The counterpart in a model of each mode of a shell.
+
+    Attributes
+    ----------
+    frequency : (k,)
+        Frequency of the partner, Hz; nan if the mode is lost, i.e. no MAC is 0.5 or more.
+    error : (k,)
+        Relative error of this frequency; nan likewise.
+    mac : (k,)
+        MAC of the partner, or of the best candidate.
+    """
+
+    frequency: NDArray
+    error: NDArray
+    mac: NDArray
+
+
+def matched(true: Shown, count: int, case: Case, found: xarray.Dataset) -> Matched:
+    """Pair the first modes of a shell with those of a model.
+
+    Parameters
+    ----------
+    true : Shown
+        Such as a `Reference`.
+    count : int
+        Number of modes of the shell.
+    case, found : Case, xarray.Dataset
+        The model, and its modes, `SPARE` more than `count`. Shapes are compared at its nodes, and
+        with internal amplitudes also between them, if these are nodes of the shell's mesh.
+    """
+    points, weights = _points(case, found)
+    seen, shape = true.at(points)
+    wanted = true.frequency[:count]
+    frequency, own = elastic(found, count + SPARE)
+    if "between_shape" in found:
+        own = np.concatenate([own, elastic(found, count + SPARE, "between_shape")[1]], axis=1)
+    partner, mac = np.full(len(wanted), np.nan), np.zeros(len(wanted))
+    for pair in pairs(wanted, shape[:count], frequency, own[:, seen], weights[seen]):
+        mac[pair.first] = pair.mac
+        if pair.mac >= LEAST:
+            partner[pair.first] = frequency[pair.second]
+    return Matched(partner, partner / wanted - 1.0, mac)
+
+
+def _points(case: Case, found: xarray.Dataset) -> tuple[NDArray, NDArray]:
+    """Points (p, 3) where modes are compared, and their weights (p,) in the MAC.
+
+    The nodes, with weights equal for all mass rules; with internal amplitudes also points between
+    them, with the same total weight.
+    """
+    structure = case.structure
+    even = replace(structure, options=replace(structure.options, mass="mixed_voronoi"))
+    weights = with_structure(case, even).nodal_mass
+    if "between_shape" not in found:
+        return structure.nodes, weights
+    between = found["between_position"].values
+    more = np.full(len(between), weights.sum() / len(between))
+    return np.concatenate([structure.nodes, between]), np.concatenate([weights, more])
+
+
+class Refinement(NamedTuple):
+    """Lowest frequencies of a structure on three meshes, and their extrapolated limits."""
+
+    divisions: int  # of the structure
+    meshes: tuple[int, ...]  # (3,) pieces of every edge, increasing, `divisions` among them
+    frequencies: NDArray[np.float64]  # (3, k) Hz
+    order: NDArray[np.float64]  # (k,) observed order; nan: not converged
+    extrapolated: NDArray[np.float64]  # (k,) Hz; nan likewise
+    touched: int | None  # vertex at which there is no limit; see `touched_clamp`
+
+    @property
+    def frequency(self) -> NDArray[np.float64]:
+        """Frequencies (k,) of the structure, Hz."""
+        return self.frequencies[self.meshes.index(self.divisions)]
+
+    @property
+    def error(self) -> float:
+        """The largest error of these frequencies, negative if the mesh is too soft.
+
+        nan if one of them has not converged.
+        """
+        errors = self.frequency / self.extrapolated - 1.0
+        return float(errors[np.abs(errors).argmax()])
+
+    @property
+    def changes(self) -> NDArray[np.float64]:
+        """Relative changes (2,) between meshes of one frequency, if possible one not converged.
+
+        This is the one that changes most in the last step; nan if a mesh lacks it.
+        """
+        changes = self.frequencies[1:] / self.frequencies[:-1] - 1.0
+        return changes[:, (np.isnan(self.order) + np.abs(changes[1])).argmax()]
+
+    def facts(self) -> dict[str, Any]:
+        """Attributes of a result that describe its mesh."""
+        return {
+            "mesh_error": self.error,
+            "mesh_frequencies": self.frequency,
+            "mesh_divisions": list(self.meshes),
+            "mesh_order": self.order,
+            "mesh_changes": self.changes,
+            "extrapolated": self.extrapolated,
+            **({} if self.touched is None else {"touched_clamp": self.touched}),
+        }
+
+
+def refinement(case: Case, count: int = MODES) -> Refinement | None:
+    """Estimate the error of a case's mesh from its lowest elastic frequencies at rest.
+
+    Parameters
+    ----------
+    case : Case
+        Its supports matter, its loads do not. The sheet needs no density here.
+    count : int
+        How many frequencies.
+
+    Returns
+    -------
+    Refinement or None
+        From this mesh and two with half and a quarter of its pieces per edge, or finer ones if
+        there are no such meshes. None if the structure has no mesh, if its mesh is fine (more than
+        16 pieces per edge), or if supports are given by nodes that another mesh lacks.
+    """
+    structure = case.structure
+    divisions = structure.divisions
+    if divisions is None or divisions > FINE:
+        return None
+    meshes = _meshes(divisions)
+    try:
+        found = {n: _modes(case, structure.meshed(n), count) for n in meshes}
+    except InputError:  # nodes beyond the vertices
+        return None
+    frequencies = same_modes(found[divisions], list(found.values()), count)
+    if not frequencies.size:
+        return None
+    order, limit = convergence(frequencies, meshes)
+    touched = touched_clamp(structure)
+    if touched is not None:
+        order[:] = limit[:] = np.nan
+    return Refinement(divisions, meshes, frequencies, order, limit, touched)
+
+
+def _meshes(divisions: int) -> tuple[int, ...]:
+    """Pieces of every edge in three meshes: `divisions`, half and a quarter, or finer ones."""
+    coarser = [divisions >> halvings for halvings in range(3) if divisions >> halvings]
+    return tuple(sorted([*coarser, *(divisions << k + 1 for k in range(3 - len(coarser)))]))
+
+
+def _modes(case: Case, structure: Discretized, count: int) -> MeshModes:
+    """Elastic modes of a case on another mesh, without loads, contact and air."""
+    if structure.sheet.density is None:
+        structure = replace(structure, sheet=replace(structure.sheet, density=1.0))
+    bare = replace(case, structure=structure, loads=(), contact=None, air=None)
+    return mesh_modes(bare, count)

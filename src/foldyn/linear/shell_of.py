@@ -10,12 +10,12 @@ import numpy as np
 
 from foldyn.cases import Case, Rayleigh
 from foldyn.errors import InputError, warn, within
-from foldyn.linear.reference import DIVISIONS
 from foldyn.patterns import Pattern
 from foldyn.shells import Shell, ShellOptions, shell
 from foldyn.structures.discretized import Discretized
 from foldyn.values import of_kind, show, whole
 
+DIVISIONS = (6, 12)  # of every edge in the two finer meshes; a third one is half as fine
 MOST_TRIANGLES = 15_000
 """Most triangles of a default shell: its modes take ten to twenty seconds."""
 GRADED = (8, 12)

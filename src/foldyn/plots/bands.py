@@ -10,7 +10,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from foldyn.errors import InputError
-from foldyn.linear.band_gaps import ALL, band_gaps, frequencies_of
+from foldyn.linear.band_structure import ALL, band_gaps, frequencies_of
 from foldyn.plots import style
 from foldyn.values import flag, whole
 

@@ -9,7 +9,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from foldyn.errors import InputError
 from foldyn.linear import Fidelity
-from foldyn.linear.matched import LEAST
+from foldyn.linear.reference import LEAST
 from foldyn.plots import style
 from foldyn.plots.modes import hertz
 

@@ -18,14 +18,12 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.results import case_of, check_result
 from foldyn.statics.equilibrium import OrigamiProblem
-from foldyn.statics.newton import Attempt, Settings, Solver, plane, settings_of
+from foldyn.statics.newton import Attempt, Settings, Solver, balance, plane, settings_of
 from foldyn.statics.path_methods import METHODS, PathPlan, along
-from foldyn.statics.problem import balance
-from foldyn.statics.reached import until_of
 from foldyn.statics.recording import record
 from foldyn.statics.stability import critical_modes
 from foldyn.statics.stepping import PathStoppedError, Point, Station, Walk, arrive
-from foldyn.statics.tracing import check_steps
+from foldyn.statics.tracing import check_steps, until_of
 from foldyn.values import choice, function, of_kind, whole
 
 if TYPE_CHECKING:

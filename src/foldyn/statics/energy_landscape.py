@@ -6,6 +6,8 @@ against their displacement. Where the driving force vanishes, the structure is i
 without it: stable where the force rises with the stroke, unstable (the top of the barrier) where it
 falls. These states, and the ends of the ranges in which the force falls (negative stiffness), are
 located to round-off.
+
+`load_at` finds the state of a path in which a node has moved by a given displacement likewise.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     import xarray
 
 NO_FORCE = 1e-9  # of the largest driving force: counts as zero at the ends of a path
+SHARP = 1e-13  # share of a step to which the point is located
 
 
 @brief
@@ -251,3 +254,61 @@ class _Walker:
                 f"no equilibrium was found between the load factors {start.point.factor:.6g} and "
                 f"{end.point.factor:.6g} of the path: trace it with smaller steps"
             ) from None
+
+
+class Moved(NamedTuple):
+    """An equilibrium on a path: displacement (n, 3), m, and load factor."""
+
+    displacement: NDArray
+    factor: float
+
+
+def load_at(path: xarray.Dataset, dof: int, displacement: float, case: Case | None = None) -> Moved:
+    """The first equilibrium on a path at which a node has a given displacement along an axis.
+
+    Parameters
+    ----------
+    path : xarray.Dataset
+        From `trace`.
+    dof : int
+        3 * node + axis.
+    displacement : float
+        Displacement along the axis, m.
+    case : Case, optional
+        The case of the path; needed if the path cannot rebuild it.
+
+    Raises
+    ------
+    InputError
+        The node never has this displacement on the path.
+    ComputationError
+        No equilibrium is found between two points of the path.
+    """
+    check_result(path, "path: ")
+    moved = path["displacement"].transpose("step", "node", "axis").values
+    beyond = moved.reshape(len(moved), -1)[:, dof] - displacement
+    across = np.flatnonzero(beyond[:-1] * beyond[1:] <= 0.0)
+    if not len(across):
+        low, high = beyond.min() + displacement, beyond.max() + displacement
+        raise InputError(
+            f"the node moves from {low:.4g} to {high:.4g} m on the path, and not to "
+            f"{displacement:.4g} m"
+        )
+    k = int(across[0])
+    problem = problem_of(path, case, 0)
+    solver = Solver(problem)
+    for end in (k, k + 1):
+        if beyond[end] == 0.0:
+            return Moved(moved[end], float(path["load_factor"].values[end]))
+    ends = (station_of(solver, problem, path, end) for end in (k, k + 1))
+    try:
+        found = Section(solver, *ends).zero(
+            lambda mark: problem.dofs(mark.station.point.u)[dof] - displacement, SHARP
+        )
+    except LostError:
+        raise ComputationError(
+            f"no equilibrium was found between the points {k} and {k + 1} of the path: trace it "
+            "with smaller steps"
+        ) from None
+    point = found.station.point
+    return Moved(problem.displacement(point.u).copy(), point.factor)

@@ -1,5 +1,13 @@
 """Newton's method for one equilibrium, with line search and an optional moving load factor.
 
+A problem has flat vectors of dofs. With u (m,) all dofs and a load factor f, a path is the set of
+solutions of
+
+    residual(u, f) = internal force - external force = 0  on the free dofs,
+    u = prescribed(f)                                     on the held ones,
+
+so a von Mises truss, a sheet of origami and a shell all look the same to a solver.
+
 Each iteration solves K a = -residual with the held dofs at their prescribed values. If a rule lets
 the load factor f move too, it also solves K b = -d residual/df (the response to the factor): the
 step is a + df b, df from the rule (Batoz and Dhatt, Int. J. Numer. Meth. Eng. 14, 1979). Without a
@@ -7,8 +15,19 @@ rule the factor is fixed.
 
 Steps are cut if a part would turn by more than `MOST_TURN` or run into another. With `search`, they
 are also cut until the residual along the step is at most half its initial value, as in Crisfield's
-line search; plain steps are tried first, because the residual of sheets often grows once (bars
-stretch to second order as panels turn) before it vanishes.
+line search. Plain steps are tried first: the residual of a sheet often grows once before it
+vanishes, because bars stretch to second order as panels turn.
+
+A state counts as an equilibrium if both conditions hold, with the fraction `tolerance` (1e-9 by
+default):
+
+- the residual's norm over the free dofs is below tolerance times the forces at play: the largest
+  of the norms of the external forces, the support forces and the hinge forces alone (which bars
+  balance if nothing is loaded, as in a sheet that unfolds without loads);
+- the last step is below tolerance times the displacements.
+
+Neither can be met below round-off. A residual below the rounding errors of the bar forces (eps
+times the bars' EA) counts as zero, and so does the step, which is then noise as well.
 """
 
 from __future__ import annotations
@@ -16,7 +35,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, NamedTuple, TypeVar
+from typing import Annotated, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +46,6 @@ from foldyn.algebra.solvers import factorizer
 from foldyn.algebra.superlu import Factorization, SingularTangentError, Solution, Unsymmetric
 from foldyn.arguments import Check, Checked, Flag
 from foldyn.errors import InputError
-from foldyn.statics.problem import Balance, Problem, balance, clear_share, converged
 from foldyn.values import choice, number, whole
 
 COLLIDES = "panel would pass through panel"
@@ -41,6 +59,99 @@ SHIFT = 1e-13  # of the mean diagonal, added to a tangent singular to round-off
 S = TypeVar("S", bound=Solution)
 # df from (motion since the start of the step, a, b); nan if the rule cannot be met
 Rule = Callable[[NDArray, NDArray, NDArray], float]
+EPS = float(np.finfo(float).eps)
+
+
+class Problem(Protocol):
+    """Equilibrium of m dofs along a load factor.
+
+    Attributes
+    ----------
+    free, held : ndarray of int
+        The dofs solved for and the others, each in increasing order; together they are all dofs.
+    force_rounding : float
+        Norm (N) of the residual's rounding errors on the free dofs.
+    length : float
+        Norm (m) of the dofs' rest positions: the scale for rounding errors of displacements.
+    """
+
+    free: NDArray
+    held: NDArray
+    force_rounding: float
+    length: float
+
+    def prescribed(self, factor: float) -> NDArray:
+        """Values of the held dofs; linear in the factor."""
+        ...
+
+    def residual(self, u: NDArray, factor: float) -> NDArray:
+        """Internal minus external force (m,), N; on held dofs the support force."""
+        ...
+
+    def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> Any:
+        """Sparse (m, m) derivative of the residual, with vanishing slopes floored.
+
+        Symmetric, except for loads without potential. Used only for steps and, its symmetric part,
+        for the count of negative eigenvalues; the residual has no floor. With `before`, the
+        state from which the last step came, it may be another matrix that serves the next step
+        better; without, it is the derivative.
+        """
+        ...
+
+    def rate(self, u: NDArray, factor: float) -> NDArray:
+        """Derivative (m,) of the residual with respect to the factor at fixed u."""
+        ...
+
+    def reference(self, u: NDArray, factor: float) -> float:
+        """Force (N) that residuals are compared with, besides the support forces."""
+        ...
+
+    def turn(self, u: NDArray, v: NDArray) -> float:
+        """Largest turn (rad) of a part of the structure from u to v; inf if parts collide."""
+        ...
+
+
+def clear_share(problem: Problem, u: NDArray, step: NDArray) -> float:
+    """Share of a step (m,) that can be taken before anything crosses; 1 without contact."""
+    clear = getattr(problem, "clear", None)  # problems without contact have none
+    return clear(u, step) if clear else 1.0
+
+
+def is_counted(problem: Problem, u: NDArray) -> bool:
+    """Whether negative eigenvalues in a state (m,) are meaningful: not if a node slips."""
+    slips = getattr(problem, "slips", None)  # problems without friction have none
+    return not (slips and slips(u))
+
+
+class Balance(NamedTuple):
+    """How far a state is from equilibrium."""
+
+    residual: float  # norm on the free dofs, N
+    reference: float  # norm of the forces at play, N
+
+    @property
+    def relative(self) -> float:
+        """Residual as a fraction of the forces at play; 0 where both vanish."""
+        return self.residual / self.reference if self.reference > 0.0 else 0.0
+
+
+UNKNOWN = Balance(float("nan"), float("nan"))
+
+
+def balance(problem: Problem, u: NDArray, factor: float, residual: NDArray) -> Balance:
+    """Measure a residual (m,) against the forces at play."""
+    reference = max(problem.reference(u, factor), float(np.linalg.norm(residual[problem.held])))
+    return Balance(float(np.linalg.norm(residual[problem.free])), reference)
+
+
+def converged(problem: Problem, forces: Balance, u: NDArray, step: float, tolerance: float) -> bool:
+    """Whether a state u, reached by a last step of norm `step`, is an equilibrium."""
+    if not forces.residual < np.inf:  # false for nan
+        return False
+    if forces.residual <= problem.force_rounding:
+        return True
+    size = max(float(np.linalg.norm(u)), EPS * problem.length / tolerance)
+    return forces.residual <= tolerance * forces.reference and step <= tolerance * size
 
 
 @dataclass(frozen=True)
@@ -51,7 +162,7 @@ class Settings(Checked):
     ----------
     tolerance : float
         A state is accepted when the residual is below this fraction of the forces at play and
-        the last step below this fraction of the displacements (both; see `statics.problem`).
+        the last step below this fraction of the displacements (both; see the module docstring).
     iterations : int
         Newton iterations after which an attempt is given up and the step is cut.
     target : int

@@ -22,8 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.arguments import brief
-from foldyn.statics.newton import COLLIDES, Attempt, Solver, Stiffness
-from foldyn.statics.problem import Problem, balance, clear_share, is_counted
+from foldyn.statics.newton import (
+    COLLIDES,
+    Attempt,
+    Problem,
+    Solver,
+    Stiffness,
+    balance,
+    clear_share,
+    is_counted,
+)
 
 NEGLIGIBLE = 1e-6  # of the structure's size: smaller motions are never a snap
 SNAPS = "the structure snaps to a state off its path"

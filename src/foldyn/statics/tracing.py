@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence, Sized
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.algebra.solvers import check_fill
+from foldyn.arguments import Check
 from foldyn.cases import Case, Gravity, State
 from foldyn.cases.constraints import check_tied
 from foldyn.cases.contact_checks import check_contact, check_driven
+from foldyn.cases.decode import Part, PartOf
+from foldyn.cases.directions import AXES, Axis
+from foldyn.cases.selection import resolve_nodes
 from foldyn.errors import InputError
 from foldyn.ram_limit import check_memory
 from foldyn.statics.equilibrium import AdaptiveLoad, OrigamiProblem, drives, is_actuated
@@ -20,10 +25,10 @@ from foldyn.statics.mechanism import refuse_mechanisms
 from foldyn.statics.newton import Settings, Solver, settings_of
 from foldyn.statics.path_memory import FOLLOWED, flowing
 from foldyn.statics.path_methods import METHODS, PathPlan, along, plan_path
-from foldyn.statics.reached import until_of
 from foldyn.statics.recording import record
 from foldyn.statics.stepping import Point, Walk, kept, settle, walk
-from foldyn.values import choice, flag, function, indices, of_kind, show, single, whole
+from foldyn.structures.discretized import Discretized
+from foldyn.values import choice, flag, function, indices, number, of_kind, show, single, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -31,6 +36,51 @@ if TYPE_CHECKING:
 SHORTEST = 1e-3  # of the rest length of a bar: least length at the start of a path
 LOOKS = 51  # load factors between two given ones at which supports and planes are checked
 COPIES = 8  # of a point's dofs in memory while forces, work and the dataset are computed
+
+
+@dataclass(frozen=True)
+class Reached(Part):
+    """Whether a node has reached a displacement along an axis.
+
+    Parameters
+    ----------
+    node : int
+        Number of the node.
+    axis : {"x", "y", "z"}
+        Axis along which it moves.
+    displacement : float
+        Displacement (m) from the rest position, not zero; reached once the node is at least as far
+        from zero, on the same side.
+    """
+
+    node: Annotated[int, Check(whole)]
+    axis: Axis
+    displacement: Annotated[float, Check(number, unit="m")]
+
+    def agree(self) -> None:
+        """Refuse a displacement of zero, where the path begins."""
+        if self.displacement == 0.0:
+            raise InputError(" = 0: the path begins there; say where it ends", "displacement")
+
+    def __call__(self, displacement: NDArray, load_factor: float) -> bool:
+        """Whether it is reached for displacements (n, 3), m."""
+        moved = displacement[self.node, AXES.index(self.axis)]
+        return bool(moved / self.displacement >= 1.0)
+
+
+UNTIL = PartOf((Reached,), "analysis.until", "node, axis and displacement")
+"""End condition of a path, in a case file and as an argument."""
+
+
+def until_of(given: Any, structure: Discretized) -> Callable[[NDArray, float], bool] | None:
+    """End condition of a path: a function as given, a table as `Reached`."""
+    if given is None:
+        return None
+    if callable(given) and not isinstance(given, Reached):
+        return given  # type: ignore[return-value]
+    end = given if isinstance(given, Reached) else UNTIL("until", given)
+    resolve_nodes(structure, (end.node,), "until.node")
+    return end
 
 
 def trace(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError, warn
-from foldyn.linear.band_gaps import ALL, frequencies_of, legs
+from foldyn.linear.band_structure import ALL, frequencies_of, legs
 from foldyn.linear.frf import quantity_of
 from foldyn.linear.peaks_of import kind_of, resonances
 from foldyn.mechanics.contact.clearance import Clearance, clearance
@@ -26,7 +26,7 @@ from foldyn.signals import (
     spectrum,
 )
 from foldyn.statics import Landscape, landscape
-from foldyn.statics.load_at import load_at
+from foldyn.statics.energy_landscape import load_at
 from foldyn.sweeps.measure import BAND, MODE, Measure
 from foldyn.viewer.states import bar_strain
 

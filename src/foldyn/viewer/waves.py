@@ -9,7 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.linear.band_gaps import ALL, band_gaps
+from foldyn.linear.band_structure import ALL, band_gaps
 from foldyn.patterns.screw import Screw
 from foldyn.viewer.arrays import Arrays
 

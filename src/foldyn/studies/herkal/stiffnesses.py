@@ -17,8 +17,7 @@ import numpy as np
 from foldyn import program as programs
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.analyses import read_case
-from foldyn.linear.fidelity import MODELS, fidelity
-from foldyn.linear.small_loads import small_loads
+from foldyn.linear.fidelity import MODELS, fidelity, small_loads
 from foldyn.shells import shell
 from foldyn.structures import discretize
 from foldyn.structures.discretized import Discretized
