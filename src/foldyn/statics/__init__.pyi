@@ -6,16 +6,9 @@ from foldyn.statics.energy_landscape import (
     landscape as landscape,
 )
 from foldyn.statics.equilibrium import OrigamiProblem as OrigamiProblem
-from foldyn.statics.folding import (
-    Folding as Folding,
-    fold as fold,
-)
-from foldyn.statics.mechanism import mechanisms as mechanisms
-from foldyn.statics.newton import (
-    Problem as Problem,
-    Settings as Settings,
-    Solver as Solver,
-)
+from foldyn.statics.folding import Folding as Folding, fold as fold
+from foldyn.statics.tracing import mechanisms as mechanisms
+from foldyn.statics.newton import Problem as Problem, Settings as Settings, Solver as Solver
 from foldyn.statics.path_methods import METHODS as METHODS
 from foldyn.statics.stepping import Point as Point
 from foldyn.statics.tracing import trace as trace

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
@@ -25,9 +26,6 @@ from foldyn.statics.stability import critical_modes
 from foldyn.statics.stepping import PathStoppedError, Point, Station, Walk, arrive
 from foldyn.statics.tracing import check_steps, until_of
 from foldyn.values import choice, function, of_kind, whole
-
-if TYPE_CHECKING:
-    import xarray
 
 FIRST_TURN = np.radians(1.0)  # of the hinge that turns most in the first step onto the branch
 TRIES = 6  # amplitudes tried, each half of the previous one

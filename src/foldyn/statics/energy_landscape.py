@@ -15,9 +15,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.arguments import Unit, brief
@@ -29,9 +30,6 @@ from foldyn.statics.equilibrium import OrigamiProblem
 from foldyn.statics.newton import Settings, Solver, settings_of
 from foldyn.statics.stability import LostError, Section
 from foldyn.statics.stepping import Station
-
-if TYPE_CHECKING:
-    import xarray
 
 NO_FORCE = 1e-9  # of the largest driving force: counts as zero at the ends of a path
 SHARP = 1e-13  # share of a step to which the point is located
@@ -246,14 +244,24 @@ class _Walker:
 
     def root(self, function: Callable[[Station], float], start: Station, end: Station) -> Station:
         """Station between two others at which a function vanishes."""
-        section = Section(self.solver, start, end)
-        try:
-            return section.zero(lambda mark: function(mark.station), 1e-13).station
-        except LostError:
-            raise ComputationError(
-                f"no equilibrium was found between the load factors {start.point.factor:.6g} and "
-                f"{end.point.factor:.6g} of the path: trace it with smaller steps"
-            ) from None
+        factors = f"load factors {start.point.factor:.6g} and {end.point.factor:.6g}"
+        return _between(self.solver, start, end, function, f"the {factors}")
+
+
+def _between(
+    solver: Solver, start: Station, end: Station, function: Callable[[Station], float], ends: str
+) -> Station:
+    """Station between two others of a path at which a function vanishes.
+
+    ends : the two others in words, for the message if none is found.
+    """
+    try:
+        section = Section(solver, start, end)
+        return section.zero(lambda mark: function(mark.station), SHARP).station
+    except LostError:
+        raise ComputationError(
+            f"no equilibrium was found between {ends} of the path: trace it with smaller steps"
+        ) from None
 
 
 class Moved(NamedTuple):
@@ -300,15 +308,11 @@ def load_at(path: xarray.Dataset, dof: int, displacement: float, case: Case | No
     for end in (k, k + 1):
         if beyond[end] == 0.0:
             return Moved(moved[end], float(path["load_factor"].values[end]))
-    ends = (station_of(solver, problem, path, end) for end in (k, k + 1))
-    try:
-        found = Section(solver, *ends).zero(
-            lambda mark: problem.dofs(mark.station.point.u)[dof] - displacement, SHARP
-        )
-    except LostError:
-        raise ComputationError(
-            f"no equilibrium was found between the points {k} and {k + 1} of the path: trace it "
-            "with smaller steps"
-        ) from None
-    point = found.station.point
+    start, end = (station_of(solver, problem, path, end) for end in (k, k + 1))
+    found = _between(
+        solver, start, end,
+        lambda station: problem.dofs(station.point.u)[dof] - displacement,
+        f"the points {k} and {k + 1}",
+    )  # fmt: skip
+    point = found.point
     return Moved(problem.displacement(point.u).copy(), point.factor)

@@ -11,38 +11,24 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.errors import (
-    ComputationError,
-    CrossingWarning,
-    MotionInterrupted,
-    StretchWarning,
-    warn,
-)
+from foldyn.errors import ComputationError, CrossingWarning, MotionInterrupted, StretchWarning, warn
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.results import path_dataset
 from foldyn.results.crossings import crossings_of
 from foldyn.statics.equilibrium import OrigamiProblem
 from foldyn.statics.newton import Solver
 from foldyn.statics.path_methods import METHODS
-from foldyn.statics.stepping import (
-    REMEDY_COLLISION,
-    REMEDY_LOCKED,
-    PathStoppedError,
-    Point,
-    Walk,
-)
+from foldyn.statics.stepping import REMEDY_COLLISION, REMEDY_LOCKED, PathStoppedError, Point, Walk
 from foldyn.structures.locking import kept_apart, locks
 from foldyn.structures.mesh import hinge_angles, lengths
 from foldyn.structures.stretching import remedy, stretch
-
-if TYPE_CHECKING:
-    import xarray
 
 MOST_STRETCH = 2.0  # stretch of a bar: no sheet can be followed beyond it
 CLOSED = 179.0  # degrees from flat beyond which a fold counts as closed
@@ -164,11 +150,15 @@ def record(
             points.append(station.point)
             if progress is not None:
                 progress(station.point)
-            if len(points) > 1 and _ends(until, problem, station.point):
-                until = None
-                break
+            if until is not None and len(points) > 1:
+                moved = problem.displacement(station.point.u).copy()
+                if until(moved, station.point.factor):
+                    until = None
+                    break
     except PathStoppedError as stop:
-        remedy = _closed(problem, points) or _true(stop.remedy, problem)
+        remedy = _closed(problem, points) or stop.remedy
+        if remedy == REMEDY_COLLISION and locks(problem.structure.fold_law):
+            remedy = REMEDY_LOCKED
         partial = dataset("stopped", stopped_because=stop.reason, remedy=remedy)
         raise ComputationError(f"{stop.reason}; {remedy}", partial) from None
     except KeyboardInterrupt:
@@ -186,12 +176,6 @@ def record(
     return path
 
 
-def _ends(
-    until: Callable[[NDArray, float], bool] | None, problem: OrigamiProblem, point: Point
-) -> bool:
-    return until is not None and bool(until(problem.displacement(point.u).copy(), point.factor))
-
-
 def _check_stretch(problem: OrigamiProblem, point: Point) -> None:
     """Stop the path once a bar is twice as long as at rest, beyond any sensible range."""
     structure = problem.structure
@@ -206,13 +190,6 @@ def _check_stretch(problem: OrigamiProblem, point: Point) -> None:
         f"{one} and {other} are {longer[bar]:.3g} times as far apart as at rest",
         "end it before (until, load_factors or steps), or check the units of loads and modulus",
     )
-
-
-def _true(remedy: str, problem: OrigamiProblem) -> str:
-    """The remedy for a stopped path, or another one if it is already in place."""
-    if remedy == REMEDY_COLLISION and locks(problem.structure.fold_law):
-        return REMEDY_LOCKED
-    return remedy
 
 
 def _closed(problem: OrigamiProblem, points: Sequence[Point]) -> str:
@@ -243,7 +220,10 @@ def _dataset(
         warn(message, "loads.md#pressure")
     recorded = [_recorded(problem, point) for point in points]
     residuals, energies, reactions, touches = zip(*recorded, strict=True)
-    begun = _begun(problem, points[0], energies[0]) if from_rest else 0.0
+    begun = 0.0  # J, from rest to the first point: stored there, or dissipated
+    if from_rest:
+        begun = float(energies[0].sum()) - problem.energy_at_rest
+        begun += problem.memories.lost(points[0].memory)
     displacement = np.array([problem.displacement(p.u) for p in points])
     crossings = crossings_of(problem.case, displacement)
     if len(crossings.first):
@@ -252,6 +232,9 @@ def _dataset(
         warn(crossings.text(when, len(points)), "results.md#panels-that-cross", CrossingWarning)
     if message := _stretch_warning(problem, points, energies, displacement):
         warn(message, "models.md#where-panels-stretch", StretchWarning)
+    intervals = {}
+    if any(point.interval for point in points):  # some could not be located
+        intervals["interval"] = [p.interval or (p.factor, p.factor) for p in points]
     own = "an adaptive load, a function of the user's own, acted on it"
     result = path_dataset(
         problem.case,
@@ -267,7 +250,7 @@ def _dataset(
             "point": [p.kind for p in points],
             "iterations": [p.iterations for p in points],
             "residual": [p.residual for p in points],
-            **_intervals(points),
+            **intervals,
             **_memory(problem, points, from_rest),
             **{name: [touch[name] for touch in touches] for name in touches[0]},
         },
@@ -314,19 +297,6 @@ def _recorded(
         problem.reactions(*at),
         problem.touch(point.u),
     )
-
-
-def _intervals(points: Sequence[Point]) -> dict[str, list[tuple[float, float]]]:
-    """Load factors that bracket critical points, if some could not be located."""
-    if all(point.interval is None for point in points):
-        return {}
-    return {"interval": [point.interval or (point.factor, point.factor) for point in points]}
-
-
-def _begun(problem: OrigamiProblem, first: Point, energies: NDArray) -> float:
-    """Work (J) from rest to the first point: the energy stored there, plus what has dissipated."""
-    stored = float(energies.sum()) - problem.energy_at_rest
-    return stored + problem.memories.lost(first.memory)
 
 
 def _memory(problem: OrigamiProblem, points: Sequence[Point], from_rest: bool) -> dict[str, Any]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.errors import ComputationError, CrossingWarning, InputError, MotionInterrupted, warn
@@ -35,9 +36,6 @@ from foldyn.statics.folding.ways import (
     wrong_ways,
 )
 from foldyn.values import choice, function, whole
-
-if TYPE_CHECKING:
-    import xarray
 
 MOST_SHOWN = 8  # creases listed in a message
 SHUT = 1e-3  # rad from 180 degrees within which a crease counts as closed

@@ -42,13 +42,9 @@ def lowest(energy: FoldEnergy, shape: Shape, x: NDArray, aim: Aim, stiffness: St
 
 
 def minimum(
-    energy: FoldEnergy,
-    shape: Shape,
-    aim: Aim,
-    stiffness: Stiffness,
-    iterations: int = 150,
+    energy: FoldEnergy, shape: Shape, aim: Aim, stiffness: Stiffness, iterations: int = 150,
     least: float = 1e-6,
-) -> Shape:
+) -> Shape:  # fmt: skip
     """Shape of least energy near `shape`; the best one found if steps stop descending.
 
     least : largest turn (rad) of a hinge in the last step.
