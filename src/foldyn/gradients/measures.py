@@ -79,15 +79,19 @@ def _at(result: xr.Dataset, variable: str, place: Mapping[str, Any], value: Any)
     return {variable: array.transpose(*order).values}
 
 
-def _moved(result: xr.Dataset, node: int, axis: str) -> NDArray:
-    return result["displacement"].sel(node=node, axis=axis).values
+def _of_samples(weights: Callable[..., NDArray], variable: str = "displacement") -> Derivative:
+    """Derivative of a weighted sum of one node's samples along an axis.
 
+    weights : function of the result, the node's displacements (k,), and further arguments.
+    """
 
-def _samples(result: xr.Dataset, node: int, axis: str, weights: NDArray) -> Seeds:
-    """Seeds of a weighted sum of one node's displacements over the samples."""
-    array = np.zeros((len(weights), result.sizes["node"], result.sizes["axis"]))
-    array[:, node, AXES.index(axis)] = weights
-    return {"displacement": array}
+    def seeds(result: xr.Dataset, case: Case, node: int, axis: str, **further: Any) -> Seeds:
+        motion = result["displacement"].sel(node=node, axis=axis).values
+        array = np.zeros((len(motion), result.sizes["node"], result.sizes["axis"]))
+        array[:, node, AXES.index(axis)] = weights(result, motion, **further)
+        return {variable: array}
+
+    return Derivative(seeds)
 
 
 def _all_moved(result: xr.Dataset) -> NDArray:
@@ -101,34 +105,14 @@ def _one(count: int, k: int) -> NDArray:
     return out
 
 
-def _displacement(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
-    count = len(_moved(result, node, axis))
-    return _samples(result, node, axis, _one(count, count - 1))
-
-
-def _displacement_at(result: xr.Dataset, case: Case, node: int, axis: str, time: float) -> Seeds:
-    motion = _moved(result, node, axis)
-    return _samples(result, node, axis, _one(len(motion), time_of(result, time)))
-
-
-def _velocity(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
-    count = len(_moved(result, node, axis))
-    seeds = _samples(result, node, axis, _one(count, count - 1))
-    return {"velocity": seeds["displacement"]}
-
-
 def _extreme(sign: float) -> Derivative:
     """Derivative of the highest (sign 1) or lowest (-1) displacement of a node."""
 
     def places(result: xr.Dataset, case: Case, node: int, axis: str) -> list[tuple[int, ...]]:
-        return _largest(sign * _moved(result, node, axis))
+        return _largest(sign * result["displacement"].sel(node=node, axis=axis).values)
 
-    def seeds(
-        result: xr.Dataset, case: Case, at: tuple[int], node: int, axis: str
-    ) -> Seeds:  # fmt: skip
-        return _samples(result, node, axis, _one(result.sizes["time"], *at))
-
-    return Derivative(seeds, places=places)
+    own = _of_samples(lambda result, motion, at: _one(len(motion), *at))
+    return own._replace(places=places)
 
 
 def _trapezoid(result: xr.Dataset) -> NDArray:
@@ -140,14 +124,10 @@ def _trapezoid(result: xr.Dataset) -> NDArray:
     return weights
 
 
-def _integral(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
-    return _samples(result, node, axis, _trapezoid(result))
-
-
-def _mean_square(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
+def _mean_square(result: xr.Dataset, motion: NDArray) -> NDArray:
+    """Weights (k,) of the change of a mean square."""
     weights = _trapezoid(result)
-    motion = _moved(result, node, axis)
-    return _samples(result, node, axis, 2.0 * weights * motion / weights.sum())
+    return 2.0 * weights * motion / weights.sum()
 
 
 def _moved_farthest(
@@ -410,13 +390,15 @@ DERIVATIVES: Mapping[str, Derivative] = {
     "frequency": _of_mode("frequency"),
     "damping_ratio": _of_mode("damping_ratio"),
     "effective_mass": _of_mode("effective_mass"),
-    "displacement": Derivative(_displacement),
-    "displacement_at": Derivative(_displacement_at),
-    "velocity": Derivative(_velocity),
+    "displacement": _of_samples(lambda result, motion: _one(len(motion), -1)),
+    "displacement_at": _of_samples(
+        lambda result, motion, time: _one(len(motion), time_of(result, time))
+    ),
+    "velocity": _of_samples(lambda result, motion: _one(len(motion), -1), "velocity"),
     "maximum": _extreme(1.0),
     "minimum": _extreme(-1.0),
-    "integral": Derivative(_integral),
-    "mean_square": Derivative(_mean_square),
+    "integral": _of_samples(lambda result, motion: _trapezoid(result)),
+    "mean_square": _of_samples(_mean_square),
     "largest_displacement": Derivative(_largest_displacement, places=_moved_farthest),
     "strain": Derivative(_strain, _strain_of, places=_strained_most, cut=True),
     "strain_energy": Derivative(_strain_energy, _strain_energy_of, places=_tensest, cut=True),

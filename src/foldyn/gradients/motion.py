@@ -16,8 +16,7 @@ from foldyn.dynamics.implicit_adjoint import ImplicitAdjoint, Retraced
 from foldyn.dynamics.methods import with_mass
 from foldyn.dynamics.runge_kutta_adjoint import RungeKuttaAdjoint, segment
 from foldyn.dynamics.system import pack
-from foldyn.errors import InputError
-from foldyn.gradients.parameters import Gradient, numbers_of_motion
+from foldyn.gradients.parameters import Gradient, check_known, numbers_of_motion
 from foldyn.mechanics.pullback import Arrays
 
 KNOWN = ("displacement", "velocity")
@@ -74,11 +73,7 @@ class MotionGradient:
 
         seeds : derivatives of the quantity by variables of the result.
         """
-        if unknown := [name for name in seeds if name not in KNOWN]:
-            raise InputError(
-                f"there are no derivatives through {', '.join(unknown)} of motions, but through "
-                f"{', '.join(KNOWN)}"
-            )
+        check_known(seeds, KNOWN, "motions")
         adjoint, by = self._adjoint(), self._motion.packed.numbering
         by_u, by_v = np.zeros((2, self._motion.packed.system.rows, 3))
         for k in range(len(self._times) - 1, -1, -1):

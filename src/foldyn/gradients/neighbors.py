@@ -24,7 +24,6 @@ from foldyn.algebra.complex_symmetric import solved
 from foldyn.algebra.superlu import PIVOT, factorize
 from foldyn.algebra.woodbury import Squared
 from foldyn.cases import Case
-from foldyn.dynamics import Progress
 from foldyn.dynamics.companions import Accompanied, Companion
 from foldyn.dynamics.initial import begin, check_start
 from foldyn.dynamics.motion import Motion
@@ -281,7 +280,9 @@ def responses(one: Asked, others: Sequence[Asked]) -> list[xarray.Dataset]:
     else:
         known = {each.name for each in fields(HarmonicBalance)}
         given = {name: value for name, value in one.arguments.items() if name in known}
-        answer = harmonic(cases[0].linear, cases[0].drive, hertz, HarmonicBalance(**given), _silent)
+        answer = harmonic(
+            cases[0].linear, cases[0].drive, hertz, HarmonicBalance(**given), lambda _: None
+        )
         found = _harmonic(cases, TURN * hertz, answer.response)
     named = {"frequency": hertz}
     return [
@@ -290,10 +291,6 @@ def responses(one: Asked, others: Sequence[Asked]) -> list[xarray.Dataset]:
         )
         for each, own in zip(cases, found, strict=True)
     ]
-
-
-def _silent(_: Progress) -> None:
-    """Ignore progress."""
 
 
 def _direct(cases: Sequence[_Driven], omegas: NDArray) -> NDArray[np.complex128]:

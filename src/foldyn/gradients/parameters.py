@@ -68,6 +68,15 @@ def numbers_of(case: Case) -> Arrays:
     return Arrays(numbers, layout)
 
 
+def check_known(seeds: Mapping[str, Any], known: Sequence[str], what: str) -> None:
+    """Refuse derivatives of a quantity by variables of a result through which none lead back."""
+    if unknown := [name for name in seeds if name not in known]:
+        raise InputError(
+            f"there are no derivatives through {', '.join(unknown)} of {what}, but through "
+            f"{', '.join(known)}"
+        )
+
+
 def numbers_of_motion(packed: Packed, start: tuple[NDArray, NDArray]) -> Arrays:
     """Numbers of a case as packed for motions, and its initial state."""
     arrays, system, mass = arrays_of_body(packed.body), packed.system, packed.mass

@@ -23,7 +23,7 @@ from scipy.sparse.linalg import splu
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.gradients.parameters import Gradient, nothing, numbers_of
+from foldyn.gradients.parameters import Gradient, check_known, nothing, numbers_of
 from foldyn.mechanics.pullback import Arrays, Pullback, refuse_lacking
 from foldyn.statics import trace
 from foldyn.statics.energy_landscape import Moved, load_at
@@ -151,11 +151,7 @@ class PathGradient:
         seeds : derivatives of the quantity by variables of the result, and by load factors at given
             nodal displacements: "load_at", a mapping from (dof, displacement) to derivatives.
         """
-        if unknown := [name for name in seeds if name not in KNOWN]:
-            raise InputError(
-                f"there are no derivatives through {', '.join(unknown)} of paths, but through "
-                f"{', '.join(KNOWN)}"
-            )
+        check_known(seeds, KNOWN, "paths")
         total = nothing(self.case, self._pullback)
         for k in range(self.result.sizes["step"]):
             self._add_point(k, seeds, total)

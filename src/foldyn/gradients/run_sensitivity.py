@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -21,14 +21,13 @@ from foldyn.cases import Case
 from foldyn.dynamics import simulate
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import InputError, within
-from foldyn.gradients.chain import Chain, Wanted
+from foldyn.gradients.chain import Chain, Differentiated, Wanted
 from foldyn.gradients.expressions import parse
-from foldyn.gradients.frf import FrfGradient
 from foldyn.gradients.measures import Derivative, Seeds, derivative_of, one_number
-from foldyn.gradients.modes import ModesGradient
 from foldyn.gradients.motion import MotionGradient
 from foldyn.gradients.parameters import Gradient, Parameters, Slope, Values, checked
 from foldyn.gradients.path import PathGradient
+from foldyn.gradients.vibrations import FrfGradient, ModesGradient
 from foldyn.input_files import path_of
 from foldyn.linear import frf, modes
 from foldyn.statics import trace
@@ -37,9 +36,6 @@ from foldyn.structures.discretized import Discretized
 from foldyn.sweeps.job import ASIDE
 from foldyn.sweeps.measure import of_callable
 from foldyn.values import choice, listed, of_kind, show
-
-if TYPE_CHECKING:
-    from foldyn.gradients.chain import Differentiated
 
 KINDS: Mapping[str, Callable[[Case, Mapping[str, Any]], Differentiated]] = {
     "modes": ModesGradient,
@@ -139,7 +135,9 @@ def sensitivity(
     """
     began = time.perf_counter()
     source = source_of(build, parameters, analysis)
-    design = Parameters(source.build, source.values, _sizes(sizes))
+    unsized = sizes is None or (isinstance(sizes, Mapping) and not sizes)
+    own_sizes = {} if unsized else checked(sizes, "sizes")  # type: ignore[arg-type]
+    design = Parameters(source.build, source.values, own_sizes)
     wanted = _wanted(measures, source.kind)
     case = design.case()
     found = source.analyse(case)
@@ -155,27 +153,15 @@ def sensitivity(
     if direction is None:
         for name, value in design.values.items():
             rows = np.stack([gradient[name] for gradient in gradients])
-            own = (
-                (("measure",), rows[:, 0])
-                if value.ndim == 0
-                else (
-                    ("measure", f"{name}_entry"),
-                    rows,
-                )
-            )
-            data[f"gradient_{name}"] = own
+            alone = value.ndim == 0
+            dims = ("measure",) if alone else ("measure", f"{name}_entry")
+            data[f"gradient_{name}"] = dims, rows[:, 0] if alone else rows
     else:
         rates = [sum(float(direction[n] @ g[n]) for n in direction) for g in gradients]
         data["derivative"] = ("measure", np.array(rates))
     names = [one.text for one in wanted]
     facts = {"analysis": source.kind, "wall_seconds": time.perf_counter() - began}
     return xr.Dataset(data, {"measure": names}, facts)
-
-
-def _sizes(given: Values | None) -> dict[str, NDArray]:
-    """Sizes of parameters, if any are given."""
-    none = given is None or (isinstance(given, Mapping) and not given)
-    return {} if none else checked(given, "sizes")  # type: ignore[arg-type]
 
 
 class Sourced(NamedTuple):
