@@ -13,7 +13,6 @@ import numpy as np
 
 from foldyn.errors import FoldynWarning
 from foldyn.linear.reference import (
-    DIVISIONS,
     SPARE,
     Reference,
     Shown,
@@ -21,6 +20,7 @@ from foldyn.linear.reference import (
     modes_at_rest,
     reference_modes,
 )
+from foldyn.linear.shell_of import DIVISIONS
 from foldyn.shells import shell
 from foldyn.structures import Structure, discretize
 from foldyn.structures.plate_frequency import BELOW, plate_frequency

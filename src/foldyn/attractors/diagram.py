@@ -4,31 +4,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.attractors.drive import at_frequency, at_level, driven_frequency
 from foldyn.attractors.jumps import Jump, is_jump, jump_variables
-from foldyn.attractors.run import (
-    PER_PERIOD,
-    Run,
-    Stretch,
-    check_measure,
-    measured,
-    swing,
-)
+from foldyn.attractors.run import PER_PERIOD, Run, Stretch, check_measure, measured, swing
 from foldyn.cases import Case, State
-from foldyn.dynamics.progress import Progress, Reporter, reporter
+from foldyn.dynamics.progress import Progress, Reporter
 from foldyn.errors import ComputationError, InputError, MotionInterrupted, told_once, warn
+from foldyn.linear.time_domain import reported
 from foldyn.results import Quantity
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import variable
 from foldyn.values import choice, number, numbers, of_kind, whole
-
-if TYPE_CHECKING:
-    import xarray
 
 SWEEPS = ("up", "down", "both")
 RESOLUTION = 1e-3  # relative width to which jumps are bracketed
@@ -145,9 +137,8 @@ def bifurcation_diagram(
     points: list[list[Point]] = []
     jumps: list[Jump] = []
     interrupted = False
-    report, close = reporter(progress)
     try:
-        with told_once():
+        with reported(progress) as report, told_once():
             for way in ways:
                 here = values if way == "up" else values[::-1]
                 if points:  # from the end of the upward sweep
@@ -170,8 +161,6 @@ def bifurcation_diagram(
                 jumps += bracketed(steady, way, found, resolution)
     except KeyboardInterrupt:
         interrupted = True
-    finally:
-        close()
     points = [found for found in points if found]
     if not points:
         raise MotionInterrupted("interrupted before the first point")

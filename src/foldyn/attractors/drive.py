@@ -8,24 +8,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from foldyn.cases import (
-    Air,
-    BaseMotion,
-    Case,
-    Constant,
-    CreaseMoment,
-    Force,
-    Gravity,
-    Harmonic,
-    History,
-    Impose,
-    LineLoad,
-    Plane,
-    Pressure,
-    Temperature,
-    TotalForce,
-    as_history,
-)
+from foldyn import cases
+from foldyn.cases import Case, Constant, Harmonic, History, as_history
 from foldyn.errors import InputError
 
 WHOLE = 1e-9  # relative tolerance for integer ratios of frequencies
@@ -33,17 +17,17 @@ HARMONIC = (
     'fd.Harmonic(frequency=...) (in a case file, history = { kind = "harmonic", frequency = ... })'
 )
 SIZES: Mapping[type, str] = {
-    Force: "vector",
-    TotalForce: "total",
-    LineLoad: "force_per_length",
-    Gravity: "acceleration",
-    Pressure: "pressure",
-    CreaseMoment: "moment",
-    Temperature: "change",
-    Impose: "value",
-    BaseMotion: "value",
-    Plane: "motion",
-    Air: "velocity",
+    cases.Force: "vector",
+    cases.TotalForce: "total",
+    cases.LineLoad: "force_per_length",
+    cases.Gravity: "acceleration",
+    cases.Pressure: "pressure",
+    cases.CreaseMoment: "moment",
+    cases.Temperature: "change",
+    cases.Impose: "value",
+    cases.BaseMotion: "value",
+    cases.Plane: "motion",
+    cases.Air: "velocity",
 }
 """Fields with the size of a load, of the motion of a support or plane, or of the wind."""
 
@@ -56,7 +40,9 @@ def drive_frequency(case: Case) -> float:
     InputError
         The others are not multiples of it, so that the drive has no period.
     """
-    return lowest_frequency([part.history.frequency for part in _driven_parts(case)])
+    return lowest_frequency(
+        [part.history.frequency for _, part in _parts(case) if _is_driven(part)]
+    )
 
 
 def lowest_frequency(frequencies: Sequence[float]) -> float:
@@ -138,11 +124,6 @@ def _altered(case: Case, change: Callable[[Any], Any]) -> Case:
     return case.altered(
         loads=changed(case.loads), supports=changed(case.supports), contact=contact, air=air
     )
-
-
-def _driven_parts(case: Case) -> list[Any]:
-    """Loads, supports, planes and winds with a harmonic history."""
-    return [part for _, part in _parts(case) if _is_driven(part)]
 
 
 def _parts(case: Case) -> Iterator[tuple[str, Any]]:

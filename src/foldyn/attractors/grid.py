@@ -14,9 +14,10 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn import writing
@@ -28,8 +29,9 @@ from foldyn.cases.document import to_document
 from foldyn.dynamics import initial_state, prepare, simulate_many
 from foldyn.dynamics.ensemble import device_for
 from foldyn.dynamics.gpu.choice import DEVICES
-from foldyn.dynamics.progress import Progress, Reporter, reporter
+from foldyn.dynamics.progress import Progress, Reporter
 from foldyn.errors import InputError, told_once, warn
+from foldyn.linear.time_domain import reported
 from foldyn.program import program
 from foldyn.ram_limit import check_memory
 from foldyn.results.dataset import result_dataset
@@ -37,9 +39,6 @@ from foldyn.results.quantities import PLACE, variable
 from foldyn.results.seal import seal, sound
 from foldyn.store import Store, name_of
 from foldyn.values import choice, number, numbers, of_kind, show, whole
-
-if TYPE_CHECKING:
-    import xarray
 
 AT_ONCE = 256  # motions
 LOOKED_AT = 64  # starts used to choose the step
@@ -160,16 +159,12 @@ def basins(
     compute = partial(_ends, case, settled, period, record, how, used)
     about |= {"duration": settled, "period": period, "record": record}
     kept, found = KeptEnds(folder, case, about), list[NDArray]()
-    report, close = reporter(progress)
-    try:
-        with told_once():
-            for k in range(0, len(starts), AT_ONCE):
-                some = starts[k : k + AT_ONCE]
-                found.append(kept.of(some, partial(compute, some)))
-                done = k + len(some)
-                report(Progress(float(done), float(len(starts)), done, 0.0))
-    finally:
-        close()
+    with reported(progress) as report, told_once():
+        for k in range(0, len(starts), AT_ONCE):
+            some = starts[k : k + AT_ONCE]
+            found.append(kept.of(some, partial(compute, some)))
+            done = k + len(some)
+            report(Progress(float(done), float(len(starts)), done, 0.0))
     ends = np.concatenate(found)
     weights = np.array([1.0, period / (2.0 * np.pi) if frequency else 0.0])
     size = _size(case, starts, ends, weights, same, bool(frequency))

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.attractors.drive import drive_frequency
@@ -17,15 +18,13 @@ from foldyn.dynamics import METHODS, Motion, prepare
 from foldyn.dynamics.failures import failure
 from foldyn.dynamics.methods import suited, with_mass
 from foldyn.dynamics.motion_state import Outcome
-from foldyn.dynamics.progress import Progress, Reporter, reporter
+from foldyn.dynamics.progress import Progress, Reporter
 from foldyn.errors import ComputationError, InputError, MotionInterrupted, told_once
+from foldyn.linear.time_domain import reported
 from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import variable
 from foldyn.values import choice, number, of_kind
-
-if TYPE_CHECKING:
-    import xarray
 
 APART = 1e-7  # distance of the second motion, relative to the size of the first
 SMALL = 1e-4  # of the longest bar: least size, for a motion at rest
@@ -131,13 +130,11 @@ def lyapunov_exponent(
     grown, interrupted = list[float](), False
     with told_once():
         pair = Pair(case, (silent + counted) * interval, interval, initial, method, dt)
-        report, close = reporter(progress)
         try:
-            grown.extend(pair.growth(silent + counted, report))
+            with reported(progress) as report:
+                grown.extend(pair.growth(silent + counted, report))
         except KeyboardInterrupt:
             interrupted, counted = True, len(grown) - silent
-        finally:
-            close()
     if counted < 1:
         raise MotionInterrupted("interrupted before anything was counted")
     growth = np.array(grown[silent:])

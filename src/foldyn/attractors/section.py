@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.attractors.drive import drive_frequency
@@ -15,9 +14,6 @@ from foldyn.results import Quantity, case_of
 from foldyn.results.attributes import facts, own_attributes
 from foldyn.results.quantities import MOTION, variable, variables
 from foldyn.values import choice, number, show
-
-if TYPE_CHECKING:
-    import xarray
 
 ITERATIONS = 60  # of the bisection for the time of a crossing
 ROUNDING = 1e-9  # tolerance, as a fraction of a period

@@ -6,9 +6,10 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.attractors.diagram import FREQUENCY, RESOLUTION, SWEEPS, Steady, bracketed
@@ -16,17 +17,14 @@ from foldyn.attractors.drive import at_frequency, drive_frequency, driven_freque
 from foldyn.attractors.jumps import Jump, is_jump, jump_variables, jumps_between
 from foldyn.attractors.run import Run, Stretch, check_measure, extremes, measured
 from foldyn.cases import Case, Chirp, Harmonic, State
-from foldyn.dynamics.progress import Reporter, reporter
+from foldyn.dynamics.progress import Reporter
 from foldyn.errors import ComputationError, InputError, told_once
-from foldyn.linear.time_domain import overall
+from foldyn.linear.time_domain import overall, reported
 from foldyn.ram_limit import check_memory
 from foldyn.results import Quantity
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import variable
 from foldyn.values import choice, number, numbers, of_kind, whole
-
-if TYPE_CHECKING:
-    import xarray
 
 PER_CYCLE = 48  # samples in a cycle of the highest frequency
 FEWEST = 10  # least cycles in a sweep
@@ -135,24 +133,20 @@ def swept_sine(
     check_memory("duration", f"{samples:.3g} samples of {nodes} nodes", needed, "sweep faster")
     ways = ["up", "down"] if sweep == "both" else [sweep]
     frequency, amplitude, jumps = [], [], list[Jump]()
-    report, close = reporter(progress)
-    try:
-        with told_once():
-            for k, way in enumerate(ways):
-                first, last = (ends if way == "up" else ends[::-1]).tolist()
-                line, before = Line(first, last, duration), k * duration
-                tell = overall(report, before, len(ways) * duration)
-                stretch, run = _glide(case, line, settle, run, 1.0 / (PER_CYCLE * ends[1]), tell)
-                own = _amplitudes(stretch.time, measured(measure, stretch), line.cycles)
-                rates = 1.0 / np.diff(line.cycles)
-                glide = Glide(case, measure, line, settle, stretch, rates, own, run)
-                found = jumps_between(way, rates, own, resolution)
-                jumps += [jump for jump in found if glide.folds(jump, resolution)]
-                order = slice(None, None, 1 if way == "up" else -1)
-                frequency.append(rates[order])
-                amplitude.append(own[order])
-    finally:
-        close()
+    with reported(progress) as report, told_once():
+        for k, way in enumerate(ways):
+            first, last = (ends if way == "up" else ends[::-1]).tolist()
+            line, before = Line(first, last, duration), k * duration
+            tell = overall(report, before, len(ways) * duration)
+            stretch, run = _glide(case, line, settle, run, 1.0 / (PER_CYCLE * ends[1]), tell)
+            own = _amplitudes(stretch.time, measured(measure, stretch), line.cycles)
+            rates = 1.0 / np.diff(line.cycles)
+            glide = Glide(case, measure, line, settle, stretch, rates, own, run)
+            found = jumps_between(way, rates, own, resolution)
+            jumps += [jump for jump in found if glide.folds(jump, resolution)]
+            order = slice(None, None, 1 if way == "up" else -1)
+            frequency.append(rates[order])
+            amplitude.append(own[order])
     along, text = ("sweep", "cycle"), measure.text or "measure"
     data = {
         "amplitude": variable(along, amplitude, measure.units, f"amplitude of {text}"),

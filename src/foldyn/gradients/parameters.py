@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.system import PackedCase
 from foldyn.errors import FoldynError, InputError, warn, within
 from foldyn.mechanics.pullback import Arrays, Pullback, arrays_of_body
 from foldyn.values import numbers, show
@@ -77,7 +77,7 @@ def check_known(seeds: Mapping[str, Any], known: Sequence[str], what: str) -> No
         )
 
 
-def numbers_of_motion(packed: Packed, start: tuple[NDArray, NDArray]) -> Arrays:
+def numbers_of_motion(packed: PackedCase, start: tuple[NDArray, NDArray]) -> Arrays:
     """Numbers of a case as packed for motions, and its initial state."""
     arrays, system, mass = arrays_of_body(packed.body), packed.system, packed.mass
     numbers = {

@@ -8,10 +8,12 @@ definite.
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from scipy import linalg
 from scipy.sparse.linalg import LinearOperator, eigs
@@ -19,19 +21,17 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from foldyn.cases import State
 from foldyn.errors import InputError, warn
 from foldyn.linear.bloch import Bloch, null_space
-from foldyn.linear.linearized_cell import linearize_cell
-from foldyn.linear.model_range import warn_beyond
-from foldyn.linear.unit_cell import UnitCell
+from foldyn.linear.linearized import warn_beyond
+from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
+from foldyn.linear.unit_cell import UnitCell, checked_phases
 from foldyn.linear.wave_solver import Waves, WaveSolver, check_count, slopes_of, tracked
-from foldyn.linear.zone import checked_phases, of_phases
 from foldyn.results.dataset import result_dataset
 from foldyn.threads import in_threads
 from foldyn.values import flag, number, of_kind, whole
 
-if TYPE_CHECKING:
-    import xarray
-
 TURN = 2.0 * np.pi
+OF_PHASES = ("ticks", "tick_labels", "grid")
+"""Attributes of phases that bands take over."""
 SHIFT = 1e-4  # of the square root of the stiffness-to-mass scale
 NOISE = 1e-3  # of the shift: smaller s count as zero
 DENSE = 200  # dofs up to which all eigenvalues are computed
@@ -156,8 +156,6 @@ def bands(
     if asked[2]:
         shares = np.array([polarizations(linear.nodes, waves) for waves in found])
         data["polarization"] = (("phase", "band", "axis"), shares, {"units": "1"})
-    along, attributes = of_phases(phases, given)
-    along["band"] = ("band", 1 + np.arange(count))
     facts = {
         "count": count,
         "tracked": int(asked[3]),
@@ -165,8 +163,23 @@ def bands(
         "residual": linear.residual,
         "wall_seconds": time.perf_counter() - began,
     }
-    result = result_dataset("bands", cell.case, data | linear.variables, along, facts)
-    return result.assign_attrs(attributes)
+    return _dataset("bands", linear, phases, given, data, facts)
+
+
+def _dataset(
+    kind: str, linear: LinearizedCell, phases: Any, given: NDArray, data: Mapping[str, Any],
+    facts: Mapping[str, Any],
+) -> xarray.Dataset:  # fmt: skip
+    """Bands at given phases (n, d), with the coordinates and attributes that describe these."""
+    along: dict[str, Any] = {
+        "wave_vector": (("phase", "period"), given, {"units": "rad"}),
+        "band": ("band", 1 + np.arange(facts["count"])),
+    }
+    if "distance" in getattr(phases, "coords", ()):
+        along["distance"] = phases.coords["distance"]
+    result = result_dataset(kind, linear.cell.case, {**data, **linear.variables}, along, facts)
+    told = getattr(phases, "attrs", {})
+    return result.assign_attrs({key: told[key] for key in OF_PHASES if key in told})
 
 
 def polarizations(nodes: int, waves: Waves) -> NDArray[np.float64]:
@@ -221,16 +234,13 @@ def damped_bands(
     size = np.abs(rates)
     warn_beyond(cell.case.structure, size.max(axis=0) / TURN, "band")
     ratio = np.divide(-rates.real, size, out=np.full(size.shape, np.nan), where=size > 0.0)
-    along, attributes = of_phases(phases, given)
-    along["band"] = ("band", 1 + np.arange(count))
     data: dict[str, Any] = {
         "rate": (("phase", "band"), rates, {"units": "1/s"}),
         "frequency": (("phase", "band"), np.abs(rates.imag) / TURN, {"units": "Hz"}),
         "damping_ratio": (("phase", "band"), ratio, {"units": "1"}),
     }
     facts = {"count": count, "secant": secant}
-    result = result_dataset("damped_bands", cell.case, data | linear.variables, along, facts)
-    return result.assign_attrs(attributes)
+    return _dataset("damped_bands", linear, phases, given, data, facts)
 
 
 def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex128]:
@@ -297,8 +307,6 @@ def band_gaps(bands: Any, least: float = 1e-3) -> xarray.Dataset:
     InputError
         Not a result of `foldyn.bands`.
     """
-    import xarray
-
     frequency = frequencies_of(bands)
     least = number("least", least, least=0.0)
     found = []

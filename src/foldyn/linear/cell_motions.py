@@ -7,9 +7,10 @@ in the axes of cell 0, turned back with the screw, as for Bloch waves.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
@@ -19,9 +20,6 @@ from foldyn.results.contents import check_variable
 from foldyn.signals import sampling_interval, wavenumber_spectrum
 from foldyn.signals.records import Window
 from foldyn.values import choice, of_kind
-
-if TYPE_CHECKING:
-    import xarray
 
 FEWEST = 3  # least number of cells of a chain
 AXES = ("x", "y", "z")
@@ -129,8 +127,6 @@ def space_time(
     >>> found.displacement.dims, found.sizes["cell"], found.sizes["gap"]
     (('time', 'cell'), 5, 4)
     """
-    import xarray as xr
-
     choice("component", component, COMPONENTS)
     time, positions = _motion(trajectory)
     cells = cells_of(positions, cell, along)
@@ -162,7 +158,7 @@ def space_time(
         "between": ("gap", number[:-1] + 0.5),
     }
     attributes = {"kind": "space_time", "component": component, "shift": motion.shift}
-    return xr.Dataset(variables, coordinates, attributes)
+    return xarray.Dataset(variables, coordinates, attributes)
 
 
 def wave_spectrum(
@@ -199,8 +195,6 @@ def wave_spectrum(
     InputError
         Not a motion, or not of such cells; times that are not evenly spaced.
     """
-    import xarray as xr
-
     if component is not None:
         choice("component", component, AXES)
     time, positions = _motion(trajectory)
@@ -209,7 +203,7 @@ def wave_spectrum(
     if component is not None:
         velocity = velocity[..., AXES.index(component)]
     found = wavenumber_spectrum(velocity, sampling_interval(time), window=window)
-    return xr.Dataset(
+    return xarray.Dataset(
         {"amplitude": (("phase", "frequency"), found.amplitude, {"units": "m/s"})},
         {
             "phase": ("phase", found.phase, {"units": "rad"}),
@@ -249,7 +243,6 @@ def transmission(response: xarray.Dataset, cell: UnitCell, *, along: int = 0) ->
     InputError
         Not a frequency response, or not of a chain of such cells.
     """
-    import xarray as xr
     from scipy.stats import theilslopes
 
     name = next((each for each in ("receptance", "mobility", "accelerance", "transmissibility")
@@ -272,7 +265,7 @@ def transmission(response: xarray.Dataset, cell: UnitCell, *, along: int = 0) ->
     units = response[name].attrs.get("units", "1")
     with np.errstate(invalid="ignore"):
         ratio = amplitude[:, -1] / amplitude[:, 0]
-    return xr.Dataset(
+    return xarray.Dataset(
         {
             "amplitude": (("frequency", "cell"), amplitude, {"units": units}),
             "ratio": ("frequency", ratio, {"units": "1"}),

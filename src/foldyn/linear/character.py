@@ -18,9 +18,10 @@ after the part with more than half of its motion; a mode without such a part is 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, resolve_nodes
@@ -28,9 +29,6 @@ from foldyn.cases.directions import AXES, check_axis
 from foldyn.errors import InputError
 from foldyn.results import case_of, check_result
 from foldyn.values import whole
-
-if TYPE_CHECKING:
-    import xarray
 
 NODES_PER_STATION = 12
 MOST_STATIONS = 9
@@ -80,8 +78,6 @@ def character(
         raise InputError(f"modes: is a {modes.attrs['foldyn_result']}; give modes")
     case = case_of(modes) if case is None else case
     structure, axis = case.structure, main_axis(case) if axis is None else check_axis("axis", axis)
-    import xarray
-
     every = np.arange(len(structure.nodes))
     chosen = every if nodes is None else resolve_nodes(structure, nodes)
     if stations is None:

@@ -12,24 +12,22 @@ pairs (B. R. Mace, E. Manconi, J. Sound Vib. 318, 2008).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from scipy import linalg
 
 from foldyn.cases import State
 from foldyn.errors import InputError
 from foldyn.linear.bloch import Bloch
+from foldyn.linear.linearized import warn_beyond
 from foldyn.linear.linearized_cell import linearize_cell
-from foldyn.linear.model_range import warn_beyond
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.results.dataset import result_dataset
 from foldyn.threads import in_threads
 from foldyn.values import number, numbers, whole
-
-if TYPE_CHECKING:
-    import xarray
 
 TRAVELS = 1e-6  # Np per cell: below this attenuation a wave counts as traveling
 FASTEST = 40.0  # Np per cell beyond which a wave is lost in round-off

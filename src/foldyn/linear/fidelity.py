@@ -243,13 +243,10 @@ class Comparison:
 
 
 def comparison(
-    case: Case,
-    count: int = 6,
-    divisions: Sequence[int] | None = None,
+    case: Case, count: int = 6, divisions: Sequence[int] | None = None,
     models: Sequence[str] | Mapping[str, Mapping[str, Any]] | None = None,
-    secant: float | None = None,
-    vertex_radius: float | None = None,
-) -> Comparison:
+    secant: float | None = None, vertex_radius: float | None = None,
+) -> Comparison:  # fmt: skip
     """Check a comparison and make its structures; arguments as in `fidelity`."""
     count = whole("count", count, least=1)
     if secant is not None:

@@ -5,21 +5,21 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.algebra.eigen import SHIFT, Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
-from foldyn.dynamics.progress import Reporter, reporter
+from foldyn.dynamics.progress import Reporter
 from foldyn.errors import InputError, StretchWarning, warn
 from foldyn.linear.excitation import NAMED, Answer, absolute, drive_of
 from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
-from foldyn.linear.linearized import Linearized, linearize
-from foldyn.linear.model_range import warn_beyond
-from foldyn.linear.time_domain import Rig, SteppedSine, stepped_sine
+from foldyn.linear.linearized import Linearized, linearize, warn_beyond
+from foldyn.linear.time_domain import Rig, SteppedSine, reported, stepped_sine
 from foldyn.linear.transients import BurstRandom, Impulse, burst_random, impulse
 from foldyn.ram_limit import check_memory
 from foldyn.results import frf_dataset
@@ -27,9 +27,6 @@ from foldyn.results.quantities import RESPONSES, variable
 from foldyn.signals import convert_response
 from foldyn.structures.stretching import most, remedy, stretching
 from foldyn.values import choice, number, numbers, of_kind, suggest, whole
-
-if TYPE_CHECKING:
-    import xarray
 
 
 class ResponseMethod(NamedTuple):
@@ -182,9 +179,8 @@ def frf(
             "leave it out",
             "internal",
         )
-    report, close = reporter(progress)
     began = time.perf_counter()
-    try:
+    with reported(progress) as report:
         if way.linear:
             system = linearize(
                 case, state, secant=way.secant or secant, load_factor=load_factor, internal=internal
@@ -199,8 +195,6 @@ def frf(
             answer = way.compute(rig, frequency, chosen, report)
             response, displacement = answer.response, rig.state
             own = {"integrator": rig.integrator, "dt": chosen.dt}
-    finally:
-        close()
     warn_beyond(case.structure, frequency, internal=None if way.by_amplitude else internal)
     facts = {
         "method": method,

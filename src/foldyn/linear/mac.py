@@ -162,14 +162,6 @@ def _weighted(shapes: NDArray, mass: Any) -> NDArray:
     return product.reshape(nodes, count, components).transpose(1, 0, 2).reshape(count, -1)
 
 
-class Pair(NamedTuple):
-    """Paired modes: their numbers from 0 and their MAC."""
-
-    first: int
-    second: int
-    mac: float
-
-
 def clusters(frequency: NDArray) -> NDArray:
     """Number (k,) of the cluster of each of increasing frequencies (k,)."""
     apart = np.diff(frequency) > NEAR * frequency[1:]
@@ -192,7 +184,7 @@ def likeness(fa: NDArray, a: NDArray, fb: NDArray, b: NDArray, mass: NDArray) ->
     return np.minimum(found, 1.0)
 
 
-def pairs(fa: NDArray, a: NDArray, fb: NDArray, b: NDArray, mass: NDArray) -> list[Pair]:
+def pairs(fa: NDArray, a: NDArray, fb: NDArray, b: NDArray, mass: NDArray) -> Pairs:
     """Pairs of modes, in the order of the first set.
 
     Parameters
@@ -207,8 +199,8 @@ def pairs(fa: NDArray, a: NDArray, fb: NDArray, b: NDArray, mass: NDArray) -> li
     from scipy.optimize import linear_sum_assignment
 
     if not len(fa) or not len(fb):
-        return []
+        return Pairs(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
     alike = likeness(fa, a, fb, b, mass)
     cost = 1.0 - alike + FREQUENCY_WEIGHT * np.abs(np.log(fb[None, :] / fa[:, None]))
     first, second = linear_sum_assignment(cost)
-    return [Pair(int(i), int(j), float(alike[i, j])) for i, j in zip(first, second, strict=True)]
+    return Pairs(first, second, alike[first, second])

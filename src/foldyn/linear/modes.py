@@ -9,9 +9,10 @@ axis.
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import eigh
@@ -22,17 +23,13 @@ from foldyn.cases import Case, State
 from foldyn.dynamics.modal_damping import mass_of
 from foldyn.errors import StretchWarning, warn
 from foldyn.linear.hereditary import Branches, damped_mode
-from foldyn.linear.linearized import Linearized, linearize
-from foldyn.linear.model_range import warn_beyond
+from foldyn.linear.linearized import Linearized, linearize, warn_beyond
 from foldyn.ram_limit import check_memory
 from foldyn.results import modes_dataset
 from foldyn.statics.rigid import free_rigid_motions, rigid_motions
 from foldyn.statics.stability import oriented
 from foldyn.structures.stretching import most, remedy, stretching
 from foldyn.values import of_kind, whole
-
-if TYPE_CHECKING:
-    import xarray
 
 COPIES = 4  # of the shapes in memory, while they are found and stored
 RIGID = 1.0 - 1e-6  # share in the space of rigid motions above which a shape counts as rigid
@@ -115,11 +112,10 @@ def modes(
     ModelRangeWarning
         Modes lie above the range of the model.
     """
-    found = spectrum_of(
+    return spectrum_of(
         case, count, state, secant, load_factor=load_factor, internal=internal, verify=verify,
         solver=solver,
-    )  # fmt: skip
-    return found.result
+    ).result  # fmt: skip
 
 
 class Found(NamedTuple):
@@ -131,16 +127,9 @@ class Found(NamedTuple):
 
 
 def spectrum_of(
-    case: Case,
-    count: int = 6,
-    state: State | str | None = None,
-    secant: float | None = None,
-    *,
-    load_factor: float = 1.0,
-    internal: int = 0,
-    verify: bool = True,
-    solver: str = "auto",
-) -> Found:
+    case: Case, count: int = 6, state: State | str | None = None, secant: float | None = None, *,
+    load_factor: float = 1.0, internal: int = 0, verify: bool = True, solver: str = "auto",
+) -> Found:  # fmt: skip
     """Modes as from `modes`, with the linearized system and its spectrum; arguments as there."""
     of_kind("case", case, Case)
     count = whole("count", count, least=1)

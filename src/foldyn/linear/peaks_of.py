@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.cases.directions import AXES, signed
@@ -23,9 +23,6 @@ from foldyn.signals import (
     without_window,
 )
 from foldyn.values import choice
-
-if TYPE_CHECKING:
-    import xarray
 
 PROMINENT = 0.05
 HALF_POWER = math.sqrt(2.0)
@@ -148,16 +145,9 @@ def resonances(
     scatters : whether the curve is an estimate from random records, with meaningless low peaks.
     """
     kind, size = kind_of(shown), np.abs(curve)  # an undamped response is real, of either sign
-    if prominence is not None:
-        return find_peaks(f, size, prominence=prominence, count=count, quantity=kind)
-    return find_peaks(
-        f,
-        size,
-        prominence=PROMINENT,
-        count=count,
-        quantity=kind,
-        rise=None if scatters else HALF_POWER,
-    )
+    rise = None if scatters or prominence is not None else HALF_POWER
+    least = PROMINENT if prominence is None else prominence
+    return find_peaks(f, size, prominence=least, count=count, quantity=kind, rise=rise)
 
 
 def kind_of(shown: str) -> str:

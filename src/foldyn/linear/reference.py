@@ -85,8 +85,8 @@ def same_modes(own: MeshModes, meshes: Sequence[MeshModes], count: int) -> NDArr
     for row, mesh in zip(frequencies, meshes, strict=True):
         seen, shape = own.at(mesh.structure.nodes)
         weights = np.ones(len(seen))
-        for pair in pairs(first, shape[:k], mesh.frequency, mesh.shape[:, seen], weights):
-            row[pair.first] = mesh.frequency[pair.second]
+        found = pairs(first, shape[:k], mesh.frequency, mesh.shape[:, seen], weights)
+        row[found.first] = mesh.frequency[found.second]
     return frequencies
 
 
@@ -102,8 +102,6 @@ class Reference:
     mesh_error : (k,)
         Relative errors of the finest mesh, by the order observed with the two coarser ones; nan if
         the meshes have not converged, or there is no limit.
-    mesh_frequency : (3, k)
-        Frequencies of these modes on each mesh, Hz; nan if a coarse mesh lacks one.
     shape : (k, n, 3)
         Shapes of the fine mesh.
     case : Case
@@ -114,7 +112,6 @@ class Reference:
 
     frequency: Annotated[NDArray, Unit("Hz")]
     mesh_error: NDArray
-    mesh_frequency: NDArray
     shape: NDArray
     case: Case
     found: xarray.Dataset
@@ -170,9 +167,7 @@ def reference_modes(cases: Sequence[Case], count: int) -> Reference:
     if touched_clamp(cases[-1].structure) is not None:
         error[:] = np.nan
     rank = np.argsort(limit, kind="stable")  # extrapolation may swap close modes of a coarse mesh
-    return Reference(
-        limit[rank], error[rank], values[:, rank], fine.shape[rank], cases[-1], fine.found
-    )
+    return Reference(limit[rank], error[rank], fine.shape[rank], cases[-1], fine.found)
 
 
 def is_graded(case: Case) -> bool:
@@ -255,10 +250,10 @@ def matched(true: Shown, count: int, case: Case, found: xarray.Dataset) -> Match
     if "between_shape" in found:
         own = np.concatenate([own, elastic(found, count + SPARE, "between_shape")[1]], axis=1)
     partner, mac = np.full(len(wanted), np.nan), np.zeros(len(wanted))
-    for pair in pairs(wanted, shape[:count], frequency, own[:, seen], weights[seen]):
-        mac[pair.first] = pair.mac
-        if pair.mac >= LEAST:
-            partner[pair.first] = frequency[pair.second]
+    both = pairs(wanted, shape[:count], frequency, own[:, seen], weights[seen])
+    mac[both.first] = both.mac
+    alike = both.mac >= LEAST
+    partner[both.first[alike]] = frequency[both.second[alike]]
     return Matched(partner, partner / wanted - 1.0, mac)
 
 

@@ -6,7 +6,8 @@ The stepped sine method takes steady motions under a sine, one frequency at a ti
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, cast
 
@@ -30,7 +31,7 @@ from foldyn.cases import (
 from foldyn.cases.directions import unit_vector
 from foldyn.cases.supports import Support
 from foldyn.dynamics import METHODS, Progress, prepare
-from foldyn.dynamics.progress import Reporter
+from foldyn.dynamics.progress import Reporter, reporter
 from foldyn.linear.excitation import Answer, Drive, warn_at
 from foldyn.linear.operating_point import operating_point
 from foldyn.signals import stepped_sine as response_per_drive
@@ -121,14 +122,9 @@ class Rig:
         return replace(self.case, supports=supports, loads=loads)
 
     def run(
-        self,
-        history: History,
-        duration: float,
-        interval: float,
-        progress: Reporter,
-        start: float = 0.0,
-        initial: State | None = None,
-    ) -> tuple[NDArray, NDArray, State]:
+        self, history: History, duration: float, interval: float, progress: Reporter,
+        start: float = 0.0, initial: State | None = None,
+    ) -> tuple[NDArray, NDArray, State]:  # fmt: skip
         """Times, response (nt, n, 3) relative to the state, and the final state of a motion."""
         dt, tolerance = self.integration.dt, self.integration.tolerance
         if dt is not None:
@@ -154,6 +150,16 @@ def forces(vectors: NDArray, history: History | None = None) -> list[Force]:
         for k, vector in enumerate(distinct)
         if vector.any()
     ]
+
+
+@contextmanager
+def reported(progress: bool | Reporter | None) -> Iterator[Reporter]:
+    """A reporter for the argument `progress`; closed at the end."""
+    report, close = reporter(progress)
+    try:
+        yield report
+    finally:
+        close()
 
 
 def overall(report: Reporter, before: float, total: float) -> Callable[[Progress], Any]:

@@ -14,26 +14,25 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import product
-from typing import TYPE_CHECKING, Any, NamedTuple
+from itertools import pairwise, product
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.linear.zone import zone_grid, zone_path
 from foldyn.patterns.screw import Screw, motion_between, translation
 from foldyn.patterns.tiling import half_edges
 from foldyn.patterns.tiling import periods as translations_of
+from foldyn.ram_limit import check_memory
 from foldyn.values import number, numbers, of_kind, show, whole
-
-if TYPE_CHECKING:
-    import xarray
 
 NEAR_MISS = 0.05  # of the pattern's size: nearer misses of a vertex are reported
 COMMUTE = 10.0  # factor on the tolerance: largest difference between the two orders of two motions
 SHOWN = 6  # vertices named in a message
+HEXAGONAL = 1e-6  # tolerance for lengths and angle of a hexagonal lattice
 
 
 class Copies(NamedTuple):
@@ -414,3 +413,92 @@ def _named(vertices: Sequence[int] | NDArray) -> str:
     listed = [str(int(v)) for v in vertices]
     more = f" and {len(listed) - SHOWN} more" if len(listed) > SHOWN else ""
     return ", ".join(listed[:SHOWN]) + more
+
+
+def zone_path(vectors: NDArray, points: str, count: int) -> xarray.DataArray:
+    """Phases along a path, see `UnitCell.path`; vectors (d, 3) of the periods, m."""
+    known = special_points(vectors)
+    if not isinstance(points, str):
+        raise InputError(f' = {show(points)}: give names, as in "G-X-M-G"', "points")
+    names = [name.strip().replace("Γ", "G") for name in points.split("-")]
+    unknown = [name for name in names if name not in known]
+    if unknown or len(names) < 2:
+        what = f"{show(unknown[0])} is no point" if unknown else "give at least two points"
+        raise InputError(
+            f" = {show(points)}: {what}; this cell has {', '.join(known)}, as in "
+            f'"{"G-X-M-G" if len(vectors) == 2 else "G-X"}"',
+            "points",
+        )
+    count = whole("count", count, least=len(names))
+    _check_memory(count, len(vectors))
+    corners = np.array([known[name] for name in names])
+    lengths = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    if not lengths.all():
+        raise InputError(f" = {show(points)}: names a point twice in a row", "points")
+    ends = np.concatenate([[0.0], np.cumsum(lengths)])
+    marks = np.round(ends / ends[-1] * (count - 1)).astype(int)
+    marks = np.maximum.accumulate(np.maximum(marks, np.arange(len(marks))))
+    for k in range(len(marks) - 1, 0, -1):  # leave room for the remaining corners
+        marks[k] = min(marks[k], count - len(marks) + k)
+    rows = [
+        corners[k]
+        + np.linspace(0.0, 1.0, b - a, endpoint=False)[:, None] * (corners[k + 1] - corners[k])
+        for k, (a, b) in enumerate(pairwise(marks.tolist()))
+    ]
+    phases = np.concatenate([*rows, corners[-1:]])
+    distance = np.concatenate([[0.0], np.linalg.norm(np.diff(phases, axis=0), axis=1).cumsum()])
+    return xarray.DataArray(
+        phases, dims=("phase", "period"),
+        coords={"distance": ("phase", distance, {"units": "rad", "long_name": "along the path"})},
+        attrs={"units": "rad", "ticks": distance[marks], "tick_labels": "-".join(names)},
+    )  # fmt: skip
+
+
+def _check_memory(count: int, dimensions: int) -> None:
+    """Refuse more phases than memory can hold; building them takes twice as much."""
+    check_memory(
+        "count", f"a list of {count:g} phases", 16.0 * count * (dimensions + 1), "take fewer"
+    )
+
+
+def zone_grid(dimensions: int, count: int) -> xarray.DataArray:
+    """Phases covering the zone; see `UnitCell.grid`."""
+    count = whole("count", count, least=2)
+    _check_memory(count**dimensions, dimensions)
+    along = -np.pi + 2.0 * np.pi / count * np.arange(count)
+    phases = np.stack(np.meshgrid(*[along] * dimensions, indexing="ij"), axis=-1)
+    return xarray.DataArray(
+        phases.reshape(-1, dimensions), dims=("phase", "period"),
+        attrs={"units": "rad", "grid": np.array([count] * dimensions)},
+    )  # fmt: skip
+
+
+def special_points(vectors: NDArray) -> dict[str, NDArray]:
+    """Points (d,) of high symmetry by name, rad."""
+    pi = np.pi
+    if len(vectors) == 1:
+        return {"G": np.zeros(1), "X": np.full(1, pi)}
+    corners = {"G": (0.0, 0.0), "X": (pi, 0.0), "Y": (0.0, pi), "M": (pi, pi)}
+    found = {name: np.array(corner) for name, corner in corners.items()}
+    lengths = np.linalg.norm(vectors, axis=1)
+    if lengths.all():
+        cosine = vectors[0] @ vectors[1] / lengths.prod()
+        alike = abs(lengths[0] / lengths[1] - 1.0) < HEXAGONAL
+        if alike and abs(abs(cosine) - 0.5) < HEXAGONAL:
+            found["K"] = 2.0 * pi / 3.0 * np.array([1.0, -1.0 if cosine > 0.0 else 1.0])
+    return found
+
+
+def checked_phases(phases: object, dimensions: int) -> NDArray[np.float64]:
+    """Phases (n, d), rad; for d = 1 also a list of numbers."""
+    values = phases.values if isinstance(phases, xarray.DataArray) else phases
+    array = numbers("phases", values)
+    if array.ndim == 1 and dimensions == 1:
+        array = array[:, None]
+    if array.ndim != 2 or array.shape[1] != dimensions or not len(array):
+        raise InputError(
+            f": shape {array.shape}: give (n, {dimensions}), rad per period, as cell.path makes "
+            "them",
+            "phases",
+        )
+    return array

@@ -18,11 +18,10 @@ from foldyn.dynamics import initial
 from foldyn.errors import ComputationError, InputError, warn
 from foldyn.linear.linearized import equivalent_slope
 from foldyn.periodic.balance import AtFrequency, Balance, Converged, Fourier, newton, values_of
-from foldyn.periodic.collocation import STEPS, Shooting, is_stable
 from foldyn.periodic.continuation import Step, Stride, point_at, steps
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.families import ByLevel
-from foldyn.periodic.orbit import SHOWN, Orbit
+from foldyn.periodic.orbit import SHOWN, STEPS, Orbit, Shooting, is_stable
 from foldyn.periodic.reduction import reduced
 from foldyn.ram_limit import check_memory
 from foldyn.results.periodic_dataset import periodic_dataset

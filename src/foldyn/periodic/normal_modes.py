@@ -5,19 +5,20 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from foldyn.cases import Case, State
 from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics import Progress
-from foldyn.dynamics.progress import Reporter, reporter
+from foldyn.dynamics.progress import Reporter
 from foldyn.errors import ComputationError, InputError, MotionInterrupted, warn
+from foldyn.linear.time_domain import reported
 from foldyn.periodic.balance import Balance, Fourier, values_of
-from foldyn.periodic.collocation import STEPS, is_stable
 from foldyn.periodic.continuation import LOST, Point, Step, Stride, corrected, point_at, steps
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.families import AboutRest, Free, InResonance
@@ -29,14 +30,11 @@ from foldyn.periodic.motion import (
     linear_response,
     warn_of_errors,
 )
-from foldyn.periodic.orbit import SHOWN, Orbit, along
+from foldyn.periodic.orbit import SHOWN, STEPS, Orbit, along, is_stable
 from foldyn.ram_limit import check_memory
 from foldyn.results.periodic_dataset import points_dataset
 from foldyn.statics.tracing import displacement_of
 from foldyn.values import flag, number, numbers, of_kind, show, whole
-
-if TYPE_CHECKING:
-    import xarray
 
 FIRST = 0.3  # of the longest step
 TURN = 2.0 * np.pi
@@ -162,13 +160,11 @@ def backbone(
             return _largest(family.orbit(point.z, point.p), place)
 
         kept, complete, interrupted = [first], False, False
-        report, close = reporter(progress)
         try:
-            complete = _follow(family, kept, stride, reached, ends, report)
+            with reported(progress) as report:
+                complete = _follow(family, kept, stride, reached, ends, report)
         except KeyboardInterrupt:
             interrupted = True
-        finally:
-            close()
         facts = {
             "mode": mode,
             "harmonics": balance.fourier.harmonics,

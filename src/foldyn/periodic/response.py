@@ -11,18 +11,19 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.attractors.run import check_measure
 from foldyn.cases import Case, State
 from foldyn.dynamics import Progress
-from foldyn.dynamics.progress import Reporter, reporter
+from foldyn.dynamics.progress import Reporter
 from foldyn.errors import InputError, MotionInterrupted, warn
+from foldyn.linear.time_domain import reported
 from foldyn.periodic.balance import Balance, Fourier
-from foldyn.periodic.collocation import STEPS, is_stable
 from foldyn.periodic.continuation import (
     LONG,
     LOST,
@@ -36,13 +37,10 @@ from foldyn.periodic.continuation import (
 )
 from foldyn.periodic.families import ByFrequency, ByLevel
 from foldyn.periodic.motion import NAMED, balance_of, balanced, coefficients, warn_of_errors
-from foldyn.periodic.orbit import along, amplitude
+from foldyn.periodic.orbit import STEPS, along, amplitude, is_stable
 from foldyn.results import Quantity
 from foldyn.results.periodic_dataset import points_dataset
 from foldyn.values import number, numbers, of_kind, show, whole
-
-if TYPE_CHECKING:
-    import xarray
 
 FIRST = 0.2  # of the longest step
 AWAY = 0.05  # of the motion: distance at which a branch is entered
@@ -163,9 +161,8 @@ def response_curve(
     steps = whole("steps", steps, least=4)
     balance = balance_of(case, "fd.response_curve", harmonics, periods, modes, guess, steps)
     tracer = _Tracer(by, ends, stride, steps, tolerance)
-    report, close = reporter(progress)
     try:
-        with balance.threads:
+        with reported(progress) as report, balance.threads:
             family = tracer.family(balance)
             first = tracer.first(family, guess)
             tracer.follow(family, first, branches, report)
@@ -173,8 +170,6 @@ def response_curve(
         tracer.complete = False
         partial = _dataset(case, tracer, measure, began) if tracer.found else None
         raise MotionInterrupted(f"interrupted after {len(tracer.found)} points", partial) from None
-    finally:
-        close()
     return _dataset(case, tracer, measure, began)
 
 
