@@ -93,7 +93,7 @@ def test_cells_that_meet_across_corners_are_one_lattice():
     vectors = [(0.0, step, 0.0), (1.5 * 0.03, 0.5 * step, 0.0)]
     cell = cell_of(pattern, vectors=vectors)
     assert cell.kinds == 3  # two corners and the middle
-    assert "K" in fd.linear.zone.special_points(cell.vectors)
+    assert "K" in fd.linear.unit_cell.special_points(cell.vectors)
     zeros = fd.bands(cell, [[0.0, 0.0]], count=4).frequency.values[0] < 1e-3
     assert zeros.tolist() == [True, True, True, False]
 

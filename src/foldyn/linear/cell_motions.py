@@ -14,6 +14,7 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.linear.frf import quantity_of
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.patterns.screw import Screw
 from foldyn.results.contents import check_variable
@@ -245,10 +246,7 @@ def transmission(response: xarray.Dataset, cell: UnitCell, *, along: int = 0) ->
     """
     from scipy.stats import theilslopes
 
-    name = next((each for each in ("receptance", "mobility", "accelerance", "transmissibility")
-                 if each in getattr(response, "data_vars", ())), "")  # fmt: skip
-    if not name:
-        raise InputError(": give a frequency response, as fd.frf returns it", "response")
+    name = quantity_of(response)
     positions = check_variable(response, "rest_position", ("node", "axis")).values
     cells = cells_of(positions, cell, along)
     values = response[name].transpose("frequency", "node", "axis").values

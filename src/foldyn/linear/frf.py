@@ -288,7 +288,7 @@ def quantity_of(response: xarray.Dataset) -> str:
     if len(held) != 1:
         raise InputError(
             f"response: got {type(response).__name__} without {', '.join(RESPONSES)}; give a "
-            "result of fd.frf"
+            "frequency response, as fd.frf returns it"
         )
     return held[0]
 

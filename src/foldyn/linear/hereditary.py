@@ -63,10 +63,8 @@ class Branches:
 
     def stiffness(self, s: complex) -> sparse.csc_array:
         """Stiffness (nf, nf) of the branches, N/m."""
-        return self._matrix(self.weights(s))
-
-    def _matrix(self, weights: NDArray) -> sparse.csc_array:
-        return sparse.csc_array(self.gradient.T @ sparse.diags_array(weights) @ self.gradient)
+        weights = sparse.diags_array(self.weights(s))
+        return sparse.csc_array(self.gradient.T @ weights @ self.gradient)
 
     def between(self, shapes: NDArray, s: complex) -> NDArray:
         """Stiffness of the branches between shapes (nf, k), as a matrix (k, k)."""

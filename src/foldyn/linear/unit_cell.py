@@ -239,7 +239,41 @@ class UnitCell:
         InputError
             An unknown point, or fewer phases than points.
         """
-        return zone_path(self.vectors, points, count)
+        known = special_points(self.vectors)
+        if not isinstance(points, str):
+            raise InputError(f' = {show(points)}: give names, as in "G-X-M-G"', "points")
+        names = [name.strip().replace("Γ", "G") for name in points.split("-")]
+        unknown = [name for name in names if name not in known]
+        if unknown or len(names) < 2:
+            what = f"{show(unknown[0])} is no point" if unknown else "give at least two points"
+            raise InputError(
+                f" = {show(points)}: {what}; this cell has {', '.join(known)}, as in "
+                f'"{"G-X-M-G" if self.dimensions == 2 else "G-X"}"',
+                "points",
+            )
+        count = whole("count", count, least=len(names))
+        _check_memory(count, self.dimensions)
+        corners = np.array([known[name] for name in names])
+        lengths = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+        if not lengths.all():
+            raise InputError(f" = {show(points)}: names a point twice in a row", "points")
+        ends = np.concatenate([[0.0], np.cumsum(lengths)])
+        marks = np.round(ends / ends[-1] * (count - 1)).astype(int)
+        marks = np.maximum.accumulate(np.maximum(marks, np.arange(len(marks))))
+        for k in range(len(marks) - 1, 0, -1):  # leave room for the remaining corners
+            marks[k] = min(marks[k], count - len(marks) + k)
+        rows = [
+            corners[k]
+            + np.linspace(0.0, 1.0, b - a, endpoint=False)[:, None] * (corners[k + 1] - corners[k])
+            for k, (a, b) in enumerate(pairwise(marks.tolist()))
+        ]
+        phases = np.concatenate([*rows, corners[-1:]])
+        distance = np.concatenate([[0.0], np.linalg.norm(np.diff(phases, axis=0), axis=1).cumsum()])
+        named = {"units": "rad", "long_name": "along the path"}
+        return xarray.DataArray(
+            phases, dims=("phase", "period"), coords={"distance": ("phase", distance, named)},
+            attrs={"units": "rad", "ticks": distance[marks], "tick_labels": "-".join(names)},
+        )  # fmt: skip
 
     def grid(self, count: int = 24) -> xarray.DataArray:
         """Phases covering the Brillouin zone, from -pi to pi along each period.
@@ -254,7 +288,14 @@ class UnitCell:
         xarray.DataArray
             Phases (phase, period), rad; the attribute `grid` holds the number along each.
         """
-        return zone_grid(self.dimensions, count)
+        count = whole("count", count, least=2)
+        _check_memory(count**self.dimensions, self.dimensions)
+        along = -np.pi + 2.0 * np.pi / count * np.arange(count)
+        phases = np.stack(np.meshgrid(*[along] * self.dimensions, indexing="ij"), axis=-1)
+        return xarray.DataArray(
+            phases.reshape(-1, self.dimensions), dims=("phase", "period"),
+            attrs={"units": "rad", "grid": np.array([count] * self.dimensions)},
+        )  # fmt: skip
 
 
 def images(
@@ -415,62 +456,11 @@ def _named(vertices: Sequence[int] | NDArray) -> str:
     return ", ".join(listed[:SHOWN]) + more
 
 
-def zone_path(vectors: NDArray, points: str, count: int) -> xarray.DataArray:
-    """Phases along a path, see `UnitCell.path`; vectors (d, 3) of the periods, m."""
-    known = special_points(vectors)
-    if not isinstance(points, str):
-        raise InputError(f' = {show(points)}: give names, as in "G-X-M-G"', "points")
-    names = [name.strip().replace("Γ", "G") for name in points.split("-")]
-    unknown = [name for name in names if name not in known]
-    if unknown or len(names) < 2:
-        what = f"{show(unknown[0])} is no point" if unknown else "give at least two points"
-        raise InputError(
-            f" = {show(points)}: {what}; this cell has {', '.join(known)}, as in "
-            f'"{"G-X-M-G" if len(vectors) == 2 else "G-X"}"',
-            "points",
-        )
-    count = whole("count", count, least=len(names))
-    _check_memory(count, len(vectors))
-    corners = np.array([known[name] for name in names])
-    lengths = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-    if not lengths.all():
-        raise InputError(f" = {show(points)}: names a point twice in a row", "points")
-    ends = np.concatenate([[0.0], np.cumsum(lengths)])
-    marks = np.round(ends / ends[-1] * (count - 1)).astype(int)
-    marks = np.maximum.accumulate(np.maximum(marks, np.arange(len(marks))))
-    for k in range(len(marks) - 1, 0, -1):  # leave room for the remaining corners
-        marks[k] = min(marks[k], count - len(marks) + k)
-    rows = [
-        corners[k]
-        + np.linspace(0.0, 1.0, b - a, endpoint=False)[:, None] * (corners[k + 1] - corners[k])
-        for k, (a, b) in enumerate(pairwise(marks.tolist()))
-    ]
-    phases = np.concatenate([*rows, corners[-1:]])
-    distance = np.concatenate([[0.0], np.linalg.norm(np.diff(phases, axis=0), axis=1).cumsum()])
-    return xarray.DataArray(
-        phases, dims=("phase", "period"),
-        coords={"distance": ("phase", distance, {"units": "rad", "long_name": "along the path"})},
-        attrs={"units": "rad", "ticks": distance[marks], "tick_labels": "-".join(names)},
-    )  # fmt: skip
-
-
 def _check_memory(count: int, dimensions: int) -> None:
     """Refuse more phases than memory can hold; building them takes twice as much."""
     check_memory(
         "count", f"a list of {count:g} phases", 16.0 * count * (dimensions + 1), "take fewer"
     )
-
-
-def zone_grid(dimensions: int, count: int) -> xarray.DataArray:
-    """Phases covering the zone; see `UnitCell.grid`."""
-    count = whole("count", count, least=2)
-    _check_memory(count**dimensions, dimensions)
-    along = -np.pi + 2.0 * np.pi / count * np.arange(count)
-    phases = np.stack(np.meshgrid(*[along] * dimensions, indexing="ij"), axis=-1)
-    return xarray.DataArray(
-        phases.reshape(-1, dimensions), dims=("phase", "period"),
-        attrs={"units": "rad", "grid": np.array([count] * dimensions)},
-    )  # fmt: skip
 
 
 def special_points(vectors: NDArray) -> dict[str, NDArray]:
