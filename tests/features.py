@@ -108,8 +108,8 @@ REASONS: Mapping[str, tuple[str, str]] = {
         "the rotations of a shell have no mass, and the method needs accelerations of all dofs",
     ),
     "b": (
-        "what rubs sticks or slides",
-        "what rubs sticks or slides, so that no linear law describes small motions",
+        "contacts stick or slide",
+        "contacts stick or slide, so that no linear law describes small motions",
     ),
     "c": (
         "creep",

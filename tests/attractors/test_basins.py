@@ -179,7 +179,7 @@ def test_a_grid_that_was_cut_off_goes_on(tmp_path, monkeypatch):
     run(lengths, folder=tmp_path, record=5)
     assert len(list(tmp_path.glob("*.npz"))) == 4
     arch = duffing(-1.0, ALPHA)
-    with pytest.raises(InputError, match="folder: nothing of this case can be kept"):
+    with pytest.raises(InputError, match="folder: this case cannot be stored"):
         fd.basins(
             arch, lambda x: at(arch, x), grid={"x": [1.0]}, duration=1.0, dt=0.05, folder=tmp_path
         )

@@ -95,7 +95,7 @@ def test_what_has_no_exponent_is_refused(ueda):
         fd.Sheet(1e6, 0.25, 0.01, density=1.0),
     )
     touching = fd.Case(fd.discretize(pattern, sheet), contact=fd.Contact(thickness=0.01))
-    with pytest.raises(InputError, match="contact: the exponent takes smooth forces"):
+    with pytest.raises(InputError, match="contact: the exponent needs smooth forces"):
         fd.lyapunov_exponent(touching, 1.0)
     yielding = fd.discretize(pattern, sheet, fold_law=fd.Plastic(10.0))
     with pytest.raises(InputError, match="structure: some of its hinges yield or creep"):

@@ -106,8 +106,8 @@ def test_what_has_no_section_is_refused(periodic):
     ):
         fd.poincare_section(motion)
     with pytest.warns(
-        FoldynWarning, match="at no time from after = 1e\\+09 s a whole period of 1 s"
+        FoldynWarning, match=r"from after = 1e\+09 s until the end, .* no whole period of 1 s"
     ):
         assert not fd.poincare_section(motion, 1.0, after=1e9).sizes["time"]
-    with pytest.warns(FoldynWarning, match="the plane passes 1e\\+09"):
+    with pytest.warns(FoldynWarning, match=r"no passage of the level 1e\+09"):
         assert not fd.poincare_section(motion, plane=X, level=1e9).sizes["time"]

@@ -78,7 +78,7 @@ def test_a_base_that_moves_leaves_the_floor_behind():
 
 
 def test_friction_is_refused():
-    with pytest.raises(InputError, match=r"contact.friction: what rubs sticks or slides"):
+    with pytest.raises(InputError, match=r"contact.friction: contacts stick or slide"):
         fd.modes(tent(panels=True, friction=0.2), 3)
 
 

@@ -212,7 +212,7 @@ def _thick(thickness):
 
 
 def test_what_does_not_take_air_refuses_it(sheet):
-    with pytest.raises(InputError, match="air: a sheet of cells without end would leave it out"):
+    with pytest.raises(InputError, match="air: an infinite sheet of cells would leave it out"):
         bands(UnitCell(sheet.altered(supports=())), [(0.5, 0.0)])
     with pytest.raises(InputError, match="air"):
         fd.backbone(sheet)

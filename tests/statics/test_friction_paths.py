@@ -226,7 +226,7 @@ def test_a_press_whose_creases_yield():
 
 @pytest.mark.parametrize("surface", SURFACES)
 def test_what_needs_an_energy_refuses_friction(surface):
-    with pytest.raises(InputError, match=r"contact.friction: makes equilibria depend on the way"):
+    with pytest.raises(InputError, match=r"contact.friction: makes equilibria depend on the path"):
         OrigamiProblem(SURFACES[surface][0]([]))
 
 

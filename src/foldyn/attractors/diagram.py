@@ -286,7 +286,7 @@ def bracketed(steady: Steady, way: str, points: list[Point], resolution: float) 
                     break
                 passed.append(ahead)
             else:
-                break  # it does not fall without the long step
+                break  # in short steps it does not fall
     return found
 
 

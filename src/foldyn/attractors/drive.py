@@ -101,8 +101,8 @@ def at_level(case: Case, level: float) -> Case:
     def scaled(part: Any) -> Any:
         if type(part) not in SIZES:
             raise InputError(
-                f"amplitudes: {type(part).__name__} has no size that could be scaled; vary the "
-                "frequency, or drive by a force or a support"
+                f"amplitudes: {type(part).__name__} has no size to scale; vary the frequency, or "
+                "drive by a force or a support"
             )
         field = SIZES[type(part)]
         size = level * np.asarray(getattr(part, field), float)

@@ -138,8 +138,8 @@ def basins(
     check_relaxing(case, "their memory is not part of the grid")
     if case.contact is not None and case.contact.rubs:
         raise InputError(
-            ": motions go on from the states in which they have settled, without what friction "
-            "holds there; give friction = 0.0",
+            ": motions continue from their settled states, which do not hold the stretch of "
+            "friction springs; give friction = 0.0",
             "contact.friction",
         )
     names, places = _grid(grid, len(case.structure.nodes))
@@ -364,7 +364,7 @@ class KeptEnds:
         document = to_document(case)
         if document.obstacles:
             raise InputError(
-                f": nothing of this case can be kept: {document.obstacles[0]}; leave it out",
+                f": this case cannot be stored: {document.obstacles[0]}; leave folder out",
                 "folder",
             )
         arrays = {name: _digest([array]) for name, array in document.arrays.items()}

@@ -169,16 +169,16 @@ def _check(case: Case, method: str, initial: State | None) -> None:
     explicit = [one.name for one in METHODS.values() if not (one.implicit or one.adaptive)]
     choice("method", method, explicit)
     if case.contact is not None:
-        raise InputError(": the exponent takes smooth forces; leave contact out", "contact")
+        raise InputError(": the exponent needs smooth forces; leave contact out", "contact")
     if case.air is not None and case.air.added_mass:
         raise InputError(
-            ": the exponent takes a mass that stays; give added_mass = false", "air.added_mass"
+            ": the exponent needs a constant mass; give added_mass = false", "air.added_mass"
         )
-    check_relaxing(case, "the exponent takes smooth forces")
+    check_relaxing(case, "the exponent needs smooth forces")
     if any(part.alone for part in with_mass(suited(method, case), case).remembering):
         raise InputError(
-            "damping: turns of damped creases of n5b8e are rounding between motions as near as the "
-            'exponent takes; take preset = "plate", or other damping than CreaseDamping'
+            "damping: two motions this close differ in the turns of damped creases of n5b8e by "
+            'round-off alone; take preset = "plate", or other damping than CreaseDamping'
         )
 
 
@@ -252,13 +252,13 @@ class Pair:
             raise error
 
     def _tied(self, values: NDArray) -> NDArray:
-        """Values (rows, 3) in memory that supports and ties allow: round-off would not decay."""
+        """Values (rows, 3), as stored, without forbidden motions, whose round-off stays."""
         x = self._numbering.outward(values)
         x[self._ties.determined] = 0.0
         return self._numbering.inward(self._ties.displacement(x.ravel()).reshape(x.shape))
 
     def _look(self, motion: Motion) -> None:
-        """Stop if energies do not balance, or the step has become too long."""
+        """Raise an error if energies do not balance, or the step has become too long."""
         motion.audit()
         motion.recheck(motion.packed.numbering.outward(motion.state.u))
 

@@ -115,9 +115,9 @@ def poincare_section(
 
 def _missed(stretch: Stretch, after: float, period: float | None, level: float) -> str:
     """Warning for a section without states."""
-    wanted = f"a whole period of {period:g} s" if period else f"the plane passes {level:g}"
+    wanted = f"whole period of {period:g} s" if period else f"passage of the level {level:g}"
     last = float(stretch.time[-1])
-    return f"the motion lasts until {last:g} s, and at no time from after = {after:g} s {wanted}"
+    return f"the section is empty: from after = {after:g} s until the end, {last:g} s, no {wanted}"
 
 
 def _stretch(motion: xarray.Dataset) -> Stretch:

@@ -232,7 +232,7 @@ class Glide(NamedTuple):
                 first = int(np.flatnonzero(apart)[-1]) if apart.any() else 0
             after = steady.point(before.run, jump.after)
             return bool(bracketed(steady, jump.sweep, [before, after], RESOLUTION))
-        except ComputationError:  # it does not stay there
+        except ComputationError:  # the motion fails there
             return True
 
     def _at(self, cycle: int) -> tuple[Run, float, float]:

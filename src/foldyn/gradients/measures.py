@@ -62,7 +62,7 @@ def _largest(numbers: NDArray) -> list[tuple[int, ...]]:
 
 
 def _of_mode(variable: str) -> Derivative:
-    """Derivative of a measure that is one entry of a variable of modes."""
+    """Derivative of a measure that is one entry of a modal variable."""
 
     def seeds(result: xr.Dataset, case: Case, mode: int, **axis: str) -> Seeds:
         chosen = {"mode": mode, **axis}
@@ -260,12 +260,12 @@ def _tensest(result: xr.Dataset, case: Case) -> list[tuple[int, ...]]:
 def _strain_energy(result: xr.Dataset, case: Case, at: tuple[int]) -> Seeds:
     """Seeds of the strain energy of a sample."""
     if case.swellings:
-        raise InputError("has no derivative here where panels are warm; leave it out")
+        raise InputError("has no derivative if panels are heated; leave it out")
     u, energy = _all_moved(result), _strain_energies(result, case)[at]
     if abs(_energy(case, u[at]) - energy) > TIE * energy:
         raise InputError(
-            "has no derivative where turns of edges lag behind the nodes, as damping makes them; "
-            'leave out beta, or take a structure without such turns, as preset = "plate"'
+            "has no derivative if damping makes turns of edges lag behind the nodes; leave out "
+            'beta, or take a structure without such turns, as preset = "plate"'
         )
     out = np.zeros(u.shape)
     out[at] = _forces(case, u[at])
@@ -289,7 +289,7 @@ def _limit_load(result: xr.Dataset, case: Case) -> Seeds:
     """Seeds of the load factor at the first limit point."""
     at = np.flatnonzero(result["point"].values == "limit")
     if not len(at):
-        raise InputError("the path has no limit point; trace it by arc_length, and farther")
+        raise InputError("the path has no limit point; trace it farther, by arc_length")
     low, high = intervals(result, "limit")[0]
     if high > low:
         raise InputError(
@@ -363,7 +363,9 @@ def _peak(what: str) -> Derivative:
         result: xr.Dataset, case: Case, node: int, axis: str | None = None
     ) -> list[tuple[int, ...]]:
         if "frequency" not in result.dims:
-            raise InputError("of a spectrum of a motion has no derivative; take that of an frf")
+            raise InputError(
+                "has no derivative for the spectrum of a motion; take a frequency response"
+            )
         return _largest(curve_of(result, node, axis)[2].height)
 
     def seeds(
@@ -443,7 +445,7 @@ def derivative_of(one: Asked) -> Derivative:
     found = DERIVATIVES.get(one.measure.name)
     if found is None:
         raise InputError(
-            f": {one.text} has no derivative; those that have one are {', '.join(DERIVATIVES)}. "
+            f": {one.text} has no derivative; measures with one are {', '.join(DERIVATIVES)}. "
             'Give your own with its derivative, as {"tip": (function, derivative)}, or use '
             'method = "cma", which needs none'
         )

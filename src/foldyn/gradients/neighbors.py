@@ -91,7 +91,7 @@ def refined(x: NDArray, step_at: Callable[[NDArray], NDArray], size: float) -> N
             break
     if near.all():
         return x
-    raise ComputationError(f"{NONE} this state: Newton's steps do not end")
+    raise ComputationError(f"{NONE} this state: Newton's steps do not converge")
 
 
 # ------------------------------------------------------------------ statics
@@ -152,7 +152,7 @@ def _balanced(problem: OrigamiProblem, x: NDArray, factor: float, factored: Any)
 def motions(
     motion: Motion, one: Asked, others: Sequence[Asked], share: float
 ) -> list[NDArray[np.float64]]:
-    """Displacements (k, n, 3) of other cases at the samples of a motion, which is integrated too.
+    """Displacements (k, n, 3) of other cases at the samples of a motion, integrated along with it.
 
     share : relative change of a difference between motions at which a step has converged.
     """
@@ -234,7 +234,7 @@ def _linear(one: Asked) -> Linearized:
     """A case linearized about rest."""
     given = one.arguments
     if given.get("state") is not None:
-        raise InputError(f"{NONE} what is linearized about a state that loads have made")
+        raise InputError(f"{NONE} a linearization about a loaded state")
     linear = linearize(
         one.case,
         None,

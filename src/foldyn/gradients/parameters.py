@@ -186,7 +186,7 @@ class Parameters:
         common = own.max(initial=0.0)
         if not common:
             raise InputError(
-                f" = 0: how far it may be changed for a difference is not known; give its size, as "
+                f" = 0: its size, by which differences change it, is unknown; give it, as "
                 f'sizes={{"{name}": 1.0}}',
                 name,
             )
@@ -257,7 +257,7 @@ class Parameters:
         sets = list(islice(combinations(range(groups), groups // 2), count))
         sought = np.array([0, *(sum(1 << group for group in own) for own in sets)])
         order = np.argsort(sought)
-        irregular = size * (0.5 + np.arange(1, count + 1) * GOLDEN % 1.0)  # none cancel each other
+        irregular = size * (0.5 + np.arange(1, count + 1) * GOLDEN % 1.0)  # changes never cancel
         found = {key: np.zeros(np.shape(each), np.int64) for key, each in here.items()}
         for group in range(groups):
             moved = at(irregular * [group in own for own in sets], STEP)

@@ -303,8 +303,8 @@ def _of_file(
     own = case_file_at(place, document, {})
     if own.start_keys:
         raise InputError(
-            ": there are no gradients of what starts from a given state; leave the table out, or "
-            "give a function that builds the case",
+            ": there are no gradients of motions from a given state; leave the table out, or give "
+            "a function that builds the case",
             "initial",
             place,
         )

@@ -177,7 +177,7 @@ class ModesGradient:
         found = splu(bordered).solve(np.append(by_shape, 0.0))
         return found[:-1], float(found[-1])
 
-    # ------------------------------------------------------------------ where there is none
+    # ------------------------------------------------------------------ refusals
     def _clusters(self) -> list[tuple[int, int]]:
         """First and last + 1 of modes with a common eigenvalue."""
         values = self._values
@@ -195,8 +195,8 @@ class ModesGradient:
             ).max(initial=0.0)
             if not sum_alone and not self._parted:
                 raise InputError(
-                    f"modes {first + 1} to {last} have one frequency, and change places: alone "
-                    "they have no derivative. Take the sum of all, such as "
+                    f"modes {first + 1} to {last} have the same frequency and may swap: single "
+                    "ones have no derivative. Take the sum of all, such as "
                     f'"frequency[{first + 1}] + frequency[{last}]", or the derivative in one '
                     "direction (along)"
                 )

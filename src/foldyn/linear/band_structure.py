@@ -268,9 +268,8 @@ def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex
         u = -linalg.lu_solve(factor, mass @ g + damping @ f + shift * (mass @ f))
         return np.concatenate([u, f + shift * u])
 
-    if (
-        size <= DENSE or wanted >= 2 * size - 1
-    ):  # iterations over clusters of bands may not converge
+    # iterations over clusters of bands may not converge
+    if size <= DENSE or wanted >= 2 * size - 1:
         inverse = linalg.eigvals(solve(np.eye(2 * size)))
         found = shift + 1.0 / inverse[np.argsort(-np.abs(inverse))[:wanted]]
     else:

@@ -2,7 +2,7 @@
 
 K_R maps displacements of cell R to forces on the dofs of cell 0, and is taken from the patch around
 it (`cell_patch`); displacements of cell R are given in axes that turn with the cell. K_-R is the
-transpose of K_R, so that K(k) is Hermitian: this is checked, and with it that all cells are alike.
+transpose of K_R, so that K(k) is Hermitian. A check of this also shows that all cells are alike.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def hermitian(own: Hops, steps: NDArray, what: str) -> Hops:
 
 
 class NotAlikeError(InputError):
-    """Matrices of different cells that differ, most at the `dofs`."""
+    """The matrices of two cells differ, most at the `dofs`."""
 
     def __init__(self, what: str, share: float, dofs: tuple[int, int]) -> None:
         self.what, self.share, self.dofs = what, share, dofs
@@ -179,8 +179,8 @@ class NotAlikeError(InputError):
 
     def _message(self, where: str) -> str:
         return (
-            f": the {self.what} of one cell differs from that of the next by {self.share:.2g} of "
-            f"its largest entry, at {where}; a support, a panel or the state does not repeat"
+            f": the {self.what} differs from one cell to the next by {self.share:.2g} of its "
+            f"largest entry, at {where}; a support, a panel or the state does not repeat"
         )
 
     def naming(self, first: NDArray) -> InputError:

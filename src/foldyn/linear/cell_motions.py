@@ -66,7 +66,7 @@ def cells_of(positions: NDArray, cell: UnitCell, along: int = 0) -> Cells:
     following = np.where(distance <= near, partner, -1)
     rows, left = [], np.ones(len(positions), bool)
     starts = np.setdiff1d(np.arange(len(positions)), following)
-    for node in (*starts, *range(len(positions))):  # the latter lie on closed rings
+    for node in (*starts, *range(len(positions))):  # all others lie on closed rings
         if left[node]:
             row = [int(node)]
             while (after := int(following[row[-1]])) >= 0 and after != node:
@@ -96,8 +96,8 @@ def space_time(
         Motion of a chain or sheet of such cells, from `simulate`.
     cell : UnitCell
     component : {"x", "y", "z", "rotation"}
-        Displacement component: along an axis of cell 0 (in cells turned by a screw, along the axis
-        turned likewise), or the rotation about the axis of the screw, in rad.
+        Displacement component: along an axis of cell 0, turned with each cell by a screw; or the
+        rotation about the axis of the screw, in rad.
     along : int
         Number of the cell's motion along the chain.
 

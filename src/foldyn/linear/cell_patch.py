@@ -152,8 +152,8 @@ def _check(case: Case) -> None:
     structure = case.structure
     if not structure.as_made:
         raise InputError(
-            ": its structure is not as fd.discretize or fd.shell makes it, and copies cannot be "
-            "made like it; give what differs to them",
+            ": its structure was changed after fd.discretize or fd.shell made it, and cannot be "
+            "copied; give the changes to these functions",
             "case",
         )
     if structure.pattern.boards is not None:
@@ -162,10 +162,10 @@ def _check(case: Case) -> None:
         raise InputError(
             ": cells do not touch each other; leave contact out of the case of a cell", "contact"
         )
-    refuse_air(case, "a sheet of cells without end")
+    refuse_air(case, "an infinite sheet of cells")
     if case.modal_damping is not None:
         raise InputError(
-            ": modes of one cell are not those of the repeated sheet; take Rayleigh, crease or "
+            ": modes of one cell differ from modes of the sheet; take Rayleigh, crease or "
             "strain damping",
             "damping",
         )
@@ -173,7 +173,7 @@ def _check(case: Case) -> None:
         law = getattr(structure, name, None)
         if law is not None and memory_of(law) is not None:
             raise InputError(
-                f' = "{law.name}": remembers, so that its stiffness depends on the '
+                f' = "{law.name}": has memory, so that its stiffness depends on the '
                 "frequency; take an elastic law",
                 name,
             )

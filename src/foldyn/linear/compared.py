@@ -165,13 +165,12 @@ def _mesh(result: xarray.Dataset, below: int) -> Iterator[str]:
     if unsettled:
         yield (
             f"The meshes of the shell have not converged for mode{'s' * (',' in unsettled)} "
-            f"{unsettled}: what is said of {'them' if ',' in unsettled else 'it'} is not certain; "
-            "compare again with finer divisions."
+            f"{unsettled}, so that errors there are uncertain; compare again with finer divisions."
         )
     elif error.max() > MESH:
         yield (
-            f"The finer mesh of the shell is itself about {size(float(error.max()))} off what it "
-            "tends to: compare again with finer divisions."
+            f"The finer mesh of the shell is itself about {size(float(error.max()))} off its "
+            "limit: compare again with finer divisions."
         )
 
 

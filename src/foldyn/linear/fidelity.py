@@ -156,7 +156,7 @@ class Comparison:
     shells : (Case, Case, Case)
         The case with shells of three meshes, finest last, with forces as its only loads.
     compared : mapping of str to Case
-        The case with each model, its own first, likewise.
+        The case with each model, its own first, with the same loads.
     not_forces : tuple of int
         Numbers of the loads left out.
     secant : float or None
@@ -347,7 +347,7 @@ def _warn_of_imbalance(residual: float) -> None:
         warn(
             f"the rest state is no equilibrium: its residual is {residual:.2g} of the forces at "
             "play (creases with a rest angle of their own, or laws that have a moment at rest); "
-            "what is compared are not free vibrations",
+            "the vibrations compared are not free ones",
             "fidelity.md#your-own-pattern",
         )
 

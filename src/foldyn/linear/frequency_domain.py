@@ -102,8 +102,8 @@ def modal(
     """Superpose modes: x = Phi q + r with (Lambda - w^2 + i w Phi' C Phi) q = Phi' f.
 
     The modal damping matrix is kept in full: modes coupled by damping (dashpots and creases, beta
-    K0 about a state where the tangent is not K0) stay coupled. So do massless dofs that damping or
-    memory moves differently from the modes, in which they follow statically. r = (K - s M)^-1 f -
+    K0 about a state where the tangent is not K0) stay coupled. Massless dofs follow the modes
+    statically; a different motion due to damping or memory is coupled to them. r = (K - s M)^-1 f -
     Phi (Lambda - s)^-1 Phi' f is the response of all other modes at the squared frequency s: 0, or
     slightly below for a body that is free to move (mode acceleration: Craig and Kurdila,
     Fundamentals of Structural Dynamics, 2nd ed. 2006, chapter 11).

@@ -108,14 +108,14 @@ def check_internal(structure: Discretized, internal: Any) -> int:
         return 0
     if not isinstance(structure, Structure) or structure.edge_plates is None:
         raise InputError(
-            f" = {count}: internal amplitudes are those of panels as plates, of the scheme n5b8e; "
+            f" = {count}: internal amplitudes need panels that bend as plates (scheme n5b8e); "
             'discretize with preset = "n5b8e", or leave it out',
             "internal",
         )
     if structure.pattern is not None and len(structure.pattern.welds):
         raise InputError(
-            f" = {count}: internal amplitudes are those of panels between creases, and the pattern "
-            f"has welds ({len(structure.pattern.welds)}); leave it out, or take a shell",
+            f" = {count}: internal amplitudes describe panels between creases, and the pattern has "
+            f"welds ({len(structure.pattern.welds)}); leave it out, or take a shell",
             "internal",
         )
     if structure.node_mass is not None or structure.options.mass != "condensed":
@@ -139,7 +139,7 @@ def amplitudes(structure: Discretized, body: Assembly, q: NDArray, count: int) -
         The body of the structure, or one with other rest angles and more terms.
     count : int
         Amplitudes of each panel, in addition to one for each edge without a crease; one more if
-        symmetry makes two alike.
+        the last two are equal by symmetry.
     """
     size = body.size
     if not count:

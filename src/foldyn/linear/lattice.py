@@ -2,8 +2,8 @@
 
 A vertex of the repeated sheet is one of a kind in a cell: (R, kind). Vertices are ordered by cell
 first, then by kind, and so are panels. Any two of them are therefore in the same order in all
-cells, and so is every choice of a discretization that depends on the order of numbers: directions
-of hinges, signs of rotations, ties.
+cells. So is every choice of a discretization that depends on this order: directions of hinges,
+signs of rotations, ties.
 """
 
 from __future__ import annotations
@@ -189,8 +189,7 @@ class Lattice:
             bare = Pattern(points, faces, name=own.name, welds=shared[welds])
             if any(bare.flipped):
                 raise InputError(
-                    ": cells show their fronts on different sides by turns; take two of them for "
-                    "one cell",
+                    ": neighboring cells show opposite sides; take two of them as one cell",
                     "case",
                 )
             flat = np.abs(bare.dihedrals - np.pi) < FLAT

@@ -209,8 +209,8 @@ def linearize(
     """
     if case.contact is not None and case.contact.rubs:
         raise InputError(
-            ".friction: what rubs sticks or slides, so that small motions have no linear law; give "
-            "0, here and in the planes",
+            ".friction: contacts stick or slide, so that small motions have no linear law; give 0, "
+            "here and in the planes",
             "contact",
         )
     refuse_wind(case, "small vibrations")
@@ -281,7 +281,7 @@ def _symmetric(loads: sparse.csr_array, free: NDArray) -> sparse.csr_array:
     if share > ASYMMETRIC:
         warn(
             f"{NO_POTENTIAL.format(share)} modes and frequency responses take its symmetric part, "
-            "which misses how such a load may feed vibrations (flutter): simulated motions do not",
+            "which misses flutter, vibrations fed by such a load: simulated motions include it",
             "loads.md#pressure",
         )
     return sparse.csr_array(0.5 * (loads + loads.T))

@@ -409,8 +409,8 @@ def folded_body(cell: UnitCell, patch: Patch, factor: float) -> Assembly:
     """The patch with its folds actuated by a factor; refuses loads that depend on displacement."""
     if cell.case.following_terms:
         raise InputError(
-            ": some depend on the displacement, as a pressure does, and their stiffness is not "
-            "that of a cell; leave them out",
+            ": some depend on the displacement, as a pressure does, and a cell does not include "
+            "their stiffness; leave them out",
             "loads",
         )
     body: Any = patch.case.elastic_body

@@ -127,7 +127,7 @@ def _chosen(first: NDArray, second: NDArray, nodes: Any) -> tuple[NDArray, NDArr
         raise InputError(
             f"a has {first.shape[1]} nodes with {first.shape[2]} components, b "
             f"{second.shape[1]} with {second.shape[2]}: give nodes = (numbers in a, numbers in b) "
-            "of those that are the same"
+            "of the nodes that they share"
         )
     return first, second
 
@@ -170,9 +170,8 @@ def clusters(frequency: NDArray) -> NDArray:
 
 def likeness(fa: NDArray, a: NDArray, fb: NDArray, b: NDArray, mass: NDArray) -> NDArray:
     """MAC (ka, kb) of shapes (ka, n, 3) and (kb, n, 3), averaged over clusters."""
-    values = np.nan_to_num(
-        mac(a, b, mass=mass)
-    )  # shapes that do not move these nodes are like none
+    # shapes that do not move these nodes are like none
+    values = np.nan_to_num(mac(a, b, mass=mass))
     found = values.copy()
     left, right = clusters(fa), clusters(fb)
     for i in np.unique(left):

@@ -327,8 +327,9 @@ def rigid_space(linear: Linearized) -> NDArray:
     basis, _ = np.linalg.qr(chosen)
     motions = plain @ (basis @ basis.T)
     on_nodes = linear.free[linear.free < x.size]
-    still = np.zeros((len(linear.free) - len(on_nodes), motions.shape[1]))  # turns of a shell's
-    return _orthonormal(linear, np.vstack([motions[on_nodes], still]))  # edges are relative
+    # turns of a shell's edges are relative to its panels: they stay 0
+    still = np.zeros((len(linear.free) - len(on_nodes), motions.shape[1]))
+    return _orthonormal(linear, np.vstack([motions[on_nodes], still]))
 
 
 def _orthonormal(linear: Linearized, motions: NDArray) -> NDArray:

@@ -1,6 +1,6 @@
 """The lowest modes of a shell, extrapolated in mesh size: the reference for models.
 
-The modes of a model are paired with them, and the convergence of one's own mesh is estimated alike.
+The modes of a model are paired with them. The error of one's own mesh is estimated likewise.
 """
 
 from __future__ import annotations
@@ -220,7 +220,7 @@ class Matched(NamedTuple):
     frequency : (k,)
         Frequency of the partner, Hz; nan if the mode is lost, i.e. no MAC is 0.5 or more.
     error : (k,)
-        Relative error of this frequency; nan likewise.
+        Relative error of this frequency; nan if the mode is lost.
     mac : (k,)
         MAC of the partner, or of the best candidate.
     """
@@ -280,7 +280,7 @@ class Refinement(NamedTuple):
     meshes: tuple[int, ...]  # (3,) pieces of every edge, increasing, `divisions` among them
     frequencies: NDArray[np.float64]  # (3, k) Hz
     order: NDArray[np.float64]  # (k,) observed order; nan: not converged
-    extrapolated: NDArray[np.float64]  # (k,) Hz; nan likewise
+    extrapolated: NDArray[np.float64]  # (k,) Hz; nan: not converged
     touched: int | None  # vertex at which there is no limit; see `touched_clamp`
 
     @property

@@ -37,14 +37,14 @@ def check_reduced(case: Any) -> None:
     structure = case.structure
     if structure.kind == Shell.kind:
         raise InputError(
-            ": is a shell already, with which bars and hinges are compared; make its structure "
+            ": is a shell, and bars and hinges are compared with the shell; make its structure "
             'with fd.discretize (in a case file model.kind = "bars_and_hinges")',
             "case",
         )
     if structure.pattern is None or not structure.as_made:
         raise InputError(
-            ": its structure is not as fd.discretize makes it, and a shell cannot be made like it; "
-            "give what differs to fd.discretize",
+            ": its structure was changed after fd.discretize made it, and has no equivalent shell; "
+            "give the changes to fd.discretize",
             "case",
         )
     if structure.sheet.density is None:

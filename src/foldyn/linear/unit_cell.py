@@ -413,9 +413,9 @@ def _check_all(
                 field,
             )
         raise InputError(
-            f": motion {k} brings no boundary edge of the pattern to another one; of its vertices, "
-            f"{a} comes nearest to one, {b}, at a distance of {distance[best]:.3g} m; give the "
-            "motion from a cell to the next",
+            f": motion {k} brings no boundary edge of the pattern to another one; its nearest "
+            f"vertices, {a} and {b}, stay {distance[best]:.3g} m apart; give the motion from a "
+            "cell to the next",
             field,
         )
 

@@ -236,13 +236,13 @@ def steps(
 
 
 def _along(family: Family, one: Point, other: Point) -> float:
-    """Distance of one point from another along the tangent at the latter."""
+    """Distance from `one` to `other` along the tangent at `one`."""
     apart = np.append(other.z - one.z, other.p - one.p)
     return float((_weights(family, one.z) * one.tangent) @ apart)
 
 
 def _passes(family: Family, step: Step, first: Point) -> bool:
-    """Whether a step passes a point in the direction in which the curve left it."""
+    """Whether a step passes the first point, in the direction in which the curve left it."""
     along, weights = _along(family, step.before, first), _weights(family, step.before.z)
     if not 0.0 < along <= step.length or (weights * step.before.tangent) @ first.tangent <= 0.0:
         return False

@@ -149,26 +149,26 @@ def check_smooth(case: Case, name: str) -> None:
     case.check_movable()
     if case.contact is not None and case.contact.rubs:
         raise InputError(
-            f": {name} takes forces that depend on where the sheet is, and friction on how it got "
-            "there; give friction = 0.0, or simulate the motion",
+            f": {name} takes forces that depend on the displacement alone, and friction depends on "
+            "the way there; give friction = 0.0, or simulate the motion",
             "contact.friction",
         )
     refuse_air(case, name)
     if case.remembering:
         raise InputError(
-            f"structure: {name} takes forces that depend on where the sheet is, and some of its "
-            "hinges remember (prony, plastic or damped creases that give way); take an elastic "
-            "law, or simulate the motion"
+            f"structure: {name} takes forces that depend on the displacement alone, and some "
+            "hinges have memory (prony, plastic, or damped creases between compliant panels); take "
+            "an elastic law, or simulate the motion"
         )
     if len(case.body.hidden):
         raise InputError(
-            f"structure: {name} takes bars and hinges, and this model has unknowns without mass "
-            'beside them; take scheme = "n5b8" or "n4b5"'
+            f"structure: {name} takes bars and hinges, and this model also has unknowns without "
+            'mass; take scheme = "n5b8" or "n4b5"'
         )
 
 
 def check_held(case: Case, name: str) -> None:
-    """Refuse supports that let the whole drift, without a place to return to."""
+    """Refuse supports that let the whole sheet drift."""
     nodes, body = case.structure.nodes, case.body
     if free_rigid_motions(nodes, case.constraints, body.holds(np.zeros(body.size))).shape[1]:
         raise InputError(

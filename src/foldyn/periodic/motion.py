@@ -223,15 +223,15 @@ def warn_of_errors(
     crossed = [f"{orbit.omega / TURN:.6g} Hz" for orbit in orbits if orbit.crosses()]
     if crossed:
         warn(
-            f"contact: the motion at {', '.join(crossed[:NAMED])} passes through what it touches, "
-            "so that it is not valid; give another guess, or give more harmonics",
+            f"contact: the motion at {', '.join(crossed[:NAMED])} passes through a contact and is "
+            "not valid; give another guess, or give more harmonics",
             "nonlinear-vibration.md#one-motion",
         )
     most = 0.0 if reduction is None else float(np.max(reduction))
     if most > REDUCED:
         warn(
-            f"modes: what they leave out would change the motion by {most:.1g} of it or more; give "
-            "more",
+            f"modes: the omitted dofs would change the motion by {most:.1g} of it or more; "
+            "give more",
             "nonlinear-vibration.md#big-sheets",
         )
 

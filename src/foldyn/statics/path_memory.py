@@ -136,8 +136,8 @@ def _rubs(case: Case, flow: str) -> bool:
         return False
     if flow == REFUSED:
         raise InputError(
-            ".friction: makes equilibria depend on the way there; fd.simulate and fd.trace take "
-            "it; elsewhere give 0, here and in the planes",
+            ".friction: makes equilibria depend on the path, and only fd.simulate and fd.trace "
+            "follow it; elsewhere give 0, here and in the planes",
             "contact",
         )
     return flow == FOLLOWED

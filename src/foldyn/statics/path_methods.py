@@ -314,7 +314,7 @@ def _driven(
     for i, (one, other) in enumerate(pairwise(factors)):
         if one == other and not (durations and durations[i] > 0.0):
             raise InputError(
-                f": number {i + 1} repeats the one before, {one:g}, which takes a duration",
+                f": number {i + 1} repeats the previous one, {one:g}, which needs a duration",
                 "load_factors",
             )
     return PathPlan(method, factors[0], factors[1:], None, len(factors) - 1, 0.0, durations)

@@ -323,7 +323,7 @@ def _asymmetry_warning(point: Point, problem: OrigamiProblem) -> str:
         return ""
     return (
         f"{NO_POTENTIAL.format(share)} the equilibria are exact, but negative eigenvalues are "
-        "those of the symmetric part of the tangent, and flutter is not looked for"
+        "counted in the symmetric part of the tangent, which does not show flutter"
     )
 
 

@@ -159,8 +159,8 @@ class Folding:
             )
         else:
             lines.append(
-                f"does not fold without strain: {self.strain:.2g} are left, the largest, with "
-                f"panels bent by up to {math.degrees(self.bend):.3g} degrees"
+                f"does not fold without strain: bars keep up to {self.strain:.2g}, with panels "
+                f"bent by up to {math.degrees(self.bend):.3g} degrees"
             )
         if not np.isnan(self.targets).all():
             lines.append(f"angles differ from those wanted by up to {math.degrees(self.error):.3g}")
@@ -171,9 +171,9 @@ class Folding:
             if self.layers is not None:
                 order = f"in an order without crossings ({len(self.layers)} pairs that overlap)"
             elif self.first_crossings:
-                order = "in an order that is not known, since panels cross"
+                order = "in an unknown order, since panels cross"
             else:
-                order = "in the order in which they have come"
+                order = "in the order in which they arrived"
             count = len(self.closed)
             lines.append(f"{count} creases are closed: panels lie upon each other {order}")
         if self.first_crossings:

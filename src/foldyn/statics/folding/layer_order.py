@@ -184,8 +184,8 @@ def _triples(
         thirds += sorted(found)
         if len(rows) > MOST_TRIPLES:
             raise ComputationError(
-                f"the order of the layers is not looked for: more than {MOST_TRIPLES} times three "
-                "panels lie upon each other"
+                f"the order of the layers is not sought: more than {MOST_TRIPLES} triples of "
+                "panels lie on each other"
             )
     shapely.prepare(common)
     shared = shapely.intersects(common[rows], inside[thirds])
@@ -281,8 +281,8 @@ def layer_order(pattern: Pattern, state: FlatState, given: Orders = ()) -> NDArr
     for f, g in pattern.crease_faces[state.signs != 0].tolist():
         if edge_of(f, g) not in row:
             raise ComputationError(
-                f"no order of the layers was looked for: panels {f} and {g} lie upon each other, "
-                f"but what counts as flat is as large as they are ({state.near:.3g} m)"
+                f"the order of the layers is not sought: panels {f} and {g} lie on each other, but "
+                f"are no larger than the tolerance of flatness, {state.near:.3g} m"
             )
     for f, g, side in given:
         if side and edge_of(f, g) in row:
