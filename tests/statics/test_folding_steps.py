@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.statics.folding import curvature
-from foldyn.statics.folding.energy import Aim, FoldEnergy, Stiffness
+from foldyn.statics.folding.energy import Aim, Curvature, FoldEnergy, Stiffness
 
 
 @pytest.mark.parametrize("band", [True, False])
 def test_a_step_is_newtons(band, monkeypatch):
-    monkeypatch.setattr(curvature, "takes_band", lambda *_: band)
+    monkeypatch.setattr("foldyn.statics.folding.energy.takes_band", lambda *_: band)
     pattern = fd.patterns.waterbomb((2, 3), dihedral=140)
     energy, rng = (
         FoldEnergy(pattern, np.zeros(len(pattern.creases), bool)),
@@ -57,13 +56,13 @@ def test_larger_patterns_take_no_more_steps(monkeypatch):
 
 
 def test_sheets_of_many_ways_to_fold_let_their_springs_go_in_few_steps(monkeypatch):
-    solved, factorized = [0], curvature.Curvature.factorized
+    solved, factorized = [0], Curvature.factorized
 
     def counting(*arguments):
         solved[0] += 1
         return factorized(*arguments)
 
-    monkeypatch.setattr(curvature.Curvature, "factorized", counting)
+    monkeypatch.setattr(Curvature, "factorized", counting)
     folding = fd.fold(fd.patterns.resch((6, 6), dihedral=180), fraction=0.55, steps=12)
     assert folding.rigid_path and not folding.wrong
     assert solved[0] < 1800  # 463; 2798 where springs are weak at once

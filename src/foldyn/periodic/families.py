@@ -13,6 +13,8 @@ hinges are integrated: bars are accurate there for small displacements.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -104,7 +106,7 @@ class _OfBalance:
 
     def coefficients(self, z: NDArray) -> NDArray:
         """Coefficients (c, k) of the motion."""
-        return z[: self.balance.shape[0] * self.balance.shape[1]].reshape(self.balance.shape)
+        return z[: math.prod(self.balance.shape)].reshape(self.balance.shape)
 
     def instants(self, level: float) -> Instants:
         """The equation at the samples; the one of the last level is kept."""
@@ -144,9 +146,7 @@ class _OfBalance:
 
     def orbit(self, z: NDArray, p: float) -> Orbit:
         """The motion."""
-        x, omega, level = self.own(z, p)
-        amplitudes = self.balance.fourier.complex_of(x)
-        return Orbit(self.balance.equation, amplitudes, omega, self.balance.multiple, level)
+        return Orbit.of(self.balance, *self.own(z, p))
 
 
 class ByFrequency(_OfBalance):

@@ -147,7 +147,7 @@ def periodic_motion(
         else:
             x = coefficients(balance, guess, omega)
             found = balanced(balance, x, omega, tolerance)
-            orbit, spent = orbit_of(balance, found.x, omega), found.iterations
+            orbit, spent = Orbit.of(balance, found.x, omega), found.iterations
         floquet = orbit.multipliers(steps)
     truncation = orbit.truncation()
     reduction = None if modes is None else orbit.reduction()
@@ -242,7 +242,7 @@ def _shot(
     """Motion by shooting from one of few harmonics, and the iterations spent."""
     equation, longer = balance.equation, balance.multiple
     few = Balance(equation, Fourier(min(balance.fourier.harmonics, FEW * longer)), longer)
-    near = orbit_of(few, balanced(few, coefficients(few, guess, omega), omega, 1e-3).x, omega)
+    near = Orbit.of(few, balanced(few, coefficients(few, guess, omega), omega, 1e-3).x, omega)
     shooting = Shooting(equation, omega, steps, longer)
     begin = [values_of(near.amplitudes, np.zeros(1), k)[0] for k in (0, 1)]
     found = newton(shooting, np.concatenate(begin), tolerance)
@@ -399,9 +399,3 @@ def _grown(balance: Balance, x: NDArray, omega: float, tolerance: float, level: 
         f"{share:.2g} of the drive. Remedies: another guess (a motion at a frequency nearby, or a "
         "State), fd.response_curve from a frequency off resonance, or more damping"
     )
-
-
-def orbit_of(balance: Balance, x: NDArray, omega: float, level: float = 1.0) -> Orbit:
-    """Orbit of coefficients (c k,)."""
-    amplitudes = balance.fourier.complex_of(x.reshape(balance.shape))
-    return Orbit(balance.equation, amplitudes, omega, balance.multiple, level)

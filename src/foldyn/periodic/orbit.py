@@ -229,6 +229,12 @@ class Orbit:
     multiple: int = 1
     level: float = 1.0
 
+    @classmethod
+    def of(cls, balance: Balance, x: NDArray, omega: float, level: float = 1.0) -> Orbit:
+        """The motion with Fourier coefficients (c k,) or (c, k)."""
+        amplitudes = balance.fourier.complex_of(x.reshape(balance.shape))
+        return cls(balance.equation, amplitudes, omega, balance.multiple, level)
+
     @property
     def period(self) -> float:
         """Period of the motion, s."""
