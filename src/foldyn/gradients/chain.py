@@ -4,35 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.gradients.expressions import Expression
 from foldyn.gradients.measures import Derivative, Seeds
-from foldyn.gradients.parameters import SHORTER, Gradient, Parameters
+from foldyn.gradients.parameters import SHORTER, Differentiated, Parameters
 from foldyn.mechanics.pullback import Arrays
 from foldyn.sweeps.measure import Asked
 
 SAME, ROUNDING = 1e-6, 1e-9  # of derivatives, and of the value: differences that count as zero
-
-
-class Differentiated(Protocol):
-    """A result, with gradients of functions of it."""
-
-    result: xr.Dataset
-
-    def numbers(self, case: Case) -> Arrays:
-        """Numbers of a case with respect to which gradients are taken."""
-        ...
-
-    def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:
-        """Gradient of a function of the result, from its derivatives by the result's variables."""
-        ...
 
 
 class Wanted(NamedTuple):

@@ -16,13 +16,13 @@ from foldyn.dynamics.implicit_adjoint import ImplicitAdjoint, Retraced
 from foldyn.dynamics.methods import with_mass
 from foldyn.dynamics.runge_kutta_adjoint import RungeKuttaAdjoint, segment
 from foldyn.dynamics.system import pack
-from foldyn.gradients.parameters import Gradient, check_known, numbers_of_motion
+from foldyn.gradients.parameters import Differentiated, Gradient, check_known, numbers_of_motion
 from foldyn.mechanics.pullback import Arrays
 
 KNOWN = ("displacement", "velocity")
 
 
-class MotionGradient:
+class MotionGradient(Differentiated):
     """A motion, with gradients of functions of it.
 
     Parameters
@@ -30,11 +30,6 @@ class MotionGradient:
     case : Case
     arguments : mapping
         Arguments of `fd.simulate`.
-
-    Attributes
-    ----------
-    result : xarray.Dataset
-        As from `fd.simulate`.
     """
 
     def __init__(self, case: Case, arguments: Mapping[str, Any]) -> None:

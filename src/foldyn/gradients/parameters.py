@@ -22,6 +22,7 @@ from itertools import combinations, islice
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from scipy import sparse
 
@@ -75,6 +76,29 @@ def check_known(seeds: Mapping[str, Any], known: Sequence[str], what: str) -> No
             f"there are no derivatives through {', '.join(unknown)} of {what}, but through "
             f"{', '.join(known)}"
         )
+
+
+class Differentiated:
+    """A result of a case, with gradients of functions of it.
+
+    Attributes
+    ----------
+    result : xarray.Dataset
+        As from the function of the analysis.
+    """
+
+    result: xarray.Dataset
+
+    def numbers(self, case: Case) -> Arrays:
+        """Numbers of a case with respect to which gradients are taken."""
+        return numbers_of(case)
+
+    def backward(self, seeds: Mapping[str, Any]) -> Gradient:
+        """Gradient of a function of the result with respect to the numbers of the case.
+
+        seeds : derivatives of the function by variables of the result.
+        """
+        raise NotImplementedError
 
 
 def numbers_of_motion(packed: PackedCase, start: tuple[NDArray, NDArray]) -> Arrays:

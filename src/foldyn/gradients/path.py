@@ -23,8 +23,8 @@ from scipy.sparse.linalg import splu
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.gradients.parameters import Gradient, check_known, nothing, numbers_of
-from foldyn.mechanics.pullback import Arrays, Pullback, refuse_lacking
+from foldyn.gradients.parameters import Differentiated, Gradient, check_known, nothing
+from foldyn.mechanics.pullback import Pullback, refuse_lacking
 from foldyn.statics import trace
 from foldyn.statics.energy_landscape import Moved, load_at
 from foldyn.statics.stability import softest_modes
@@ -119,7 +119,7 @@ def seen_through(
         total[f"imposed.{k}"] += moved
 
 
-class PathGradient:
+class PathGradient(Differentiated):
     """An equilibrium path, with gradients of functions of its points.
 
     Parameters
@@ -127,11 +127,6 @@ class PathGradient:
     case : Case
     arguments : mapping
         Arguments of `fd.path`.
-
-    Attributes
-    ----------
-    result : xarray.Dataset
-        As from `fd.path`.
     """
 
     def __init__(self, case: Case, arguments: Mapping[str, Any]) -> None:
@@ -140,10 +135,6 @@ class PathGradient:
         self._given = arguments.get("method", "newton") in GIVEN
         self._pullback = Pullback(case.body)
         self._balances: dict[int, Balance] = {}
-
-    def numbers(self, case: Case) -> Arrays:
-        """Numbers of a case with respect to which gradients are taken."""
-        return numbers_of(case)
 
     def backward(self, seeds: Mapping[str, Any]) -> Gradient:
         """Gradient with respect to the numbers of the case.

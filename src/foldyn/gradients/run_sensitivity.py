@@ -21,11 +21,11 @@ from foldyn.cases import Case
 from foldyn.dynamics import simulate
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import InputError, within
-from foldyn.gradients.chain import Chain, Differentiated, Wanted
+from foldyn.gradients.chain import Chain, Wanted
 from foldyn.gradients.expressions import parse
 from foldyn.gradients.measures import Derivative, Seeds, derivative_of, one_number
 from foldyn.gradients.motion import MotionGradient
-from foldyn.gradients.parameters import Gradient, Parameters, Slope, Values, checked
+from foldyn.gradients.parameters import Differentiated, Gradient, Parameters, Slope, Values, checked
 from foldyn.gradients.path import PathGradient
 from foldyn.gradients.vibrations import FrfGradient, ModesGradient
 from foldyn.input_files import path_of

@@ -39,13 +39,12 @@ from foldyn.cases import Case, Rayleigh, State
 from foldyn.cases.directions import AXES
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.gradients.linearized import Products, refuse
-from foldyn.gradients.parameters import Gradient, check_known, numbers_of
+from foldyn.gradients.parameters import Differentiated, Gradient, check_known
 from foldyn.linear.excitation import drive_of, drive_terms
 from foldyn.linear.frequency_domain import dynamic_stiffness
 from foldyn.linear.frf import frf, quantity_of
 from foldyn.linear.linearized import linearize
 from foldyn.linear.modes import nodes_translated, spectrum_of, unit_translations
-from foldyn.mechanics.pullback import Arrays
 from foldyn.statics.stability import oriented
 
 ALONE = 1e-6  # relative distance below which eigenvalues count as one
@@ -54,7 +53,7 @@ KNOWN = ("frequency", "eigenvalue", "shape", "damping_ratio", "effective_mass", 
 Complex = NDArray[np.complex128]
 
 
-class ModesGradient:
+class ModesGradient(Differentiated):
     """Modes of a case, with gradients of functions of them.
 
     Parameters
@@ -62,11 +61,6 @@ class ModesGradient:
     case : Case
     arguments : mapping
         Arguments of `fd.modes`.
-
-    Attributes
-    ----------
-    result : xarray.Dataset
-        As from `fd.modes`.
     """
 
     def __init__(self, case: Case, arguments: Mapping[str, Any]) -> None:
@@ -77,10 +71,6 @@ class ModesGradient:
         self._equilibrium = arguments.get("state") == "equilibrium"
         self._products = Products(found.linear, arguments.get("state") == "equilibrium")
         self._parted = False
-
-    def numbers(self, case: Case) -> Arrays:
-        """Numbers of a case with respect to which gradients are taken."""
-        return numbers_of(case)
 
     def along(self, rate: Callable[[Gradient], float]) -> ModesGradient:
         """These modes for derivatives in one direction, in which modes of equal frequency separate.
@@ -221,7 +211,7 @@ class ModesGradient:
             )
 
 
-class FrfGradient:
+class FrfGradient(Differentiated):
     """A frequency response of a case, with gradients of functions of it.
 
     Parameters
@@ -229,11 +219,6 @@ class FrfGradient:
     case : Case
     arguments : mapping
         Arguments of `fd.frf`.
-
-    Attributes
-    ----------
-    result : xarray.Dataset
-        As from `fd.frf`.
     """
 
     def __init__(self, case: Case, arguments: Mapping[str, Any]) -> None:
@@ -260,10 +245,6 @@ class FrfGradient:
                 "ground, not the base; attach their ends to fixed nodes"
             )
         self._products = Products(self._linear, equilibrium)
-
-    def numbers(self, case: Case) -> Arrays:
-        """Numbers of a case with respect to which gradients are taken."""
-        return numbers_of(case)
 
     def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:
         """Gradient with respect to the numbers of the case.
@@ -304,7 +285,8 @@ class FrfGradient:
         damped, mass = 1j * omega * rayleigh.beta * z, (1j * omega * rayleigh.alpha - omega**2) * z
         state += self._add_products(self._products, -z, x, total)
         reference += self._add_products(self._reference, -damped, x, total)
-        self._add_inertia(-mass, x, total)
+        self._products.add_mass(-mass.real, x.real, 1.0, total)
+        self._products.add_mass(-mass.imag, x.imag, -1.0, total)
         total["alpha"] -= (1j * omega * z @ (linear.mass @ x)).real
         total["beta"] -= (1j * omega * z @ (self._stiffness @ x)).real
         if self._axis is not None:
@@ -320,11 +302,6 @@ class FrfGradient:
         """Add the gradient of Re(z' K x), z and x complex; returns the part by the dofs (m,)."""
         real = products.add_stiffness(z.real, x.real, 1.0, total)
         return real + products.add_stiffness(z.imag, x.imag, -1.0, total)
-
-    def _add_inertia(self, z: Complex, x: Complex, total: dict[str, NDArray]) -> None:
-        """Add the gradient of Re(z' M x)."""
-        self._products.add_mass(z.real, x.real, 1.0, total)
-        self._products.add_mass(z.imag, x.imag, -1.0, total)
 
     @cached_property
     def _reference(self) -> Products:

@@ -148,7 +148,8 @@ class Bloch:
 
 def hermitian(own: Hops, steps: NDArray, what: str) -> Hops:
     """Hermitian part of a matrix; raises if the rest is more than round-off."""
-    opposite = _opposites(steps)
+    where = {tuple(row): k for k, row in enumerate(steps.tolist())}
+    opposite = np.array([where[tuple(-x for x in row)] for row in steps.tolist()])  # -R of each R
     entries = own.values.tocoo()
     row, column = own.rows[entries.row], own.columns[entries.row]
 
@@ -190,12 +191,6 @@ class NotAlikeError(InputError):
             for dof in self.dofs
         ]
         return InputError(self._message(" and ".join(names)), "case")
-
-
-def _opposites(steps: NDArray) -> NDArray[np.int64]:
-    """Number of -R for each R."""
-    where = {tuple(row): k for k, row in enumerate(steps.tolist())}
-    return np.array([where[tuple(-x for x in row)] for row in steps.tolist()])
 
 
 def steps_of(offset: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

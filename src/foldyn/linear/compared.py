@@ -250,7 +250,9 @@ class Fidelity:
 
     def __str__(self) -> str:
         """A table in plain text, and the advice."""
-        return f"{_text(self)}\n\n{_wrapped(self.advice)}"
+        # numbers stay next to their units
+        held = re.sub(r"(\d) (%|Hz)", "\\1\u00a0\\2", self.advice)
+        return f"{_text(self)}\n\n{fill(held, WIDE)}".replace("\u00a0", " ")
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -276,12 +278,6 @@ class Fidelity:
             ComparedMode(mode, shell, mesh, shell < self.limit, error, mac)
             for mode, shell, mesh, error, mac in zip(*columns, strict=True)
         )
-
-
-def _wrapped(text: str) -> str:
-    """A text in lines, with numbers kept next to their units."""
-    held = re.sub(r"(\d) (%|Hz)", "\\1\u00a0\\2", text)
-    return fill(held, WIDE).replace("\u00a0", " ")
 
 
 def _text(found: Fidelity) -> str:

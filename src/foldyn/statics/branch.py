@@ -101,11 +101,14 @@ def switch_branch(
         "started_from": "state",
     }
 
+    # eigenvalues that vanish at the bifurcation: the jump of the negative count there
+    counts = path["negative_eigenvalues"].values[max(at - 1, 0) : at + 2]
+    multiplicity = max(int(np.ptp(counts)), 1)
     plan = PathPlan(way, crossing.point.factor, [], None, steps - 1, 0.0)
 
     def stations() -> Walk:
         yield crossing
-        first = _onto_branch(solver, crossing, mode, _multiplicity(path, at), direction)
+        first = _onto_branch(solver, crossing, mode, multiplicity, direction)
         yield first
         away = first.point.u - crossing.point.u
         yield from along(solver, first, plan, away)
@@ -158,12 +161,6 @@ def station_of(solver: Solver, problem: OrigamiProblem, path: xarray.Dataset, at
     negative = int(path["negative_eigenvalues"].values[at])
     kind = str(path["point"].values[at])
     return station._replace(point=replace(station.point, negative=negative, kind=kind))
-
-
-def _multiplicity(path: xarray.Dataset, at: int) -> int:
-    """Number of eigenvalues that vanish at a bifurcation: the jump of the negative count there."""
-    counts = path["negative_eigenvalues"].values[max(at - 1, 0) : at + 2]
-    return max(int(np.ptp(counts)), 1)
 
 
 def _onto_branch(

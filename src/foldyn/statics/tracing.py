@@ -217,9 +217,12 @@ def trace(
     function("progress", progress)
     inertia_relief = flag("inertia_relief", inertia_relief)
     check_fill(case.structure.fill, case.body.size)
+    memory = case.memory_in(initial)
+    if isinstance(memory, np.ndarray):  # of all branches: select the ones that evolve
+        memory = memory[flowing(case, timed)]
     problem = OrigamiProblem(
         case, steady, displacement, adaptive_load, inertia_relief,
-        flow=FOLLOWED, memory=_flowed(case, initial, timed), timed=timed,
+        flow=FOLLOWED, memory=memory, timed=timed,
     )  # fmt: skip
     begin = 0.0 if initial is None else plan.begin
     _check_start(problem, begin)
@@ -250,12 +253,6 @@ def trace(
         yield from along(solver, first, plan)
 
     return record(stations(), progress, solver, problem, facts, until, adaptive_load is not None)
-
-
-def _flowed(case: Case, initial: State | None, timed: bool) -> NDArray | str | None:
-    """Initial state of the branches that evolve along the path, selected from all (b, 2)."""
-    state = case.memory_in(initial)
-    return state[flowing(case, timed)] if isinstance(state, np.ndarray) else state
 
 
 def check_steps(steps: Any, dofs: int) -> None:

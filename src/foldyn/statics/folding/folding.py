@@ -456,7 +456,8 @@ def folded_pattern(pattern: Pattern, energy: FoldEnergy, shape: Shape, x: NDArra
     Panels that would leave slivers, such as with three corners on a line, stay whole.
     """
     bent = np.abs(shape.turns - energy.rest)[: len(energy.diagonals)] > PLANE
-    cut = np.setdiff1d(energy.diagonal_panel[bent], _with_slivers(energy, x))
+    slivers = energy.triangle_panel[are_slivers(x[energy.triangles])]
+    cut = np.setdiff1d(energy.diagonal_panel[bent], slivers)
     whole = np.ones(len(pattern.faces), bool)
     whole[cut] = False
     faces = [face for face, kept in zip(pattern.faces, whole, strict=True) if kept]
@@ -469,8 +470,3 @@ def folded_pattern(pattern: Pattern, energy: FoldEnergy, shape: Shape, x: NDArra
         raise ComputationError(
             f"the folded state is no sound pattern ({error}): fold it less"
         ) from None
-
-
-def _with_slivers(energy: FoldEnergy, x: NDArray) -> NDArray[np.int64]:
-    """Panels with a triangle much longer than wide."""
-    return np.unique(energy.triangle_panel[are_slivers(x[energy.triangles])])

@@ -91,7 +91,9 @@ def _given(pattern: Pattern, angles: Any) -> NDArray[np.float64]:
             targets[row[pair]] = math.radians(_angle(f"angles[{pair}]", angles[key]))
         return targets
     if np.ndim(angles) == 0:
-        return _sized_all(pattern, angles)
+        targets, rows = np.full(count, np.nan), folded_rows("angles", "all", pattern)
+        targets[rows] = _sized(pattern, rows, angles, "angles")
+        return targets
     checked = check_fold_angles("angles", [0.0 if a is None else a for a in angles])
     if np.size(checked) != count:
         raise InputError(
@@ -101,13 +103,6 @@ def _given(pattern: Pattern, angles: Any) -> NDArray[np.float64]:
         )
     free = np.array([a is None for a in angles], bool)
     return np.where(free, np.nan, np.radians(checked))
-
-
-def _sized_all(pattern: Pattern, angle: Any) -> NDArray[np.float64]:
-    targets = np.full(len(pattern.creases), np.nan)
-    rows = folded_rows("angles", "all", pattern)
-    targets[rows] = _sized(pattern, rows, angle, "angles")
-    return targets
 
 
 def _angle(field: str, value: Any) -> float:
