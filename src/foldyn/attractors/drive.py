@@ -112,7 +112,7 @@ def at_level(case: Case, level: float) -> Case:
 
 
 def _altered(case: Case, change: Callable[[Any], Any]) -> Case:
-    """The case with a change of each part that has a harmonic history."""
+    """The case, with each part that has a harmonic history changed."""
 
     def changed(parts: Sequence[Any]) -> list[Any]:
         return [change(part) if _is_driven(part) else part for part in parts]

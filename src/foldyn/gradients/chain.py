@@ -102,7 +102,7 @@ class Chain(NamedTuple):
             size = max(np.abs(left).max(), np.abs(right).max())
             if np.abs(left - right).max() > SAME * size + ROUNDING * abs(value):
                 raise InputError(
-                    f"is reached at {len(places)} places at once, which part as the design "
+                    f"is reached at {len(places)} places at once, which separate as the design "
                     "changes: it has no derivative; take a measure of one of them, or mean_square"
                 )
         return one

@@ -349,7 +349,7 @@ class Columns(NamedTuple):
     by: list[dict[str, NDArray]]
 
     def pulled(self, gradient: Gradient) -> NDArray:
-        """Derivatives (count,) of a quantity by the parameter; see `Slope`."""
+        """Derivatives (count,) of a quantity by the parameter, from its gradient by numbers."""
         return np.array(
             [
                 sum(

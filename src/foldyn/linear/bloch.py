@@ -185,7 +185,7 @@ class NotAlikeError(InputError):
         )
 
     def naming(self, first: NDArray) -> InputError:
-        """The same error with node names, by the node (m,) of each node of cell 0."""
+        """The same error with names of nodes, given the node (m,) for each node of cell 0."""
         names = [
             f"node {first[dof // 3]}" if dof < 3 * len(first) else "a rotation of a panel's edge"
             for dof in self.dofs
@@ -194,7 +194,7 @@ class NotAlikeError(InputError):
 
 
 def steps_of(offset: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Distinct R (s, d) of the given ones (m, d) and their opposites; the number (m,) of each."""
+    """Distinct R (s, d) among given ones (m, d) and their opposites, and the row (m,) of each."""
     steps, number = np.unique(np.concatenate([offset, -offset]), axis=0, return_inverse=True)
     return steps, np.ravel(number)[: len(offset)]
 

@@ -52,7 +52,7 @@ TURNED = 1e-13  # of coefficients of constraints: round-off of zeros
 
 
 class CellReach:
-    """Dofs of cell 0, m = 3 node + axis followed by hidden ones, and all dofs that reach them.
+    """The m dofs of cell 0 (3 node + axis, then hidden ones), and all dofs that act on them.
 
     Parameters
     ----------

@@ -219,8 +219,9 @@ def _warn_of_twins(linear: Linearized, values: NDArray, shapes: NDArray) -> None
         near = abs(values[k] - values[k - 1]) <= TWINS * abs(values[k])
         if near and abs(shapes[:, k] @ (linear.mass @ shapes[:, k - 1])) > RIGID:
             warn(
-                f"the memory of the creases makes two modes one ({np.sqrt(values[k]) / TURN:.4g} "
-                "Hz): another one near it is missing; frequency responses are not affected",
+                "two modes are the same with the memory of the creases "
+                f"({np.sqrt(values[k]) / TURN:.4g} Hz), and one near them is missing; frequency "
+                "responses are not affected",
                 "laws.md#in-other-analyses",
             )
 

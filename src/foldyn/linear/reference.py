@@ -56,7 +56,7 @@ class MeshModes(NamedTuple):
     found: xarray.Dataset
 
     def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
-        """Which points (m, 3) are nodes of the mesh (j,), and the shapes there (k, j, 3)."""
+        """Numbers (j,) of the points (m, 3) that are nodes of the mesh, and shapes (k, j, 3)."""
         from scipy.spatial import cKDTree
 
         apart, place = cKDTree(self.structure.nodes).query(nodes)
@@ -117,7 +117,7 @@ class Reference:
     found: xarray.Dataset
 
     def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
-        """Which points (m, 3) are nodes of the mesh (j,), and the shapes there (k, j, 3)."""
+        """Numbers (j,) of the points (m, 3) that are nodes of the mesh, and shapes (k, j, 3)."""
         return MeshModes(self.case.structure, self.frequency, self.shape, self.found).at(nodes)
 
 
@@ -208,7 +208,7 @@ class Shown(Protocol):
         ...
 
     def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
-        """Which points (m, 3) have shapes (j,), and the shapes (k, j, 3)."""
+        """Numbers (j,) of the points (m, 3) that have shapes, and these shapes (k, j, 3)."""
         ...
 
 

@@ -139,8 +139,8 @@ def meshes(pattern: Pattern, given: Sequence[int] | None) -> tuple[int, int]:
     raise InputError(
         f": the shell of {len(pattern.faces)} panels would have "
         f"{triangle_count(pattern, 4)} triangles even with 4 divisions, more than "
-        f"{MOST_TRIANGLES}; compare fewer cells of the pattern, or give divisions = (2, 4) and "
-        "the time that takes",
+        f"{MOST_TRIANGLES}; compare fewer cells of the pattern, or give divisions = (2, 4), "
+        "which takes long",
         "divisions",
     )
 

@@ -175,7 +175,7 @@ class ByLevel(_OfBalance):
         return self.coefficients(z), self.omega, p
 
     def slope(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n,) of R by p, exact for loads proportional to it."""
+        """Derivative (n,) of R by p, from differences: exact for loads proportional to p."""
         return self.by_level(z, p)
 
 

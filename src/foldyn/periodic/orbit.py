@@ -39,7 +39,7 @@ BARELY = 1e-3  # of a gap: share that remains between two samples of motions tha
 STAGES = 3
 ROOT15, ROOT6 = np.sqrt(15.0), np.sqrt(6.0)
 STEPS = 64  # in a period of the drive
-NEUTRAL = 1e-6  # above 1: round-off in an undamped motion
+NEUTRAL = 1e-6  # excess of a modulus over 1 that counts as round-off
 
 
 class Tableau:
@@ -292,7 +292,7 @@ class Orbit:
     def truncation(self) -> float:
         """Estimated effect of twice as many harmonics, as a fraction of the motion.
 
-        The residual at the additional harmonics over the mean dynamic stiffness there.
+        It is the residual at the additional harmonics, divided by the mean dynamic stiffness there.
         """
         kept, equation = len(self.amplitudes) - 1, self.equation
         fourier = Fourier(2 * kept + 1)  # even ones alone may vanish by symmetry

@@ -139,9 +139,7 @@ def problem_of(path: xarray.Dataset, case: Case | None, at: int) -> OrigamiProbl
         raise InputError("path: was traced with an adaptive load, which a path does not keep")
     case = case_of(path) if case is None else of_kind("case", case, Case)
     if "elapsed" in path and case.remembering:
-        raise InputError(
-            "path: its creases have relaxed in part, in a duration; trace it without one"
-        )
+        raise InputError("path: its creases have relaxed in part; trace it without a duration")
     displacement = path["displacement"].values[at]
     if displacement.shape != case.structure.nodes.shape:
         raise InputError(

@@ -325,8 +325,8 @@ def _durations(given: Any, steps: int) -> list[float]:
     array = numbers("duration", given)
     if array.ndim > 1 or (array.ndim and len(array) != steps) or not (array >= 0.0).all():
         raise InputError(
-            f" = {show(given)}: give the time (s) of a step, at least 0, or that of each of the "
-            f"{steps} steps",
+            f" = {show(given)}: give one time (s), at least 0, for all steps, or one for each of "
+            f"the {steps} steps",
             "duration",
         )
     return np.broadcast_to(array, steps).tolist()

@@ -19,7 +19,7 @@ from foldyn.errors import InputError
 
 FREE = 1e-9  # of a rigid motion's size: motion of held dofs that counts as zero
 AXES = "xyz"
-TIE = 1e-6  # by how much less the last dof counts than the first when pins are chosen
+TIE = 1e-6  # when pins are chosen: weight of the first dof minus that of the last
 
 
 def rigid_motions(x: NDArray) -> NDArray:

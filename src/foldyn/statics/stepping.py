@@ -135,7 +135,7 @@ def elapse(problem: Problem, seconds: float) -> None:
 
 
 def step_to(solver: Solver, start: Station, factor: float, seconds: float = 0.0) -> Attempt:
-    """Equilibrium at another load factor, or later, on the path of `start`."""
+    """Equilibrium at another load factor, or after some seconds, on the path of `start`."""
     elapse(solver.problem, seconds)
     plain = _step(solver, start, factor, seconds, False)
     if not plain.failure or plain.failure == SNAPS:
@@ -288,8 +288,8 @@ def settle(solver: Solver, u: NDArray, factor: float) -> Station:
     except PathStoppedError as stop:
         raise PathStoppedError(
             f"no equilibrium was found at the load factor {factor:.6g} from the state given",
-            "start from a state nearer to it, or apply what is constant along the path in "
-            f"smaller steps ({stop.reason})",
+            "start from a state nearer to it, or apply the constant loads in smaller steps "
+            f"({stop.reason})",
         ) from None
     attempt = solver.correct(last.point.u, factor)
     if attempt.failure:

@@ -163,8 +163,8 @@ class Folding:
                 f"bent by up to {math.degrees(self.bend):.3g} degrees"
             )
         if not np.isnan(self.targets).all():
-            lines.append(f"angles differ from those wanted by up to {math.degrees(self.error):.3g}")
-            lines[-1] += " degrees"
+            off = math.degrees(self.error)
+            lines.append(f"angles are up to {off:.3g} degrees off their targets")
         if self.started_from == "folded":
             lines.append("the path opens from the folded state, which rotations of the panels give")
         if len(self.closed):

@@ -303,7 +303,7 @@ def layer_order(pattern: Pattern, state: FlatState, given: Orders = ()) -> NDArr
 
 
 class CrossingError(Exception):
-    """No order satisfies one condition, on these rows of the pairs."""
+    """One condition, on these rows of the pairs, cannot be satisfied."""
 
     def __init__(self, rows: tuple[int, ...]) -> None:
         super().__init__(rows)
