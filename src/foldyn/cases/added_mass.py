@@ -20,6 +20,7 @@ from foldyn.mechanics.air.added_mass import (
     normal_velocities,
 )
 from foldyn.mechanics.air.gaps import APART, JOINED, narrow_gap
+from foldyn.patterns.pattern import Pattern
 from foldyn.ram_limit import check_memory
 from foldyn.structures.boundary_elements import BoundaryElements, boundary_elements
 
@@ -131,7 +132,7 @@ def added_mass_at(case: Any, displacement: NDArray) -> sparse.csr_array | None:
     return added.sparse
 
 
-def _check_gaps(pattern: Any, elements: BoundaryElements, points: NDArray) -> None:
+def _check_gaps(pattern: Pattern, elements: BoundaryElements, points: NDArray) -> None:
     """Refuse a state in which panels come too near to each other for their elements."""
     panels = np.repeat(np.arange(len(pattern.faces)), [len(face) for face in pattern.faces])
     corners = np.concatenate([np.array(face) for face in pattern.faces])

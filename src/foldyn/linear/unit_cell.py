@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
+from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.screw import Screw, motion_between, translation
 from foldyn.patterns.tiling import half_edges
 from foldyn.patterns.tiling import periods as translations_of
@@ -135,7 +136,7 @@ class UnitCell:
             f"{' and '.join(ways)}>"
         )
 
-    def _found(self, pattern: Any, near: float) -> tuple[tuple[Screw, ...], list[tuple]]:
+    def _found(self, pattern: Pattern, near: float) -> tuple[tuple[Screw, ...], list[tuple]]:
         """The motions, and pairs of vertices known to be copies."""
         if self.vectors is not None or self.screw is not None:
             given = [] if self.vectors is None else list(map(translation, _steps(self.vectors)))
@@ -159,7 +160,7 @@ class UnitCell:
             return tuple(map(translation, steps)), []
         return self._marked(pattern, near)
 
-    def _marked(self, pattern: Any, near: float) -> tuple[tuple[Screw, ...], list[tuple]]:
+    def _marked(self, pattern: Pattern, near: float) -> tuple[tuple[Screw, ...], list[tuple]]:
         """The motions and pairs named by the pattern; pairs of a seam are one vertex."""
         motions, found = [], []
         for k, rows in enumerate(pattern.periods):
@@ -348,7 +349,7 @@ def check_commuting(vertices: NDArray, motions: Sequence[Screw], near: float, fi
 
 
 def _partners(
-    pattern: Any, motions: Sequence[Screw], near: float, known: set[int]
+    pattern: Pattern, motions: Sequence[Screw], near: float, known: set[int]
 ) -> list[tuple[int, int, tuple[int, ...]]]:
     """Pairs of vertices (v, w, R), w = g^R v, of boundary edges that meet edges of other cells.
 
@@ -373,7 +374,7 @@ def _partners(
 
 
 def _check_all(
-    pattern: Any, motions: Sequence[Screw], pairs: Sequence[tuple], near: float, field: str
+    pattern: Pattern, motions: Sequence[Screw], pairs: Sequence[tuple], near: float, field: str
 ) -> None:
     """Refuse motions under which nothing meets, or some vertices narrowly miss their partners."""
     from scipy.spatial import cKDTree

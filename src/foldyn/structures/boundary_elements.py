@@ -8,13 +8,14 @@ of elements along an edge.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.errors import InputError
+from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.topology import edge_lookup, edge_of
 from foldyn.structures.discretized import Discretized
 
@@ -115,7 +116,7 @@ def boundary_elements(
     return BoundaryElements(weights, triangles, panel, unknown, *on)
 
 
-def _check_convex(pattern: Any) -> None:
+def _check_convex(pattern: Pattern) -> None:
     for panel, face in enumerate(pattern.faces):
         sides = np.diff(pattern.vertices[[*face, face[0], face[1]]], axis=0)
         turns = np.cross(sides[:-1], sides[1:]) @ pattern.face_normals[panel]
@@ -126,7 +127,7 @@ def _check_convex(pattern: Any) -> None:
             )
 
 
-def _corners(pattern: Any) -> _Corners:
+def _corners(pattern: Pattern) -> _Corners:
     sizes = np.array([len(face) for face in pattern.faces])
     panel = np.repeat(np.arange(len(sizes)), sizes)
     vertex = np.concatenate([np.array(face) for face in pattern.faces])

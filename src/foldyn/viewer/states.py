@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 from scipy import sparse
 
@@ -45,13 +46,13 @@ class States(NamedTuple):
     free: NDArray
 
 
-def memory_acts(case: Case, result: Any) -> bool:
+def memory_acts(case: Case, result: xr.Dataset) -> bool:
     """Whether creases have memory: dampers in series with panels do, in a motion."""
     passes = "time" in result.sizes or "elapsed" in result
     return any(passes or not isinstance(part.law, CreaseDampers) for part in case.remembering)
 
 
-def creases_known(case: Case, result: Any) -> bool:
+def creases_known(case: Case, result: xr.Dataset) -> bool:
     """Whether displacements determine the rotation of creases.
 
     They do not if panels yield next to creases with memory or, in motions, with dampers.
@@ -62,7 +63,7 @@ def creases_known(case: Case, result: Any) -> bool:
     return not (give and (damped or memory_acts(case, result)))
 
 
-def states(case: Case, result: Any, displacement: NDArray) -> States:
+def states(case: Case, result: xr.Dataset, displacement: NDArray) -> States:
     """States at displacements (samples, n, 3), m, with massless unknowns in equilibrium."""
     body, structure, kind = case.body, case.structure, case.structure.hinge_kinds[0]
     samples = len(displacement)
@@ -102,7 +103,7 @@ def states(case: Case, result: Any, displacement: NDArray) -> States:
     return States(*turned, pairs, energy, plates, rest, stress, free)
 
 
-def _acting(case: Case, result: Any, samples: int) -> Iterator[tuple[SomeLoads, NDArray]]:
+def _acting(case: Case, result: xr.Dataset, samples: int) -> Iterator[tuple[SomeLoads, NDArray]]:
     """Each load of a case with its factor (samples,)."""
     constant = set(np.atleast_1d(result.attrs.get("constant", [])).astype(int).tolist())
     for k, load in enumerate(case.loads):
@@ -212,7 +213,7 @@ class Field(NamedTuple):
     signed: bool
 
 
-def fields(case: Case, result: Any, displacement: NDArray) -> dict[str, Field]:
+def fields(case: Case, result: xr.Dataset, displacement: NDArray) -> dict[str, Field]:
     """Fields of a motion or path with displacements (samples, n, 3), by name.
 
     Fields that displacements do not determine are left out: moments and energies if laws have
@@ -254,7 +255,7 @@ def _strain_field(strain: NDArray) -> Field:
     return Field("strain of bars", "1", "bar", strain, True)
 
 
-def energies(case: Case, result: Any) -> dict[str, NDArray]:
+def energies(case: Case, result: xr.Dataset) -> dict[str, NDArray]:
     """Energies of a result (samples), J, by name, as far as it has them."""
     names = {"kinetic": "kinetic", **case.energy_groups, "dissipated": "dissipated"}
     names |= {"air": "lost to the air", "work": "work"}

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+import xarray as xr
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
@@ -20,7 +19,7 @@ from foldyn.plots.chart_figures import figure_of
 WIDTH = 9.0  # inches
 
 
-def plot_measured(one: Measurement, result: Any, case: Case, note: str = "") -> Figure:
+def plot_measured(one: Measurement, result: xr.Dataset, case: Case, note: str = "") -> Figure:
     """Draw measurements and a result of the fitted model.
 
     Shapes stand in the plane of the two measured axes along which the nodes lie farthest apart,

@@ -236,7 +236,7 @@ def _draw(name: str, *arguments: Any) -> Any:
 FLOOR = 1e-300  # magnitude that represents zero in decibels
 
 
-def charts_of(one: Measurement, result: Any, case: Case) -> list[Chart]:
+def charts_of(one: Measurement, result: xr.Dataset, case: Case) -> list[Chart]:
     """Charts of a measurement and the fitted model's result; empty if there is nothing to show."""
     if isinstance(one, ForceDisplacement):
         curve = dense_curve(one)
@@ -273,7 +273,7 @@ def _beside(
     return charts
 
 
-def _shapes(one: Shapes, result: Any, case: Case) -> list[Chart]:
+def _shapes(one: Shapes, result: xr.Dataset, case: Case) -> list[Chart]:
     """A chart for each load factor."""
     model, (across, up) = one.shapes(result, case), picture_plane(one, case)
     letters = [AXES.index(axis) for axis in one.axes]
@@ -289,7 +289,7 @@ def _shapes(one: Shapes, result: Any, case: Case) -> list[Chart]:
     return charts
 
 
-def _mode_shapes(one: ModeShapes, result: Any, case: Case) -> list[Chart]:
+def _mode_shapes(one: ModeShapes, result: xr.Dataset, case: Case) -> list[Chart]:
     """Measured over predicted components of mode shapes, a chart for each mode."""
     model = one.shapes(result, case)
     charts = []
@@ -302,7 +302,7 @@ def _mode_shapes(one: ModeShapes, result: Any, case: Case) -> list[Chart]:
     return charts
 
 
-def _responses(one: FrequencyResponse, result: Any, case: Case) -> list[Chart]:
+def _responses(one: FrequencyResponse, result: xr.Dataset, case: Case) -> list[Chart]:
     """Magnitude of responses for each node and, if measured, phase."""
     model = one.curves(result, case)
     labels = [f"{one.axis} (dB{f' re 1 {one.unit}' if one.unit else ''})", "phase (degrees)"]
@@ -328,7 +328,7 @@ def _decibels(values: NDArray) -> NDArray[np.float64]:
     return 20.0 * np.log10(np.maximum(np.abs(values), FLOOR))
 
 
-def modes_table(one: ModalParameters, result: Any, case: Case) -> Table:
+def modes_table(one: ModalParameters, result: xr.Dataset, case: Case) -> Table:
     """Table of measured values per mode and the model's values."""
     places, measured = one.places(result, case), one.observed()
     model = result[one.quantity].values[places]
@@ -352,7 +352,7 @@ def modes_table(one: ModalParameters, result: Any, case: Case) -> Table:
     return Table([*header, "MAC"], rows, f"{one.name}: paired by their shapes (MAC)")
 
 
-def shapes_table(one: ModeShapes, result: Any, case: Case) -> Table:
+def shapes_table(one: ModeShapes, result: xr.Dataset, case: Case) -> Table:
     """Table of the similarity of measured shapes and the model's shapes."""
     place, alike = one.pairing(result, case)
     kept = resisted(result)[place]

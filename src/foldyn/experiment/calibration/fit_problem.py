@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.analyses import CaseFile
@@ -119,7 +120,9 @@ class Problem:
             warnings.simplefilter("ignore", FoldynWarning)
             return self._predicted(seen(run, case_file, members), case_file, run.members)
 
-    def _predicted(self, result: Any, case_file: CaseFile, members: Sequence[int]) -> Predicted:
+    def _predicted(
+        self, result: xr.Dataset, case_file: CaseFile, members: Sequence[int]
+    ) -> Predicted:
         case = case_file.case()
         return {i: self.measurements[i].predicted(result, case) for i in members}
 

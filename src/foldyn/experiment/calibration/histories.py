@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
@@ -109,12 +110,12 @@ class TimeHistory(NodeValues):
         early, late = self.time[0] + self.delay, self.time[-1] + self.delay
         _within(self._of("time"), np.array([early - self.align, late + self.align]), arguments)
 
-    def curves(self, result: Any, case: Case) -> NDArray[np.float64]:
+    def curves(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Displacements in a motion at the measured times, shape (t, m), trend included."""
         along = _spline(result, self.where(case), self.axis, self.sight)
         return along(self.time + self.delay + self.shift(result, case))
 
-    def shift(self, result: Any, case: Case) -> float:
+    def shift(self, result: xr.Dataset, case: Case) -> float:
         """Best-fitting time shift (s) of the model in addition to `delay`, at most `align`."""
         if self.align == 0.0:
             return 0.0
@@ -132,7 +133,7 @@ class TimeHistory(NodeValues):
             by = float(np.clip(by - slope @ misfit(by) / (slope @ slope), *tried[[0, -1]]))
         return by
 
-    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Predictions of the measured values, in the order of `observed`."""
         return self._reduced(self.curves(result, case))
 
@@ -240,19 +241,21 @@ class Spectrum(NodeValues):
         super().check(case, arguments)
         _within(self._of("time"), self.time, arguments)
 
-    def spectra(self, result: Any, case: Case) -> NDArray[np.float64]:
+    def spectra(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Amplitudes of the model at the measured frequencies, shape (f, m)."""
         along = _spline(result, self.where(case), self.axis, self.sight)(self.time)
         step = sampling_interval(self.time)
         frequency, amplitude = spectrum(along, step, window=self.taper, detrend=self.detrend)
         return np.stack([np.interp(self.frequency, frequency, one) for one in amplitude.T], axis=1)
 
-    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Predictions of the measured values, in the order of `observed`."""
         return self.spectra(result, case).T.ravel()
 
 
-def _spline(result: Any, nodes: NDArray[np.int64], axis: str, sight: Sight | None) -> CubicSpline:
+def _spline(
+    result: xr.Dataset, nodes: NDArray[np.int64], axis: str, sight: Sight | None
+) -> CubicSpline:
     """Interpolate the seen displacement of nodes along an axis between a motion's samples."""
     moved = result["displacement"].values[:, nodes]
     if sight is not None:

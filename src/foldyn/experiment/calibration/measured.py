@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
@@ -96,7 +97,7 @@ class ForceDisplacement(AtNodes):
         nodes, axis = self.where(case), AXES.index(self.axis)
         return float(sum(np.mean(term[nodes, axis]) for term, _ in case.imposed_terms))
 
-    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Predictions of the measured values, in the order of `observed`."""
         nodes = np.isin(result["support_node"].values, self.where(case))
         chosen = nodes & (result["support_axis"].values == self.axis)
@@ -148,7 +149,7 @@ class Shapes(NodeValues):
         """Load factors at which the path is needed."""
         return self.load_factor
 
-    def shapes(self, result: Any, case: Case) -> NDArray[np.float64]:
+    def shapes(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Values of a result at all nodes, seen or not, shape (s, m, a)."""
         nodes, axes = self.where(case), [AXES.index(axis) for axis in self.axes]
         moved = result["displacement"].values[_steps(result, self.load_factor)][:, nodes][..., axes]
@@ -156,12 +157,12 @@ class Shapes(NodeValues):
             return moved
         return moved + case.structure.nodes[nodes][:, axes]
 
-    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Predictions of the measured values, in the order of `observed`."""
         return self.shapes(result, case)[np.isfinite(self.values)]
 
 
-def _steps(result: Any, factors: NDArray[np.float64]) -> NDArray[np.int64]:
+def _steps(result: xr.Dataset, factors: NDArray[np.float64]) -> NDArray[np.int64]:
     """Steps of a path at requested load factors: in order, or the nearest ones."""
     place, found = np.cumsum(np.append(0, np.diff(factors) != 0.0)), result["load_factor"].values
     if len(found) > place[-1] and np.array_equal(found[place], factors):

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.analyses.keys import parts
@@ -97,10 +98,10 @@ class Measurement(ABC):
         """Refuse a case, or arguments of its analysis, that cannot predict these values."""
 
     @abstractmethod
-    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Predictions of the measured values by a result, flattened in the same order."""
 
-    def examine(self, result: Any, case: Case) -> None:  # noqa: B027
+    def examine(self, result: xr.Dataset, case: Case) -> None:  # noqa: B027
         """Refuse a result in which the measured modes cannot be identified."""
 
     def factors(self, case: Case) -> NDArray[np.float64]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
@@ -123,7 +124,7 @@ class ModeShapes(NodeValues):
                 "name nodes and axes that move"
             )
 
-    def pairing(self, result: Any, case: Case) -> Pairing:
+    def pairing(self, result: xr.Dataset, case: Case) -> Pairing:
         """Pair measured modes with modes of a result so that the sum of their MAC is largest.
 
         Raises
@@ -139,7 +140,7 @@ class ModeShapes(NodeValues):
             row[:] = np.nan_to_num(mac(one[seen][None], shapes[:, seen])[0])
         return Pairing(pair_modes(alike).second, alike)
 
-    def examine(self, result: Any, case: Case) -> None:
+    def examine(self, result: xr.Dataset, case: Case) -> None:
         """Refuse a result unless each measured mode resembles exactly one mode of the model."""
         place, alike = self.pairing(result, case)
         kept = resisted(result)
@@ -163,7 +164,7 @@ class ModeShapes(NodeValues):
                     "lower analysis.count if one of them is too high"
                 )
 
-    def shapes(self, result: Any, case: Case) -> NDArray[np.float64]:
+    def shapes(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Shapes of the partners, scaled to fit best where measured, shape (k, m, a)."""
         shapes = self._of_model(result, case)[self.pairing(result, case).place]
         seen = np.isfinite(self.values)
@@ -172,15 +173,15 @@ class ModeShapes(NodeValues):
         scale = (own * other).sum(axis=(1, 2)) / np.where(size > 0.0, size, 1.0)
         return shapes * scale[:, None, None]
 
-    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Predictions of the measured values, in the order of `observed`."""
         return self.shapes(result, case)[np.isfinite(self.values)]
 
-    def places(self, result: Any, case: Case) -> NDArray[np.int64]:
+    def places(self, result: xr.Dataset, case: Case) -> NDArray[np.int64]:
         """Indices (k,) of the measured modes in a result."""
         return resisted(result)[self.pairing(result, case).place]
 
-    def _of_model(self, result: Any, case: Case) -> NDArray[np.float64]:
+    def _of_model(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Shapes (K, m, a) of the model's modes with stiffness, where measured."""
         shapes = result["shape"].transpose("mode", "node", "axis").values[resisted(result)]
         return shapes[:, self.where(case)][..., [AXES.index(axis) for axis in self.axes]]
@@ -268,13 +269,13 @@ class ModalParameters(Measurement):
         if self.shapes is not None:
             self.shapes.check(case, arguments)
 
-    def examine(self, result: Any, case: Case) -> None:
+    def examine(self, result: xr.Dataset, case: Case) -> None:
         """Refuse a result in which the measured modes cannot be identified."""
         if self.shapes is not None:
             self.shapes.examine(result, case)
         self.predicted(result, case)
 
-    def places(self, result: Any, case: Case) -> NDArray[np.int64]:
+    def places(self, result: xr.Dataset, case: Case) -> NDArray[np.int64]:
         """Indices (k,) of the measured modes in a result."""
         if self.shapes is not None:
             return self.shapes.places(result, case)
@@ -282,7 +283,7 @@ class ModalParameters(Measurement):
         _enough(self.name, len(kept), self.count, result)
         return kept[self.mode - 1]
 
-    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Predictions of the measured values, in the order of `observed`."""
         return result[self.quantity].values[self.places(result, case)]
 
@@ -356,12 +357,12 @@ class DampingRatios(ModalParameters):
             )
 
 
-def resisted(result: Any) -> NDArray[np.int64]:
+def resisted(result: xr.Dataset) -> NDArray[np.int64]:
     """Indices of modes with stiffness: not rigid, mechanisms, or unstable."""
     return np.flatnonzero(result["eigenvalue"].values > 0.0)
 
 
-def _enough(name: str, found: int, needed: int, result: Any) -> None:
+def _enough(name: str, found: int, needed: int, result: xr.Dataset) -> None:
     """Refuse a result with fewer modes than were measured."""
     if found >= needed:
         return

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases import BaseMotion, Case
@@ -129,18 +130,18 @@ class FrequencyResponse(NodeValues):
                 "nodes that move"
             )
 
-    def examine(self, result: Any, case: Case) -> None:
+    def examine(self, result: xr.Dataset, case: Case) -> None:
         """Refuse a result without finite predictions."""
         self.predicted(result, case)
 
-    def curves(self, result: Any, case: Case) -> NDArray[np.complex128]:
+    def curves(self, result: xr.Dataset, case: Case) -> NDArray[np.complex128]:
         """Response of the model at the measured frequencies, shape (f, m)."""
         held = result if self.quantity == MOTION else convert(result, self.quantity)
         lines = np.searchsorted(result["frequency"].values, self.frequency)
         whole = held[self.quantity].transpose("frequency", "node", "axis").values
         return whole[lines][:, self.where(case), AXES.index(self.axis)]
 
-    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Predictions of the measured values, in the order of `observed`."""
         curves = self.curves(result, case)
         lost = ~np.isfinite(curves).all(axis=1)

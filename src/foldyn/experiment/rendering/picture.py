@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.experiment.camera import Camera, opencv
+from foldyn.patterns.pattern import Pattern
 from foldyn.structures.discretized import Discretized
 from foldyn.values import number, whole
 
@@ -96,7 +96,7 @@ class Paper:
         return cls(triangles, flat, marked, two_colors(pattern)[panels])
 
 
-def two_colors(pattern: Any) -> NDArray[np.bool_]:
+def two_colors(pattern: Pattern) -> NDArray[np.bool_]:
     """Color of each panel; neighbors differ wherever the pattern allows."""
     neighbors: list[list[int]] = [[] for _ in pattern.faces]
     for a, b in np.asarray(pattern.crease_faces).tolist():
