@@ -24,7 +24,7 @@ from foldyn.periodic.families import ByLevel
 from foldyn.periodic.orbit import SHOWN, STEPS, Orbit, Shooting, is_stable
 from foldyn.periodic.reduction import reduced
 from foldyn.ram_limit import check_memory
-from foldyn.results.periodic_dataset import periodic_dataset
+from foldyn.results.dataset import periodic_dataset
 from foldyn.statics import trace
 from foldyn.statics.equilibrium import drives
 from foldyn.statics.tracing import displacement_of

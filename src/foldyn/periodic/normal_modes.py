@@ -32,7 +32,7 @@ from foldyn.periodic.motion import (
 )
 from foldyn.periodic.orbit import SHOWN, STEPS, Orbit, along, is_stable
 from foldyn.ram_limit import check_memory
-from foldyn.results.periodic_dataset import points_dataset
+from foldyn.results.dataset import points_dataset
 from foldyn.statics.tracing import displacement_of
 from foldyn.values import flag, number, numbers, of_kind, show, whole
 

@@ -39,7 +39,7 @@ from foldyn.periodic.families import ByFrequency, ByLevel
 from foldyn.periodic.motion import NAMED, balance_of, balanced, coefficients, warn_of_errors
 from foldyn.periodic.orbit import STEPS, along, amplitude, is_stable
 from foldyn.results import Quantity
-from foldyn.results.periodic_dataset import points_dataset
+from foldyn.results.dataset import points_dataset
 from foldyn.values import number, numbers, of_kind, show, whole
 
 FIRST = 0.2  # of the longest step

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.mechanics.crossings import crossing_panels, pairs_text
 from foldyn.results.columns import Column
-from foldyn.results.quantities import CROSSINGS, variable
+from foldyn.results.quantities import CROSSINGS, variables
 
 
 class Crossings(NamedTuple):
@@ -43,11 +43,8 @@ class Crossings(NamedTuple):
         if not len(self.crossed):
             return result.assign_attrs(counts)
         found = {"crossing_panels": self.panels, "crossing_first": self.first}
-        known = {
-            name: variable(("crossing", *CROSSINGS[name].dims), values, "", CROSSINGS[name].text)
-            for name, values in found.items()
-        }
-        return result.assign(known).assign_attrs(counts)
+        named = variables(CROSSINGS, "crossing", found)
+        return result.assign(named).assign_attrs(counts)
 
     def text(self, when: str, samples: int) -> str:
         """Describe the crossings in words; empty if there are none.

@@ -28,6 +28,7 @@ from foldyn.results.quantities import (
     ORIGIN,
     PATH,
     PLACE,
+    POINTS,
     RESPONSES,
     Quantity,
     energies_of,
@@ -120,10 +121,7 @@ def origin_variables(origin: Origin, time: float = math.nan) -> dict[str, Any]:
     values: dict[str, Any] = {"origin": origin.displacement, "origin_time": begun}
     if origin.flow is not None:
         values |= {"flow": origin.flow, "flow_time": time, "flow_looked": origin.looked}
-    return {
-        name: variable(ORIGIN[name].dims, value, ORIGIN[name].units, ORIGIN[name].text)
-        for name, value in values.items()
-    }
+    return variables(ORIGIN, (), values)
 
 
 def path_dataset(
@@ -274,11 +272,7 @@ def bands_dataset(
         Facts about the computation, each stored as an attribute.
     """
     first = ("state",) if "state" in along else ()
-    data = {
-        name: variable((*first, *BANDS[name].dims), array, BANDS[name].units, BANDS[name].text)
-        for name, array in values.items()
-    }
-    data |= variables(GAPS, "gap", gaps)
+    data = variables(BANDS, first, values) | variables(GAPS, "gap", gaps)
     return result_dataset("bands", case, data, along, statistics)
 
 
@@ -301,10 +295,7 @@ def fidelity_dataset(
     statistics : mapping
         Facts about the comparison, each stored as an attribute.
     """
-    data = {
-        name: variable(FIDELITY[name].dims, array, FIDELITY[name].units, FIDELITY[name].text)
-        for name, array in values.items()
-    }
+    data = variables(FIDELITY, (), values)
     numbers = 1 + np.arange(len(np.asarray(values["frequency"])))
     along = {
         "mode": ("mode", numbers, {"long_name": "elastic mode of the shell"}),
@@ -400,3 +391,76 @@ def stage_times(statistics: Mapping[str, Any]) -> NDArray[np.float64] | None:
     times[::2] = float(statistics.get("start", 0.0)) + np.arange(steps + 1) * dt
     times[1::2] = times[:-1:2] + 0.5 * dt
     return times
+
+
+def periodic_dataset(
+    case: Case, time: ArrayLike, motion: Mapping[str, ArrayLike], coefficient: NDArray,
+    floquet: ArrayLike, stable: bool, periods: int, statistics: Mapping[str, Any],
+    origin: Origin | None = None,
+) -> xr.Dataset:  # fmt: skip
+    """Dataset of one periodic motion, which carries its case.
+
+    Parameters
+    ----------
+    case : Case
+    time : array_like, shape (nt,)
+        Over one period, s.
+    motion : mapping of str to array_like, shape (nt, n, 3)
+        displacement (m) and velocity (m/s).
+    coefficient : ndarray, complex, shape (h + 1, n, 3)
+        Amplitudes of exp(2 pi i j t / period), m.
+    floquet : array_like, complex, shape (2k,)
+    stable : bool
+    periods : int
+        Drive periods per period of the motion.
+    statistics : mapping
+        Facts about the computation, each stored as an attribute.
+    origin : Origin, optional
+        The reference state of damping.
+    """
+    data = variables(MOTION, "time", motion)
+    data |= {} if origin is None else origin_variables(origin)
+    single = {"coefficient": coefficient, "stable": stable, "periods": periods, "floquet": floquet}
+    data |= variables(POINTS, (), single)
+    along = {
+        "time": ("time", np.asarray(time, float), {"units": "s"}),
+        "harmonic": ("harmonic", np.arange(len(coefficient)), {"long_name": "harmonic"}),
+    }
+    return result_dataset("periodic_motion", case, data, along, statistics)
+
+
+def points_dataset(
+    kind: str, case: Case, values: Mapping[str, ArrayLike], statistics: Mapping[str, Any],
+    units: str = "m", origin: Origin | None = None,
+) -> xr.Dataset:  # fmt: skip
+    """Dataset of the points of a response curve or a backbone, which carries its case.
+
+    Parameters
+    ----------
+    kind : {"response_curve", "backbone"}
+    case : Case
+    values : mapping of str to array_like, shape (points, ...)
+        Variables of `POINTS`; `frequency` is a coordinate.
+    statistics : mapping
+        Facts about the computation, each stored as an attribute.
+    units : str
+        Unit of the amplitude.
+    origin : Origin, optional
+        See `periodic_dataset`.
+    """
+    size = POINTS["amplitude"]._replace(units=units)
+    if kind == "backbone":
+        size = size._replace(text="largest displacement of any node from the equilibrium")
+    known = {**POINTS, "amplitude": size}
+    data = variables(known, "point", {k: v for k, v in values.items() if k != "frequency"})
+    data |= {} if origin is None else origin_variables(origin)
+    text = "frequency of the motion" if kind == "backbone" else POINTS["frequency"].text
+    frequency = np.asarray(values["frequency"], float)
+    along: dict[str, Any] = {
+        "frequency": ("point", frequency, {"units": "Hz", "long_name": text}),
+        "point": ("point", np.arange(len(frequency)), {"long_name": "point"}),
+    }
+    if "coefficient" in values:
+        count = np.asarray(values["coefficient"]).shape[1]
+        along["harmonic"] = ("harmonic", np.arange(count), {"long_name": "harmonic"})
+    return result_dataset(kind, case, data, along, statistics)

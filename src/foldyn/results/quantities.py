@@ -89,6 +89,23 @@ PATH: Mapping[str, Quantity] = {
     "dissipated": Quantity("J", f"energy dissipated by creases and friction {SINCE}"),
     "elapsed": Quantity("s", "time since the first point"),
 }
+HARMONICS = ("harmonic", *PLACE)
+POINTS: Mapping[str, Quantity] = {
+    "frequency": Quantity("Hz", "frequency of the drive"),
+    "level": Quantity("1", "factor on the drive"),
+    "amplitude": Quantity("m", "half the distance between the extremes"),
+    "stable": Quantity(text="whether the motion is stable"),
+    "bifurcation": Quantity(text="bifurcation at the point"),
+    "branch": Quantity(text="number of the branch"),
+    "periods": Quantity("1", "periods of the drive in one of the motion"),
+    "floquet": Quantity("1", "Floquet multiplier", ("multiplier",)),
+    "coefficient": Quantity("m", "complex amplitude of a harmonic of the motion", HARMONICS),
+    "truncation": Quantity("1", "what twice as many harmonics would add, estimated"),
+    "reduction": Quantity("1", "what the dofs left out would add, estimated"),
+    "energy": Quantity("J", "energy above that at rest"),
+    "energy_drift": Quantity("1", "largest change of the energy along the motion"),
+}
+"""Possible variables of points of a curve or a backbone, along the dimension point."""
 FOLDING: Mapping[str, Quantity] = {
     "displacement": Quantity("m", "displacement from the pattern as it was", PLACE),
     "position": Quantity("m", "position of the vertex", PLACE),
@@ -185,11 +202,12 @@ FIDELITY: Mapping[str, Quantity] = {
 
 
 def variables(
-    known: Mapping[str, Quantity], along: str, values: Mapping[str, ArrayLike]
+    known: Mapping[str, Quantity], along: str | tuple[str, ...], values: Mapping[str, ArrayLike]
 ) -> dict[str, Any]:
-    """Dataset variables from values along a dimension."""
+    """Dataset variables from values along a dimension, or several or none."""
+    first = (along,) if isinstance(along, str) else along
     return {
-        name: variable((along, *known[name].dims), array, known[name].units, known[name].text)
+        name: variable((*first, *known[name].dims), array, known[name].units, known[name].text)
         for name, array in values.items()
     }
 
