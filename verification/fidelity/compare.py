@@ -43,7 +43,7 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
     "plate, consistent, bars": {"preset": "plate", "membrane": "bars"},
     "n5b8e, condensed, bars": {"preset": "n5b8e", "membrane": "bars"},
 }
-COMPARED = 8  # modes of the shell, at most
+COMPARED = 8  # most compared modes of the shell
 FIRST = 5  # that are compared at any frequency
 REFERENCE = 10  # computed modes of the shell
 

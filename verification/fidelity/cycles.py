@@ -19,7 +19,7 @@ from scipy.signal import fftconvolve
 
 PERIODS = 2.0  # length of the window
 PADDED = 8  # multiple of the record's length, zero-padded for the spectrum of the peak search
-SETTLED = 1e-6  # relative change of the frequency at which its iteration stops
+SETTLED = 1e-6  # the iteration stops at this relative change of the frequency
 ROUNDS = 30
 
 

@@ -133,7 +133,7 @@ def beside(true: Run, own: Run) -> Beside:
 
 
 def compared(found: Iterable[Run]) -> dict[str, list[Beside]]:
-    """All models compared with the shell, where it has a period, and `RECOMMENDED`."""
+    """Every model, and `RECOMMENDED`, compared with runs of the shell that have a period."""
     models: dict[str, list[Beside]] = {}
     triangles = _of_triangles()
     for (case, _), every in grouped(found).items():

@@ -42,13 +42,13 @@ from verification.fidelity.cycles import Cycles, NoCyclesError, cycles
 from verification.fidelity.motion_results import SHELL, STORED, Run, summaries, write
 from verification.fidelity.statics import LAWS, STUDIES
 
-FIRST_STEP = 0.1  # of the load that would fold a linear shell to the largest amplitude
+FIRST_STEP = 0.1  # share of the load that folds a linear shell to the largest amplitude
 MOST_STEPS = 80  # most steps on the way there
 EXACT = 1e-4  # relative error of the held fold
 SECANTS = 8
 SETTINGS = Settings(stability=False, locate=False)
-MOVING = 0.3  # of the largest change of a fold: smaller changes do not count as moving
-SMALL = 1e-6  # of the pattern's size: displacement within which folds change linearly
+MOVING = 0.3  # least change of a moving fold, relative to the largest
+SMALL = 1e-6  # displacement, relative to the size, with linear changes of folds
 
 
 class Held(NamedTuple):
@@ -238,17 +238,17 @@ CASES: Mapping[int, tuple[float, ...]] = {
     25: (5.0, 20.0),
     34: (5.0,),
 }
-REACHED = 0.8  # of the shell's largest fold: the last amplitude if that is below 50
+REACHED = 0.8  # last amplitude relative to the shell's largest fold, if below 50 degrees
 APART = 1.25  # least ratio of two amplitudes
-PERIODS = 6.0  # of the linear shell: length of a free vibration in periods
+PERIODS = 6.0  # length of a free vibration, in periods of the linear shell
 STEPS = 100  # steps in such a period
-HALVINGS = 2  # of the step, if a motion becomes unstable
+HALVINGS = 2  # most halvings of the step if a motion becomes unstable
 METHOD = "generalized_alpha"
 PULSE_STEP, PULSE_LENGTH = 0.01, 16.0  # s: time step and duration of a pulsed motion
 PULSE_END = 0.5  # s: end of the paper's pulse
-BAND = (0.4, 2.5)  # of the shell's first frequency: band of its fundamental
+BAND = (0.4, 2.5)  # band of the shell's fundamental, relative to its first frequency
 PULSE_BAND = (0.5, 4.0)
-NEAR = (0.5, 2.0)  # of the shell's fundamental: band of a model's
+NEAR = (0.5, 2.0)  # band of a model's fundamental, relative to the shell's
 
 
 class Motion(NamedTuple):

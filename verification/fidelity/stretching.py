@@ -37,7 +37,7 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
 }
 STEEL = Sheet(2e11, 0.3, 1e-3, density=7850.0)
 SMALL = 1e-6  # m
-PRESSED, STEPS = 8e-3, 16  # m, beyond the largest force
+PRESSED, STEPS = 8e-3, 16  # pressed distance (m), past the largest force; steps
 ENDS = {"x": "compressed", "y": "sheared", "z": "moved across"}
 
 

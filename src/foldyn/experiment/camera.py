@@ -17,7 +17,7 @@ from foldyn.errors import InputError, optional
 from foldyn.values import choice, number
 
 _TERMS = 6  # degree in r^2 of the polynomial that inverts the distortion
-_REACH = 1.08  # part of the half diagonal up to which it is fitted
+_REACH = 1.08  # radius of that fit, relative to half the image diagonal
 _LARGEST_SPREAD = 0.02  # allowed spread of the lengths that define a scale
 
 # Unit vectors by name: "x", "-x", "+z".

@@ -21,10 +21,10 @@ from foldyn.patterns.topology import Edge, Faces, around, edge_lookup, edge_of
 # Area over squared diameter (and edge length over diameter) below which a face is degenerate: far
 # above rounding (1e-16), far below any panel that can be made.
 _DEGENERATE = 1e-10
-SAME_PLACE = 1e-9  # of the pattern's size
-ASKEW = np.array([0.5377, 0.8339, 0.1244])  # shorter than a unit vector
+SAME_PLACE = 1e-9  # distance of equal points, relative to the pattern's size
+ASKEW = np.array([0.5377, 0.8339, 0.1244])  # a generic direction, shorter than a unit vector
 LAYERS = 1e-6  # rad: panels that leave their edges within this angle are coincident
-_ASKANCE = 10.0  # the same for a merging distance, relative to that distance
+_ASKANCE = 10.0  # as LAYERS, for points merged within a distance and relative to it
 CLOSED = 1e-3  # rad from closed: nearer, the letter decides the side, not rounding
 
 

@@ -20,7 +20,7 @@ FRONT, BACK = bytes.fromhex(PAPER[1:]), (217, 195, 154)
 LINES = {
     "M": (CREASES["M"], "1.6", ""), "V": (CREASES["V"], "1.6", "5 3"),
     "F": (CREASES["F"], "1.2", "1.5 2"),
-    "U": ("#B8578E", "1.4", "5 2 1 2"),  # as on the page: thin lines need a darker purple
+    "U": ("#B8578E", "1.4", "5 2 1 2"),  # darker than in figures: thin lines
     "B": ("#444", "1.1", ""),
 }  # fmt: skip
 

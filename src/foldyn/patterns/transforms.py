@@ -20,7 +20,7 @@ from foldyn.patterns.tiling import periods as periods_of
 from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.values import number, numbers, show, vector, whole
 
-FLAT = 1e-6  # rad from pi: a crease between copies that gets no letter from its dihedral
+FLAT = 1e-6  # rad from pi: flatter creases between copies get no letter
 TURNED = {"M": "V", "V": "M"}
 # Key of a pattern's custom data with the order of its layers, as in FOLD.
 FACE_ORDERS = "faceOrders"

@@ -73,7 +73,7 @@ def plot_laws(
 
 
 def _legend_below(axes: Axes, count: int, note: str) -> None:
-    """Write a legend for the first curves."""
+    """Write a legend of the first curves."""
     axes.legend(
         handles=axes.get_lines()[:count],
         loc="upper left",

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from foldyn.plots import scene
 from foldyn.plots.scene import Points, View
 
-CROWD = 20  # number of arrows between the vertices of a pattern, above which they are thinned,
-MANY = 100  # and number of all arrows, above which they are thinned more
+CROWD = 20  # more arrows than this between a pattern's vertices are thinned
+MANY = 100  # with more arrows in all, thinning is stronger
 _DIRECTIONS = np.radians(np.arange(90.0, 450.0, 30.0))
 
 

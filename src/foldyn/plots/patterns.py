@@ -13,7 +13,7 @@ from foldyn.plots import scene, style
 from foldyn.plots.scene import Seen, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, edge_keys
 
-FLAT = 1e-6  # of the size: a pattern of smaller height is drawn from above
+FLAT = 1e-6  # largest height, relative to the size, of a pattern drawn from above
 _ABOVE, _ASLANT = (90.0, -90.0), (28.0, -60.0)
 _MARGIN, _CAPTION, _LEGEND = 0.15, 0.3, 0.35  # inches
 

@@ -33,7 +33,7 @@ WIDTH = 7.0  # width of a figure, in inches
 _LEFT, _RIGHT, _TICKS, _TALLEST = 0.8, 0.8, 0.5, 5.0
 _LABEL_PADS = 6.0, 6.0, 4.0  # points; the label of z would leave the margin with more
 _CLOSE = 0.4  # inches between two ticks with overlapping numbers
-_MOST_PIECES, _MOST_DIVISIONS = 2000, 12  # of all panels in a picture, and along a triangle's edge
+_MOST_PIECES, _MOST_DIVISIONS = 2000, 12  # pieces of all panels in a picture; pieces along an edge
 _LIGHT = np.array([0.35, -0.5, 0.8]) / np.linalg.norm([0.35, -0.5, 0.8])
 
 

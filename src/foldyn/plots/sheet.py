@@ -139,7 +139,7 @@ def _differs(own: Mapping[str, float]) -> str:
 
 
 class EdgeKind(NamedTuple):
-    """Edges of equal look: the nodes along them (k, p), look and name."""
+    """Edges of one kind: the nodes along them (k, p), look and name."""
 
     name: str
     edges: Indices

@@ -48,9 +48,9 @@ WATCHED = 8  # the paper's node 9
 # Nodes seen by a camera in front of the specimen, without the bottom row, which stands still.
 FRONT = tuple(7 * i + j for i in range(8) for j in (1, 3, 5))
 SYNTHETIC = "synthetic"
-FORCE_ERROR = 2e-4  # N: scales read to 0.02 g
+FORCE_ERROR = 2e-4  # N: a scale that reads to 0.02 g
 STATIC_ERROR = 5e-5  # m: a corner in a photograph
-FILM_ERROR = 1e-5  # m: 0.3 pixels, if 4032 of them span 0.13 m
+FILM_ERROR = 1e-5  # m: 0.3 pixels of a picture with 4032 pixels over 0.13 m
 RATE = 240.0  # frames per second
 BAND = (2.0, 40.0)  # Hz: band of compared spectra
 TURNED = 0.05  # s from the release to the first turning point

@@ -22,8 +22,8 @@ from foldyn.studies.targets import Verdict, read_targets, verdicts
 TARGETS = Path(__file__).with_name("targets.toml")
 CORNER, TOP = 0, 3  # top nodes at a corner and in the middle
 HIGHEST = 22.0  # Hz: upper limit of reported peaks
-RELEASED = 2.0  # s, at which the weight is removed,
-SETTLED = 0.05  # and time from there to the first minimum
+RELEASED = 2.0  # s: time at which the weight is removed
+SETTLED = 0.05  # s from there to the first minimum
 PAIR, ALONE = Rayleigh(14.4, 4.1e-4), Rayleigh(15.8)
 IN_AIR = {"air.density": 1.204}  # kg/m3
 ORDINALS = ("first", "second", "third")

@@ -32,8 +32,8 @@ from foldyn.structures import Sheet, Structure, discretize
 SIDES = 6
 SUBSTEPS = 4  # per critical step, as cells stiffen in tension
 SAMPLES = 1e-3  # s, between samples of a motion
-UNTIL = 0.8  # of a chain: cells evaluated before waves return from its end
-SHARE = 0.85  # of the largest strain of a cell: smaller peaks do not count
+UNTIL = 0.8  # share of a chain that is evaluated: its end reflects waves
+SHARE = 0.85  # least peak that counts, relative to the cell's largest strain
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,9 @@ from foldyn.studies.waves.study import FULL, Study
 
 TITLE = "Waves in periodic origami"
 STATES = 4  # number of fold states with drawn bands
-FROM, TO = 0.3, 0.7  # of a chain: range of cells in which the pulse is followed
+FROM, TO = 0.3, 0.7  # part of the chain where the pulse is followed
 SHEETS = {"miura": "Miura", "eggbox": "eggbox"}
-FELT = 0.05  # of the highest tension: smaller compression before it is ignored
+FELT = 0.05  # least compression before the highest tension, relative to it, that counts
 KEPT = 0.2  # largest relative change of height and width of a pulse that keeps its form
 SPEEDS = 0.01  # largest relative difference of equal speeds
 

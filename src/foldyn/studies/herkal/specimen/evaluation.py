@@ -28,12 +28,12 @@ from foldyn.studies.herkal.specimen.prepared import FreeVibration, prepare
 from foldyn.writing import write_text
 
 FILM_SUPPORT = "glued"
-PROMINENCE = 0.05  # of a peak, relative to the highest amplitude
+PROMINENCE = 0.05  # least prominence of a peak, relative to the highest amplitude
 NEAR = (4.0, 14.0)  # Hz: band of the axial vibration
 FINER = 8  # refinement of the frequency grid relative to the resolution
-UNLIKE = 0.2  # share of their displacement by which nodes may differ from a state of the model
-SAME = 1e-4  # m, by which positions at rest may differ
-FACTORS = np.linspace(0.0, 1.1, 34)  # of the path that is searched for measured shapes
+UNLIKE = 0.2  # largest misfit of nodes to a state of the model, relative to their displacement
+SAME = 1e-4  # m: largest difference of rest positions
+FACTORS = np.linspace(0.0, 1.1, 34)  # load factors to search for measured shapes
 
 
 def load_factor(path: xr.Dataset, nodes: Sequence[int], moved: NDArray[np.float64]) -> float:

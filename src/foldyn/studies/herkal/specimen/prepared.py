@@ -21,12 +21,12 @@ GAP = 1 / 30  # s, longest gap that is filled: a third of a period
 SLOWEST = 60.0  # least frames per second
 SLACK = 0.015  # s, largest error of the instant of the release
 SETTLED = 0.1  # share of the record over which the final position is averaged
-ROUNDED = 0.01  # share of an interval by which times may be rounded
+ROUNDED = 0.01  # largest rounding error of times, relative to their interval
 FEWEST = 0.5  # least share of frames in which a node must be measured
-HELD = 0.0125  # s, for which it must be still before the release
+HELD = 0.0125  # s: least time that it is still before the release
 AVERAGED = 0.05  # s, over which the held position is averaged
-STILL = 0.05  # share of its motion by which it may drift while held
-SLOW = 0.1  # share of its largest speed below which it is still held
+STILL = 0.05  # largest drift of the held node, relative to its motion
+SLOW = 0.1  # largest speed of a held node, relative to its maximum
 ENOUGH = 8  # least number of frames with the watched node
 
 
