@@ -25,7 +25,8 @@ import machine
 import numpy as np
 
 from foldyn.studies.herkal.opensees.stored import Moved, read_motion, stored_motions
-from foldyn.studies.herkal.sheet_models import CASES
+from foldyn.studies.herkal.runs import CASES
+from verification.fidelity.compare import markdown
 from verification.opensees import compare, run
 
 Motion = Callable[[], Moved]
@@ -82,7 +83,7 @@ def main() -> None:
         error = compare.percent(compare.motion_away(found[name], reference))
         seconds = f"{np.median(took):.1f}"
         rows.append([name, seconds, f"{median:.3f} ({low:.3f} to {high:.3f})", error])
-    print(compare.table(("", "processor time, s", "/ OpenSees", "off, %"), rows))
+    print(markdown(("", "processor time, s", "/ OpenSees", "off, %"), rows))
 
 
 if __name__ == "__main__":

@@ -20,9 +20,8 @@ from foldyn.report import Table
 from foldyn.report.album import Album
 from foldyn.studies.herkal import report, sensitivity_page, stiffnesses_page, variations
 from foldyn.studies.herkal.claims import claims, paper_table, tolerance
-from foldyn.studies.herkal.runs import reported
+from foldyn.studies.herkal.runs import REFERENCE, label, reported, rules
 from foldyn.studies.herkal.sensitivity import BEND_LAWS
-from foldyn.studies.herkal.sheet_models import REFERENCE, label, rules
 from foldyn.studies.herkal.specimen import page
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.study import FULL, RESULTS, Study

@@ -85,7 +85,7 @@ def test_more_nodes_than_points(sharp):
     few = Tracking(corners=CornerSettings(most=8), nodes=tuple(range(20)))
     with pytest.raises(InputError, match="8 points are tracked, fewer than the 20 nodes"):
         track_film(str(sharp.path), sharp.model, tracking=few)
-    with pytest.raises(InputError, match="99 is no vertex"):
+    with pytest.raises(InputError, match="99: the model has vertices"):
         track_film(str(sharp.path), sharp.model, tracking=Tracking(nodes=(99,)))
 
 

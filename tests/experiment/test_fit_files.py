@@ -125,7 +125,7 @@ def test_fit_files_are_told_from_case_files(folder) -> None:
         ("band = [1, 6]", 'band = [1, "b"]', 'data[3]: band = [1, "b"]: must be numbers'),
         ("nodes = [0, 2]", "nodes = [0.5]", "data[2]: nodes = [0.5]: 0.5 is not a node number"),
         ("nodes = [0, 2]", "nodes = [0]\nwindow = 5", "data[2]: window = 5: give two times (s)"),
-        ("nodes = [0, 2]", "nodes = [0]\ncolumns = 3", "columns = 3: give a list of 1 headings"),
+        ("nodes = [0, 2]", "nodes = [0]\ncolumns = 3", "columns = 3: give 1 headings"),
         ("nodes = [0, 2]", 'nodes = [0]\naxis = "w"', 'axis = "w": choose one of x, y, z'),
         ("sigma = 1e-5", 'columns = { "f" = "x" }', "give the headings of displacement and force"),
         ("band = [1, 6]", "band = [1, 6]\nwindw = [0, 1]", "data[3].windw: unknown key; did you"),
@@ -267,7 +267,7 @@ def test_tracks_of_photographs_are_shapes(folder) -> None:
     one = shapes(folder / "photos.nc", nodes=[9], load_factor=[0.2, 0.5, 1.0])
     assert one.axes == "xy"
     np.testing.assert_allclose(one.values[:, 0], [[9, 16], [81, 100], [225, 256]])
-    with pytest.raises(InputError, match="give the load factor of each of its 3 photographs"):
+    with pytest.raises(InputError, match="give one for each of its 3 photographs"):
         shapes(folder / "photos.nc")
     with pytest.raises(InputError, match="node 7 was not measured"):
         shapes(folder / "photos.nc", nodes=[7], load_factor=[1, 2, 3])

@@ -66,7 +66,7 @@ def test_forces_and_shapes_are_checked() -> None:
     [
         ([], "data: none; give at least one measurement"),
         (["forces.csv"], "data[0]: got"),
-        ([history(nodes=[0, 1])], "values: are of 1 nodes, 2 are named"),
+        ([history(nodes=[0, 1])], "values: has 1 nodes, but 2 are named"),
         ([history(nodes=[99])], "node 99 is out of range"),
         ([history(delay=0.1)], "time: 0.1 to 2.05 s, delay included, is not within the motion"),
         ([history(), history()], "sigma: missing; several measurements are weighted"),
@@ -74,7 +74,7 @@ def test_forces_and_shapes_are_checked() -> None:
         ([history(held_out=True)], "0 values that are not held out cannot give 1 parameters"),
         ([history(case="none.toml")], "none.toml: there is no such file"),
         ([history(changes={"sheet.thicknes": 1.0})], "did you mean 'thickness'"),
-        ([history(changes={"analysis.method": "dormand_prince"})], "chooses its steps by their er"),
+        ([history(changes={"analysis.method": "dormand_prince"})], "has adaptive steps, which"),
     ],
 )
 def test_data_that_do_not_fit_the_case(swung, data, message) -> None:

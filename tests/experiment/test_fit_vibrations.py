@@ -230,7 +230,7 @@ def test_a_moving_base_gives_a_transmissibility(tmp_path) -> None:
             lambda: NaturalFrequencies(
                 frequency=[1, 2], shapes=ModeShapes(nodes=[0], values=np.ones((1, 1, 3)))
             ),
-            "are of the modes [1], the values of [1, 2]",
+            "has the modes [1], but there are values of [1, 2]",
         ),
         (lambda: DampingRatios(damping_ratio=[2.0]), "damping_ratio = 2: must be from 0 to below"),
         (lambda: ModeShapes(nodes=[0], values=np.ones((1, 1, 2))), "here (modes, nodes, 3)"),
@@ -267,10 +267,10 @@ def curve(**changes) -> FrequencyResponse:
         (NaturalFrequencies(frequency=[1], mode=[31]), "has only 30 that something resists; leave"),
         (ModeShapes(nodes=[99], values=np.ones((1, 1, 3))), "node 99 is out of range"),
         (ModeShapes(nodes=[0, 1], values=np.ones((1, 2, 3))), "supports hold all of them along x"),
-        (ModeShapes(nodes=[7, 8], values=np.ones((1, 1, 3))), "are of 1 nodes, 2 are named"),
+        (ModeShapes(nodes=[7, 8], values=np.ones((1, 1, 3))), "has 1 nodes, but 2 are named"),
         (
             ModeShapes(nodes=FREE, values=np.resize([1, -1, 2, 0.3, -2], (1, 6, 3))),
-            "mode 1 is like no mode of the model: the largest MAC is",
+            "mode 1 resembles no mode of the model: the largest MAC",
         ),
         (curve(), 'kind = "frf" needs a case of kind "frf"'),
     ],

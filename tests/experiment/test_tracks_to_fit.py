@@ -201,7 +201,7 @@ def test_what_tracks_cannot_say(filmed, photographed, ending):
     film, photos = filmed.with_name(f"film.{ending}"), photographed.with_name(f"photos.{ending}")
     with pytest.raises(InputError, match="only a fit file can name: kind"):
         recognize(photos)
-    with pytest.raises(InputError, match="load factor of each of its 3 photographs"):
+    with pytest.raises(InputError, match="one for each of its 3 photographs"):
         shapes(photos, load_factor=[1.0])
     with pytest.raises(InputError, match="node 70 was not measured"):
         shapes(photos, nodes=[70], load_factor=FACTORS)

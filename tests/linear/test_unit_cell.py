@@ -124,7 +124,7 @@ def test_computed_angles_are_not_doubted():
 
 def test_screws_that_move_nothing_are_refused():
     for angle in (0.0, -720.0):
-        with pytest.raises(InputError, match=r"shift = 0, angle = -?\d+: leave all in its place"):
+        with pytest.raises(InputError, match=r"shift = 0, angle = -?\d+: moves nothing"):
             fd.Screw("z", angle, 0.0)
 
 

@@ -121,5 +121,5 @@ def test_moves_that_are_no_slips_are_refused():
     beside = [1.0, 1e-4]  # a corner that vertex 1 would pass as it moves
     faces = [(0, 1, 5, 2), (0, 2, 3), (0, 3, 4), (0, 4, 1)]
     fan = fd.Pattern(np.vstack([[0, 0], rim, beside]), faces, "MMVM")
-    with pytest.raises(ComputationError, match="near by: vertex 1 would move by"):
+    with pytest.raises(ComputationError, match="close enough: vertex 1 would move by"):
         flat_foldable(fan)

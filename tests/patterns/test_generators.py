@@ -271,10 +271,10 @@ def test_bad_panel_angle(kind, value):
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        (3, "cells = 3: must be two integers"),
-        ((1, 2, 3), "must be two integers"),
-        ("12", 'cells = "12": must be two integers'),
-        (None, "must be two integers"),
+        (3, "cells = 3: give two integers"),
+        ((1, 2, 3), "give two integers"),
+        ("12", 'cells = "12": give two integers'),
+        (None, "give two integers"),
         ((1, 0), r"cells\[1\] = 0: must be a whole number, at least 1"),
         ((-1, 1), r"cells\[0\] = -1: must be a whole number, at least 1"),
         ((1.5, 1), r"cells\[0\] = 1.5: must be a whole number, at least 1"),

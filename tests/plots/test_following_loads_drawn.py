@@ -9,7 +9,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from pictures import keys
 
 import foldyn as fd
-from foldyn.plots import draw_structure, following, plot_load_history, style
+from foldyn.plots import draw_structure, load_curves, plot_load_history, style
 from foldyn.plots.attachments import REACH, dashpot_lines
 from foldyn.plots.scene import View
 
@@ -34,13 +34,13 @@ def heads(figure) -> int:
 @pytest.mark.parametrize("s", models(), ids=["bars", "shell"])
 def test_pressure_is_an_arrow_normal_to_each_panel(s) -> None:
     case = fd.Case(s, loads=[fd.Pressure(3.0), fd.Pressure(-2.0, [1], fd.Ramp(1.0))])
-    first, second = following.on_panels(case, fd.Pressure)
+    first, second = load_curves.on_panels(case, fd.Pressure)
     assert first.numbers.tolist() == [0, 1]
-    middles, vectors = following.panel_arrows(case, s.nodes, first)
+    middles, vectors = load_curves.panel_arrows(case, s.nodes, first)
     centers = [PATTERN.vertices[list(face)].mean(axis=0) for face in PATTERN.faces]
     np.testing.assert_allclose(middles, centers, atol=1e-12)
     np.testing.assert_allclose(vectors, 3.0 * PATTERN.face_normals, atol=1e-12)
-    _, vectors = following.panel_arrows(case, s.nodes, second)
+    _, vectors = load_curves.panel_arrows(case, s.nodes, second)
     np.testing.assert_allclose(vectors, [-2.0 * PATTERN.face_normals[1]], atol=1e-12)
     found = keys(draw_structure(case))
     assert "pressure 3 Pa on panels 0, 1" in found
@@ -51,11 +51,11 @@ def test_pressure_is_an_arrow_normal_to_each_panel(s) -> None:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_arcs_of_a_moment_lie_on_the_front_and_point_to_the_panels_it_opens(s, sign) -> None:
     case = fd.Case(s, loads=[fd.CreaseMoment([0], sign * 0.25)])
-    (share,) = following.moments(case)
+    (share,) = load_curves.moments(case)
     assert share.value.tolist() == pytest.approx([sign * 0.25])
-    arcs = following.crease_arcs(case, s.nodes, share, 0.1)
+    arcs = load_curves.crease_arcs(case, s.nodes, share, 0.1)
     middle = PATTERN.vertices[PATTERN.creases[0]].mean(axis=0)
-    assert arcs.shape == (2, following.STEPS, 3)
+    assert arcs.shape == (2, load_curves.STEPS, 3)
     np.testing.assert_allclose(np.linalg.norm(arcs - middle, axis=2), 0.1, rtol=1e-12)
     for arc in arcs:
         ends = [
@@ -120,8 +120,8 @@ def test_warm_panels_have_stars_in_their_middles() -> None:
     figure = fd.plots.draw_structure(heated())
     assert "20 K warmer on panels 0, 3" in keys(figure)
     assert any(text.startswith("5 K colder on panels 0, 1, 2") for text in keys(figure))
-    share, _ = following.on_panels(heated(), fd.Temperature)
-    middles = following.panel_middles(heated().structure, heated().structure.nodes, share)
+    share, _ = load_curves.on_panels(heated(), fd.Temperature)
+    middles = load_curves.panel_middles(heated().structure, heated().structure.nodes, share)
     expected = [MIURA.vertices[list(MIURA.faces[panel])].mean(axis=0) for panel in (0, 3)]
     np.testing.assert_allclose(middles, expected)
     (axes,) = figure.axes

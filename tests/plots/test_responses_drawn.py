@@ -279,7 +279,7 @@ def test_bad_input(response, call, words):
 
 def test_what_a_moving_base_cannot_be(case, response, trajectory):
     moved = made(case, quantity="transmissibility")
-    with pytest.raises(InputError, match="forces drive some of them, a base others"):
+    with pytest.raises(InputError, match="forces drive some, a moving base others"):
         plot_frf({"a": response, "b": moved}, [7])
     with pytest.raises(InputError, match="'mobility'; the response has transmissibility"):
         plot_frf({"b": moved}, [7], quantity="mobility")

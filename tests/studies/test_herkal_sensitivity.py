@@ -17,7 +17,7 @@ from foldyn.studies.herkal import report, runs, sensitivity, sensitivity_page, v
 from foldyn.studies.herkal import study as studies
 from foldyn.studies.herkal.claims import paper_table, tolerance
 from foldyn.studies.herkal.metric import errors
-from foldyn.studies.herkal.runs import Job, Numerics
+from foldyn.studies.herkal.runs import REFERENCE, Job, Numerics, Variant, paper_rules, rules
 from foldyn.studies.herkal.sensitivity import (
     BEND_LAWS,
     CALIBRATIONS,
@@ -26,7 +26,6 @@ from foldyn.studies.herkal.sensitivity import (
     Comparison,
     tasks,
 )
-from foldyn.studies.herkal.sheet_models import REFERENCE, Variant, paper_rules, rules
 from foldyn.studies.herkal.specimen import tasks as tasks_of_the_specimen
 from foldyn.studies.herkal.variations import (
     Variations,
@@ -41,7 +40,7 @@ SHORT = Numerics(divisions=2, dt=0.01, duration=0.5)
 
 # ---------------------------------------------------------------------- tasks
 def test_tasks_are_all_combinations_of_loads():
-    found = [task for task in tasks(studies.CASES, SHORT) if task.load is not None]
+    found = [task for task in tasks(runs.CASES, SHORT) if task.load is not None]
     assert len(set(found)) == len(found) == 4 * 1 + 3 * 4 * 2  # the edge of case 1 is loaded whole
     assert {(t.load.pulse, t.load.loads) for t in found if t.case == "case3"} == set(
         itertools.product(PULSES, ("file", "edge"))
@@ -74,7 +73,7 @@ def test_outdated_and_damaged_results_are_computed_again(tmp_path, monkeypatch):
     assert task.there(tmp_path)
     assert not Comparison("case1", Numerics(3)).there(tmp_path)
     with monkeypatch.context() as patched:
-        patched.setattr(sensitivity, "program", lambda: "another")
+        patched.setattr(runs, "program", lambda: "another")
         assert not task.there(tmp_path)
     file = tmp_path / f"{task.name}.json"
     sound = file.read_text()
@@ -195,7 +194,7 @@ def stored():
 
 
 def test_stored_tables_are_whole(stored):
-    wanted = [t for t in tasks(studies.CASES, SHORT) if t.load is not None]
+    wanted = [t for t in tasks(runs.CASES, SHORT) if t.load is not None]
     keys = {(t.case, t.load.pulse, t.load.loads, *laws) for t in wanted
             for laws in itertools.product(BEND_LAWS, CALIBRATIONS)}  # fmt: skip
     found = [
@@ -237,7 +236,7 @@ def test_page_of_the_sensitivity(stored, tmp_path):
 
 
 def test_the_command_varies_and_goes_on(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(studies, "CASES", ("case1",))
+    monkeypatch.setattr(runs, "CASES", ("case1",))
     monkeypatch.setattr(studies, "QUICK", studies.StudyPlan(SHORT))
     monkeypatch.setattr(sensitivity, "PULSES", (0.5,))
     monkeypatch.setattr("foldyn.cli.study.PROCESSES", 1)

@@ -7,10 +7,9 @@ import pytest
 
 from foldyn.report import Table, Text
 from foldyn.studies import pool
-from foldyn.studies.herkal import report, stiffnesses_page
+from foldyn.studies.herkal import report, runs, stiffnesses_page
 from foldyn.studies.herkal import study as studies
-from foldyn.studies.herkal.runs import Job, Numerics
-from foldyn.studies.herkal.sheet_models import REFERENCE
+from foldyn.studies.herkal.runs import REFERENCE, Job, Numerics
 from foldyn.studies.herkal.stiffnesses import (
     OWN,
     PEAKED,
@@ -26,7 +25,7 @@ COARSE = (3, 6)
 
 
 def test_tasks_are_each_known_by_what_they_depend_on():
-    every = tasks(studies.CASES)
+    every = tasks(runs.CASES)
     assert len({one.name for one in every}) == len(every) == 1 + 4 + len(PEAKED)
     coarse = Stiffness("modes", divisions=COARSE)
     assert coarse.settings() != Stiffness("modes").settings()

@@ -20,11 +20,12 @@ from foldyn.studies.herkal import study as studies
 from foldyn.studies.herkal.claims import CLAIMS, TARGETS, claims, table1
 from foldyn.studies.herkal.metric import FAR, LEAST_MAC, best, content, deviation, errors, ranks
 from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
-from foldyn.studies.herkal.runs import Job, Numerics
-from foldyn.studies.herkal.sheet_models import (
+from foldyn.studies.herkal.runs import (
     MODELS,
     OTHERS,
     REFERENCE,
+    Job,
+    Numerics,
     Variant,
     case_with,
     compared,
@@ -86,7 +87,7 @@ def test_metric_is_per_node():
 def test_metric_refuses_what_cannot_be_compared():
     with pytest.raises(InputError, match="same length"):
         deviation(np.ones((4, 2)), np.ones((5, 2)))
-    with pytest.raises(InputError, match="does not move"):
+    with pytest.raises(InputError, match="is still"):
         deviation(np.ones((4, 2)), np.array([[1.0, 0.0]] * 4))
 
 
@@ -278,7 +279,7 @@ def test_table_1_is_the_papers():
         0.1970, 0.1556, 0.0620, 0.1698, 0.2931,
     ]  # fmt: skip
     assert rows["case3_equi_inertial"].value == 1.2393
-    assert {f"{c}_{m}" for c in studies.CASES for m in paper_rules()} == set(rows)
+    assert {f"{c}_{m}" for c in runs.CASES for m in paper_rules()} == set(rows)
 
 
 def test_a_claim_on_the_best_is_judged_by_its_error_over_the_smallest(small, monkeypatch):

@@ -23,7 +23,7 @@ from foldyn.studies.herkal.opensees.stored import (
     write_motion,
     write_still,
 )
-from foldyn.studies.herkal.sheet_models import CASES
+from foldyn.studies.herkal.runs import CASES
 from verification.opensees import compare, model
 from verification.opensees.model import panel_mesh
 

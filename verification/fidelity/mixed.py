@@ -18,19 +18,14 @@ from foldyn.errors import InputError
 from foldyn.patterns import GENERATORS, Pattern, miura
 from foldyn.structures import PanelSheet, Sheet
 from foldyn.structures.graded import grading
-from verification.fidelity.cases import (
-    FidelityCase,
-    Held,
-    documented,
-    polygons,
-    random_sheet,
-    spread,
-    supports,
-)
+from verification.fidelity import cases
+from verification.fidelity.cases import FidelityCase, Held
 
 # Seed and number of cases of each set.
 SETS = {"mixed_1": (20261201, 34), "mixed_2": (20261202, 33), "mixed_3": (20261203, 33)}
-PARALLELOGRAMS = sorted({case.kind for case in documented() if "cells" in case.shape}, reverse=True)
+PARALLELOGRAMS = sorted(
+    {case.kind for case in cases.documented() if "cells" in case.shape}, reverse=True
+)
 KINDS = (*PARALLELOGRAMS, "kresling", "waterbomb", "resch", "quads")
 SUPPORTS = ("free", "one edge", "two edges", "corners")
 GRIDS = (*PARALLELOGRAMS, "quads")  # numbered along y first
@@ -46,12 +41,12 @@ class MixedCase(FidelityCase):
     """A case whose supported rims follow from the outline of the flat pattern."""
 
     def pattern(self) -> Pattern:
-        """See `FidelityCase`."""
+        """The pattern."""
         return _pattern(self.kind, self.shape)
 
     @property
     def held(self) -> Held:
-        """See `FidelityCase`."""
+        """Its supports."""
         if self.support == "free":
             return Held()
         rings, corners = self._rims()
@@ -107,7 +102,7 @@ def _turns(rng: np.random.Generator, names: Sequence[str]) -> Iterator[str]:
 def _one(rng: np.random.Generator, kind: str, support: str) -> MixedCase:
     while True:
         shape = _shape(rng, kind)
-        sheet = random_sheet(rng, 1.0, 30.0)
+        sheet = cases.random_sheet(rng, 1.0, 30.0)
         try:
             edge, width = _sizes(_pattern(kind, shape))
         except InputError:
@@ -119,9 +114,9 @@ def _one(rng: np.random.Generator, kind: str, support: str) -> MixedCase:
 
 
 def _shape(rng: np.random.Generator, kind: str) -> dict[str, Any]:
-    a = spread(rng, 0.02, 2.0)
-    b = a * spread(rng, 1.0 / 1.6, 1.6)
-    cells = [int(spread(rng, 1.0, CELLS + 1.0)) for _ in range(2)]
+    a = cases.spread(rng, 0.02, 2.0)
+    b = a * cases.spread(rng, 1.0 / 1.6, 1.6)
+    cells = [int(cases.spread(rng, 1.0, CELLS + 1.0)) for _ in range(2)]
     dihedral, angle = float(rng.uniform(20.0, 179.0)), float(rng.uniform(45.0, 85.0))
     if kind == "kresling":
         sides, twist = int(rng.integers(4, 9)), float(rng.uniform(10.0, 40.0))
@@ -228,18 +223,18 @@ class Gap(MixedCase):
         return self.told
 
     def pattern(self) -> Pattern:
-        """See `FidelityCase`."""
-        return polygons(**self.shape) if self.kind == "polygons" else super().pattern()
+        """The pattern."""
+        return cases.polygons(**self.shape) if self.kind == "polygons" else super().pattern()
 
     @property
     def held(self) -> Held:
-        """See `FidelityCase`."""
+        """Its supports."""
         panel = self.support == "panel"
-        return supports(self.kind, self.shape)["panel"] if panel else super().held
+        return cases.supports(self.kind, self.shape)["panel"] if panel else super().held
 
     @property
     def options(self) -> Mapping[str, Any]:
-        """See `FidelityCase`."""
+        """Options that follow from the supports."""
         return {"clamped": self.held.edges} if self.clamped else {}
 
 

@@ -16,19 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from foldyn.structures.plate_frequency import BELOW
-from verification.fidelity.compare import (
-    ERRORS,
-    FIRST,
-    RESULTS,
-    Modes,
-    Row,
-    all_rows,
-    columns,
-    markdown,
-    read,
-    summary_of,
-    write,
-)
+from verification.fidelity import compare
+from verification.fidelity.compare import Modes, Row
 from verification.fidelity.mixed import SETS, SUPPORTS, MixedCase
 from verification.fidelity.references import Stored, case_sets, certain, read_references, stored
 
@@ -41,7 +30,7 @@ BESIDE = {
 }
 
 
-def references(name: str, folder: Path = RESULTS) -> list[tuple[MixedCase, Stored]]:
+def references(name: str, folder: Path = compare.RESULTS) -> list[tuple[MixedCase, Stored]]:
     """Stored cases of a set, with their modes."""
     lines, cases = read_references(name, folder), case_sets()[name]
     return [(case, stored(case, lines[case.name])) for case in cases if case.name in lines]
@@ -50,7 +39,7 @@ def references(name: str, folder: Path = RESULTS) -> list[tuple[MixedCase, Store
 def compared(case: MixedCase, true: Stored) -> Modes:
     """The first modes of a case by every model."""
     rows = {
-        name: all_rows(case, true, model, internal=internal)
+        name: compare.all_rows(case, true, model, internal=internal)
         for name, (model, internal) in BESIDE.items()
     }
     return Modes(case.name, rows)
@@ -70,8 +59,10 @@ def mixed_table(found: Sequence[tuple[MixedCase, Modes]]) -> str:
         for name in BESIDE:
             rows = [row for modes in group for row in modes.rows[name] if counts(row, low)]
             if rows:
-                lines.append([title, len(rows), f"`{name}`", columns(summary_of(rows))])
-    return markdown(["held", "modes", "model", *ERRORS], lines)
+                lines.append(
+                    [title, len(rows), f"`{name}`", compare.columns(compare.summary_of(rows))]
+                )
+    return compare.markdown(["held", "modes", "model", *compare.ERRORS], lines)
 
 
 def gap_table(found: Sequence[Modes]) -> str:
@@ -83,7 +74,7 @@ def gap_table(found: Sequence[Modes]) -> str:
         cells = [_span(modes.rows[name], low=True) for name in models[:2]]
         cells += [_span(modes.rows[name], low=False) for name in models]
         rows.append([modes.case, *cells])
-    return markdown(["", *heads], rows)
+    return compare.markdown(["", *heads], rows)
 
 
 def _span(rows: Sequence[Row], low: bool) -> str:
@@ -97,14 +88,14 @@ def _span(rows: Sequence[Row], low: bool) -> str:
 
 def counts(row: Row, low: bool) -> bool:
     """Whether a mode counts: a low one, or one of the first five."""
-    return row.over_plate < BELOW if low else row.mode <= FIRST
+    return row.over_plate < BELOW if low else row.mode <= compare.FIRST
 
 
-def counted(folder: Path = RESULTS) -> list[tuple[MixedCase, Modes]]:
+def counted(folder: Path = compare.RESULTS) -> list[tuple[MixedCase, Modes]]:
     """Stored results of the mixed sets for cases with reliable references."""
     found = []
     for name in SETS:
-        modes = {one.case: one for one in read(folder / f"{name}.csv")}
+        modes = {one.case: one for one in compare.read(folder / f"{name}.csv")}
         known = references(name, folder)
         found += [(case, modes[case.name]) for case, true in known if certain(case, true)]
     return found
@@ -113,16 +104,18 @@ def counted(folder: Path = RESULTS) -> list[tuple[MixedCase, Modes]]:
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line."""
     parser = argparse.ArgumentParser(description="Models beside the stored shells.")
-    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the files")
+    parser.add_argument("--out", type=Path, default=compare.RESULTS, help="folder of the files")
     given = parser.parse_args(arguments)
     for name, cases in case_sets().items():
         known = references(name, given.out)
         print(f"{name}: {len(known)} of {len(cases)} cases are stored", flush=True)
-        write([compared(case, true) for case, true in known], given.out / f"{name}.csv")
+        compare.write([compared(case, true) for case, true in known], given.out / f"{name}.csv")
         for case, true in known:
             if not certain(case, true):
                 print(f"known to {100 * np.max(true.doubt):.1f} % only: {case.name}", flush=True)
-    print(f"\n{mixed_table(counted(given.out))}\n\n{gap_table(read(given.out / 'gaps.csv'))}")
+    print(
+        f"\n{mixed_table(counted(given.out))}\n\n{gap_table(compare.read(given.out / 'gaps.csv'))}"
+    )
     return 0
 
 

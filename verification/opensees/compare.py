@@ -21,8 +21,7 @@ from foldyn.linear import modes
 from foldyn.statics import trace
 from foldyn.studies.herkal.metric import AXES
 from foldyn.studies.herkal.opensees import stored
-from foldyn.studies.herkal.runs import reported
-from foldyn.studies.herkal.sheet_models import CASES, REFERENCE, case_study, case_with
+from foldyn.studies.herkal.runs import CASES, REFERENCE, case_study, case_with, reported
 from verification.fidelity.compare import markdown
 from verification.opensees.run import DT, SAMPLES
 

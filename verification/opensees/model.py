@@ -83,9 +83,7 @@ def panel_mesh(pattern: Pattern, divisions: int) -> PanelMesh:
     corners: list[list[int]] = [[] for _ in pattern.vertices]
     for number, face in enumerate(pattern.faces):
         if len(face) != 4:
-            raise InputError(
-                f"panel {number} has {len(face)} corners: this model takes panels of four"
-            )
+            raise InputError(f"panel {number} has {len(face)} corners: this model takes four")
         at = pattern.vertices[list(face)]
         node = number * per_panel + np.arange(per_panel).reshape(divisions + 1, divisions + 1)
         points.append(_bilinear(at, divisions))

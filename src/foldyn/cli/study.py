@@ -138,7 +138,8 @@ def _vary(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence[
     """Compute the sensitivity of the case studies; return its page and the tasks' outcome."""
     from foldyn.studies import pool
     from foldyn.studies.herkal import report, sensitivity, variations
-    from foldyn.studies.herkal.study import CASES, QUICK, VARIED
+    from foldyn.studies.herkal.runs import CASES
+    from foldyn.studies.herkal.study import QUICK, VARIED
 
     numerics = QUICK.numerics if given.quick else VARIED
     tasks = sensitivity.tasks(CASES, numerics)

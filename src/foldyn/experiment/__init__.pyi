@@ -14,7 +14,7 @@ from foldyn.experiment.calibration.modal import (
     NaturalFrequencies as NaturalFrequencies,
 )
 from foldyn.experiment.calibration.parameters import Parameter as Parameter
-from foldyn.experiment.calibration.responses import FrequencyResponse as FrequencyResponse
+from foldyn.experiment.calibration.modal import FrequencyResponse as FrequencyResponse
 from foldyn.experiment.calibration.fitted import Estimate as Estimate
 from foldyn.experiment.camera import (
     Camera as Camera,

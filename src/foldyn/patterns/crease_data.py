@@ -193,7 +193,7 @@ def folded_rows(field: str, word: str, pattern: Any) -> NDArray[np.int64]:
 def crease_values(
     field: str, given: Mapping[str, float], pattern: Any
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Value of each crease (nc,) from values by word, and whether it has one (nc,).
+    """Value of each crease (nc,), given values by word, and whether it has one (nc,).
 
     Raises
     ------
@@ -237,9 +237,7 @@ def periods(given: Any, count: int) -> tuple[NDArray[np.int64], ...]:
             )
         beyond = array[(array < 0) | (array >= count)]
         if beyond.size:
-            raise InputError(
-                f": there is no vertex {beyond[0]}; there are {count}", f"periods[{k}]"
-            )
+            raise InputError(f": there is no vertex {beyond[0]} of {count}", f"periods[{k}]")
         array = array.astype(np.int64)
         array.setflags(write=False)
         found.append(array)

@@ -161,14 +161,14 @@ def _alternating(angles: NDArray[np.float64], folds: NDArray[np.bool_]) -> float
     return abs(float(np.sum(np.where(sector % 2 == 0, angles, -angles))))
 
 
-NEARLY = np.radians(2.0)  # Kawasaki's sum (rad) up to which a vertex is meant to fold flat
-NEARLY_PLANE = 0.1  # the same for the sum of logarithms about a panel that is meant to stay planar
+NEARLY = np.radians(2.0)  # largest Kawasaki sum (rad) that counts as a slip of drawing
+NEARLY_PLANE = 0.1  # largest sum of logarithms around a panel meant to stay plane
 EXACT = 1e-6  # Kawasaki's sum (rad) that counts as zero, before and after a repair
 FARTHEST = 0.01  # largest move of a vertex, relative to its shortest edge
 _STEPS = 20
 _CONVERGED = 1e-12  # rad
 _LEAST = 1e-13  # relative to the diagonal: smaller ones are redundant conditions
-_PLANE = 1e-9  # of the size
+_PLANE = 1e-9  # largest height of a flat pattern, relative to its size
 
 
 def slips(vertices: FlatFoldability) -> NDArray[np.int64]:
@@ -250,7 +250,7 @@ def _check(pattern: Pattern, moved: NDArray, left: float) -> None:
     worst = int(np.argmax(moved / shortest))
     if not left < EXACT or moved[worst] > FARTHEST * shortest[worst]:
         raise ComputationError(
-            f"no flat-foldable pattern was found near by: vertex {worst} would move by "
+            f"no flat-foldable pattern is close enough: vertex {worst} would move by "
             f"{moved[worst]:.3g} m, and its shortest edge is {shortest[worst]:.3g} m long"
         )
 

@@ -20,7 +20,9 @@ from foldyn.arguments import Check, Checked
 from foldyn.errors import InputError, UnitsWarning
 from foldyn.values import number, show, vector
 
-SPREAD = 1e-6  # of their size: how far points must extend across a line to determine a rotation
+SPREAD = (
+    1e-6  # least extent of points across a line, relative to their size, to determine a rotation
+)
 STILL = 1e-9  # rad: smaller rotations count as none
 
 
@@ -68,10 +70,7 @@ class Screw(Checked):
     def agree(self) -> None:
         """Require a motion."""
         if self.angle % 360.0 == 0.0 and self.shift == 0.0:
-            raise InputError(
-                f" = 0, angle = {self.angle:g}: leave all in its place; give a turn or a shift",
-                "shift",
-            )
+            raise InputError(f" = 0, angle = {self.angle:g}: moves nothing; give one", "shift")
 
     @property
     def unit(self) -> NDArray[np.float64]:

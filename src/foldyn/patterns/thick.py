@@ -30,7 +30,7 @@ from foldyn.patterns.pattern import Pattern, pattern_of
 from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.values import SHORTEST, number, number_or_list, show
 
-SAME = 1e-9  # of the pattern's size: positions and heights within this are equal
+SAME = 1e-9  # distance of equal positions and heights, relative to the size
 SIDES = {"V": 0.5, "M": -0.5, "F": 0.0}  # height of a hinge line, in thicknesses, by assignment
 CONDITIONS = (
     "hinge lines at different heights do not meet in a point, and boards of one thickness around "
@@ -111,9 +111,7 @@ def _thickness(given: Any, pattern: Pattern) -> NDArray[np.float64]:
     sizes = np.array(number_or_list("thickness", given, "panel"))
     count = len(pattern.faces)
     if sizes.ndim and len(sizes) != count:
-        raise InputError(
-            f": {len(sizes)} values for {count} panels: give one for each", "thickness"
-        )
+        raise InputError(f": {len(sizes)} values for {count} panels: give one each", "thickness")
     if not (sizes >= SHORTEST).all():
         raise InputError(f" = {show(given)}: must be greater than 0", "thickness")
     if len(pattern.welds):
@@ -164,9 +162,7 @@ def _given_heights(offsets: Any, pattern: Pattern) -> tuple[NDArray[np.float64],
         return np.zeros(count), np.zeros(count, bool)
     height = np.array(number_or_list("offsets", offsets, "crease"))
     if height.ndim and len(height) != count:
-        raise InputError(
-            f": {len(height)} values for {count} creases: give one for each", "offsets"
-        )
+        raise InputError(f": {len(height)} values for {count} creases: give one each", "offsets")
     return np.broadcast_to(height, (count,)), np.ones(count, bool)
 
 

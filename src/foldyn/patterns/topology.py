@@ -243,9 +243,7 @@ def vertex_pair(field: str, key: Any) -> Edge:
             raise TypeError
         a, b = (operator.index(v) for v in key)
     except (TypeError, ValueError):
-        raise InputError(
-            f": key {key!r} is not a pair of vertex numbers; write (0, 1)", field
-        ) from None
+        raise InputError(f": key {key!r} is not a pair of vertices, as (0, 1)", field) from None
     return edge_of(a, b)
 
 

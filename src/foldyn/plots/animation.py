@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import scene, style
-from foldyn.plots.given import case_from_result
 from foldyn.plots.modes import ShownModes
-from foldyn.plots.readings import check_path, displacements, stretches, way
+from foldyn.plots.readings import case_from_result, check_path, displacements, stretches, way
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, side_by_side
 from foldyn.plots.writers import checked_file, filmed
@@ -168,8 +167,8 @@ def frame_displacements(
 ) -> tuple[NDArray[np.float64], Points]:
     """Evenly spaced times, or distances along a path, and displacements (frames, n, 3).
 
-    The distance along a path is `plots.readings.way`, so that shapes change evenly from picture to
-    picture, whatever the step lengths.
+    The distance along a path is `plots.readings.way`: shapes change evenly from picture to picture,
+    whatever the step lengths.
     """
     if "step" in result.sizes:
         check_path(result, "result")

@@ -21,10 +21,10 @@ _LEAD = 0.2  # straight ends of a zigzag, as a share of its length
 _HATCHES = 8  # hatches of a clamped edge
 
 
-def attachments(
+def springs_and_masses(
     sheet: Sheet3D, points: Points, size: float, view: View, supports: bool, loads: bool
 ) -> list[Mark]:
-    """Marks of a case's attachments at node positions (n, 3).
+    """Marks of springs, clamped edges and point masses of a case at node positions (n, 3).
 
     size : length of a support's mark, m.
     supports, loads : whether springs and clamps, and whether masses are shown.

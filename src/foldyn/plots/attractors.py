@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.given import alone
-from foldyn.plots.readings import check_nodes_of
+from foldyn.plots.readings import alone, check_nodes_of
 from foldyn.values import choice
 
 # Looks of both sweep directions.

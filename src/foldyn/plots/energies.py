@@ -14,20 +14,9 @@ from foldyn.dynamics import audit
 from foldyn.errors import InputError
 from foldyn.mechanics.contact.term import GROUP as CONTACT
 from foldyn.mechanics.springs import GROUP
-from foldyn.plots import style
+from foldyn.plots import readings, style
 from foldyn.plots.chart_figures import figure_of
 from foldyn.plots.charts import Chart, Curve
-from foldyn.plots.given import alone
-from foldyn.plots.readings import (
-    along,
-    asked,
-    check_path,
-    energy_shares,
-    parts_of,
-    stacked,
-    strain_name,
-    way,
-)
 
 COLORS: Mapping[str, str] = {
     "strain_bars": style.VERMILLION,
@@ -80,7 +69,8 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
         An energy is missing from the trajectory.
     """
     strain = {
-        part: f"strain, {strain_name(part)}" for part in parts_of(alone("trajectory", trajectory))
+        part: f"strain, {readings.strain_name(part)}"
+        for part in readings.parts_of(readings.alone("trajectory", trajectory))
     }
     others = {"dissipated": "dissipated", "work": "work of the loads"}
     lost = "dissipated"
@@ -111,7 +101,7 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
 
 def _table(trajectory: xr.Dataset) -> NDArray[np.float64]:
     """Return the energies (J) as in the audit, one column each."""
-    names = audit.audited(parts_of(trajectory), audit.AIR in trajectory)
+    names = audit.audited(readings.parts_of(trajectory), audit.AIR in trajectory)
     return np.column_stack([trajectory[name].values for name in names])
 
 
@@ -148,13 +138,14 @@ def plot_path_energies(
     InputError
         Not a path, a node that it does not have, another direction.
     """
-    check_path(path, "path")
+    readings.check_path(path, "path")
     x, name = _abscissa(path, nodes, direction)
     labels = ["strain energy (J)", "share"]
     figure, (upper, lower) = style.rows((7.0, 5.0), title, name, labels, heights=[1.8, 1.0])
-    energies = stacked(path)
+    energies = readings.stacked(path)
     names, colors = zip(
-        *((strain_name(part), COLORS.get(part, style.GRAY)) for part in energies), strict=True
+        *((readings.strain_name(part), COLORS.get(part, style.GRAY)) for part in energies),
+        strict=True,
     )
     handles = upper.stackplot(x, *energies.values(), labels=names, colors=colors, alpha=0.75)
     work = path["work"].values
@@ -163,7 +154,7 @@ def plot_path_energies(
         x, work, color=style.BLACK, linewidth=1.2, linestyle=style.DASHES[1],
         label="at the start + work done",
     )  # fmt: skip
-    lower.stackplot(x, *energy_shares(path).values(), colors=colors, alpha=0.75)
+    lower.stackplot(x, *readings.energy_shares(path).values(), colors=colors, alpha=0.75)
     lower.set_ylim(0.0, 1.0)
     lower.yaxis.set_major_formatter(PercentFormatter(1.0))
     for axes in (upper, lower):
@@ -178,8 +169,8 @@ def _abscissa(
 ) -> tuple[NDArray[np.float64], str]:
     """Return a quantity that grows monotonically along the path, and its name."""
     if nodes is not None:
-        numbers, direction = asked({"path": path}, nodes, direction)
-        moved = along(path, numbers, direction)
+        numbers, direction = readings.asked({"path": path}, nodes, direction)
+        moved = readings.along(path, numbers, direction)
         if not (np.diff(moved) > 0.0).all():
             raise InputError(
                 f"nodes: their displacement along {direction} does not grow all along the path; "
@@ -189,4 +180,4 @@ def _abscissa(
     factor = path["load_factor"].values
     if (np.diff(factor) > 0.0).all():
         return factor, "load factor"
-    return way(path), "mean distance traveled by the nodes (m)"
+    return readings.way(path), "mean distance traveled by the nodes (m)"

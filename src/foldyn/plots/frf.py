@@ -18,13 +18,12 @@ from foldyn.linear import convert
 from foldyn.linear.frf import PER_FORCE, quantity_of
 from foldyn.linear.peaks_of import resonances
 from foldyn.plots import style
-from foldyn.plots.given import by_label
 from foldyn.plots.modes import hertz
-from foldyn.plots.readings import AXES, along_drive, check_nodes_of, directions, unit_of
+from foldyn.plots.readings import AXES, along_drive, by_label, check_nodes_of, directions, unit_of
 from foldyn.values import number
 
-_APART = 0.07  # of the frequency axis: peaks closer than that share one label
-_FEW = 60  # number of frequencies up to which they are drawn as dots too
+_APART = 0.07  # closest labels of peaks, as a share of the frequency axis
+_FEW = 60  # up to this number of frequencies they are also drawn as dots
 _DECADES = 5.0  # least range of the magnitude axis below its highest value
 
 
@@ -125,7 +124,7 @@ def curves_of(
     """
     held = {quantity_of(response) for response in responses.values()}
     if len(held) > 1:
-        raise InputError("responses: forces drive some of them, a base others; draw them apart")
+        raise InputError("responses: forces drive some, a moving base others; draw them separately")
     shown = held.pop()
     if quantity is not None:
         if quantity not in PER_FORCE or shown not in PER_FORCE:

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.plots.chart_figures import figure_of
 from foldyn.plots.charts import Chart, Curve
-from foldyn.plots.given import by_label
-from foldyn.plots.readings import AXES, check_nodes_of, directions
+from foldyn.plots.readings import AXES, by_label, check_nodes_of, directions
 from foldyn.signals import sampling_interval, spectrum
 from foldyn.values import number
 
@@ -69,9 +68,7 @@ def plot_history(
     trajectories = by_label("trajectories", trajectories)
     for one in trajectories.values():
         if "displacement" not in one or "time" not in one["displacement"].dims:
-            raise InputError(
-                ": one has no displacement along time; give results of fd.simulate", "trajectories"
-            )
+            raise InputError(": one is no motion; give results of fd.simulate", "trajectories")
     numbers = check_nodes_of(trajectories, nodes)
     moved = {
         label: one["displacement"].transpose("time", ...).sel(node=numbers, axis=list(AXES)).values

@@ -1,4 +1,4 @@
-"""Mode shapes side by side, over the state about which the structure vibrates; MAC."""
+"""Mode shapes side by side, over the equilibrium in gray, and matrices of MAC."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.given import case_from_result
-from foldyn.plots.readings import chosen_modes
+from foldyn.plots.readings import case_from_result, chosen_modes
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import rest_keys, side_by_side
 from foldyn.structures import Structure

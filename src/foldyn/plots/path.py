@@ -12,20 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.plots import style
-from foldyn.plots.given import by_label, case_from_result
-from foldyn.plots.readings import (
-    CRITICAL,
-    along,
-    asked,
-    check_path,
-    chosen_points,
-    critical_word,
-    displacements,
-    is_loose,
-    stretches,
-    total_reaction,
-)
+from foldyn.plots import readings, style
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import rest_keys, side_by_side
 from foldyn.structures import Structure
@@ -73,15 +60,15 @@ def plot_load_displacement(
     InputError
         No path or node, a node that a path does not have, another direction.
     """
-    paths = by_label("paths", paths)
-    numbers, direction = asked(paths, nodes, direction)
+    paths = readings.by_label("paths", paths)
+    numbers, direction = readings.asked(paths, nodes, direction)
     curves = []
     for label, path in paths.items():
         for node in numbers:
             parts = [label] if len(paths) > 1 else []
             parts += [f"node {node}"] if len(numbers) > 1 else []
-            x, factor = along(path, [node], direction), path["load_factor"].values
-            curves.append(_Curve(", ".join(parts), x, factor, path, is_loose(path)))
+            x, factor = readings.along(path, [node], direction), path["load_factor"].values
+            curves.append(_Curve(", ".join(parts), x, factor, path, readings.is_loose(path)))
     of = f" of node {numbers[0]}" if len(numbers) == 1 else ""
     return _draw(curves, title, f"displacement{of} along {direction} (m)", "load factor")
 
@@ -122,13 +109,13 @@ def plot_reaction(
         No path or node, a node that a path does not have or does not support along the direction,
         another direction.
     """
-    paths = by_label("paths", paths)
-    numbers, direction = asked(paths, nodes, direction)
+    paths = readings.by_label("paths", paths)
+    numbers, direction = readings.asked(paths, nodes, direction)
     curves = [
         _Curve(
             label if len(paths) > 1 else "",
-            along(path, numbers, direction),
-            total_reaction(path, numbers, direction=direction),
+            readings.along(path, numbers, direction),
+            readings.total_reaction(path, numbers, direction=direction),
             path,
         )
         for label, path in paths.items()
@@ -160,10 +147,10 @@ def _draw(curves: list[_Curve], title: str, xlabel: str, ylabel: str) -> Figure:
         if curve.label
     ]
     gray: dict[str, Any] = {"color": style.GRAY, "linewidth": 1.4}
-    if any(not stretch.stable for curve in curves for stretch in stretches(curve.path)):
+    if any(not stretch.stable for curve in curves for stretch in readings.stretches(curve.path)):
         keys.append(style.key("stable", **gray))
         keys.append(style.key("unstable", **gray, linestyle=_UNSTABLE))
-    for kind, name in CRITICAL.items():
+    for kind, name in readings.CRITICAL.items():
         if any((curve.path["point"].values == kind).any() for curve in curves):
             keys.append(style.key(name, color=style.GRAY, linestyle="none", **_MARKS[kind]))
     if any(np.any(curve.loose) for curve in curves):
@@ -177,7 +164,7 @@ def _draw(curves: list[_Curve], title: str, xlabel: str, ylabel: str) -> Figure:
 def _draw_curve(axes: Axes, curve: _Curve, color: str, zorder: float) -> None:
     """Draw the stretches of a curve and its critical points."""
     label, x, y, path, loose = curve
-    for number, (start, stop, stable) in enumerate(stretches(path)):
+    for number, (start, stop, stable) in enumerate(readings.stretches(path)):
         part = slice(start, stop + 1)
         look: dict[str, Any] = {"color": color, "linewidth": 1.4, "zorder": zorder}
         dashes = "solid" if stable else _UNSTABLE
@@ -197,7 +184,7 @@ def _draw_curve(axes: Axes, curve: _Curve, color: str, zorder: float) -> None:
         axes.plot(np.tile(x[loose], 2), ends, "_", color=color, markersize=8.0, label="_interval")
 
 
-@case_from_result
+@readings.case_from_result
 def draw_shapes(
     case_or_structure: Case | Structure,
     path: xr.Dataset,
@@ -237,10 +224,10 @@ def draw_shapes(
     InputError
         A path of another structure, or no such point.
     """
-    check_path(path, "path")
+    readings.check_path(path, "path")
     sheet = Sheet3D.of(case_or_structure)
-    numbers = chosen_points(path, points)
-    moved = displacements(path)[numbers]
+    numbers = readings.chosen_points(path, points)
+    moved = readings.displacements(path)[numbers]
     sheet.check_nodes("path: it has", moved, "traced")
     captions = [describe_point(path, number) for number in numbers]
     notes = rest_keys(scale)
@@ -250,7 +237,7 @@ def draw_shapes(
 def describe_point(path: xr.Dataset, number: int) -> str:
     """Text for a point: its number, load factor, and kind if critical."""
     point = path.isel(step=number)
-    remark = critical_word(path, number)
+    remark = readings.critical_word(path, number)
     if not remark and int(point["negative_eigenvalues"]) > 0:
         remark = "unstable"
     text = f"point {number}: load factor {float(point['load_factor']):.4g}"

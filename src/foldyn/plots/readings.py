@@ -1,11 +1,12 @@
-"""Shared readings of results for figures and pages, without drawing: nodes, paths, energies."""
+"""What figures and pages take from their arguments, without drawing: cases, nodes, energies."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
+from functools import partial, wraps
+from inspect import signature
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar, overload
 
 import numpy as np
 import xarray as xr
@@ -17,12 +18,64 @@ from foldyn.errors import InputError
 from foldyn.linear.frf import PER_FORCE, quantity_of
 from foldyn.mechanics.contact.term import GROUP as CONTACT
 from foldyn.mechanics.springs import GROUP
-from foldyn.plots.given import alone
 from foldyn.results.contents import nodes_of
 from foldyn.results.quantities import RESPONSES
 from foldyn.shells.term import GROUPS as OF_SHELLS
+from foldyn.structures import Structure
 from foldyn.structures.bars_hinges import GROUPS as OF_BARS_AND_HINGES
-from foldyn.values import choice
+from foldyn.values import choice, show
+
+P = ParamSpec("P")
+R = TypeVar("R", covariant=True)
+
+
+def by_label(field: str, results: xr.Dataset | Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """Results by label; a single result has the label ""."""
+    if isinstance(results, xr.Dataset):
+        return {"": results}
+    if not isinstance(results, Mapping) or not results:
+        raise InputError(
+            ": give a result, or a mapping of label to result, as {'specimen': result}", field
+        )
+    return {label: alone(f"{field}[{label!r}]", one) for label, one in results.items()}
+
+
+def alone(field: str, result: Any) -> xr.Dataset:
+    """Return a result; refuse anything else."""
+    if not isinstance(result, xr.Dataset):
+        raise InputError(f" = {show(result)}: give a result, as fd.load returns it", field)
+    return result
+
+
+class OfResult(Protocol[P, R]):
+    """A figure of a result, whose case may be omitted."""
+
+    @overload
+    def __call__(
+        self, case_or_structure: Case | Structure, result: xr.Dataset, /,
+        *args: P.args, **kwargs: P.kwargs,
+    ) -> R: ...  # fmt: skip
+
+    @overload
+    def __call__(self, result: xr.Dataset, /, *args: P.args, **kwargs: P.kwargs) -> R: ...
+
+
+def case_from_result(
+    draw: Callable[Concatenate[Case | Structure, xr.Dataset, P], R],
+) -> OfResult[P, R]:
+    """Make a figure take the case from its result if no case is given."""
+    case, result, *others = signature(draw).parameters
+
+    @wraps(draw)
+    def drawn(*given: Any, **named: Any) -> Any:
+        first = given[0] if given else named.get(result)
+        if isinstance(first, xr.Dataset) and case not in named:
+            named |= zip(others, given[1:], strict=False)  # positional arguments move up by one
+            given = (first, first) if given else (first,)
+        return draw(*given, **named)
+
+    return drawn
+
 
 AXES = ("x", "y", "z")
 # Kinds of points marked in figures, and their names.
@@ -64,9 +117,7 @@ def directions(
     if len(chosen) == 1:
         return chosen * count
     if len(chosen) != count:
-        raise InputError(
-            f"axes: {len(chosen)} directions for {count} nodes; give one, or one per node"
-        )
+        raise InputError(f"axes: {len(chosen)} directions for {count} nodes; give one, or one each")
     return chosen
 
 
@@ -189,7 +240,7 @@ STRAIN: Mapping[str, str] = {
 MOST_MODES = 12
 # Variables of modes that figures need.
 NEEDED = ("frequency", "eigenvalue", "shape", "rigid", "displacement")
-_NONE = 1e-9  # of the largest energy: smaller energies have no shares
+_NONE = 1e-9  # smallest energy with shares, relative to the largest
 
 
 def moved_supports(case: Case) -> tuple[list[int], str] | None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.given import alone, by_label
+from foldyn.plots.readings import alone, by_label
 
 MARKERS = {"fold": "o", "pitchfork": "s", "period doubling": "D", "Neimark-Sacker": "^"}
 UNSTABLE = (0, (3, 1.6))
@@ -51,7 +51,7 @@ def plot_response_curve(
     labeled = by_label("curves", curves)
     kinds = {_kind("curves", one, "response_curve", "by") for one in labeled.values()}
     if len(kinds) > 1:
-        raise InputError(": some vary the frequency, some the amplitude; draw them apart", "curves")
+        raise InputError(": some vary the frequency, others the level; draw them apart", "curves")
     along = "frequency" if kinds.pop() == "frequencies" else "level"
     xlabel = "frequency of the drive (Hz)" if along == "frequency" else "factor on the drive"
     figure, axes = style.single(SIZE, title, xlabel, _amplitude(next(iter(labeled.values()))))

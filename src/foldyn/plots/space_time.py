@@ -13,7 +13,7 @@ from foldyn.errors import InputError
 from foldyn.linear.cell_motions import space_time
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.plots import style
-from foldyn.plots.given import alone, by_label
+from foldyn.plots.readings import alone, by_label
 from foldyn.values import choice, number
 
 SIGNED = LinearSegmentedColormap.from_list(

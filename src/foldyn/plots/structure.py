@@ -14,15 +14,7 @@ from numpy.typing import ArrayLike
 from foldyn.cases import Case, Fix, Impose, Pressure, Temperature
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
-from foldyn.plots import following, marks, scene, style
-from foldyn.plots import load_curves as histories
-from foldyn.plots.attachments import (
-    attachments,
-    dashpot_lines,
-    describe_dashpot,
-    direction_triangles,
-    links,
-)
+from foldyn.plots import attachments, load_curves, marks, scene, style
 from foldyn.plots.marks import Mark
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, panel_keys, rest_keys
@@ -96,12 +88,12 @@ def draw_structure(
     marked = min(0.055 * size, 0.25 * edge)
     length = min(0.17 * size, 0.8 * edge)
     groups = _supports(sheet, points, marked, sight) if supports else []
-    attached = attachments(sheet, points, marked, sight, supports, loads)
+    attached = attachments.springs_and_masses(sheet, points, marked, sight, supports, loads)
     arrows = _motions(sheet, points, length, sight) if supports else []
     arrows += _dashpots(sheet, points, 0.5 * length, sight) if supports else []
     arrows += _loads(sheet, points, length, sight) if loads else []
     others = _warm(sheet, points) if loads else []
-    others += links(sheet.case, points) if supports and sheet.case else []
+    others += attachments.links(sheet.case, points) if supports and sheet.case else []
     shown = [*(group.mark for group in groups), *attached, *arrows, *others]
     triangles = np.concatenate([np.zeros((0, 3, 3)), *(group.mark.triangles for group in groups)])
     # The names of held directions stand beyond the feet of the triangles.
@@ -165,7 +157,7 @@ def _supports(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[
     groups = []
     for kind, mask, color, ink, text in kinds:
         straight, axes = marks.support_triangles(points, mask, size, sight, moves)
-        oblique = direction_triangles(sheet.case, kind, points, size, sight)
+        oblique = attachments.direction_triangles(sheet.case, kind, points, size, sight)
         if len(straight) or len(oblique):
             triangles, keys = (
                 np.concatenate([straight, oblique]),
@@ -178,15 +170,15 @@ def _supports(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[
 def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[Mark]:
     """Arrows of imposed displacements, and of the base at the mean of its nodes."""
     imposed = [
-        (points, vectors, f"moved {histories.describe(vectors, 'm')}")
+        (points, vectors, f"moved {load_curves.describe(vectors, 'm')}")
         for vectors, _ in sheet.case.prescribed_terms
     ]
     base = []
     for vectors, _ in sheet.case.base_terms:
-        moved = histories.base_vectors(sheet.case, vectors)
-        peak = histories.signed_peak(moved)
+        moved = load_curves.base_vectors(sheet.case, vectors)
+        peak = load_curves.signed_peak(moved)
         middle = points[moved.any(axis=1)].mean(axis=0)
-        base.append((middle[None], peak[None], histories.describe_base(peak)))
+        base.append((middle[None], peak[None], load_curves.describe_base(peak)))
     return [
         *_arrows(imposed, length, sight, style.IMPOSED),
         *_arrows(base, length, sight, style.BASE),
@@ -194,11 +186,11 @@ def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list
 
 
 def _dashpots(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[Mark]:
-    """Lines of the dashpots."""
-    lines = dashpot_lines(sheet.case, points, size, sight)
+    """Mark of all dashpots, with their legend entries."""
+    lines = attachments.dashpot_lines(sheet.case, points, size, sight)
     if not len(lines):
         return []
-    texts = dict.fromkeys(describe_dashpot(one) for _, one in sheet.case.dashpots)
+    texts = dict.fromkeys(attachments.describe_dashpot(one) for _, one in sheet.case.dashpots)
     keys = [style.key(text, color=style.DASHPOT, linewidth=1.8) for text in texts]
     return [Mark(style.DASHPOT, keys[:_MOST_LOADS_LISTED], [lines])]
 
@@ -206,15 +198,15 @@ def _dashpots(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[
 def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[Mark]:
     """Arrows of forces, pressure and moments, and of gravity at the center of mass."""
     case, vertices = sheet.case, len(sheet.pattern.vertices)
-    forces = [(points, f, histories.describe(f, "N")) for f, _ in case.force_terms]
+    forces = [(points, f, load_curves.describe(f, "N")) for f, _ in case.force_terms]
     pressure = [
-        (*following.panel_arrows(case, points, share), histories.describe_pressure(share))
-        for share in following.on_panels(case, Pressure)
+        (*load_curves.panel_arrows(case, points, share), load_curves.describe_pressure(share))
+        for share in load_curves.on_panels(case, Pressure)
     ]
     gravity = []
     for vector, _ in case.gravity_terms:  # only gravity needs masses
         center = case.nodal_mass @ points / case.nodal_mass.sum()
-        gravity.append((center[None], vector[None], histories.describe_gravity(vector)))
+        gravity.append((center[None], vector[None], load_curves.describe_gravity(vector)))
     return [
         *_arrows(forces, length, sight, style.LOAD, vertices),
         *_arrows(pressure, length, sight, style.LOAD),
@@ -225,17 +217,17 @@ def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[M
 
 def _turns(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[Mark]:
     """Curved arrows of crease moments."""
-    shares = following.moments(sheet.case)
+    shares = load_curves.moments(sheet.case)
     if not shares:
         return []
     drawn = [
         marks.arc_arrows(
-            following.crease_arcs(sheet.case, points, share, 0.6 * length), 0.22 * length, sight
+            load_curves.crease_arcs(sheet.case, points, share, 0.6 * length), 0.22 * length, sight
         )
         for share in shares
     ]
     look = {"color": style.LOAD, "marker": ">", "markersize": 6.0, "linewidth": 1.8}
-    keys = [style.key(histories.describe_moment(share), **look) for share in shares]
+    keys = [style.key(load_curves.describe_moment(share), **look) for share in shares]
     pieces, heads = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
     return [Mark(style.LOAD, keys, [pieces], heads)]
 
@@ -243,12 +235,12 @@ def _turns(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[M
 def _warm(sheet: Sheet3D, points: Points) -> list[Mark]:
     """Stars on warmed panels."""
     look, found = {"marker": "*", "markersize": 9.0, "markeredgecolor": "white"}, []
-    for share in following.on_panels(sheet.case, Temperature):
+    for share in load_curves.on_panels(sheet.case, Temperature):
         key = style.key(
-            histories.describe_temperature(share), color=style.WARM, marker="*", linestyle="none",
+            load_curves.describe_temperature(share), color=style.WARM, marker="*", linestyle="none",
             markersize=8.0,
         )  # fmt: skip
-        middles = following.panel_middles(sheet.structure, points, share)
+        middles = load_curves.panel_middles(sheet.structure, points, share)
         found.append(Mark(style.WARM, [key], dots=middles, zorder=6.4, look=look))
     return found
 

@@ -13,17 +13,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.plots import style
+from foldyn.plots import style, sweep_charts
 from foldyn.plots.chart_figures import figure_of
-from foldyn.plots.sweep_charts import (
-    by_ratio,
-    check_left,
-    check_some,
-    effect_charts,
-    line_chart,
-    named,
-    places,
-)
 from foldyn.results.sweep_dataset import SobolIndices, is_grid, label, measured, parameters_of
 from foldyn.values import choice
 
@@ -71,14 +62,14 @@ def plot_sweep_map(
     found = measured(sweep, measure, at)
     first, second = _two(sweep, x, y, at)
     if is_grid(sweep):
-        check_left(found, (first, second))
+        sweep_charts.check_left(found, (first, second))
     figure, axes = style.single((6.2, 4.4), title, label(sweep[first]), label(sweep[second]))
     axes.grid(False)
     across, down = _places(axes, sweep[first], "x"), _places(axes, sweep[second], "y")
     if is_grid(sweep):
         values = found.transpose(second, first).values
         mesh = np.ma.masked_invalid(values)
-        check_some(values, measure)
+        sweep_charts.check_some(values, measure)
         drawn = axes.pcolormesh(
             across, down, mesh, cmap=_SHADES, shading="nearest", rasterized=True
         )
@@ -89,13 +80,13 @@ def plot_sweep_map(
         axes.plot(across[missing[:, 1]], down[missing[:, 0]], **_FAILED)
     else:
         values = found.values
-        check_some(values, measure)
+        sweep_charts.check_some(values, measure)
         there = np.isfinite(values)
         look = {"c": values[there], "cmap": _SHADES, "s": 26.0, "edgecolors": style.GRAY}
         drawn = axes.scatter(across[there], down[there], linewidths=0.5, **look)
         missing = np.flatnonzero(~there)
         axes.plot(across[missing], down[missing], **_FAILED)
-    style.color_bar(figure, drawn, named(found), ax=axes)
+    style.color_bar(figure, drawn, sweep_charts.named(found), ax=axes)
     return style.finish(figure, [style.key("no value", **_FAILED)] if len(missing) else ())
 
 
@@ -137,7 +128,7 @@ def plot_sweep_lines(
         Not a sweep, no such measure or parameter, no value at any point, or a further parameter of
         a grid that `at` does not name.
     """
-    chart = line_chart(sweep, measure, x, by, at)
+    chart = sweep_charts.line_chart(sweep, measure, x, by, at)
     return figure_of([chart], (6.2, 4.0), title)
 
 
@@ -162,7 +153,7 @@ def plot_main_effects(
     InputError
         As in `plot_sweep_map`.
     """
-    charts = effect_charts(sweep, measure, at)
+    charts = sweep_charts.effect_charts(sweep, measure, at)
     columns = min(COLUMNS, len(charts))
     size = 0.6 + 2.8 * columns, 0.5 + 2.6 * -(-len(charts) // columns)
     figure = figure_of(charts, size, title, columns, legend=0, sharey=True)
@@ -237,10 +228,10 @@ def _two(
 
 def _places(axes: Axes, one: xr.DataArray, which: Literal["x", "y"]) -> NDArray:
     """Coordinates of a parameter's values along an axis, whose ticks or scale it sets."""
-    values, words = places(one.values)
+    values, words = sweep_charts.places(one.values)
     if words:
         getattr(axes, f"set_{which}ticks")(range(len(words)), words)
-    elif by_ratio(values):
+    elif sweep_charts.by_ratio(values):
         getattr(axes, f"set_{which}scale")("log")
     else:
         style.exponents(axes, which=which)

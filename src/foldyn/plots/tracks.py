@@ -14,8 +14,7 @@ from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.chart_figures import figure_of
 from foldyn.plots.charts import Chart, Curve
-from foldyn.plots.given import alone
-from foldyn.plots.readings import AXES, check_nodes_of
+from foldyn.plots.readings import AXES, alone, check_nodes_of
 from foldyn.plots.track_charts import dimension, track_charts
 from foldyn.values import choice
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from foldyn.signals.circle_fit import CircleFit, circle_fit, circle_fits
-from foldyn.signals.conversions import base_transmissibility, convert_response, transmissibility
 from foldyn.signals.frequency_response import (
     FrequencyResponse,
+    base_transmissibility,
+    convert_response,
     exponential_window,
     frequency_response,
+    transmissibility,
     without_window,
 )
 from foldyn.signals.log_decrement import LogDecrement, log_decrement

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import ComputationError, InputError
 from foldyn.signals import records
-from foldyn.signals.conversions import convert_response
+from foldyn.signals.frequency_response import convert_response
 from foldyn.values import choice
 
 _FEWEST = 5  # points in a band: six real unknowns, ten real numbers
-_LARGEST_ERROR = 1.0 / 3.0  # of the damping ratio: pure noise gives circles with errors above 0.4
+_LARGEST_ERROR = 1.0 / 3.0  # largest relative error of damping; pure noise has above 0.4
 _SWEEPS = 200
 _SETTLED = 1e-10
 

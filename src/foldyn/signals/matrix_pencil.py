@@ -189,9 +189,7 @@ def _order(values: NDArray[np.float64], n: int, threshold: float | None) -> int:
         level = number("threshold", threshold, above=0.0, below=1.0) * float(values[0])
     count = int(np.sum(values > level))
     if count == 0:
-        raise InputError(
-            "x: no singular value stands above the noise; start the record earlier, or give `order`"
-        )
+        raise InputError("x: nothing but noise; start the record earlier, or give `order`")
     return count
 
 

@@ -14,7 +14,7 @@ from foldyn.signals import records
 from foldyn.values import choice, number, whole
 
 _LOPSIDED = 0.1
-LOWEST = 1e-4  # of the maximum: smaller values may be simulation errors
+LOWEST = 1e-4  # least value, relative to the maximum; lower ones may be simulation errors
 
 
 @brief
@@ -167,7 +167,9 @@ class Curve(NamedTuple):
         a, b, c, center = self.stiffness_parabola(index)
         at = (self.f[near] / center) ** 2 - 1.0
         own = (self.size[index] / self.size[near]) ** 2 * (1.0 + at) ** self.order
-        shape = np.stack([np.roll(at, -k) for k in range(3)])  # of each: its place, then the others
+        shape = np.stack(
+            [np.roll(at, -k) for k in range(3)]
+        )  # each row: its own place, then the others
         one, other = v - shape[:, 1], v - shape[:, 2]
         scale = (shape[:, 0] - shape[:, 1]) * (shape[:, 0] - shape[:, 2])
         part, slope = one * other / scale, (one + other) / scale  # L_i and L_i'
@@ -355,9 +357,7 @@ def _peak_index(curve: Curve, quantity: str, near: float | None, ripple: float) 
     """Index of the highest peak, or of the peak nearest to a frequency."""
     peaks = find_peaks(curve.f, curve.size, prominence=0.0, quantity=quantity)
     if peaks.index.size == 0:
-        raise InputError(
-            "magnitude: the curve has no peak between its ends; extend the frequencies"
-        )
+        raise InputError("magnitude: no peak between the ends of the curve; extend the frequencies")
     if near is None:
         return int(peaks.index[np.argmax(peaks.height)])
     distance = np.abs(peaks.frequency - number("near", near, least=0.0))

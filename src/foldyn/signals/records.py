@@ -101,9 +101,7 @@ def checked_frequencies(frequency: ArrayLike, fewest: int) -> NDArray[np.float64
     """Return frequencies (Hz), at least `fewest`, increasing and not negative."""
     f = real_array("frequency", frequency)
     if f.ndim != 1 or f.size < fewest:
-        raise InputError(
-            f"frequency: shape {f.shape}; at least {fewest} frequencies in one row are needed"
-        )
+        raise InputError(f"frequency: shape {f.shape}; give at least {fewest} frequencies")
     if f[0] < 0.0 or (np.diff(f) <= 0.0).any():
         raise InputError("frequency: must increase from 0 Hz or more; sort it and drop doubles")
     return f
@@ -190,9 +188,7 @@ def sampling_interval(time: ArrayLike) -> float:
     """
     t = np.asarray(time, dtype=np.float64)
     if t.ndim != 1 or t.size < 2:
-        raise InputError(
-            f"time: shape {t.shape} has no sampling interval; give at least two times in one row"
-        )
+        raise InputError(f"time: shape {t.shape}: give at least two times in one row")
     if not is_uniform(t):
         if not np.isfinite(t).all():
             where = int(np.flatnonzero(~np.isfinite(t))[0])

@@ -74,9 +74,7 @@ def wavenumber_spectrum(
 
     field = records.real_array("values", values)
     if field.ndim < 2 or min(field.shape[:2]) < FEWEST:
-        raise InputError(
-            f"values: shape {field.shape}: give at least {FEWEST} times and cells, (times, cells)"
-        )
+        raise InputError(f"values: shape {field.shape}: give at least {FEWEST} times and cells")
     interval = records.checked_interval(dt)
     times, cells = field.shape[:2]
     over_time = records.checked_window(window, times)

@@ -69,8 +69,8 @@ def evaluate(problem: Problem, point: Point) -> Evaluation:
 
 # Change of a parameter, in its scale, for a difference quotient: well above the solvers' noise.
 STEP = 1e-3
-ENOUGH = 1e-5  # relative change of the parameters at which a search ends
-LEVEL = 1e-8  # relative decrease of the cost at which a search ends
+ENOUGH = 1e-5  # a search ends at this relative change of the parameters
+LEVEL = 1e-8  # a search ends at this relative decrease of the cost
 TRIED = 60  # most steps of a search
 # Reasons for the end of a search, by the status of `least_squares`.
 WHY = {
@@ -196,8 +196,8 @@ def fit(
         again = tuple(search.quotients(values))
     if not lowest.converged:
         _warn(
-            f"the search was {lowest.message}: the values are not those of the least misfit, and "
-            "their intervals mean nothing yet; begin from these values, or nearer to the truth"
+            f"the search was {lowest.message}: these values do not minimize the misfit, and their "
+            "intervals mean nothing yet; begin from these values, or nearer to the truth"
         )
     _warn_of_pairing(made, values)
     return Fit(
@@ -251,7 +251,7 @@ class _Search:
 
     @property
     def count(self) -> int:
-        """Number of evaluations of the model."""
+        """Number of evaluations."""
         return sum(one.computed + one.found for one in self.all)
 
     def _tell(self, *_: object) -> None:
@@ -419,10 +419,8 @@ class _Search:
             columns = [(residuals[i] - residuals[j]) / step for i, j, step in pairs]
         if not np.isfinite(columns).all():
             place = next(k for k, one in enumerate(columns) if not np.isfinite(one).all())
-            (why,) = self.at([points[pairs[place][0]]], runs)
-            raise ComputationError(
-                f"{self.made.space.keys[place]}: the model fails near {values[place]:.6g}: {why}"
-            )
+            (why,), key = self.at([points[pairs[place][0]]], runs), self.made.space.keys[place]
+            raise ComputationError(f"{key}: the model fails near {values[place]:.6g}: {why}")
         return np.stack(columns, axis=1)
 
 

@@ -20,12 +20,12 @@ from foldyn.experiment.calibration.measured_files import READERS
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.modal import (
     DampingRatios,
+    FrequencyResponse,
     ModalParameters,
     ModeShapes,
     NaturalFrequencies,
 )
 from foldyn.experiment.calibration.parameters import Parameter
-from foldyn.experiment.calibration.responses import FrequencyResponse
 from foldyn.tables import ListOf, Section, check_keys, check_table, keys, read, told
 from foldyn.values import number, show
 

@@ -27,8 +27,12 @@ from foldyn.experiment.calibration.measured import (
     picture_plane,
 )
 from foldyn.experiment.calibration.measurement import AtNodes, Measurement
-from foldyn.experiment.calibration.modal import ModalParameters, ModeShapes, resisted
-from foldyn.experiment.calibration.responses import FrequencyResponse
+from foldyn.experiment.calibration.modal import (
+    FrequencyResponse,
+    ModalParameters,
+    ModeShapes,
+    resisted,
+)
 from foldyn.plots.charts import Chart, Curve
 from foldyn.report.album import Album
 from foldyn.report.page import write_report

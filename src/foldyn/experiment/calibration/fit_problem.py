@@ -20,18 +20,10 @@ from foldyn.analyses.pattern_section import HINGES
 from foldyn.analyses.reading import case_of_document, read_document, validated
 from foldyn.cases.models import SHELL
 from foldyn.errors import FoldynError, FoldynWarning, InputError
+from foldyn.experiment.calibration import predicted_run
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Beside, Parameter, Space, space
-from foldyn.experiment.calibration.predicted_run import (
-    REFINED,
-    PredictedRun,
-    computed,
-    motion_of,
-    result_of,
-    seen,
-    steady,
-    with_neighbors,
-)
+from foldyn.experiment.calibration.predicted_run import PredictedRun
 from foldyn.experiment.camera import Sight
 from foldyn.input_files import path_of
 from foldyn.program import program
@@ -118,7 +110,9 @@ class Problem:
         case_file, members = self.case_file(run, values), run.those_of(self.measurements)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
-            return self._predicted(seen(run, case_file, members), case_file, run.members)
+            return self._predicted(
+                predicted_run.seen(run, case_file, members), case_file, run.members
+            )
 
     def _predicted(
         self, result: xr.Dataset, case_file: CaseFile, members: Sequence[int]
@@ -140,7 +134,7 @@ class Problem:
             return self._computed(run, values), []
         parts = self.space.differences(values, second)
         points = {tuple(part.point): part.point for part in parts}
-        if run.kind not in REFINED:
+        if run.kind not in predicted_run.REFINED:
             points.pop(tuple(values), None)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
@@ -152,7 +146,7 @@ class Problem:
                 for each in points.values()
             ]
             members = run.those_of(self.measurements)
-            result, found = with_neighbors(run, one, others, members, second)
+            result, found = predicted_run.with_neighbors(run, one, others, members, second)
         own = self._predicted(result, one, run.members)
         beside = {tuple(values): own} | {
             point: self._predicted(there, other, fitted)
@@ -194,7 +188,7 @@ class Problem:
     ) -> Any:
         """Path or motion at given values, for its own measurements or others."""
         case_file = self.case_file(run, values)
-        return result_of(run, case_file, members or run.those_of(self.measurements))
+        return predicted_run.result_of(run, case_file, members or run.those_of(self.measurements))
 
     def observed(self) -> list[NDArray[np.float64]]:
         """Measured values of each measurement."""
@@ -228,7 +222,7 @@ class Problem:
             if run.kind in VIBRATIONS:
                 case_file = self.case_file(run, values)
                 members = run.those_of(self.measurements)
-                result = computed(run, case_file, members)
+                result = predicted_run.computed(run, case_file, members)
                 for one in members:
                     one.examine(result, case_file.case())
 
@@ -239,7 +233,7 @@ class Problem:
         orders = []
         for k, run in enumerate(self.runs):
             if run.kind == "dynamics":
-                motion = motion_of(run, self.case_file(run, values))
+                motion = predicted_run.motion_of(run, self.case_file(run, values))
                 orders.append(motion.method.order)
                 steps[k] = {"analysis.dt": 0.5 * motion.plan.dt}
                 if "every_steps" not in run.document.get("output", {}):
@@ -375,7 +369,7 @@ def _runs(
 
 
 def _mass_rule(document: Mapping[str, Any]) -> dict[str, Any]:
-    """The first mass rule of a file that lists several; cases with the others are not built."""
+    """Choose the first mass rule of a file that lists several."""
     rules = value_at(document, "model.mass")
     return {"model.mass": rules[0]} if isinstance(rules, list) and rules else {}
 
@@ -388,7 +382,7 @@ def _check(one: Measurement, case_file: CaseFile) -> None:
             f"{case_file.path} is of kind {show(kind)}"
         )
     if kind == "dynamics":
-        steady(case_file)
+        predicted_run.steady(case_file)
     one.check(case_file.case(), case_file.analysis.arguments)
 
 

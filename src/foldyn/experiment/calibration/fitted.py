@@ -329,16 +329,16 @@ class Fit:
             return ""
         square = self.freedom * self.misfit**2
         if chi2.sf(square, self.freedom) < RARE:
-            return "more than noise explains: the model is wrong somewhere, or sigma is too small"
+            return "more than noise explains: the model is wrong, or sigma is too small"
         if chi2.cdf(square, self.freedom) < RARE:
-            return "less than such noise leaves: sigma is too large, and intervals go by the misfit"
+            return "less than such noise causes: sigma is too large; intervals use the misfit"
         return ""
 
     @property
     def quality(self) -> str:
         """Describe the misfit in words, with conclusions on model and data."""
         if not np.isfinite(self.misfit):
-            return "No degree of freedom is left to tell the misfit."
+            return "No degree of freedom is left to estimate the misfit."
         freedom = f"{self.freedom} degree{'s' if self.freedom != 1 else ''} of freedom"
         if not self.weighed:
             return (

@@ -46,6 +46,7 @@ class ForceDisplacement(AtNodes):
     kind: ClassVar[str] = "force_displacement"
     analysis: ClassVar[str] = "statics"
     word: ClassVar[str] = IMPOSED
+    unit: ClassVar[str] = "N"
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -53,11 +54,6 @@ class ForceDisplacement(AtNodes):
         choice(self._of("axis"), self.axis, AXES)
         moved = column(self._of("displacement"), self.displacement)
         self._set(displacement=moved, force=column(self._of("force"), self.force, len(moved)))
-
-    @property
-    def unit(self) -> str:
-        """Unit of the values."""
-        return "N"
 
     def observed(self) -> NDArray[np.float64]:
         """Measured values, flattened."""

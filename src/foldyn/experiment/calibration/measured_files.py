@@ -14,18 +14,16 @@ from numpy.typing import NDArray
 from foldyn.cases.csv_table import read_headings, read_numbers, some
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
+from foldyn.experiment.calibration import modal_files
 from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
 from foldyn.experiment.calibration.measured import IMPOSED, ForceDisplacement, Shapes
 from foldyn.experiment.calibration.measurement import Measurement
-from foldyn.experiment.calibration.modal import DampingRatios, ModeShapes, NaturalFrequencies
-from foldyn.experiment.calibration.modal_files import (
-    damping_ratios,
-    frequencies,
-    frf,
-    mode_shapes,
-    recognized,
+from foldyn.experiment.calibration.modal import (
+    DampingRatios,
+    FrequencyResponse,
+    ModeShapes,
+    NaturalFrequencies,
 )
-from foldyn.experiment.calibration.responses import FrequencyResponse
 from foldyn.experiment.calibration.tables import by_node, limits, listed_nodes, made
 from foldyn.experiment.camera import Sight
 from foldyn.experiment.tracking.tracks_dataset import load_tracks
@@ -146,7 +144,7 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
     responses.
     """
     choice(f"{file}: axis", axis, AXES)
-    modal = recognized(file, axis, **known)
+    modal = modal_files.recognized(file, axis, **known)
     if modal is not None:
         return modal
     tracks, names = _opened(file)
@@ -223,9 +221,7 @@ def _motions(
         return moved["time"].values, moved.values
     headings = [f"node {n} {axis}" for n in nodes] if columns is None else columns
     if not _texts(headings) or len(headings) != len(nodes):
-        raise InputError(
-            f"columns = {show(columns)}: give a list of {len(nodes)} headings, one for each node"
-        )
+        raise InputError(f"columns = {show(columns)}: give {len(nodes)} headings, one per node")
     fields = [f"node {n}" for n in nodes]
     wanted = {"time": (names[0], "s")}
     wanted |= {name: (heading, "m") for name, heading in zip(fields, headings, strict=True)}
@@ -239,9 +235,7 @@ def _shapes_of_tracks(
     """Shapes from displacements along the dimension `photo`, one for each load factor."""
     count = moved.sizes["photo"]
     if not isinstance(load_factor, Sequence | np.ndarray) or len(load_factor) != count:
-        raise InputError(
-            f"{file}: load_factor: give the load factor of each of its {count} photographs"
-        )
+        raise InputError(f"{file}: load_factor: give one for each of its {count} photographs")
     moved = moved.dropna("node", how="all")
     if not moved.size:
         raise InputError(f"{file}: no node was measured in any photograph")
@@ -288,8 +282,8 @@ READERS: Mapping[str, Any] = {
     Shapes.kind: shapes,
     TimeHistory.kind: history,
     Spectrum.kind: spectrum,
-    NaturalFrequencies.kind: frequencies,
-    DampingRatios.kind: damping_ratios,
-    ModeShapes.kind: mode_shapes,
-    FrequencyResponse.kind: frf,
+    NaturalFrequencies.kind: modal_files.frequencies,
+    DampingRatios.kind: modal_files.damping_ratios,
+    ModeShapes.kind: modal_files.mode_shapes,
+    FrequencyResponse.kind: modal_files.frf,
 }

@@ -51,6 +51,10 @@ class Measurement(ABC):
     kind: ClassVar[str] = ""
     analysis: ClassVar[str] = ""
     each: ClassVar[bool] = False  # whether sigma may be a list
+    unit: ClassVar[str] = "m"  # of the values; empty if none
+    adapts: ClassVar[bool] = False  # whether predictions depend on the measured values
+    # degrees of freedom that predictions take from the data: scales, shifts and trends
+    absorbed: ClassVar[int] = 0
 
     def __post_init__(self) -> None:
         """Check the common fields."""
@@ -68,21 +72,6 @@ class Measurement(ABC):
     def _of(self, name: str) -> str:
         """Name of a field in messages."""
         return f"{self.name or self.kind}: {name}"
-
-    @property
-    def unit(self) -> str:
-        """Unit of the values; empty if none."""
-        return "m"
-
-    @property
-    def adapts(self) -> bool:
-        """Whether predictions depend on the measured values."""
-        return False
-
-    @property
-    def absorbed(self) -> int:
-        """Degrees of freedom that predictions take from the data: scales, shifts and trends."""
-        return 0
 
     @abstractmethod
     def observed(self) -> NDArray[np.float64]:
@@ -143,7 +132,7 @@ class NodeValues(AtNodes):
         """Refuse a case that cannot predict these values."""
         named, known = len(self.where(case)), self.values.shape[1]
         if named != known:
-            raise InputError(f"{self._of('values')}: are of {known} nodes, {named} are named")
+            raise InputError(f"{self._of('values')}: has {known} nodes, but {named} are named")
 
     def _per_node(self, values: NDArray, rows: int, what: str, field: str = "values") -> NDArray:
         """Values for a number of rows, a column for each node."""

@@ -1,4 +1,4 @@
-"""Modes in a fit: natural frequencies, damping ratios and mode shapes."""
+"""Vibrations in a fit: natural frequencies, damping ratios, mode shapes, frequency responses."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from foldyn.cases import Case
+from foldyn.cases import BaseMotion, Case
 from foldyn.cases.directions import AXES
-from foldyn.errors import InputError
+from foldyn.errors import ComputationError, InputError
 from foldyn.experiment.calibration.measurement import (
     Measurement,
     NodeValues,
@@ -21,8 +21,10 @@ from foldyn.experiment.calibration.measurement import (
     column,
     plain_array,
 )
-from foldyn.linear import mac, pair_modes
-from foldyn.values import numbers, show
+from foldyn.linear import convert, mac, pair_modes
+from foldyn.linear.frf import METHODS
+from foldyn.results.quantities import RESPONSES
+from foldyn.values import choice, numbers, show
 
 LEAST = 0.5  # least MAC of a partner
 CLOSE = 0.1  # least difference of the MAC with two modes of the model for a unique partner
@@ -65,6 +67,8 @@ class ModeShapes(NodeValues):
     mode: Any = None
     kind: ClassVar[str] = "mode_shapes"
     analysis: ClassVar[str] = "modes"
+    unit: ClassVar[str] = ""
+    adapts: ClassVar[bool] = True  # shapes are paired and scaled
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -89,16 +93,6 @@ class ModeShapes(NodeValues):
                 )
         largest = np.nanmax(np.abs(values), axis=(1, 2))
         self._set(values=values / largest[:, None, None])
-
-    @property
-    def unit(self) -> str:
-        """Unit of the values."""
-        return ""
-
-    @property
-    def adapts(self) -> bool:
-        """Predictions depend on the measured values: shapes are paired and scaled."""
-        return True
 
     @property
     def absorbed(self) -> int:
@@ -151,8 +145,8 @@ class ModeShapes(NodeValues):
             if row[own] < LEAST:
                 best = int(row.argmax())
                 raise InputError(
-                    f"{self.name}: mode {number} is like no mode of the model: the largest MAC is "
-                    f"{row[best]:.2f}, with mode {names[best]} ({hertz[best]:.4g} Hz); check "
+                    f"{self.name}: mode {number} resembles no mode of the model: the largest MAC "
+                    f"is {row[best]:.2f}, with mode {names[best]} ({hertz[best]:.4g} Hz); check "
                     "nodes, axes and supports, start nearer to the truth, or raise analysis.count"
                 )
             if others[rival] > row[own] - CLOSE:
@@ -207,6 +201,7 @@ class ModalParameters(Measurement):
     shapes: ModeShapes | None = None
     analysis: ClassVar[str] = "modes"
     each: ClassVar[bool] = True
+    quantity: ClassVar[str]  # variable of modes to compare, and the field of its measured values
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -230,19 +225,14 @@ class ModalParameters(Measurement):
             return self.shapes.mode
         if not np.array_equal(self.shapes.mode, numbered):
             raise InputError(
-                f"{self._of('shapes')}: are of the modes {show(self.shapes.mode.tolist())}, the "
-                f"values of {show(numbered.tolist())}; give both of the same modes"
+                f"{self._of('shapes')}: has the modes {show(self.shapes.mode.tolist())}, but there "
+                f"are values of {show(numbered.tolist())}; give both for the same modes"
             )
         return numbered
 
     @abstractmethod
     def _check_values(self, values: NDArray[np.float64]) -> None:
         """Refuse values that are impossible for modes."""
-
-    @property
-    @abstractmethod
-    def quantity(self) -> str:
-        """Variable of modes to compare, and the field with its measured values."""
 
     @property
     def adapts(self) -> bool:
@@ -300,16 +290,8 @@ class NaturalFrequencies(ModalParameters):
 
     frequency: Any = ()
     kind: ClassVar[str] = "frequencies"
-
-    @property
-    def quantity(self) -> str:
-        """Variable of modes to compare, and the field with its measured values."""
-        return "frequency"
-
-    @property
-    def unit(self) -> str:
-        """Unit of the values."""
-        return "Hz"
+    quantity: ClassVar[str] = "frequency"
+    unit: ClassVar[str] = "Hz"
 
     def _check_values(self, values: NDArray[np.float64]) -> None:
         if (values <= 0.0).any():
@@ -337,16 +319,8 @@ class DampingRatios(ModalParameters):
 
     damping_ratio: Any = ()
     kind: ClassVar[str] = "damping_ratios"
-
-    @property
-    def quantity(self) -> str:
-        """Variable of modes to compare, and the field with its measured values."""
-        return "damping_ratio"
-
-    @property
-    def unit(self) -> str:
-        """Unit of the values."""
-        return ""
+    quantity: ClassVar[str] = "damping_ratio"
+    unit: ClassVar[str] = ""
 
     def _check_values(self, values: NDArray[np.float64]) -> None:
         wrong = values[(values < 0.0) | (values >= 1.0)]
@@ -385,3 +359,141 @@ def _numbered(name: str, given: Any, count: int) -> NDArray[np.int64]:
             f"of the {count} modes"
         )
     return modes
+
+
+MOTION = "transmissibility"  # the quantity of a moving base; the others are per force
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FrequencyResponse(NodeValues):
+    """Frequency responses of nodes along an axis to the case's drive.
+
+    Complex values are compared by their real and imaginary parts.
+
+    Parameters
+    ----------
+    frequency : array_like, shape (f,)
+        Frequencies (Hz), increasing.
+    values : array_like, shape (f, m)
+        Response of each node, as `fd.frf` defines it: complex, for the time dependence exp(+i w t);
+        or its magnitude. NaN where not measured.
+    axis : {"x", "y", "z"}
+    quantity : {"receptance", "mobility", "accelerance", "transmissibility"}
+        Displacement (m/N), velocity (m/(N s)) or acceleration (m/(N s2)) per newton of the driving
+        forces, all their magnitudes together; or motion per motion of the base.
+    magnitude : bool
+        Whether the values are magnitudes.
+    sigma : float or array_like, shape (f, m), optional
+        Standard error of a real or an imaginary part, or of a magnitude.
+    """
+
+    frequency: Any = ()
+    axis: str = "x"
+    quantity: str = "receptance"
+    magnitude: bool = False
+    kind: ClassVar[str] = "frf"
+    analysis: ClassVar[str] = "frf"
+    each: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        super().__post_init__()
+        choice(self._of("axis"), self.axis, AXES)
+        choice(self._of("quantity"), self.quantity, RESPONSES)
+        frequency = column(self._of("frequency"), self.frequency)
+        if frequency[0] < 0.0 or (np.diff(frequency) <= 0.0).any():
+            raise InputError(f"{self._of('frequency')}: must increase from 0 Hz or more; sort it")
+        values = plain_array(self._of("values"), self.values)
+        wanted = "fiu" if self.magnitude else "c"
+        if values.dtype.kind not in wanted:
+            what = "magnitudes are real numbers" if self.magnitude else "must be complex numbers"
+            other = "leave out magnitude" if self.magnitude else "for magnitudes: magnitude = true"
+            raise InputError(f"{self._of('values')}: got {values.dtype}: {what} ({other})")
+        values = values.astype(np.float64 if self.magnitude else np.complex128)
+        values = self._per_node(values, len(frequency), "frequencies")
+        if not np.isfinite(values).any() or np.isinf(values).any():
+            raise InputError(f"{self._of('values')}: must be numbers, NaN where none was measured")
+        if self.magnitude and (values < 0.0).any():
+            raise InputError(f"{self._of('values')}: a magnitude cannot be negative")
+        self._set(frequency=frequency, values=values)
+        if isinstance(self.sigma, np.ndarray | list | tuple):
+            self._set(sigma=self._errors_of_lines())
+
+    def _errors_of_lines(self) -> NDArray[np.float64]:
+        sigma = plain_array(self._of("sigma"), self.sigma)
+        sigma = self._per_node(sigma, len(self.frequency), "frequencies", "sigma")
+        sound = sigma.dtype.kind in "fiu" and sigma.shape == self.values.shape
+        if not sound or not (sigma[np.isfinite(self.values)] > 0.0).all():
+            raise InputError(
+                f"{self._of('sigma')}: must be a number greater than 0 for each of the "
+                f"{self.values.shape} values"
+            )
+        return sigma.astype(np.float64)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values."""
+        unit = RESPONSES[self.quantity].units
+        return "" if unit == "1" else unit
+
+    def observed(self) -> NDArray[np.float64]:
+        """Measured values, flattened."""
+        return self._flat(self.values)
+
+    def errors(self) -> NDArray[np.float64]:
+        """Standard error of each measured value."""
+        if not isinstance(self.sigma, np.ndarray):
+            return super().errors()
+        return self._flat(self.sigma if self.magnitude else self.sigma * (1.0 + 1.0j))
+
+    def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
+        """Refuse a case that cannot predict these values."""
+        super().check(case, arguments)
+        if not METHODS[arguments["method"]].linear:
+            linear = ", ".join(name for name, one in METHODS.items() if one.linear)
+            raise InputError(
+                f"{self.name}: analysis.method = {show(arguments['method'])}: estimates a response "
+                "from motions, with an error that jumps with the parameters; fit with one of "
+                f"{linear}"
+            )
+        base = any(isinstance(one, BaseMotion) for one in arguments["drive"])
+        if base != (self.quantity == MOTION):
+            drive = "a base" if base else "forces"
+            raise InputError(
+                f"{self._of('quantity')} = {show(self.quantity)}: the case is driven by {drive}, "
+                f"which gives {MOTION if base else 'receptance, mobility or accelerance'}"
+            )
+        held = self.where(case)[case.fixed[self.where(case), AXES.index(self.axis)]]
+        if held.size and not base:
+            raise InputError(
+                f"{self._of('nodes')}: a support holds node {held[0]} along {self.axis}; name "
+                "nodes that move"
+            )
+
+    def examine(self, result: xr.Dataset, case: Case) -> None:
+        """Refuse a result without finite predictions."""
+        self.predicted(result, case)
+
+    def curves(self, result: xr.Dataset, case: Case) -> NDArray[np.complex128]:
+        """Response of the model at the measured frequencies, shape (f, m)."""
+        held = result if self.quantity == MOTION else convert(result, self.quantity)
+        lines = np.searchsorted(result["frequency"].values, self.frequency)
+        whole = held[self.quantity].transpose("frequency", "node", "axis").values
+        return whole[lines][:, self.where(case), AXES.index(self.axis)]
+
+    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
+        """Predictions of the measured values, in the order of `observed`."""
+        curves = self.curves(result, case)
+        lost = ~np.isfinite(curves).all(axis=1)
+        if lost.any():
+            raise ComputationError(
+                f"{self.name}: the model has no response at {self.frequency[lost][0]:g} Hz: a "
+                "resonance without damping, a body free to move at 0 Hz, or no convergence; give "
+                "the case damping, or leave this frequency out"
+            )
+        return self._flat(np.abs(curves) if self.magnitude else curves)
+
+    def _flat(self, curves: NDArray) -> NDArray[np.float64]:
+        """Measured entries, node by node: all real parts, then all imaginary parts."""
+        seen: NDArray[Any] = curves.T[np.isfinite(self.values).T]
+        return np.concatenate([np.real(seen), np.imag(seen)]) if np.iscomplexobj(seen) else seen

@@ -16,12 +16,13 @@ from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.measurement import Measurement, check_axes
 from foldyn.experiment.calibration.modal import (
+    MOTION,
     DampingRatios,
+    FrequencyResponse,
     ModeShapes,
     NaturalFrequencies,
     resisted,
 )
-from foldyn.experiment.calibration.responses import MOTION, FrequencyResponse
 from foldyn.experiment.calibration.tables import by_node, limits, listed_nodes, made
 from foldyn.linear import convert
 from foldyn.linear.frf import PER_FORCE, quantity_of
@@ -238,9 +239,9 @@ def _columns(
     named = next((name for name, of in UNITS_OF.items() if unit in of), None)
     if named is None:
         known = ", ".join(one for of in UNITS_OF.values() for one in of)
-        raise InputError(f"{file}: the unit [{unit}] is none of a response; use one of {known}")
+        raise InputError(f"{file}: [{unit}] is not a unit of a response; use one of {known}")
     if quantity is not None and quantity != named:
-        raise InputError(f"{file}: quantity = {show(quantity)}: its unit is of a {named}")
+        raise InputError(f"{file}: quantity = {show(quantity)}: the columns have a {named}")
     parts += ("sigma",) if "sigma" in there else ()
     base = UNITS_OF[named][0]
     fields = {

@@ -18,15 +18,14 @@ from foldyn.dynamics.methods import method_of
 from foldyn.dynamics.motion import Motion
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment.calibration.measurement import Measurement
-from foldyn.experiment.calibration.modal import ModalParameters, ModeShapes
-from foldyn.experiment.calibration.responses import FrequencyResponse
+from foldyn.experiment.calibration.modal import FrequencyResponse, ModalParameters, ModeShapes
 from foldyn.gradients.neighbors import Asked, equilibria, modes, motions, responses
 from foldyn.linear.modes import spectrum_of
 from foldyn.patterns import Pattern
 from foldyn.values import show
 
 STEADY = "generalized_alpha"  # integrator of a fit if the case file does not choose one
-# Relative change at which iterations for differences of motions end: in a search, at its end.
+# Relative change that ends the iterations for differences of motions: during a search, after it.
 SHARES = 1e-4, 1e-6
 # Analyses whose neighbors are computed more accurately than the result, so that it is recomputed as
 # one.
@@ -187,8 +186,8 @@ def _path(case: Case, members: Sequence[Measurement]) -> list[float]:
         return [*factors[factors < 0.0][::-1], *factors[factors >= 0.0]]
     if any(not np.array_equal(one, given[0]) for one in given[1:]):
         raise InputError(
-            "data: creases that yield depend on the way, and these measurements have different "
-            "ones: give what was measured along one path, or fit them apart"
+            "data: creases that yield depend on the way, which differs between these measurements: "
+            "give measurements along one path, or fit them separately"
         )
     return given[0][np.append(True, np.diff(given[0]) != 0.0)].tolist()
 
@@ -204,8 +203,8 @@ def steady(case_file: CaseFile) -> dict[str, Any]:
     method = method_of(given["method"])
     if method.adaptive:
         raise InputError(
-            f"{case_file.path}: analysis.method = {show(method.name)}: chooses its steps by their "
-            "error, which makes a misfit jump; fit with rk4, newmark or generalized_alpha"
+            f"{case_file.path}: analysis.method = {show(method.name)}: has adaptive steps, which "
+            "make the misfit jump; fit with rk4, newmark or generalized_alpha"
         )
     if method.implicit:
         given["tolerance"] = None

@@ -23,17 +23,17 @@ from foldyn.jit.compiled import strict
 from foldyn.values import number
 
 _CANDIDATES = 5  # candidates of Harris's measure per requested corner
-_DIRECTIONS = 120  # circle of samples around a point, in which edges are looked for
+_DIRECTIONS = 120  # samples on a circle around a point, to look for edges
 _APART = 4  # directions, at least, between two edges of a corner (12 degrees)
-_EDGES = 6  # of a corner, at most
+_EDGES = 6  # most edges of a corner
 _FAINTEST = 4.0  # least contrast (gray values) between the sides of an edge
-_RELATIVE = 0.12  # the same, relative to the strongest edge of the corner
-_PROFILES = 12  # across an edge, at least
+_RELATIVE = 0.12  # least contrast, relative to the corner's strongest edge
+_PROFILES = 12  # least number of profiles across an edge
 _STEP = 0.5  # pixels between samples across an edge
 _ROUNDS = 3
 _NARROWEST = 1.6  # pixels of room on each side of an edge
-_STRAIGHT = 0.35  # pixels, rms, by which an edge may deviate from a line
-_FLATTEST = 0.02  # smallest ratio of eigenvalues: below it edges are nearly parallel
+_STRAIGHT = 0.35  # pixels, rms: largest deviation of an edge from a line
+_FLATTEST = 0.02  # least ratio of eigenvalues; lower ones mean nearly parallel edges
 
 
 @dataclass(frozen=True)
@@ -107,9 +107,7 @@ def find_corners(
         blockSize=block, useHarrisDetector=True, k=0.05,
     )  # fmt: skip
     if candidates is None or not len(candidates):
-        raise InputError(
-            f"{place}: no corners found in it; take a sharp, well lit one, or another --roi"
-        )
+        raise InputError(f"{place}: no corners found; take a sharp, well lit one, or another --roi")
     junctions = refine(image, candidates.reshape(-1, 2), reach=reach, moved=0.6 * reach)
     # with more edges it is more likely a corner of the pattern than the end of a stain
     order = np.lexsort([junctions.error, -np.minimum(junctions.edges, 4)])

@@ -17,7 +17,7 @@ from foldyn.arguments import brief
 from foldyn.errors import InputError
 from foldyn.experiment.camera import axes_of_view
 from foldyn.experiment.tracking.corners import refine
-from foldyn.experiment.tracking.neighbors import Array, by_neighbors, distances
+from foldyn.experiment.tracking.follow import Array, by_neighbors, distances
 from foldyn.experiment.tracking.view import View, fit_view, hidden_nodes
 from foldyn.values import number
 
@@ -28,7 +28,7 @@ _BEST = 6  # number of placements that are refined
 _FEWEST = 6  # matched nodes, below which a placement is chance
 _LEAST_SHARE = 0.5  # share of the nodes that no panel hides
 _NEIGHBORS, _FIRMNESS = 6, 0.1  # neighbors whose positions correct a node: `by_neighbors`
-_STRAY = 0.2  # of the nodes' spacing, by which a node may deviate from its neighbors' prediction
+_STRAY = 0.2  # largest deviation from the neighbors' prediction, relative to the nodes' spacing
 
 
 @dataclass(frozen=True)
@@ -322,7 +322,7 @@ def _without_strays(place: Array, flat: Array, asked: NDArray[np.int64]) -> Arra
 
 
 def by_model(place: Array, flat: Array, asked: NDArray[np.int64]) -> Array:
-    """Predict requested nodes (n, 2) from their neighbors' deviation from the model's `flat`.
+    """Predict nodes (n, 2) from the deviation of their neighbors from the projected model, `flat`.
 
     NaN for all others, and where fewer than four neighbors are known.
     """

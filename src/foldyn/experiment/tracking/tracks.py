@@ -266,9 +266,7 @@ def _matched(
     asked = tracking.nodes or ()
     wrong = [node for node in asked if not 0 <= node < model.vertices]
     if wrong:
-        raise InputError(
-            f"--nodes: {wrong[0]} is no vertex of the model: 0 to {model.vertices - 1}"
-        )
+        raise InputError(f"--nodes: {wrong[0]}: the model has vertices 0 to {model.vertices - 1}")
     if len(asked) > len(corners):
         raise InputError(
             f"{place}: {len(corners)} points are tracked, fewer than the {len(asked)} nodes asked "

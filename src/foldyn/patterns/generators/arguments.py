@@ -65,9 +65,7 @@ def cell_counts(cells: Any, per_cell: int) -> tuple[int, int]:
             raise TypeError
         along_x, along_y = cells
     except (TypeError, ValueError):
-        raise InputError(
-            f" = {show(cells)}: must be two integers, the unit cells along x and y.", "cells"
-        ) from None
+        raise InputError(f" = {show(cells)}: give two integers, for x and y", "cells") from None
     nx, ny = whole("cells[0]", along_x, least=1), whole("cells[1]", along_y, least=1)
     check_size(f"cells = {show([nx, ny])}", per_cell * nx * ny)
     return nx, ny

@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.studies.herkal.metric import UP_TO, content, content_of, strongest_peak
-from foldyn.studies.herkal.runs import reported
-from foldyn.studies.herkal.sheet_models import REFERENCE, paper_rules
+from foldyn.studies.herkal.runs import REFERENCE, paper_rules, reported
 from foldyn.studies.herkal.study import Study, mean_ranks
 from foldyn.studies.targets import Target, Verdict, read_targets, verdicts
 
 TARGETS = Path(__file__).with_name("targets.toml")
 BAND = (1.4, 2.4)  # Hz: band of second peaks
-PROMINENCE = 0.01  # of a peak, relative to the highest amplitude
+PROMINENCE = 0.01  # least prominence of a peak, relative to the highest amplitude
 NO_VALUE = math.nan
 NO_MOTION = np.full((1, 2), math.nan)
 

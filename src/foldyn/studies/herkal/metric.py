@@ -1,7 +1,7 @@
 """Distance of a model from the shell: the paper's metric, and frequencies of similar modes.
 
-The metric, per node: the norm of the difference of the amplitude spectra up to a frequency, over
-the norm of the shell's spectrum; then the mean over the nodes that the case reports.
+The metric of a node is the norm of the difference of the amplitude spectra up to a frequency, over
+the norm of the shell's spectrum; the metric of a case is the mean over its reported nodes.
 """
 
 from __future__ import annotations
@@ -96,9 +96,7 @@ def deviation(amplitude: ArrayLike, reference: ArrayLike) -> NDArray[np.float64]
         )
     size = np.linalg.norm(theirs, axis=0)
     if (size == 0.0).any():
-        raise InputError(
-            f"reference: node column {int(np.argmin(size))} does not move; leave it out"
-        )
+        raise InputError(f"reference: node column {int(np.argmin(size))} is still; leave it out")
     return np.linalg.norm(ours - theirs, axis=0) / size
 
 

@@ -20,19 +20,9 @@ from foldyn.report import Heading, Listing, Section, Table, Text, write_report
 from foldyn.report.album import Album
 from foldyn.report.sections import cell
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
-from foldyn.studies.herkal import sensitivity_page, stiffnesses_page, variations
+from foldyn.studies.herkal import runs, sensitivity_page, stiffnesses_page, variations
 from foldyn.studies.herkal.claims import claims, paper_table, table1, tolerance
 from foldyn.studies.herkal.metric import FAR, LEAST_MAC, best
-from foldyn.studies.herkal.runs import SECANT, reported
-from foldyn.studies.herkal.sheet_models import (
-    AS_FILED,
-    REFERENCE,
-    case_study,
-    case_with,
-    label,
-    model_of,
-    paper_rules,
-)
 from foldyn.studies.herkal.specimen import page as specimen_page
 from foldyn.studies.herkal.specimen.page import NO_BREAK
 from foldyn.studies.herkal.study import FULL, RESULTS, Study, mean_ranks, second_table
@@ -98,7 +88,7 @@ def _opening(study: Study) -> str:
 
 
 def _papers(study: Study) -> list[str]:
-    return [m for m in study.plan.models if model_of(m).paper]
+    return [m for m in study.plan.models if runs.model_of(m).paper]
 
 
 def verdict(study: Study, varied: Variations | None = None) -> str:
@@ -121,10 +111,10 @@ def verdict(study: Study, varied: Variations | None = None) -> str:
         if len(known) < 3:
             continue
         ours, theirs = best(known), best({m: paper[case][m] for m in names})
-        same = "as in the paper" if ours == theirs else f"in the paper {label(theirs)}"
+        same = "as in the paper" if ours == theirs else f"in the paper {runs.label(theirs)}"
         parts.append(
-            f"Case {case[-1]}: {label(ours)} has the smallest error, {same}; the rank correlation "
-            f"with the paper's order is {rank_correlation(known, paper[case]):+.1f}."
+            f"Case {case[-1]}: {runs.label(ours)} has the smallest error, {same}; the rank "
+            f"correlation with the paper's order is {rank_correlation(known, paper[case]):+.1f}."
         )
     judged = [v for v in claims(study) if v.holds is not None]
     failing = [f"{v.target.what}: {v.computed:.3g}" for v in judged if v.holds is False]
@@ -143,7 +133,7 @@ def _why_so_wide(varied: Variations | None) -> str:
     """Explain the tolerance: how far the numbers move with what the paper leaves open."""
     if varied is None:
         return ""
-    filed, names = varied.filed(), paper_rules()
+    filed, names = varied.filed(), runs.paper_rules()
     changed = {what: varied.filed(**change) for what, change in WIDER.items()}
     moved = [
         f"{likeness(table, filed, names, tolerance()).median:.0%} with {what}"
@@ -182,7 +172,7 @@ def _second(study: Study) -> list[Section]:
         rows.append([case[-1], f"Foldyn,{NO_BREAK}{own}", *[cell(ours[m]) for m in row]])
         rows.append(["", f"OpenSees,{NO_BREAK}{divisions}", *row.values()])
     table = Table(
-        ["case", "shell, divisions", *map(label, study.plan.models)],
+        ["case", "shell, divisions", *map(runs.label, study.plan.models)],
         rows,
         "The same errors against a shell of OpenSees: triangles with transverse shear and springs "
         "between crease nodes. Its motions come with the package.",
@@ -199,7 +189,14 @@ def _table_1(study: Study) -> Table:
         rows.append([case[-1], "paper", *[paper.get(m) for m in models]])
         rows.append(["", "here", *[cell(row[m]) for m in models]])
     return Table(
-        ["case", "", *[label(m) if model_of(m).paper else f"{label(m)} (ours)" for m in models]],
+        [
+            "case",
+            "",
+            *[
+                runs.label(m) if runs.model_of(m).paper else f"{runs.label(m)} (ours)"
+                for m in models
+            ],
+        ],
         rows,
         "Table 1 of the paper and ours: mean error of the frequency content against the shell. The "
         "paper lacks the models marked as ours. Plate and n5b8e differ in stiffness, all others "
@@ -214,7 +211,7 @@ def rank_table(study: Study) -> Table:
     theirs, five = mean_ranks(paper, names), mean_ranks(study.table(models=names), names)
     every = mean_ranks(study.table(), study.plan.models)
     rows = [
-        [label(m), theirs.get(m), cell(five.get(m, math.nan)), cell(every[m]),
+        [runs.label(m), theirs.get(m), cell(five.get(m, math.nan)), cell(every[m]),
          *(cell(100.0 * _frequency_error(study, m, up_to)) for up_to in (BELOW, math.inf))]
         for m in study.plan.models
     ]  # fmt: skip
@@ -234,7 +231,7 @@ def _frequency_error(study: Study, model: str, up_to: float) -> float:
     """Mean error over the cases, for modes up to some multiple of a free plate's frequency."""
     errors = []
     for case in study.plan.cases:
-        found, file = study.frequencies(case, model), case_study(case)
+        found, file = study.frequencies(case, model), runs.case_study(case)
         if found is not None:
             low = found.reference < up_to * plate_frequency(file.pattern, file.sheet)
             off = np.abs(found.deviation[low])
@@ -256,7 +253,7 @@ def _claims(study: Study) -> Table:
 
 
 def _computed(verdict: Verdict) -> str:
-    """Table of the computations, with errors or deviations."""
+    """Computed value of a claim, with its deviation unless it keeps a bound."""
     found = f"{verdict.computed:.3g}"
     if verdict.target.bound is None or not verdict.holds:
         found += f" ({100.0 * verdict.deviation:+.1f} %)"
@@ -265,7 +262,7 @@ def _computed(verdict: Verdict) -> str:
 
 def _case(study: Study, case: str, album: Album, shown: Stage | None) -> list[Section | Stage]:
     """Geometry, statics, motion and modes of one case."""
-    case_file, (nodes, axis, up_to) = case_study(case), reported(case)
+    case_file, (nodes, axis, up_to) = runs.case_study(case), runs.reported(case)
     sections: list[Section | Stage] = [
         Heading(case_file.heading),
         *([shown] if shown else []),
@@ -288,15 +285,15 @@ def _case(study: Study, case: str, album: Album, shown: Stage | None) -> list[Se
             ),
             _statics(study.displacements(case), nodes, force),
         ]
-    motions = {m: study.result(case, m, "motion") for m in (REFERENCE, *study.plan.models)}
+    motions = {m: study.result(case, m, "motion") for m in (runs.REFERENCE, *study.plan.models)}
     for name, paper, what in (
         ("motion", True, "the paper's distributions"),
         ("motion-beyond", False, "the models beyond the paper"),
     ):
         moved = {
-            label(m): motion
+            runs.label(m): motion
             for m, motion in motions.items()
-            if motion is not None and (m == REFERENCE or model_of(m).paper == paper)
+            if motion is not None and (m == runs.REFERENCE or runs.model_of(m).paper == paper)
         }
         if len(moved) > 1:
             sections += album.figure(
@@ -350,7 +347,7 @@ def _errors(study: Study, case: str, nodes: list[int]) -> Table:
     errors = {m: study.node_errors(case, m) for m in study.plan.models}
     return Table(
         ["model", *[f"node {n}" for n in nodes], "mean"],
-        [[label(m), *e.tolist(), float(e.mean())] for m, e in errors.items() if e is not None],
+        [[runs.label(m), *e.tolist(), float(e.mean())] for m, e in errors.items() if e is not None],
         "Error of the frequency content against the shell, per node.",
         digits=3,
     )
@@ -369,7 +366,7 @@ def _modes(study: Study, case: str) -> Table:
             else "none"
             for f, d, m in zip(partners.frequency, partners.deviation, partners.mac, strict=True)
         ]
-        rows.append([label(model), *cells, cell(100.0 * partners.mean_error)])
+        rows.append([runs.label(model), *cells, cell(100.0 * partners.mean_error)])
     count = len(rows[0]) - 2 if rows else 0
     return Table(
         ["model", *[f"mode {k + 1}" for k in range(count)], "mean error (%)"],
@@ -377,14 +374,14 @@ def _modes(study: Study, case: str) -> Table:
         "Frequencies at rest of the shell's first modes and of their partners: Hz, deviation and "
         f"MAC at the vertices. Partners have a MAC of at least {LEAST_MAC:g} and frequencies less "
         f"than {FAR:g} times apart. Superlinear bends have no stiffness at rest: theirs is that of "
-        f"turns of {SECANT:g} degree. Plate and n5b8e have linear bends.",
+        f"turns of {runs.SECANT:g} degree. Plate and n5b8e have linear bends.",
         digits=2,
     )
 
 
 def _how(study: Study) -> str:
     n = study.plan.numerics
-    first = study.result(study.plan.cases[0], REFERENCE, "motion")
+    first = study.result(study.plan.cases[0], runs.REFERENCE, "motion")
     version = "" if first is None else f"Foldyn {first.attrs['foldyn_version']}. "
     return (
         f"{version}Shell: {n.divisions} divisions of every panel edge, lumped mass, Newmark's "
@@ -403,12 +400,12 @@ def stage_of(study: Study, case: str) -> Stage | None:
 
     Motions are stored at the pattern's vertices, which are the nodes of the coarsest shell.
     """
-    shown = {label(m): found[["displacement"]] for m, found in _motions(study, case).items()}
+    shown = {runs.label(m): found[["displacement"]] for m, found in _motions(study, case).items()}
     if not shown:
         return None
-    case_file = case_study(case)
-    coarse = case_with(case_file, REFERENCE, AS_FILED, divisions=1)
-    return stage(shown, dict.fromkeys(shown, coarse), case_file.heading, reported(case)[0])
+    case_file = runs.case_study(case)
+    coarse = runs.case_with(case_file, runs.REFERENCE, runs.AS_FILED, divisions=1)
+    return stage(shown, dict.fromkeys(shown, coarse), case_file.heading, runs.reported(case)[0])
 
 
 def inputs_of(study: Study, call: Call | None) -> list[Section]:
@@ -418,7 +415,7 @@ def inputs_of(study: Study, call: Call | None) -> list[Section]:
     for case in study.plan.cases:
         found = _motions(study, case)
         if found:
-            case_file = case_study(case)
+            case_file = runs.case_study(case)
             table = inputs_table(inputs(case_file, case_file.case(), found))
             sections += [Heading(case_file.heading, level=3), table]
             sections.append(Listing(f"The case file {case_file.path.name}", case_file.text))
@@ -428,5 +425,5 @@ def inputs_of(study: Study, call: Call | None) -> list[Section]:
 
 def _motions(study: Study, case: str) -> dict[str, xarray.Dataset]:
     """The stored motions of a case by model, starting with the shell."""
-    motions = {m: study.result(case, m, "motion") for m in (REFERENCE, *study.plan.models)}
+    motions = {m: study.result(case, m, "motion") for m in (runs.REFERENCE, *study.plan.models)}
     return {m: motion for m, motion in motions.items() if motion is not None}

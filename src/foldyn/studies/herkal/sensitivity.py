@@ -20,17 +20,9 @@ import foldyn
 from foldyn.analyses import CaseFile
 from foldyn.input_files import from_json, read_text
 from foldyn.store import Store, stamp_of
+from foldyn.studies.herkal import runs
 from foldyn.studies.herkal.metric import errors, partners
-from foldyn.studies.herkal.runs import Job, Numerics, case_file_digest, compute, program, reported
-from foldyn.studies.herkal.sheet_models import (
-    AS_FILED,
-    LOADS,
-    OTHERS,
-    REFERENCE,
-    Variant,
-    case_study,
-    rules,
-)
+from foldyn.studies.herkal.runs import Job, Numerics, Variant
 from foldyn.studies.herkal.variations import Variations
 from foldyn.studies.pool import Task
 from foldyn.writing import write_text
@@ -39,12 +31,12 @@ PULSES = (0.1, 0.25, 0.5, 1.0)  # s
 BEND_LAWS = ("superlinear", "linear")
 CALIBRATIONS = ("standard", "merlin2")
 # Models compared with the shell: the distributions, and equi-inertial in the other orientation.
-MODELS = (*rules(), *OTHERS)
+MODELS = (*runs.rules(), *runs.OTHERS)
 
 MOST = 64  # largest stored file (MiB)
 
 
-def stiffnesses(load: Variant = AS_FILED) -> list[Variant]:
+def stiffnesses(load: Variant = runs.AS_FILED) -> list[Variant]:
     """Variants of bars and hinges under one load."""
     laws = product(BEND_LAWS, CALIBRATIONS)
     return [Variant(load.pulse, load.loads, *law) for law in laws]
@@ -53,7 +45,7 @@ def stiffnesses(load: Variant = AS_FILED) -> list[Variant]:
 def load_sets(case_file: CaseFile) -> tuple[str, ...]:
     """Sets of loaded nodes; a single one if the case file loads the whole edge."""
     loaded = {node for load in case_file.case().loads for node in getattr(load, "nodes", ())}
-    return LOADS[:1] if loaded == set(case_file.output.nodes.tolist()) else LOADS
+    return runs.LOADS[:1] if loaded == set(case_file.output.nodes.tolist()) else runs.LOADS
 
 
 def _digest(rows: Any) -> str:
@@ -104,8 +96,8 @@ class Comparison(Task):
         """Everything that its result depends on."""
         return {
             "task": self.name,
-            "case_file": case_file_digest(self.case),
-            "program": program(),
+            "case_file": runs.case_file_digest(self.case),
+            "program": runs.program(),
             "models": list(MODELS),
             **asdict(self.numerics),
         }
@@ -116,20 +108,20 @@ class Comparison(Task):
 
     def _errors(self, load: Variant) -> Iterator[dict[str, Any]]:
         """Errors of the frequency content under one load."""
-        shown = reported(self.case)
-        reference = compute(Job(self.case, REFERENCE, "motion", self.numerics, load))
+        shown = runs.reported(self.case)
+        reference = runs.compute(Job(self.case, runs.REFERENCE, "motion", self.numerics, load))
         for variant in stiffnesses(load):
             row = {"case": self.case, **asdict(variant)}
             for model in MODELS:
-                motion = compute(Job(self.case, model, "motion", self.numerics, variant))
+                motion = runs.compute(Job(self.case, model, "motion", self.numerics, variant))
                 row[model] = float(errors(motion, reference, *shown).mean())
             yield row
 
     def _frequencies(self) -> Iterator[dict[str, Any]]:
         """First frequencies compared with the shell's."""
-        reference = compute(Job(self.case, REFERENCE, "modes", self.numerics))
+        reference = runs.compute(Job(self.case, runs.REFERENCE, "modes", self.numerics))
         for variant, model in product(stiffnesses(), MODELS):
-            ours = compute(Job(self.case, model, "modes", self.numerics, variant))
+            ours = runs.compute(Job(self.case, model, "modes", self.numerics, variant))
             found = partners(reference, ours)
             for k, shell in enumerate(found.reference):
                 yield {
@@ -147,7 +139,9 @@ class Comparison(Task):
 def tasks(cases: Iterable[str], numerics: Numerics) -> list[Comparison]:
     """All tasks, the longest first."""
     names = list(cases)
-    loads = [(case, loaded) for case in reversed(names) for loaded in load_sets(case_study(case))]
+    loads = [
+        (case, loaded) for case in reversed(names) for loaded in load_sets(runs.case_study(case))
+    ]
     found = [  # case 1 is the smallest
         Comparison(case, numerics, Variant(pulse, loaded))
         for (case, loaded), pulse in product(loads, PULSES)

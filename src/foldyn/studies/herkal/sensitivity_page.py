@@ -13,18 +13,12 @@ from foldyn.plots import style
 from foldyn.report import Heading, Section, Table, Text
 from foldyn.report.album import Album
 from foldyn.report.sections import cell
+from foldyn.studies.herkal import variations
 from foldyn.studies.herkal.claims import paper_table
 from foldyn.studies.herkal.metric import best
+from foldyn.studies.herkal.runs import OTHERS, label, paper_rules, rules
 from foldyn.studies.herkal.sensitivity import BEND_LAWS, CALIBRATIONS, PULSES
-from foldyn.studies.herkal.sheet_models import OTHERS, label, paper_rules, rules
-from foldyn.studies.herkal.variations import (
-    FILED,
-    Errors,
-    Variations,
-    frequency_errors,
-    likeness,
-    standings,
-)
+from foldyn.studies.herkal.variations import Variations
 
 LOADED = {"file": "as filed", "edge": "whole edge"}
 SIDES = {"superlinear": (-0.3, style.BLUE), "linear": (0.08, style.ORANGE)}
@@ -122,7 +116,7 @@ def opinion(found: Variations) -> str:
         if not rows:
             continue
         hits = sum(best({m: r[m] for m in names}) == best(paper[r["case"]]) for r in rows)
-        ranked = standings(rows, names)
+        ranked = variations.standings(rows, names)
         first = min(ranked, key=lambda m: ranked[m].mean_rank)
         worst = max(one.worst_rank for one in ranked.values())
         spared = [label(m) for m, one in ranked.items() if one.worst_rank < worst]
@@ -147,8 +141,8 @@ def one_at_a_time(found: Variations, tolerance: float) -> Table:
         table = found.filed(**change)
         if not table:
             continue
-        near = likeness(table, paper_table(), names, tolerance)
-        moved = likeness(table, filed, names, tolerance)
+        near = variations.likeness(table, paper_table(), names, tolerance)
+        moved = variations.likeness(table, filed, names, tolerance)
         sizes = [round(100.0 * size) if change else None for size in (moved.median, moved.largest)]
         cases = near.of // len(names)
         rows.append([what, f"{near.within} of {near.of}", f"{near.same_best} of {cases}",
@@ -166,7 +160,10 @@ def one_at_a_time(found: Variations, tolerance: float) -> Table:
 
 
 def _best_table(
-    found: Variations, titles: list[str], tables: Iterable[tuple[Any, Any, Errors]], caption: str
+    found: Variations,
+    titles: list[str],
+    tables: Iterable[tuple[Any, Any, variations.Errors]],
+    caption: str,
 ) -> Table:
     """Best of the five distributions and its error by case, for pairs of settings."""
     cases, rows = list(found.filed()), []
@@ -182,9 +179,9 @@ def _best_table(
 
 def by_load(found: Variations) -> Table:
     """Best of the five by load, with the files' bars and hinges."""
-    tables: list[tuple[Any, Any, Errors]] = []
+    tables: list[tuple[Any, Any, variations.Errors]] = []
     for loads, pulse in product(LOADED, PULSES):
-        rows = found.chosen(**{**FILED, "loads": loads, "pulse": pulse})
+        rows = found.chosen(**{**variations.FILED, "loads": loads, "pulse": pulse})
         tables.append((LOADED[loads], pulse, {row["case"]: row for row in rows}))
     return _best_table(
         found,
@@ -209,7 +206,7 @@ def by_stiffness(found: Variations) -> Table:
 def over_all(found: Variations, law: str) -> Table:
     """Ranks of each distribution over all combinations with one law of the bends."""
     chosen = found.chosen(bend_law=law)
-    five, every = standings(chosen, paper_rules()), standings(chosen, rules())
+    five, every = variations.standings(chosen, paper_rules()), variations.standings(chosen, rules())
     rows: list[list[Any]] = []
     for model, among in every.items():
         own = five.get(model)
@@ -246,7 +243,7 @@ def frequencies(found: Variations) -> Table:
     """Errors of the first frequencies, which do not depend on the load."""
     names = (*rules(), TURNED)
     columns = [
-        frequency_errors(
+        variations.frequency_errors(
             [r for r in found.frequencies if (r["bend_law"], r["calibration"]) == one], names
         )
         for one in STIFFNESSES

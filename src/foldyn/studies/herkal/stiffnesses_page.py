@@ -9,8 +9,7 @@ import numpy as np
 
 from foldyn.report import Heading, Section, Table, Text
 from foldyn.studies.herkal.claims import TARGETS
-from foldyn.studies.herkal.runs import case_study
-from foldyn.studies.herkal.sheet_models import BARS_AND_HINGES
+from foldyn.studies.herkal.runs import BARS_AND_HINGES, case_study
 from foldyn.studies.herkal.specimen.page import NO_BREAK
 from foldyn.studies.herkal.stiffnesses import OWN, PEAKED, Rows
 from foldyn.studies.herkal.study import Study

@@ -10,17 +10,9 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from foldyn.studies.herkal import metric, stiffnesses
+from foldyn.studies.herkal import metric, runs, stiffnesses
 from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
-from foldyn.studies.herkal.runs import Job, Numerics, reported
-from foldyn.studies.herkal.sheet_models import (
-    AS_FILED,
-    CASES,
-    REFERENCE,
-    Variant,
-    compared,
-    model_of,
-)
+from foldyn.studies.herkal.runs import Job, Numerics, Variant
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.synthetic import COARSE, PAPERS, Shot
 from foldyn.studies.herkal.specimen.tasks import Part, parts
@@ -48,8 +40,8 @@ class StudyPlan:
     """
 
     numerics: Numerics = field(default_factory=Numerics)
-    cases: tuple[str, ...] = CASES
-    models: tuple[str, ...] = field(default_factory=compared)
+    cases: tuple[str, ...] = runs.CASES
+    models: tuple[str, ...] = field(default_factory=runs.compared)
     shot: Shot = PAPERS
     meshes: tuple[int, int] = MESHES
 
@@ -58,7 +50,7 @@ class StudyPlan:
         found = [
             Job(case, model, kind, self.numerics)
             for kind in ("motion", "modes")
-            for model in (REFERENCE, *self.models)
+            for model in (runs.REFERENCE, *self.models)
             for case in self.cases
         ]
         return found + [
@@ -74,10 +66,10 @@ class StudyPlan:
     def paths(self) -> dict[str, tuple[str, Variant]]:
         """Model and variant of each stiffness, by label: mass does not matter in statics."""
         found: dict[str, tuple[str, Variant]] = {}
-        for name in (REFERENCE, *self.models):
-            stiffness = model_of(name).statics
-            found.setdefault(stiffness, (name, AS_FILED))
-            if model_of(name).distribution:
+        for name in (runs.REFERENCE, *self.models):
+            stiffness = runs.model_of(name).statics
+            found.setdefault(stiffness, (name, runs.AS_FILED))
+            if runs.model_of(name).distribution:
                 found.setdefault(f"{stiffness}, linear bends", (name, LINEAR))
         return found
 
@@ -127,7 +119,7 @@ class Study:
         return ended + run(then, results, tell, processes=1)
 
     def result(
-        self, case: str, model: str, kind: str, variant: Variant = AS_FILED
+        self, case: str, model: str, kind: str, variant: Variant = runs.AS_FILED
     ) -> xarray.Dataset | None:
         """Result of a computation, or None if missing."""
         job = Job(case, model, kind, self.plan.numerics, variant)  # type: ignore[arg-type]
@@ -141,15 +133,17 @@ class Study:
         return task.result(self.folder / RESULTS)
 
     # ------------------------------------------------------------------ tables
-    def node_errors(self, case: str, model: str, variant: Variant = AS_FILED) -> NDArray | None:
+    def node_errors(
+        self, case: str, model: str, variant: Variant = runs.AS_FILED
+    ) -> NDArray | None:
         """Deviation of the frequency content from the shell's, per node."""
-        reference = self.result(case, REFERENCE, "motion", variant.of_shell)
+        reference = self.result(case, runs.REFERENCE, "motion", variant.of_shell)
         motion = self.result(case, model, "motion", variant)
         if reference is None or motion is None:
             return None
-        return metric.errors(motion, reference, *reported(case))
+        return metric.errors(motion, reference, *runs.reported(case))
 
-    def error(self, case: str, model: str, variant: Variant = AS_FILED) -> float:
+    def error(self, case: str, model: str, variant: Variant = runs.AS_FILED) -> float:
         """The paper's metric, nan if a motion is missing."""
         found = self.node_errors(case, model, variant)
         return float("nan") if found is None else float(found.mean())
@@ -161,7 +155,7 @@ class Study:
 
     def displacements(self, case: str) -> dict[str, NDArray]:
         """Static displacement (m) of the reported nodes at full load, by path."""
-        nodes, axis, _ = reported(case)
+        nodes, axis, _ = runs.reported(case)
         return {
             label: path["displacement"].sel(node=nodes, axis=axis).values[-1]
             for label, path in self.paths(case).items()
@@ -177,7 +171,7 @@ class Study:
 
     def frequencies(self, case: str, model: str) -> metric.Partners | None:
         """Modes of a model matched with the shell's."""
-        reference = self.result(case, REFERENCE, "modes")
+        reference = self.result(case, runs.REFERENCE, "modes")
         ours = self.result(case, model, "modes")
         if reference is None or ours is None:
             return None
@@ -207,7 +201,7 @@ def second_table(study: Study) -> dict[str, tuple[int, dict[str, float]]]:
 
 
 def _second_row(study: Study, case: str, divisions: int, dt: float) -> dict[str, float]:
-    nodes, axis, up_to = reported(case)
+    nodes, axis, up_to = runs.reported(case)
     theirs = read_motion(case, divisions, dt)
     if theirs.node.tolist() != nodes:
         return {}

@@ -22,15 +22,8 @@ from foldyn.report.sections import cell
 from foldyn.results import case_of, load, netcdf
 from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import BAND, DAMPING, FOLDS, WATCHED
-from foldyn.studies.herkal.specimen import synthetic, tasks
-from foldyn.studies.herkal.specimen.evaluation import (
-    FILM_SUPPORT,
-    NEAR,
-    content,
-    content_misfit,
-    misfit,
-    vibration_of,
-)
+from foldyn.studies.herkal.specimen import evaluation, synthetic, tasks
+from foldyn.studies.herkal.specimen.evaluation import FILM_SUPPORT
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.tasks import Part
 from foldyn.studies.herkal.vibration import CORNER, ORDINALS, TARGETS, Response
@@ -60,8 +53,8 @@ def plot_front_content(front: xr.Dataset, support: str, label: str, note: str) -
     step = sampling_interval(front["time"].values)
     curves = {}
     for node in front["node"].values.tolist():
-        film = content(front["whole"].sel(node=node).values, step)
-        said = content(front["model"].sel(node=node, support=support).values, step)
+        film = evaluation.content(front["whole"].sel(node=node).values, step)
+        said = evaluation.content(front["model"].sel(node=node, support=support).values, step)
         if film is not None and said is not None:
             curves[node] = (*film, said[1])
     return _grid(curves, ("frequency (Hz)", "x (mm)"), label, note)
@@ -116,7 +109,7 @@ def plot_supports(front: xr.Dataset, label: str, note: str) -> Figure:
 
 
 def _plot_content(axes: Axes, x: NDArray[np.float64], step: float, look: Mapping) -> None:
-    found = content(x, step)
+    found = evaluation.content(x, step)
     if found is not None:
         axes.plot(found[0], 1e3 * found[1], **look)
 
@@ -311,7 +304,7 @@ def _vibrations(front: xr.Dataset, data: Data) -> list[Section]:
     curves |= {
         f"model: {name}": at["model"].sel(support=key) for key, name in SUPPORT_NAMES.items()
     }
-    found = {name: vibration_of(x.values, step) for name, x in curves.items()}
+    found = {name: evaluation.vibration_of(x.values, step) for name, x in curves.items()}
     paper = _targets()
     rows: list[list[Any]] = [
         ["paper", paper["release_frequency"].value, None, paper["release_damping"].value]
@@ -322,8 +315,8 @@ def _vibrations(front: xr.Dataset, data: Data) -> list[Section]:
         ["", "spectrum's peak (Hz)", "maxima (Hz)", "decrement (%)"],
         rows,
         f"Vibration of node {WATCHED} along x: the highest peak of its spectrum between "
-        f"{NEAR[0]:g} and {NEAR[1]:g} Hz; the frequency of its maxima over time, and the damping "
-        "by their logarithmic decrement, as the paper has it.",
+        f"{evaluation.NEAR[0]:g} and {evaluation.NEAR[1]:g} Hz; as in the paper, the frequency of "
+        "its maxima over time, and damping by their logarithmic decrement.",
         digits=3,
     )
     held, alone = (found[f"model: {SUPPORT_NAMES[key]}"].peak for key in (FILM_SUPPORT, ALONE))
@@ -368,8 +361,8 @@ def _agreement(front: xr.Dataset) -> Table:
         both = at["model"].sel(support=[FILM_SUPPORT, "plate"]).values
         rows.append(
             [node, "fitted" if node == WATCHED else f"held{NO_BREAK}out",
-             *[100.0 * misfit(film, x) for x in both],
-             *[cell(100.0 * content_misfit(whole, x, step)) for x in both]]
+             *[100.0 * evaluation.misfit(film, x) for x in both],
+             *[cell(100.0 * evaluation.content_misfit(whole, x, step)) for x in both]]
         )  # fmt: skip
     return Table(
         ["node", "", "time: glued (%)", "time: ideal (%)", "frequency: glued (%)",
