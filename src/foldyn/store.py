@@ -1,8 +1,8 @@
 """Results stored in files, so that interrupted work can continue.
 
 A file holds a stamp of everything that its result depends on, including a digest of the program's
-sources (`foldyn.program`). Results of other inputs or another program, and damaged files, are
-ignored and computed again.
+sources. Results of other inputs or another program, and damaged files, are ignored and computed
+again.
 """
 
 from __future__ import annotations
@@ -11,12 +11,47 @@ import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from foldyn.errors import warn
 
 Result = TypeVar("Result")
+
+
+COMPUTING = (
+    "jit", "patterns", "materials", "mechanics", "algebra", "structures", "shells", "cases",
+    "statics", "dynamics", "linear", "signals",
+)  # fmt: skip
+"""Folders of the package whose changes outdate stored results."""
+
+
+@cache
+def program(*more: str) -> str:
+    """Digest of the program, "1f0c6a2b9d3e4f58".
+
+    Parameters
+    ----------
+    *more : str
+        Further files and folders of the package on which a result depends.
+    """
+    return digest(Path(__file__).parent, *more)
+
+
+def digest(package: Path, *more: str) -> str:
+    """Digest of the sources of a package that compute."""
+    sources = [path for part in (*COMPUTING, *more) for path in _sources(package / part)]
+    found = hashlib.sha256()
+    for path in sorted(sources):
+        found.update(path.relative_to(package).as_posix().encode())
+        found.update(path.read_bytes())
+    return found.hexdigest()[:16]
+
+
+def _sources(part: Path) -> list[Path]:
+    inside = [path for path in part.rglob("*") if path.suffix in (".py", ".toml")]
+    return [part] if part.is_file() else inside
 
 
 @dataclass(frozen=True)

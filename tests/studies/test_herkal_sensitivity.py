@@ -12,7 +12,7 @@ import pytest
 import foldyn as fd
 from foldyn.cli.main import main
 from foldyn.errors import FoldynWarning
-from foldyn.program import digest
+from foldyn.store import digest
 from foldyn.studies.herkal import report, runs, sensitivity, sensitivity_page, variations
 from foldyn.studies.herkal import study as studies
 from foldyn.studies.herkal.claims import paper_table, tolerance

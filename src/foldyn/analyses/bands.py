@@ -1,9 +1,14 @@
-"""Bands of a repeated case: [analysis] of kind "bands", arguments of `UnitCell` and `bands`."""
+"""Bands of a repeated case: [analysis] of kind "bands", arguments of `UnitCell` and `bands`.
+
+The case may be at rest, stretched, in a stored state, or in several states.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import Annotated, Any
@@ -15,15 +20,15 @@ from numpy.typing import NDArray
 from foldyn import plots
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
-from foldyn.analyses.cell_states import CellState, cell_states, coordinate, one_key
-from foldyn.analyses.ranges import Varied
+from foldyn.analyses.ranges import Varied, varied
 from foldyn.analyses.sections import AnalysisSection, Count, Positive, Text, whole_number
-from foldyn.analyses.vibration import About, Secant, VibrationSchema, bar_closed
+from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
 from foldyn.arguments import Check, Placed
-from foldyn.cases import Case
+from foldyn.cases import Case, State
 from foldyn.cases.loads import Actuate
-from foldyn.errors import InputError
-from foldyn.linear import UnitCell, attenuation, band_gaps, bands, damped_bands, modes
+from foldyn.cases.units import unit_of
+from foldyn.errors import ComputationError, InputError
+from foldyn.linear import UnitCell, attenuation, band_gaps, bands, damped_bands, modes, relaxed
 from foldyn.linear.band_structure import ALL
 from foldyn.patterns.screw import Screw
 from foldyn.report.album import Album, ByRule, by_mass_rule
@@ -33,7 +38,7 @@ from foldyn.report.sections import Text as PageText
 from foldyn.results.dataset import bands_dataset
 from foldyn.results.quantities import BANDS, GAPS
 from foldyn.tables import Section, TableOf
-from foldyn.values import indices, number, number_or_list
+from foldyn.values import indices, number, number_or_list, one_or_each, show
 
 AROUND = {1: "G-X", 2: "G-X-M-Y-G"}
 """Paths around the zone by its dimensions, where a file names none."""
@@ -42,6 +47,163 @@ MOST_LEVELS = 10_000
 ABOVE = 1.05
 """Where the frequencies of an attenuation spectrum end, over the highest one of the bands."""
 COORDINATES = ("distance", "wave_vector", "zone_wave_vector", "leg")
+
+
+MOST_STATES = 200
+ASIDE = ("analysis", "output", "sweep", "design", "title")
+"""Tables and keys that make no other state,"""
+PERIODS = "periods"
+STATED = ("stretch", "turn")
+"""but for these of [analysis]."""
+
+
+def one_key(value: Any) -> Varied:
+    """The one key along which the states of a file follow each other."""
+    one, *more = varied(value, sampled=False)
+    if more:
+        raise InputError(
+            f" = {show(value)}: names {1 + len(more)} keys; give the one along which the states "
+            "follow each other (foldyn sweep varies several)"
+        )
+    table, _, key = one.key.partition(".")
+    if table in ASIDE and not (table == "analysis" and key.partition("[")[0] in STATED):
+        raise InputError(f": {one.key} makes no other state; vary a key of another table")
+    if not one.numeric or len(one.values) > MOST_STATES:
+        raise InputError(f" = {show(value)}: give numbers, at most {MOST_STATES}")
+    return one
+
+
+@dataclass(frozen=True, eq=False)
+class CellState:
+    """A repeated case in one of the states of a file.
+
+    Attributes
+    ----------
+    cell : UnitCell
+    start : mapping
+        Arguments of `bands` for a stored state, if the file names one.
+    given : mapping
+        Table [analysis].
+    varied : Varied or None
+        What the file varies, and its `value` here.
+    """
+
+    cell: UnitCell
+    start: Mapping[str, Any]
+    given: Mapping[str, Any]
+    varied: Varied | None = None
+    value: Any = None
+
+    def arguments(self) -> dict[str, Any]:
+        """Arguments of `bands`: the state, the load factor and the secant amplitude.
+
+        Raises
+        ------
+        InputError
+            Factors that do not fit the periods.
+        ComputationError
+            There is no equilibrium.
+        """
+        own = {"secant": self.given["secant"], **self.start}
+        stretch, turn = self.given["stretch"], self.given["turn"]
+        if stretch is None and turn is None and self.given["state"] == "rest":
+            return own
+        return own | {"state": self._relaxed(stretch, turn, own.get("state"))}
+
+    def _relaxed(self, stretch: Any, turn: float | None, state: State | None) -> State:
+        """The equilibrium with the periods that the file asks for."""
+        cell = self.cell
+        factors = np.ones(cell.dimensions)
+        if stretch is not None:
+            factors = factors * one_or_each("stretch", stretch, cell.dimensions, "periods")
+        if turn is not None and not any(motion.turns for motion in cell.motions):
+            raise InputError(f" = {turn:g}: the cell repeats without a screw; leave it out", "turn")
+        motions = [
+            replace(
+                motion, shift=factor * motion.shift,
+                angle=turn if turn is not None and motion.turns else motion.angle,
+            )
+            for motion, factor in zip(cell.motions, factors, strict=True)
+        ]  # fmt: skip
+        return relaxed(cell, motions, state=state)
+
+    @contextmanager
+    def placed(self) -> Iterator[None]:
+        """Say in which state something is wrong, and that a stored one is."""
+        with _placed(self.varied, self.value):
+            try:
+                yield
+            except InputError as error:
+                if error.field != "state" or not self.start:
+                    raise
+                raise InputError(error.reason, "initial") from None
+
+
+def cell_states(case_file: CaseFile, mass: str, given: Mapping[str, Any]) -> list[CellState]:
+    """The states of a file, each with its cell."""
+    vary: Varied | None = given["vary"]
+    states = []
+    for value in (None,) if vary is None else vary.values:
+        with _placed(vary, value):
+            here, own = case_file, given
+            if vary is not None:
+                here = case_file.with_values({vary.key: value})
+            if vary is not None and vary.key.startswith("analysis."):
+                own = {**given, **{key: here.analysis.arguments[key] for key in STATED}}
+            cell = _cell(here.case(mass), given)
+            states.append(CellState(cell, about(here, mass), own, vary, value))
+    if len({len(state.cell.case.structure.nodes) for state in states}) > 1:
+        raise InputError(
+            ": the states have different numbers of nodes, and a result has one cell; vary another "
+            "key, or take foldyn sweep",
+            "vary",
+        )
+    return states
+
+
+def _cell(case: Case, given: Mapping[str, Any]) -> UnitCell:
+    """The cell of a case, which repeats as the file says."""
+    vectors, screw, tolerance = given["vectors"], given["screw"], given["tolerance"]
+    if given["periods"] is None:
+        return UnitCell(case, vectors, screw, tolerance)
+    if vectors is not None or screw is not None:
+        raise InputError(
+            ": chooses among those of the pattern; leave out vectors and screw", PERIODS
+        )
+    motions = UnitCell(case, tolerance=tolerance).motions
+    chosen = given["periods"]
+    if not 0 <= min(chosen) <= max(chosen) < len(motions):
+        raise InputError(
+            f" = {show(chosen)}: the pattern has the periods 0 to {len(motions) - 1}", PERIODS
+        )
+    kept = [motions[k] for k in chosen]
+    vectors = [motion.vector for motion in kept if not motion.turns]
+    screw = next((motion for motion in kept if motion.turns), None)
+    return UnitCell(case, np.array(vectors) if vectors else None, screw, tolerance)
+
+
+@contextmanager
+def _placed(vary: Varied | None, value: Any) -> Iterator[None]:
+    if vary is None:
+        yield
+        return
+    where = f"{vary.key} = {show(value)}"
+    try:
+        yield
+    except InputError as error:
+        reason = f"{error.reason} (with {where})"
+        raise InputError(reason, error.field, error.file, error.others) from None
+    except ComputationError as error:
+        raise ComputationError(f"{where}: {error}") from None
+
+
+def coordinate(vary: Varied) -> tuple[str, NDArray, dict[str, str]]:
+    """Coordinate of the states."""
+    word = vary.key.rpartition(".")[2]
+    bare = word.partition("[")[0]
+    unit = unit_of(bare, vary.values[0])
+    text = {"key": vary.key, "long_name": word.replace("_", " ")}
+    return "state", np.array(vary.values), text | ({"units": unit} if unit else {})
 
 
 class BandsSection(AnalysisSection):

@@ -32,12 +32,11 @@ from foldyn.dynamics.gpu.choice import DEVICES
 from foldyn.dynamics.progress import Progress, Reporter
 from foldyn.errors import InputError, told_once, warn
 from foldyn.linear.time_domain import reported
-from foldyn.program import program
 from foldyn.ram_limit import check_memory
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import PLACE, variable
 from foldyn.results.seal import seal, sound
-from foldyn.store import Store, name_of
+from foldyn.store import Store, name_of, program
 from foldyn.values import choice, number, numbers, of_kind, show, whole
 
 AT_ONCE = 256  # motions

@@ -22,7 +22,7 @@ from foldyn.errors import ComputationError, FoldynError, InputError, Told, withi
 from foldyn.gradients.measures import derivative_of, one_number
 from foldyn.gradients.run_sensitivity import FUNCTIONS, case_file_at, sensitivity
 from foldyn.input_files import path_of
-from foldyn.program import program
+from foldyn.store import program
 from foldyn.sweeps.evaluations import Evaluation
 from foldyn.sweeps.job import ASIDE, Job, code_of
 from foldyn.sweeps.measure import Asked

@@ -31,10 +31,10 @@ from foldyn.dynamics.system import PackedCase
 from foldyn.errors import ComputationError, InputError
 from foldyn.lock import LockedError, locked
 from foldyn.mechanics.inelastic import HingeMemory
-from foldyn.program import program
 from foldyn.results.columns import Columns
 from foldyn.results.netcdf import check_target, load, save
 from foldyn.results.seal import seal, sound
+from foldyn.store import program
 from foldyn.values import flag, number, show
 from foldyn.writing import remove_leftovers, whole
 

@@ -17,7 +17,7 @@ from foldyn.analyses.casefile import Moving
 from foldyn.analyses.keys import Tie, files_of, replaced
 from foldyn.analyses.reading import case_of_document
 from foldyn.errors import ComputationError, InputError, Told
-from foldyn.program import program
+from foldyn.store import program
 from foldyn.sweeps.evaluations import Evaluation
 from foldyn.sweeps.measure import Asked, Loaded
 from foldyn.sweeps.points import Point

@@ -26,7 +26,7 @@ from foldyn.experiment.calibration.parameters import Beside, Parameter, Space, s
 from foldyn.experiment.calibration.predicted_run import PredictedRun
 from foldyn.experiment.camera import Sight
 from foldyn.input_files import path_of
-from foldyn.program import program
+from foldyn.store import program
 from foldyn.values import listed, show
 
 # Fields of measurements that do not affect predictions.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.folding import check_fold_angles, check_fraction
+from foldyn.cases.loads import check_fold_angles, check_fraction
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.patterns.crease_data import folded_rows, vertex_pair

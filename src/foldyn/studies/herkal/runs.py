@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import xarray
 
-from foldyn import program as programs
+from foldyn import store
 from foldyn.analyses import CaseFile, read_case
 from foldyn.cases import Case, Force, HalfSine
 from foldyn.dynamics import simulate
@@ -297,7 +297,7 @@ class Job(Task):
 
 def program() -> str:
     """Digest of the program that computes the case studies."""
-    return programs.program(*COMPUTING)
+    return store.program(*COMPUTING)
 
 
 def case_file_digest(case: str) -> str:

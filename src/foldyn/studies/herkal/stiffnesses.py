@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from foldyn import program as programs
+from foldyn import store
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.analyses import read_case
 from foldyn.linear.fidelity import MODELS, fidelity, small_loads
@@ -72,7 +72,7 @@ class Stiffness(Task):
         return {
             "task": self.name,
             "case_files": [case_file_digest(file) for file in files],
-            "program": programs.program(*COMPUTING),
+            "program": store.program(*COMPUTING),
             **mesh,
         }
 

@@ -11,8 +11,8 @@ from typing import Any, Literal
 import numpy as np
 import xarray
 
-from foldyn.program import program
 from foldyn.results.netcdf import read, write
+from foldyn.store import program
 from foldyn.studies.pool import Done, Task, datasets, run
 from foldyn.studies.waves import kresling, sheets
 

@@ -17,9 +17,8 @@ from foldyn.errors import ComputationError, InputError
 from foldyn.experiment import Fit, Measurement, TimeHistory
 from foldyn.experiment.calibration.fit_page import write_fit
 from foldyn.input_files import file_digest, from_json, read_text
-from foldyn.program import program
 from foldyn.results import netcdf, save
-from foldyn.store import Store, warn_of_damage
+from foldyn.store import Store, program, warn_of_damage
 from foldyn.studies.herkal import calibration, vibration
 from foldyn.studies.herkal.specimen import evaluation, synthetic
 from foldyn.studies.herkal.specimen.measured import Data, measurement
