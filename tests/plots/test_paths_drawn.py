@@ -202,7 +202,7 @@ def test_what_energies_are_drawn_over(case, path):
     figure = plot_path_energies(path, [7])
     assert figure.axes[1].get_xlabel() == "displacement along -z (m)"
     np.testing.assert_array_equal(figure.axes[0].get_lines()[0].get_xdata(), DOWN)
-    with pytest.raises(InputError, match="along y does not grow all along the path"):
+    with pytest.raises(InputError, match="they also move back along y"):
         plot_path_energies(path, [6, 8])
 
 

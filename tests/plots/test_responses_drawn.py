@@ -283,7 +283,7 @@ def test_what_a_moving_base_cannot_be(case, response, trajectory):
         plot_frf({"a": response, "b": moved}, [7])
     with pytest.raises(InputError, match="'mobility'; the response has transmissibility"):
         plot_frf({"b": moved}, [7], quantity="mobility")
-    with pytest.raises(InputError, match="a base drives it; circles are drawn of responses to for"):
+    with pytest.raises(InputError, match="a base drives it; circles need forces"):
         plot_nyquist(moved, 7)
     with pytest.raises(InputError, match=r"give a result of fd\.frf"):
         plot_frf({"a": trajectory}, [7])

@@ -73,10 +73,7 @@ def welded(
     rows = _rows(pattern, facets)
     edges = np.concatenate([pattern.creases[rows], pattern.welds])
     if pattern.boards is not None and len(edges):
-        raise InputError(
-            ": thick panels are boards of their own; weld the thin pattern, then thicken it",
-            "facets",
-        )
+        raise InputError(": thick panels are boards; weld the thin pattern first", "facets")
     beside = np.concatenate([pattern.crease_faces[rows], pattern.weld_faces])
     turned = np.concatenate([pattern.dihedrals[rows], pattern.weld_dihedrals]) - np.pi
     order = longest_first(pattern.vertices, edges)

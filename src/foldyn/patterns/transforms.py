@@ -353,10 +353,7 @@ def _counts(counts: Any) -> tuple[int, int]:
 
 def _thin(pattern: Transforms) -> None:
     if pattern.boards is not None:
-        raise InputError(
-            ": its panels are thick; repeat or join the thin pattern, and thicken the result",
-            "pattern",
-        )
+        raise InputError(": its panels are thick; repeat or join the thin pattern first", "pattern")
 
 
 def _direction(name: str, given: Any) -> NDArray[np.float64]:

@@ -137,7 +137,4 @@ def _along(bands: xr.Dataset) -> tuple[np.ndarray, str]:
     phases: Any = bands["wave_vector"].values
     if phases.shape[1] == 1:
         return phases[:, 0], "phase per period (rad)"
-    raise InputError(
-        ": its phases lie on no path; take those of cell.path, or plot_iso_frequency for a grid",
-        "bands",
-    )
+    raise InputError(": its phases lie on no path; use cell.path, or plot_iso_frequency", "bands")

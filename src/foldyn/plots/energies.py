@@ -172,10 +172,7 @@ def _abscissa(
         numbers, direction = readings.asked({"path": path}, nodes, direction)
         moved = readings.along(path, numbers, direction)
         if not (np.diff(moved) > 0.0).all():
-            raise InputError(
-                f"nodes: their displacement along {direction} does not grow all along the path; "
-                "leave them out"
-            )
+            raise InputError(f"nodes: they also move back along {direction}; leave them out")
         return moved, f"displacement along {direction} (m)"
     factor = path["load_factor"].values
     if (np.diff(factor) > 0.0).all():

@@ -87,10 +87,7 @@ def plot_nyquist(
         A response to a moving base; no such node or direction.
     """
     if quantity_of(response) not in PER_FORCE:
-        raise InputError(
-            "response: a base drives it; circles are drawn of responses to forces: fd.frf with "
-            "drive=[fd.Force(...)]"
-        )
+        raise InputError("response: a base drives it; circles need forces, drive=[fd.Force(...)]")
     (curve,), _ = curves_of({"": response}, [node], axis, "mobility")
     usable = np.isfinite(curve.values) & (curve.frequency > 0.0)
     f, Y = curve.frequency[usable], curve.values[usable]

@@ -178,10 +178,7 @@ def _mobility(
     f = records.checked_frequencies(frequency, fewest=_FEWEST)
     Y = np.asarray(response)
     if Y.shape != f.shape:
-        raise InputError(
-            f"response: shape {Y.shape}, but there are {f.size} frequencies; fit one response "
-            "at a time"
-        )
+        raise InputError(f"response: shape {Y.shape} for {f.size} frequencies; fit one at a time")
     if not np.iscomplexobj(Y):
         raise InputError("response: real; a circle fit needs the complex response, not its modulus")
     Y = convert_response(f, Y, source=quantity, target="mobility")

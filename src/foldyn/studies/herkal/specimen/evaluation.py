@@ -161,10 +161,7 @@ def check_tracks(tracks: xr.Dataset) -> None:
         "x" not in tracks["axis"].values
         or not np.isfinite(tracks["displacement"].sel(node=list(FRONT), axis="x").values).any()
     ):
-        raise InputError(
-            "no front node was measured along x: film the specimen from the front (--up=-x "
-            "--facing z)"
-        )
+        raise InputError("no front node was measured along x: film its front (--up=-x --facing z)")
 
 
 @dataclass(frozen=True, eq=False)
