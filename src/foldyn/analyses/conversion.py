@@ -29,16 +29,21 @@ def flagged(document: Document, flags: Mapping[str, Any]) -> Document:
     return {**others, "analysis": analysis, "initial": start}
 
 
-def compared(path: Path, document: Document) -> Document:
-    """The document as a comparison with the shell, in which loads act in full.
+STARTLESS: Mapping[str, str] = {
+    "fidelity": "small vibrations about rest are compared, and displacements under the loads",
+    "response": (
+        "periodic motions have no start, and [[loads]] and [[supports]] with a harmonic history "
+        "drive them"
+    ),
+}
+"""Kinds in which loads and supports stay as they are, and why a start and a drive do not."""
 
-    A start and a drive have no place there, and are left out with a warning.
-    """
-    left = _tables(document, "initial", "drive")
-    why = "small vibrations about rest are compared, and displacements under the loads"
-    _tell(path, "fidelity", left, why)
+
+def startless(path: Path, document: Document, kind: str) -> Document:
+    """The document as one of `STARTLESS`; a start and a drive are left out with a warning."""
+    _tell(path, kind, _tables(document, "initial", "drive"), STARTLESS[kind])
     kept = _without(document, "initial", "drive", "output")
-    return {**kept, "analysis": {"kind": "fidelity"}}
+    return {**kept, "analysis": {"kind": kind}}
 
 
 def unbounded(path: Path, document: Document, state: str) -> Document:
@@ -62,18 +67,6 @@ def unbounded(path: Path, document: Document, state: str) -> Document:
     return {**kept, "loads": kept_loads, "analysis": {"kind": "bands"}}
 
 
-def driven(path: Path, document: Document) -> Document:
-    """The document as a response curve under its harmonic histories."""
-    left = _tables(document, "initial", "drive")
-    why = (
-        "periodic motions have no start, and [[loads]] and [[supports]] with a harmonic history "
-        "drive them"
-    )
-    _tell(path, "response", left, why)
-    kept = _without(document, "initial", "drive", "output")
-    return {**kept, "analysis": {"kind": "response"}}
-
-
 def _tables(document: Document, *names: str) -> list[str]:
     """Those of some tables that a document has."""
     return [f"[{name}]" for name in names if name in document]
@@ -88,12 +81,10 @@ def _tell(path: Path, command: str, left: list[str], why: str) -> None:
 
 def converted(path: Path, document: Document, kind: str, state: str) -> Document:
     """The document as one of another kind; what has no place there is left out, with a warning."""
-    if kind == "fidelity":
-        return compared(path, document)
+    if kind in STARTLESS:
+        return startless(path, document, kind)
     if kind == "bands":
         return unbounded(path, document, state)
-    if kind == "response":
-        return driven(path, document)
     left: list[str] = []
     atrest = state == "rest"
     supports, bases = _supports(document.get("supports", []), atrest, left)

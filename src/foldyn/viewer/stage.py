@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -93,8 +93,10 @@ def stage(
             key = keys.setdefault(id(case.structure.pattern), f"s{len(keys)}")
             if key not in sheets:
                 sheets[key] = sheet(arrays, key, case)
-            own = {"name": name, "sheet": key, "alone": len(results) == 1}
-            listed += _LISTED[kind](arrays, f"r{len(listed)}", case, result, own)
+            alone = len(results) == 1
+            one = _Shown(arrays, f"r{len(listed)}", case, result, name, alone)
+            own = {"name": name, "sheet": key, "alone": alone}
+            listed += [own | about for about in _LISTED[kind](one)]
     about |= {"sheets": sheets, "results": listed, **_more(kind, results, cases, nodes)}
     if listed and "way" in listed[0]:  # axes along which supports move
         about["axis"] = "xyz".index(listed[0]["way"][-1])
@@ -122,6 +124,17 @@ def rest_stage(shown: Pattern | Case, title: str) -> Stage:
     return Stage(about, arrays)
 
 
+class _Shown(NamedTuple):
+    """A result to describe with the arrays of a page, which get names that begin with its key."""
+
+    arrays: Arrays
+    key: str
+    case: Case
+    result: xr.Dataset
+    name: str
+    alone: bool
+
+
 def _kind(result: xr.Dataset) -> str:
     if "share" in result.coords:
         return "folding"
@@ -140,45 +153,41 @@ def _kind(result: xr.Dataset) -> str:
     )
 
 
-def _motion(
-    arrays: Arrays, key: str, case: Case, result: xr.Dataset, own: dict[str, Any]
-) -> list[dict[str, Any]]:
-    every = slice(None, None, -(-result["displacement"].size // MOST))
-    some = result.isel(time=every)
-    u = displacements(some, "time")
-    return [own | _changing(arrays, key, case, some, u, some["time"].values)]
+def _motion(one: _Shown) -> Iterator[dict[str, Any]]:
+    every = slice(None, None, -(-one.result["displacement"].size // MOST))
+    some = one.result.isel(time=every)
+    yield _changing(one, some, displacements(some, "time"), some["time"].values)
 
 
-def _path(
-    arrays: Arrays, key: str, case: Case, result: xr.Dataset, own: dict[str, Any]
-) -> list[dict[str, Any]]:
+def _path(one: _Shown) -> Iterator[dict[str, Any]]:
+    arrays, key, case, result, *_ = one
     u = displacements(result, "step")
     stable = np.ones(len(u), bool)
     for start, stop, good in stretches(result):
         stable[start + 1 : stop] &= good
         stable[[start, stop]] &= good
-    about = _changing(arrays, key, case, result, u, way(result))
+    about = _changing(one, result, u, way(result))
     about["load"] = arrays.exact(f"{key}.load", result["load_factor"].values, "f4")
     if (moved := moved_supports(case)) is not None:  # the load factor is the supports' displacement
         force = total_reaction(result, moved[0], direction=moved[1])
         about |= {"way": moved[1], "force": arrays.exact(f"{key}.force", force, "f4")}
-    return [own | about | {"stable": stable.tolist()}]
+    yield about | {"stable": stable.tolist()}
 
 
-def _folding(
-    arrays: Arrays, key: str, case: Case, result: xr.Dataset, own: dict[str, Any]
-) -> list[dict[str, Any]]:
-    u = displacements(result, "step")
-    own_fields = folding_fields(case, u, result["fold_angle"].values)
-    about = _changing(arrays, key, case, result, u, way(result), own_fields)
-    return [own | about | {"load": arrays.exact(f"{key}.load", result["share"].values, "f4")}]
+def _folding(one: _Shown) -> Iterator[dict[str, Any]]:
+    result, u = one.result, displacements(one.result, "step")
+    own_fields = folding_fields(one.case, u, result["fold_angle"].values)
+    about = _changing(one, result, u, way(result), own_fields)
+    load = one.arrays.exact(f"{one.key}.load", result["share"].values, "f4")
+    yield about | {"load": load}
 
 
 def _changing(
-    arrays: Arrays, key: str, case: Case, result: xr.Dataset,
-    u: NDArray, moments: NDArray, own_fields: Mapping[str, Field] | None = None,
+    one: _Shown, result: xr.Dataset, u: NDArray, moments: NDArray,
+    own_fields: Mapping[str, Field] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Shared description of motions, paths and foldings."""
+    """Shared description of motions, paths and foldings, at some of their samples."""
+    arrays, key, case, *_ = one
     error = allowed(case.structure.pattern.size, float(np.abs(u).max(initial=0.0)))
     return {
         "displacement": arrays.changing(f"{key}.u", u, error),
@@ -203,57 +212,39 @@ def allowed(size: float, largest: float) -> float:
     return min(OF_LARGEST, OF_SIZE * size / (largest or 1.0))
 
 
-def _modes(
-    arrays: Arrays, key: str, case: Case, result: xr.Dataset, own: dict[str, Any]
-) -> list[dict[str, Any]]:
+def _modes(one: _Shown) -> Iterator[dict[str, Any]]:
+    result = one.result
     shapes = result["shape"].transpose("mode", "node", "axis").values
-    words = character(result, case=case)
-    out = []
+    words = character(result, case=one.case)
     for k, frequency in enumerate(result["frequency"].values.tolist()):
         damping = float(result["damping_ratio"][k]) if "damping_ratio" in result else np.nan
-        facts = {
-            "name": f"{k + 1}" if own["alone"] else f"{own['name']} {k + 1}",
-            "of": own["name"],
+        yield {
+            "name": f"{k + 1}" if one.alone else f"{one.name} {k + 1}",
+            "of": one.name,
             "number": k + 1,
             "frequency": frequency if np.isfinite(frequency) else None,  # nan if unstable
             "damping": damping if np.isfinite(damping) else None,
             "what": str(words.name.values[k]),
-            "displacement": arrays.changing(f"{key}.{k}", shapes[k : k + 1], OF_LARGEST),
+            "displacement": one.arrays.changing(f"{one.key}.{k}", shapes[k : k + 1], OF_LARGEST),
         }
-        out.append(own | facts)
-    return out
 
 
-def _response(
-    arrays: Arrays, key: str, case: Case, result: xr.Dataset, own: dict[str, Any]
-) -> list[dict[str, Any]]:
-    values = result[_measured(result)].transpose("frequency", "node", "axis").values
+def _response(one: _Shown) -> Iterator[dict[str, Any]]:
+    values = one.result[_measured(one.result)].transpose("frequency", "node", "axis").values
     both = np.stack([np.real(values), np.imag(values)], axis=1)
-    return [
-        own
-        | {
-            "displacement": arrays.changing(f"{key}.u", both, OF_LARGEST / 1000),
-            "moments": arrays.exact(f"{key}.t", result["frequency"].values, "f4"),
-        }
-    ]
+    frequency = one.result["frequency"].values
+    yield {
+        "displacement": one.arrays.changing(f"{one.key}.u", both, OF_LARGEST / 1000),
+        "moments": one.arrays.exact(f"{one.key}.t", frequency, "f4"),
+    }
 
 
-def _bands(
-    arrays: Arrays, key: str, case: Case, result: xr.Dataset, own: dict[str, Any]
-) -> list[dict[str, Any]]:
-    return [own | waves(arrays, key, result)]
-
-
-def _periodic(
-    arrays: Arrays, key: str, case: Case, result: xr.Dataset, own: dict[str, Any]
-) -> list[dict[str, Any]]:
-    return [own | orbits(arrays, key, result)]
-
-
-_LISTED: Mapping[str, Callable[..., list[dict[str, Any]]]] = {
+_LISTED: Mapping[str, Callable[[_Shown], Iterable[dict[str, Any]]]] = {
     "motion": _motion, "path": _path, "folding": _folding, "modes": _modes, "response": _response,
-    "bands": _bands, "periodic": _periodic,
+    "bands": lambda one: [waves(one.arrays, one.key, one.result)],
+    "periodic": lambda one: [orbits(one.arrays, one.key, one.result)],
 }  # fmt: skip
+"""Descriptions of a result of each kind: one, or one of each mode."""
 
 
 def _moved(kind: str, result: xr.Dataset) -> str:
