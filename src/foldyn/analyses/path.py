@@ -37,14 +37,7 @@ from foldyn.cases.supports import SUPPORT
 from foldyn.errors import ComputationError, InputError
 from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.readings import along, critical_word, evenly, is_loose, main_direction
-from foldyn.report.album import (
-    Album,
-    ByRule,
-    crossing_panels,
-    listed,
-    shown_nodes,
-    visible_scale,
-)
+from foldyn.report.album import Album, ByRule, crossing_panels, listed, shown_nodes, visible_scale
 from foldyn.report.sections import Charts, Heading, Picture, Section, Table, Text, cell
 from foldyn.statics import METHODS, Landscape, Point, Settings, landscape, trace
 from foldyn.statics.newton import settings_of
@@ -96,8 +89,7 @@ class PathSection(AnalysisSection):
     ] = None
     steps: Count | None = None
     duration: Annotated[
-        float | Sequence[float] | None,
-        Check(number_or_list, what="interval", least=0.0, unit="s"),
+        float | Sequence[float] | None, Check(number_or_list, what="interval", least=0.0, unit="s")
     ] = None
     first_step: Annotated[float | None, Check(number)] = None
     constant: Annotated[str | Sequence[int], Check(_constant)] = ()

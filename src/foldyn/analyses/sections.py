@@ -33,16 +33,7 @@ from foldyn.structures.creases import per_crease
 from foldyn.structures.rigid_plates import checked_panels
 from foldyn.structures.structure import CALIBRATIONS, MEMBRANES, SCHEMES
 from foldyn.tables import ListOf, Section, TableOf, check_table
-from foldyn.values import (
-    MOST,
-    choice,
-    indices,
-    number,
-    number_or_list,
-    show,
-    vector,
-    whole,
-)
+from foldyn.values import MOST, choice, indices, number, number_or_list, show, vector, whole
 
 RULES = [name for model in MODELS.values() for name in model.masses]
 MOST_SHAPES = 12

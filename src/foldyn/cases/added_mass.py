@@ -12,13 +12,7 @@ from scipy import sparse
 
 from foldyn.cases.air import LOCAL
 from foldyn.errors import InputError
-from foldyn.mechanics.air.added_mass import (
-    AddedMass,
-    Flow,
-    caught,
-    flow_of,
-    normal_velocities,
-)
+from foldyn.mechanics.air.added_mass import AddedMass, Flow, caught, flow_of, normal_velocities
 from foldyn.mechanics.air.gaps import APART, JOINED, narrow_gap
 from foldyn.patterns.pattern import Pattern
 from foldyn.ram_limit import check_memory

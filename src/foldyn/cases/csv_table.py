@@ -107,9 +107,7 @@ def _opened(file: Path) -> Iterator[tuple[list[_Column], list[tuple[int, list[st
 
 
 def read_numbers(
-    path: str | os.PathLike[str],
-    wanted: Mapping[str, tuple[str, str]],
-    gaps: Collection[str] = (),
+    path: str | os.PathLike[str], wanted: Mapping[str, tuple[str, str]], gaps: Collection[str] = ()
 ) -> dict[str, NDArray[np.float64]]:
     """Numbers of several columns of a CSV file, of any quantities, in lines of any order.
 

@@ -118,7 +118,7 @@ def within_reach(angles: NDArray[np.float64], creases: NDArray[np.int64]) -> NDA
     if beyond.size:
         raise InputError(
             f": crease {beyond[0]} cannot fold that far: its thick panels are hinged on the other "
-            "side; fold it less, or give its hinge another offset",
+            "side; fold it less, or give its hinge another offset"
         )
     return np.clip(angles, 0.0, 360.0)
 

@@ -109,10 +109,7 @@ def _frame(document: dict[str, Any], chosen: int | str | None) -> dict[str, Any]
     others = document.get("file_frames", [])
     if not isinstance(others, list) or not all(isinstance(each, dict) for each in others):
         raise InputError("file_frames must be a list of JSON objects, one for each frame.")
-    frames = [
-        {key: value for key, value in document.items() if key != "file_frames"},
-        *others,
-    ]
+    frames = [{key: value for key, value in document.items() if key != "file_frames"}, *others]
     number = _number(frames, chosen)
     fields: dict[str, Any] = {}
     seen: set[int] = set()

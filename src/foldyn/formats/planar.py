@@ -110,8 +110,7 @@ def split(lines: Lines, tolerance: float) -> Lines:
             return lines
         lines, _ = single(without_points(_pieces(lines, near)))
     raise InputError(
-        f": some lines tangle within {tolerance:.3g} of each other; simplify the drawing",
-        "lines",
+        f": some lines tangle within {tolerance:.3g} of each other; simplify the drawing", "lines"
     )
 
 

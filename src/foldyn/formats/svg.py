@@ -181,11 +181,7 @@ def _link(element: Element) -> str:
 
 
 def _drawing(
-    lines: _Lines,
-    boxes: list[NDArray[np.float64]],
-    frame: _Frame,
-    doubts: list[str],
-    title: str,
+    lines: _Lines, boxes: list[NDArray[np.float64]], frame: _Frame, doubts: list[str], title: str
 ) -> Drawing:
     if not lines.curves:
         raise InputError(

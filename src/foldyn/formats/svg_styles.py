@@ -179,8 +179,7 @@ def declared(element: Element, rules: Rules, place: str) -> Mapping[str, str]:
         if css.get(name, "none") not in (_UNMOVED if name == "zoom" else _UNMOVED[:2]):
             how = 'a "transform"' if name in _MOVING else "an attribute"
             raise InputError(
-                f" = {show(css[name])}: is not read from CSS; write it as {how}",
-                f"{place}.{name}",
+                f" = {show(css[name])}: is not read from CSS; write it as {how}", f"{place}.{name}"
             )
     said = {key.lower(): value.strip() for key, value in element.attrib.items()}
     return given | css | {name: said[name] for name in (ASSIGNMENT, ANGLE) if said.get(name)}

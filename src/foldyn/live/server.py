@@ -68,10 +68,7 @@ class Server(ThreadingHTTPServer):
     daemon_threads = True
 
     def __init__(
-        self,
-        page: Callable[[str], str],
-        answers: Mapping[str, Answer] | None = None,
-        port: int = 0,
+        self, page: Callable[[str], str], answers: Mapping[str, Answer] | None = None, port: int = 0
     ) -> None:
         self.key = secrets.token_urlsafe(16)
         self.page = page(self.key).encode()

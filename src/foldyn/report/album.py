@@ -122,9 +122,7 @@ def rules(results: ByRule) -> str:
 
 
 def by_mass_rule(
-    results: ByRule,
-    columns: Mapping[str, str | Callable[[xarray.Dataset], Any]],
-    caption: str,
+    results: ByRule, columns: Mapping[str, str | Callable[[xarray.Dataset], Any]], caption: str
 ) -> Table:
     """Table with a row per mass rule; columns are attributes or functions of its result."""
     rows = []

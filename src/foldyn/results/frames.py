@@ -204,8 +204,7 @@ def state_of(result: xr.Dataset, frame: int | None = None, *, scale: float = 1.0
         frame = count - 1
     if isinstance(frame, bool) or not isinstance(frame, int) or not 0 <= frame < count:
         raise InputError(
-            f" = {frame!r}: the result has the samples 0 to {count - 1}; give one of these",
-            "frame",
+            f" = {frame!r}: the result has the samples 0 to {count - 1}; give one of these", "frame"
         )
     pattern, (state,) = _states(result, _shapes(result, np.array([frame]), scale))
     name = f"{pattern.name}, {state.title}" if pattern.name else state.title

@@ -17,14 +17,7 @@ from foldyn.linear.band_structure import ALL, frequencies_of, legs
 from foldyn.linear.frf import quantity_of
 from foldyn.linear.peaks_of import kind_of, resonances
 from foldyn.mechanics.contact.clearance import Clearance, clearance
-from foldyn.signals import (
-    Peaks,
-    find_peaks,
-    half_power,
-    log_decrement,
-    sampling_interval,
-    spectrum,
-)
+from foldyn.signals import Peaks, find_peaks, half_power, log_decrement, sampling_interval, spectrum
 from foldyn.statics import Landscape, landscape
 from foldyn.statics.energy_landscape import load_at
 from foldyn.sweeps.measure import BAND, MODE, Measure
