@@ -1,4 +1,4 @@
-"""The fluid that moves with the sheet of a case, and its mass."""
+"""The fluid that moves with a sheet, and its mass."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ COPIES = 3  # of the flow's matrix, while it is made
 
 @dataclass(frozen=True, eq=False)
 class Fluid:
-    """The fluid around a sheet in one state of it.
+    """The fluid around a sheet in one of its states.
 
     Attributes
     ----------
     triangles : ndarray of int, shape (nt, 3)
         Nodes of the structure's triangles.
     under, shares : ndarray, shape (k,) and (k, 3)
-        The triangles under the centers of boundary elements, and the weights of their nodes; two
-        share an element on the line between them.
+        The triangle under the center of each boundary element, and the weights of its nodes. An
+        element on the line between two triangles appears once for each.
     catch : sparse array, shape (u, k)
         Integrals of the flow's functions over these elements, m2.
     """
@@ -48,13 +48,12 @@ class Fluid:
     def flow(self) -> Flow:
         """The matrix rho D^-1 (u, u), kg/m4.
 
-        With the normal velocities y there the energy of the fluid is
-        (catch y)' flow (catch y) / 2.
+        For normal velocities y the energy of the fluid is (catch y)' flow (catch y) / 2.
         """
         return self._density * flow_of(*self._surface)
 
     def on(self, x: NDArray) -> AddedMass:
-        """Added mass for the normals that the triangles have with the nodes at x (n, 3), m."""
+        """Added mass with the triangles' normals for nodes at x (n, 3), m."""
         normal = normal_velocities(x, self.triangles, self.under, self.shares)
         return AddedMass(sparse.csr_array(self.catch @ normal), self.flow)
 
@@ -94,9 +93,9 @@ def fluid_at(case: Any, displacement: NDArray) -> Fluid:
 
 
 def operator_at(case: Any, displacement: NDArray) -> tuple[AddedMass, bool] | None:
-    """Added mass of a case at a displacement (n, 3), or None without; whether it is to be a matrix.
+    """Added mass of a case at a displacement (n, 3), and whether it fits in a matrix; None without.
 
-    It is not where it couples too many dofs.
+    It does not fit if it couples too many dofs.
     """
     if case.air is None or not case.air.added_mass:
         return None
@@ -105,7 +104,7 @@ def operator_at(case: Any, displacement: NDArray) -> tuple[AddedMass, bool] | No
 
 
 def added_mass_at(case: Any, displacement: NDArray) -> sparse.csr_array | None:
-    """Added mass (3n, 3n) of a case at a displacement (n, 3), kg, or None without.
+    """Added mass (3n, 3n) of a case at a displacement (n, 3), kg; None if it has none.
 
     Raises
     ------
@@ -127,7 +126,7 @@ def added_mass_at(case: Any, displacement: NDArray) -> sparse.csr_array | None:
 
 
 def _check_gaps(pattern: Pattern, elements: BoundaryElements, points: NDArray) -> None:
-    """Refuse a state in which panels come too near to each other for their elements."""
+    """Refuse a state in which panels are closer than their boundary elements can resolve."""
     panels = np.repeat(np.arange(len(pattern.faces)), [len(face) for face in pattern.faces])
     corners = np.concatenate([np.array(face) for face in pattern.faces])
     members = sparse.csr_array((np.ones(len(corners)), (panels, corners)))

@@ -40,19 +40,19 @@ class Air(Part):
     velocity : sequence of float, shape (3,)
         Of the fluid far from the sheet (m/s); still air by default.
     added_mass : bool or "local", default True
-        Whether the fluid that the sheet moves adds to its mass. With "local" each panel moves the
-        fluid by itself, as if it were alone in it: for sheets whose full matrix is too large.
+        Whether the fluid that the sheet moves adds to its mass. "local" treats each panel as if it
+        were alone in the fluid: for sheets whose full matrix is too large.
     drag : bool, default True
-        Whether motions meet the pressure drag of the panels.
+        Whether the pressure drag of the panels acts in motions.
     drag_coefficient : float, optional
-        C_d of the force C_d / 2 density area v|v| on a panel with the velocity v normal to it
-        relative to the fluid; by default that of a flat plate with the aspect ratio of the sheet
-        at rest, from 1.18 for a square to 2 for a long strip (see `coefficient`).
+        C_d in the force C_d / 2 density area v|v| on a panel, v its normal velocity relative to the
+        fluid. By default the value of a flat plate with the sheet's aspect ratio at rest: from 1.18
+        for a square to 2 for a long strip (see `coefficient`).
     resolution : int, default 4
-        Boundary elements along each edge of a panel, even, from which the added mass is found.
+        Number of boundary elements along each edge of a panel, even, for the added mass.
     history : History or callable, optional
-        Factor of the velocity over time: of gusts; constant by default. With added mass it may
-        not jump, as fluid pushes when it accelerates.
+        Factor of the velocity over time, for gusts; constant by default. With added mass it may
+        not jump, because accelerating fluid pushes.
 
     Examples
     --------
@@ -71,7 +71,7 @@ class Air(Part):
     history: Factor = STEADY
 
     def agree(self) -> None:
-        """Ask for an even resolution, and for something that acts."""
+        """Require an even resolution, and added mass or drag."""
         if self.resolution % 2:
             raise InputError(
                 f" = {self.resolution}: must be even, so that panels of any number of corners can "
@@ -83,14 +83,14 @@ class Air(Part):
 
     @property
     def blows(self) -> bool:
-        """Whether it acts on a sheet that stands still."""
+        """Whether there is wind, which acts on a sheet at rest."""
         return any(self.velocity)
 
     def coefficient(self, structure: Discretized) -> float:
         """Drag coefficient of the panels of a structure.
 
-        That of a flat plate, interpolated over the ratio of its shorter to its longer side. The
-        sides are those of the rectangle with the second moments of area of the sheet at rest.
+        Interpolated from flat plates by the ratio of the shorter to the longer side of a rectangle
+        with the sheet's second moments of area at rest.
         """
         if self.drag_coefficient is not None:
             return self.drag_coefficient
@@ -109,7 +109,7 @@ def _side_ratio(structure: Discretized) -> float:
 
 
 def refuse_air(case: Any, name: str) -> None:
-    """Refuse a case in air, of which `name` knows nothing.
+    """Refuse a case in air for a function `name` that does not support it.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def refuse_air(case: Any, name: str) -> None:
 
 
 def refuse_wind(case: Any, name: str) -> None:
-    """Refuse a case whose air moves past the sheet, which `name` does not take.
+    """Refuse a case with wind for a function `name` that does not support it.
 
     Raises
     ------

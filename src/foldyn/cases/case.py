@@ -1,4 +1,4 @@
-"""The case: what a solver gets, a structure with supports, loads and damping."""
+"""The case, the input of a solver: a structure with supports, loads and damping."""
 
 from __future__ import annotations
 
@@ -49,17 +49,17 @@ class Case(Loaded, Damped):
     structure : Structure
         The discretized pattern.
     supports : sequence of Fix, Impose, BaseMotion and the other kinds of `SUPPORTS`
-        Nodes held at rest, moved as prescribed, tied together, held by springs or damped, and
-        motions of the base; none by default (free motion is legal in dynamics).
+        Nodes held at rest, moved as prescribed, tied together, on springs or dashpots, and motions
+        of the base. None by default: in dynamics a structure may move freely.
     loads : sequence of Force, Gravity, Actuate and the other kinds of `LOADS`
-        Forces, gravity, pressure, creases that fold by themselves; none by default.
+        Forces, gravity, pressure, self-folding creases; none by default.
     damping : Rayleigh, ModalDamping, CreaseDamping, StrainDamping, or a sequence of them
-        Damping; none by default. Several add up.
+        Damping; none by default. Several kinds add up.
     masses : sequence of PointMass
-        What nodes carry beside the mass of the sheet; none by default.
+        Masses that nodes carry in addition to the sheet; none by default.
     contact : Contact, optional
-        Panels that touch each other, and planes; without it they pass through each other. Motions
-        and paths of equilibria take it.
+        Contact between panels, and with planes, in motions and equilibrium paths. Without it
+        panels pass through each other.
     air : Air, optional
         The fluid around the sheet; vacuum by default.
 
@@ -73,32 +73,32 @@ class Case(Loaded, Damped):
     imposed : ndarray of bool, shape (n, 3)
         True where an `Impose` moves a node along an axis.
     constraints : Constraints
-        What ties displacements together: directions that are held, links, rigid panels.
+        Equations between displacements: held directions, links, rigid panels.
     free_dofs, supported_dofs : ndarray of int64
-        Numbers 3 * node + axis of the free ones, on which all others depend, and of the held ones,
-        increasing.
+        Numbers 3 * node + axis of the free dofs, which determine all others, and of the held dofs;
+        both increase.
     reaction_dofs : ndarray of int64
-        The held ones and those on which supports act along a direction, increasing.
+        Dofs that supports hold along an axis or act on along a direction, increasing.
     load_terms : tuple of (ndarray of shape (n, 3), History)
         Forces (N) on all nodes with their history; loads with equal histories are one term.
         Forces on held nodes are kept: the reactions carry them.
     force_terms : tuple of (ndarray of shape (n, 3), History)
-        The same of the forces on nodes alone, without gravity.
+        The same for forces on nodes only, without gravity.
     following_terms : tuple of (Following, History)
         Forces that depend on the displacement, one term for each load that has them.
     gravity_terms : tuple of (ndarray of shape (3,), History)
         Accelerations of gravity (m/s2) with their history.
     imposed_terms : tuple of (ndarray of shape (n, 3), History)
-        Displacements (m) at factor 1 of the imposed dofs and of those that constraints tie to
-        them, zero elsewhere, with their history; equal histories are one term.
+        Displacements (m) at factor 1 of imposed dofs, and of dofs that constraints tie to them,
+        zero elsewhere, with their history; equal histories are one term.
     base_terms : tuple of (ndarray of shape (n, 3), History)
-        The same of the dofs that `Fix` holds along the axis of a `BaseMotion`, from where they
-        stand at the start of the motion.
+        The same for dofs that `Fix` holds along the axis of a `BaseMotion`, relative to the start
+        of the motion.
     actuation_terms : tuple of (ndarray of shape (nf,), History)
         Changes (rad) of the rest angles of the folds at factor 1, zero elsewhere, with their
         history; equal histories are one term.
     rest_terms : tuple of (ndarray of shape (nr,), History)
-        The same of all rest angles (`body.sheet.rest_angles`: folds first), whatever changes them.
+        The same for all rest angles (`body.sheet.rest_angles`: folds first), from all loads.
 
     Raises
     ------
@@ -152,7 +152,7 @@ class Case(Loaded, Damped):
                     _ = self.mass
 
     def _check_selections(self) -> None:
-        """Refuse nodes and creases that are not there, all at once."""
+        """Refuse nodes and creases that do not exist; report all of them together."""
         faults = Faults()
         for place, support in self._supports(Fix, Impose, Link):
             with faults.collected():
@@ -168,14 +168,14 @@ class Case(Loaded, Damped):
         faults.raise_all()
 
     def altered(self, **changes: Any) -> Case:
-        """With other fields; what this case warned of when it was made is not said again."""
+        """Copy with other fields, without repeating the warnings of this case."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
             return replace(self, **changes)
 
     @cached_property
     def body(self) -> Assembly:
-        """What solvers take: the structure with what the case adds to its stiffness."""
+        """The structure with all terms that the case adds to its energy: the input of solvers."""
         body = self.elastic_body
         if self.contact is None:
             return body
@@ -185,16 +185,16 @@ class Case(Loaded, Damped):
 
     @property
     def contact_term(self) -> ContactTerm:
-        """What contact adds to `body`, if there is any."""
+        """The contact term of `body`; only for cases with contact."""
         return self.body.term(ContactTerm)
 
     @cached_property
     def elastic_body(self) -> Assembly:
-        """The same without contact: what vibrations, damping and critical steps are about."""
+        """`body` without contact, for vibrations, damping and critical steps."""
         return self.structure.body.with_terms(*self.terms)
 
     def elastic_body_at(self, time: float | None) -> Assembly:
-        """The same with the rest angles at a time (s), or under the constant loads alone."""
+        """`elastic_body` with the rest angles at a time (s); None: under constant loads only."""
         body, turns = self.elastic_body, self.rest_terms
         if not turns:
             return body
@@ -203,11 +203,11 @@ class Case(Loaded, Damped):
 
     @cached_property
     def remembering(self) -> tuple[Remembering, ...]:
-        """Its hinges that remember, by kinds; `body` has the elastic parts of their laws alone."""
+        """Hinges with memory, by kind; `body` holds only the elastic parts of their laws."""
         return remembering(self.structure, self.body, self.crease_damping)
 
     def check_flow(self) -> None:
-        """Refuse changes of rest angles from which laws measure what has flowed."""
+        """Refuse changes of rest angles where a law measures its flow from the rest angle."""
         for change, _ in self.rest_terms:
             rest = len(change) - self.body.sheet.offsets
             for number in np.flatnonzero(change[:rest]).tolist():
@@ -227,7 +227,7 @@ class Case(Loaded, Damped):
             )
 
     def memory_in(self, state: State | None) -> NDArray | str | None:
-        """Memory (b, 2) of a state for the branches of its laws; a word, or None for the usual."""
+        """Memory (b, 2) of a state for the branches of laws; a word, or None for the default."""
         given = None if state is None else state.memory
         if given is None or isinstance(given, str):
             return given
@@ -243,13 +243,13 @@ class Case(Loaded, Damped):
 
     @property
     def obstacle_terms(self) -> tuple[tuple[int, History], ...]:
-        """Numbers of the planes of its contact that move, and their histories."""
+        """Numbers of the contact planes that move, with their histories."""
         planes = enumerate(() if self.contact is None else self.contact.planes)
         return tuple((i, as_history(p.history)) for i, p in planes if p.history is not None)
 
     @property
     def wind_terms(self) -> tuple[tuple[NDArray[np.float64], History], ...]:
-        """Velocity (3,), m/s, of a wind that varies, and its history; none in others."""
+        """Velocity (3,), m/s, of a varying wind, with its history; empty for constant wind."""
         if self.air is None or not self.air.blows:
             return ()
         history = as_history(self.air.history)
@@ -257,12 +257,12 @@ class Case(Loaded, Damped):
 
     @property
     def energy_groups(self) -> Mapping[str, str]:
-        """Parts of its strain energy, and what they are."""
+        """Names of the parts of the strain energy, with descriptions."""
         return self.body.energy_groups
 
     @cached_property
     def mass(self) -> sparse.csr_array:
-        """Nodal mass matrix (n, n), kg: the structure's with point masses.
+        """Nodal mass matrix (n, n), kg: structure and point masses.
 
         Raises
         ------
@@ -281,18 +281,18 @@ class Case(Loaded, Damped):
 
     @cached_property
     def free_mass(self) -> sparse.csr_array:
-        """Mass matrix of the free dofs among those of the nodes, kg, as constraints leave it."""
+        """Mass matrix of the free nodal dofs, kg, with constraints eliminated."""
         whole = sparse.kron(self.mass, sparse.eye_array(3), format="csr")
         free = self.free_dofs
         return sparse.csr_array(self.constraints.matrix(whole)[free][:, free])
 
     def added_mass(self, state: State | None = None) -> AddedMass:
-        """Mass of the fluid that moves with the sheet in a state, at rest unless given.
+        """Mass of the fluid that moves with the sheet in a state, by default at rest.
 
         Parameters
         ----------
         state : State, optional
-            Of which the displacement counts.
+            Only its displacement matters.
 
         Returns
         -------
@@ -325,7 +325,7 @@ class Case(Loaded, Damped):
 
     @cached_property
     def boundary_elements(self) -> BoundaryElements:
-        """Elements of the fluid on the sheet of a case in air."""
+        """Boundary elements of the fluid on the sheet, for a case in air."""
         return elements_of(self)
 
     @cached_property

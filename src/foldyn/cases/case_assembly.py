@@ -1,4 +1,4 @@
-"""Assembly of a `Case`: what its supports, loads and damping do to a structure."""
+"""Assembly of a `Case`: the effects of its supports, loads and damping on a structure."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Supported:
 
     @cached_property
     def constraints(self) -> Constraints:
-        """What ties displacements together: directions that are held, links, rigid panels."""
+        """Equations between displacements: held directions, links, rigid panels."""
         equations = equations_of(self.structure, self._supports(Fix, Impose, Link))
         return Constraints(equations, self.fixed.ravel())
 
@@ -90,7 +90,7 @@ class Supported:
 
     @cached_property
     def still(self) -> NDArray[np.bool_]:
-        """Whether supports keep each node where it stands along each axis, shape (n, 3)."""
+        """Whether supports keep each node in place along each axis, shape (n, 3)."""
         held = self.fixed & ~self.imposed
         for vector, _ in self.base_terms:
             held &= vector == 0.0
@@ -98,7 +98,7 @@ class Supported:
 
     @property
     def imposed_slaves(self) -> NDArray[np.int64]:
-        """Numbers of the dofs that `Impose` along a direction moves with others of their nodes."""
+        """Dofs that an `Impose` along a direction ties to the other dofs of their nodes."""
         return self.constraints.slaves_of([place for place, _ in self._supports(Impose)])
 
     @property
@@ -127,7 +127,7 @@ class Supported:
 
     @cached_property
     def prescribed_terms(self) -> Terms:
-        """What each `Impose` says, alone, along its axis or direction: (n, 3), m, with history."""
+        """Displacements (n, 3), m, that each `Impose` itself prescribes, with their history."""
         return _sum_by_history(self._prescribed()) if self.constraints else self.imposed_terms
 
     def _prescribed(self) -> Summands:
@@ -138,7 +138,10 @@ class Supported:
             yield vector, support.history
 
     def _carry_supports(self, stated: NDArray, place: str, values: Mapping[str, Any]) -> NDArray:
-        """Displacements (n, 3), m, when supports move as stated and by values along theirs."""
+        """Displacements (n, 3), m, of all dofs when supports move as stated.
+
+        values : displacements along directions, by the place of the support.
+        """
         shape, ties = self._straight.carried(stated), self.constraints
         return ties.moved(shape, values_of(ties.owners, values), place) if ties else shape
 
@@ -168,13 +171,13 @@ class Supported:
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
-        """What its supports add to the energy, by their kinds."""
+        """Energy terms of the supports, one for each kind that has one."""
         kinds = dict.fromkeys(type(support) for support in self.supports)
         terms = (kind.term(list(self._supports(kind)), self.structure) for kind in kinds)
         return tuple(term for term in terms if term is not None)
 
     def _supports(self, *kinds: type) -> Iterator[tuple[str, Any]]:
-        """Supports of some kinds, with their places for messages."""
+        """Supports of the given kinds, with their places for messages."""
         places = ((f"supports[{i}]", support) for i, support in enumerate(self.supports))
         return ((place, support) for place, support in places if isinstance(support, kinds))
 
@@ -243,13 +246,13 @@ class Loaded:
 
     @cached_property
     def following_terms(self) -> tuple[tuple[Following, History], ...]:
-        """Forces that depend on the displacement, of each load that has them, with its history."""
+        """Forces that depend on the displacement, one for each load that has them, with history."""
         found = ((load.following(self.structure, place), load) for place, load in self._loads())
         return tuple((part, load.history) for part, load in found if part is not None)
 
     @cached_property
     def swellings(self) -> tuple[tuple[Swelling, History], ...]:
-        """What panels are that would stretch and curl, by each load, with its history."""
+        """Free stretching and curling of panels due to each load, with its history."""
         found = ((load.swelling(self.structure, place), load) for place, load in self._loads())
         return tuple((own, load.history) for own, load in found if own is not None)
 
@@ -281,13 +284,13 @@ class Loaded:
 
 @dataclass(frozen=True, eq=False)
 class SomeLoads(Loaded):
-    """Some loads of a case, which has checked them, with their places in it.
+    """Some of the loads of a case, which has already checked them.
 
     Parameters
     ----------
     case : Case
     numbers : sequence of int
-        Their numbers among the loads of the case.
+        Their indices among the loads of the case.
     """
 
     case: Loaded
@@ -319,7 +322,7 @@ class Damped(Supported):
     Attributes
     ----------
     rayleigh : Rayleigh
-        Its part of the damping, of nothing where there is none.
+        The Rayleigh part of the damping; zero if there is none.
     modal_damping : ModalDamping or None
         Damping ratios of modes, if there are any.
     crease_damping : ndarray, shape (nf,)
@@ -327,11 +330,11 @@ class Damped(Supported):
     strain_damping : float
         Damping of strain rates, s.
     dashpots : tuple of (str, Dashpot)
-        Those among the supports, with their places for messages.
+        Dashpots among the supports, with their places for messages.
     damped : bool
         Whether anything dissipates energy.
     damped_at_start : bool
-        Whether any damping is that about the state in which a motion begins.
+        Whether any damping refers to the state in which a motion begins.
     """
 
     damping: Damping | Sequence[Damping]
@@ -400,12 +403,12 @@ class Damped(Supported):
 
 
 def _union(numbers: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
-    """Numbers that are among any of some, increasing."""
+    """Sorted union of several sets of numbers."""
     return np.unique(np.concatenate([np.zeros(0, np.int64), *numbers]))
 
 
 def _sum_by_history(parts: Summands) -> Terms:
-    """Vectors with their histories, those with equal histories added."""
+    """Vectors with their histories; vectors with equal histories are added up."""
     terms: list[tuple[NDArray[np.float64], History]] = []
     for vector, history in parts:
         same = next((total for total, other in terms if other == history), None)

@@ -1,7 +1,7 @@
-"""Edges that are supported along their whole length, and the points of a mesh on them.
+"""Edges that are supported along their whole length, and the mesh points on them.
 
-Supports with `along` do so, and those of both ends of a clamped edge, which stays straight: points
-between move as the line between the ends.
+A support with `along` holds an edge this way. So does a clamped edge whose ends are both held: it
+stays straight, and the points between move as the line between the ends.
 """
 
 from __future__ import annotations
@@ -77,9 +77,9 @@ def _edges(structure: Discretized, support: Any, named: NDArray, place: str) -> 
 
 
 def straightened(options: Any, pattern: Pattern, supports: Iterable[Any]) -> dict[str, Any]:
-    """What makes a structure with these options fit for supports along edges, where these may bow.
+    """Further options that a structure whose edges may bow needs for supports along edges.
 
-    That is the option `straight`, with the edges of the boundary that are held along; or nothing.
+    This is the option `straight` with all boundary edges held along their length; or nothing.
     """
     if not getattr(options, "bowed", False):
         return {}
@@ -102,27 +102,27 @@ def _between(structure: Discretized, edges: NDArray, vector: NDArray) -> NDArray
 
 
 class Straight:
-    """Points of a structure's mesh between the ends of its clamped edges.
+    """Mesh points between the ends of a structure's clamped edges.
 
     Parameters
     ----------
     structure : Structure or Shell
     stated : ndarray of bool, shape (n, 3)
-        Dofs for which supports are given: these are not changed.
+        Dofs with a support of their own, which stay unchanged.
     """
 
     def __init__(self, structure: Discretized, stated: NDArray[np.bool_]) -> None:
         self._structure, self._stated = structure, stated
 
     def held(self) -> NDArray[np.bool_]:
-        """Dofs (n, 3) that are supported in all."""
+        """All supported dofs (n, 3)."""
         held = self._stated.copy()
         for nodes in self._structure.clamped_nodes:
             held[nodes[1:-1]] |= held[nodes[0]] & held[nodes[-1]]
         return held
 
     def moved(self, imposed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Those of a mask (n, 3), and points between ends of which one is among them."""
+        """Moved dofs (n, 3): the imposed ones, and points between ends of which one is imposed."""
         both, moved = self.held(), imposed.copy()
         for nodes in self._structure.clamped_nodes:
             inner = nodes[1:-1]
@@ -132,7 +132,7 @@ class Straight:
         return moved
 
     def carried(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Displacements (n, 3), linear between the ends."""
+        """Displacements (n, 3), linear between the ends of clamped edges."""
         out, both = vector.copy(), self.held()
         for nodes in self._structure.clamped_nodes:
             inner, between = nodes[1:-1], _between(self._structure, nodes[None], vector)[0]

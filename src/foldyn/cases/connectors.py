@@ -22,16 +22,15 @@ NEAR = 1e-9  # of the structure's size: nodes closer than that have no line betw
 
 
 class Connector(Part):
-    """Base of the frozen data classes that tie nodes to the ground, or to each other.
+    """Base of frozen data classes that tie nodes to the ground or to each other.
 
     Attributes
     ----------
     nodes, between, direction
-        Nodes on the ground or, instead, pairs of nodes; the direction in which it acts, if it is a
-        fixed one.
+        Nodes tied to the ground, or instead pairs of nodes; the direction, if it is fixed.
     asked, no_line : str
-        Messages where not one of `nodes` and `between` is given, and where the nodes a and b of
-        pair k are in one place and have no direction.
+        Messages if not exactly one of `nodes` and `between` is given, and if the nodes a and b of
+        pair k coincide and no direction is given.
     """
 
     nodes: Nodes | None
@@ -42,17 +41,17 @@ class Connector(Part):
     no_line: ClassVar[str]
 
     def agree(self) -> None:
-        """Ask for one of what it may tie."""
+        """Require exactly one of `nodes` and `between`."""
         if (self.nodes is None) == (self.between is None):
             raise InputError(f": give {self.asked}", "nodes" if self.between is None else "between")
 
     def ends(self, structure: Discretized, place: str) -> NDArray[np.int64]:
-        """Ends (k, 2); `GROUND` in place of the second.
+        """Pairs of ends (k, 2); the second is `GROUND` for nodes on the ground.
 
         Raises
         ------
         InputError
-            A node is out of range; or without a direction, two ends are in one place.
+            A node is out of range, or two ends coincide and no direction is given.
         """
         if self.nodes is not None:
             nodes = resolve_nodes(structure, self.nodes, f"{place}.nodes")
@@ -69,7 +68,7 @@ class Connector(Part):
 
     @property
     def directions(self) -> NDArray[np.float64] | None:
-        """Unit vectors (k, 3) along which it acts; None of the line between its ends."""
+        """Unit vectors (k, 3) along which it acts; None: along the line between its ends."""
         if self.direction is not None:
             return unit_vector(self.direction)[None]
         return np.eye(3) if self.nodes is not None else None
@@ -115,7 +114,7 @@ class Spring(Connector):
     )
 
     def agree(self) -> None:
-        """Refuse a length of springs that have none."""
+        """Refuse a rest length for springs that have none."""
         super().agree()
         rest = self.rest_length
         if rest is not None and (self.between is None or self.direction is not None):
@@ -174,21 +173,20 @@ def packed(parts: Iterable[tuple[str, Spring]], structure: Discretized) -> Sprin
 class Dashpot(Connector):
     """Viscous dampers: a force c times a velocity, against it.
 
-    From a node to the ground, which stands still even where a base moves; or between two nodes,
-    against the rate of their distance, or of its component along a fixed direction.
+    It acts between a node and the ground, which stays at rest even if a base moves; or between two
+    nodes, against the rate of their distance or of its component along a fixed direction.
 
     Parameters
     ----------
     coefficient : float
         Damping c of each dashpot, N s/m, at least 0.
     nodes : int, sequence of int, or str, optional
-        Nodes that have one each to the ground.
+        Nodes that each get a dashpot to the ground.
     between : sequence of int, or of pairs of them, optional
-        Instead of `nodes`: two nodes, as (0, 5), or several pairs, with a dashpot each.
+        Instead of `nodes`: two nodes, as (0, 5), or several pairs with a dashpot each.
     direction : {"x", "y", "z", "-x", "-y", "-z"} or sequence of float, shape (3,), optional
         The only direction in which it acts, fixed in space. Without it a dashpot to the ground acts
-        against any motion of its node, and one between nodes along the line from one to the other,
-        as it is now.
+        against any motion of its node, and one between nodes along the current line between them.
     """
 
     coefficient: Annotated[float, Check(number, least=0.0, unit="N s/m"), Key("dashpot")]

@@ -1,9 +1,9 @@
-"""What ties the displacements of a case together: oblique supports, links and rigid panels.
+"""Constraints between displacements: oblique supports, links and rigid panels.
 
-All are linear equations G u = g with constant coefficients between the displacements u (3n,), in
-which g is zero but for supports that move. They are met exactly, by elimination: solvers take the
-vector x that `algebra.elimination` speaks of, u = E x, of which they solve for the free dofs. No
-stiffness is added, and no unknown; what was symmetric and positive definite stays so.
+All are linear equations G u = g with constant coefficients for the displacements u (3n,); g is zero
+except for supports that move. Elimination satisfies them exactly: u = E x (`algebra.elimination`),
+and solvers solve for the free dofs of x. This adds no stiffness and no unknowns, and keeps matrices
+symmetric and positive definite.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ class Equation(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """Equations between the dofs of a case, m = 3 n of them; false if there are none.
+    """Equations between the 3n nodal dofs of a case; false if there are none.
 
-    Vectors and matrices over all dofs may have more of them behind those of the nodes (those of a
-    model's hidden dofs), which are left as they are.
+    Vectors and matrices over all dofs (m) may have further dofs after the nodal ones (a model's
+    hidden dofs), which stay unchanged.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Constraints:
     free : ndarray of int
         Dofs that are neither held nor slaves, increasing: the unknowns.
     slaves : ndarray of int
-        Dofs that the others determine.
+        Dofs that the other dofs determine.
     """
 
     equations: Sequence[Equation]
@@ -69,7 +69,7 @@ class Constraints:
 
     @cached_property
     def owners(self) -> NDArray[np.str_]:
-        """Who asks for each equation, (k,)."""
+        """Owner of each equation, (k,)."""
         return np.array([one.owner for one in self.equations], np.str_)
 
     @cached_property
@@ -106,7 +106,7 @@ class Constraints:
 
     @cached_property
     def determined(self) -> NDArray[np.bool_]:
-        """Whether each node (n, 3) is held along each axis, or follows others."""
+        """Whether each dof (n, 3) is held or follows others."""
         mask = np.ones(len(self.held), bool)
         mask[self.free] = False
         return mask.reshape(-1, 3)
@@ -118,7 +118,7 @@ class Constraints:
         return Constraints(self.equations, held) if len(dofs) else self
 
     def slaves_of(self, owners: Collection[str]) -> NDArray[np.int64]:
-        """Slaves of the equations of some owners."""
+        """Slaves in the equations of the given owners."""
         if not self:
             return np.zeros(0, np.int64)
         return self.slaves[np.isin(self.owners[self._solved.kept], list(owners))]
@@ -132,7 +132,7 @@ class Constraints:
         return np.concatenate([self.basis @ x[:count], x[count:]])
 
     def coordinates(self, u: NDArray) -> NDArray:
-        """x of displacements u (m,): the values of their equations in place of the slaves."""
+        """x of displacements u (m,): slaves are replaced by the values of their equations."""
         if not self:
             return u
         x = u.copy()
@@ -140,7 +140,7 @@ class Constraints:
         return x
 
     def rows_on_dofs(self, rows: NDArray) -> NDArray:
-        """Rows (r, m) that multiply x, as they multiply the displacements u of that x."""
+        """Rows (r, m) for x that give the same products as the given rows with u = E x."""
         if not self:
             return rows
         out, count = rows.copy(), len(self.held)
@@ -156,7 +156,7 @@ class Constraints:
         return np.concatenate([self.basis.T @ force[:count], force[count:]])
 
     def largest(self, force: NDArray) -> NDArray:
-        """E' f with all signs positive: how large forces of the sizes f (m,) may become, N."""
+        """|E|' f: upper bounds, N, of E' f for forces of the sizes f (m,)."""
         if not self:
             return force
         count = len(self.held)
@@ -170,7 +170,7 @@ class Constraints:
         return sparse.csr_array(basis.T @ matrix @ basis)
 
     def extended(self, size: int) -> sparse.csr_array:
-        """E of so many dofs (m, m)."""
+        """E extended to m dofs (m, m)."""
         more = size - len(self.held)
         if not more:
             return self.basis
@@ -182,25 +182,25 @@ class Constraints:
 
     @cached_property
     def along(self) -> NDArray[np.bool_]:
-        """Whether each equation (k,) is that of a support along a direction."""
+        """Whether each equation (k,) belongs to a support along a direction."""
         return np.array([_is_direction(one) for one in self.equations], bool)
 
     # ------------------------------------------------------------------ supports that move
     def moved(self, shape: NDArray, values: NDArray, place: str) -> NDArray:
-        """Displacements (n, 3) while held dofs move as in `shape` (n, 3) and the others stand.
+        """Displacements (n, 3) when held dofs move as in `shape` (n, 3) and free ones stay.
 
         Parameters
         ----------
         shape : ndarray, shape (n, 3)
         values : ndarray, shape (k,)
-            Of the equations, m.
+            Values of the equations, m.
         place : str
-            What moves, for messages.
+            The support that moves, for messages.
 
         Raises
         ------
         InputError
-            An equation that the others determine contradicts them.
+            Redundant equations contradict each other.
         """
         if not self:
             return shape
@@ -218,7 +218,7 @@ class Constraints:
     # ------------------------------------------------------------------ reactions
     @cached_property
     def supported(self) -> NDArray[np.int64]:
-        """Dofs (s,) on which supports exert forces, increasing: held ones, those of directions."""
+        """Dofs (s,) on which supports exert forces, increasing: held, or along a direction."""
         return np.union1d(np.flatnonzero(self.held), self._along).astype(np.int64)
 
     @cached_property
@@ -230,7 +230,7 @@ class Constraints:
 
     @cached_property
     def reactions(self) -> sparse.csr_array:
-        """What supports exert (s, 3n) on `supported` dofs, from forces that act on all."""
+        """Matrix (s, 3n) from forces on all dofs to the supports' forces on `supported` dofs."""
         size = len(self.held)
         own = sparse.diags_array(self.held.astype(float))
         if not self:
@@ -245,15 +245,14 @@ class Constraints:
 
 
 def _is_direction(equation: Equation) -> bool:
-    """Whether an equation is of one node alone, which those of links and panels never are."""
+    """Whether an equation concerns a single node, unlike equations of links and panels."""
     return len({dof // 3 for dof in equation.dofs}) == 1
 
 
 def equations_of(structure: Discretized, supports: Iterable[tuple[str, Any]]) -> list[Equation]:
-    """Equations of a structure's rigid panels and of supports, these with their places.
+    """Equations of a structure's rigid panels, and of supports with their places.
 
-    Those of supports come first, so that of equations that say the same theirs is the one that
-    carries.
+    Supports come first, so that their equation carries the force if another one is redundant.
     """
     directions: list[Equation] = []
     links: list[Equation] = []
@@ -267,9 +266,9 @@ def equations_of(structure: Discretized, supports: Iterable[tuple[str, Any]]) ->
 
 
 def values_of(owners: NDArray, values: Mapping[str, Any]) -> NDArray[np.float64]:
-    """Values (k,), m, of equations with these owners; of others than those given, zero.
+    """Values (k,), m, of equations with these owners; zero for owners without a value.
 
-    values : by owner; one for all nodes, or one for each.
+    values : by owner, one for all nodes or one for each.
     """
     out = np.zeros(len(owners))
     for owner, value in values.items():
@@ -278,7 +277,7 @@ def values_of(owners: NDArray, values: Mapping[str, Any]) -> NDArray[np.float64]
 
 
 def check_tied(case: Any, displacement: NDArray, field: str) -> None:
-    """Refuse displacements (n, 3), m, in which links gape or rigid panels are bent."""
+    """Refuse displacements (n, 3), m, that violate links or bend rigid panels."""
     ties = case.constraints
     if not ties:
         return
@@ -294,7 +293,7 @@ def check_tied(case: Any, displacement: NDArray, field: str) -> None:
 
 
 def _along(support: Fix | Impose, owner: str, nodes: NDArray) -> list[Equation]:
-    """The displacement of each node along a direction, which its largest component names."""
+    """Equations for the displacement along a direction; its largest component is solved for."""
     unit = unit_vector(support.direction)
     axes = [int(k) for k in np.argsort(-np.abs(unit), kind="stable") if unit[k] != 0.0]
     values = unit[axes].tolist()
@@ -345,7 +344,7 @@ def _rigid(structure: Discretized) -> list[Equation]:
 
 
 def _riding(owner: str, nodes: NDArray, corners: NDArray, weights: NDArray) -> list[Equation]:
-    """Each node moves as corners (3,) do with its weights (k, 3)."""
+    """Equations by which each node follows three corners with its weights (k, 3)."""
     return [
         Equation(owner, [3 * node + k, *(3 * corners + k).tolist()], [1.0, *-row])
         for node, row in zip(nodes.tolist(), weights, strict=True)

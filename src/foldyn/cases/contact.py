@@ -1,4 +1,4 @@
-"""Contact: panels that touch each other, and planes that they meet."""
+"""Contact of panels with each other and with planes."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ from foldyn.values import length, number, objects, vector
 
 @dataclass(frozen=True)
 class Plane(Part):
-    """A plane that the sheet cannot pass: the ground, the plate of a press; fixed or moving.
+    """A plane that the sheet cannot pass, fixed or moving: the ground, or the plate of a press.
 
-    It meets the nodes of the sheet, or the corners of thick panels' middle surfaces, at half the
-    thickness; nodes that are held along all three axes are left alone.
+    It acts on the nodes of the sheet, or on the corners of thick panels' middle surfaces, at half
+    the thickness, but not on nodes that are held along all three axes.
 
     Parameters
     ----------
     point : sequence of float, shape (3,)
         A point of the plane (m).
     normal : sequence of float, shape (3,)
-        Normal of any length, on the side on which the sheet is.
+        Normal of any length, pointing to the side of the sheet.
     friction : float, optional
-        Coefficient of Coulomb friction; that of the `Contact` by default.
+        Coefficient of Coulomb friction; by default the one of the `Contact`.
     motion : sequence of float, shape (3,), optional
-        Displacement (m) of the plane at factor 1; it stands still by default. In a path of
-        equilibria it is multiplied by the load factor.
+        Displacement (m) of the plane at factor 1; none by default. In an equilibrium path it is
+        multiplied by the load factor.
     history : History or callable, optional
         Factor of time of the motion, constant by default.
 
@@ -66,7 +66,7 @@ class Plane(Part):
     missing = {"normal": "give its normal, on the side of the sheet"}
 
     def agree(self) -> None:
-        """Refuse a history of no motion."""
+        """Refuse a history without a motion."""
         if self.motion is not None:
             self._set(history=as_history(self.history))
         elif self.history is not None:
@@ -75,23 +75,22 @@ class Plane(Part):
 
 @dataclass(frozen=True)
 class Contact(Part):
-    """Panels that touch each other where they come nearer than the sheet's thickness, and planes.
+    """Contact of panels that come closer than the sheet's thickness, and with planes.
 
     Parameters
     ----------
     thickness : float, optional
-        Distance (m) of middle surfaces below which panels repel each other; the sheet's thickness
-        by default, that of each panel where they differ.
+        Distance (m) of middle surfaces below which panels repel each other; by default the
+        thickness of the sheet, or of each panel.
     friction : float, default 0
-        Coefficient of Coulomb friction of panels on each other, and on planes that have none of
-        their own.
+        Coefficient of Coulomb friction between panels, and on planes without their own.
     stiffness : float, optional
         k (N/m) of the potential k d0^2 (1 - d/d0)^3 / (d/d0)^4; 0.03 times Young's modulus times
         the thickness by default.
     panels : bool, default True
-        Whether panels touch each other; else planes alone act.
+        Whether panels touch each other; if not, only planes act.
     planes : sequence of Plane
-        Planes that the sheet meets; none by default.
+        Planes; none by default.
 
     Examples
     --------
@@ -111,12 +110,12 @@ class Contact(Part):
     ] = ()
 
     def agree(self) -> None:
-        """Ask for something that touches."""
+        """Require panels or planes."""
         if not self.panels and not self.planes:
             raise InputError(": without planes nothing touches; give planes, or True", "panels")
 
     def sheets(self, structure: Discretized, held: NDArray[np.bool_]) -> Sheets:
-        """What may touch of a structure whose nodes are held along all axes, or not (n,)."""
+        """Surfaces in contact; held (n,) says which nodes are held along all axes."""
         # copies: arrays that may be written to and those that may not have kernels of their own
         panel = np.array(structure.triangle_panel)
         count, sheet = int(panel.max(initial=-1)) + 1, structure.sheet
@@ -146,7 +145,7 @@ class Contact(Part):
         return BoardSheets(**vars(sheets), middle=x - height[:, :, None] * normal[:, None])
 
     def friction_on(self, plane: Plane) -> float:
-        """Coefficient of friction on a plane: its own, or else that of all."""
+        """Coefficient of friction on a plane: its own, or else the common one."""
         return self.friction if plane.friction is None else plane.friction
 
     @property

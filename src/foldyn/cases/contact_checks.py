@@ -1,4 +1,4 @@
-"""What contact asks of a case, and of the state in which it begins."""
+"""Checks of cases with contact, and of the state in which they begin."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from foldyn.errors import InputError, warn
 from foldyn.mechanics.contact.candidates import NORMAL, POINT
 from foldyn.mechanics.crossings import crossing_panels, pairs_text
 
-STRIDE = 5  # at every so manieth state panels that cross are looked for
-NEAREST = 0.01  # of the distance at which contact begins: no motion brings anything nearer
+STRIDE = 5  # check every fifth state for crossing panels
+NEAREST = 0.01  # of the distance at which contact begins: no motion gets closer
 APART = (
     "start from a state in which they are apart, as with crease_rest above 0 and below 360 degrees"
 )
 
 
 def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
-    """Refuse a start at which something has passed another; warn where panels overlap.
+    """Refuse a start in which panels or planes have been passed; warn if panels overlap.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
     u : (n, 3)
         Displacement (m) at the start.
     moved : (p, 3)
-        That of the planes.
+        Displacement (m) of the planes.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
     Warns
     -----
     FoldynWarning
-        At rest panels are nearer to each other than the sheet is thick.
+        At rest panels are closer to each other than the thickness of the sheet.
     """
     if case.contact is None:
         return
@@ -50,7 +50,7 @@ def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
 
 
 def _check_planes(case: Case, u: NDArray, moved: NDArray) -> None:
-    """Refuse nodes that are behind a plane, or in it."""
+    """Refuse nodes behind a plane or in it."""
     assert case.contact is not None
     contact, tables = case.contact_term, case.contact_term.tables
     met = tables.meeting
@@ -74,7 +74,7 @@ def _check_planes(case: Case, u: NDArray, moved: NDArray) -> None:
 
 
 def _check_panels(case: Case, u: NDArray) -> None:
-    """Refuse panels that cross or meet; warn where they overlap at rest."""
+    """Refuse panels that cross or meet; warn if they overlap at rest."""
     contact = case.contact_term
     tables = contact.tables
     x = tables.rest + contact.points(u)
@@ -100,21 +100,21 @@ def _check_panels(case: Case, u: NDArray) -> None:
 
 
 def check_driven(case: Case, states: Iterable[tuple[str, NDArray, NDArray]]) -> None:
-    """Refuse supports and planes that would go through each other, whatever the rest does.
+    """Refuse supports and planes that inevitably pass through each other.
 
     Parameters
     ----------
     case : Case
         With contact.
     states : iterable of (str, ndarray of shape (n, 3), ndarray of shape (p, 3))
-        When, as "t = 0.1 s"; displacements (m) of the nodes, as far as supports decide them, and of
-        the planes. The first is the start.
+        The moment, as "t = 0.1 s"; displacements (m) of the nodes, as far as supports determine
+        them, and of the planes. The first is the start.
 
     Raises
     ------
     InputError
-        A node of which supports decide how far it is from a plane comes behind it; or panels of
-        which supports move all nodes cross.
+        A node whose distance from a plane supports determine gets behind it, or panels cross
+        whose nodes are all moved by supports.
     """
     assert case.contact is not None
     contact, tables = case.contact_term, case.contact_term.tables
@@ -159,7 +159,7 @@ def check_driven(case: Case, states: Iterable[tuple[str, NDArray, NDArray]]) -> 
 
 
 def _decided(case: Case, direction: NDArray) -> NDArray:
-    """Whether supports alone decide how far each node (n,) moves along a unit vector."""
+    """Whether supports alone determine the motion of each node (n,) along a unit vector."""
     ties, nodes = case.constraints, len(case.structure.nodes)
     along = sparse.csr_array(sparse.kron(sparse.eye_array(nodes), direction[None]))
     if ties:
@@ -168,9 +168,9 @@ def _decided(case: Case, direction: NDArray) -> NDArray:
 
 
 def _followers(case: Case, decided: NDArray) -> tuple[NDArray, sparse.csr_array]:
-    """Centers (c,) of panels whose corners supports decide; from motions (n, 3) what they follow.
+    """Centers (c,) of panels whose corners supports determine, and the matrix of their motion.
 
-    decided : (n,) which nodes supports decide.
+    decided : (n,) whether supports determine each node.
     """
     structure = case.structure
     tri, size = structure.triangles, len(structure.nodes)

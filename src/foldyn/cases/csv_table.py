@@ -1,4 +1,4 @@
-"""Columns of a CSV file with their units: times and values of a table."""
+"""Columns of a CSV file with their units, such as times and values of a table."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _HEADER = 'begin with a line that names the columns, as in "time [s],force [N]"'
 
 @dataclass(frozen=True)
 class _Column:
-    """One column: its place in a line, its heading as written, and the parts of the heading."""
+    """A column: its place in a line, its heading as written, and the name and unit in it."""
 
     place: int
     heading: str
@@ -100,7 +100,7 @@ def read_columns(
 
 @contextmanager
 def _opened(file: Path) -> Iterator[tuple[list[_Column], list[tuple[int, list[str]]]]]:
-    """Columns and lines of a file, which messages name; see `_lines`."""
+    """Columns and lines of a file, as from `_lines`; messages name the file."""
     text = read_text(file, "a CSV file in UTF-8", MOST, "take fewer lines or columns")
     with within("", file):
         yield _lines(text)
@@ -109,15 +109,15 @@ def _opened(file: Path) -> Iterator[tuple[list[_Column], list[tuple[int, list[st
 def read_numbers(
     path: str | os.PathLike[str], wanted: Mapping[str, tuple[str, str]], gaps: Collection[str] = ()
 ) -> dict[str, NDArray[np.float64]]:
-    """Numbers of several columns of a CSV file, of any quantities, in lines of any order.
+    """Numbers from several columns of a CSV file, of any quantities; lines may have any order.
 
     Parameters
     ----------
     path : path
         A file as `Table.from_csv` reads it.
     wanted : mapping of str to (str, str)
-        By field, for messages and the result: the heading of its column, with or without the
-        unit, and the unit that its numbers become.
+        For each field, which messages and the result name: the heading of its column, with or
+        without the unit, and the unit to convert to.
     gaps : collection of str
         Fields whose cells may be empty.
 
@@ -129,7 +129,7 @@ def read_numbers(
     Raises
     ------
     InputError
-        As `Table.from_csv`, but for the order of the lines.
+        As in `Table.from_csv`, except for the order of the lines.
     """
     with _opened(path_of(path)) as (columns, rows):
         chosen = [_find(field, heading, columns, 0) for field, (heading, _) in wanted.items()]
@@ -151,7 +151,7 @@ def read_headings(path: str | os.PathLike[str]) -> list[tuple[str, str | None]]:
 
 
 def some(names: Sequence[str]) -> str:
-    """Names for a message, of many only the first ones."""
+    """Names for a message; only the first ones if there are many."""
     if len(names) <= _MANY:
         return ", ".join(names)
     return f"{', '.join(names[: _MANY - 2])}, ... ({len(names)} in all)"
@@ -224,7 +224,7 @@ def _quantity(unit: str) -> str | None:
 
 
 def _ratio(column: _Column, wanted: str) -> Fraction:
-    """Size of the column's unit in the unit that the caller wants."""
+    """Factor from the column's unit to the wanted unit."""
     quantity = _quantity(wanted) or _NUMBER
     listed = ", ".join(UNITS[quantity])
     place = f'column "{column.shown}"'
@@ -266,7 +266,7 @@ def _is_number(cell: str) -> bool:
 def _number(
     number: int, cells: Sequence[str], column: _Column, ratio: Fraction, gap: bool = False
 ) -> float:
-    """Number in a cell; NaN for an empty one where there may be gaps."""
+    """Number in a cell; NaN if it is empty and gaps are allowed."""
     cell = cells[column.place]
     place = f'line {number}, column "{column.shown}"'
     remedy = "; leave the cell empty where a node was lost" if gap else ""

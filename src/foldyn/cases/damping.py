@@ -1,6 +1,6 @@
-"""Damping: how a case loses energy, and the registry of all kinds.
+"""Kinds of damping, and their registry.
 
-Viscous dampers between nodes are supports (`dashpots`).
+Viscous dampers between nodes are supports (`connectors`).
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ STATES = ("rest", "initial")
 class Rayleigh(Part):
     """Damping matrix C = alpha M + beta K0, K0 the tangent stiffness at a stated state.
 
-    A motion of angular frequency w is damped with the ratio alpha / (2 w) + beta w / 2. K0 is
-    constant, so beta resists rotations too: `StrainDamping` is for what turns far.
+    A motion of angular frequency w has the damping ratio alpha / (2 w) + beta w / 2. As K0 is
+    constant, beta also resists rigid rotations: take `StrainDamping` for large rotations.
 
     Parameters
     ----------
@@ -112,22 +112,22 @@ class Rayleigh(Part):
 class ModalDamping(Part):
     """Damping ratios of the lowest modes, C = M Phi diag(2 zeta omega) Phi' M, phi' M phi = 1.
 
-    Small motions in a mode that is listed have its ratio, those in all other modes none. The matrix
+    Small motions in the listed modes have these ratios; other modes are undamped. The matrix
     is constant (E. L. Wilson and J. Penzien, Int. J. Numer. Methods Eng. 4, 1972; R. W. Clough and
-    J. Penzien, Dynamics of Structures, 2nd ed. 1993, section 12-3), and damps deformation alone:
-    where supports move, it is the motion relative to where they would slowly bring the structure.
-    Rigid motions, and modes that nothing resists, are not counted and not damped. Modes of one
-    frequency, of which any sums are modes too, get the mean of their ratios.
+    J. Penzien, Dynamics of Structures, 2nd ed. 1993, section 12-3), and damps only deformation: if
+    supports move, the motion relative to the quasi-static one. Rigid motions and modes without
+    stiffness are neither counted nor damped. Modes of equal frequency get the mean of their ratios,
+    as their shapes are not unique.
 
     Parameters
     ----------
     ratios : float or sequence of float
         Damping ratio (0.02 is 2 %, at least 0) of `count` modes, or of each from the lowest on.
     count : int, optional
-        How many of the lowest modes have the ratio, if it is one number; all by default.
+        Number of lowest modes that have the ratio, if it is a single number; all by default.
     state : {"rest", "initial"}
-        Whose modes: at the structure's rest, or where a motion starts (for modes and frequency
-        responses: those of the state about which it vibrates).
+        State of these modes: rest, or the initial state of a motion (for modes and frequency responses:
+        the state of the vibration).
     """
 
     ratios: Annotated[float | Sequence[float], Check(number_or_list, what="mode", least=0.0)]
@@ -138,7 +138,7 @@ class ModalDamping(Part):
     several: ClassVar[bool] = False
 
     def agree(self) -> None:
-        """Refuse a number of modes beside ratios of each."""
+        """Refuse a count together with a ratio for each mode."""
         if self.count is not None and isinstance(self.ratios, tuple):
             raise InputError(
                 f" = {self.count}: {len(self.ratios)} ratios are those of {len(self.ratios)} "
@@ -154,10 +154,10 @@ class ModalDamping(Part):
 
 @dataclass(frozen=True)
 class CreaseDamping(Part):
-    """A moment against the rate at which creases fold: M = c L d theta / dt on each, nothing else.
+    """A moment against the folding rate of each crease: M = c L d theta / dt.
 
-    theta is the dihedral now, so that it is right for any motion; rigid motions dissipate nothing.
-    Where several damp one crease, their coefficients add up.
+    theta is the current dihedral, so this is exact for any motion; rigid motions dissipate nothing.
+    If several damp the same crease, their coefficients add up.
 
     Parameters
     ----------
@@ -183,14 +183,14 @@ class CreaseDamping(Part):
 
 @dataclass(frozen=True)
 class StrainDamping(Part):
-    """Damping of the rates at which bars stretch and hinges turn, each by beta times its stiffness.
+    """Damping of the rates at which bars stretch and hinges turn: beta times their stiffness.
 
-    That of a Kelvin-Voigt material: the force of each bar and hinge is that of its elongation or
-    turn plus beta times the rate of it, along its direction now; bars of panels with membranes are
-    coupled in their rates as in their strains. So it is right for motions of any size, and takes
-    nothing from rigid rotations. For small motions about rest it is beta K0 (see `Rayleigh`): a
-    vibration of angular frequency w is damped with the ratio beta w / 2. Hinges count with the
-    slope of their law at rest, and springs, which have dashpots, not at all.
+    A Kelvin-Voigt material: the force of a bar or hinge depends on its elongation or turn plus beta
+    times its rate, along its current direction. The rates of bars in panels with membranes are
+    coupled as their strains are. So this is exact for motions of any size, and rigid rotations
+    dissipate nothing. For small motions about rest it equals beta K0 (see `Rayleigh`): a vibration
+    of angular frequency w has the damping ratio beta w / 2. Hinges have the slope of their law at
+    rest; springs are not damped, as they have dashpots for this.
 
     Parameters
     ----------
@@ -206,16 +206,16 @@ class StrainDamping(Part):
 
 Damping = Rayleigh | ModalDamping | CreaseDamping | StrainDamping
 DAMPINGS: tuple[type[Damping], ...] = get_args(Damping)
-"""All kinds. In a table of damping each stands under its `key`, without one in the table itself."""
+"""All kinds. In the table of damping each has its `key`; one without a key is the table itself."""
 
 
 def dampings(given: Any) -> Damping | tuple[Damping, ...]:
-    """Return one kind of damping as it is, several as a tuple, none as Rayleigh's of nothing.
+    """Return one damping as it is, several as a tuple, and zero Rayleigh damping for none.
 
     Raises
     ------
     InputError
-        Something else, or a kind twice of which there can be one only.
+        Something else, or two of a kind of which there can be only one.
     """
     parts = tuple(given) if isinstance(given, list | tuple) else (given,)
     names = " or ".join(f"{kind.__name__}(...)" for kind in DAMPINGS)
@@ -231,7 +231,7 @@ def dampings(given: Any) -> Damping | tuple[Damping, ...]:
 
 
 def damping_table(parts: Sequence[Damping]) -> dict[str, Any]:
-    """Table of some dampings, of plain values."""
+    """Table of dampings with plain values."""
     table: dict[str, Any] = {}
     for part in parts:
         if not part.key:
@@ -244,7 +244,7 @@ def damping_table(parts: Sequence[Damping]) -> dict[str, Any]:
 
 
 class _DampingsOf(Check):
-    """Dampings of a kind: from a table, from several, or from its first argument alone."""
+    """Dampings of a kind, from a table, a list of tables, or just the first argument."""
 
     def __init__(self, kind: type[Damping]) -> None:
         super().__init__(self._listed)
@@ -294,7 +294,7 @@ class DampingSection(Rayleigh, Section):
     creases : float, table, or list of tables
         Damping of creases (N m s/rad per m); see `CreaseDamping`.
     strain : float
-        As beta (s), but for motions of any size; see `StrainDamping`.
+        Like beta (s), but for motions of any size; see `StrainDamping`.
     """
 
     ratios: Annotated[Sequence[Sequence[float]] | None, Check(_ratios)] = None
@@ -303,7 +303,7 @@ class DampingSection(Rayleigh, Section):
     strain: Annotated[Sequence[Damping], _DampingsOf(StrainDamping)] = ()
 
     def agree(self) -> None:
-        """Ask for coefficients or ratios."""
+        """Refuse coefficients together with ratios."""
         if self.ratios is not None and self.stated & {"alpha", "beta"}:
             raise InputError(
                 f" = {show(self.ratios)}: they give alpha and beta; leave those out, or ratios",
@@ -311,7 +311,7 @@ class DampingSection(Rayleigh, Section):
             )
 
     def made(self) -> Damping | tuple[Damping, ...]:
-        """The damping."""
+        """The damping that the table describes."""
         others = [*self.modal, *self.creases, *self.strain]
         if others and not self.stated & {"alpha", "beta", "ratios"}:
             return dampings(others)

@@ -1,7 +1,7 @@
-"""From tables (of a case file or a stored case) to histories, laws, parts of a case, generators.
+"""Histories, laws and other parts of a case from tables of case files and stored cases.
 
-Every message begins with what follows the table's own place: ".duration = -1: must be ...", so
-that the caller puts "loads[0].history" in front.
+Every message begins after the table's place: ".duration = -1: must be ..."; the caller puts
+"loads[0].history" in front.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def history_from(table: Any, folder: Path | None = None) -> History:
     ----------
     table : mapping
     folder : Path, optional
-        Where the relative path of a table's CSV file starts; without it no file is read.
+        Folder of relative paths to CSV files; without it no file is read.
     """
     kind, arguments = _kind_of(table, HISTORIES)
     if kind == Table.kind and folder is not None and not arguments.keys() & {"times", "values"}:
@@ -45,8 +45,8 @@ def history_from(table: Any, folder: Path | None = None) -> History:
 def law_from(spec: Any, laws: Mapping[str, type]) -> Any:
     """Law from its name, or from its table such as ``{kind = "enhanced", theta1 = 75}``.
 
-    A name is returned as it is. A law that has another within, as ``law = {kind = "enhanced"}``,
-    gets that one in the same way.
+    A name is returned unchanged. A law inside another, as ``law = {kind = "enhanced"}``, is made in
+    the same way.
     """
     if isinstance(spec, str):
         return choice("", spec, laws)
@@ -60,7 +60,7 @@ def law_from(spec: Any, laws: Mapping[str, type]) -> Any:
 def call_from(
     function: Callable[..., Any], arguments: Mapping[str, Any], skip: Iterable[str] = ()
 ) -> Any:
-    """Call a function or class with a table's entries, which it checks.
+    """Call a function or class, which checks its arguments, with the entries of a table.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def _table_from_file(arguments: Mapping[str, Any], folder: Path) -> Table:
 
 
 class KindOf(Placed):
-    """A table whose `kind` is the name of one of some data classes, or the name alone."""
+    """A table whose `kind` names one of several data classes, or just that name."""
 
     def __init__(
         self, read: Callable[..., Any], kinds: Mapping[str, Any], named: bool, **limits: Any
@@ -153,14 +153,14 @@ class Part(Checked):
     Attributes
     ----------
     apart : str
-        What the message says where another kind's keys stand beside its own.
+        Message if keys of another kind are given together with its own.
     """
 
     apart: ClassVar[str] = ""
 
     @classmethod
     def term(cls, parts: Sequence[tuple[str, Any]], structure: Discretized) -> Term | None:
-        """What all of a kind, each with its place for messages, add to the energy of a case."""
+        """Energy term of all parts of this kind, each given with its place; None if none."""
         return None
 
     @classmethod
@@ -169,27 +169,27 @@ class Part(Checked):
         return {argument.key: name for name, argument in arguments(cls).items()}
 
     def table(self) -> dict[str, Any]:
-        """Its table of plain values, without the history and what is None."""
+        """Its table of plain values, without the history and arguments that are None."""
         given = {key: getattr(self, name) for key, name in self.by_key().items()}
         given.pop("history", None)
         return {key: plain(value) for key, value in given.items() if value is not None}
 
 
 class PartOf(Check):
-    """A table that is a part of one of some kinds, which its keys tell.
+    """A table of one of several kinds of parts; its keys tell which.
 
-    Among the kinds of which there are keys that no other has, or if there are none among all, that
-    is the first that has all keys, or else the last.
+    Candidates are the kinds with a given key that no other kind has, or all if there is no such
+    key. The first candidate with all given keys is chosen, or else the last.
 
     Parameters
     ----------
     kinds : sequence of type
     section : str
-        Where such tables stand in a case file.
+        Name of the list of these tables in a case file.
     asked : str
-        What a message asks for where there are no keys at all.
+        Remedy in the message if the table has no keys.
     **refused
-        Keys that such a file may not have, each with the reason.
+        Forbidden keys, each with the reason.
     """
 
     def __init__(
@@ -199,7 +199,7 @@ class PartOf(Check):
         self.kinds, self.section, self.asked, self.refused = kinds, section, asked, refused
 
     def without(self, **refused: str) -> PartOf:
-        """The same, of a file that may not have some keys, each for a reason."""
+        """Copy that forbids some keys, each with the reason."""
         return PartOf(self.kinds, self.section, self.asked, **refused)
 
     def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:

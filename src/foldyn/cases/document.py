@@ -1,8 +1,8 @@
-"""A case as a document (a table that TOML can hold) and named arrays, and back.
+"""Conversion of a case to a document (a table for TOML) with named arrays, and back.
 
-The document has the sections of a case file. What is long lives in the arrays and is referred to
-as ``{ array = "name" }``: the pattern's vertices and faces, per-crease values, tables of
-histories. Numbers survive exactly.
+The document has the sections of a case file. It refers to long data in the arrays as
+``{ array = "name" }``: the pattern's vertices and faces, values per crease, tables of histories.
+Numbers are preserved exactly.
 """
 
 from __future__ import annotations
@@ -48,16 +48,16 @@ PER_CREASE = ("crease_stiffness", "crease_rest")
 
 @dataclass(frozen=True, eq=False)
 class Document:
-    """A case in writing.
+    """A case as plain tables and arrays.
 
     Attributes
     ----------
     sections : dict
         Sections of a case file, of plain Python values.
     arrays : dict of str to ndarray
-        What the sections refer to, by name.
+        Arrays that the sections refer to, by name.
     obstacles : tuple of str
-        Why the case cannot be rebuilt from the document; empty when it can.
+        Why the case cannot be rebuilt from the document; empty if it can.
     """
 
     sections: dict[str, Any]
@@ -66,13 +66,13 @@ class Document:
 
 
 def to_document(case: Case, stage_times: NDArray[np.float64] | None = None) -> Document:
-    """Write a case down.
+    """Convert a case to a document.
 
     Parameters
     ----------
     case : Case
     stage_times : ndarray, shape (n,), optional
-        Times (s) at which functions of time are sampled; without them such a case cannot be
+        Times (s) for sampling functions of time; without them a case with such functions cannot be
         rebuilt.
 
     Returns
@@ -83,7 +83,7 @@ def to_document(case: Case, stage_times: NDArray[np.float64] | None = None) -> D
 
 
 def pattern_document(pattern: Pattern) -> Document:
-    """Write down a pattern alone, which has no sheet and is no case."""
+    """Convert a pattern without a sheet to a document, which is no complete case."""
     writer = _Writer(None)
     sections = {
         "pattern": writer.pattern(pattern),
@@ -105,7 +105,7 @@ def from_document(sections: Mapping[str, Any], arrays: Mapping[str, NDArray]) ->
 
 
 def pattern_from_document(sections: Mapping[str, Any], arrays: Mapping[str, NDArray]) -> Pattern:
-    """Pattern of a document, of which the rest may be what cannot be rebuilt.
+    """Pattern of a document, even if the case cannot be rebuilt.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def _undamaged(read: Callable[[Any], T], table: Any, arrays: Mapping[str, NDArra
 
 
 class _Writer:
-    """Collects the arrays and obstacles while the sections are written."""
+    """Makes the sections, and collects arrays and obstacles."""
 
     def __init__(self, stage_times: NDArray[np.float64] | None) -> None:
         self.stage_times = stage_times
@@ -183,7 +183,7 @@ class _Writer:
         }
 
     def _more(self, pattern: Pattern) -> dict[str, Any]:
-        """What a pattern says of its creases beside their letters, where it says anything."""
+        """Further data of a pattern: fold angles, welds, families, periods, custom data."""
         table: dict[str, Any] = {}
         if not np.isnan(pattern.fold_angles).all():
             table["fold_angles"] = self.store("fold_angles", pattern.fold_angles)
@@ -377,7 +377,7 @@ def _stored_pattern(table: Mapping[str, Any]) -> Pattern:
 
 
 def _resolve(value: Any, arrays: Mapping[str, NDArray]) -> Any:
-    """Put the arrays in the place of their references."""
+    """Replace references by their arrays."""
     if isinstance(value, Mapping):
         if set(value) == {"array"}:
             if value["array"] not in arrays:

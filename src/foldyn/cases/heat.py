@@ -1,4 +1,4 @@
-"""What the strain energies of a case lack where panels are warm."""
+"""Corrections to the strain energies of a case with warm panels."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ IN_PLANE, BENDING = ("strain_membrane", "strain_bars"), ("strain_bending", "stra
 def heat_of(
     structure: Discretized, parts: Sequence[tuple[Swelling, int]], histories: int, offset: NDArray
 ) -> Heat | None:
-    """Heat of swollen states with the numbers of their histories; None of none.
+    """Heat of swollen states, each with the number of its history; None if there are none.
 
-    offset : (., 4) of the sheet, with its dofs in balance; see `SheetTerm.series`.
+    offset : (., 4) of the sheet with its dofs in balance; see `SheetTerm.series`.
     """
     if not parts:
         return None

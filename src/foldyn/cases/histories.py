@@ -28,7 +28,7 @@ __all__ = [
 ]  # fmt: skip
 
 TABLE = 8  # code
-SHARP = 0.01  # of the range of a table: how far a sharp corner leads away from a straight line
+SHARP = 0.01  # of the range of a table: deviation from a straight line at a sharp corner
 
 
 @dataclass(frozen=True)
@@ -117,15 +117,15 @@ def smooth_ramp(t, duration):
 
 @dataclass(frozen=True)
 class Ramp(_Lasting):
-    """Factor t / duration, held at 0 before t = 0 and at 1 from t = duration on.
+    """Factor t / duration, 0 before t = 0 and 1 from t = duration on.
 
     Parameters
     ----------
     duration : float
         Length of the rise (s), greater than 0.
     smooth : bool
-        Rise without a jump of the first two derivatives: x^3 (10 - 15 x + 6 x^2) with
-        x = t / duration. The smooth ramp starts and ends a motion without a jolt.
+        Rise with continuous first and second derivatives, which starts and ends a motion without a
+        jolt: x^3 (10 - 15 x + 6 x^2) with x = t / duration.
 
     Examples
     --------
@@ -219,13 +219,12 @@ def chirp(t, start, slope, phase, duration):
 class Chirp(Formula):
     """Factor sin(2 pi (f0 t + (f1 - f0) t^2 / (2 duration)) + phase), 0 <= t < duration.
 
-    The frequency goes from one to the other in a straight line; before and after, the factor is 0.
+    The frequency changes linearly from one to the other; before and after, the factor is 0.
 
     Parameters
     ----------
     from_frequency, to_frequency : float
-        Frequencies f0 at t = 0 and f1 at t = duration (Hz), at least 0, not both 0; either may be
-        the lower.
+        Frequencies f0 and f1 (Hz) at t = 0 and at t = duration, at least 0 and not both 0, in any order.
     duration : float
         Length of the sweep (s), greater than 0.
     phase : float
@@ -246,7 +245,7 @@ class Chirp(Formula):
     formulas = (Waveform(7, chirp),)
 
     def agree(self) -> None:
-        """Refuse what does not swing."""
+        """Refuse a chirp that does not oscillate."""
         if self.from_frequency == self.to_frequency == 0.0:
             raise InputError(" = 0.0: this or from_frequency must be above 0", "to_frequency")
 
@@ -271,7 +270,7 @@ class Chirp(Formula):
 
 @dataclass(frozen=True, eq=False)
 class Table(Formula):
-    """Factors given at times, linear between them, the first and the last held outside.
+    """Factors given at times, linear between them and constant outside.
 
     Parameters
     ----------
@@ -280,8 +279,8 @@ class Table(Formula):
     values : array_like, shape (n,)
         Factors at these times.
     smooth : bool
-        A cubic spline through the values instead of straight lines: for measured displacements
-        that a support follows, whose velocity must not jump at every value.
+        A cubic spline through the values instead of straight lines: for measured displacements of
+        supports, whose velocity must not jump at every value.
     """
 
     times: Annotated[Any, Check(numbers, unit="s")]
@@ -291,7 +290,7 @@ class Table(Formula):
     formulas = (Waveform(TABLE, None),)
 
     def agree(self) -> None:
-        """Refuse times that do not increase, and values that are not one for each."""
+        """Refuse times that do not increase, and another number of values."""
         times, values = self.times, self.values
         if times.ndim != 1 or times.size < 2:
             raise InputError(f" = {show(times)}: must be a list of at least two numbers", "times")
@@ -318,7 +317,7 @@ class Table(Formula):
         unit: str = "-",
         smooth: bool = False,
     ) -> Table:
-        """Table from two columns of a CSV file, whose units are checked and converted.
+        """Table from two columns of a CSV file; units are checked and converted.
 
         The file is a text in UTF-8: a line with the names of the columns and their units in
         brackets, as in ``time [ms],force [mN]``, then lines of numbers. Cells are separated by
@@ -333,10 +332,10 @@ class Table(Formula):
             Headings of the two columns, with or without the unit; the first and the second column
             by default. The unit of the time is s, ms, us or min.
         unit : str
-            What the values become. The default "-" is a factor without unit, from a column with
-            [-], [1], [%] or no unit. With "N", "mN" or "kN" the column must be a force in one of
-            these and is converted: the load's vector is then a direction, (1, 0, 0) for a force
-            along x. Likewise "m", "cm", "mm" and "m/s2", "mm/s2".
+            Unit to convert the values to. The default "-" is a factor without unit, from a column
+            with [-], [1], [%] or no unit. With "N", "mN" or "kN" the column must be a force: the
+            load's vector is then a direction, (1, 0, 0) for a force along x. Likewise "m", "cm",
+            "mm" and "m/s2", "mm/s2".
         smooth : bool
             As for the class.
 
@@ -362,7 +361,7 @@ class Table(Formula):
         return self.times, cubics
 
     def knots(self) -> tuple[float, ...]:
-        """See `History.knots`: both ends, and sharp corners; those of a curve's points are not."""
+        """See `History.knots`: both ends and sharp corners, not the points of a smooth curve."""
         sharp = np.ones(len(self.times), bool)
         sharp[1:-1] = False
         if not self.smooth:
@@ -372,7 +371,7 @@ class Table(Formula):
         return tuple(self.times[sharp].tolist())
 
     def __eq__(self, other: object) -> bool:
-        """Tell whether the other is a table of the same numbers."""
+        """Whether the other is a table with the same numbers."""
         return self._key() == other._key() if isinstance(other, Table) else NotImplemented
 
     def __hash__(self) -> int:

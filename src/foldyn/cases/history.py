@@ -1,7 +1,8 @@
-"""What a history is: how a load varies in time, as a factor of time.
+"""Histories: how a load varies in time, as a factor.
 
-A history is called with times (s), a number or an array of any shape, and gives factors of the
-same shape. `histories` has those with a formula, here are a constant and a function of the user's.
+A history is called with times (s), a number or an array of any shape, and returns factors of the
+same shape. Here are the constant and user-defined functions; `histories` has the other built-in
+ones.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ CALLED, CONSTANT = -1, 0  # codes of the user's functions, and of the constant
 class History(Checked, ABC):
     """A factor of time.
 
-    A subclass computes `factor` for an array of times (s) and, as a frozen dataclass, compares
-    equal to another with the same arguments: loads with equal histories are summed.
+    A subclass computes `factor` for an array of times (s). It is a frozen data class, so histories
+    with the same arguments are equal, and loads with equal histories are summed.
     """
 
     kind: ClassVar[str]
@@ -43,43 +44,43 @@ class History(Checked, ABC):
         return factors if times.ndim else float(factors)
 
     def parameters(self) -> tuple[float, ...]:
-        """Numbers of the compiled formula, at most four."""
+        """Parameters of the compiled formula, at most four."""
         return ()
 
     def polynomials(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Knots (k,) and coefficients (k, 4) of the cubics between them; none but for tables."""
+        """Knots (k,) of a table and coefficients (k, 4) of the cubics after them; else empty."""
         return np.zeros(0), np.zeros((0, 4))
 
     def jumps(self) -> tuple[float, ...]:
-        """Times (s) at which the factor jumps: no motion can be imposed across them."""
+        """Times (s) at which the factor jumps, which no imposed motion can follow."""
         return ()
 
     def knots(self) -> tuple[float, ...] | None:
-        """Times (s), in order, at which it jumps or turns a corner; None if they are not known."""
+        """Times (s), in order, at which it jumps or has a corner; None if unknown."""
         return self.jumps()
 
 
 class Waveform(NamedTuple):
-    """A compiled formula: the factor and its first and second derivative in time.
+    """A compiled formula for the factor and its first and second derivative in time.
 
-    It takes the time (s) and `parameters`, as many as it has arguments. Where a derivative jumps it
-    gives the value after the jump.
+    It takes the time (s) and the history's `parameters`. At a jump of a derivative it returns the
+    value after the jump.
     """
 
-    code: int  # one that no other has
-    formula: Any  # None where the history is its `polynomials`
+    code: int  # unique
+    formula: Any  # None if `polynomials` define the history
 
 
 class Formula(History):
-    """A history whose formula is compiled, for loops over time."""
+    """A history with a compiled formula, for loops over time."""
 
     formulas: ClassVar[tuple[Waveform, ...]] = ()
-    """One for each of its codes; its `code` is the first of these."""
+    """One for each code of the history; the first is the default."""
     table: ClassVar[Callable[[History, NDArray], NDArray]]
-    """Factors and derivatives at times; the kernels, which know the histories, give it to them."""
+    """Factors and derivatives at times; set by `waveforms`, which imports all histories."""
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Take the code of the formula."""
+        """Set the code to that of the first formula."""
         super().__init_subclass__(**options)
         if "formulas" in vars(cls) and isinstance(cls.code, int):
             cls.code = cls.formulas[0].code
@@ -109,26 +110,26 @@ class Constant(Formula):
 
 
 def _times(name: str, value: Any) -> tuple[float, ...]:
-    """Return times in order, each once."""
+    """Return sorted times without repetitions."""
     return tuple(np.unique(numbers(name, value)).tolist())
 
 
 @dataclass(frozen=True)
 class Function(History):
-    """A history from the user's own function of time.
+    """A history from a user-defined function of time.
 
     Parameters
     ----------
     function : callable
-        Takes a time (s), a float, and gives a factor.
+        Returns the factor at a time (s), a float.
     at : sequence of float, optional
-        Times (s) at which it jumps or turns a corner; empty if it never does. Integrators that
-        choose their steps end one at each. Without it they can only sample the function within a
-        step, and warn that a short pulse may be missed.
+        Times (s) at which it jumps or has a corner; empty if there are none. Integrators with
+        adaptive steps end a step at each. Without `at` they only sample the function within a step,
+        and warn that a short pulse may be missed.
 
     Notes
     -----
-    A function cannot be written to a file: results store it sampled at the stage times of the run.
+    A function cannot be written to a file: results store its values at the stage times of the run.
 
     Examples
     --------
@@ -177,12 +178,12 @@ class Function(History):
 
 
 def factor(history: History, time: float | None) -> float:
-    """Factor at a time (s); without one that of the constant loads alone."""
+    """Factor at a time (s); without a time 1 for constant histories and 0 for all others."""
     return float(history.code == CONSTANT) if time is None else float(history(time))
 
 
 def as_history(history: History | Callable[[Any], Any] | None) -> History:
-    """Turn None (a constant), a history or any callable into a history."""
+    """History from None (constant), a history or any callable."""
     if history is None:
         return STEADY
     if isinstance(history, History):

@@ -1,4 +1,4 @@
-"""What every load is: a frozen dataclass that says what it does at factor 1 of its history."""
+"""Base of all loads: frozen data classes that define the effects of a load at factor 1."""
 
 from __future__ import annotations
 
@@ -15,19 +15,18 @@ from foldyn.structures.swelling import Swelling
 
 
 class Load(Part):
-    """A load: a frozen dataclass that says what it does at factor 1 of its history.
+    """A load: a frozen data class that defines its effects at factor 1 of its history.
 
-    A new kind is a subclass that is listed in `LOADS`; `place`, its place among the loads, is for
-    messages.
+    A new kind is a subclass listed in `LOADS`. `place` is the load's place for messages.
 
     Attributes
     ----------
     apart : str
-        In messages: why it cannot share a table with another load.
+        Why it cannot share a table with another load, for messages.
     arrows : bool
         Whether pictures show its forces as arrows at the nodes.
     moves : bool
-        Whether its history is that of a motion, whose velocity counts.
+        Whether its history describes a motion, so that its velocity matters.
     """
 
     apart: ClassVar[str]
@@ -40,39 +39,39 @@ class Load(Part):
         return None
 
     def loaded(self, structure: Discretized, place: str) -> NDArray[np.int64]:
-        """Nodes on which it acts; none if it acts on all, or on creases."""
+        """Nodes on which it acts; empty if it acts on all nodes or on creases."""
         return np.zeros(0, np.int64)
 
     def rest_changes(
         self, structure: Discretized, place: str
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
-        """Creases that it actuates, and the change (rad) of their rest angles; None if none."""
+        """Actuated creases, and the changes (rad) of their rest angles; None if there are none."""
         return None
 
     def turns(self, structure: Discretized, place: str) -> NDArray[np.float64] | None:
-        """Changes, rad, of `SheetTerm.rest_angles`, or of the first of them; None if none.
+        """Changes, rad, of the first `SheetTerm.rest_angles`; None if there are none.
 
-        Those of creases by `rest_changes` are apart.
+        Changes of creases by `rest_changes` are not included.
         """
         return None
 
     def following(self, structure: Discretized, place: str) -> Following | None:
-        """Forces that depend on the displacement, at factor 1; None if it has none."""
+        """Displacement-dependent forces at factor 1; None if there are none."""
         return None
 
     def swelling(self, structure: Discretized, place: str) -> Swelling | None:
-        """How panels would stretch and curl at factor 1; None if they would not."""
+        """Free stretching and curling of panels at factor 1; None if there is none."""
         return None
 
     def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
-        """Refuse what the structure or its held dofs (n, 3) do not allow."""
+        """Refuse a load that does not suit the structure or its held dofs (n, 3)."""
 
 
 def check_held(
     what: str, nodes: NDArray[np.int64], acts: NDArray[np.int64], fixed: NDArray[np.bool_],
     place: str, told: bool = True,
 ) -> None:  # fmt: skip
-    """Refuse a load that acts on held axes only.
+    """Refuse a load that acts only on held axes.
 
     Parameters
     ----------
@@ -83,7 +82,7 @@ def check_held(
     fixed : ndarray of bool, shape (n, 3)
     place : str
     told : bool
-        Whether one that acts on held axes in part is warned of.
+        Whether to warn if some of the axes are held.
     """
     held = fixed[np.ix_(nodes, acts)]
     if not held.any():

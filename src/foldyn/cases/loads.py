@@ -1,4 +1,10 @@
-"""Loads: forces on nodes, gravity, creases that fold by themselves, and the registry of all."""
+"""Loads: forces on nodes, gravity, self-folding creases, and the registry of all loads.
+
+Creases fold to a dihedral, a fold angle, or a fraction of fully folded. The fold angle follows the
+FOLD format: 0 if the panels are flat, positive for a valley, negative for a mountain, 180 or -180
+degrees if closed. It is the dihedral of the flat panels minus the dihedral: 180 degrees minus it,
+except for thick panels (`Pattern.flat_dihedrals`).
+"""
 
 from __future__ import annotations
 
@@ -45,17 +51,17 @@ PerCrease = float | Sequence[float]
 
 
 def check_angles(name: str, value: Any) -> Angles:
-    """Return a dihedral (degrees) for all creases, or a tuple of one for each."""
+    """Return a dihedral (degrees) for all creases, or a tuple with one for each."""
     return _within(name, value, 0.0, 360.0, " (flat: 180)")
 
 
 def check_fold_angles(name: str, value: Any) -> Angles:
-    """Return a fold angle (degrees) for all creases, or a tuple of one for each."""
+    """Return a fold angle (degrees) for all creases, or a tuple with one for each."""
     return _within(name, value, -180.0, 180.0, " (flat: 0; valleys above, mountains below)")
 
 
 def check_fraction(name: str, value: Any) -> float:
-    """Return a fraction between 0 and 1 from a number, or from a text as "80%"."""
+    """Return a fraction between 0 and 1 from a number or a text such as "80%"."""
     given = value
     if isinstance(value, str):
         try:
@@ -90,11 +96,11 @@ def dihedrals(
     letters: NDArray[np.str_],
     flat: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Dihedrals (degrees) of creases (nc,); one of the first three is given.
+    """Dihedrals (degrees) of creases (nc,), from the one of the first three that is given.
 
-    letters, flat : their assignments, and their dihedrals (degrees) where the panels are flat.
-    assigned : whether the creases were chosen by their assignment, so that one fold angle for all
-        of them is a size, and each folds the way it is assigned.
+    letters, flat : assignments of the creases, and their dihedrals (degrees) with flat panels.
+    assigned : whether the creases were chosen by a word. A single fold angle is then a size, and
+        each crease folds as it is assigned.
     """
     if angle is not None:
         return one_or_each("angle", angle, len(letters), "creases")
@@ -113,7 +119,7 @@ def dihedrals(
 
 
 def within_reach(angles: NDArray[np.float64], creases: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Dihedrals (degrees) from 0 to 360, rounding apart, as thick panels may leave them."""
+    """Dihedrals (degrees) clipped to 0 to 360 if only rounding exceeds this; else an error."""
     beyond = creases[(angles < -ROUNDING) | (angles > 360.0 + ROUNDING)]
     if beyond.size:
         raise InputError(
@@ -124,7 +130,7 @@ def within_reach(angles: NDArray[np.float64], creases: NDArray[np.int64]) -> NDA
 
 
 def _signs(name: str, letters: NDArray[np.str_]) -> NDArray[np.float64]:
-    """Sign of the fold angle of each crease, which must be a mountain or a valley."""
+    """Sign of the fold angle of each crease; all must be mountains or valleys."""
     unknown = [letter for letter in letters.tolist() if letter not in SIGNS]
     if unknown:
         what = {"F": "flat", "U": "unassigned"}[unknown[0]]
@@ -168,7 +174,7 @@ class Force(Load):
         return forces
 
     def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
-        """Refuse a force that acts on held axes only; warn of one that does so in part."""
+        """Refuse a force that acts only on held axes; warn if some of its axes are held."""
         nodes, acts = self.loaded(structure, place), np.flatnonzero(self.vector)
         check_held(f"the force {show(self.vector)}", nodes, acts, fixed, place)
 
@@ -185,16 +191,15 @@ def _acceleration(name: str, value: Any) -> tuple[float, ...]:
 class Gravity(Load):
     """Gravity on the whole structure, times a history.
 
-    Each node gets the sum of its row of the mass matrix times the acceleration, so that the
-    weight is exact with every mass rule and a free structure falls with the acceleration itself.
-    Point masses count.
-    The part that supports hold adds to the reactions.
+    Each node gets the sum of its row of the mass matrix times the acceleration. So the weight is
+    exact with every mass rule, and a free structure falls with exactly this acceleration. Point
+    masses are included. The weight of held nodes adds to the reactions.
 
     Parameters
     ----------
     acceleration : sequence of float, shape (3,), or str
-        Acceleration (m/s2) of free fall, as (0, 0, -9.81), not zero; or the direction in which
-        things fall on Earth, as "-z": standard gravity, 9.80665 m/s2.
+        Acceleration (m/s2) of free fall, as (0, 0, -9.81), not zero; or a direction, as "-z", for
+        standard gravity, 9.80665 m/s2.
     history : History or callable, optional
         Factor of time; constant by default.
     """
@@ -215,9 +220,8 @@ class Gravity(Load):
 class Actuate(Load):
     """Creases that fold or unfold by themselves.
 
-    The rest dihedral of each crease moves from its rest value (`Structure.fold_rest`) to the one
-    given, in proportion to the factor of the history. Give one of `angle`, `fold_angle` and
-    `fraction`.
+    The rest dihedral of each crease changes from `Structure.fold_rest` to the given one, in
+    proportion to the factor of the history. Give one of `angle`, `fold_angle` and `fraction`.
 
     Parameters
     ----------
@@ -229,12 +233,12 @@ class Actuate(Load):
     history : History or callable, optional
         Factor of time; constant by default.
     fold_angle : float or sequence of float, optional
-        Instead, the fold angle of the FOLD format (degrees, -180 to 180): 180 less the dihedral,
+        Instead, the fold angle of the FOLD format (degrees, -180 to 180): 180 minus the dihedral,
         0 flat, valleys positive, mountains negative. One number for creases chosen by a word is a
-        size, at least 0: each of them folds the way it is assigned.
+        size, at least 0: each crease folds as it is assigned.
     fraction : float or str, optional
-        Instead, how far to fully folded, 0 to 1 or as in "80%": valleys fold to 180 degrees times
-        it, mountains to -180 degrees times it.
+        Instead, the fraction of fully folded, 0 to 1 or as in "80%": valleys fold to 180 degrees
+        times the fraction, mountains to -180 degrees times it.
     """
 
     creases: Creases
@@ -247,7 +251,7 @@ class Actuate(Load):
     moves = True
 
     def agree(self) -> None:
-        """Ask for one of the three that say how far."""
+        """Require exactly one of `angle`, `fold_angle` and `fraction`."""
         given = self.given(*FOLDED)
         if not given:
             raise InputError(": missing; give it (degrees), or fold_angle or fraction", "angle")
@@ -257,7 +261,7 @@ class Actuate(Load):
     def rest_changes(
         self, structure: Discretized, place: str
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """See `Load`; refuses angles that the fold law cannot be free of stress at."""
+        """See `Load`; refuses rest angles that the fold law does not allow."""
         creases = resolve_creases(structure, self.creases, f"{place}.creases")
         with within(f"{place}."):
             angles = dihedrals(
@@ -281,7 +285,7 @@ class Actuate(Load):
 
 
 def _of_creases(structure: Discretized, creases: NDArray[np.int64]) -> tuple[NDArray, NDArray]:
-    """Assignments of creases, and their dihedrals (degrees) where the panels are flat."""
+    """Assignments of creases, and their dihedrals (degrees) with flat panels."""
     pattern, count = structure.pattern, len(structure.folds)
     if pattern is None:
         return np.full(count, "U")[creases], np.full(count, 180.0)[creases]
@@ -299,6 +303,6 @@ LOADS: tuple[type[Load], ...] = (
     CreaseMoment,
     Temperature,
 )
-"""All kinds. Which one a table of a case file means, its keys tell."""
+"""All kinds. The keys of a table in a case file determine the kind."""
 LOAD = PartOf(LOADS, "loads")
 """A load in a case file."""

@@ -1,4 +1,4 @@
-"""Point masses: what nodes carry beside the mass of the sheet."""
+"""Point masses, which nodes carry in addition to the mass of the sheet."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from foldyn.values import number
 
 @dataclass(frozen=True)
 class PointMass(Part):
-    """The same mass on each of some nodes, without a size of its own.
+    """The same point mass on each of some nodes.
 
-    It moves with its node along x, y and z: in motions, modes, frequency responses, gravity and
-    inertia relief.
+    It moves with its node along x, y and z, and counts in motions, modes, frequency responses,
+    gravity and inertia relief.
 
     Parameters
     ----------

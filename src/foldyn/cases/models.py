@@ -1,4 +1,4 @@
-"""The models of a sheet."""
+"""The models of a sheet: bars and hinges, and the shell."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ class Model:
     make : callable
         ``make(pattern, sheet, **options)`` gives the structure.
     options : callable
-        ``options(welds=..., **given)`` gives all its options, the defaults of what is not given
-        among them; welds says whether the pattern has some.
+        ``options(welds=..., **given)`` returns all its options with defaults for those not given;
+        welds says whether the pattern has welds.
     masses : iterable of str
-        Distributions of mass that it offers.
+        Mass rules that it offers.
     name : str
-        In messages.
+        Name in messages.
     """
 
     make: Callable[..., Any]
@@ -39,7 +39,7 @@ class Model:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Names of what `make` takes besides pattern and sheet."""
+        """Names of the arguments of `make` after pattern and sheet."""
         return tuple(signature(self.make).parameters)[2:]
 
 

@@ -37,20 +37,20 @@ from foldyn.values import number, number_or_list, one_or_each, show, vector
 
 
 class Spread(Load):
-    """A force on nodes of which each gets a part by its share of a length or an area."""
+    """A force that nodes share in proportion to their length or area."""
 
     arrows = True
 
     def measure(self, structure: Discretized, place: str) -> NDArray[np.float64]:
-        """Length (m) or area (m2) that belongs to each node (n,)."""
+        """Length (m) or area (m2) of each node (n,)."""
         raise NotImplementedError
 
     def total_of(self, measure: float) -> NDArray[np.float64]:
-        """Force (3,), N, on a length or an area."""
+        """Total force (3,), N, on a length (m) or an area (m2)."""
         raise NotImplementedError
 
     def loaded(self, structure: Discretized, place: str) -> NDArray[np.int64]:
-        """See `Load`; vertices of the pattern where it acts on others too."""
+        """See `Load`; only vertices of the pattern, if there is one."""
         nodes = np.flatnonzero(self.measure(structure, place))
         pattern = structure.pattern
         return nodes if pattern is None else nodes[nodes < len(pattern.vertices)]
@@ -71,14 +71,14 @@ class TotalForce(Spread):
     total : sequence of float, shape (3,)
         Sum of the forces (N).
     nodes : int, sequence of int, or str, optional
-        Vertices by number, or an expression ("xmin"). Each gets its part by the area of the sheet
-        that belongs to it: a panel gives each of its corners an equal part.
+        Vertices by number, or an expression ("xmin"). Each gets a part in proportion to its area:
+        the area of a panel is divided equally among its corners.
     edges : sequence of (vertex, vertex), or str, optional
-        Edges of the pattern; an expression means those of which it selects both ends. Each gets
-        its part by its length, evenly along it: half of a piece of an edge for either end.
+        Edges of the pattern; an expression selects edges by both of their ends. The force is
+        distributed evenly over their length: half of each piece of an edge for either end.
     panels : int, sequence of int, or "all", optional
-        Panels by number. Each gets its part by its area at rest, evenly over it: a third of each
-        of the triangles into which it is cut for each corner.
+        Panels by number. The force is distributed evenly over their area at rest: a third of each
+        triangle of a panel for each corner.
     history : History or callable, optional
         Factor of time; constant by default.
 
@@ -103,7 +103,7 @@ class TotalForce(Spread):
     apart = "a total force is a load of its own"
 
     def agree(self) -> None:
-        """Ask for one place where it acts."""
+        """Require exactly one of nodes, edges and panels."""
         given = self.given("nodes", "edges", "panels")
         if len(given) != 1:
             what = "is given" if not given else f"are given, {' and '.join(given)}"
@@ -136,7 +136,7 @@ class TotalForce(Spread):
         return np.array(self.total)
 
     def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
-        """Refuse a force that acts on held axes only; warn of one on nodes that does in part."""
+        """Refuse a force that acts only on held axes; warn if some axes of its nodes are held."""
         nodes = np.flatnonzero(self.measure(structure, place))
         what, acts = f"the force {show(self.total)}", np.flatnonzero(self.total)
         check_held(what, nodes, acts, fixed, place, told=self.nodes is not None)
@@ -149,9 +149,9 @@ class LineLoad(Spread):
     Parameters
     ----------
     edges : sequence of (vertex, vertex), or str
-        Edges of the pattern; an expression ("xmin") means those of which it selects both ends.
+        Edges of the pattern; an expression ("xmin") selects edges by both of their ends.
     force_per_length : sequence of float, shape (3,)
-        Force (N/m) per length at rest: half of that of each piece of an edge for either end.
+        Force per length at rest (N/m); half of each piece of an edge for either end.
     history : History or callable, optional
         Factor of time; constant by default.
 
@@ -177,7 +177,7 @@ class LineLoad(Spread):
         return measure * np.array(self.force_per_length)
 
     def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
-        """Refuse a load that acts on held axes only."""
+        """Refuse a load that acts only on held axes."""
         nodes = np.flatnonzero(self.measure(structure, place))
         what = f"the force per length {show(self.force_per_length)}"
         check_held(what, nodes, np.flatnonzero(self.force_per_length), fixed, place, told=False)
@@ -185,15 +185,15 @@ class LineLoad(Spread):
 
 @dataclass(frozen=True)
 class Pressure(Load):
-    """Pressure on panels, which stays normal to them as they move, times a history.
+    """Pressure on panels, always normal to them, times a history.
 
     It acts along the normal of the panels' fronts: a positive pressure inflates a closed body whose
-    fronts are outside. The force on a triangle is the pressure times its present area.
+    fronts are outside. The force on a triangle is the pressure times its current area.
 
     Parameters
     ----------
     pressure : float
-        Pa; negative towards the front.
+        Pa; a negative one pushes on the fronts.
     panels : int, sequence of int, or "all"
         Panels by number; all by default.
     history : History or callable, optional
@@ -225,10 +225,10 @@ class Pressure(Load):
 
 @dataclass(frozen=True)
 class CreaseMoment(Load):
-    """Moments of creases, times a history: pairs of equal and opposite moments on their panels.
+    """Moments about creases, times a history: equal and opposite moments on both panels.
 
-    The moment does work as the dihedral grows: a positive one opens a valley. A crease whose fold
-    law is linear, M = k (angle - rest), comes to rest at rest + moment / k.
+    A positive moment does work as the dihedral grows: it opens a valley. A crease with a linear
+    fold law, M = k (angle - rest), is in equilibrium at rest + moment / k.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ class CreaseMoment(Load):
         Numbers in the order of `pattern.creases`, or a name: "mountain", "valley", "all", which
         are all but the flat ones, or a family of the pattern (`Pattern.families`), as "zigzag".
     moment : float or sequence of float
-        N m of each whole crease, of all these creases or of each.
+        Moment of each whole crease (N m): one for all these creases, or one for each.
     history : History or callable, optional
         Factor of time; constant by default.
     """
@@ -248,12 +248,12 @@ class CreaseMoment(Load):
     apart = "acts on creases"
 
     def of_creases(self, structure: Discretized, place: str) -> tuple[NDArray, NDArray]:
-        """Its creases (k,), and the moment (k,), N m, of each."""
+        """Its creases (k,) and their moments (k,), N m."""
         creases = resolve_creases(structure, self.creases, f"{place}.creases")
         return creases, one_or_each(f"{place}.moment", self.moment, len(creases), "creases")
 
     def following(self, structure: Discretized, place: str) -> Following:
-        """See `Load`; a shell's pieces of a crease take their part of it by their length."""
+        """See `Load`; pieces of a crease in a shell share the moment by their length."""
         creases, moment = self.of_creases(structure, place)
         each = np.zeros(len(structure.folds))
         each[creases] = moment
@@ -266,7 +266,7 @@ class CreaseMoment(Load):
         return joined([(turning, 0), (pushes(hidden[there], back[there]), 0)])
 
     def turns(self, structure: Discretized, place: str) -> NDArray | None:
-        """See `Load`: the panels beside a crease give way to all of its moment."""
+        """See `Load`: panels at a crease yield to its whole moment."""
         sheet = structure.body.sheet
         if not sheet.offsets:
             return None
@@ -277,7 +277,7 @@ class CreaseMoment(Load):
         return np.append(angles, sheet.offsets_under(each))
 
     def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
-        """Refuse moments of creases between panels that are held."""
+        """Refuse moments of creases between held panels."""
         creases, _ = self.of_creases(structure, place)
         pieces = structure.body.sheet.fold_hinges()
         held = fixed[pieces.nodes].all(axis=(1, 2)) & (pieces.hidden == NO_DOF).all(axis=1)
@@ -295,24 +295,24 @@ MOST_STRAIN = 0.2  # free strain beyond which the laws of the sheet say nothing
 
 @dataclass(frozen=True)
 class Temperature(Load):
-    """Panels that are warmer than at rest, times a history.
+    """A change of temperature of panels, times a history.
 
-    Free panels would stretch by `expansion` times the change, and curl towards their front by
-    `curvature` times it, without any stress; where they may not, they push. Other causes of free
-    strains act in the same way: moisture, growth, a swelling gel.
+    Free panels stretch by `expansion` times the change and curl towards their front by `curvature`
+    times it, without stress; constrained panels are under stress. Other causes of free strain act
+    alike: moisture, growth, swelling of a gel.
 
-    Bars and hinges get the rest angles of a paraboloid of that curvature; both models are exact for
-    small slopes. Between the factors 0 and 1 the free strain is proportional to the factor to the
+    Bars and hinges get the rest angles of a paraboloid with this curvature; both models are exact
+    for small slopes. Between the factors 0 and 1 the free strain is proportional to the factor to
     first order in the strain.
 
     Parameters
     ----------
     change : float
-        Change of the temperature, K, at factor 1.
+        Temperature change, K, at factor 1.
     expansion : float
         Free strain per kelvin, 1/K.
     curvature : float
-        Free curvature per kelvin, 1/(m K), positive where the sheet bends as at a valley.
+        Free curvature per kelvin, 1/(m K), positive if the sheet bends like a valley.
     panels : int, sequence of int, or "all"
         Panels by number; all by default.
     layers : sequence of (float, float, float), optional
@@ -333,7 +333,7 @@ class Temperature(Load):
     apart = "a temperature acts on panels"
 
     def agree(self) -> None:
-        """Ask for what says how the panels deform, and refuse strains that are too large."""
+        """Require expansion, curvature or layers, and refuse too large strains."""
         given = self.given("expansion", "curvature")
         if self.layers is not None and given:
             raise InputError(f": the layers give the {given[0]}; leave it out", given[0])

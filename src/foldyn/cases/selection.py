@@ -1,6 +1,6 @@
 """Selections: nodes by number or by place (`patterns.selection`); creases, edges and panels.
 
-Also how much of an edge or a panel belongs to each node.
+Also the share of each node in the length of edges and the area of panels.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def resolve_nodes(
 
 
 def in_range(field: str, given: Any, count: int, what: str) -> NDArray[np.int64]:
-    """Return numbers of nodes or creases, of which the structure has `count`, as an array."""
+    """Return numbers as an array if all are below `count`, the number of such items."""
     chosen = np.atleast_1d(np.array(given, dtype=np.int64))
     bad = chosen[(chosen < 0) | (chosen >= count)]
     if bad.size:
@@ -64,7 +64,7 @@ def in_range(field: str, given: Any, count: int, what: str) -> NDArray[np.int64]
 
 
 def check_nodes(name: str, nodes: Any) -> str | tuple[int, ...]:
-    """Return a node selection as text or as a tuple of numbers, checked but for its range."""
+    """Return a node selection as text or tuple of numbers; their range is not checked."""
     if isinstance(nodes, str):
         with given_as(name):
             return check_expression(nodes)
@@ -72,7 +72,7 @@ def check_nodes(name: str, nodes: Any) -> str | tuple[int, ...]:
 
 
 def check_creases(name: str, creases: Any) -> str | tuple[int, ...]:
-    """Return a choice of creases, a word or a tuple of numbers, checked but for its range."""
+    """Return creases as a word or tuple of numbers; their range is not checked."""
     if isinstance(creases, str):
         if not creases.strip():
             raise InputError(
@@ -124,7 +124,7 @@ PAIRS = 'pairs of vertices, as in [[0, 1], [1, 2]], or a selection such as "xmin
 
 
 def check_edges(name: str, edges: Any) -> str | tuple[tuple[int, int], ...]:
-    """Return a selection as text, or edges as a tuple of (low, high); but for their range."""
+    """Return edges as text or tuple of pairs (low, high); their range is not checked."""
     if isinstance(edges, str):
         return str(check_nodes(name, edges))
     given = listed(name, edges, PAIRS)
@@ -142,9 +142,9 @@ def check_edges(name: str, edges: Any) -> str | tuple[tuple[int, int], ...]:
 
 
 def resolve_edges(structure: Discretized, edges: Any, name: str) -> NDArray[np.int64]:
-    """Nodes (k, p) along each of some edges, p two or what a shell has along an edge.
+    """Nodes (k, p) along edges; p is 2, or the number of a shell's nodes along an edge.
 
-    edges : as `check_edges` returns them; a selection means the edges of which it has both ends.
+    edges : from `check_edges`; a text selects edges by both of their ends.
 
     Raises
     ------
@@ -174,13 +174,13 @@ def resolve_edges(structure: Discretized, edges: Any, name: str) -> NDArray[np.i
 
 
 def edges_between(structure: Discretized, nodes: NDArray) -> NDArray[np.int64]:
-    """Nodes (k, p) along each of the edges of which both ends are among some nodes."""
+    """Nodes (k, p) along all edges with both ends among the given nodes."""
     along = structure.edge_nodes
     return along[np.isin(along[:, [0, -1]], nodes).all(axis=1)]
 
 
 def check_panels(name: str, panels: Any) -> str | tuple[int, ...]:
-    """Return "all" or a tuple of panel numbers, checked but for their range."""
+    """Return "all" or a tuple of panel numbers; their range is not checked."""
     if isinstance(panels, str):
         if panels != "all":
             raise InputError(f' = {show(panels)}: give panel numbers, or "all"', name)
@@ -189,7 +189,7 @@ def check_panels(name: str, panels: Any) -> str | tuple[int, ...]:
 
 
 def resolve_panels(structure: Discretized, panels: Any, name: str) -> NDArray[np.int64]:
-    """Triangles (k,) of a structure that lie in panels, as `check_panels` returns them."""
+    """Triangles (k,) of a structure in panels, which are given as from `check_panels`."""
     if not len(structure.triangles):
         raise InputError(f"{name} = {show(panels)}: this structure has no panels")
     if panels == "all":
@@ -203,7 +203,7 @@ Panels = Annotated[int | str | Sequence[int], Check(check_panels)]
 
 
 def length_at_nodes(structure: Discretized, along: NDArray) -> NDArray[np.float64]:
-    """Length (n,), m, at each node of edges (k, p): half of each piece for either end."""
+    """Length (n,), m, of each node on edges (k, p): half of each piece for either end."""
     x, length = structure.nodes, np.zeros(len(structure.nodes))
     pieces = np.linalg.norm(np.diff(x[along], axis=1), axis=2)
     for ends in (along[:, :-1], along[:, 1:]):
@@ -212,7 +212,7 @@ def length_at_nodes(structure: Discretized, along: NDArray) -> NDArray[np.float6
 
 
 def area_at_nodes(structure: Discretized, triangles: NDArray) -> NDArray[np.float64]:
-    """Area (n,), m2, at each node of some triangles (k,): a third of each for each corner."""
+    """Area (n,), m2, of each node on triangles (k,): a third of each for each corner."""
     corners = structure.triangles[triangles]
     area = 0.5 * np.linalg.norm(double_areas(structure.nodes, corners), axis=1)
     count = len(structure.nodes)
@@ -220,10 +220,10 @@ def area_at_nodes(structure: Discretized, triangles: NDArray) -> NDArray[np.floa
 
 
 def tributary_area(structure: Discretized) -> NDArray[np.float64]:
-    """Area (n,), m2, of the sheet that belongs to each vertex, whatever the model.
+    """Area (n,), m2, of the sheet for each vertex, independent of the model.
 
-    A panel gives each of its corners an equal part of its area. Further nodes of a structure have
-    none; without a pattern, a triangle gives a third to each corner.
+    The area of a panel is divided equally among its corners. Other nodes of a structure get none.
+    Without a pattern, a third of each triangle goes to each corner.
     """
     if structure.pattern is None:
         return area_at_nodes(structure, np.arange(len(structure.triangles)))

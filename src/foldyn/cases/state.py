@@ -1,4 +1,4 @@
-"""A state: displacement and velocity of every node."""
+"""A state: displacement and velocity of every node, and data for continuing a motion."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from foldyn.values import choice, numbers
 @brief
 @dataclass(frozen=True, eq=False)
 class Continuation:
-    """What an implicit method needs beside a state to go on as if it had not been stopped.
+    """Data, in addition to a state, with which an implicit method continues without a break.
 
     Parameters
     ----------
     method : str
         The method.
     values : ndarray, shape (k,)
-        Its own numbers; those of the displacement come first.
+        Its own values, beginning with the displacement.
     """
 
     method: str
@@ -33,19 +33,18 @@ class Continuation:
 @brief
 @dataclass(frozen=True, eq=False)
 class Origin:
-    """Where the motion began that goes on from a state.
+    """Start of the motion that a state continues.
 
     Parameters
     ----------
     displacement : ndarray, shape (n, 3)
-        There, m: that about which damping has its `state = "initial"`.
+        Displacement (m) at the start, the reference of damping with `state = "initial"`.
     time : float, optional
-        When (s), for the rest angles there; without it those of the constant loads alone.
+        Time (s) of the start, for its rest angles; without it, those under constant loads only.
     flow : ndarray, shape (n, 3), optional
-        Displacement (m) at which the flow of added mass was found last; where it goes on unless
-        known.
+        Displacement (m) at which the flow of added mass was last computed; by default the state's.
     looked : int
-        Steps since it was looked at whether that flow still holds.
+        Steps since that flow was last checked.
     """
 
     displacement: NDArray
@@ -55,7 +54,7 @@ class Origin:
 
 
 def _vectors(name: str, value: Any) -> NDArray:
-    """Return a vector of every node."""
+    """Return an array of one vector per node."""
     array = numbers(name, value)
     if array.ndim != 2 or array.shape[1] != 3:
         raise InputError(f": shape {array.shape}: must be (nodes, 3)", name)
@@ -63,12 +62,12 @@ def _vectors(name: str, value: Any) -> NDArray:
 
 
 def _memory(name: str, value: Any) -> NDArray | str:
-    """Return a state of branches, or the word for a fresh one."""
+    """Return the state of branches, or the word "fresh"."""
     return choice(name, value, ("fresh",)) if isinstance(value, str) else numbers(name, value)
 
 
 def _known(name: str, value: Any, kind: type) -> Any:
-    """Return what is of a kind."""
+    """Return `value` if it is of a kind."""
     if isinstance(value, kind):
         return value
     raise InputError(f": got {type(value).__name__}; it comes from fd.initial_state(result)", name)
@@ -85,17 +84,16 @@ class State(Checked):
     velocity : array_like, shape (n, 3), optional
         Velocity (m/s) of every node; zero by default.
     memory : array_like of shape (b, 2), or "fresh", optional
-        State of the branches of laws with memory, as results have it (`memory`). "fresh": every
-        hinge has just come from its rest angle. By default those of the law `prony` have had the
-        time to relax there, all others are fresh.
+        State of the branches of laws with memory, from the variable `memory` of a result. "fresh":
+        every hinge has just left its rest angle. By default branches of the law `prony` have
+        relaxed, and all others are fresh.
     continuation : Continuation, optional
-        With which a motion goes on exactly from the end of another one; `initial_state` takes it
-        from the result. It serves the same method where the state and the forces are those of the
-        end; otherwise the motion starts as without it.
+        Data to continue exactly from the end of another motion; `initial_state` takes it from the
+        result. It is used only by the same method, and only if state and forces match that end.
     origin : Origin, optional
-        Where the motion began that goes on here: damping with ``state = "initial"`` and added mass
-        stay what they were. `initial_state` takes it from the result; without it the motion begins
-        in the state itself.
+        Start of the motion that continues here, so that damping with ``state = "initial"`` and added
+        mass stay the same. `initial_state` takes it from the result; without it the motion begins
+        in this state.
     """
 
     displacement: Annotated[ArrayLike | None, Check(_vectors, unit="m")] = None
@@ -105,7 +103,7 @@ class State(Checked):
     origin: Annotated[Origin | None, Check(_known, kind=Origin)] = None
 
     def of_nodes(self, name: str, shape: tuple[int, ...], field: str = "initial") -> NDArray:
-        """Its displacement or velocity of the nodes of a case (n, 3), zero where it has none."""
+        """Its displacement or velocity for the nodes of a case (n, 3); zero if not given."""
         value = getattr(self, name)
         array = np.zeros(shape) if value is None else np.array(value)
         if array.shape != shape:
@@ -115,7 +113,7 @@ class State(Checked):
     def origin_of(
         self, shape: tuple[int, ...], time: float | None = None, field: str = "initial"
     ) -> Origin:
-        """Where the motion of nodes (n, 3) began that goes on from here at a time (s)."""
+        """Start of the motion of nodes (n, 3) that continues here at a time (s)."""
         if self.origin is None:
             return Origin(self.of_nodes("displacement", shape, field), time)
         if self.origin.displacement.shape != shape:
@@ -125,7 +123,7 @@ class State(Checked):
         return self.origin
 
     def agree(self) -> None:
-        """Refuse displacements and velocities of different numbers of nodes."""
+        """Refuse displacements and velocities for different numbers of nodes."""
         both = [getattr(self, name) for name in self.given("displacement", "velocity")]
         if len({array.shape for array in both}) > 1:
             raise InputError("displacement and velocity: must have the same shape")

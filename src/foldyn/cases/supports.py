@@ -1,4 +1,4 @@
-"""Supports: nodes held, moved, tied together or held by springs, a base that moves; all kinds."""
+"""Supports: held, moved and tied nodes, a moving base, and the registry of all kinds."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from foldyn.values import indices, number, number_or_list, one_or_each, show
 
 @dataclass(frozen=True)
 class Fix(Part):
-    """Nodes held along some axes, or along one direction.
+    """Nodes held along axes or along one direction.
 
     Parameters
     ----------
     nodes : int, sequence of int, or str
         Node numbers, or an expression over the pattern's vertices ("xmin", "zmax and y>0").
     axes : str
-        The axes held: letters of "xyz"; all three unless a direction is given.
+        Held axes, letters of "xyz"; all three unless a direction is given.
     direction : sequence of float, shape (3,), or str, optional
-        Instead of axes: the displacement along this vector of any length, or along "x" to "-z", is
-        held; across it the nodes slide, as on rollers on a plane with this normal.
+        Instead of axes: a vector of any length, or "x" to "-z", along which nodes are held. Across
+        it they slide, like rollers on a plane with this normal.
     along : bool
-        Whether the edges between these nodes are held too, along their whole length. Bars and
-        hinges whose edges may bow need those edges among the `straight` ones of `discretize`.
+        Whether to hold the edges between these nodes, too, along their whole length. If edges of
+        bars and hinges may bow, these edges must be among the `straight` ones of `discretize`.
     """
 
     nodes: Nodes
@@ -44,7 +44,7 @@ class Fix(Part):
     apart = 'holds nodes at rest, and axis = "x", say, moves them'
 
     def agree(self) -> None:
-        """Hold all axes where nothing else is said."""
+        """Hold all axes by default; refuse axes together with a direction."""
         if self.direction is None:
             self._set(axes=self.axes or AXES)
         elif self.axes is not None:
@@ -57,10 +57,10 @@ class Fix(Part):
 
 @dataclass(frozen=True)
 class Impose(Part):
-    """Nodes moved along one axis or direction as prescribed, whatever force that takes.
+    """Nodes with a prescribed displacement along one axis or direction.
 
-    The displacement from the rest position is the value times the factor of the history. Along a
-    direction it is the component that is prescribed; across it the nodes are free.
+    The displacement from the rest position is the value times the factor of the history. With a
+    direction, only the component along it is prescribed; across it the nodes are free.
 
     Parameters
     ----------
@@ -69,14 +69,14 @@ class Impose(Part):
     axis : {"x", "y", "z"}, optional
         The axis; give one `Impose` for each.
     value : float or sequence of float
-        Displacement (m) at factor 1 of all these nodes, or of each of them in the order of
-        `nodes`, which then are numbers.
+        Displacement (m) at factor 1: one for all nodes, or one for each in the order of `nodes`,
+        which must then be numbers.
     history : History or callable, optional
         Factor of time; constant by default.
     direction : sequence of float, shape (3,), or str, optional
         Instead of the axis: a vector of any length, or "x" to "-z".
     along : bool
-        Whether the edges between these nodes are moved too, each as the line between its ends; see
+        Whether to move the edges between these nodes, too, each as the line between its ends; see
         `Fix`.
     """
 
@@ -95,7 +95,7 @@ class Impose(Part):
     apart = "moves nodes"
 
     def agree(self) -> None:
-        """Ask for one direction, and for a value of each node."""
+        """Require an axis or a direction, and a value for each node."""
         if (self.axis is None) == (self.direction is None):
             raise InputError(
                 ': give the axis of the displacement, as in axis = "x", or its direction, as in '
@@ -115,11 +115,10 @@ class Impose(Part):
 
 @dataclass(frozen=True)
 class BaseMotion(Part):
-    """The base moves along one axis: all that `Fix` holds along it moves together.
+    """Motion of the base along one axis: it moves all nodes that `Fix` holds along this axis.
 
-    Each of these nodes moves by the value times the factor of the history from where it stands at
-    the start of the motion. Several base motions along an axis add up; nodes of an `Impose` follow
-    their own displacement.
+    The displacement since the start of the motion is the value times the factor of the history.
+    Several base motions along an axis add up; nodes of an `Impose` keep their own displacement.
 
     Parameters
     ----------
@@ -148,19 +147,19 @@ def _corners(name: str, value: Any) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Link(Part):
-    """Nodes tied together, exactly: by equal displacements, or to three others.
+    """Nodes tied together exactly, by equal displacements or to three other nodes.
 
     Parameters
     ----------
     nodes : int, sequence of int, or str
         Node numbers, or an expression over the pattern's vertices.
     axes : str, optional
-        All these nodes, at least two, have the same displacement along these axes ("xyz" unless
-        `to` is given). They do not follow each other's rotation about them.
+        All these nodes, at least two, have equal displacements along these axes ("xyz" unless `to`
+        is given). Rotations are not tied.
     to : sequence of int, shape (3,), optional
-        Instead of axes: the nodes ride on these three as points of one plate. They lie in the plane
-        of the three, u = w1 u1 + w2 u2 + w3 u3 with w what weights their places at rest, which is
-        exact for any motion of a plate that stays flat.
+        Instead of axes: three nodes; `nodes` move as points of the plate that these span. They must
+        lie in its plane: u = w1 u1 + w2 u2 + w3 u3, with the weights of their positions at rest.
+        This is exact for any motion of a plate that stays flat.
     """
 
     nodes: Nodes
@@ -170,7 +169,7 @@ class Link(Part):
     apart = "ties nodes together"
 
     def agree(self) -> None:
-        """Tie along all axes where nothing else is said."""
+        """Tie along all axes by default; refuse axes together with `to`."""
         if self.to is None:
             self._set(axes=self.axes or AXES)
             if isinstance(self.nodes, tuple) and len(self.nodes) < 2:
