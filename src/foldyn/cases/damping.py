@@ -126,8 +126,8 @@ class ModalDamping(Part):
     count : int, optional
         Number of lowest modes that have the ratio, if it is a single number; all by default.
     state : {"rest", "initial"}
-        State of these modes: rest, or the initial state of a motion (for modes and frequency responses:
-        the state of the vibration).
+        State of these modes: rest, or the initial state of a motion (for modes and frequency
+        responses: the state of the vibration).
     """
 
     ratios: Annotated[float | Sequence[float], Check(number_or_list, what="mode", least=0.0)]

@@ -224,7 +224,8 @@ class Chirp(Formula):
     Parameters
     ----------
     from_frequency, to_frequency : float
-        Frequencies f0 and f1 (Hz) at t = 0 and at t = duration, at least 0 and not both 0, in any order.
+        Frequencies f0 and f1 (Hz) at t = 0 and at t = duration, at least 0 and not both 0, in any
+        order.
     duration : float
         Length of the sweep (s), greater than 0.
     phase : float
