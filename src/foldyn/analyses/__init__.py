@@ -1,4 +1,4 @@
-"""Analyses as case files ask for them: reading, computing, drawing a page."""
+"""Analyses of case files: reading the file, computing, writing the page."""
 
 from foldyn.analyses.casefile import Analysis, CaseFile, Computation, Output
 from foldyn.analyses.reading import read_case

@@ -41,24 +41,24 @@ from foldyn.tables import Section, TableOf
 from foldyn.values import indices, number, number_or_list, one_or_each, show
 
 AROUND = {1: "G-X", 2: "G-X-M-Y-G"}
-"""Paths around the zone by its dimensions, where a file names none."""
+"""Default paths around the zone, by its number of dimensions."""
 MOST_ZONE = 200
 MOST_LEVELS = 10_000
 ABOVE = 1.05
-"""Where the frequencies of an attenuation spectrum end, over the highest one of the bands."""
+"""Upper end of an attenuation spectrum, relative to the highest frequency of the bands."""
 COORDINATES = ("distance", "wave_vector", "zone_wave_vector", "leg")
 
 
 MOST_STATES = 200
 ASIDE = ("analysis", "output", "sweep", "design", "title")
-"""Tables and keys that make no other state,"""
+"""Tables and keys that do not change the state,"""
 PERIODS = "periods"
 STATED = ("stretch", "turn")
-"""but for these of [analysis]."""
+"""except for these keys of [analysis]."""
 
 
 def one_key(value: Any) -> Varied:
-    """The one key along which the states of a file follow each other."""
+    """The one key that distinguishes the states of a file."""
     one, *more = varied(value, sampled=False)
     if more:
         raise InputError(
@@ -81,11 +81,11 @@ class CellState:
     ----------
     cell : UnitCell
     start : mapping
-        Arguments of `bands` for a stored state, if the file names one.
+        Arguments of `bands` for a stored state; empty without one.
     given : mapping
         Table [analysis].
     varied : Varied or None
-        What the file varies, and its `value` here.
+        The varied key; `value` is its value in this state.
     """
 
     cell: UnitCell
@@ -100,7 +100,7 @@ class CellState:
         Raises
         ------
         InputError
-            Factors that do not fit the periods.
+            The number of factors does not match the periods.
         ComputationError
             There is no equilibrium.
         """
@@ -111,7 +111,7 @@ class CellState:
         return own | {"state": self._relaxed(stretch, turn, own.get("state"))}
 
     def _relaxed(self, stretch: Any, turn: float | None, state: State | None) -> State:
-        """The equilibrium with the periods that the file asks for."""
+        """Equilibrium with the requested periods."""
         cell = self.cell
         factors = np.ones(cell.dimensions)
         if stretch is not None:
@@ -129,7 +129,7 @@ class CellState:
 
     @contextmanager
     def placed(self) -> Iterator[None]:
-        """Say in which state something is wrong, and that a stored one is."""
+        """Name the state in messages, and `initial` if a stored state is wrong."""
         with _placed(self.varied, self.value):
             try:
                 yield
@@ -162,7 +162,7 @@ def cell_states(case_file: CaseFile, mass: str, given: Mapping[str, Any]) -> lis
 
 
 def _cell(case: Case, given: Mapping[str, Any]) -> UnitCell:
-    """The cell of a case, which repeats as the file says."""
+    """The repeating cell of a case."""
     vectors, screw, tolerance = given["vectors"], given["screw"], given["tolerance"]
     if given["periods"] is None:
         return UnitCell(case, vectors, screw, tolerance)
@@ -216,19 +216,19 @@ class BandsSection(AnalysisSection):
     points : int
         Wave vectors along the path.
     count : int
-        How many bands, the lowest ones.
+        Number of bands, from the lowest.
     zone : int, optional
         Wave vectors along each period of the whole zone, for exact full gaps.
     attenuation : int, optional
-        Frequencies of an attenuation spectrum along the legs of the path that follow one period.
+        Number of frequencies of an attenuation spectrum, along legs of the path in one period.
     vary : mapping, optional
         Several states: one key of the file, and its values or range.
     stretch : float or sequence of float, optional
-        Equilibrium with periods times this factor, one or one for each.
+        Factor on the periods of the equilibrium: one for all, or one for each.
     turn : float, optional
-        Equilibrium with this angle (degrees) from cell to cell of a tube.
+        Turn (degrees) from cell to cell of a tube in equilibrium.
     periods : int or sequence of int, optional
-        Numbers of the periods of the pattern that repeat it; all by default.
+        Numbers of the pattern's periods to repeat it along; all by default.
     """
 
     like = (modes, UnitCell)
@@ -253,7 +253,7 @@ class BandsSection(AnalysisSection):
 
 
 class BandsOutput(Section):
-    """[output] of bands, which has no keys."""
+    """[output] of kind "bands"; it has no keys."""
 
 
 class BandsSchema(VibrationSchema):
@@ -263,7 +263,7 @@ class BandsSchema(VibrationSchema):
     output: BandsOutput = BandsOutput()
 
     def agree(self) -> None:
-        """Refuse loads that do more than fold."""
+        """Refuse loads other than folding creases, unless there is a stored state."""
         super().agree()
         for i, load in enumerate(self.loads):
             if self.initial is None and not isinstance(load, Actuate):
@@ -304,7 +304,7 @@ class BandsAnalysis(Analysis):
         return compute
 
     def line(self, name: str, result: xarray.Dataset) -> str:
-        """How many bands and gaps, and the effort."""
+        """Number of bands and gaps, and the time."""
         of = f" in {result.sizes['state']} states" if "state" in result.sizes else ""
         full = int((result["gap_direction"] == ALL).sum())
         return (
@@ -349,7 +349,7 @@ def _path(cell: UnitCell, points: str | None, count: int) -> xarray.DataArray:
 
 
 def _bands(state: CellState, path: xarray.DataArray, given: Mapping[str, Any]) -> xarray.Dataset:
-    """What the file asks for in one state."""
+    """All requested results in one state."""
     began, cell, count, own = time.perf_counter(), state.cell, given["count"], state.arguments()
     found = bands(
         cell, path, count=count, group_velocity=True, shape=True, polarization=True, **own
@@ -377,7 +377,7 @@ def _bands(state: CellState, path: xarray.DataArray, given: Mapping[str, Any]) -
 def _in_zone(
     cell: UnitCell, phases: NDArray, side: int, count: int, own: Mapping[str, Any]
 ) -> NDArray[np.float64]:
-    """Frequencies (phase, band), Hz, at phases of a grid, half of them by reciprocity."""
+    """Frequencies (phase, band), Hz, at the phases of a grid; reciprocity gives half of them."""
     shape = [side] * cell.dimensions
     places = np.indices(shape).reshape(cell.dimensions, -1)
     opposite = np.ravel_multi_index(tuple(-places % side), shape)  # of -k
@@ -389,7 +389,7 @@ def _in_zone(
 
 
 def _attenuate(found: xarray.Dataset, cell: Any, count: int, own: Mapping[str, Any]) -> None:
-    """Add the attenuation along the legs of the path that follow one period."""
+    """Add the attenuation along the legs of the path in the direction of one period."""
     names = found.attrs["tick_labels"].split("-")
     corners = np.searchsorted(found["distance"].values, found.attrs["ticks"] - 1e-9)
     levels = np.linspace(0.0, ABOVE * np.nanmax(found["frequency"].values), count + 1)[1:]
@@ -413,7 +413,7 @@ def _attenuate(found: xarray.Dataset, cell: Any, count: int, own: Mapping[str, A
 def _joined(
     case: Case, states: Sequence[CellState], found: Sequence[xarray.Dataset]
 ) -> xarray.Dataset:
-    """One result of the bands of all states."""
+    """Join the bands of all states to one result."""
     first, vary = found[0], states[0].varied
 
     def over(values: Sequence[Any]) -> NDArray:
@@ -438,12 +438,12 @@ def _joined(
 
 
 MOST_GAPS = 200
-"""Gaps that the table of the page lists at most."""
+"""Most gaps in the table of the page."""
 NUMBERS = ("gap_below", "gap_bottom", "gap_top", "gap_width", "gap_relative_width")
 
 
 def state_text(result: xarray.Dataset, k: int) -> str:
-    """What the key that varies is in a state: "dihedral 80 degrees"."""
+    """The varied key with its value in a state: "dihedral 80 degrees"."""
     about = result["state"].attrs
     unit = f" {about['units']}" if "units" in about else ""
     return f"{about['long_name']} {result['state'].values[k]:g}{unit}"

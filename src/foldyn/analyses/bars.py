@@ -6,7 +6,7 @@ from typing import Any
 
 
 class _Hidden:
-    """A bar that is not shown."""
+    """Stands for a bar that is not shown."""
 
     n = total = 0.0
 
@@ -17,9 +17,10 @@ class _Hidden:
 
 
 def bar(shown: bool, **options: Any) -> Any:
-    """Bar of tqdm, which is imported only where it is shown.
+    """Progress bar of tqdm, or a stand-in.
 
-    Its lock stays behind when a process is killed, as the workers of a fit may be.
+    tqdm is imported only if the bar is shown: its lock outlives killed processes, such as workers
+    of a fit.
     """
     if not shown:
         return _Hidden()

@@ -1,4 +1,4 @@
-"""A case file that has been read, and what a kind of analysis gives to it."""
+"""`CaseFile`, a case file that has been read, and `Analysis`, the base of kinds of analysis."""
 
 from __future__ import annotations
 
@@ -35,23 +35,23 @@ from foldyn.viewer import stage
 
 Begun = Callable[[], None]
 Compute = Callable[[bool, Begun], xarray.Dataset]
-"""Computes a result, with or without a bar; calls its second argument, once or more often, after
-all input has been accepted."""
+"""Computes a result, with or without a progress bar. It calls its second argument, at least once,
+when all input has been accepted."""
 
 
 @runtime_checkable
 class Kept(Protocol):
-    """A computation that can be kept on the disk while it runs, and go on from there."""
+    """A computation that is stored while it runs, and can resume."""
 
     kept: Keeping | None
 
     def keep(self, keeping: Keeping, shown: bool) -> None:
-        """Say how it is kept, and whether its result is to be shown, for which memory must do."""
+        """Set how it is stored, and whether its result will be shown, which must fit in memory."""
 
 
 @runtime_checkable
 class Moving(Protocol):
-    """A computation of a motion, which may be integrated beside others before it is called."""
+    """A computation of a motion; it may be integrated together with others before the call."""
 
     motion: Motion
     integrated: bool
@@ -59,26 +59,26 @@ class Moving(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Output:
-    """What to keep and show.
+    """What results keep and pages show.
 
     Attributes
     ----------
     nodes : ndarray of int64
         Nodes that figures and spectra show.
     named : bool
-        Whether the file names these nodes; otherwise they are the default.
+        Whether the file names these nodes; otherwise they are the default ones.
     axis : str or None
-        Component that figures show, "x", "y" or "z", of a path also "-x", "-y" or "-z"; None: the
-        one in which a node moves most.
+        Component that figures show: "x", "y" or "z", for paths also "-x", "-y" or "-z". None: the
+        one with the largest motion of a node.
     animation : str or None
-        Film of the motion that is written beside the page, "gif" or "mp4"; None: none.
+        Format of a film next to the page, "gif" or "mp4"; None: no film.
     max_frequency : float or None
-        Of a motion: where the axes of spectra end (Hz); None: at half the sampling rate.
+        For motions: upper end of spectra (Hz); None: half the sampling rate.
     shapes : int, tuple of int or None
-        Of a path: how many deformed shapes are drawn, or the numbers of their points. Of modes:
-        how many are drawn, or their numbers.
+        For paths: number of drawn shapes, or the numbers of their points. For modes: number of
+        drawn modes, or their numbers.
     quantity : str or None
-        Of a frequency response: "receptance", "mobility" or "accelerance"; None: what it is.
+        For frequency responses: "receptance", "mobility" or "accelerance"; None: as computed.
     """
 
     nodes: NDArray[np.int64]
@@ -91,26 +91,26 @@ class Output:
 
 
 class Analysis(ABC):
-    """One kind of analysis, as a case file asks for it.
+    """A kind of analysis in case files.
 
-    A new kind is a subclass of this in a file of its own, listed in `analyses.registry`.
+    A new kind is a subclass in its own file, listed in `analyses.registry`.
 
     Attributes
     ----------
     kind : str
-        What a case file calls it.
+        Its name in case files.
     schema : type
-        What such a case file looks like.
+        Schema of case files of this kind.
     files : tuple of str
-        Figures, without their suffix, and animations that its page may come with.
+        Possible files of its page: figures without suffix, animations with it.
     needs_density : str
-        Beginning of a message, "a motion needs"; "" where it does without.
+        Beginning of the message if the density is missing, "a motion needs"; "" if not needed.
     takes : sequence of str
-        Names of the arguments that may take the place of the file's.
+        Names of arguments that can override those of the file.
     moving : bool
-        Whether its results move, and are shown so at the top of their page.
+        Whether results move, and are shown in motion at the top of the page.
     by_mass : bool
-        Whether each mass rule of a file has a result of its own; otherwise its first has the one.
+        Whether each mass rule of a file has its own result; if not, only the first has one.
     arguments : dict
         Keyword arguments of its function: of `simulate`, `trace`, `modes` or `frf`.
     """
@@ -128,33 +128,33 @@ class Analysis(ABC):
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
-        """What the checked sections of a case file ask for."""
+        """The analysis that the checked sections of a case file ask for."""
         return cls({k: value for k, value in schema.analysis.values().items() if k != "kind"})
 
     @abstractmethod
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
-        """Check a computation with one mass rule, as far as possible before it starts.
+        """Return a computation with one mass rule, checked as far as possible.
 
-        changes : arguments that take the place of the file's.
+        changes : arguments that override those of the file.
         """
 
     @abstractmethod
     def line(self, name: str, result: xarray.Dataset) -> str:
-        """Summarize the computation with the mass rule `name` in a line."""
+        """Summary of a result in one line; `name` is its mass rule."""
 
     @staticmethod
     @abstractmethod
     def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterable[Section]:
-        """Sections of the page about results, by mass rule; the album draws their figures."""
+        """Sections of the page for results by mass rule; the album draws the figures."""
 
     def page(
         self, case_file: CaseFile, results: ByRule, folder: Path, call: Call | None = None,
         figures: str | None = None,
     ) -> Path:  # fmt: skip
-        """Show results, by mass rule, in an existing folder; returns the path of report.html.
+        """Write the page of results by mass rule to an existing folder; return its path.
 
-        call : how they were asked for.
-        figures : what figures are written as, "png", "svg" or "pdf"; None: none are drawn.
+        call : the command or call that computed them.
+        figures : file format of figures, "png", "svg" or "pdf"; None: no figures.
         """
         cases = {mass: case_file.case(mass) for mass in results}
         shown = case_file.output.nodes.tolist()
@@ -166,21 +166,21 @@ class Analysis(ABC):
         return write_report(sections, folder / "report.html", title=case_file.heading)
 
     def check(self, computations: Sequence[Compute], figures: bool) -> None:  # noqa: B027
-        """Refuse computations of several mass rules that cannot run, or be drawn, together."""
+        """Refuse computations of several mass rules that cannot be run or drawn together."""
 
     def shown(self, case: Case) -> NDArray[np.int64]:
-        """Nodes to show where the file names none: those with a force, else all that can move."""
+        """Default nodes to show: loaded ones, or else all that can move."""
         return case.loaded_nodes if case.loaded_nodes.size else movable(case)
 
 
 def movable(case: Case) -> NDArray[np.int64]:
-    """Vertices that supports do not hold altogether."""
+    """Vertices that supports do not hold along all axes."""
     vertices = len(case.structure.pattern.vertices)
     return np.flatnonzero(~case.fixed[:vertices].all(axis=1))
 
 
 def arguments_of(function: Callable[..., Any]) -> tuple[str, ...]:
-    """Names of the arguments of an analysis' function, but for what `run` itself gives."""
+    """Names of the arguments of an analysis function, except for those that `run` provides."""
     own = {"case", "progress", "options", "kept"}
     return tuple(name for name in signature(function).parameters if name not in own)
 
@@ -205,14 +205,14 @@ class CaseFile:
     model : str
         "bars_and_hinges" or "shell".
     masses : list of str
-        Mass rules, one or several to compare.
+        One mass rule, or several to compare.
     analysis : Analysis
-        What to compute; its `arguments` are those of `simulate`, `trace`, `modes` or `frf`.
+        The analysis; its `arguments` are for `simulate`, `trace`, `modes` or `frf`.
     output : Output
     with_values : callable
-        The file with other values of some keys, by key: ``with_values({"pattern.dihedral": 80})``.
+        Returns the file with other values of keys: ``with_values({"pattern.dihedral": 80})``.
     text : str
-        What the file said when it was read; "" of a document that was not read from one.
+        Text of the file; "" if the document was not read from a file.
     """
 
     path: Path
@@ -230,7 +230,7 @@ class CaseFile:
     text: str = field(default="", repr=False)
 
     def __repr__(self) -> str:
-        """One line: the file, what it asks for, of what."""
+        """One line: the file, its analysis, model and mass rules."""
         model = self.model.replace("_", " ")
         return f"<CaseFile {self.path}: {self.analysis.kind} of {model}, mass {self.masses}>"
 
@@ -245,24 +245,24 @@ class CaseFile:
 
     @property
     def sweep(self) -> SweepSection | None:
-        """Its table [sweep], None where it has none."""
+        """Its table [sweep]; None if it has none."""
         return self._schema.sweep
 
     @property
     def design(self) -> DesignSection | None:
-        """Its table [design], None where it has none."""
+        """Its table [design]; None if it has none."""
         return self._schema.design
 
     @property
     def start_keys(self) -> dict[str, Any]:
-        """What its table [initial] says; nothing where it has none."""
+        """Keys of its table [initial]; empty if it has none."""
         section = getattr(self._schema, "initial", None)
         if section is None:
             return {}
         return {key: value for key, value in section.values().items() if key in section.stated}
 
     def case(self, mass: str | None = None) -> Case:
-        """Case with one of the mass rules, by default the first that the file names."""
+        """Case with one of the mass rules, by default the first of the file."""
         rule = self._rule(mass)
         if rule not in self._cases:
             self._cases[rule] = self._make(rule)
@@ -274,24 +274,23 @@ class CaseFile:
         return {rule: case.structure for rule, case in self._cases.items()}
 
     def initial(self, mass: str | None = None) -> State | None:
-        """State that the motion or path starts from, or about which modes swing; None for rest.
+        """Initial state of the motion or path, or state of the vibration; None for rest.
 
         Parameters
         ----------
         mass : str, optional
-            Mass rule, by default the first that the file names: it decides where the center of
-            mass is.
+            Mass rule, by default the first of the file; it determines the center of mass.
 
         Raises
         ------
         InputError
-            A support holds a node that the rigid motion moves; the result cannot be read or has
+            A support holds a node that the rigid motion moves, or the result cannot be read or has
             other nodes.
         """
         return self.start(mass).state
 
     def start(self, mass: str | None = None) -> Start:
-        """As `initial`, with the load factor of a stored state."""
+        """`initial` with the load factor of a stored state."""
         section = getattr(self._schema, "initial", None)
         with within("initial", self.path):
             return start_of(section, self.case(mass), self.path.parent)
@@ -299,28 +298,28 @@ class CaseFile:
     def run(
         self, mass: str | None = None, progress: bool = False, **changes: Any
     ) -> xarray.Dataset:
-        """Compute what the file asks for.
+        """Run the analysis of the file.
 
         Parameters
         ----------
         mass : str, optional
-            Mass rule, by default the first that the file names.
+            Mass rule, by default the first of the file.
         progress : bool
-            Whether to show a bar.
+            Whether to show a progress bar.
         **changes
-            Arguments of `simulate`, `trace`, `modes` or `frf` that take the place of the file's.
+            Arguments of `simulate`, `trace`, `modes` or `frf` that override those of the file.
 
         Returns
         -------
         xarray.Dataset
-            What that function returns.
+            The result of that function.
 
         Raises
         ------
         InputError
             The message names the file and the key.
         ComputationError
-            The computation fails; what was computed until then is its `partial`.
+            The computation fails; its `partial` holds the results so far.
 
         Examples
         --------
@@ -333,12 +332,12 @@ class CaseFile:
         return self.computation(mass, **changes).run(progress)
 
     def computation(self, mass: str | None = None, **changes: Any) -> Computation:
-        """A computation that is checked, but not begun; arguments as of `run`."""
+        """A checked computation that has not begun; arguments as in `run`."""
         return Computation(self, self._rule(mass), changes)
 
     @contextmanager
     def placing(self, mass: str | None = None) -> Iterator[None]:
-        """Put the file, the mass rule and the table of the key before bad input."""
+        """Prefix messages about bad input with the file, the mass rule and the table."""
         try:
             yield
         except InputError as error:
@@ -348,11 +347,11 @@ class CaseFile:
             raise error.within(place, self.path) from None
 
     def named(self, mass: str | None) -> str:
-        """A mass rule for the beginning of a message, where the file has several."""
+        """Prefix of messages that names the mass rule; "" if the file has only one."""
         return f'mass = "{mass}": ' if mass and len(self.masses) > 1 else ""
 
     def _section(self, key: str) -> str:
-        """Table in which the file has a key, with a dot; "" for what is none."""
+        """Table of the file that has a key, with a dot; "" if there is none."""
         for name in ("analysis", "output", "model"):
             if key in arguments(type(getattr(self._schema, name))):
                 return f"{name}."
@@ -365,12 +364,12 @@ class CaseFile:
 
 
 class Computation:
-    """One result of a case file, checked as far as possible before it is computed.
+    """Computation of one result of a case file, checked as far as possible in advance.
 
     Attributes
     ----------
     file : str
-        Name for the file of the result.
+        File name for the result.
     """
 
     def __init__(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> None:
@@ -383,16 +382,16 @@ class Computation:
 
     @property
     def place(self) -> str:
-        """Beginning of messages about it."""
+        """Prefix of messages about it."""
         return f"{self.case_file.path}: {self.case_file.named(self.mass)}"
 
     def result(self, progress: bool = False, begun: Begun = lambda: None) -> xarray.Dataset:
-        """Compute it; `begun` is called, at least once, when all input has been accepted."""
+        """Compute the result; `begun` is called at least once, when all input has been accepted."""
         with self.case_file.placing(self.mass):
             return self.compute(progress, begun)
 
     def run(self, progress: bool = False, begun: Begun = lambda: None) -> xarray.Dataset:
-        """The result with what it says of its mesh, for whoever looks at it."""
+        """Compute the result and add estimates of its mesh error."""
         result = self.result(progress, begun)
         judged = refinement(self.case_file.case(self.mass))
         return result if judged is None else result.assign_attrs(judged.facts())

@@ -1,4 +1,4 @@
-"""A case file turned into one of another model, or into one of small vibrations."""
+"""Conversion of a case file to another model, or to an analysis of small vibrations."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Document = dict[str, Any]
 
 
 def flagged(document: Document, flags: Mapping[str, Any]) -> Document:
-    """The document with the keys of [analysis] that the command line gives."""
+    """The document with keys of [analysis] from the command line."""
     analysis = {**document["analysis"], **flags}
     if "state" not in flags:
         return {**document, "analysis": analysis}
@@ -47,10 +47,10 @@ def startless(path: Path, document: Document, kind: str) -> Document:
 
 
 def unbounded(path: Path, document: Document, state: str) -> Document:
-    """The document as a cell of a sheet without end, which its supports would hold everywhere.
+    """The document as the cell of an infinite sheet.
 
-    Supports and what acts are left out with a warning, but for creases that fold, where the state
-    is an equilibrium.
+    Supports, which would hold every cell, and loads are left out with a warning, except for folding
+    creases in an equilibrium.
     """
     loads = document.get("loads", [])
     kept_loads = [_without(each, "history") for each in loads if "creases" in each]
@@ -68,19 +68,19 @@ def unbounded(path: Path, document: Document, state: str) -> Document:
 
 
 def _tables(document: Document, *names: str) -> list[str]:
-    """Those of some tables that a document has."""
+    """Those of the named tables that the document has."""
     return [f"[{name}]" for name in names if name in document]
 
 
 def _tell(path: Path, command: str, left: list[str], why: str) -> None:
-    """Warn of what a command leaves out of a file, if it does."""
+    """Warn if a command leaves out parts of a file."""
     if left:
         text = f"{path}: foldyn {command} leaves out {', '.join(left)}: {why}"
         warn(text, "command-line.md#modes-frequency-responses-and-bands")
 
 
 def converted(path: Path, document: Document, kind: str, state: str) -> Document:
-    """The document as one of another kind; what has no place there is left out, with a warning."""
+    """The document as another kind of analysis; parts without a meaning there cause a warning."""
     if kind in STARTLESS:
         return startless(path, document, kind)
     if kind == "bands":
@@ -125,7 +125,7 @@ def converted(path: Path, document: Document, kind: str, state: str) -> Document
 def _supports(
     supports: list[Document], atrest: bool, left: list[str]
 ) -> tuple[list[Document], list[tuple[int, Document]]]:
-    """Supports that hold or, not at rest, move nodes; and those that move the base."""
+    """Supports that hold or, except at rest, move nodes; and supports that move the base."""
     kept, bases = [], []
     for i, support in enumerate(supports):
         if "base" in support:
@@ -140,7 +140,7 @@ def _supports(
 
 
 def _shown(output: Document, kind: str) -> Document:
-    """The keys of [output] that mean the same for another kind."""
+    """Keys of [output] that have the same meaning for another kind."""
     if kind == "modes":  # axis and nodes mean something else there
         return {key: output[key] for key in ("animation",) if key in output}
     shown = {key: output[key] for key in ("nodes", "axis") if key in output}
@@ -156,16 +156,15 @@ def _without(table: Document, *keys: str) -> Document:
 def remodeled(
     document: Mapping[str, Any], model: str | None, divisions: int | None
 ) -> dict[str, Any]:
-    """Case file for another model, or a shell of other divisions.
+    """Case file for another model, or for a shell with other divisions.
 
-    What means nothing to the other model is left out: keys of [model] that it does not have, the
-    mass rules, and for a shell explicit methods with their steps, secant and internal
-    amplitudes.
+    Parts without a meaning for the other model are left out: its unknown keys of [model], the mass
+    rules, and for a shell explicit methods with their steps, secant and internal amplitudes.
 
     Parameters
     ----------
     document : mapping
-        What the file says; the sections that change are valid, or left for its check.
+        Content of the file; changed sections are valid, or are checked later.
     model : {"bars_and_hinges", "shell"}, optional
     divisions : int, optional
         Pieces of every edge of a shell.
@@ -188,7 +187,7 @@ def remodeled(
 
 
 def _fold_law_of(preset: str | None) -> Document:
-    """The key of a fold law that a preset stands for, where it is not the usual one."""
+    """The key for the fold law of a preset; empty if it is the default law."""
     law = None if preset is None else PRESETS[preset].fold_law
     if law in (None, ModelOptions().fold_law):
         return {}
@@ -197,7 +196,7 @@ def _fold_law_of(preset: str | None) -> Document:
 
 
 def _of_a_shell(analysis: Mapping[str, Any]) -> dict[str, Any]:
-    """The table [analysis] without what means nothing to a shell."""
+    """The table [analysis] without keys that have no meaning for a shell."""
     left = {"secant", "internal"}
     key, usual = ("method", "auto") if analysis["kind"] == "dynamics" else ("integrator", "rk4")
     if analysis.get(key, usual) not in ("auto", *MASSLESS_METHODS):

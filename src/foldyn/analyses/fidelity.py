@@ -1,4 +1,4 @@
-"""Models beside the shell: [analysis] of kind "fidelity", arguments of `fidelity`."""
+"""Comparison of models with the shell: [analysis] of kind "fidelity", arguments of `fidelity`."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class FidelitySection(AnalysisSection):
 
 
 class FidelityOutput(Section):
-    """[output] of kind "fidelity", which has no keys."""
+    """[output] of kind "fidelity"; it has no keys."""
 
 
 class FidelitySchema(CaseSchema):
@@ -62,7 +62,7 @@ class FidelitySchema(CaseSchema):
 
 
 class FidelityAnalysis(Analysis):
-    """Models of bars and hinges beside the shell."""
+    """Comparison of models of bars and hinges with the shell."""
 
     kind = "fidelity"
     schema = FidelitySchema
@@ -72,7 +72,7 @@ class FidelityAnalysis(Analysis):
     by_mass = False
 
     masses: tuple[str, ...] = ()
-    """Further mass rules of the file: models of their own."""
+    """Further mass rules of the file, compared as models of their own."""
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
@@ -121,7 +121,7 @@ class FidelityAnalysis(Analysis):
 
 
 class _Steps:
-    """A bar of so many steps as it is told."""
+    """A progress display that shows the current step."""
 
     def __init__(self, shown: bool) -> None:
         self.bar = bar(shown, bar_format="{desc} ({elapsed})")

@@ -1,4 +1,4 @@
-"""The page of a folding: the way in three dimensions, its states, and how good they are."""
+"""The page of a folding: its motion in three dimensions, its states and their accuracy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from foldyn.statics import Folding
 from foldyn.viewer import stage
 
 MOST_ROWS = 12
-"""States that the table shows at most."""
+"""Most states in the table."""
 
 
 def write_folding_page(
@@ -32,7 +32,7 @@ def write_folding_page(
         File to write, in an existing directory.
     title : str
     call : Call, optional
-        How it was asked for, and its cost.
+        The command or call, and its cost.
 
     Returns
     -------

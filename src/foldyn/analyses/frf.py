@@ -1,6 +1,6 @@
 """Frequency responses: [analysis] of kind "frf", arguments of `frf` and options of its methods.
 
-What shakes the structure stands under [[drive]].
+The drive is given under [[drive]].
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def _frequencies(name: str, value: Any) -> NDArray[np.float64]:
 
 
 def _range(name: str, table: dict[str, Any]) -> NDArray[np.float64]:
-    """Frequencies spaced evenly, first and last among them."""
+    """Evenly spaced frequencies, including the first and last."""
     known = ("first", "last", "count")
     check_keys(table, known, name)
     for key in known:
@@ -86,7 +86,7 @@ class FrfSection(*(method.options for method in METHODS.values()), AnalysisSecti
     amplitude: Positive = 1.0
 
     def agree(self) -> None:
-        """Ask for what fits the method."""
+        """Refuse options that do not fit the method."""
         given, method = self.stated, METHODS[self.method]
         for key in sorted(given & OPTIONS):
             owners = [name for name, other in METHODS.items() if key in arguments(other.options)]
@@ -112,7 +112,7 @@ class FrfSection(*(method.options for method in METHODS.values()), AnalysisSecti
         method.options(**self.options())
 
     def options(self) -> dict[str, Any]:
-        """What the file says of the options of its method."""
+        """Options of its method that the file gives."""
         return {key: getattr(self, key) for key in OPTIONS & self.stated}
 
 
@@ -140,14 +140,14 @@ DRIVE = DriveOf(
 
 
 class FrfOutput(ShownSection):
-    """[output] of a frequency response: what is shown.
+    """[output] of a frequency response.
 
     Parameters
     ----------
     axis : {"x", "y", "z", "-x", "-y", "-z"}, optional
-        Direction that figures show; by default that of the drive.
+        Direction that figures show; by default the direction of the drive.
     quantity : {"receptance", "mobility", "accelerance"}, optional
-        What is shown: displacement, velocity or acceleration per force.
+        Shown quantity: displacement, velocity or acceleration per force.
     """
 
     axis: Annotated[str | None, one_of(DIRECTIONS)] = None
@@ -162,7 +162,7 @@ class FrfSchema(VibrationSchema):
     output: FrfOutput = FrfOutput()
 
     def agree(self) -> None:
-        """Let the integrator move the model, and a base drive alone."""
+        """Refuse integrators that cannot move a shell, and further drives with a moving base."""
         super().agree()
         if self.model.kind == SHELL:
             check_massless(self, "integrator")
@@ -181,7 +181,7 @@ class FrfSchema(VibrationSchema):
 
 
 class FrfAnalysis(Analysis):
-    """The response to a drive of each frequency about a state."""
+    """The response to a harmonic drive about a state."""
 
     kind = "frf"
     moving = True
@@ -202,7 +202,7 @@ class FrfAnalysis(Analysis):
         return cls({**given, **section.options(), "drive": schema.drive})
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
-        """See `Analysis`; `frf` refuses bad input before it tells of its first progress."""
+        """See `Analysis`; `frf` refuses bad input before it first reports progress."""
         given = {**self.arguments, **about(case_file, mass), **changes}
         case = case_file.case(mass)
         check_internal(case.structure, given.get("internal", 0))
@@ -230,7 +230,7 @@ class FrfAnalysis(Analysis):
         )
 
     def shown(self, case: Case) -> NDArray[np.int64]:
-        """Nodes with a driving force, else all that can move."""
+        """Nodes with a driving force, or else all that can move."""
         forces = [
             one.loaded(case.structure, f"drive[{i}]")
             for i, one in enumerate(self.arguments["drive"])
@@ -286,13 +286,13 @@ class FrfAnalysis(Analysis):
 
 
 MOST_CURVES = 8
-"""Responses that one figure shows at most, each in its color."""
+"""Most responses in one figure, each in its color."""
 MOST_REASONS = 6
-"""Peaks for which the page explains missing numbers, at most."""
+"""Most peaks with an explanation of missing numbers on the page."""
 
 
 def _coherence(results: ByRule, nodes: list[int], axis: str) -> list[Section]:
-    """Coherence of responses that were estimated, for a page without figures."""
+    """Coherence of estimated responses, for a page without figures."""
     curves = [
         Curve(
             f"node {node}" if len(results) == 1 else f"node {node}, {rule}",
@@ -318,7 +318,7 @@ def driven_direction(response: xarray.Dataset) -> str:
 
 
 def _driven(case: Case, drive: list[Any]) -> Case:
-    """The case with its drive, for the picture of the structure."""
+    """The case including the drive, for the picture of the structure."""
     bases = [part for part in drive if isinstance(part, BaseMotion)]
     forces = [part for part in drive if not isinstance(part, BaseMotion)]
     return replace(case, supports=[*case.supports, *bases], loads=[*case.loads, *forces])
@@ -426,7 +426,7 @@ def _notes(
 
 
 def _reason(note: str) -> str:
-    """A note without its advice to programmers."""
+    """A note without its advice for Python."""
     parts = [part for part in note.split("; ") if part.startswith(("half power", "circle fit"))]
     return "; ".join(parts or [note]).replace("magnitude: ", "")
 

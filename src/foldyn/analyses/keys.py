@@ -22,7 +22,7 @@ from foldyn.patterns.expressions import parse, written
 from foldyn.values import SHOWN, shortened, show, suggest
 
 LONGEST = 200
-"""Characters of a key: no case file nests its tables that deep."""
+"""Most characters of a key: no case file nests its tables that deep."""
 _KEY = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.[A-Za-z_]\w*(\[\d+\])*)*\Z")
 
 
@@ -32,7 +32,7 @@ def parts(key: Any) -> tuple[str | int, ...]:
     Raises
     ------
     InputError
-        The text is no path.
+        The text is not a path.
     """
     if not isinstance(key, str) or len(key) > LONGEST or not _KEY.match(key):
         raise InputError(
@@ -52,7 +52,7 @@ def dotted(location: Sequence[str | int]) -> str:
 
 
 def value_at(document: Mapping[str, Any], key: str) -> Any:
-    """Value of a key in a case file; None where the file does not have it."""
+    """Value of a key in a case file; None if the file does not have it."""
     here: Any = document
     for part in parts(key):
         if isinstance(part, int):
@@ -76,13 +76,13 @@ def number_keys(document: Mapping[str, Any]) -> list[str]:
 def replaced(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Copy of a case file with the values of some keys replaced or added.
 
-    Missing tables are made, and a law given by its name becomes a table of that kind; whether a
-    case file may have such a key is for its reader to decide.
+    Missing tables are added, and a law given by its name becomes a table. The reader of the case
+    file checks whether it may have such a key.
 
     Raises
     ------
     InputError
-        A path leads through something that is no table or list, or beyond the end of a list.
+        A path leads through something other than a table or list, or beyond the end of a list.
     """
     result = copy.deepcopy(dict(document))
     for key, value in changes.items():
@@ -112,7 +112,7 @@ def _step(here: Any, part: str | int, key: str) -> Any:
 
 
 def files_of(value: Any, *without: str) -> list[str]:
-    """Paths of all files that a case file names, but for those in some of its tables."""
+    """Paths of all files that a case file names, except in tables under the keys `without`."""
     if isinstance(value, Mapping):
         own = [value["file"]] if isinstance(value.get("file"), str) else []
         inner = [item for key, item in value.items() if key not in without]
@@ -123,7 +123,7 @@ def files_of(value: Any, *without: str) -> list[str]:
 
 
 def files_moved(value: Any, way: str) -> Any:
-    """Document whose file names are relative to another folder."""
+    """Document with file names relative to another folder; `way` leads there."""
     if isinstance(value, dict):
         return {
             key: Path(way, item).as_posix() if key == "file" else files_moved(item, way)
@@ -148,9 +148,9 @@ class Tie:
     Parameters
     ----------
     key : str
-        Key that is set.
+        The dependent key.
     expression : str
-        Its value, of numbers, ``+ - * /``, parentheses and keys of parameters.
+        Its value in terms of numbers, ``+ - * /``, parentheses and keys of parameters.
     """
 
     key: str
@@ -164,7 +164,7 @@ class Tie:
         self.value(None)
 
     def value(self, parameters: Mapping[str, float] | None) -> float:
-        """Value for given values of the parameters; None where these are not known yet."""
+        """Value for given parameters; with None it only checks the expression."""
         try:
             tree = parse(self.expression.strip())
         except InputError as error:

@@ -24,9 +24,9 @@ from foldyn.report.sections import Section as PageSection
 
 FRAMES, FPS = 24, 12
 MOST_FILMED = 6
-"""Modes that the film shows at most."""
+"""Most modes in the film."""
 MOST_TRIANGLES = 25_000
-"""Triangles that each of its pictures has at most, unless a single mode has more."""
+"""Most triangles in each picture of the film, unless a single mode has more."""
 
 
 class ModesSection(AnalysisSection):
@@ -40,14 +40,14 @@ class ModesSection(AnalysisSection):
 
 
 class ModesOutput(ShownSection):
-    """[output] of modes: what is shown, and along which axis and at which nodes it is judged.
+    """[output] of modes; axis and nodes determine how modes are characterized.
 
     Parameters
     ----------
     shapes : int or sequence of int
-        How many modes are drawn, or their numbers.
+        Number of drawn modes, or their numbers.
     animation : {"gif", "mp4"}, optional
-        Film of the modes beside the page.
+        Film of the modes next to the page.
     """
 
     shapes: Annotated[
@@ -152,7 +152,7 @@ class ModesAnalysis(Analysis):
 
 
 def shown_modes(modes: xarray.Dataset, shapes: int | tuple[int, ...] | None) -> list[int]:
-    """Numbers of the modes that are drawn: those named, or the first that are not rigid."""
+    """Numbers of the drawn modes: the requested ones, or the first that are not rigid."""
     from foldyn.plots.readings import chosen_modes
 
     if isinstance(shapes, tuple):
@@ -161,26 +161,26 @@ def shown_modes(modes: xarray.Dataset, shapes: int | tuple[int, ...] | None) -> 
 
 
 def _about(modes: xarray.Dataset) -> str:
-    """About which state the modes swing."""
+    """The state of the vibration, in words."""
     states = {"rest": "the undeformed sheet", "equilibrium": "the equilibrium under the loads"}
     return states.get(str(modes.attrs["state"]), "the stored state")
 
 
 def _character(case_file: CaseFile, modes: xarray.Dataset, case: Case) -> xarray.Dataset:
-    """What the modes do along the axis that the file names, or the main one."""
+    """Characters of the modes along the axis of the file, or the main one."""
     chosen = case_file.output
     return character(modes, chosen.axis, nodes=chosen.nodes if chosen.named else None, case=case)
 
 
 def _judged(case_file: CaseFile, names: xarray.Dataset) -> str:
-    """How the names of modes came about."""
+    """How modes were named, for a caption."""
     nodes = case_file.output.nodes.tolist()
     of = f" of {listed('node', nodes)}" if case_file.output.named else ""
     return f"named by the largest share of their motion{of}, seen along {names.attrs['axis']}"
 
 
 def _draw_mac(first: str, same: Mapping[str, NDArray[np.float64]]) -> Any:
-    """Draw the matrices beside each other."""
+    """Draw the matrices side by side."""
     whole = np.hstack([np.nan_to_num(matrix) for matrix in same.values()])
     if len(same) == 1:
         return plots.plot_mac(whole, row_title=first, column_title=next(iter(same)))
@@ -189,7 +189,7 @@ def _draw_mac(first: str, same: Mapping[str, NDArray[np.float64]]) -> Any:
 
 
 def _compared(results: ByRule, same: Mapping[str, NDArray]) -> Table:
-    """Frequencies of modes that belong together, by mass rule."""
+    """Table of corresponding modes with other mass rules."""
     first, modes = next(iter(results.items()))
     header = ["mode", f"{first} (Hz)"]
     rows: list[list[Any]] = [

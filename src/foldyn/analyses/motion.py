@@ -48,9 +48,9 @@ LOADS = "Loads and imposed motions over time."
 SAMPLING = ("every_steps", "interval")
 """Keys of [output] that are arguments of `simulate`."""
 SAMPLES = 2000
-"""Samples that a motion keeps when the file does not say."""
+"""Default number of samples of a motion."""
 MASSLESS_METHODS = tuple(name for name, method in METHODS.items() if method.massless)
-"""Integrators that take dofs without mass, as the rotations of a shell are."""
+"""Integrators that allow massless dofs, such as the rotations of a shell."""
 
 
 class MotionSection(AnalysisSection):
@@ -68,18 +68,18 @@ class MotionSection(AnalysisSection):
 
 
 class MotionOutput(ShownSection):
-    """[output] of a motion: what is kept and shown.
+    """[output] of a motion.
 
     Parameters
     ----------
     every_steps : int, optional
         Steps between samples, instead of `interval`.
     interval : float, optional
-        Time between samples (s), by default the duration over 2000.
+        Time between samples (s), by default 1/2000 of the duration.
     max_frequency : float, optional
-        Highest frequency of spectra that are drawn (Hz).
+        Upper end of drawn spectra (Hz).
     animation : {"gif", "mp4"}, optional
-        Film of the motion beside the page.
+        Film of the motion next to the page.
     """
 
     every_steps: Count | None = None
@@ -96,13 +96,13 @@ class MotionSchema(CaseSchema):
     output: MotionOutput = MotionOutput()
 
     def agree(self) -> None:
-        """Refuse a method that cannot move the model."""
+        """Refuse a method that does not suit the model."""
         if self.model.kind == SHELL:
             check_massless(self, "method", (AUTO, *MASSLESS_METHODS))
 
 
 def check_massless(schema: Any, key: str, fit: Sequence[str] = MASSLESS_METHODS) -> None:
-    """Refuse an integrator that a shell cannot have, unless its panels may all be rigid."""
+    """Refuse an integrator that needs mass everywhere for a shell, unless panels are rigid."""
     method = getattr(schema.analysis, key, None)
     if schema.model.rigid is None and method is not None and method not in fit:
         raise InputError(
@@ -124,7 +124,7 @@ class MotionAnalysis(Analysis):
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
-        """See `Analysis`; the sampling of [output] is an argument of `simulate` too."""
+        """See `Analysis`; the sampling in [output] becomes arguments of `simulate`, too."""
         analysis, output = super().of(schema, case), schema.output
         own = {name: getattr(output, name) for name in SAMPLING}
         given = {name: value for name, value in own.items() if value is not None}
@@ -162,7 +162,7 @@ class MotionAnalysis(Analysis):
             check_samples(*size, len(motions))
 
     def line(self, name: str, result: xarray.Dataset) -> str:
-        """Method and its reason if it was chosen, steps, speed and accuracy."""
+        """Method, with the reason if chosen automatically, steps, speed and accuracy."""
         a = result.attrs
         size = f"{a['dt']:.3g} s"
         if "smallest_step" in a:
@@ -227,7 +227,7 @@ class MotionAnalysis(Analysis):
 
 
 class _Prepared:
-    """A motion that has been checked."""
+    """A checked motion."""
 
     def __init__(self, motion: Any) -> None:
         self.motion = motion

@@ -46,7 +46,7 @@ from foldyn.tables import ListOf, TableOf
 from foldyn.values import indices, number, number_or_list, show
 
 SETTINGS = ("tolerance", "largest_turn", "stability")
-"""Keys that are settings of the solver."""
+"""Keys for settings of the solver."""
 
 
 def _one_mass(name: str, value: Any, beside: Mapping[str, Any]) -> list[str]:
@@ -101,16 +101,16 @@ class PathSection(AnalysisSection):
 
 
 class PathOutput(ShownSection):
-    """[output] of a path: what is shown.
+    """[output] of a path.
 
     Parameters
     ----------
     axis : {"x", "y", "z", "-x", "-y", "-z"}, optional
-        Direction that figures show; by default that of the largest motion.
+        Direction that figures show; by default the direction of the largest motion.
     shapes : int or sequence of int
-        How many deformed shapes are drawn, or the numbers of their points.
+        Number of drawn shapes, or the numbers of their points.
     animation : {"gif", "mp4"}, optional
-        Film of the path beside the page.
+        Film of the path next to the page.
     """
 
     axis: Annotated[str | None, one_of(DIRECTIONS)] = None
@@ -119,7 +119,7 @@ class PathOutput(ShownSection):
 
 
 class PathModel(ModelSection):
-    """[model] of a path, with one mass rule at most."""
+    """[model] of a path, with at most one mass rule."""
 
     mass: Annotated[str | None, Check(_one_mass)] = None
 
@@ -159,7 +159,7 @@ class PathAnalysis(Analysis):
         return cls({**given, "settings": settings})
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
-        """See `Analysis`; bad input is refused before the first point, a mechanism for example."""
+        """See `Analysis`; bad input, such as a mechanism, is refused before the first point."""
         own = dict(self.arguments)
         for one, other in (("load_factors", "steps"), ("steps", "load_factors")):
             if one in changes:
@@ -187,7 +187,7 @@ class PathAnalysis(Analysis):
         return compute
 
     def line(self, name: str, result: xarray.Dataset) -> str:
-        """Points, what is special about them, effort."""
+        """Points, limit points and bifurcations among them, iterations and time."""
         a, kinds = result.attrs, result["point"].values
         limits, crossings = int((kinds == "limit").sum()), int((kinds == "bifurcation").sum())
         loose = [critical_word(result, int(k)) for k in np.flatnonzero(is_loose(result))]
@@ -203,7 +203,7 @@ class PathAnalysis(Analysis):
         )
 
     def shown(self, case: Case) -> NDArray[np.int64]:
-        """Those with a force, else those that supports move, else all that can move."""
+        """Loaded nodes, or else nodes that supports move, or else all that can move."""
         moved = [vectors.any(axis=1) for vectors, _ in case.prescribed_terms]
         if not case.loaded_nodes.size and np.any(moved):
             return np.flatnonzero(np.any(moved, axis=0))
@@ -279,21 +279,21 @@ class PathAnalysis(Analysis):
 
 
 def _bar(shown: bool) -> Any:
-    """Bar of points, whose number is not known."""
+    """Progress bar of points, whose number is unknown."""
     return bar(shown, bar_format="points: {n_fmt}{postfix} [{elapsed}]", mininterval=0.0)
 
 
 FRAMES, FPS = 60, 15
 MOST_CURVES = 8
-"""Nodes whose curves one figure shows at most, each in its color."""
+"""Most nodes in a figure of curves, each in its color."""
 MOST_ROWS = 12
-"""Regular points that the table shows at most."""
+"""Most regular points in the table."""
 MOST_COLUMNS = 4
-"""Nodes whose displacements the table shows at most."""
+"""Most nodes with displacements in the table."""
 
 
 def _reaction(path: xarray.Dataset, nodes: list[int], direction: str) -> Charts:
-    """The force of moved supports over their displacement, for a page without figures."""
+    """Force of moved supports over their displacement, for a page without figures."""
     curve = Curve(
         listed("node", nodes), along(path, nodes, direction),
         plots.total_reaction(path, nodes, direction=direction),
@@ -305,7 +305,7 @@ def _reaction(path: xarray.Dataset, nodes: list[int], direction: str) -> Charts:
 def _landscape(
     case: Case, path: xarray.Dataset, moved: tuple[list[int], str] | None
 ) -> Landscape | None:
-    """The energy landscape of a path along which what drives it falls; None of others."""
+    """Energy landscape of a path whose load or reaction falls somewhere; otherwise None."""
     driven = (
         path["load_factor"].values
         if moved is None
@@ -346,7 +346,7 @@ def _states(found: Landscape) -> Table:
 
 
 def _multiplied(path: xarray.Dataset) -> str:
-    """What the load factor is."""
+    """Meaning of the load factor, in words."""
     constant = np.atleast_1d(path.attrs.get("constant", [])).astype(int).tolist()
     but = f", except {listed('load', constant)} (in full throughout)" if constant else ""
     return f"The load factor multiplies all loads and imposed displacements{but}."

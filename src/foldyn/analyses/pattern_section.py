@@ -15,11 +15,11 @@ from foldyn.tables import check_keys
 from foldyn.values import choice, nearest, number_or_list, numbers, show
 
 HINGES, FACES = "hinge_offset", "faces"
-"""Key of [pattern] that makes its panels thick, and its word for hinges in their faces."""
+"""Key of [pattern] for thick panels, and its value for hinges in their faces."""
 FACETS = "facets"
-"""Key of [pattern] for what lines assigned "F" are."""
+"""Key of [pattern] for the meaning of lines assigned "F"."""
 READING = ("scale", "unit", "frame", FACETS, "tolerance", "flat_foldable")
-"""Keys of [pattern] beside `file`: arguments of `read_pattern`."""
+"""Keys of [pattern] in addition to `file`: arguments of `read_pattern`."""
 INLINE = ("vertices", "faces", "assignments", "fold_angles", "families")
 """Keys of [pattern] for a pattern that the case file holds."""
 
@@ -47,7 +47,7 @@ class PatternOf(Placed):
 
 
 def checked_pattern(value: Any) -> dict[str, Any]:
-    """The table, if it is one of a pattern; else InputError."""
+    """The table if it describes a pattern; otherwise InputError."""
     if not isinstance(value, Mapping):
         raise InputError(f" = {show(value)}: must be a table, written [pattern]")
     sources = [key for key in ("kind", "file", "vertices") if key in value]
@@ -83,7 +83,7 @@ def checked_pattern(value: Any) -> dict[str, Any]:
 
 
 def _check_generator(value: Mapping[str, Any]) -> None:
-    """Refuse an unknown generator, and keys that it, or the one that is meant, does not have."""
+    """Refuse an unknown generator, and keys unknown to it or to the nearest known one."""
     faults, kind = Faults(), value["kind"]
     with faults.collected():
         choice(".kind", kind, GENERATORS)
@@ -125,7 +125,7 @@ def _inline(value: Mapping[str, Any]) -> None:
 
 
 def _all(given: Any, *types: type) -> bool:
-    """Whether all entries of a list or a table are of some types."""
+    """Whether all entries of a list or table have one of the types."""
     if not isinstance(given, list | Mapping):
         return False
     entries = given.values() if isinstance(given, Mapping) else given

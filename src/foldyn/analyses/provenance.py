@@ -1,4 +1,4 @@
-"""The last part of every page: what was computed, with what, and when."""
+"""The last part of every page: inputs, program, time and cost of the computation."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ if TYPE_CHECKING:
     from foldyn.cases import Case
 
 MOST_LISTED = 24
-"""Numbers of a list that are written one by one, at most."""
+"""Most numbers of a list that are written individually."""
 MOST = 200  # characters of a value
 
 
 @dataclass(frozen=True)
 class Call:
-    """How results were asked for, and what they cost.
+    """The command or call that computed results, and its cost.
 
     Parameters
     ----------
     command : str
-        What was typed; "" in Python.
+        Command as typed; "" in Python.
     warnings : tuple of str
-        What was said meanwhile.
+        Warnings issued meanwhile.
     wall, cpu : float
-        Time (s) from the reading of the case file to the last result, and computing time of it.
+        Wall time and processor time (s) from reading the case file to the last result.
     """
 
     command: str = ""
@@ -53,7 +53,7 @@ class Call:
 
 
 def provenance(case_file: Any, results: ByRule, call: Call | None = None) -> list[Section]:
-    """All that results of a `CaseFile` were computed from in a table, and the file itself."""
+    """Table of all inputs of the results of a `CaseFile`, and the text of the file."""
     first = next(iter(results))
     rows = inputs(case_file, case_file.case(first), results)
     rows += computed(results, call or Call())
@@ -64,12 +64,12 @@ def provenance(case_file: Any, results: ByRule, call: Call | None = None) -> lis
 
 
 def inputs_table(rows: Iterable[tuple[str, str]]) -> Table:
-    """Parts of a computation with what they were, without those of which nothing is said."""
+    """Table of the parts of a computation; parts without a description are left out."""
     return Table(["part", "as computed"], [[*row] for row in rows if row[1]], sorts=False)
 
 
 def inputs(case_file: Any, case: Case, results: ByRule) -> list[tuple[str, str]]:
-    """Pattern, sheet, model, supports, loads, damping, analysis of a `CaseFile`, each in words."""
+    """Pattern, sheet, model, supports, loads, damping, analysis of a `CaseFile`, in words."""
     structure = case.structure
     model = vars(structure.options) | {"mass": ", ".join(results)}
     pattern = structure.pattern
@@ -97,13 +97,13 @@ def inputs(case_file: Any, case: Case, results: ByRule) -> list[tuple[str, str]]
 
 
 def computed(results: ByRule, call: Call) -> Iterator[tuple[str, str]]:
-    """When and by what results were computed, at what cost, and what was said of them."""
+    """Date, program, command, cost and warnings of results."""
     own = sum(float(result.attrs.get("wall_seconds", 0.0)) for result in results.values())
     yield from cost_rows(next(iter(results.values())).attrs["foldyn_version"], call, own)
 
 
 def cost_rows(version: str, call: Call, own: float = 0.0) -> Iterator[tuple[str, str]]:
-    """When and by what something was computed, at what cost, and what was said of it.
+    """Date, program, command, cost and warnings of a computation.
 
     own : time (s) in solvers.
     """
@@ -136,7 +136,7 @@ def damping_text(case: Case) -> str:
 
 
 def _point_masses(case: Case) -> str:
-    """How much the point masses weigh, and on how many nodes."""
+    """Sum of the point masses, and their number of nodes."""
     masses = case.point_masses
     count = int((masses > 0.0).sum())
     nodes = f"{count} node{'s' if count > 1 else ''}"
@@ -144,14 +144,14 @@ def _point_masses(case: Case) -> str:
 
 
 def _contact(contact: Contact) -> str:
-    """What may touch, with how much friction, in words."""
+    """Contact in words: between which parts, and with how much friction."""
     touching = "between panels" if contact.panels else "on planes alone"
     said = f"{touching}; {_said(contact, 'planes', 'panels')}"
     return ". ".join([said, *filter(None, [_parts(contact.planes)])])
 
 
 def mesh_error(result: xarray.Dataset) -> str:
-    """What a result says of its mesh, in words; empty where there is nothing to say."""
+    """Mesh error of a result in words; "" if it was not estimated."""
     if "mesh_divisions" not in result.attrs:
         return ""
     told, order = result.attrs, np.atleast_1d(result.attrs["mesh_order"])
@@ -186,7 +186,7 @@ def _said(part: Any, *aside: str) -> str:
 
 
 def _listed(values: Mapping[str, Any], own: Mapping[str, str] | None = None) -> str:
-    """Names and values with their units; what was not given is left out."""
+    """Names and values with units; values that were not given are left out."""
     known = units() if own is None else own
     return "; ".join(
         f"{name.replace('_', ' ')} {_written(value)} "

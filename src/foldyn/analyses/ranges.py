@@ -1,7 +1,7 @@
-"""What a sweep varies: keys of a case file, each with its values or a range to sample from.
+"""Varied keys of a case file, each with its values or a range to sample from.
 
-A range is written A:B:N, from A to B in N equal steps of value, or A:B:N:log, of ratio; a sampled
-one is A:B or A:B:log. Values are written one by one: 1,2,5.
+A range A:B:N has N values from A to B with equal differences, A:B:N:log with equal ratios. A range
+to sample from is A:B or A:B:log. Single values are written 1,2,5.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from foldyn.errors import InputError, within
 from foldyn.values import number, parsed, plain, show, single, whole
 
 MOST_VALUES = 1_000_000
-"""Values of a key: more are a slip of the finger."""
+"""Most values of a key; a larger number is a typing error."""
 LOG = "log"
 SAMPLINGS = ("latin_hypercube", "sobol", "saltelli")
-"""How points are drawn."""
+"""Sampling methods."""
 _REMEDY = "write A:B:N (N values from A to B), A:B:N:log, or values as in 1,2,5"
 _SAMPLED = "with samples, write A:B (from A to B), A:B:log, or values as in 1,2,5"
 
@@ -32,17 +32,17 @@ Value = float | int | str | bool
 
 @dataclass(frozen=True)
 class Varied:
-    """A key of a case file and what a sweep gives it.
+    """A key of a case file with its values in a sweep.
 
     Attributes
     ----------
     key : str
     values : tuple
-        Its values; empty where it is drawn from a range.
+        Its values; empty if it is sampled from a range.
     lower, upper : float
-        Ends of that range.
+        Ends of the range.
     log : bool
-        Whether it is drawn evenly in the logarithm.
+        Whether the range is sampled evenly in the logarithm.
     """
 
     key: str
@@ -57,13 +57,13 @@ class Varied:
         return all(isinstance(v, int | float) and not isinstance(v, bool) for v in self.values)
 
     def at(self, share: NDArray[np.float64]) -> list[Value]:
-        """Values at shares of the way, from 0 to below 1: of its range, or of its list."""
+        """Values at positions from 0 to below 1 in its range or list."""
         if self.values:
             return [self.values[int(part * len(self.values))] for part in share]
         return _between(self.lower, self.upper, share, self.log).tolist()
 
     def tried(self) -> tuple[Value, ...]:
-        """Values that show whether the case file can hold all of them."""
+        """Sample values for checking whether the case file accepts them all."""
         if self.values:
             return self.values
         middle = _between(self.lower, self.upper, np.array([0.3819660112501051]), self.log)
@@ -71,14 +71,14 @@ class Varied:
 
 
 def varied(given: Any, sampled: bool) -> tuple[Varied, ...]:
-    """What a sweep varies, from its table.
+    """Varied keys of a sweep, from its table.
 
     Parameters
     ----------
     given : mapping of str to str, number or list
-        Key, and its range or values.
+        Range or values of each key.
     sampled : bool
-        Whether points are drawn, so that a range is without a count.
+        Whether points are sampled, so that ranges have no count.
 
     Raises
     ------
@@ -131,12 +131,12 @@ def _range(key: str, text: str, sampled: bool) -> Varied:
 
 
 def _between(lower: float, upper: float, share: NDArray, log: bool) -> NDArray[np.float64]:
-    """Values at shares of the way from one end to the other."""
+    """Values at positions from 0 to 1 between two ends."""
     return lower * (upper / lower) ** share if log else lower + share * (upper - lower)
 
 
 def _word(word: str) -> Value:
-    """A number, true or false, or else the text itself."""
+    """A number, true or false, or otherwise the text itself."""
     word = word.strip()
     for kind in (int, float):
         try:

@@ -1,4 +1,4 @@
-"""Reading a case file: a TOML text that is checked whole before anything runs."""
+"""Reading of case files (TOML), which are checked completely before anything runs."""
 
 from __future__ import annotations
 
@@ -30,24 +30,24 @@ from foldyn.tables import read, told
 from foldyn.values import LARGEST, MOST, SMALLEST, show
 
 MOST_MIB = 2
-"""Size of a case file (MiB)."""
+"""Largest case file (MiB)."""
 
 
 def read_case(
     path: str | os.PathLike[str], model: str | None = None, *, divisions: int | None = None
 ) -> CaseFile:
-    """Read a case file and check it whole.
+    """Read a case file and check it completely.
 
     Parameters
     ----------
     path : path
-        A TOML file; see the documentation for its keys. Relative paths in it start at its folder.
+        A TOML file; the documentation lists its keys. Relative paths in it start at its folder.
     model : {"bars_and_hinges", "shell"}, optional
-        Model instead of that of the file. Creases, supports, loads and output stay; what means
-        nothing to the other model is left out: keys of [model] that it does not have, the mass
-        rules, and for a shell an explicit method with its step, secant and internal amplitudes.
+        Model to use instead of the file's. Creases, supports, loads and output stay; parts without
+        a meaning for the other model are left out: its unknown keys of [model], the mass rules, and
+        for a shell an explicit method with its step, secant and internal amplitudes.
     divisions : int, optional
-        Pieces of every edge of a shell, instead of those of the file.
+        Divisions of every edge of a shell, instead of the file's.
 
     Returns
     -------
@@ -56,8 +56,8 @@ def read_case(
     Raises
     ------
     InputError
-        The file cannot be read or anything in it cannot be used; the message names the file, the
-        key, the value and what to do.
+        The file cannot be read or used; the message names the file, the key, the value and the
+        remedy.
     """
     path = path_of(path)
     text = _text(path)
@@ -76,22 +76,22 @@ def read_as(
     model: str | None = None,
     divisions: int | None = None,
 ) -> CaseFile:
-    """Read a case file of any kind as one of small vibrations.
+    """Read a case file of any kind as another kind of analysis.
 
     Parameters
     ----------
     path : Path
     kind : {"modes", "frf", "response", "bands", "fidelity"}
     flags : mapping
-        Keys of [analysis] that the command line gives instead of the file; `state` may be a
-        result's file, too.
+        Keys of [analysis] from the command line, which override the file; `state` may also be the
+        file of a result.
     model, divisions
-        As of `read_case`.
+        As in `read_case`.
 
     Warns
     -----
     FoldynWarning
-        Loads, motions of the base or a start have no place there, and are left out.
+        Loads, motions of the base or a start have no meaning there and are left out.
     """
     text = _text(path)
     document = _parsed(path, text)
@@ -109,7 +109,7 @@ def read_as(
 
 
 def validated(path: Path, document: Mapping[str, Any]) -> Any:
-    """Sections of a case file, checked one by one and with each other."""
+    """Sections of a case file, checked individually and together."""
     others = {kind: analysis.schema for kind, analysis in ANALYSES.items()}
     try:
         return read(schema_of(document), "", document, path.parent, others=others)
@@ -121,11 +121,11 @@ def case_of_document(
     path: Path, document: Mapping[str, Any], text: str = "", pattern: Any = None,
     structures: Mapping[str, Any] | None = None,
 ) -> CaseFile:  # fmt: skip
-    """Check what a case file says and make its cases; see `read_case`.
+    """Check the content of a case file and make its cases; see `read_case`.
 
-    text : of the file, if the document was read from one.
-    pattern, structures : what the document has made before, these by mass rule; made if they are
-        not given.
+    text : text of the file, if the document was read from one.
+    pattern, structures : pattern and structures (by mass rule) made from this document before;
+        made anew if not given.
     """
     schema = validated(path, document)
     model = MODELS[schema.model.kind]
@@ -194,7 +194,7 @@ def case_of_document(
 
 
 def read_document(path: Path) -> dict[str, Any]:
-    """Read what a case file says, unchecked."""
+    """Read the content of a case file without checks."""
     return _parsed(path, _text(path))
 
 
@@ -212,10 +212,10 @@ def _parsed(path: Path, text: str) -> dict[str, Any]:
 
 
 def check_values(document: Mapping[str, Any]) -> None:
-    """Refuse numbers that cannot be computed with.
+    """Refuse numbers that are too large or too small for computations.
 
-    What is not finite is left to the checks of the keys, which know what is right there. Small
-    numbers in lists are left alone: tables of a pulse have such tails.
+    The checks of the keys handle numbers that are not finite. Small numbers in lists are accepted,
+    as in the tail of a tabulated pulse.
     """
     for place, value in _values(document):
         words = ""
@@ -230,7 +230,7 @@ def check_values(document: Mapping[str, Any]) -> None:
 
 
 def _values(document: Mapping[str, Any]) -> Iterator[tuple[tuple[str | int, ...], Any]]:
-    """All values that are not tables or lists, each with its place."""
+    """All values other than tables and lists, each with its place."""
     waiting: list[tuple[tuple[str | int, ...], Any]] = [((), document)]
     while waiting:
         place, value = waiting.pop()
@@ -262,17 +262,14 @@ def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
 
 
 def _radians(angles: Any) -> Any:
-    """Angles (degrees) of a list or a table in radians; None for none."""
+    """Angles (degrees) of a list or table in radians; None stays None."""
     if isinstance(angles, Mapping):
         return {word: math.radians(angle) for word, angle in angles.items()}
     return None if angles is None else np.radians(angles)
 
 
 def _facets(pattern: Pattern, table: Mapping[str, Any]) -> Pattern:
-    """The pattern with its flat creases as the case file wants them, and convex panels.
-
-    They are hinges if it says nothing.
-    """
+    """The pattern with flat creases as the case file asks, by default hinges, and convex panels."""
     wanted = table.get(FACETS, HINGE)
     pattern = pattern if wanted == HINGE else welded(pattern, join=wanted == WELD)
     parts = pattern if wanted == LINE else convex(pattern)
@@ -282,7 +279,7 @@ def _facets(pattern: Pattern, table: Mapping[str, Any]) -> Pattern:
 
 
 def _thick(pattern: Pattern, sheet: Sheet, offset: Any) -> Pattern:
-    """The pattern with panels of the sheet's thickness, hinged at some height."""
+    """The pattern with panels of the sheet's thickness, with hinges at the given heights."""
     thickness = sheet.values("thickness", len(pattern.faces))
     try:
         return thicken(pattern, thickness.tolist(), offsets=None if offset == FACES else offset)
@@ -292,7 +289,7 @@ def _thick(pattern: Pattern, sheet: Sheet, offset: Any) -> Pattern:
 
 
 def _check_vertices(schema: Any, count: int) -> None:
-    """Refuse nodes of a shell's mesh: what a case file says is meant for every mesh."""
+    """Refuse inner nodes of a shell's mesh: a case file must hold for every mesh."""
     places: dict[str, Any] = {
         f"{name}[{i}].{key}": np.ravel(given).tolist()
         for name in ("supports", "loads", "masses", "drive")

@@ -1,4 +1,4 @@
-"""The kinds of analysis that a case file may ask for."""
+"""The kinds of analysis in case files, and the JSON Schema of case files."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ANALYSES: Mapping[str, type[Analysis]] = {
         FidelityAnalysis,
     )
 }
-"""By the name that `analysis.kind` has for them."""
+"""Analyses by `analysis.kind`."""
 
 
 def _known_kind(name: str, value: Any) -> Any:
@@ -44,7 +44,7 @@ def _known_kind(name: str, value: Any) -> Any:
 
 
 class UnknownSchema(CaseSchema):
-    """A case file that does not say its kind: the sections of its kind are left alone."""
+    """A case file without a valid kind: sections that depend on the kind are not checked."""
 
     initial: Any = None
     drive: Any = None
@@ -53,7 +53,7 @@ class UnknownSchema(CaseSchema):
 
 
 def schema_of(document: Mapping[str, Any]) -> type[CaseSchema]:
-    """Schema of a case file by the kind that it names."""
+    """Schema of a case file, by its kind."""
     analysis = document.get("analysis")
     kind = analysis.get("kind") if isinstance(analysis, Mapping) else None
     if isinstance(kind, str) and kind in ANALYSES:
@@ -62,7 +62,7 @@ def schema_of(document: Mapping[str, Any]) -> type[CaseSchema]:
 
 
 def case_schema() -> Schema:
-    """Schema (draft 7) of case files: of all kinds of analysis, and then of the kind at hand."""
+    """JSON Schema (draft 7) of case files: for all kinds, and stricter for the given kind."""
     definitions: dict[str, Schema] = {}
     listed: list[dict[str, Schema]] = []
     kinds: list[Schema] = []

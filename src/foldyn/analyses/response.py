@@ -48,7 +48,7 @@ class ResponseSection(AnalysisSection):
     most_points: Annotated[int, Check(whole_number, least=2)] = 500
 
     def agree(self) -> None:
-        """Go along one of the two."""
+        """Require either frequencies or amplitudes."""
         if (self.frequencies is None) == (self.amplitudes is None):
             raise InputError(
                 ": give both ends of the frequencies (Hz), as frequencies = [2.0, 5.0], or of a "
@@ -58,7 +58,7 @@ class ResponseSection(AnalysisSection):
 
 
 class ResponseOutput(Section):
-    """[output] of kind "response", which has no keys."""
+    """[output] of kind "response"; it has no keys."""
 
 
 class ResponseSchema(CaseSchema):
@@ -95,7 +95,7 @@ class ResponseAnalysis(Analysis):
         return compute
 
     def line(self, name: str, result: xarray.Dataset) -> str:
-        """Points, bifurcations and effort."""
+        """Points, bifurcations and time."""
         marked = int((result["bifurcation"].values != "").sum())
         return (
             f"  {name}: {counted(result.sizes['point'], 'point')}, "
@@ -130,7 +130,7 @@ class ResponseAnalysis(Analysis):
 
 
 def _bifurcations(results: ByRule) -> Table:
-    """Where motions gain or lose stability, and the ends of each branch."""
+    """Table of bifurcations and of the ends of each branch."""
     header = ["mass rule", "branch", "point", "frequency (Hz)", "factor", "amplitude (m)"]
     rows = [
         [
@@ -144,7 +144,7 @@ def _bifurcations(results: ByRule) -> Table:
 
 
 def _told(result: xarray.Dataset) -> list[int]:
-    """Numbers of the points that the table shows."""
+    """Numbers of the points in the table."""
     branch = result["branch"].values
     edges = np.flatnonzero(np.diff(branch))
     ends = {0, len(branch) - 1, *edges.tolist(), *(edges + 1).tolist()}

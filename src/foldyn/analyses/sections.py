@@ -1,8 +1,7 @@
-"""The case file's contract: the tables that all kinds of analysis share, their keys and types.
+"""The tables of case files that all kinds of analysis share, with their keys and types.
 
-Each kind's own tables are in its file of `analyses`. Limits of values live here only where a
-message should name the key; everything else is checked by the objects that are built from the
-tables.
+The tables of each kind are in its file in `analyses`. Limits of values are here only if a message
+should name the key; the objects that are built from the tables check the rest.
 """
 
 from __future__ import annotations
@@ -37,25 +36,25 @@ from foldyn.values import MOST, choice, indices, number, number_or_list, show, v
 
 RULES = [name for model in MODELS.values() for name in model.masses]
 MOST_SHAPES = 12
-"""Deformed shapes or modes that one figure shows at most."""
+"""Most shapes or modes in one figure."""
 
 
 def text(name: str, value: Any) -> str:
-    """Return `value` when it is a text."""
+    """Return `value` if it is a text."""
     if not isinstance(value, str):
         raise InputError(f" = {show(value)}: must be text", name)
     return value
 
 
 def switch(name: str, value: Any) -> bool:
-    """Return `value` when it is true or false."""
+    """Return `value` if it is true or false."""
     if not isinstance(value, bool):
         raise InputError(f" = {show(value)}: must be true or false", name)
     return value
 
 
 def whole_number(name: str, value: Any, *, least: int = 1, most: int = MOST) -> int:
-    """Return `value` when it is a whole number within bounds."""
+    """Return `value` if it is a whole number within bounds."""
     number(name, whole(name, value), least=least, most=most)
     return value
 
@@ -63,11 +62,11 @@ def whole_number(name: str, value: Any, *, least: int = 1, most: int = MOST) -> 
 def some_shapes(
     name: str, value: Any, drawn: str, what: str, least: int = -MOST
 ) -> int | tuple[int, ...]:
-    """Return how many shapes are drawn, or their numbers.
+    """Return the number of drawn shapes, or their numbers.
 
-    drawn : their name in messages, "modes"
-    what : what the numbers count, "mode"
-    least : the least of these numbers
+    drawn : name of the shapes for messages, "modes"
+    what : name of a numbered item, "mode"
+    least : the smallest number
     """
     if isinstance(value, int) and not isinstance(value, bool):
         if not 1 <= value <= MOST_SHAPES:
@@ -96,13 +95,13 @@ def _masses(name: str, value: Any, beside: Mapping[str, Any]) -> list[str]:
 
 
 def known_masses(beside: Mapping[str, Any]) -> list[str]:
-    """Distributions of mass of the model, or of all models where its kind is wrong."""
+    """Mass rules of the model, or of all models if its kind is invalid."""
     kinds = [beside["kind"]] if "kind" in beside else list(MODELS)
     return [name for kind in kinds for name in MODELS[kind].masses]
 
 
 def check_mass(name: str, value: Any, beside: Mapping[str, Any]) -> str:
-    """Return a distribution of mass that the model has."""
+    """Return `value` if it is a mass rule of the model."""
     known = known_masses(beside)
     for kind, other in MODELS.items():
         if isinstance(value, str) and value in other.masses and value not in known:
@@ -115,7 +114,7 @@ def check_mass(name: str, value: Any, beside: Mapping[str, Any]) -> str:
 
 
 def still(name: str, value: Any, why: str) -> Any:
-    """Refuse histories of planes in a table of contact."""
+    """Refuse histories of planes in a contact table."""
     planes = value.get("planes", []) if isinstance(value, Mapping) else []
     for i, plane in enumerate(planes if isinstance(planes, list) else []):
         if isinstance(plane, Mapping) and "history" in plane:
@@ -124,7 +123,7 @@ def still(name: str, value: Any, why: str) -> Any:
 
 
 def _per_crease(name: str, value: Any) -> Any:
-    """Return a number for all creases, one for each, or a table by name."""
+    """Return a number for all creases, a list with one for each, or a table by name."""
     return per_crease(
         name, value if isinstance(value, Mapping) else number_or_list(name, value, "crease")
     )
@@ -160,12 +159,12 @@ Animation = Annotated[str | None, one_of(ANIMATIONS)]
 
 
 class ModelSection(Section):
-    """[model]: arguments of `discretize` or `shell`; what is left out has its default there.
+    """[model]: arguments of `discretize` or `shell`, with their defaults.
 
     Parameters
     ----------
     kind : {"bars_and_hinges", "shell"}
-        What the pattern is modeled as.
+        Kind of model.
     mass : str or sequence of str
         Mass rule; a list compares several.
     """
@@ -192,7 +191,7 @@ class ModelSection(Section):
     membrane: Annotated[str | None, one_of(MEMBRANES)] = None
 
     def agree(self) -> None:
-        """Refuse keys of the other model."""
+        """Refuse keys of other models."""
         model = MODELS[self.kind]
         strange = [
             key
@@ -210,13 +209,13 @@ class ModelSection(Section):
 
     @property
     def options(self) -> dict[str, Any]:
-        """What the file says of the options of its model, but for the mass."""
+        """Options of the model that the file gives, without the mass rule."""
         given = self.stated - {"kind", "mass"}
         return {key: getattr(self, key) for key in MODELS[self.kind].keys if key in given}
 
 
 class AnalysisSection(Section):
-    """[analysis]; kinds of analysis add their keys."""
+    """[analysis]; each kind of analysis adds its keys."""
 
     kind: Text
 
@@ -229,7 +228,7 @@ class ShownSection(Section):
     nodes : int, sequence of int, or str
         Node numbers or a selection; by default the loaded, driven or moved ones.
     axis : {"x", "y", "z"}, optional
-        Component that figures show; by default that of the largest motion.
+        Component that figures show; by default the one with the largest motion.
     """
 
     nodes: Nodes | None = None
@@ -245,15 +244,15 @@ class SweepSection(Section):
         Keys of the file in quotes, each with a range A:B:N, A:B:N:log or a list of values; with
         `samples` A:B or A:B:log.
     samples : int, optional
-        Points that are drawn, instead of all combinations.
+        Number of sampled points, instead of all combinations.
     method : {"latin_hypercube", "sobol", "saltelli"}
-        How points are drawn.
+        Sampling method.
     seed : int
-        Of the points that are drawn.
+        Random seed of the samples.
     ties : mapping, optional
-        Keys that follow others, each with its expression.
+        Dependent keys, each with its expression.
     measures : sequence of str
-        What is measured of each result, as "peak_frequency[8]".
+        Measures of each result, as "peak_frequency[8]".
     """
 
     samples: Count | None = None
@@ -276,19 +275,19 @@ class DesignSection(Section):
     subject_to : sequence of str
         Constraints, as "frequency[1] >= 12".
     guess : mapping, optional
-        Values to begin from; those of the file by default.
+        Values to begin from; by default the file's.
     method : {"slsqp", "trust-constr", "mma", "cma"}
         Method of the search.
     searches : int
-        How many, all but the first from designs that are drawn.
+        Number of searches, all but the first from random designs.
     seed : int
-        Of designs that are drawn.
+        Random seed of these designs.
     tolerance : float
-        When a search ends.
+        Relative change of the objective at which a search ends.
     slack : float
-        What counts as no violation of a constraint.
+        Relative violation of a constraint that counts as none.
     max_evaluations : int
-        Evaluations of each search, at most.
+        Most evaluations of each search.
     """
 
     bounds: Anything
@@ -310,7 +309,7 @@ class CaseSchema(Section):
     Parameters
     ----------
     title : str
-        For the page and its figures.
+        Title of the page.
     """
 
     title: Text = ""

@@ -19,7 +19,7 @@ from foldyn.tables import Section
 from foldyn.values import show
 
 TOLERANCE = 1e-9
-"""Velocity of a supported node, relative to the largest, that counts as rounding."""
+"""Velocity of a supported node, relative to the largest, that counts as rounding error."""
 
 
 def _result_file(name: str, value: Any) -> str:
@@ -62,7 +62,7 @@ class MotionStart(Section):
     at: Whole = -1
 
     def agree(self) -> None:
-        """Ask for one kind of start."""
+        """Require either a rigid motion or a stored state."""
         given = self.stated
         rigid = sorted(given & {"velocity", "spin"})
         if not given:
@@ -76,20 +76,20 @@ class MotionStart(Section):
 
 
 class Start(NamedTuple):
-    """A state, and for a stored one the load factor to which its creases are folded, if known."""
+    """A state; for a stored one also the load factor of its folded creases, if known."""
 
     state: State | None = None  # rest
     load_factor: float | None = None
 
 
 def start_of(section: MotionStart | StoredStart | None, case: Case, folder: Path) -> Start:
-    """What a case starts from.
+    """Start of a case from its section.
 
     Raises
     ------
     InputError
-        A support holds a node that the rigid motion moves; the result cannot be read or has other
-        nodes. The field is inside `initial`.
+        A support holds a node that the rigid motion moves, or the result cannot be read or has
+        other nodes. The field is inside `initial`.
     """
     if section is None:
         return Start()
@@ -121,9 +121,9 @@ def _stored(section: MotionStart | StoredStart, case: Case, folder: Path) -> Sta
 
 
 def _rigid_motion(case: Case, start: MotionStart) -> State:
-    """State at rest in shape, with the velocities of a rigid body.
+    """Undeformed state with the velocities of a rigid body.
 
-    v = velocity + spin x (x - center), with the center of the nodes' masses at rest.
+    v = velocity + spin x (x - center), with the center of mass of the nodes at rest.
     """
     x = case.structure.nodes
     mass = case.nodal_mass

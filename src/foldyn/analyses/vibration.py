@@ -1,6 +1,6 @@
-"""What modes and frequency responses share: the one state about which a structure vibrates.
+"""Shared parts of small-vibration analyses: the state about which a structure vibrates.
 
-Supports and loads are preloads: they act in full in its equilibrium and have no history.
+Supports and loads are preloads: they act in full in the equilibrium and have no history.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from foldyn.tables import ListOf
 from foldyn.values import number, show
 
 STATES = ("rest", "equilibrium")
-"""States about which a case file may have its structure vibrate, beside a stored one."""
+"""States of vibration in case files, in addition to a stored one."""
 About = Annotated[str, one_of(STATES)]
 Secant = Annotated[float | None, Check(number, above=0.0, most=180.0)]
 Internal = Annotated[int, Check(whole_number, least=0, most=MOST)]
@@ -38,7 +38,7 @@ NO_BASE = (
 
 
 class VibrationSchema(CaseSchema):
-    """What case files of small vibrations share."""
+    """Case files of small vibrations."""
 
     supports: Annotated[Sequence[Any], ListOf(SUPPORT.without(base=NO_BASE, history=TIMELESS))] = ()
     loads: Annotated[Sequence[Any], ListOf(LOAD.without(history=TIMELESS))] = ()
@@ -46,7 +46,7 @@ class VibrationSchema(CaseSchema):
     analysis: Any
 
     def agree(self) -> None:
-        """Ask for what the model knows, and for one state."""
+        """Refuse options that the model does not have, and contradictory states."""
         if self.model.kind == SHELL and "secant" in self.analysis.stated:
             raise InputError(
                 f" = {show(self.analysis.secant)}: is for superlinear bends, and a shell has none; "
@@ -79,19 +79,19 @@ class VibrationSchema(CaseSchema):
 
 
 def about(case_file: CaseFile, mass: str) -> dict[str, Any]:
-    """Arguments for the stored state that a case file names; none where it names none."""
+    """Arguments for the stored state of a case file; empty if it has none."""
     start = case_file.start(mass)._asdict()
     return {key: value for key, value in start.items() if value is not None}
 
 
 @contextmanager
 def bar_closed(bar: Any, keeps: bool = False) -> Iterator[Any]:
-    """Close a bar at the end.
+    """Close a progress bar at the end.
 
-    The partial result of a search for equilibrium, or of a simulated motion, is not a result of
-    this kind and is not kept.
+    Partial results of an equilibrium search or a simulated motion are dropped, as they are not of
+    this kind of analysis.
 
-    keeps : whether what an interrupt leaves is of this kind.
+    keeps : whether the partial result of an interrupted computation is of this kind.
     """
     try:
         yield bar

@@ -92,8 +92,8 @@ class State(Checked):
         result. It is used only by the same method, and only if state and forces match that end.
     origin : Origin, optional
         Start of the motion that continues here, so that damping with ``state = "initial"`` and
-        added mass stay the same. `initial_state` takes it from the result; without it the motion begins
-        in this state.
+        added mass stay the same. `initial_state` takes it from the result; without it the motion
+        begins in this state.
     """
 
     displacement: Annotated[ArrayLike | None, Check(_vectors, unit="m")] = None
