@@ -203,7 +203,8 @@ class ModelRangeWarning(FoldynWarning):
 
 
 OF_MODELS = (StretchWarning, ModelRangeWarning)
-"""What studies and shipped cases say on their pages alone: they take their models on purpose."""
+"""Warnings of models, which studies and shipped cases show on their pages only: they use these
+models on purpose."""
 
 
 class UnitsWarning(FoldynWarning):

@@ -29,7 +29,7 @@ Result = TypeVar("Result")
 AHEAD = 2
 """Items that wait for each process, so that none is idle."""
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-"""Variables by which a process beside others is told to run on one thread."""
+"""Environment variables that tell a process, which runs next to others, to use one thread."""
 GONE = "the process that computed it was ended from outside, perhaps for lack of memory"
 
 

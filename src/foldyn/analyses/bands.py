@@ -487,7 +487,7 @@ def _notes(result: xarray.Dataset) -> str:
     if "zone_frequency" not in result and result.sizes["period"] > 1:
         notes.append(
             "Full gaps are those at all wave vectors of the path. The greatest and least "
-            "frequencies of bands may lie beside it: analysis.zone computes the whole zone."
+            "frequencies of bands may lie off it: analysis.zone computes the whole zone."
         )
     residual = float(np.max(result["residual"].values))
     if residual > 1e-6:

@@ -32,7 +32,7 @@ def add_fold(commands: Any) -> None:
         help="fold a pattern file",
         description="Fold a flat or partly folded pattern, every mountain and valley its own way, "
         "and say what does not fold. OUT is the folded pattern, as FOLD with the states on the way "
-        "as frames; a page that shows the way stands beside it.",
+        "as frames; a page in the same folder shows them.",
     )
     command.add_argument("pattern", metavar="PATTERN", help="pattern file: FOLD, SVG, CP, ...")
     aim = command.add_mutually_exclusive_group()

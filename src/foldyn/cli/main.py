@@ -150,10 +150,10 @@ def parser() -> argparse.ArgumentParser:
 
     fidelity = commands.add_parser(
         "fidelity",
-        help="models of bars and hinges beside the shell, for a case file of any kind",
-        description="Frequencies, shapes and small displacements of bars and hinges beside the "
-        "shell of the same pattern, sheet and supports, for a case file of any kind; what its "
-        "[analysis] says, if it is of kind fidelity, holds unless given here.",
+        help="compare models of bars and hinges with the shell, for a case file of any kind",
+        description="Frequencies, shapes and small displacements of models of bars and hinges, "
+        "compared with the shell of the same pattern, sheet and supports, for a case file of any "
+        "kind. Options not given here are taken from its [analysis], if that is of kind fidelity.",
     )
     _add_case(fidelity, "fidelity")
     fidelity.set_defaults(model=None)
@@ -170,8 +170,7 @@ def parser() -> argparse.ArgumentParser:
         "--models",
         nargs="+",
         metavar="NAME",
-        help="what stands beside the model of the file: standard, plate, n5b8e, bars "
-        "(default: all but bars)",
+        help="further models to compare: standard, plate, n5b8e, bars (default: all but bars)",
     )
     fidelity.add_argument(
         "--vertex-radius",

@@ -61,13 +61,13 @@ def frame_of(given: str | None) -> int | str | None:
 
 def add_figures(command: argparse.ArgumentParser) -> None:
     """Add options for figures in publication formats."""
-    command.add_argument("--figures", choices=FIGURES, help="draw figures too, beside the page")
+    command.add_argument("--figures", choices=FIGURES, help="draw figures too, in this format")
 
 
 def add_film(command: argparse.ArgumentParser) -> None:
     """Add the option for a film of the motion."""
     command.add_argument(
-        "--film", choices=ANIMATIONS, help="write the motion as a film too, beside its page"
+        "--film", choices=ANIMATIONS, help="write the motion as a film too, in this format"
     )
 
 

@@ -26,9 +26,9 @@ def add_study(commands: Any) -> None:
     """Add the command and its arguments."""
     study = commands.add_parser(
         "study",
-        help="the study of a paper, its numbers beside ours",
+        help="compute the study of a paper and compare numbers",
         description="Compute the studies of a paper; results, figures and report.html go to a "
-        "folder. What is in the folder already is not computed again.",
+        "folder. Results that are in the folder already are not computed again.",
     )
     study.add_argument(
         "name",

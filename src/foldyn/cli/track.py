@@ -40,7 +40,7 @@ def add_track(commands: Any) -> None:
         "track",
         help="camera tracking of a film, or of photographs",
         description="Track the corners of a folded sheet in a film, or find the nodes of a model "
-        "in photographs; histories go to OUT (NetCDF), a CSV file and figures beside it.",
+        "in photographs. Histories go to OUT (NetCDF), a CSV file and figures to the same folder.",
     )
     track.add_argument("inputs", nargs="+", metavar="VIDEO|PHOTO", help="a film, or photographs")
     track.add_argument("--roi", metavar="X,Y,W,H", help="region of interest (pixels)")

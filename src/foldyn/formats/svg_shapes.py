@@ -132,7 +132,7 @@ def placed_by(given: Mapping[str, str], place: str) -> Placing:
     words = ["0" if w in ("left", "top") else w for w in given.get("transform-origin", "").split()]
     if given.get("transform-box", "view-box") != "view-box" or "%" in "".join(words):
         raise InputError(
-            ": is not read where it is said by the box of the element; give the origin as lengths, "
+            ": is not read where it depends on the box of the element; give the origin as lengths, "
             "as 5px 5px, or apply the transform to the coordinates",
             f"{place}.transform-origin",
         )

@@ -163,10 +163,10 @@ KINDS: Mapping[str, str] = {
 }
 """Analyses that can be computed, with their names on the page."""
 STEPS, PERIODS, FREQUENCIES, COUNT = 10, 10.0, 200, 6
-"""Of analyses that the file does not ask for: steps of a static curve, periods of the first mode
-that a motion lasts, frequencies of a response, modes."""
+"""Sizes of analyses that the file does not ask for: steps of a static curve, periods of the first
+mode that a motion lasts, frequencies of a response, number of modes."""
 SAMPLES, STEPS_A_SAMPLE = 250, 4
-"""Samples of a motion, and steps between them where they are ours: a hundred in a period."""
+"""Samples of a motion, and steps between them unless the file gives them: a hundred in a period."""
 MOST_WORK = 1e7
 """Most steps times dofs of a motion with fixed steps, about a second of computing; longer motions
 are cut."""

@@ -62,8 +62,8 @@ MOTION: Mapping[str, Quantity] = STATE | {
     "memory": MEMORY,
 }
 CONTINUATIONS: Mapping[str, str] = {
-    "continuation": "what the method needs beside to go on from the last sample",
-    "continued_from": "with what the method went on from another motion at the first sample",
+    "continuation": "what else the method needs to go on from the last sample",
+    "continued_from": "what the method took over from another motion at the first sample",
 }
 """Further variables of motions by implicit methods, along the dimension continued."""
 ORIGIN: Mapping[str, Quantity] = {
