@@ -18,7 +18,7 @@ import numpy as np
 import foldyn as fd
 from foldyn.errors import FoldynWarning
 from foldyn.mechanics.contact.contact_state import Memory
-from foldyn.mechanics.contact.forces import add_contact
+from foldyn.mechanics.contact.kernels import add_contact
 from foldyn.mechanics.contact.search import list_pairs
 
 # cells, steps of a run

@@ -11,9 +11,8 @@ from foldyn.dynamics.implicit.contact_measure import new_move
 from foldyn.dynamics.implicit.contact_pairs import edges_step, vertex_step
 from foldyn.jit.compiled import kernel
 from foldyn.mechanics.contact.candidates import Sheets, tables
-from foldyn.mechanics.contact.edge_edge import edge_edge
+from foldyn.mechanics.contact.pair_potentials import edge_edge, vertex_triangle
 from foldyn.mechanics.contact.potential import difference_quotient
-from foldyn.mechanics.contact.vertex_triangle import vertex_triangle
 
 D0 = 0.2
 # triangle 0 amid others of its panel, of which it shares all sides and corner 1 is closed

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import foldyn as fd
 from foldyn.checks import gradient_error, tangent_error
 from foldyn.jit.context import Context
-from foldyn.mechanics.contact.ride import (
+from foldyn.mechanics.contact.boards import (
     add_back,
     curvature,
     jacobian,

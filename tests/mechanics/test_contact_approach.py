@@ -12,8 +12,8 @@ from foldyn.jit.compiled import shared
 from foldyn.mechanics.contact.candidates import tables
 from foldyn.mechanics.contact.ccd import KEEP, clear_share
 from foldyn.mechanics.contact.contact_state import memories, memory
-from foldyn.mechanics.contact.forces import add_contact
-from foldyn.mechanics.contact.pairs import edge_gap, vertex_gap
+from foldyn.mechanics.contact.distances import edge_gap, vertex_gap
+from foldyn.mechanics.contact.kernels import add_contact
 from foldyn.mechanics.contact.planes import plane_powers, slip
 from foldyn.mechanics.contact.search import list_pairs, place
 from foldyn.mechanics.contact.step_limit import RESOLVED, limited

@@ -10,9 +10,13 @@ from foldyn.checks import gradient_error, tangent_error
 from foldyn.jit.compiled import kernel
 from foldyn.mechanics.contact.candidates import tables
 from foldyn.mechanics.contact.distances import closest_of_segments, closest_on_triangle
-from foldyn.mechanics.contact.edge_edge import edge_edge, edge_edge_tangent
+from foldyn.mechanics.contact.pair_potentials import (
+    edge_edge,
+    edge_edge_tangent,
+    vertex_triangle,
+    vertex_triangle_tangent,
+)
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.contact.vertex_triangle import vertex_triangle, vertex_triangle_tangent
 
 D0 = 0.2
 # a vertex over a triangle amid others of its panel, and two edges

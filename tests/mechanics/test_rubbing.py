@@ -10,16 +10,16 @@ from numpy.testing import assert_allclose
 from foldyn.checks import gradient_error, tangent_error
 from foldyn.mechanics.contact.candidates import tables
 from foldyn.mechanics.contact.contact_state import memory
-from foldyn.mechanics.contact.pairs import EDGES, VERTEX
+from foldyn.mechanics.contact.distances import EDGES, VERTEX
 from foldyn.mechanics.contact.panel_friction import (
     add_rub,
+    add_rub_tangent,
     add_rubs,
     pressed_pair,
     rub_power,
     rub_state,
     slip_pairs,
 )
-from foldyn.mechanics.contact.panel_friction_tangent import add_rub_tangent
 from foldyn.mechanics.contact.search import list_pairs, use_all
 
 D0, MU = 0.2, 0.3

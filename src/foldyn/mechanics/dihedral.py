@@ -18,6 +18,7 @@ import numpy as np
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
 from foldyn.jit.eights import choose
+from foldyn.mechanics.contact.distances import cross, dot
 
 PI = math.pi
 TAN_PI_8 = math.sqrt(2.0) - 1.0
@@ -166,16 +167,6 @@ def dihedral_rates(
 
 
 @inner_scalar
-def _cross(a, b):
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@inner_scalar
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@inner_scalar
 def _difference(points, p, q):
     return points[p, 0] - points[q, 0], points[p, 1] - points[q, 1], points[p, 2] - points[q, 2]
 
@@ -188,12 +179,12 @@ def add_hessian(points, gradient, moment, block):
     blocks are formulas; the others follow from symmetry and translation invariance.
     """
     b, r, s = _difference(points, 1, 0), _difference(points, 2, 0), _difference(points, 1, 3)
-    m, n = _cross(r, b), _cross(b, s)
-    bb, mm, nn = _dot(b, b), _dot(m, m), _dot(n, n)
+    m, n = cross(r, b), cross(b, s)
+    bb, mm, nn = dot(b, b), dot(m, m), dot(n, n)
     length = math.sqrt(bb)
-    rho, sigma = _dot(r, b) / bb, _dot(s, b) / bb
-    bm, rm = _cross(b, m), _cross(r, m)
-    bn, sn = _cross(b, n), _cross(s, n)
+    rho, sigma = dot(r, b) / bb, dot(s, b) / bb
+    bm, rm = cross(b, m), cross(r, m)
+    bn, sn = cross(b, n), cross(s, n)
     cm, cn = moment * length / (mm * mm), moment * length / (nn * nn)
     dm, dn = moment / (length * mm), moment / (length * nn)
     for p in range(3):

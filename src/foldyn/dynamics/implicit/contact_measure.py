@@ -38,7 +38,7 @@ class Move(NamedTuple):
     second: NDArray  # (12, 12) second derivative at the midpoint
     after: NDArray  # (12,) gradient at the end
     gradient: NDArray  # (12,) discrete gradient
-    weights: NDArray  # (4,) of a distance; see `mechanics.contact.distance_hessian`
+    weights: NDArray  # (4,) of a distance; see `mechanics.contact.potential`
     moves: NDArray  # (2, 4)
     apart: NDArray  # (3,) m
 

@@ -14,12 +14,17 @@ import numpy as np
 
 from foldyn.dynamics.implicit.contact_measure import add_measure, go
 from foldyn.jit.compiled import inner, kernel
-from foldyn.mechanics.contact.distance_hessian import apart_of, half_square
-from foldyn.mechanics.contact.distances import cross, dot, minus, point
-from foldyn.mechanics.contact.edge_edge import PARALLEL, mollifier, square_of_cross, weigh_edges
-from foldyn.mechanics.contact.pairs import EDGES, VERTEX
-from foldyn.mechanics.contact.potential import barrier, difference_quotient
-from foldyn.mechanics.contact.vertex_triangle import PARTS, share_of, weigh_triangle
+from foldyn.mechanics.contact.distances import EDGES, VERTEX, cross, dot, minus, point
+from foldyn.mechanics.contact.pair_potentials import (
+    PARALLEL,
+    PARTS,
+    mollifier,
+    share_of,
+    square_of_cross,
+    weigh_edges,
+    weigh_triangle,
+)
+from foldyn.mechanics.contact.potential import apart_of, barrier, difference_quotient, half_square
 
 
 @inner

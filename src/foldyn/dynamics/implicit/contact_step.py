@@ -20,9 +20,7 @@ from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.contact.candidates import FRICTION, NORMAL
 from foldyn.mechanics.contact.contact_state import Memory
-from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
-from foldyn.mechanics.contact.motions import farthest, fastest
-from foldyn.mechanics.contact.pairs import (
+from foldyn.mechanics.contact.distances import (
     EDGES,
     VERTEX,
     closest_of,
@@ -30,11 +28,11 @@ from foldyn.mechanics.contact.pairs import (
     nodes_of,
     put_corners,
 )
-from foldyn.mechanics.contact.panel_friction import add_rub
-from foldyn.mechanics.contact.panel_friction_tangent import add_rub_tangent
+from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
+from foldyn.mechanics.contact.panel_friction import add_rub, add_rub_tangent
 from foldyn.mechanics.contact.planes import farthest_stretch, height, move_planes, stretch_of
 from foldyn.mechanics.contact.potential import barrier, difference_quotient
-from foldyn.mechanics.contact.search import list_pairs, place, use_all
+from foldyn.mechanics.contact.search import farthest, fastest, list_pairs, place, use_all
 from foldyn.mechanics.contact.tangent import friction_tangent
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.dihedral import add_hessian

@@ -12,15 +12,11 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.context import Context
-from foldyn.mechanics.contact.boards import BoardSheets, board_tables
-from foldyn.mechanics.contact.candidates import Tables
-from foldyn.mechanics.contact.ccd import clear_share
-from foldyn.mechanics.contact.contact_state import Memory, memory
-from foldyn.mechanics.contact.forces import add_contact
-from foldyn.mechanics.contact.kernels import board_kernels
-from foldyn.mechanics.contact.ride import (
+from foldyn.mechanics.contact.boards import (
+    BoardSheets,
     Ride,
     add_back,
+    board_tables,
     carried,
     curvature,
     jacobian,
@@ -28,6 +24,10 @@ from foldyn.mechanics.contact.ride import (
     put_points,
     step_jacobian,
 )
+from foldyn.mechanics.contact.candidates import Tables
+from foldyn.mechanics.contact.ccd import clear_share
+from foldyn.mechanics.contact.contact_state import Memory, memory
+from foldyn.mechanics.contact.kernels import add_contact, board_kernels
 from foldyn.mechanics.contact.term import ContactTerm, contact_tangent
 from foldyn.mechanics.term import CompiledTerm, nodal
 

@@ -1,8 +1,7 @@
-"""Boards: the contact surfaces of panels hinged off their middle surfaces.
+"""Boards: the contact surfaces of panels hinged off their middle surfaces, which ride on the mesh.
 
-The contact surface of a board is its middle surface. Its corners ride on the mesh (`ride`), and
-neighboring panels have separate corners. The nodes of the mesh follow in the arrays, for the guards
-of hinges.
+The contact surface of a board is its middle surface. Neighboring boards have separate corners. The
+nodes of the mesh follow in the arrays, for the guards of hinges.
 
 The middles of two boards are s = |h + h'| apart at a closed crease, h and h' the heights of its
 hinge line above them. Between sheets, s = 0 (`tables`), and boards hinged in their faces, s = t,
@@ -13,15 +12,36 @@ which touch everywhere at once,
 with l the distance from the crease: boards that lie flat do not touch with their sides. Guards of
 hinges begin at 1 - s/t of the angle for sheets: if the middle surfaces stay apart, their distance
 already determines the side.
+
+Corners of boards ride on the triangles of the mesh at an offset. A point that rides on a triangle
+of nodes x_i, with N = (x_b - x_a) x (x_c - x_a), n = N / |N|, is
+
+    y = sum w_i x_i + h n,    sum w_i = 1;
+
+a corner of several triangles is the mean over them. With the edge e_i opposite to node i, dN/dx_i =
+[e_i x], so that
+
+    dy/dx_i = w_i I + h P [e_i x] / |N|,    P = I - n n'.
+
+Points follow rigid motions of the mesh, so forces f on points, mapped to the nodes by the
+transpose, keep their resultant and their moment. The second derivative of f.y has terms with h,
+
+    [e_i x]' H [e_j x] and, from N itself, -+[g x],    H = -(p n' + n p' + f.n P) h / |N|^2,
+
+p = P f and g = h p / |N|.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
+from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.mechanics.block_matrix import assembled, pairs_within, places_of
 from foldyn.mechanics.contact.candidates import (
     ACROSS_CORNER,
     ACROSS_CREASE,
@@ -33,7 +53,269 @@ from foldyn.mechanics.contact.candidates import (
     starts,
     tables,
 )
-from foldyn.mechanics.contact.ride import Ride, carried, ride_on
+from foldyn.mechanics.contact.distances import cross, dot, minus, point
+
+NOISE = 16.0 * float(np.finfo(float).eps)  # of a normal: rounding error
+LEVI_CIVITA = np.zeros((3, 3, 3))
+LEVI_CIVITA[[0, 1, 2], [1, 2, 0], [2, 0, 1]] = 1.0
+LEVI_CIVITA[[0, 2, 1], [2, 1, 0], [1, 0, 2]] = -1.0
+
+
+class Ride(NamedTuple):
+    """m points on t triangles of n nodes; the last n points are the nodes."""
+
+    x: NDArray  # (n, 3) nodes at rest, m
+    rest: NDArray  # (m, 3) points at rest, m
+    nodes: NDArray  # (t, 3)
+    points: NDArray  # (t, 3) points at the corners
+    weights: NDArray  # (t, 3, 3) w of each point's share, over the nodes
+    heights: NDArray  # (t, 3) h, m
+    reach: NDArray  # (t, 3, 3) squared bounds of how far a node moves a point, in parts that add up
+
+
+def ride_on(
+    x: NDArray, triangles: NDArray, panel: NDArray, middle: NDArray
+) -> tuple[Ride, NDArray, NDArray]:
+    """Points at positions `middle` (t, 3, 3) at rest, one for each node of a panel.
+
+    Also returns the panel and node of each point; for mesh nodes, panel -1 and the node's own
+    number.
+    """
+    n = len(x)
+    key, points = np.unique(panel[:, None] * n + triangles, return_inverse=True)
+    points = points.reshape(-1, 3)
+    m = len(key)
+    share = 1.0 / np.bincount(points.ravel(), minlength=m)[points]
+    a, b, c = (x[triangles[:, i]] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    twice = np.linalg.norm(normal, axis=1)
+    normal /= twice[:, None]
+    away = middle - a[:, None]
+    heights = np.einsum("tci,ti->tc", away, normal)
+    # weights from the areas spanned by a point and two nodes
+    weights = np.empty((len(triangles), 3, 3))
+    for i, (p, q) in enumerate(((b, c), (c, a), (a, b))):
+        span = np.cross((q - p)[:, None], middle - p[:, None])
+        weights[:, :, i] = np.einsum("tci,ti->tc", span, normal) / twice[:, None]
+    edges = np.linalg.norm(np.stack([c - b, a - c, b - a], axis=1), axis=2)
+    moved = np.abs(weights) + np.abs(heights)[:, :, None] * (edges / twice[:, None])[:, None]
+    rest = np.zeros((m, 3))
+    np.add.at(rest, points, share[:, :, None] * middle)
+    ride = Ride(
+        x=np.ascontiguousarray(x, float),
+        rest=np.concatenate([rest, x]),
+        nodes=np.ascontiguousarray(triangles, np.int64),
+        points=np.ascontiguousarray(points, np.int64),
+        weights=weights * share[:, :, None],
+        heights=heights * share,
+        reach=moved**2 * share[:, :, None],
+    )
+    return (
+        ride,
+        np.concatenate([key // n, np.full(n, -1)]).astype(np.int64),
+        np.concatenate([key % n, np.arange(n)]).astype(np.int64),
+    )
+
+
+def carried(ride: Ride, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Points (m,) that depend on the chosen nodes (n,) only."""
+    out = np.concatenate([np.ones(len(ride.rest) - len(ride.x), bool), chosen])
+    for corner in range(3):
+        np.logical_and.at(out, ride.points[:, corner], chosen[ride.nodes].all(axis=1))
+    return out
+
+
+@inner_scalar
+def _moved(ride, u, i):
+    """Position of node i at displacements u."""
+    return ride.x[i, 0] + u[i, 0], ride.x[i, 1] + u[i, 1], ride.x[i, 2] + u[i, 2]
+
+
+@inner_scalar
+def _normal(ride, u, t):
+    """Positions of a triangle's corners, its unit normal, and |N|."""
+    a = _moved(ride, u, ride.nodes[t, 0])
+    b = _moved(ride, u, ride.nodes[t, 1])
+    c = _moved(ride, u, ride.nodes[t, 2])
+    normal = cross(minus(b, a), minus(c, a))
+    size = np.sqrt(dot(normal, normal))
+    return a, b, c, (normal[0] / size, normal[1] / size, normal[2] / size), size
+
+
+@kernel
+def put_points(ride, u, out):
+    """Put the displacements (m, 3) of the points, m, for nodal displacements (rows, 3), m."""
+    first = len(out) - len(ride.x)
+    for p in range(first):
+        for axis in range(3):
+            out[p, axis] = -ride.rest[p, axis]
+    for i in range(len(ride.x)):
+        for axis in range(3):
+            out[first + i, axis] = u[i, axis]
+    for t in range(len(ride.nodes)):
+        a, b, c, n, _ = _normal(ride, u, t)
+        for corner in range(3):
+            w, h, p = ride.weights[t, corner], ride.heights[t, corner], ride.points[t, corner]
+            for axis in range(3):
+                out[p, axis] += w[0] * a[axis] + w[1] * b[axis] + w[2] * c[axis] + h * n[axis]
+
+
+@kernel
+def put_rates(ride, u, v, out):
+    """Put the velocities (m, 3) of the points, m/s, for nodal velocities (rows, 3), m/s."""
+    first = len(out) - len(ride.x)
+    out[:first] = 0.0
+    for i in range(len(ride.x)):
+        for axis in range(3):
+            out[first + i, axis] = v[i, axis]
+    for t in range(len(ride.nodes)):
+        a, b, c, n, size = _normal(ride, u, t)
+        va, vb = point(v, ride.nodes[t, 0]), point(v, ride.nodes[t, 1])
+        vc = point(v, ride.nodes[t, 2])
+        one = cross(minus(vb, va), minus(c, a))
+        other = cross(minus(b, a), minus(vc, va))
+        turned = (one[0] + other[0], one[1] + other[1], one[2] + other[2])
+        along = dot(turned, n)
+        for corner in range(3):
+            w, p = ride.weights[t, corner], ride.points[t, corner]
+            h = ride.heights[t, corner] / size
+            for axis in range(3):
+                out[p, axis] += w[0] * va[axis] + w[1] * vb[axis] + w[2] * vc[axis]
+                out[p, axis] += h * (turned[axis] - along * n[axis])
+
+
+@kernel
+def add_back(ride, u, push, force):
+    """Add point forces push (m, 3) to nodal forces (rows, 3), N."""
+    first = len(push) - len(ride.x)
+    for i in range(len(ride.x)):
+        for axis in range(3):
+            force[i, axis] += push[first + i, axis]
+    for t in range(len(ride.nodes)):
+        one, two, three = ride.points[t, 0], ride.points[t, 1], ride.points[t, 2]
+        p, q, r = point(push, one), point(push, two), point(push, three)
+        if dot(p, p) + dot(q, q) + dot(r, r) == 0.0:
+            continue
+        a, b, c, n, size = _normal(ride, u, t)
+        w, h = ride.weights[t], ride.heights[t]
+        lever = (
+            (h[0] * p[0] + h[1] * q[0] + h[2] * r[0]) / size,
+            (h[0] * p[1] + h[1] * q[1] + h[2] * r[1]) / size,
+            (h[0] * p[2] + h[1] * q[2] + h[2] * r[2]) / size,
+        )
+        along = dot(lever, n)
+        g = (lever[0] - along * n[0], lever[1] - along * n[1], lever[2] - along * n[2])
+        at_a, at_b, at_c = cross(minus(b, c), g), cross(minus(c, a), g), cross(minus(a, b), g)
+        i, j, k = ride.nodes[t, 0], ride.nodes[t, 1], ride.nodes[t, 2]
+        for axis in range(3):
+            x, y, z = p[axis], q[axis], r[axis]
+            force[i, axis] += at_a[axis] + w[0, 0] * x + w[1, 0] * y + w[2, 0] * z
+            force[j, axis] += at_b[axis] + w[0, 1] * x + w[1, 1] * y + w[2, 1] * z
+            force[k, axis] += at_c[axis] + w[0, 2] * x + w[1, 2] * y + w[2, 2] * z
+
+
+@inner
+def put_lightness(ride, lightness, out):
+    """Put upper bounds (m,) of 1 / mass of the points, given the nodes' (n,), 1/kg."""
+    first = len(out) - len(ride.x)
+    out[:first] = 0.0
+    for i in range(len(ride.x)):
+        out[first + i] = lightness[i]
+    for t in range(len(ride.nodes)):
+        for corner in range(3):
+            for i in range(3):
+                own = ride.reach[t, corner, i] * lightness[ride.nodes[t, i]]
+                out[ride.points[t, corner]] += own
+
+
+def _frames(ride: Ride, u: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """[e_i x] (t, 3, 3, 3), unit normals (t, 3), |N| (t,) and P (t, 3, 3) of all triangles."""
+    a, b, c = np.moveaxis((ride.x + u[: len(ride.x)])[ride.nodes], 1, 0)
+    normal = np.cross(b - a, c - a)
+    size = np.linalg.norm(normal, axis=1)
+    normal /= size[:, None]
+    across = np.eye(3) - normal[:, :, None] * normal[:, None, :]
+    return _crossing(np.stack([c - b, a - c, b - a], axis=1)), normal, size, across
+
+
+def _crossing(e: NDArray) -> NDArray:
+    """[e x] (..., 3, 3) of vectors (..., 3)."""
+    return -np.einsum("abc,...c->...ab", LEVI_CIVITA, e)
+
+
+def jacobian(ride: Ride, u: NDArray, size: int) -> sparse.csr_array:
+    """dy/dx (3 m, size) at displacements u (rows, 3)."""
+    turn, _, area, across = _frames(ride, u)
+    return _motion(ride, across[:, None] @ turn / area[:, None, None, None], size)
+
+
+def _motion(ride: Ride, turned: NDArray, size: int) -> sparse.csr_array:
+    """Matrix dy/dx (3 m, size), given the derivatives `turned` (t, 3, 3, 3) of normals by nodes."""
+    blocks = ride.heights[:, :, None, None, None] * turned[:, None]
+    blocks += ride.weights[:, :, :, None, None] * np.eye(3)
+    n, first = ride.x.size, ride.rest.size - ride.x.size
+    pairs = np.broadcast_arrays(ride.points[:, :, None], ride.nodes[:, None, :])
+    rows, columns = places_of(np.stack(pairs, axis=-1).reshape(-1, 2))
+    same = np.arange(n)
+    entries = np.concatenate([blocks.ravel(), np.ones(n)])
+    places = [np.concatenate([rows, first + same]), np.concatenate([columns, same])]
+    return sparse.csr_array(sparse.coo_array((entries, places), shape=(first + n, size)))
+
+
+def step_jacobian(ride: Ride, u0: NDArray, u1: NDArray, size: int) -> sparse.csr_array:
+    """Matrix G (3 m, size) with y1 - y0 = G (u1 - u0) that moves points rigidly with the mesh.
+
+    Rigidity refers to mid-step: for a rotation w, G gives w x (y0 + y1) / 2. With the normal m and
+    its derivative A at mid-step, the mean normal, and the rotation W z closest to nodal motions z,
+    this holds for A + [(m - mean) x] W; the remaining difference is corrected along the deforming
+    part of u1 - u0 (Gonzalez, J. Nonlinear Sci. 6, 1996).
+    """
+    n = len(ride.x)
+    turn, normal, area, across = _frames(ride, 0.5 * (u0 + u1))
+    before, after = _frames(ride, u0)[1], _frames(ride, u1)[1]
+    arm, step = ((x - x.mean(axis=1, keepdims=True)) for x in (
+        (ride.x + 0.5 * (u0 + u1)[:n])[ride.nodes], (u1 - u0)[ride.nodes]
+    ))  # fmt: skip
+    moment = _crossing(arm)
+    inertia = moment.swapaxes(2, 3) @ moment
+    nearest = np.linalg.solve(inertia.sum(axis=1)[:, None], moment)
+    turned = across[:, None] @ turn / area[:, None, None, None]
+    turned = turned + _crossing(normal - 0.5 * (before + after))[:, None] @ nearest
+    spin = np.einsum("tiab,tib->ta", nearest, step)
+    deform = step - np.cross(spin[:, None], arm)
+    missed = after - before - np.einsum("tiab,tib->ta", turned, step)
+    square = (deform**2).sum(axis=(1, 2))
+    acts = (np.abs(missed).max(axis=1, initial=0.0) > NOISE) & (square > 0.0)
+    missed[acts] /= square[acts, None]
+    missed[~acts] = 0.0
+    return _motion(ride, turned + missed[:, None, :, None] * deform[:, :, None, :], size)
+
+
+def curvature(ride: Ride, u: NDArray, push: NDArray, size: int) -> sparse.csr_array:
+    """Second derivative (size, size) of the sum of f.y for point forces f (m, 3)."""
+    lever = np.einsum("tc,tca->ta", ride.heights, push[ride.points])
+    acts = lever.any(axis=1)
+    ride, lever = ride._replace(nodes=ride.nodes[acts]), lever[acts]
+    turn, normal, area, across = _frames(ride, u)
+    inside = np.einsum("tab,tb->ta", across, lever)
+    along = np.einsum("ta,ta->t", lever, normal)
+    mixed = inside[:, :, None] * normal[:, None, :]
+    bend = -(mixed + mixed.swapaxes(1, 2) + along[:, None, None] * across)
+    bend /= area[:, None, None] ** 2
+    blocks = np.einsum("tiba,tbc,tjcd->tijad", turn, bend, turn)
+    spin = _crossing(inside / area[:, None])
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        blocks[:, i, j] -= spin
+        blocks[:, j, i] += spin
+    return assembled(pairs_within(ride.nodes), blocks, size)
+
+
+def largest_turn(ride: Ride, u: NDArray, step: NDArray) -> float:
+    """Largest turn (rad) of a triangle's normal in a step (rows, 3) from u, linearized."""
+    turn, _, area, across = _frames(ride, u)
+    moved = np.einsum("tab,tibc,tic->ta", across, turn, step[ride.nodes]) / area[:, None]
+    return float(np.linalg.norm(moved, axis=1).max(initial=0.0))
+
 
 JUST = 1.0 - 1e-9  # of d0: parts that just touch at rest exert no force
 LEAST = 0.02  # of the guard angle for sheets: least angle of a guard
@@ -52,7 +334,7 @@ class BoardSheets(Sheets):
     middle: NDArray
 
     def riding(self) -> tuple[Ride, NDArray, NDArray]:
-        """Points at the corners of the boards; see `ride.ride_on`."""
+        """Points at the corners of the boards; see `ride_on`."""
         return ride_on(self.nodes, self.triangles, self.panel, self.middle)
 
 

@@ -19,11 +19,10 @@ import numpy as np
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.mechanics.contact.candidates import NORMAL
+from foldyn.mechanics.contact.distances import VERTEX, corners_gap, nodes_of, put_corners
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
-from foldyn.mechanics.contact.motions import farthest, fastest
-from foldyn.mechanics.contact.pairs import VERTEX, corners_gap, nodes_of, put_corners
 from foldyn.mechanics.contact.planes import height
-from foldyn.mechanics.contact.search import list_pairs, place, use_all
+from foldyn.mechanics.contact.search import farthest, fastest, list_pairs, place, use_all
 
 KEEP = 0.2  # share of each gap to keep
 NEAR = 0.01  # of the goal: gaps this close above it count as having reached it

@@ -21,7 +21,7 @@ from foldyn.mechanics.contact.candidates import FRICTION, NORMAL, Tables
 from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.panel_friction import rub_state, slip_pairs, tie_pairs
 from foldyn.mechanics.contact.planes import LEAST, slip
-from foldyn.mechanics.contact.ties import lay_ties, take_ties
+from foldyn.mechanics.contact.search import lay_ties, take_ties
 
 
 class Friction:

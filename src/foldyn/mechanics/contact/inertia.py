@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from foldyn.jit.compiled import inlined, inner
 from foldyn.mechanics.contact.candidates import NORMAL, Tables
 from foldyn.mechanics.contact.contact_state import Memory
+from foldyn.mechanics.contact.distances import VERTEX, closest_of, nodes_of, weights_of
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
-from foldyn.mechanics.contact.pairs import VERTEX, closest_of, nodes_of, weights_of
 from foldyn.mechanics.contact.planes import height
 from foldyn.mechanics.contact.potential import barrier
 from foldyn.mechanics.contact.search import place

@@ -1,7 +1,9 @@
 """Lists of near pairs, found by sorting into the cells of a grid.
 
 A list holds all pairs closer than d0 + skin, and all pairs tied by friction. It is valid until a
-node has moved by half the skin relative to the mean motion.
+node has moved by half the skin relative to the mean motion: common motion of all nodes closes no
+gap. Tied pairs stay listed wherever lists are made: a Newton step may lead far away before it is
+shortened.
 """
 
 from __future__ import annotations
@@ -11,10 +13,168 @@ import math
 import numpy as np
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
-from foldyn.mechanics.contact.motions import farthest
-from foldyn.mechanics.contact.pairs import VERTEX, edge_gap, vertex_gap
-from foldyn.mechanics.contact.thread_partition import pass_on
-from foldyn.mechanics.contact.ties import lay_ties, put_ties, take_ties
+from foldyn.mechanics.contact.contact_state import FAR, FAST, MOTION, SPEED, pass_on
+from foldyn.mechanics.contact.distances import VERTEX, edge_gap, gap_of, vertex_gap
+from foldyn.mechanics.contact.planes import LEAST
+from foldyn.mechanics.threads import largest, total, wait
+
+
+@inner_scalar
+def _moved(now, before, i, c):
+    if before is None:
+        return now[i, c]
+    return now[i, c] - before[i, c]
+
+
+@inner_scalar
+def _mean(now, before, first, last, n):
+    """Contribution of nodes first to last - 1 to the mean over n of now - before, (rows, 3)."""
+    a, b, c = 0.0, 0.0, 0.0
+    for i in range(first, last):
+        a += _moved(now, before, i, 0) / n
+        b += _moved(now, before, i, 1) / n
+        c += _moved(now, before, i, 2) / n
+    return a, b, c
+
+
+@inner_scalar
+def _largest(now, before, first, last, a, b, c):
+    """Largest deviation of now - before of these nodes from a mean; inf if not finite."""
+    if not abs(a) + abs(b) + abs(c) < math.inf:
+        return math.inf
+    worst = 0.0
+    for i in range(first, last):
+        square = 0.0
+        square += (_moved(now, before, i, 0) - a) ** 2
+        square += (_moved(now, before, i, 1) - b) ** 2
+        square += (_moved(now, before, i, 2) - c) ** 2
+        worst = max(worst, square)
+    return math.sqrt(worst)
+
+
+@inner
+def fastest(v, n):
+    """Largest speed (m/s) of n nodes relative to the mean."""
+    a, b, c = _mean(v, None, 0, n, n)
+    return _largest(v, None, 0, n, a, b, c)
+
+
+@inner
+def farthest(u, memory):
+    """Largest motion (m) of a node since the last listing of pairs, relative to the mean."""
+    n = len(memory.x)
+    a, b, c = _mean(u, memory.listed, 0, n, n)
+    return _largest(u, memory.listed, 0, n, a, b, c)
+
+
+@inner_scalar
+def motions(u, v, memory):
+    """Both `fastest` and `farthest` over a team, whose members check their own nodes.
+
+    Synchronizes the team.
+    """
+    team, n = memory.share.team, len(memory.x)
+    note, first, last = team.note[team.number], memory.share.own[0], memory.share.own[1]
+    note[SPEED], note[SPEED + 1], note[SPEED + 2] = _mean(v, None, first, last, n)
+    note[MOTION], note[MOTION + 1], note[MOTION + 2] = _mean(u, memory.listed, first, last, n)
+    wait(team)
+    a, b, c = total(team, SPEED), total(team, SPEED + 1), total(team, SPEED + 2)
+    note[FAST] = _largest(v, None, first, last, a, b, c)
+    a, b, c = total(team, MOTION), total(team, MOTION + 1), total(team, MOTION + 2)
+    note[FAR] = _largest(u, memory.listed, first, last, a, b, c)
+    wait(team)
+    return largest(team, FAST), largest(team, FAR)
+
+
+@kernel
+def take_ties(memory):
+    """Kind, parts (m, 3), d0 and tie (m, 5) of all tied pairs."""
+    count = 0
+    for go in range(2):
+        if go == 1:
+            parts, ties = np.empty((count, 3), np.int64), np.empty((count, 5))
+        count = 0
+        for kind in range(2):
+            listed = memory.counts.listed_first if kind == VERTEX else memory.counts.listed_second
+            for k in range(listed):
+                if memory.tie[kind, k, 2] == 0.0:
+                    continue
+                if go == 1:
+                    parts[count, 0] = kind
+                    pair, tie = memory.pairs[kind, k], memory.tie[kind, k]
+                    parts[count, 1], parts[count, 2] = pair[0], pair[1]
+                    ties[count, 0] = memory.d0[kind, k]
+                    for c in range(tie.size):
+                        ties[count, 1 + c] = tie[c]
+                count += 1
+    return parts, ties
+
+
+@kernel
+def lay_ties(memory, parts, ties):
+    """Make a list of the pairs from `take_ties` only, which the next list takes over."""
+    counts = memory.counts
+    counts.has_list = counts.listed_first = counts.listed_second = 0
+    for m in range(len(parts)):
+        kind = parts[m, 0]
+        k = counts.listed_first if kind == VERTEX else counts.listed_second
+        memory.pairs[kind, k, 0], memory.pairs[kind, k, 1] = parts[m, 1], parts[m, 2]
+        memory.d0[kind, k] = ties[m, 0]
+        for c in range(ties.shape[1] - 1):
+            memory.tie[kind, k, c] = ties[m, 1 + c]
+        if kind == VERTEX:
+            counts.listed_first = k + 1
+        else:
+            counts.listed_second = k + 1
+
+
+@inner
+def put_ties(tables, memory, parts, ties, loose, found):
+    """Tie pairs of a new list, of found[kind] pairs, as `take_ties` returned them.
+
+    Missing pairs are added and counted in `found`; `loose`: whether to include pairs that did not
+    touch. New lists are ordered by triangles and first edges.
+    """
+    for kind in range(2):
+        memory.tie[kind, : found[kind], 2:] = 0.0
+    fresh = found[0], found[1]
+    for m in range(len(parts)):
+        kind = parts[m, 0]
+        pairs, key = memory.pairs[kind], 1 if kind == VERTEX else 0
+        k, last = _begin(pairs, key, parts[m, 1 + key], fresh[kind]), fresh[kind]
+        while k < last and pairs[k, key] == parts[m, 1 + key]:
+            if pairs[k, 1 - key] == parts[m, 2 - key]:
+                break
+            k += 1
+        if k == last or pairs[k, key] != parts[m, 1 + key]:
+            if ties[m, 3] <= LEAST and not loose:
+                continue
+            k = found[kind]
+            if k == len(pairs):
+                found[kind] = len(pairs) + 1  # no room
+                return
+            found[kind] += 1
+            pairs[k, 0], pairs[k, 1], memory.d0[kind, k] = parts[m, 1], parts[m, 2], ties[m, 0]
+            gap = gap_of(
+                tables.triangles, tables.edges, memory.x, kind, parts[m, 1], parts[m, 2]
+            )  # fmt: skip
+            memory.gap[kind, k] = gap - ties[m, 0]
+        for c in range(ties.shape[1] - 1):
+            memory.tie[kind, k, c] = ties[m, 1 + c]
+
+
+@inner
+def _begin(pairs, key, value, count):
+    """First of the pairs (m, 2), ordered by column `key`, whose key is at least `value`."""
+    low, high = 0, count
+    while low < high:
+        middle = (low + high) // 2
+        if pairs[middle, key] < value:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
 
 CELLS = 8.0  # at most, per node
 THINNEST = 1e-3  # of the skin: full lists halve it, at most down to this

@@ -18,22 +18,20 @@ import numpy as np
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.mechanics.contact.candidates import FRICTION, NORMAL
+from foldyn.mechanics.contact.contact_state import HINGES, LIMIT, NEAR, gather
 from foldyn.mechanics.contact.distances import (
-    apart,
-    between,
-    closest_of_segments,
-    closest_on_triangle,
+    VERTEX,
+    closest_of,
     dot,
-    point,
+    nodes_of,
+    weighted,
+    weights_of,
 )
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
-from foldyn.mechanics.contact.motions import motions
-from foldyn.mechanics.contact.pairs import VERTEX
 from foldyn.mechanics.contact.panel_friction import slip_pairs
 from foldyn.mechanics.contact.planes import height, slip
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.contact.search import place, relist
-from foldyn.mechanics.contact.thread_partition import HINGES, LIMIT, NEAR, gather
+from foldyn.mechanics.contact.search import motions, place, relist
 from foldyn.mechanics.threads import largest, part, wait
 
 APPROACH = 0.1
@@ -79,42 +77,22 @@ def _bound(limit, d, d0, closing, change, stiffness, lightness, pace, facts):
 
 
 @inner
-def _vertex_bound(tables, x, v, a, lightness, i, t, d0, reach, limit, pace, facts):
-    """Step limit of a vertex and a triangle, see `_bound`; nan if they are beyond reach."""
-    j, k, l = tables.triangles[t, 0], tables.triangles[t, 1], tables.triangles[t, 2]  # noqa: E741
-    p, pa, pb, pc = point(x, i), point(x, j), point(x, k), point(x, l)
-    wa, wb, wc, _ = closest_on_triangle(p, pa, pb, pc)
-    r = apart(p, pa, pb, pc, wa, wb, wc)
-    d = math.sqrt(dot(r, r))
+def _pair_bound(tables, x, v, a, lightness, kind, one, other, d0, reach, limit, pace, facts):
+    """Step limit of a pair, see `_bound`; nan if it is beyond reach."""
+    nodes = nodes_of(tables.triangles, tables.edges, kind, one, other)
+    p, q, _ = closest_of(tables.triangles, tables.edges, x, kind, one, other)
+    weights = weights_of(kind, p, q)
+    r = weighted(x, nodes, weights)
+    d, light = math.sqrt(dot(r, r)), 0.0
     if d - d0 > reach:
         return np.nan
-    w = apart(point(v, i), point(v, j), point(v, k), point(v, l), wa, wb, wc)
-    light = lightness[i] + wa * wa * lightness[j] + wb * wb * lightness[k] + wc * wc * lightness[l]
+    for i in range(4):
+        light += weights[i] * weights[i] * lightness[nodes[i]]
     if d < d0 and tables.friction > 0.0:
         limit = _spring_bound(limit, tables.stiffness * light, pace)
-    q = apart(point(a, i), point(a, j), point(a, k), point(a, l), wa, wb, wc)
-    closing, change, stiffness = -dot(r, w) / d, dot(r, q) / d, tables.stiffness
-    return _bound(limit, d, d0, closing, change, stiffness, light, pace, facts)
-
-
-@inner
-def _edge_bound(tables, x, v, a, lightness, i, j, d0, reach, limit, pace, facts):
-    """Step limit of two edges, see `_bound`; nan if they are beyond reach."""
-    k, l = tables.edges[i, 0], tables.edges[i, 1]  # noqa: E741
-    m, n = tables.edges[j, 0], tables.edges[j, 1]
-    s, t, _ = closest_of_segments(point(x, k), point(x, l), point(x, m), point(x, n))
-    r = between(point(x, k), point(x, l), point(x, m), point(x, n), s, t)
-    d = math.sqrt(dot(r, r))
-    if d - d0 > reach:
-        return np.nan
-    w = between(point(v, k), point(v, l), point(v, m), point(v, n), s, t)
-    light = (1.0 - s) ** 2 * lightness[k] + s * s * lightness[l]
-    light += (1.0 - t) ** 2 * lightness[m] + t * t * lightness[n]
-    if d < d0 and tables.friction > 0.0:
-        limit = _spring_bound(limit, tables.stiffness * light, pace)
-    q = between(point(a, k), point(a, l), point(a, m), point(a, n), s, t)
-    closing, change, stiffness = -dot(r, w) / d, dot(r, q) / d, tables.stiffness
-    return _bound(limit, d, d0, closing, change, stiffness, light, pace, facts)
+    closing = -dot(r, weighted(v, nodes, weights)) / d
+    change = dot(r, weighted(a, nodes, weights)) / d
+    return _bound(limit, d, d0, closing, change, tables.stiffness, light, pace, facts)
 
 
 @inner_scalar
@@ -129,15 +107,10 @@ def _pairs_bound(tables, x, v, a, lightness, far, reach, limit, pace, memory):
             if memory.gap[kind, k] - 2.0 * far > reach:
                 continue
             one, other = memory.pairs[kind, k, 0], memory.pairs[kind, k, 1]
-            d0 = memory.d0[kind, k]
-            if kind == VERTEX:
-                now = _vertex_bound(
-                    tables, x, v, a, lightness, one, other, d0, reach, limit, pace, memory.facts
-                )
-            else:
-                now = _edge_bound(
-                    tables, x, v, a, lightness, one, other, d0, reach, limit, pace, memory.facts
-                )
+            now = _pair_bound(
+                tables, x, v, a, lightness, kind, one, other, memory.d0[kind, k], reach, limit,
+                pace, memory.facts,
+            )  # fmt: skip
             if now == now:
                 limit = now
                 memory.share.found[kind, found] = k

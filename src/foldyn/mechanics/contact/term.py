@@ -15,17 +15,17 @@ from scipy import sparse
 from foldyn.jit.context import Context
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.block_matrix import assembled, pairs_within
-from foldyn.mechanics.contact.active_constraints import held_by_panels, held_by_planes
 from foldyn.mechanics.contact.candidates import HISTORY, NORMAL, Sheets, Tables, tables
 from foldyn.mechanics.contact.ccd import KEEP, clear_share
 from foldyn.mechanics.contact.contact_state import Memory, memories, memory
-from foldyn.mechanics.contact.forces import add_contact
+from foldyn.mechanics.contact.distances import VERTEX
 from foldyn.mechanics.contact.friction import Friction, stored
-from foldyn.mechanics.contact.kernels import contact_kernels
-from foldyn.mechanics.contact.pairs import VERTEX
+from foldyn.mechanics.contact.kernels import add_contact, contact_kernels
 from foldyn.mechanics.contact.panel_friction import add_rubs
 from foldyn.mechanics.contact.tangent import (
     guard_tangents,
+    held_by_panels,
+    held_by_planes,
     pair_tangents,
     plane_tangents,
     touching_pairs,
