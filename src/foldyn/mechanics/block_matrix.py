@@ -1,4 +1,4 @@
-"""Matrices of 3x3 blocks at pairs of nodes: for springs, dashpots and hinges."""
+"""Matrices assembled from elements, and from 3x3 blocks at pairs of nodes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ BETWEEN = np.array([[1.0, -1.0], [-1.0, 1.0]])
 
 
 def pairs_within(nodes: NDArray) -> NDArray:
-    """Rows and columns (n k k, 2) of the blocks of n elements that couple k nodes each (n, k)."""
+    """Pairs (n k k, 2), row and column, that n elements of k nodes or dofs each (n, k) couple."""
     count = nodes.shape[1]
     rows, columns = np.repeat(nodes, count, axis=1), np.tile(nodes, (1, count))
     return np.stack([rows, columns], axis=2).reshape(-1, 2)
@@ -45,3 +45,9 @@ def places_of(pairs: NDArray) -> tuple[NDArray, NDArray]:
 def assembled(pairs: NDArray, blocks: NDArray, size: int) -> sparse.csr_array:
     """Matrix (size, size) of blocks (k, 3, 3) at pairs (k, 2) of nodes; duplicates are added."""
     return sparse.csr_array(sparse.coo_array((blocks.ravel(), places_of(pairs)), (size, size)))
+
+
+def of_elements(dofs: NDArray, matrices: NDArray, size: int) -> sparse.csr_array:
+    """Matrix (size, size) of elements with dofs (n, k) and matrices (n, k, k), which are added."""
+    entries = (matrices.ravel(), tuple(pairs_within(dofs).T))
+    return sparse.csr_array(sparse.coo_array(entries, (size, size)))

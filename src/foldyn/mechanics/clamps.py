@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.block_matrix import pairs_within, places_of
-from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient, dihedral_rates
+from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient, rates_at
 from foldyn.mechanics.discrete_gradient import discrete_gradient
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback, zeros_for
@@ -79,58 +79,6 @@ def clamp_angles(clamps, u):
     return angle, gradient
 
 
-@inner
-def add_clamp_forces(clamps, u, force, angle):
-    """Add the forces of clamps to the nodal forces; their dihedrals go to the end of `angle`."""
-    first = angle.size - clamps.rest.size
-    for e in range(clamps.rest.size):
-        found = clamp_dihedral(clamps, u, e)
-        angle[first + e] = found[0]
-        moment = clamps.stiffness[e] * (found[0] - clamps.rest[e])
-        for c in range(3):
-            carried = 0.5 * found[10 + c]
-            force[clamps.nodes[e, 0], c] += moment * (found[1 + c] + carried)
-            force[clamps.nodes[e, 1], c] += moment * (found[4 + c] + carried)
-            force[clamps.nodes[e, 2], c] += moment * found[7 + c]
-
-
-@inner
-def add_mean_clamp_forces(clamps, u0, u1, before, force, angle):
-    """Add forces whose work from u0 to u1 is the change of the clamps' energy.
-
-    Their dihedrals are at the end of `before` at u0, and of `angle` at u1.
-    """
-    x, dx, points = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
-    plain, gradient, first = np.empty((4, 3)), np.empty((4, 3)), angle.size - clamps.rest.size
-    for e in range(clamps.rest.size):
-        for c in range(3):
-            x[3, c], dx[3, c] = clamps.points[e, 3, c], 0.0
-            for v in range(3):
-                one, other = u0[clamps.nodes[e, v], c], u1[clamps.nodes[e, v], c]
-                x[v, c], dx[v, c] = clamps.points[e, v, c] + 0.5 * (one + other), other - one
-                if v < 2:
-                    x[3, c] += 0.25 * (one + other)
-                    dx[3, c] += 0.5 * (other - one)
-        angle[first + e] = clamp_dihedral(clamps, u1, e)[0]
-        turn = angle[first + e] - before[first + e]
-        discrete_gradient(x, dx, turn, points, plain, gradient)
-        moment = clamps.stiffness[e] * (before[first + e] + 0.5 * turn - clamps.rest[e])
-        for c in range(3):
-            for v in range(3):
-                carried = 0.5 * gradient[3, c] if v < 2 else 0.0
-                force[clamps.nodes[e, v], c] += moment * (gradient[v, c] + carried)
-
-
-@inner
-def clamp_energy(clamps, u):
-    """Energy (J) of clamps."""
-    energy = 0.0
-    for e in range(clamps.rest.size):
-        turned = clamp_dihedral(clamps, u, e)[0] - clamps.rest[e]
-        energy += 0.5 * clamps.stiffness[e] * turned * turned
-    return energy
-
-
 @kernel
 def clamp_blocks(clamps, u):
     """Tangent (c, 3, 3, 3, 3), N/m, of clamps: node, node, axis, axis."""
@@ -183,12 +131,7 @@ def _pullback(own, u, v, t, weight, product, rate):
             j, k = clamps.nodes[e, 0], clamps.nodes[e, 1]
             x[3, c] = clamps.points[e, 3, c] + 0.5 * (moved[j, c] + moved[k, c])
             dx[3, c] = 0.5 * (weights[j, c] + weights[k, c])
-        found = dihedral_rates(
-            x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2],
-            x[2, 0], x[2, 1], x[2, 2], x[3, 0], x[3, 1], x[3, 2],
-            dx[0, 0], dx[0, 1], dx[0, 2], dx[1, 0], dx[1, 1], dx[1, 2],
-            dx[2, 0], dx[2, 1], dx[2, 2], dx[3, 0], dx[3, 1], dx[3, 2],
-        )  # fmt: skip
+        found = rates_at(x, dx)
         turn, turned = found[0] - clamps.rest[e], clamps.stiffness[e] * found[13]
         by.stiffness[e] += turn * found[13]
         by.rest[e] -= turned
@@ -211,20 +154,51 @@ class _Context(NamedTuple):
 
 @forces
 def _forces(own, u, v, t, force, powers):
-    add_clamp_forces(own.clamps, rows_at(u, own.rows), rows_at(force, own.rows), own.angle)
+    clamps, moved, out = own.clamps, rows_at(u, own.rows), rows_at(force, own.rows)
+    first = own.angle.size - clamps.rest.size
+    for e in range(clamps.rest.size):
+        found = clamp_dihedral(clamps, moved, e)
+        own.angle[first + e] = found[0]
+        moment = clamps.stiffness[e] * (found[0] - clamps.rest[e])
+        for c in range(3):
+            carried = 0.5 * found[10 + c]
+            out[clamps.nodes[e, 0], c] += moment * (found[1 + c] + carried)
+            out[clamps.nodes[e, 1], c] += moment * (found[4 + c] + carried)
+            out[clamps.nodes[e, 2], c] += moment * found[7 + c]
 
 
 @energies
 def _energies(own, u, out):
-    group = own.clamps.group
-    numbers_at(out, group + 1)[group] += clamp_energy(own.clamps, rows_at(u, own.rows))
+    clamps, moved, energy = own.clamps, rows_at(u, own.rows), 0.0
+    for e in range(clamps.rest.size):
+        turned = clamp_dihedral(clamps, moved, e)[0] - clamps.rest[e]
+        energy += 0.5 * clamps.stiffness[e] * turned * turned
+    numbers_at(out, clamps.group + 1)[clamps.group] += energy
 
 
 @mean_forces
 def _mean_forces(own, u0, u1, before, h, t, force, powers):
+    clamps, angle, began = own.clamps, own.angle, numbers_at(before, own.angle.size)
     start, end, out = rows_at(u0, own.rows), rows_at(u1, own.rows), rows_at(force, own.rows)
-    first = numbers_at(before, own.angle.size)
-    add_mean_clamp_forces(own.clamps, start, end, first, out, own.angle)
+    x, dx, points = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
+    plain, gradient, first = np.empty((4, 3)), np.empty((4, 3)), angle.size - clamps.rest.size
+    for e in range(clamps.rest.size):
+        for c in range(3):
+            x[3, c], dx[3, c] = clamps.points[e, 3, c], 0.0
+            for v in range(3):
+                one, other = start[clamps.nodes[e, v], c], end[clamps.nodes[e, v], c]
+                x[v, c], dx[v, c] = clamps.points[e, v, c] + 0.5 * (one + other), other - one
+                if v < 2:
+                    x[3, c] += 0.25 * (one + other)
+                    dx[3, c] += 0.5 * (other - one)
+        angle[first + e] = clamp_dihedral(clamps, end, e)[0]
+        turn = angle[first + e] - began[first + e]
+        discrete_gradient(x, dx, turn, points, plain, gradient)
+        moment = clamps.stiffness[e] * (began[first + e] + 0.5 * turn - clamps.rest[e])
+        for c in range(3):
+            for v in range(3):
+                carried = 0.5 * gradient[3, c] if v < 2 else 0.0
+                out[clamps.nodes[e, v], c] += moment * (gradient[v, c] + carried)
 
 
 class ClampsTerm(Term):

@@ -167,6 +167,36 @@ def dihedral_rates(
 
 
 @inner_scalar
+def gradient_at(x):
+    """`dihedral_gradient` of points (4, 3)."""
+    return dihedral_gradient(
+        x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2],
+        x[2, 0], x[2, 1], x[2, 2], x[3, 0], x[3, 1], x[3, 2],
+    )  # fmt: skip
+
+
+@inner_scalar
+def rates_at(x, v):
+    """`dihedral_rates` of points and velocities (4, 3)."""
+    return dihedral_rates(
+        x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2],
+        x[2, 0], x[2, 1], x[2, 2], x[3, 0], x[3, 1], x[3, 2],
+        v[0, 0], v[0, 1], v[0, 2], v[1, 0], v[1, 1], v[1, 2],
+        v[2, 0], v[2, 1], v[2, 2], v[3, 0], v[3, 1], v[3, 2],
+    )  # fmt: skip
+
+
+@inner_scalar
+def hinge_at(x, hinges, e):
+    """`dihedral_gradient` of hinge e of rows (nh, 4) of points x (n, 3)."""
+    j, k, i, l = hinges[e, 0], hinges[e, 1], hinges[e, 2], hinges[e, 3]  # noqa: E741
+    return dihedral_gradient(
+        x[j, 0], x[j, 1], x[j, 2], x[k, 0], x[k, 1], x[k, 2],
+        x[i, 0], x[i, 1], x[i, 2], x[l, 0], x[l, 1], x[l, 2],
+    )  # fmt: skip
+
+
+@inner_scalar
 def _difference(points, p, q):
     return points[p, 0] - points[q, 0], points[p, 1] - points[q, 1], points[p, 2] - points[q, 2]
 
@@ -240,11 +270,7 @@ def dihedrals_and_gradients(x, hinges):
     """
     angle, gradient = np.empty(hinges.shape[0]), np.empty((hinges.shape[0], 12))
     for e in range(hinges.shape[0]):
-        j, k, i, l = hinges[e, 0], hinges[e, 1], hinges[e, 2], hinges[e, 3]  # noqa: E741
-        found = dihedral_gradient(
-            x[j, 0], x[j, 1], x[j, 2], x[k, 0], x[k, 1], x[k, 2],
-            x[i, 0], x[i, 1], x[i, 2], x[l, 0], x[l, 1], x[l, 2],
-        )  # fmt: skip
+        found = hinge_at(x, hinges, e)
         angle[e] = found[0]
         for c in range(12):
             gradient[e, c] = found[c + 1]

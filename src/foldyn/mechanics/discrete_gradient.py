@@ -25,7 +25,7 @@ import numpy as np
 
 from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.materials import series, switch
-from foldyn.mechanics.dihedral import add_hessian, dihedral_gradient
+from foldyn.mechanics.dihedral import add_hessian, gradient_at
 from foldyn.mechanics.energy import hinge_dihedral
 from foldyn.mechanics.tangent import add_to_bar, add_to_hinge
 
@@ -87,6 +87,19 @@ def _mean_moment(model, e, code, address, theta, change):
     return mean_moment(code, address, p, share, rest, theta + model.hinge_offset[e, 0], change)
 
 
+@inner_scalar
+def _bar_step(model, e, u0, u1, mean):
+    """Stretch^2 - 1 of bar e at u0, and the change of its strain; puts its mean vector (3,)."""
+    a, b, per = model.bars[e, 0], model.bars[e, 1], model.bar_per_length2[e]
+    x, change = 0.0, 0.0
+    for c in range(3):
+        d0, d1 = u0[b, c] - u0[a, c], u1[b, c] - u1[a, c]
+        mean[c] = model.bar_vector[e, c] + 0.5 * (d0 + d1)
+        x += d0 * (2.0 * model.bar_vector[e, c] + d0)
+        change += mean[c] * (d1 - d0)
+    return x * per, change * per
+
+
 @kernel
 def add_bar_forces(model, u0, u1, force):
     """Add the mean forces of the bars from u0 to u1, all (n, 3)."""
@@ -95,14 +108,8 @@ def add_bar_forces(model, u0, u1, force):
         code, address = model.bar_runs[run, 2], model.addresses[model.bar_runs[run, 3]]
         for e in range(model.bar_runs[run, 0], model.bar_runs[run, 1]):
             a, b = model.bars[e, 0], model.bars[e, 1]
-            x, change = 0.0, 0.0
-            for c in range(3):
-                d0, d1 = u0[b, c] - u0[a, c], u1[b, c] - u1[a, c]
-                mean[c] = model.bar_vector[e, c] + 0.5 * (d0 + d1)
-                x += d0 * (2.0 * model.bar_vector[e, c] + d0)
-                change += mean[c] * (d1 - d0)
-            per = model.bar_per_length2[e]
-            stress = mean_stress(code, address, x * per, change * per)[0]
+            x, change = _bar_step(model, e, u0, u1, mean)
+            stress = mean_stress(code, address, x, change)[0]
             for c in range(3):
                 force[b, c] += model.bar_stiffness[e] * stress * mean[c]
                 force[a, c] -= model.bar_stiffness[e] * stress * mean[c]
@@ -135,11 +142,7 @@ def discrete_gradient(x, dx, turn, points, plain, gradient):
         points[v, 0] = stretch * r0 - along * w0
         points[v, 1] = stretch * r1 - along * w1
         points[v, 2] = stretch * r2 - along * w2
-    p, flat = points, plain.reshape(12)
-    dihedral = dihedral_gradient(
-        p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2],
-        p[2, 0], p[2, 1], p[2, 2], p[3, 0], p[3, 1], p[3, 2],
-    )  # fmt: skip
+    dihedral, flat = gradient_at(points), plain.reshape(12)
     for c in range(12):
         flat[c] = dihedral[1 + c]
     missed, size = turn, 0.0
@@ -224,14 +227,10 @@ def add_bar_tangent(model, u0, u1, stress, slots, data):
         code, address = model.bar_runs[run, 2], model.addresses[model.bar_runs[run, 3]]
         for e in range(model.bar_runs[run, 0], model.bar_runs[run, 1]):
             a, b = model.bars[e, 0], model.bars[e, 1]
-            x, change, per = 0.0, 0.0, model.bar_per_length2[e]
+            x, change = _bar_step(model, e, u0, u1, mean)
+            slope = mean_stress(code, address, x, change)[1] * model.bar_per_length2[e]
             for c in range(3):
-                d0, d1 = u0[b, c] - u0[a, c], u1[b, c] - u1[a, c]
-                mean[c] = model.bar_vector[e, c] + 0.5 * (d0 + d1)
-                end[c] = model.bar_vector[e, c] + d1
-                x += d0 * (2.0 * model.bar_vector[e, c] + d0)
-                change += mean[c] * (d1 - d0)
-            slope = mean_stress(code, address, x * per, change * per)[1] * per
+                end[c] = model.bar_vector[e, c] + u1[b, c] - u1[a, c]
             for p in range(3):
                 for q in range(3):
                     value = slope * mean[p] * end[q]

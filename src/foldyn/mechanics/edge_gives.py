@@ -30,6 +30,7 @@ from scipy.sparse.linalg import splu
 from foldyn.jit.compiled import Addressed, inner
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.block_matrix import of_elements, pairs_within
 from foldyn.mechanics.membranes import GROUP
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback, zeros_for
@@ -69,10 +70,7 @@ class EdgeGives(NamedTuple):
     @property
     def matrix(self) -> sparse.csc_array:
         """Stiffness (g, g) of all gives, N/m."""
-        k = self.number.shape[1]
-        places = (np.repeat(self.number, k, axis=1).ravel(), np.tile(self.number, (1, k)).ravel())
-        entries = (self.stiffness.ravel(), places)
-        return sparse.csc_array(sparse.coo_array(entries, shape=(self.count, self.count)))
+        return sparse.csc_array(of_elements(self.number, self.stiffness, self.count))
 
     @property
     def bars(self) -> NDArray:
@@ -185,16 +183,6 @@ def add_given(gives, p, g, share, out):
 
 
 @inner
-def add_gives(gives, u, g, force, pull):
-    """Add the forces on nodes (n, 3) and on gives (g,)."""
-    for p in range(gives.nodes.shape[0]):
-        strain_panel(gives, u, p)
-        add_pulls(gives, p, g, 1.0, force)
-        add_strained(gives, p, 1.0, pull)
-        add_given(gives, p, g, 1.0, pull)
-
-
-@inner
 def strained_gives(gives, u, pull):
     """Forces (g,), N, that the strains at u exert on the gives."""
     pull[:] = 0.0
@@ -215,7 +203,12 @@ class _Context(NamedTuple):
 def _forces(own, u, v, t, force, powers):
     moved, out = rows_at(u, own.rows), rows_at(force, own.rows)
     first, end = own.first, own.first + own.gives.count
-    add_gives(own.gives, moved, flat(moved)[first:end], out, flat(out)[first:end])
+    g, pull = flat(moved)[first:end], flat(out)[first:end]
+    for p in range(own.gives.nodes.shape[0]):
+        strain_panel(own.gives, moved, p)
+        add_pulls(own.gives, p, g, 1.0, out)
+        add_strained(own.gives, p, 1.0, pull)
+        add_given(own.gives, p, g, 1.0, pull)
 
 
 @energies
@@ -270,20 +263,6 @@ def _balanced_energies(own, u, out):
     balance_gives(own, rows_at(u, own.rows))
     for k in range(g.size):
         numbers_at(out, GROUP + 1)[GROUP] += 0.5 * pull[k] * g[k]
-
-
-def gives_kernels(gives: EdgeGives, rows: int, first: int) -> CompiledTerm:
-    """Kernels for gives as dofs from `first` on."""
-    context = _Context(gives, rows, first, np.zeros((2, gives.count)), NO_FACTOR)
-    return CompiledTerm(
-        Context(context), {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
-    )
-
-
-def balanced_kernels(gives: EdgeGives, rows: int) -> CompiledTerm:
-    """Kernels for gives in balance."""
-    context = _Context(gives, rows, 3 * rows, np.zeros((2, gives.count)), gives.factor())
-    return CompiledTerm(Context(context), {FORCES: _balanced_forces, ENERGIES: _balanced_energies})
 
 
 class _Backward(NamedTuple):
@@ -372,16 +351,6 @@ def _pulled(kernel: Addressed, gives: EdgeGives, rows: int, first: int, factor: 
     return Pulled(Context(own), kernel, arrays_of(out, *WORK).numbers)
 
 
-def gives_pulled(gives: EdgeGives, rows: int, first: int) -> Pulled:
-    """Pullback of gives as dofs from `first` on."""
-    return _pulled(_pullback, gives, rows, first, NO_FACTOR)
-
-
-def balanced_pulled(gives: EdgeGives, rows: int) -> Pulled:
-    """Pullback of gives in balance."""
-    return _pulled(_balanced_pullback, gives, rows, 3 * rows, gives.factor())
-
-
 class EdgeGivesTerm(Term):
     """Gives as hidden dofs; their energy counts as energy of the sheet's bars.
 
@@ -401,7 +370,9 @@ class EdgeGivesTerm(Term):
 
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
-        return gives_kernels(self.gives, self.rows, self.first)
+        memory = np.zeros((2, self.gives.count))
+        own = Context(_Context(self.gives, self.rows, self.first, memory, NO_FACTOR))
+        return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     def arrays(self) -> Arrays:
         """Arrays that its forces depend on; see `Term`."""
@@ -409,7 +380,7 @@ class EdgeGivesTerm(Term):
 
     def pulled(self) -> Pulled:
         """Pullback of its forces; see `Term`."""
-        return gives_pulled(self.gives, self.rows, self.first)
+        return _pulled(_pullback, self.gives, self.rows, self.first, NO_FACTOR)
 
     @cached_property
     def _dofs(self) -> NDArray:
@@ -422,8 +393,8 @@ class EdgeGivesTerm(Term):
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:
         """Rows and columns (k,) of its tangent entries; see `Term`."""
-        dofs, count = self._dofs, self._dofs.shape[1]
-        return np.repeat(dofs, count, axis=1).ravel(), np.tile(dofs, (1, count)).ravel()
+        row, column = pairs_within(self._dofs).T
+        return row, column
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
         """Tangent entries (k,), N/m; see `Term`."""
@@ -441,7 +412,7 @@ class EdgeGivesTerm(Term):
         """The model without strain at q; see `Term`."""
         size = (q.size, q.size)
         loose = panel_tangents(self.gives, nodal(q), nodal(q), np.zeros(self.gives.count))
-        tangent = sparse.csr_array(sparse.coo_array((loose.ravel(), self.places), size))
+        tangent = of_elements(self._dofs, loose, q.size)
         own = sparse.coo_array(self.gives.matrix)
         places = tuple(place + self.first for place in own.coords)
         alone = sparse.csr_array(sparse.coo_array((own.data, places), size))
@@ -460,11 +431,14 @@ class BalancedGivesTerm(EdgeGivesTerm):
 
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
-        return balanced_kernels(self.gives, self.rows)
+        memory, factor = np.zeros((2, self.gives.count)), self.gives.factor()
+        own = Context(_Context(self.gives, self.rows, 3 * self.rows, memory, factor))
+        return CompiledTerm(own, {FORCES: _balanced_forces, ENERGIES: _balanced_energies})
 
     def pulled(self) -> Pulled:
         """Pullback of its forces; see `Term`."""
-        return balanced_pulled(self.gives, self.rows)
+        kernel, factor = _balanced_pullback, self.gives.factor()
+        return _pulled(kernel, self.gives, self.rows, 3 * self.rows, factor)
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:
@@ -491,10 +465,8 @@ class BalancedGivesTerm(EdgeGivesTerm):
         """Tangent of the displacements with gives g in balance."""
         full = EdgeGivesTerm(self.gives, self.rows, self.first)
         u, size = nodal(q), 3 * self.rows
-        entries = (panel_tangents(self.gives, u, u, g).ravel(), full.places)
-        whole = sparse.csc_array(
-            sparse.coo_array(entries, shape=(self.first + self.gives.count,) * 2)
-        )
+        blocks = panel_tangents(self.gives, u, u, g)
+        whole = of_elements(full._dofs, blocks, self.first + self.gives.count).tocsc()
         across, own = (part.toarray() for part in (whole[self.first :, :size], self.gives.matrix))
         return whole[:size, :size].toarray() - across.T @ np.linalg.solve(own, across)
 

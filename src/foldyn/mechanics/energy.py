@@ -9,7 +9,7 @@ import numpy as np
 from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.materials.series import series_energy
 from foldyn.materials.switch import bar_energy
-from foldyn.mechanics.dihedral import dihedral_gradient
+from foldyn.mechanics.dihedral import dihedral_gradient, hinge_at
 
 
 @inner_scalar
@@ -42,22 +42,7 @@ def angles(x, hinges):
     """Dihedrals (nh,), rad, of hinge rows (nh, 4) at node positions x (n, 3)."""
     out = np.empty(hinges.shape[0])
     for e in range(out.size):
-        j, k, i, l = hinges[e, 0], hinges[e, 1], hinges[e, 2], hinges[e, 3]  # noqa: E741
-        out[e] = dihedral_gradient(
-            x[j, 0], x[j, 1], x[j, 2], x[k, 0], x[k, 1], x[k, 2],
-            x[i, 0], x[i, 1], x[i, 2], x[l, 0], x[l, 1], x[l, 2],
-        )[0]  # fmt: skip
-    return out
-
-
-@kernel
-def gradients(model, u):
-    """Gradients (nh, 12) of all dihedrals with respect to their nodes j, k, i, l."""
-    out = np.empty((model.hinges.shape[0], 12))
-    for e in range(out.shape[0]):
-        gradient = hinge_dihedral(model, u, e)
-        for c in range(12):
-            out[e, c] = gradient[c + 1]
+        out[e] = hinge_at(x, hinges, e)[0]
     return out
 
 

@@ -28,7 +28,8 @@ from scipy import sparse
 
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient
+from foldyn.mechanics.block_matrix import pairs_within
+from foldyn.mechanics.dihedral import add_hessian, carry_wing, gradient_at
 
 ASYMMETRIC = 1e-3  # asymmetric share of the load stiffness that must not be neglected
 NO_POTENTIAL = (
@@ -37,24 +38,28 @@ NO_POTENTIAL = (
 )
 
 
+def _none(*shape: int, kind: type = float) -> NDArray:
+    return np.zeros((0, *shape), kind)
+
+
 class Following(NamedTuple):
     """Entries of t triangles, h hinges, b bars, d hidden dofs; `row` numbers histories."""
 
-    triangles: NDArray  # (t, 3) nodes, counter-clockwise from the front
-    sides: NDArray  # (t, 2, 3) rest vectors from the first corner to the others, m
-    pressure: NDArray  # (t,) Pa, positive along the front's normal
-    pressure_row: NDArray  # (t,)
-    hinges: NDArray  # (h, 4) nodes: axis j, k, wings i, l; -1 for a wing l that rides
-    corners: NDArray  # (h, 4, 3) their rest positions from any origin nearby, m
-    moment: NDArray  # (h,) N m, positive where it opens the dihedral
-    moment_row: NDArray  # (h,)
-    bars: NDArray  # (b, 2) nodes
-    vectors: NDArray  # (b, 3) rest vectors from the first to the second, m
-    tension: NDArray  # (b,) N/m
-    tension_row: NDArray  # (b,)
-    hidden: NDArray  # (d,) dofs
-    push: NDArray  # (d,) N
-    push_row: NDArray  # (d,)
+    triangles: NDArray = _none(3, kind=int)  # (t, 3) nodes, counter-clockwise from the front
+    sides: NDArray = _none(2, 3)  # (t, 2, 3) rest vectors from the first corner to the others, m
+    pressure: NDArray = _none()  # (t,) Pa, positive along the front's normal
+    pressure_row: NDArray = _none(kind=int)  # (t,)
+    hinges: NDArray = _none(4, kind=int)  # (h, 4) axis j, k, wings i, l; -1 for a wing l that rides
+    corners: NDArray = _none(4, 3)  # (h, 4, 3) their rest positions from any origin nearby, m
+    moment: NDArray = _none()  # (h,) N m, positive where it opens the dihedral
+    moment_row: NDArray = _none(kind=int)  # (h,)
+    bars: NDArray = _none(2, kind=int)  # (b, 2) nodes
+    vectors: NDArray = _none(3)  # (b, 3) rest vectors from the first to the second, m
+    tension: NDArray = _none()  # (b,) N/m
+    tension_row: NDArray = _none(kind=int)  # (b,)
+    hidden: NDArray = _none(kind=int)  # (d,) dofs
+    push: NDArray = _none()  # (d,) N
+    push_row: NDArray = _none(kind=int)  # (d,)
 
     @property
     def acts(self) -> bool:
@@ -73,7 +78,7 @@ class Following(NamedTuple):
 def pressures(x: NDArray, triangles: NDArray, pressure: NDArray) -> Following:
     """Pressure (t,), Pa, on triangles (t, 3) of nodes at x (n, 3)."""
     corners = x[triangles]
-    return _none()._replace(
+    return Following(
         triangles=_whole(triangles),
         sides=_real(corners[:, 1:] - corners[:, :1]),
         pressure=_real(pressure),
@@ -83,7 +88,7 @@ def pressures(x: NDArray, triangles: NDArray, pressure: NDArray) -> Following:
 
 def moments(corners: NDArray, hinges: NDArray, moment: NDArray) -> Following:
     """Moments (h,), N m, on hinges (h, 4) with rest positions corners (h, 4, 3)."""
-    return _none()._replace(
+    return Following(
         hinges=_whole(hinges),
         corners=_real(corners - corners.mean(axis=1, keepdims=True)),
         moment=_real(moment),
@@ -93,7 +98,7 @@ def moments(corners: NDArray, hinges: NDArray, moment: NDArray) -> Following:
 
 def tensions(x: NDArray, bars: NDArray, tension: NDArray) -> Following:
     """Tension (b,), N/m, of bars (b, 2) between nodes at x (n, 3)."""
-    return _none()._replace(
+    return Following(
         bars=_whole(bars),
         vectors=_real(x[bars[:, 1]] - x[bars[:, 0]]),
         tension=_real(tension),
@@ -104,12 +109,12 @@ def tensions(x: NDArray, bars: NDArray, tension: NDArray) -> Following:
 def pushes(dofs: NDArray, push: NDArray) -> Following:
     """Constant forces (d,), N, on hidden dofs (d,)."""
     row = np.zeros(len(dofs), np.int64)
-    return _none()._replace(hidden=_whole(dofs), push=_real(push), push_row=row)
+    return Following(hidden=_whole(dofs), push=_real(push), push_row=row)
 
 
 def joined(parts: Iterable[tuple[Following, int]]) -> Following:
     """All entries of several, each part with the row of its history."""
-    numbered = [_none()]
+    numbered = [Following()]
     for part, row in parts:
         rows = {
             name: np.full_like(getattr(part, name), row)
@@ -117,21 +122,6 @@ def joined(parts: Iterable[tuple[Following, int]]) -> Following:
         }
         numbered.append(part._replace(**rows))
     return Following(*map(np.concatenate, zip(*numbered, strict=True)))
-
-
-def _none() -> Following:
-    def real(*shape: int) -> NDArray:
-        return np.zeros((0, *shape))
-
-    def whole(*shape: int) -> NDArray:
-        return np.zeros((0, *shape), np.int64)
-
-    return Following(
-        whole(3), real(2, 3), real(), whole(),
-        whole(4), real(4, 3), real(), whole(),
-        whole(2), real(3), real(), whole(),
-        whole(), real(), whole(),
-    )  # fmt: skip
 
 
 def _whole(values: NDArray) -> NDArray:
@@ -167,15 +157,14 @@ def asymmetry(matrix: sparse.csr_array) -> float:
 
 def following_places(loads: Following) -> tuple[NDArray, NDArray]:
     """Row and column (e,) of each entry of `put_following`."""
-    rows, columns = [], []
     # entries of a virtual wing are zeros, placed at the first node
     hinges = np.where(loads.hinges < 0, loads.hinges[:, :1], loads.hinges)
+    pairs = []
     for nodes in (loads.triangles, hinges, loads.bars):
-        width = 3 * nodes.shape[1]
-        dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, width)
-        rows.append(np.repeat(dofs, width, axis=1).ravel())
-        columns.append(np.tile(dofs, (1, width)).ravel())
-    return np.concatenate(rows), np.concatenate(columns)
+        dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 3 * nodes.shape[1])
+        pairs.append(pairs_within(dofs))
+    row, column = np.concatenate(pairs).T
+    return row, column
 
 
 @inner
@@ -189,20 +178,17 @@ def _edges(loads, u, t, a, b):
 
 @inner
 def hinge_of(loads, u, h, points, gradient):
-    """Corners of a hinge and the gradient of its dihedral, (4, 3) both; whether a wing rides."""
+    """Put the corners of a hinge and the gradient of its dihedral, (4, 3); return the dihedral."""
     j, k = loads.hinges[h, 0], loads.hinges[h, 1]
     for v in range(4):
         for c in range(3):
             node = loads.hinges[h, v]
             moved = 0.5 * (u[3 * j + c] + u[3 * k + c]) if node < 0 else u[3 * node + c]
             points[v, c] = loads.corners[h, v, c] + moved
-    p, g = flat(points), flat(gradient)
-    found = dihedral_gradient(
-        p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
-    )
+    found, g = gradient_at(points), flat(gradient)
     for i in range(12):
         g[i] = found[1 + i]
-    return loads.hinges[h, 3] < 0
+    return found[0]
 
 
 @kernel
@@ -220,7 +206,8 @@ def add_following(loads, u, factor, out):
                 out[3 * loads.triangles[t, v] + c] += push
     for h in range(loads.moment.size):
         moment = loads.moment[h] * factor[loads.moment_row[h], 0]
-        rides = hinge_of(loads, u, h, points, gradient)
+        hinge_of(loads, u, h, points, gradient)
+        rides = loads.hinges[h, 3] < 0
         for c in range(3):
             if rides:
                 gradient[0, c] += 0.5 * gradient[3, c]
@@ -279,7 +266,8 @@ def put_following(loads, u, factor, symmetric, out):
                         out[at] = -p * value
                         at += 1
     for h in range(loads.moment.size):
-        rides = hinge_of(loads, u, h, points, gradient)
+        hinge_of(loads, u, h, points, gradient)
+        rides = loads.hinges[h, 3] < 0
         block[:] = 0.0
         add_hessian(points, gradient, -loads.moment[h] * factor[loads.moment_row[h], 0], block)
         if rides:

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from foldyn.jit.compiled import addressed, inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import bar_energy, bar_slope, bar_stress
-from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.following import Following, hinge_of
 
 ITERATIONS = 30  # Newton iterations for the free strain of a bar; a few suffice
@@ -97,11 +96,7 @@ def add_heat(heat, u, factor, out):
             out[stretching] += 0.5 * pull * moved * (2.0 * loads.vectors[e, c] + moved)
     points, gradient = np.empty((4, 3)), np.empty((4, 3))
     for h in range(loads.moment.size):
-        hinge_of(loads, u, h, points, gradient)
-        p = flat(points)
-        angle = dihedral_gradient(
-            p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
-        )[0]
+        angle = hinge_of(loads, u, h, points, gradient)
         moment = loads.moment[h] * factor[loads.moment_row[h], 0]
         out[bending] -= moment * (angle - heat.angles[h])
     for e in range(loads.push.size):

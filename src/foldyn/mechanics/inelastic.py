@@ -103,57 +103,6 @@ def evaluate_branches(own, offset, e, turn):
 
 
 @inner
-def add_memory_forces(own, offset, u, v, force):
-    """Add the forces of the branches at u and v to `force`, all (rows, 3)."""
-    moved, speed, out, g, lost = flat(u), flat(v), flat(force), own.gradient, 0.0
-    for e in range(own.rest.size):
-        angle, rate = hinge_gradient(own.corners[e], own.dofs[e], own.hidden_turn[e], moved, g), 0.0
-        lost += evaluate_branches(own, offset, e, angle - own.rest[e])
-        for c in range(14):
-            out[own.dofs[e, c]] += own.moment[e] * g[c]
-            rate += speed[own.dofs[e, c]] * g[c]
-        own.rate[e, 1] = rate
-    own.lost[1] = lost
-    if own.elapsed[0] == 0.0:
-        own.rate[:, 0] = own.rate[:, 1]
-
-
-@inner
-def add_mean_memory_forces(own, offset, start, end, h, out):
-    """Add forces whose work in a step h equals the energy that branches store and dissipate.
-
-    `start`, `end` and `out` are flat. Offsets have their end values; returns the work of their
-    change, and by how much the dissipation falls short of the laws, J.
-    """
-    work, lost, lacking, g = 0.0, 0.0, 0.0, own.gradient
-    one, other, gradient = np.empty((2, 4, 3)), np.empty((2, 4, 3)), np.empty((4, 3))
-    own.elapsed[0] = h
-    for e in range(own.rest.size):
-        x, dofs, hidden = own.corners[e], own.dofs[e], own.hidden_turn[e]
-        before = hinge_gradient(x, dofs, hidden, start, g)
-        after = hinge_gradient(x, dofs, hidden, end, g)
-        lost += evaluate_branches(own, offset, e, after - own.rest[e])
-        own.mean[e] = 0.0
-        for k in range(own.first[e], own.first[e + 1]):
-            found = mean_moment(
-                own.code[k], own.parameters[k], own.angle[e], own.turned[e], h, own.state[k, 0],
-                own.state[k, 1],
-            )  # fmt: skip
-            own.mean[e, 0] += own.stiffness[e] * found[0]
-            own.mean[e, 1] += own.stiffness[e] * found[1]
-            lacking += own.stiffness[e] * found[2]
-        moment = own.mean[e, 0]
-        _mean_gradient(own, e, start, end, after - before, one, other, gradient)
-        for c in range(12):
-            out[dofs[c]] += moment * gradient[c // 3, c % 3]
-        for c in range(2):
-            out[dofs[12 + c]] -= moment * hidden[c]
-        work += moment * (own.turned[e] - own.angle[e] - (after - before))
-    own.lost[1] = lost
-    return work, lacking
-
-
-@inner
 def _mean_gradient(own, e, start, end, turn, motion, points, gradient):
     """`discrete_gradient` (4, 3) of a hinge with a turn; motion, points : (2, 4, 3) scratch.
 
@@ -168,36 +117,6 @@ def _mean_gradient(own, e, start, end, turn, motion, points, gradient):
     for c in range(2):
         turn += own.hidden_turn[e, c] * (end[dofs[12 + c]] - start[dofs[12 + c]])
     discrete_gradient(motion[0], motion[1], turn, points[0], points[1], gradient)
-
-
-@inner
-def straightness_error(own, scale):
-    """Error ratio of the last evaluation, as dihedrals do not change at constant rates.
-
-    The reference path is a parabola with the rates of both ends, evaluated at its middle and
-    turning point.
-    """
-    h, wrong = own.elapsed[0], 0.0
-    for e in range(own.rest.size):
-        if own.code[own.first[e]] == DAMPER:  # its rates are rounding errors in short steps
-            continue
-        begin, turn = own.angle[e], own.turned[e] - own.angle[e]
-        scale = max(scale, own.arm[e] * max(abs(begin), abs(own.turned[e])))
-        first, last = h * own.rate[e, 0], h * own.rate[e, 1]
-        back = first / (first - last) if first * last < 0.0 else 0.5
-        moment = 0.0
-        for k in range(own.first[e], own.first[e + 1]):
-            part, before, one, other = 0.0, begin, own.state[k, 0], own.state[k, 1]
-            for to in (min(0.5, back), max(0.5, back), 1.0):
-                after = begin + to * (turn + 0.5 * (1.0 - to) * (first - last))
-                found = update(
-                    own.code[k], own.parameters[k], before, after, (to - part) * h, one, other
-                )
-                part, before, one, other = to, after, found[0], found[1]
-                if to == 1.0:
-                    moment += found[2]
-        wrong = max(wrong, own.arm[e] * abs(moment - own.moment[e] / own.stiffness[e]))
-    return wrong / scale
 
 
 @kernel
@@ -285,8 +204,19 @@ class _Context(NamedTuple):
 
 @forces
 def _forces(term, u, v, t, force, powers):
-    moved, speed, out = rows_at(u, term.rows), rows_at(v, term.rows), rows_at(force, term.rows)
-    add_memory_forces(term.own, term.offset, moved, speed, out)
+    own, g, lost = term.own, term.own.gradient, 0.0
+    moved, speed = flat(rows_at(u, term.rows)), flat(rows_at(v, term.rows))
+    out = flat(rows_at(force, term.rows))
+    for e in range(own.rest.size):
+        angle, rate = hinge_gradient(own.corners[e], own.dofs[e], own.hidden_turn[e], moved, g), 0.0
+        lost += evaluate_branches(own, term.offset, e, angle - own.rest[e])
+        for c in range(14):
+            out[own.dofs[e, c]] += own.moment[e] * g[c]
+            rate += speed[own.dofs[e, c]] * g[c]
+        own.rate[e, 1] = rate
+    own.lost[1] = lost
+    if own.elapsed[0] == 0.0:
+        own.rate[:, 0] = own.rate[:, 1]
 
 
 @energies
@@ -298,11 +228,34 @@ def _energies(term, u, out):
 
 @mean_forces
 def _mean_forces(term, u0, u1, before, h, t, force, powers):
-    start, end, out = rows_at(u0, term.rows), rows_at(u1, term.rows), rows_at(force, term.rows)
-    work, lacking = add_mean_memory_forces(
-        term.own, term.offset, flat(start), flat(end), h, flat(out)
-    )
-    both = numbers_at(powers, 2)
+    """Do the work that branches store and dissipate in the step; offsets have their end values."""
+    own, g, work, lost, lacking = term.own, term.own.gradient, 0.0, 0.0, 0.0
+    start, end = flat(rows_at(u0, term.rows)), flat(rows_at(u1, term.rows))
+    out, both = flat(rows_at(force, term.rows)), numbers_at(powers, 2)
+    one, other, gradient = np.empty((2, 4, 3)), np.empty((2, 4, 3)), np.empty((4, 3))
+    own.elapsed[0] = h
+    for e in range(own.rest.size):
+        x, dofs, hidden = own.corners[e], own.dofs[e], own.hidden_turn[e]
+        begin = hinge_gradient(x, dofs, hidden, start, g)
+        after = hinge_gradient(x, dofs, hidden, end, g)
+        lost += evaluate_branches(own, term.offset, e, after - own.rest[e])
+        own.mean[e] = 0.0
+        for k in range(own.first[e], own.first[e + 1]):
+            found = mean_moment(
+                own.code[k], own.parameters[k], own.angle[e], own.turned[e], h, own.state[k, 0],
+                own.state[k, 1],
+            )  # fmt: skip
+            own.mean[e, 0] += own.stiffness[e] * found[0]
+            own.mean[e, 1] += own.stiffness[e] * found[1]
+            lacking += own.stiffness[e] * found[2]  # of what the laws dissipate
+        moment = own.mean[e, 0]
+        _mean_gradient(own, e, start, end, after - begin, one, other, gradient)
+        for c in range(12):
+            out[dofs[c]] += moment * gradient[c // 3, c % 3]
+        for c in range(2):
+            out[dofs[12 + c]] -= moment * hidden[c]
+        work += moment * (own.turned[e] - own.angle[e] - (after - begin))  # of the offset
+    own.lost[1] = lost
     both[0] += work / h
     both[1] -= lacking / h
 
@@ -333,20 +286,33 @@ def _branch_states(term, out):
 
 @step_error
 def _step_error(term, scale):
-    return straightness_error(term.own, scale)
+    """Error ratio of the last evaluation, as dihedrals do not change at constant rates.
 
-
-def memory_kernels(own: MemoryHinges, offset: NDArray, rows: int, groups: int) -> CompiledTerm:
-    """Kernels of hinges with memory, with `groups` energy groups."""
-    context = Context(_Context(own, offset, rows, groups))
-    return CompiledTerm(
-        context,
-        {
-            FORCES: _forces, ENERGIES: _energies, ADVANCE_CLOCK: _advance_clock, COMMIT: _commit,
-            DISSIPATED: _dissipated, BRANCH_STATES: _branch_states, STEP_ERROR: _step_error,
-            MEAN_FORCES: _mean_forces,
-        },
-    )  # fmt: skip
+    The reference path is a parabola with the rates of both ends, evaluated at its middle and
+    turning point.
+    """
+    own = term.own
+    h, wrong = own.elapsed[0], 0.0
+    for e in range(own.rest.size):
+        if own.code[own.first[e]] == DAMPER:  # its rates are rounding errors in short steps
+            continue
+        begin, turn = own.angle[e], own.turned[e] - own.angle[e]
+        scale = max(scale, own.arm[e] * max(abs(begin), abs(own.turned[e])))
+        first, last = h * own.rate[e, 0], h * own.rate[e, 1]
+        back = first / (first - last) if first * last < 0.0 else 0.5
+        moment = 0.0
+        for k in range(own.first[e], own.first[e + 1]):
+            part, before, one, other = 0.0, begin, own.state[k, 0], own.state[k, 1]
+            for to in (min(0.5, back), max(0.5, back), 1.0):
+                after = begin + to * (turn + 0.5 * (1.0 - to) * (first - last))
+                found = update(
+                    own.code[k], own.parameters[k], before, after, (to - part) * h, one, other
+                )
+                part, before, one, other = to, after, found[0], found[1]
+                if to == 1.0:
+                    moment += found[2]
+        wrong = max(wrong, own.arm[e] * abs(moment - own.moment[e] / own.stiffness[e]))
+    return wrong / scale
 
 
 class HingeMemory(Term):
@@ -422,7 +388,13 @@ class HingeMemory(Term):
     # ------------------------------------------------------------------ as a term
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """See `Term`; the energy belongs to groups of the sheet."""
-        return memory_kernels(self.own, self._offset, self._rows, group)
+        own = Context(_Context(self.own, self._offset, self._rows, group))
+        kernels = {
+            FORCES: _forces, ENERGIES: _energies, ADVANCE_CLOCK: _advance_clock, COMMIT: _commit,
+            DISSIPATED: _dissipated, BRANCH_STATES: _branch_states, STEP_ERROR: _step_error,
+            MEAN_FORCES: _mean_forces,
+        }  # fmt: skip
+        return CompiledTerm(own, kernels)
 
     @cached_property
     def _coupled(self) -> tuple[NDArray, NDArray, NDArray]:

@@ -112,17 +112,23 @@ def strain_of(membranes, u, p, i, along):
     return 0.5 * membranes.per_length2[i, p] * excess
 
 
+@inner_scalar
+def _gather(own, first, values, out):
+    """Put the values of the nodes (flat) of the group of eight panels from `first` on into out."""
+    at = own.corners * first
+    for v in range(own.corners):
+        for q in range(min(WIDTH, own.count - first)):
+            row = 3 * own.nodes[at + v * WIDTH + q]
+            for c in range(3):
+                out[(3 * v + c) * WIDTH + q] = values[row + c]
+
+
 @inner
 def add_membrane_forces(own, u, low, high, force):
     """Add the forces of all panels on the nodes from low to high; u and force are flat."""
     bars = own.ends.shape[0]
     for first in range(0, own.count, WIDTH):
-        m, at = min(WIDTH, own.count - first), own.corners * first
-        for v in range(own.corners):
-            for q in range(m):
-                row = 3 * own.nodes[at + v * WIDTH + q]
-                for c in range(3):
-                    own.moved[(3 * v + c) * WIDTH + q] = u[row + c]
+        _gather(own, first, u, own.moved)
         own.force[:] = 0.0
         at = bars * (first // WIDTH)
         for i in range(bars):
@@ -147,51 +153,11 @@ def add_membrane_forces(own, u, low, high, force):
             add(own.force, own.ends[i, 1], pull * x, pull * y, pull * z)
         at = own.corners * first
         for v in range(own.corners):
-            for q in range(m):
+            for q in range(min(WIDTH, own.count - first)):
                 node = own.nodes[at + v * WIDTH + q]
                 if low <= node < high:
                     for c in range(3):
                         force[3 * node + c] += own.force[(3 * v + c) * WIDTH + q]
-
-
-@inner
-def add_mean_membrane_forces(membranes, u0, u1, force):
-    """Add forces whose work from u0 to u1 is the change of the energy.
-
-    Mean strains and the vectors halfway: strains are quadratic, energies quadratic in strains.
-    """
-    bars, ends = membranes.ends.shape[0], membranes.ends
-    strain, along = np.empty(bars), np.empty((bars, 3))
-    one, other = np.empty(3), np.empty(3)
-    for p in range(membranes.nodes.shape[0]):
-        for i in range(bars):
-            strain[i] = 0.5 * strain_of(membranes, u0, p, i, one)
-            strain[i] += 0.5 * strain_of(membranes, u1, p, i, other)
-            for c in range(3):
-                along[i, c] = 0.5 * (one[c] + other[c])
-        for i in range(bars):
-            pull = 0.0
-            for j in range(bars):
-                pull += membranes.stiffness[i, j, p] * strain[j]
-            pull *= membranes.per_length2[i, p]
-            a, b = membranes.nodes[p, ends[i, 0]], membranes.nodes[p, ends[i, 1]]
-            for c in range(3):
-                force[b, c] += pull * along[i, c]
-                force[a, c] -= pull * along[i, c]
-
-
-@inner
-def membrane_energy(membranes, u):
-    """Energy (J) of all panels."""
-    bars, energy = membranes.ends.shape[0], 0.0
-    strain, along = np.empty(bars), np.empty(3)
-    for p in range(membranes.nodes.shape[0]):
-        for i in range(bars):
-            strain[i] = strain_of(membranes, u, p, i, along)
-        for i in range(bars):
-            for j in range(bars):
-                energy += 0.5 * strain[i] * membranes.stiffness[i, j, p] * strain[j]
-    return energy
 
 
 @kernel
@@ -285,13 +251,8 @@ def pull_membranes(own, back, u, weight, product):
     """Add the derivatives of weight . F = r^T S E to `product` and the gradients; all flat."""
     bars, room = own.ends.shape[0], back.vector.shape[1]
     for first in range(0, own.count, WIDTH):
-        m, at = min(WIDTH, own.count - first), own.corners * first
-        for v in range(own.corners):
-            for q in range(m):
-                row = 3 * own.nodes[at + v * WIDTH + q]
-                for c in range(3):
-                    own.moved[(3 * v + c) * WIDTH + q] = u[row + c]
-                    back.weight[(3 * v + c) * WIDTH + q] = weight[row + c]
+        _gather(own, first, u, own.moved)
+        _gather(own, first, weight, back.weight)
         own.force[:] = 0.0
         back.pulled[:] = 0.0
         at = bars * (first // WIDTH)
@@ -341,7 +302,7 @@ def pull_membranes(own, back, u, weight, product):
                 increase(own.force, (3 * one + c) * WIDTH, -by)
         at = own.corners * first
         for v in range(own.corners):
-            for q in range(m):
+            for q in range(min(WIDTH, own.count - first)):
                 row = 3 * own.nodes[at + v * WIDTH + q]
                 for c in range(3):
                     product[row + c] += own.force[(3 * v + c) * WIDTH + q]
@@ -379,13 +340,41 @@ def _forces(own, u, v, t, force, powers):
 
 @energies
 def _energies(own, u, out):
-    numbers_at(out, GROUP + 1)[GROUP] += membrane_energy(own.whole, rows_at(u, own.rows))
+    membranes, moved, energy = own.whole, rows_at(u, own.rows), 0.0
+    bars = membranes.ends.shape[0]
+    strain, along = np.empty(bars), np.empty(3)
+    for p in range(membranes.nodes.shape[0]):
+        for i in range(bars):
+            strain[i] = strain_of(membranes, moved, p, i, along)
+        for i in range(bars):
+            for j in range(bars):
+                energy += 0.5 * strain[i] * membranes.stiffness[i, j, p] * strain[j]
+    numbers_at(out, GROUP + 1)[GROUP] += energy
 
 
 @mean_forces
 def _mean_forces(own, u0, u1, before, h, t, force, powers):
+    """By mean strains and the vectors halfway, as energies are quadratic in strains."""
+    membranes, out = own.whole, rows_at(force, own.rows)
     start, end = rows_at(u0, own.rows), rows_at(u1, own.rows)
-    add_mean_membrane_forces(own.whole, start, end, rows_at(force, own.rows))
+    bars, ends = membranes.ends.shape[0], membranes.ends
+    strain, along = np.empty(bars), np.empty((bars, 3))
+    one, other = np.empty(3), np.empty(3)
+    for p in range(membranes.nodes.shape[0]):
+        for i in range(bars):
+            strain[i] = 0.5 * strain_of(membranes, start, p, i, one)
+            strain[i] += 0.5 * strain_of(membranes, end, p, i, other)
+            for c in range(3):
+                along[i, c] = 0.5 * (one[c] + other[c])
+        for i in range(bars):
+            pull = 0.0
+            for j in range(bars):
+                pull += membranes.stiffness[i, j, p] * strain[j]
+            pull *= membranes.per_length2[i, p]
+            a, b = membranes.nodes[p, ends[i, 0]], membranes.nodes[p, ends[i, 1]]
+            for c in range(3):
+                out[b, c] += pull * along[i, c]
+                out[a, c] -= pull * along[i, c]
 
 
 class MembranesTerm(Term):

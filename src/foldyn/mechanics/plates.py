@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
-from foldyn.materials.switch import hinge_energy, hinge_moment
-from foldyn.mechanics.dihedral import dihedral_gradient
+from foldyn.materials.switch import hinge_energy, hinge_moment, hinge_slope
+from foldyn.mechanics.dihedral import gradient_at
 from foldyn.mechanics.discrete_gradient import (
     add_bar_forces,
     discrete_gradient,
@@ -108,17 +108,10 @@ def plates_scratch(model: BarsPlates) -> PlatesScratch:
 @kernel
 def turn_hinges(model, u, scratch):
     """Dihedrals and their gradients at displacements u."""
-    rest, p = model.bars.rest, np.empty((4, 3))
+    p = np.empty((4, 3))
     for e in range(model.hinges.shape[0]):
-        for v in range(4):
-            node = model.hinges[e, v]
-            for c in range(3):
-                p[v, c] = rest[node, c] + u[node, c]
-        ride(model, e, 1.0, p)
-        found = dihedral_gradient(
-            p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2],
-            p[2, 0], p[2, 1], p[2, 2], p[3, 0], p[3, 1], p[3, 2],
-        )  # fmt: skip
+        put_points(model, u, e, p)
+        found = gradient_at(p)
         scratch.angle[e] = found[0]
         for c in range(12):
             scratch.gradient[e, c] = found[1 + c]
@@ -142,6 +135,16 @@ def ride(model, h, share, points):
         for c in range(3):
             middle = 0.5 * (points[0, c] + points[1, c])
             points[3, c] = middle + share * model.wings[e, c]
+
+
+@inner_scalar
+def put_points(model, u, h, points):
+    """Put the positions (4, 3) of the points of hinge h at displacements u to `points`."""
+    for v in range(4):
+        node = model.hinges[h, v]
+        for c in range(3):
+            points[v, c] = model.bars.rest[node, c] + u[node, c]
+    ride(model, h, 1.0, points)
 
 
 @inner_scalar
@@ -188,6 +191,16 @@ def fold_moment(model, scratch, f):
 
 
 @inner
+def fold_slope(model, scratch, f):
+    """Slope of a fold's moment, per unit of its stiffness."""
+    p = model.fold_parameters
+    return hinge_slope(
+        model.code, scratch.fold_angle[f], model.fold_rest[f],
+        p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[2],
+    )  # fmt: skip
+
+
+@inner
 def plates_energy(model, u, x, scratch, out):
     """Energies (J) of bars, folds and bends, to out (3,)."""
     strain_energies(model.bars, u, out)
@@ -215,6 +228,12 @@ def plates_force(model, u, x, force, couple, scratch):
     internal_force(model.bars, u, force, scratch.bars)
     turn_hinges(model, u, scratch)
     turn_moments(model, x, couple, scratch)
+    add_hinge_moments(model, scratch, force)
+
+
+@inner
+def add_hinge_moments(model, scratch, force):
+    """Add the forces (n, 3) of the moments of all hinges."""
     for h in range(model.hinges.shape[0]):
         for v in range(4):
             node = model.hinges[h, v]
@@ -255,48 +274,6 @@ def add_plate_moments(model, couple, scratch, p):
             couple[-1 - h] += model.per_reach * moment
 
 
-@inner
-def add_mean_plates_force(model, u0, x0, u1, x1, before, force, couple, scratch):
-    """Add forces whose scratch is the change of the energy; `before` are the dihedrals at u0."""
-    add_bar_forces(model.bars, u0, u1, force)
-    turn_hinges(model, u1, scratch)
-    turn_folds(model, x1, scratch)
-    scratch.moment[:] = 0.0
-    for f in range(model.fold_rest.size):
-        start = before[f]
-        for rotation in model.fold_rotations[f]:
-            start -= model.per_reach * x0[rotation] if rotation >= 0 else 0.0
-        scratch.moment[f] = model.fold_stiffness[f] * mean_moment(
-            model.code, model.addresses, model.fold_parameters[f], 1.0, model.fold_rest[f], start,
-            scratch.fold_angle[f] - start,
-        )[0]  # fmt: skip
-        for rotation in model.fold_rotations[f]:
-            if rotation >= 0:
-                couple[rotation] -= model.per_reach * scratch.moment[f]
-    folds = model.fold_rest.size
-    for p in range(model.start.size - 1):
-        for k in range(model.start[p + 1] - model.start[p]):
-            h = model.angle[model.start[p] + k]
-            if h >= 0:
-                scratch.turn[k] = 0.5 * (before[h] + scratch.angle[h]) - model.bend_rest[h - folds]
-            else:
-                scratch.turn[k] = 0.5 * model.per_reach * (x0[-1 - h] + x1[-1 - h])
-        add_plate_moments(model, couple, scratch, p)
-    x, dx, points = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
-    plain, gradient = np.empty((4, 3)), np.empty((4, 3))
-    for h in range(model.hinges.shape[0]):
-        put_motion(model.bars.rest, model.hinges, h, u0, u1, x, dx)
-        ride(model, h, 1.0, x)
-        ride(model, h, 0.0, dx)
-        discrete_gradient(x, dx, scratch.angle[h] - before[h], points, plain, gradient)
-        for c in range(12):
-            scratch.gradient[h, c] = flat(gradient)[c]
-        carry(model, h, scratch.gradient)
-        for v in range(4):
-            for c in range(3):
-                force[model.hinges[h, v], c] += scratch.moment[h] * scratch.gradient[h, 3 * v + c]
-
-
 class _Context(NamedTuple):
     model: BarsPlates
     scratch: PlatesScratch
@@ -327,12 +304,46 @@ def _energies(own, u, out):
 
 @mean_forces
 def _mean_forces(own, u0, u1, before, h, t, force, powers):
-    model, start, end = own.model, rows_at(u0, own.rows), rows_at(u1, own.rows)
-    out, angle = rows_at(force, own.rows), numbers_at(before, own.scratch.angle.size)
-    n, r = model.bars.rest.shape[0], model.rotations
-    (one, x0), (other, x1) = parted_rows(start, n, r), parted_rows(end, n, r)
-    pull, couple = parted_rows(out, n, r)
-    add_mean_plates_force(model, one, x0, other, x1, angle, pull, couple, own.scratch)
+    model, scratch, folds = own.model, own.scratch, own.model.fold_rest.size
+    n, r, began = model.bars.rest.shape[0], model.rotations, numbers_at(before, scratch.angle.size)
+    start, x0 = parted_rows(rows_at(u0, own.rows), n, r)
+    end, x1 = parted_rows(rows_at(u1, own.rows), n, r)
+    out, couple = parted_rows(rows_at(force, own.rows), n, r)
+    add_bar_forces(model.bars, start, end, out)
+    turn_hinges(model, end, scratch)
+    turn_folds(model, x1, scratch)
+    scratch.moment[:] = 0.0
+    for f in range(folds):
+        angle = began[f]
+        for rotation in model.fold_rotations[f]:
+            angle -= model.per_reach * x0[rotation] if rotation >= 0 else 0.0
+        scratch.moment[f] = model.fold_stiffness[f] * mean_moment(
+            model.code, model.addresses, model.fold_parameters[f], 1.0, model.fold_rest[f], angle,
+            scratch.fold_angle[f] - angle,
+        )[0]  # fmt: skip
+        for rotation in model.fold_rotations[f]:
+            if rotation >= 0:
+                couple[rotation] -= model.per_reach * scratch.moment[f]
+    for p in range(model.start.size - 1):
+        for k in range(model.start[p + 1] - model.start[p]):
+            hinge = model.angle[model.start[p] + k]
+            if hinge >= 0:
+                mean = 0.5 * (began[hinge] + scratch.angle[hinge])
+                scratch.turn[k] = mean - model.bend_rest[hinge - folds]
+            else:
+                scratch.turn[k] = 0.5 * model.per_reach * (x0[-1 - hinge] + x1[-1 - hinge])
+        add_plate_moments(model, couple, scratch, p)
+    x, dx, points = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
+    plain, gradient = np.empty((4, 3)), np.empty((4, 3))
+    for hinge in range(model.hinges.shape[0]):
+        put_motion(model.bars.rest, model.hinges, hinge, start, end, x, dx)
+        ride(model, hinge, 1.0, x)
+        ride(model, hinge, 0.0, dx)
+        discrete_gradient(x, dx, scratch.angle[hinge] - began[hinge], points, plain, gradient)
+        for c in range(12):
+            scratch.gradient[hinge, c] = flat(gradient)[c]
+        carry(model, hinge, scratch.gradient)
+    add_hinge_moments(model, scratch, out)
 
 
 def plates_kernels(

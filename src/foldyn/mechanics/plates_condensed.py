@@ -25,12 +25,12 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.jit.intrinsics import flat
-from foldyn.materials.switch import hinge_slope
 from foldyn.mechanics.bars_hinges import pull_bars_hinges
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.plates import (
     BarsPlates,
     PlatesScratch,
+    fold_slope,
     plates_energy,
     plates_force,
     plates_scratch,
@@ -223,7 +223,7 @@ def balance(model, u, scratch):
     """Rotations in balance at displacements u, to scratch.x; nan where there are none."""
     plates, push = model.plates, model.offset[model.plates.fold_rest.size :]
     turn_hinges(plates, u, scratch.plates)
-    p, slope = plates.fold_parameters, scratch.plates.slope
+    slope = scratch.plates.slope
     again = model.memory[0] != 0  # rates of creases are differences of turns
     begun = 0.0  # forces along the last step, where it began
     for k in range(scratch.x.size):
@@ -243,12 +243,8 @@ def balance(model, u, scratch):
             continue
         if not model.constant or model.memory[0] != 0:
             for f in range(plates.fold_rest.size):
-                found = hinge_slope(
-                    plates.code, scratch.plates.fold_angle[f], plates.fold_rest[f],
-                    p[f, 0], p[f, 1], p[f, 2], p[f, 3], plates.addresses[2],
-                )  # fmt: skip
-                stiff = plates.fold_stiffness[f]
-                slope[f] = max(stiff * found + scratch.branches[f, 1], 0.0)
+                stiff = plates.fold_stiffness[f] * fold_slope(plates, scratch.plates, f)
+                slope[f] = max(stiff + scratch.branches[f, 1], 0.0)
             factorize(model, scratch)
         largest = 0.0
         for k in range(scratch.x.size):
@@ -271,20 +267,6 @@ def balance(model, u, scratch):
     scratch.x[:] = np.nan
 
 
-@inner
-def condensed_force(model, u, force, scratch):
-    """Internal force (n, 3), N, with rotations in balance."""
-    balance(model, u, scratch)
-    plates_force(model.plates, u, scratch.x, force, scratch.couple, scratch.plates)
-
-
-@inner
-def condensed_energy(model, u, scratch, out):
-    """Energies (J) of bars, folds and bends, to out (3,), with rotations in balance."""
-    balance(model, u, scratch)
-    plates_energy(model.plates, u, scratch.x, scratch.plates, out)
-
-
 class _Context(NamedTuple):
     model: CondensedPlates
     scratch: CondensedScratch
@@ -292,14 +274,18 @@ class _Context(NamedTuple):
 
 @forces
 def _forces(own, u, v, t, force, powers):
-    rows = own.model.plates.bars.rest.shape[0]
-    condensed_force(own.model, rows_at(u, rows), rows_at(force, rows), own.scratch)
+    model, scratch, rows = own.model, own.scratch, own.model.plates.bars.rest.shape[0]
+    moved, out = rows_at(u, rows), rows_at(force, rows)
+    balance(model, moved, scratch)
+    plates_force(model.plates, moved, scratch.x, out, scratch.couple, scratch.plates)
 
 
 @energies
 def _energies(own, u, out):
-    moved = rows_at(u, own.model.plates.bars.rest.shape[0])
-    condensed_energy(own.model, moved, own.scratch, numbers_at(out, 3))
+    model, scratch = own.model, own.scratch
+    moved = rows_at(u, model.plates.bars.rest.shape[0])
+    balance(model, moved, scratch)
+    plates_energy(model.plates, moved, scratch.x, scratch.plates, numbers_at(out, 3))
 
 
 def condensed_kernels(model: CondensedPlates, scratch: CondensedScratch) -> CompiledTerm:
@@ -311,12 +297,9 @@ def condensed_kernels(model: CondensedPlates, scratch: CondensedScratch) -> Comp
 @inner
 def rate_couples(model, scratch, back, out):
     """Rates of the forces on rotations with those of the dihedrals alone, to out (r,)."""
-    out[:], p = 0.0, model.fold_parameters
+    out[:] = 0.0
     for f in range(model.fold_rest.size):
-        scratch.slope[f] = model.fold_stiffness[f] * hinge_slope(
-            model.code, scratch.fold_angle[f], model.fold_rest[f],
-            p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[2],
-        )  # fmt: skip
+        scratch.slope[f] = model.fold_stiffness[f] * fold_slope(model, scratch, f)
         for rotation in model.fold_rotations[f]:
             if rotation >= 0:
                 out[rotation] -= model.per_reach * scratch.slope[f] * back.rate[f]

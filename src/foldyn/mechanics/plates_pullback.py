@@ -27,11 +27,12 @@ from foldyn.mechanics.bars_hinges import (
     pull_bars_hinges,
     pullback_scratch,
 )
-from foldyn.mechanics.dihedral import dihedral_rates
+from foldyn.mechanics.dihedral import rates_at
 from foldyn.mechanics.plates import (
     BarsPlates,
     PlatesScratch,
     plates_scratch,
+    put_points,
     ride,
     rides,
     turn_folds,
@@ -77,20 +78,12 @@ def gradients(out: BarsPlates) -> Mapping[str, NDArray]:
 def rate_hinges(model, u, w, scratch, back):
     """Dihedrals and their gradients at u, and their rates where the nodes move by w."""
     for h in range(model.hinges.shape[0]):
+        put_points(model, u, h, back.points)
         for v in range(4):
-            node = model.hinges[h, v]
             for c in range(3):
-                back.points[v, c] = model.bars.rest[node, c] + u[node, c]
-                back.moves[v, c] = w[node, c]
-        ride(model, h, 1.0, back.points)
+                back.moves[v, c] = w[model.hinges[h, v], c]
         ride(model, h, 0.0, back.moves)
-        x, dx = back.points, back.moves
-        found = dihedral_rates(
-            x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2],
-            x[2, 0], x[2, 1], x[2, 2], x[3, 0], x[3, 1], x[3, 2],
-            dx[0, 0], dx[0, 1], dx[0, 2], dx[1, 0], dx[1, 1], dx[1, 2],
-            dx[2, 0], dx[2, 1], dx[2, 2], dx[3, 0], dx[3, 1], dx[3, 2],
-        )  # fmt: skip
+        found = rates_at(back.points, back.moves)
         scratch.angle[h], back.rate[h] = found[0], found[13]
         for c in range(12):
             scratch.gradient[h, c], back.gradient_rate[h, c] = found[1 + c], found[14 + c]

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.compiled import inner_scalar, kernel
-from foldyn.materials.switch import hinge_slope
 from foldyn.mechanics.dihedral import add_hessian, carry_wing
 from foldyn.mechanics.plates import (
     BarsPlates,
     fold_moment,
-    ride,
+    fold_slope,
+    put_points,
     rides,
     turn_folds,
     turn_hinges,
@@ -141,12 +141,10 @@ def _scatter(indptr, dof, first, nodes, block, data):
 @inner_scalar
 def _curvature(model, u, scratch, h, points, gradient, out):
     """Moment of hinge h times the second derivative of its dihedral, to out (4, 3, 4, 3)."""
+    put_points(model, u, h, points)
     for v in range(4):
-        node = model.hinges[h, v]
         for c in range(3):
-            points[v, c] = model.bars.rest[node, c] + u[node, c]
             gradient[v, c] = scratch.gradient[h, 3 * v + c]
-    ride(model, h, 1.0, points)
     if rides(model, h):
         for c in range(3):
             gradient[3, c] *= 2.0  # `carry` has given half of it away
@@ -160,14 +158,9 @@ def _curvature(model, u, scratch, h, points, gradient, out):
 def _add_folds(model, pattern, u, scratch, floor, data):
     points, gradient, turned = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3, 4, 3))
     along, bent, block = np.empty(14), turned.reshape(12, 12), np.empty((14, 14))
-    p = model.fold_parameters
     for f in range(model.fold_rest.size):
         scratch.moment[f] = fold_moment(model, scratch, f)
-        slope = hinge_slope(
-            model.code, scratch.fold_angle[f], model.fold_rest[f],
-            p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[2],
-        )  # fmt: skip
-        slope = model.fold_stiffness[f] * max(slope, floor)
+        slope = model.fold_stiffness[f] * max(fold_slope(model, scratch, f), floor)
         for c in range(12):
             along[c] = scratch.gradient[f, c]
         along[12] = along[13] = -model.per_reach

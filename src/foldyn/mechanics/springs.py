@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.block_matrix import blocks_of_ends, pairs_of_ends, places_of
 from foldyn.mechanics.model import ranks
@@ -96,52 +96,6 @@ def add_directed(springs, s, pull, force):
             force[b, c] -= pull * springs.direction[s, c]
 
 
-@inner
-def add_spring_forces(springs, u, force):
-    """Add spring forces to the nodal forces."""
-    for s in range(springs.stiffness.size):
-        pull = springs.stiffness[s] * directed_extension(springs, u, s)
-        add_directed(springs, s, pull, force)
-    for s in range(springs.axial_stiffness.size):
-        a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
-        per_length = axial_pull(springs, u, s)
-        for c in range(3):
-            pull = per_length * (springs.vector[s, c] + u[b, c] - u[a, c])
-            force[b, c] += pull
-            force[a, c] -= pull
-
-
-@inner
-def add_mean_spring_forces(springs, u0, u1, force):
-    """Add forces whose work from u0 to u1 is the change of the springs' energy."""
-    for s in range(springs.stiffness.size):
-        extension = directed_extension(springs, u0, s) + directed_extension(springs, u1, s)
-        add_directed(springs, s, 0.5 * springs.stiffness[s] * extension, force)
-    for s in range(springs.axial_stiffness.size):
-        a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
-        before, after = axial_extension(springs, u0, s), axial_extension(springs, u1, s)
-        per_length = springs.axial_stiffness[s]
-        if springs.stretch[s] < springs.length[s]:
-            per_length *= (before[0] + after[0]) / (before[1] + after[1])
-        for c in range(3):
-            moved = 0.5 * (u0[b, c] - u0[a, c] + u1[b, c] - u1[a, c])
-            force[b, c] += per_length * (springs.vector[s, c] + moved)
-            force[a, c] -= per_length * (springs.vector[s, c] + moved)
-
-
-@inner
-def spring_energy(springs, u):
-    """Energy (J) of springs."""
-    energy = 0.0
-    for s in range(springs.stiffness.size):
-        extension = directed_extension(springs, u, s)
-        energy += 0.5 * springs.stiffness[s] * extension * extension
-    for s in range(springs.axial_stiffness.size):
-        extension = axial_extension(springs, u, s)[0]
-        energy += 0.5 * springs.axial_stiffness[s] * extension * extension
-    return energy
-
-
 @kernel
 def axial_blocks(springs, u, loose):
     """Derivative (a, 3, 3), N/m, of axial spring forces; `loose`: without geometric part."""
@@ -163,33 +117,38 @@ def axial_blocks(springs, u, loose):
     return out
 
 
-@inner
-def pull_directed(springs, u, weight, out, product):
-    """Add the derivatives of weight . F of directed springs to `product` and the gradients."""
+class _Backward(NamedTuple):
+    springs: Springs
+    out: Springs  # gradients
+    rows: int  # number of rows up to the last node
+
+
+@pullback
+def _pullback(own, u, v, t, weight, product, rate):
+    springs, out = own.springs, own.out
+    moved, weights, added = (
+        rows_at(u, own.rows), rows_at(weight, own.rows), rows_at(product, own.rows)
+    )  # fmt: skip
     for s in range(springs.stiffness.size):
         a, b, k = springs.ends[s, 0], springs.ends[s, 1], springs.stiffness[s]
-        extension, rate = directed_extension(springs, u, s), directed_extension(springs, weight, s)
-        out.stiffness[s] += extension * rate
-        add_directed(springs, s, k * rate, product)
+        extension = directed_extension(springs, moved, s)
+        growth = directed_extension(springs, weights, s)
+        out.stiffness[s] += extension * growth
+        add_directed(springs, s, k * growth, added)
         for c in range(3):
-            moved = u[a, c] - (u[b, c] if b >= 0 else 0.0)
-            weighs = weight[a, c] - (weight[b, c] if b >= 0 else 0.0)
-            out.direction[s, c] += k * (moved * rate + weighs * extension)
-
-
-@inner
-def pull_axial(springs, u, weight, out, product):
-    """Add the derivatives of weight . F of axial springs to `product` and the gradients."""
+            apart = moved[a, c] - (moved[b, c] if b >= 0 else 0.0)
+            weighs = weights[a, c] - (weights[b, c] if b >= 0 else 0.0)
+            out.direction[s, c] += k * (apart * growth + weighs * extension)
     for s in range(springs.axial_stiffness.size):
         a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
-        extension, length = axial_extension(springs, u, s)
+        extension, length = axial_extension(springs, moved, s)
         share = 1.0  # force over k l
         if springs.stretch[s] < springs.length[s]:
             share = extension / length
         grown = 0.0  # rate of the ends' separation for velocities equal to the weights, times l
         for c in range(3):
-            x = springs.vector[s, c] + u[b, c] - u[a, c]
-            grown += (weight[b, c] - weight[a, c]) * x
+            x = springs.vector[s, c] + moved[b, c] - moved[a, c]
+            grown += (weights[b, c] - weights[a, c]) * x
         k = springs.axial_stiffness[s]
         by_extension = k * grown / length if length > 0.0 else 0.0
         by_length = by_extension * (1.0 - share)  # by l, on which the extension depends
@@ -199,27 +158,12 @@ def pull_axial(springs, u, weight, out, product):
             out.length[s] += by_length * springs.length[s] / length - by_extension
             by_length /= length
         for c in range(3):
-            moved = u[b, c] - u[a, c]
-            by = k * share * (weight[b, c] - weight[a, c]) + by_length * moved
+            by = k * share * (weights[b, c] - weights[a, c])
+            by += by_length * (moved[b, c] - moved[a, c])
             out.vector[s, c] += by
             by += by_length * springs.vector[s, c]
-            product[b, c] += by
-            product[a, c] -= by
-
-
-class _Backward(NamedTuple):
-    springs: Springs
-    out: Springs  # gradients
-    rows: int  # number of rows up to the last node
-
-
-@pullback
-def _pullback(own, u, v, t, weight, product, rate):
-    moved, weights, out = (
-        rows_at(u, own.rows), rows_at(weight, own.rows), rows_at(product, own.rows)
-    )  # fmt: skip
-    pull_directed(own.springs, moved, weights, own.out, out)
-    pull_axial(own.springs, moved, weights, own.out, out)
+            added[b, c] += by
+            added[a, c] -= by
 
 
 class _Context(NamedTuple):
@@ -230,18 +174,48 @@ class _Context(NamedTuple):
 
 @forces
 def _forces(own, u, v, t, force, powers):
-    add_spring_forces(own.springs, rows_at(u, own.rows), rows_at(force, own.rows))
+    springs, moved, out = own.springs, rows_at(u, own.rows), rows_at(force, own.rows)
+    for s in range(springs.stiffness.size):
+        pull = springs.stiffness[s] * directed_extension(springs, moved, s)
+        add_directed(springs, s, pull, out)
+    for s in range(springs.axial_stiffness.size):
+        a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
+        per_length = axial_pull(springs, moved, s)
+        for c in range(3):
+            pull = per_length * (springs.vector[s, c] + moved[b, c] - moved[a, c])
+            out[b, c] += pull
+            out[a, c] -= pull
 
 
 @energies
 def _energies(own, u, out):
-    numbers_at(out, own.group + 1)[own.group] = spring_energy(own.springs, rows_at(u, own.rows))
+    springs, moved, energy = own.springs, rows_at(u, own.rows), 0.0
+    for s in range(springs.stiffness.size):
+        extension = directed_extension(springs, moved, s)
+        energy += 0.5 * springs.stiffness[s] * extension * extension
+    for s in range(springs.axial_stiffness.size):
+        extension = axial_extension(springs, moved, s)[0]
+        energy += 0.5 * springs.axial_stiffness[s] * extension * extension
+    numbers_at(out, own.group + 1)[own.group] = energy
 
 
 @mean_forces
 def _mean_forces(own, u0, u1, before, h, t, force, powers):
+    springs, out = own.springs, rows_at(force, own.rows)
     start, end = rows_at(u0, own.rows), rows_at(u1, own.rows)
-    add_mean_spring_forces(own.springs, start, end, rows_at(force, own.rows))
+    for s in range(springs.stiffness.size):
+        extension = directed_extension(springs, start, s) + directed_extension(springs, end, s)
+        add_directed(springs, s, 0.5 * springs.stiffness[s] * extension, out)
+    for s in range(springs.axial_stiffness.size):
+        a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
+        first, last = axial_extension(springs, start, s), axial_extension(springs, end, s)
+        per_length = springs.axial_stiffness[s]
+        if springs.stretch[s] < springs.length[s]:
+            per_length *= (first[0] + last[0]) / (first[1] + last[1])
+        for c in range(3):
+            moved = 0.5 * (start[b, c] - start[a, c] + end[b, c] - end[a, c])
+            out[b, c] += per_length * (springs.vector[s, c] + moved)
+            out[a, c] -= per_length * (springs.vector[s, c] + moved)
 
 
 class SpringsTerm(Term):

@@ -13,7 +13,7 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.materials import BarLaw, HingeLaw, Superlinear
 from foldyn.mechanics.bars_hinges import bars_hinges_kernels, bars_hinges_pulled
-from foldyn.mechanics.energy import gradients
+from foldyn.mechanics.dihedral import dihedrals_and_gradients
 from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
 from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of
 from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges, SheetTerm, SoftHinges, largest_turn
@@ -81,8 +81,7 @@ class BarsHingesTerm(SheetTerm):
         pattern, again = self.sparsity, before is not None
         data, old = np.empty((len(pattern.indices), 3, 3)), q if before is None else before
         put_tangent(self.model, pattern, self._nodal(q), self._nodal(old), again, data)
-        shape = (self.size, self.size)
-        return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=shape).tocsr()
+        return self._assembled(data)
 
     def mean_tangent(
         self, q0: NDArray, q1: NDArray, angle: NDArray, before: NDArray, again: bool
@@ -91,8 +90,12 @@ class BarsHingesTerm(SheetTerm):
         pattern, ends = self.sparsity, (self._nodal(q0), self._nodal(q1))
         data = np.empty((len(pattern.indices), 3, 3))
         put_mean_tangent(self.model, pattern, *ends, angle, self._nodal(before), again, data)
-        shape = (self.size, self.size)
-        return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=shape).tocsr()
+        return self._assembled(data)
+
+    def _assembled(self, data: NDArray) -> sparse.csr_array:
+        """Matrix of the blocks (nnz, 3, 3) of its pattern."""
+        blocks = data, self.sparsity.indices, self.sparsity.indptr
+        return sparse.bsr_array(blocks, shape=(self.size, self.size)).tocsr()
 
     def blocks(self) -> BarsHingesBlocks:
         """Tangent blocks for implicit integrators; see `SheetTerm`."""
@@ -164,12 +167,14 @@ class BarsHingesTerm(SheetTerm):
     def soft_hinges(self, q: NDArray) -> SoftHinges:
         """Hinges of the superlinear law; see `SheetTerm`."""
         model, rows = self.model, self._soft
+        if not len(rows):
+            return super().soft_hinges(q)
         columns = 3 * model.hinges[rows].astype(np.int64)[:, :, None] + np.arange(3)
-        found = gradients(model, self._nodal(q)) if len(rows) else np.zeros((0, 12))
-        entries = found[rows].ravel()
+        place = np.ascontiguousarray(model.rest + self._nodal(q))
+        angle, found = dihedrals_and_gradients(place, np.ascontiguousarray(model.hinges[rows]))
         start = 12 * np.arange(len(rows) + 1)
-        gradient = sparse.csr_array((entries, columns.ravel(), start), (len(rows), self.size))
-        offset = (self.angles(q) - model.hinge_rest)[rows]
+        gradient = sparse.csr_array((found.ravel(), columns.ravel(), start), (len(rows), self.size))
+        offset = angle - model.hinge_rest[rows]
         return SoftHinges(offset, model.hinge_stiffness[rows], gradient)
 
     def soft_tangent(self, q: NDArray, slope: NDArray) -> sparse.csr_array:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.compiled import kernel
-from foldyn.mechanics.contact.distances import apart, closest_on_triangle, dot, point
+from foldyn.mechanics.contact.distances import point, vertex_distance
 
 APART = 0.25  # of the size of an element: least distance of panels without common corner
 JOINED = 0.01  # for panels that do: their grids open from it as the panels do
@@ -72,12 +72,9 @@ def _narrowest(points, triangles, centers, pairs, limits, sizes):
                     shared = shared or triangles[i, a] == triangles[j, b]
             if shared:
                 continue
-            p = centers[i, 0], centers[i, 1], centers[i, 2]
             a, b, c = triangles[j]
             pa, pb, pc = point(points, a), point(points, b), point(points, c)
-            wa, wb, wc, _ = closest_on_triangle(p, pa, pb, pc)
-            r = apart(p, pa, pb, pc, wa, wb, wc)
-            gap = np.sqrt(dot(r, r))
+            gap = vertex_distance(point(centers, i), pa, pb, pc)
             over = gap / (limits[k] * max(sizes[i], sizes[j]))
             if over < worst:
                 worst, at, distance = over, k, gap

@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 
 from foldyn.jit.compiled import inner_scalar, kernel
-from foldyn.mechanics.contact.distances import point
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.dihedral import dihedral_gradient
+from foldyn.mechanics.dihedral import hinge_at
 
 TURN = 2.0 * math.pi
 
@@ -19,9 +18,7 @@ TURN = 2.0 * math.pi
 @inner_scalar
 def gradient_at(tables, x, h):
     """Dihedral (rad) of a guarded hinge and its gradient (12 numbers)."""
-    a, b = point(x, tables.hinges[h, 0]), point(x, tables.hinges[h, 1])
-    c, d = point(x, tables.hinges[h, 2]), point(x, tables.hinges[h, 3])
-    return dihedral_gradient(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2], d[0], d[1], d[2])
+    return hinge_at(x, tables.hinges, h)
 
 
 @kernel

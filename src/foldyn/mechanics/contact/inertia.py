@@ -24,7 +24,14 @@ from numpy.typing import NDArray
 from foldyn.jit.compiled import inlined, inner
 from foldyn.mechanics.contact.candidates import NORMAL, Tables
 from foldyn.mechanics.contact.contact_state import Memory
-from foldyn.mechanics.contact.distances import VERTEX, closest_of, nodes_of, weights_of
+from foldyn.mechanics.contact.distances import (
+    VERTEX,
+    closest_of,
+    dot,
+    nodes_of,
+    weighted,
+    weights_of,
+)
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
 from foldyn.mechanics.contact.planes import height
 from foldyn.mechanics.contact.potential import barrier
@@ -88,19 +95,14 @@ def added_inertia(tables, added, u, dt, beta, lightness, memory):
             one, other, d0 = memory.pairs[kind, k, 0], memory.pairs[kind, k, 1], memory.d0[kind, k]
             a, b, c, d = nodes_of(tables.triangles, tables.edges, kind, one, other)
             p, q, _ = closest_of(tables.triangles, tables.edges, x, kind, one, other)
-            weights, distance = weights_of(kind, p, q), 0.0
-            nodes[found, 0], nodes[found, 1], nodes[found, 2], nodes[found, 3] = a, b, c, d
-            for axis in range(3):
-                r = weights[0] * x[a, axis] + weights[1] * x[b, axis]
-                r += weights[2] * x[c, axis] + weights[3] * x[d, axis]
-                distance += r * r
-                for i in range(4):
-                    gradient[found, i, axis] = weights[i] * r
-            distance = math.sqrt(distance)
+            weights = weights_of(kind, p, q)
+            r = weighted(x, (a, b, c, d), weights)
+            distance = math.sqrt(dot(r, r))
             if distance < d0:
+                nodes[found, 0], nodes[found, 1], nodes[found, 2], nodes[found, 3] = a, b, c, d
                 for i in range(4):
                     for axis in range(3):
-                        gradient[found, i, axis] /= distance
+                        gradient[found, i, axis] = weights[i] * r[axis] / distance
                 own = stiffness * barrier(distance / d0)[2]
                 found += _slow(added, found, own, dt, beta, lightness)
     for h in range(hinges):

@@ -18,6 +18,7 @@ from foldyn.mechanics.contact.boards import (
 )
 from foldyn.mechanics.contact.candidates import HISTORY, Tables
 from foldyn.mechanics.contact.contact_state import ENERGY, Memory, energy_of_all, finish, reaches
+from foldyn.mechanics.contact.distances import VERTEX, nodes_of
 from foldyn.mechanics.contact.hinge_guards import add_guards
 from foldyn.mechanics.contact.pair_potentials import edge_edge, vertex_triangle
 from foldyn.mechanics.contact.panel_friction import add_rubs, rub_power
@@ -46,21 +47,17 @@ def _add_pairs(tables, angle, force, memory):
     """
     counts, team, x, energy = memory.counts, memory.share.team, memory.x, 0.0
     low, high = len(x), 0
-    first, last = part(team, counts.near_first)
-    for k in range(first, last):
-        p = memory.near[0, k]
-        v, t = memory.pairs[0, p, 0], memory.pairs[0, p, 1]
-        energy += vertex_triangle(tables, x, force, v, t, memory.d0[0, p])[0]
-        a, b, c = tables.triangles[t, 0], tables.triangles[t, 1], tables.triangles[t, 2]
-        low, high = min(low, v, a, b, c), max(high, v + 1, a + 1, b + 1, c + 1)
-    first, last = part(team, counts.near_second)
-    for k in range(first, last):
-        p = memory.near[1, k]
-        i, j = memory.pairs[1, p, 0], memory.pairs[1, p, 1]
-        energy += edge_edge(tables, x, force, i, j, memory.d0[1, p])[0]
-        for e in (i, j):
-            a, b = tables.edges[e, 0], tables.edges[e, 1]
-            low, high = min(low, a, b), max(high, a + 1, b + 1)
+    for kind in range(2):
+        first, last = part(team, counts.near_first if kind == VERTEX else counts.near_second)
+        for k in range(first, last):
+            p = memory.near[kind, k]
+            one, other, d0 = memory.pairs[kind, p, 0], memory.pairs[kind, p, 1], memory.d0[kind, p]
+            if kind == VERTEX:
+                energy += vertex_triangle(tables, x, force, one, other, d0)[0]
+            else:
+                energy += edge_edge(tables, x, force, one, other, d0)[0]
+            for node in nodes_of(tables.triangles, tables.edges, kind, one, other):
+                low, high = min(low, node), max(high, node + 1)
     if counts.watched == 0 or counts.hinges > 0:
         first, last = part(team, tables.hinge_limit.size)
         energy += add_guards(tables, x, angle, force, first, last)

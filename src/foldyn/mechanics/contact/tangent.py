@@ -15,11 +15,8 @@ from foldyn.mechanics.contact.distances import (
     EDGES,
     VERTEX,
     closest_of,
-    closest_of_segments,
-    edge_gap,
+    gap_of,
     nodes_of,
-    point,
-    vertex_gap,
     weights_of,
 )
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
@@ -36,20 +33,15 @@ def touching_pairs(tables, memory):
     """Indices of the listed pairs of each kind closer than d0 at memory.x."""
     x, out = memory.x, np.empty((2, memory.d0.shape[1]), np.int64)
     found = np.zeros(2, np.int64)
-    for k in range(memory.counts.listed_first):
-        v, t = memory.pairs[0, k, 0], memory.pairs[0, k, 1]
-        if vertex_gap(x, tables.triangles, v, t) < memory.d0[0, k]:
-            out[0, found[0]] = k
-            found[0] += 1
-    for k in range(memory.counts.listed_second):
-        i, j = memory.pairs[1, k, 0], memory.pairs[1, k, 1]
-        a, b = point(x, tables.edges[i, 0]), point(x, tables.edges[i, 1])
-        c, d = point(x, tables.edges[j, 0]), point(x, tables.edges[j, 1])
-        if not closest_of_segments(a, b, c, d)[2]:
-            continue
-        if edge_gap(x, tables.edges, i, j) < memory.d0[1, k]:
-            out[1, found[1]] = k
-            found[1] += 1
+    for kind in range(2):
+        listed = memory.counts.listed_first if kind == VERTEX else memory.counts.listed_second
+        for k in range(listed):
+            one, other = memory.pairs[kind, k, 0], memory.pairs[kind, k, 1]
+            inside = closest_of(tables.triangles, tables.edges, x, kind, one, other)[2]
+            gap = gap_of(tables.triangles, tables.edges, x, kind, one, other)
+            if inside and gap < memory.d0[kind, k]:
+                out[kind, found[kind]] = k
+                found[kind] += 1
     return out[0, : found[0]].copy(), out[1, : found[1]].copy()
 
 
