@@ -363,8 +363,7 @@ class KeptEnds:
         document = to_document(case)
         if document.obstacles:
             raise InputError(
-                f": this case cannot be stored: {document.obstacles[0]}; leave folder out",
-                "folder",
+                f": this case cannot be stored: {document.obstacles[0]}; leave folder out", "folder"
             )
         arrays = {name: _digest([array]) for name, array in document.arrays.items()}
         self._about = {

@@ -202,9 +202,7 @@ class ModesGradient(Differentiated):
 
     def _check_damping(self) -> None:
         """Refuse derivatives of damping ratios from anything but alpha and beta."""
-        case = self.case
-        plain = all(isinstance(part, Rayleigh) for part in case.dampings)
-        if not plain or case.dashpots or case.crease_damping.any() or self._equilibrium:
+        if self._equilibrium or not _is_rayleigh(self.case):
             raise InputError(
                 "there are derivatives of damping ratios for alpha and beta about rest alone; "
                 "leave out other dampers, or vary the parameters by fd.sweep"
@@ -332,10 +330,15 @@ def _check_method(given: Mapping[str, Any]) -> None:
 
 def _check_damping(case: Case) -> None:
     """Refuse dampers other than alpha and beta."""
-    plain = all(isinstance(part, Rayleigh) for part in case.dampings)
-    if not plain or case.dashpots or case.crease_damping.any():
+    if not _is_rayleigh(case):
         raise InputError(
             "there are gradients of frequency responses with alpha and beta alone: damping ratios "
             "of modes change with the modes; give Rayleigh.from_ratios, leave out other dampers, "
             "or vary the parameters by fd.sweep"
         )
+
+
+def _is_rayleigh(case: Case) -> bool:
+    """Whether alpha and beta are the only damping of a case."""
+    plain = all(isinstance(part, Rayleigh) for part in case.dampings)
+    return plain and not case.dashpots and not case.crease_damping.any()

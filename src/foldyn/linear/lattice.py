@@ -189,8 +189,7 @@ class Lattice:
             bare = Pattern(points, faces, name=own.name, welds=shared[welds])
             if any(bare.flipped):
                 raise InputError(
-                    ": neighboring cells show opposite sides; take two of them as one cell",
-                    "case",
+                    ": neighboring cells show opposite sides; take two of them as one cell", "case"
                 )
             flat = np.abs(bare.dihedrals - np.pi) < FLAT
             of_crease = kinds_of(bare.creases, vertices)
