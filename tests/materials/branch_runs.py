@@ -7,8 +7,9 @@ from dataclasses import MISSING, fields
 import numpy as np
 
 import foldyn as fd
+from foldyn.jit.compiled import kernel
 from foldyn.materials import HINGE_LAWS, MemoryLaw
-from foldyn.materials.branch_switch import branch_table
+from foldyn.materials.branch_switch import mean_moment, update
 
 
 def example(kind, **given):
@@ -26,6 +27,23 @@ LAWS = {
     "plastic": fd.Plastic(0.05, isotropic=0.02, kinematic=0.1, law="linear"),
     "eyring": fd.Eyring(0.02, 1e-3, law="linear"),
 }
+
+
+@kernel
+def branch_table(code, p, after, dt, start, out):
+    """`update` and mean moments along turns (m,) with times dt (m,) between them, to `out` (m, 9).
+
+    start : (3,) turn and state before the first.
+    """
+    before, one, other = start[0], start[1], start[2]
+    for i in range(after.size):
+        found = update(code, p, before, after[i], dt[i], one, other)
+        for c in range(6):
+            out[i, c] = found[c]
+        mean = mean_moment(code, p, before, after[i], dt[i], one, other)
+        for c in range(3):
+            out[i, 6 + c] = mean[c]
+        before, one, other = after[i], found[0], found[1]
 
 
 def histories(law, turns, times, start=0.0):

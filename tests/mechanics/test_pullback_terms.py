@@ -29,8 +29,7 @@ from foldyn.mechanics.springs import SpringsTerm
 from foldyn.mechanics.viscous import ViscousTerm
 from foldyn.mechanics.viscous_panels import ViscousPanelsTerm
 from foldyn.shells.term import ShellTerm
-from foldyn.structures.bars_plates import BarsPlatesTerm
-from foldyn.structures.condensed_plates import CondensedPlatesTerm
+from foldyn.structures.bars_plates import BarsPlatesTerm, CondensedPlatesTerm
 
 THICK = fd.Sheet(1e6, 0.25, 0.1, density=1000.0, length_scale_ratio=2.0)
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.3], [0, 1, 0.3], [0.5, -0.8, 0.4]])

@@ -12,8 +12,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 import foldyn as fd
 from foldyn.shells import Shell, ShellOptions
-from foldyn.shells.mesh import ShellMesh
-from foldyn.shells.sides import sides
+from foldyn.shells.mesh import ShellMesh, sides
 
 SQUARE = fd.Pattern([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1, 2, 3]])
 SOUTH, EAST, NORTH, WEST = (0, 1), (1, 2), (2, 3), (0, 3)  # edges y = 0, x = 1, y = 1, x = 0

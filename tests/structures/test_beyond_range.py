@@ -9,7 +9,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.errors import ModelRangeWarning
-from foldyn.structures.plate_frequency import plate_frequency, range_of
+from foldyn.structures.beyond_range import plate_frequency, range_of
 from foldyn.structures.stretching import most
 
 CARD = fd.Sheet(4e9, 0.3, 4e-4, density=800.0)

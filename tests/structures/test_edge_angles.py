@@ -10,9 +10,8 @@ import foldyn as fd
 from case_texts import HELD_MIURA_TEXT
 from foldyn.checks import gradient_error, observed_order, tangent_error
 from foldyn.errors import InputError
-from foldyn.structures.condensed_panel import panel_stiffness
+from foldyn.structures.condensed_panel import condensed, panel_stiffness
 from foldyn.structures.panel_plate import outline
-from foldyn.structures.plate_boundary import condensed
 
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=1.0)
 G = SHEET.bending_modulus

@@ -8,8 +8,7 @@ import pytest
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.structures.panel_membrane import Kind, grading_of, membrane_stiffness
-from foldyn.structures.panel_plate import Outline
-from foldyn.structures.shared import shared
+from foldyn.structures.panel_plate import Outline, shared
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 NONE = (False,) * 4

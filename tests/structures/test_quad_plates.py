@@ -7,8 +7,7 @@ import pytest
 from mass_samples import PANELS
 
 from foldyn.structures.condensed_panel import Outline, panel_stiffness
-from foldyn.structures.quad_bends import quad_bends
-from foldyn.structures.quad_plates import flexibilities, twists
+from foldyn.structures.quad_plates import flexibilities, quad_bends, twists
 
 QUADS = [name for name, x in PANELS.items() if len(x) == 4]
 EDGES = {"four": "1111", "three": "1110", "obtuse": "1100", "acute": "1001", "opposite": "1010"}

@@ -11,7 +11,7 @@ import pytest
 import foldyn as fd
 from foldyn.linear.fidelity import small_loads
 from foldyn.linear.mac import likeness, pairs
-from foldyn.structures.plate_frequency import BELOW, plate_frequency
+from foldyn.structures.beyond_range import BELOW, plate_frequency
 from foldyn.studies.herkal.stiffnesses import softness
 from pairwise import beyond
 from verification.fidelity import __main__ as command

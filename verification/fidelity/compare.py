@@ -23,7 +23,7 @@ from foldyn.linear.reference import (
 from foldyn.linear.shell_of import DIVISIONS
 from foldyn.shells import shell
 from foldyn.structures import Structure, discretize
-from foldyn.structures.plate_frequency import BELOW, plate_frequency
+from foldyn.structures.beyond_range import BELOW, plate_frequency
 from foldyn.structures.presets import resolved
 from verification.fidelity.cases import FidelityCase
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from foldyn.structures.plate_frequency import BELOW
+from foldyn.structures.beyond_range import BELOW
 from verification.fidelity import compare
 from verification.fidelity.compare import Modes, Row
 from verification.fidelity.mixed import SETS, SUPPORTS, MixedCase

@@ -30,7 +30,7 @@ from foldyn.errors import FoldynWarning
 from foldyn.linear.reference import SAME_PLACE, reference_modes
 from foldyn.patterns import Pattern
 from foldyn.shells import shell
-from foldyn.structures.plate_frequency import BELOW, plate_frequency
+from foldyn.structures.beyond_range import BELOW, plate_frequency
 from verification.fidelity.compare import COMPARED, FIRST, RESULTS
 from verification.fidelity.mixed import FINE, SETS, MixedCase, gaps, mixed
 

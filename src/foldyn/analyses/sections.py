@@ -28,7 +28,7 @@ from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.plots import ANIMATIONS
 from foldyn.shells import shell
 from foldyn.structures import PRESETS, Sheet, discretize
-from foldyn.structures.creases import per_crease
+from foldyn.structures.calibration import per_crease
 from foldyn.structures.rigid_plates import checked_panels
 from foldyn.structures.structure import CALIBRATIONS, MEMBRANES, SCHEMES
 from foldyn.tables import ListOf, Section, TableOf, check_table

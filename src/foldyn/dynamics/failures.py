@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.motion_state import Outcome
 from foldyn.errors import InstabilityError, PenetrationError
-from foldyn.structures.condensed_plates import CondensedPlatesTerm
-from foldyn.structures.locking import kept_apart
+from foldyn.structures.bars_plates import CondensedPlatesTerm
+from foldyn.structures.beyond_range import kept_apart
 
 if TYPE_CHECKING:
     from foldyn.dynamics.motion import Motion

@@ -10,7 +10,7 @@ from foldyn.cases import Case
 from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.mechanics.inelastic_balance import BalancedMemory
-from foldyn.structures.condensed_plates import CondensedPlatesTerm
+from foldyn.structures.bars_plates import CondensedPlatesTerm
 from foldyn.structures.inelastic_hinges import memory
 
 

@@ -38,7 +38,7 @@ from foldyn.materials.law import Law
 from foldyn.mechanics.following import following_force, joined
 from foldyn.results import fidelity_dataset
 from foldyn.structures import ModelOptions, Structure, discretize
-from foldyn.structures.plate_frequency import BELOW, plate_frequency
+from foldyn.structures.beyond_range import BELOW, plate_frequency
 from foldyn.values import choice, listed, number, show, whole
 
 MODELS: Mapping[str, Mapping[str, Any]] = {

@@ -49,8 +49,8 @@ from foldyn.materials import Superlinear
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
+from foldyn.structures.beyond_range import range_of
 from foldyn.structures.discretized import Discretized
-from foldyn.structures.plate_frequency import range_of
 from foldyn.values import number
 
 Mass = sparse.csr_array | Squared

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from foldyn.jit.compiled import kernel
 from foldyn.jit.switches import by_code, switch
 from foldyn.materials import crease_damper, eyring, plastic, prony
 
@@ -25,20 +24,3 @@ update, mean_moment = (
     )
     for name, count in (("update", 6), ("mean_moment", 3))
 )  # fmt: skip
-
-
-@kernel
-def branch_table(code, p, after, dt, start, out):
-    """`update` and mean moments along turns (m,) with times dt (m,) between them, to `out` (m, 9).
-
-    start : (3,) turn and state before the first.
-    """
-    before, one, other = start[0], start[1], start[2]
-    for i in range(after.size):
-        found = update(code, p, before, after[i], dt[i], one, other)
-        for c in range(6):
-            out[i, c] = found[c]
-        mean = mean_moment(code, p, before, after[i], dt[i], one, other)
-        for c in range(3):
-            out[i, 6 + c] = mean[c]
-        before, one, other = after[i], found[0], found[1]

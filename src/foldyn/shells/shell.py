@@ -22,9 +22,9 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned
 from foldyn.patterns.topology import Edge
 from foldyn.ram_limit import check_memory
-from foldyn.shells.mesh import shell_mesh
-from foldyn.shells.sides import (
+from foldyn.shells.mesh import (
     Sides,
+    shell_mesh,
     sides,
     stiffness,
     triangle_plates,
@@ -32,10 +32,15 @@ from foldyn.shells.sides import (
 )
 from foldyn.shells.term import GROUPS, ShellTerm
 from foldyn.structures import Sheet
-from foldyn.structures.beyond_range import doubt_locking
-from foldyn.structures.calibration import check_sheet
+from foldyn.structures.beyond_range import doubt_locking, doubt_units
+from foldyn.structures.calibration import (
+    PerCrease,
+    check_sheet,
+    fold_rest,
+    fold_stiffness,
+    per_crease,
+)
 from foldyn.structures.clamps import boundary_edges
-from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness, per_crease
 from foldyn.structures.discretize import checked_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.edge_angles import EdgePlates, plates_model
@@ -43,14 +48,7 @@ from foldyn.structures.graded import Grading, grading
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.membranes import PanelKind, swelling
 from foldyn.structures.mesh import double_areas, hinge_angles, lengths
-from foldyn.structures.plausibility import doubt_units
-from foldyn.structures.rigid_plates import (
-    Plate,
-    check_welds,
-    checked_panels,
-    rigid_panels,
-    rigid_plates,
-)
+from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
 from foldyn.structures.swelling import Swelling, chord_turns
 from foldyn.values import choice, length, show, whole
 
@@ -139,13 +137,6 @@ class Shell(Discretized):
         """Its dofs without mass, in words; none where all panels are rigid."""
         return "the rotations of a shell" if self.rotations else ""
 
-    @cached_property
-    def plates(self) -> tuple[Plate, ...]:
-        """Its rigid panels."""
-        return rigid_plates(
-            self.options.rigid, self.pattern.faces, self.nodes, self.triangles, self.triangle_panel
-        )
-
     @property
     def fill(self) -> Fill:
         """Memory of the factors of its tangent."""
@@ -178,7 +169,7 @@ class Shell(Discretized):
         """See `Discretized`.
 
         Triangles have a free strain of their sides and a free rotation beta0 of the sheet at them
-        (see `shells.sides`): their energies are linear in those, which makes constant forces.
+        (see `shells.mesh`): their energies are linear in those, which makes constant forces.
         """
         panel, hinges, (plates, side, share) = self.triangle_panel, self.sides.hinges, self._plates
         bends = ~np.isin(panel, rigid_panels(self.options.rigid, len(self.pattern.faces)))
@@ -291,9 +282,9 @@ class Shell(Discretized):
     def _scale(self) -> NDArray:
         """Stiffness of the triangles' sides in the plane times their lengths, summed at nodes.
 
-        Turns of sides come from positions, whose rounding errors small triangles feel: with them
-        the moments of a turn by what lies between node and origin, over a triangle's height. These
-        errors are random, about a twentieth of what they could add up to.
+        Bending adds to it: rounding errors of positions, which grow with the distance from the
+        middle of the nodes, turn the sides of small triangles. These errors are random: their sum
+        is about a twentieth of its bound.
         """
         (membrane, bending), ((_, own),) = self._stiffness, self.membranes
         per_length = np.sqrt(own.per_length2.T)

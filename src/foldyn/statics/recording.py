@@ -26,7 +26,7 @@ from foldyn.statics.equilibrium import OrigamiProblem
 from foldyn.statics.newton import Solver
 from foldyn.statics.path_methods import METHODS
 from foldyn.statics.stepping import REMEDY_COLLISION, REMEDY_LOCKED, PathStoppedError, Point, Walk
-from foldyn.structures.locking import kept_apart, locks
+from foldyn.structures.beyond_range import kept_apart, locks
 from foldyn.structures.mesh import hinge_angles, lengths
 from foldyn.structures.stretching import remedy, stretch
 

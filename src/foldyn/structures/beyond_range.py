@@ -1,18 +1,21 @@
-"""Patterns beyond the range of bars and hinges: warned of, but computed.
+"""Patterns beyond the range of bars and hinges, and implausible sheets: warned of, but computed.
 
-The limits are where frequency errors relative to the shell exceed 5 to 10 % (docs/fidelity.md,
-"Beyond the range").
+The limits of patterns are where frequency errors relative to the shell exceed 5 to 10 %
+(docs/fidelity.md, "Beyond the range"). Above a frequency panels vibrate as plates, independent of
+their creases. Panels that meet pass through each other unless the law of their hinge locks.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import ModelRangeWarning, warn
-from foldyn.materials import EnhancedLinear
+from foldyn.errors import ModelRangeWarning, UnitsWarning, warn
+from foldyn.materials import EnhancedLinear, HingeLaw
 from foldyn.patterns import Pattern
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.mesh import lengths
@@ -153,3 +156,137 @@ def _slenderness(
     across = lengths(pattern.vertices, edges) * sine
     share = np.divide(thickness, across, out=np.zeros(len(edges)), where=sine > SMOOTH)
     return share.round(DIGITS)
+
+
+THICK = 0.2  # of the shortest edge of a panel: above it a sheet is not thin
+THIN, WIDE = 5e-5, 2.0  # of the shortest edge, and its length, m: thin films of such size are sails
+SLAB = 0.1  # m: sheets that fold are thinner
+SLOWEST, FASTEST = 10.0, 25e3  # m/s, sqrt(E / rho): from soft gels to diamond
+USUAL = 2000.0  # m/s
+PRESSURES = {"kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
+DENSITIES = {"g/cm3": 1e3, "t/mm3": 1e12}
+
+
+def doubt_units(pattern: Pattern, sheet: Sheet) -> None:
+    """Warn of a thickness or a wave speed that no sheet with such panels has."""
+    for text in _unit_doubts(pattern, sheet):
+        warn(text, "sheets.md#units", UnitsWarning)
+
+
+def _unit_doubts(pattern: Pattern, sheet: Sheet) -> Iterator[str]:
+    count, shortest = len(pattern.faces), np.array([sides.min() for sides in pattern.sides])
+    thickness = sheet.values("thickness", count)
+    thick = thickness / shortest
+    worst = int(thick.argmax())
+    if thick[worst] > THICK:
+        yield (
+            f"sheet: thickness = {thickness[worst]:g} m is {thick[worst]:.2g} times the shortest "
+            f"edge of panel {worst}, {shortest[worst]:.3g} m, which is no thin sheet (at most "
+            f"{THICK:g}): lengths are in m; if the thickness is meant in mm, give "
+            f"{1e-3 * thickness[worst]:g}"
+        )
+    elif thickness.max() >= SLAB:
+        yield (
+            f"sheet: thickness = {thickness.max():g} m, of panels with edges of "
+            f"{shortest.min():.3g} m and more, is that of a slab (less than {SLAB:g}): lengths are "
+            f"in m; if those of sheet and pattern are meant in mm, give {1e-3 * thickness.max():g} "
+            "and a pattern a thousand times smaller"
+        )
+    least = int(np.where(shortest >= WIDE, thick, np.inf).argmin())
+    if thick[least] < THIN and shortest[least] >= WIDE:
+        yield (
+            f"pattern: panel {least} has edges of {shortest[least]:.3g} m and more and is "
+            f"{thickness[least]:g} m thick, below 1/{1.0 / THIN:.0f} of that: lengths are in m; "
+            "if those of the pattern are meant in mm, make it a thousand times smaller"
+        )
+    modulus, density = (sheet.values(name, count) for name in ("youngs_modulus", "density"))
+    speed = np.sqrt(modulus / density)  # nan without density
+    wrong = np.flatnonzero((speed < SLOWEST) | (speed > FASTEST))
+    if len(wrong):
+        k = int(wrong[0])
+        yield (
+            f"sheet: youngs_modulus = {modulus[k]:g} Pa with density = {density[k]:g} kg/m3: sound "
+            f"would travel at {speed[k]:.3g} m/s in it, but does so at {SLOWEST:g} to {FASTEST:g} "
+            f"m/s in all materials; {_meant(modulus[k], density[k], speed[k])}"
+        )
+
+
+def _meant(modulus: float, density: float, speed: float) -> str:
+    """Suggestion for values that give the wave speed of usual materials."""
+    slow = speed < SLOWEST
+    factors = PRESSURES if slow else DENSITIES
+
+    def off(unit: str) -> float:
+        return abs(np.log(speed / USUAL) + (0.5 if slow else -0.5) * np.log(factors[unit]))
+
+    unit = min(factors, key=off)
+    name, value = ("youngs_modulus", modulus) if slow else ("density", density)
+    return f"if {name} is meant in {unit}, give {value * factors[unit]:g}"
+
+
+NEARLY = 1e-9  # rad from closed
+BOUND = 1e3  # moment / k that only an unbounded law has there
+
+
+def locks(law: HingeLaw) -> bool:
+    """Whether the moment of a law grows without bound as panels meet."""
+    nearly = np.array([NEARLY, 2.0 * math.pi - NEARLY])
+    return bool((np.abs(law.moment(nearly, math.pi)) > BOUND).all())
+
+
+def kept_apart(structure: Discretized, one: int, other: int) -> str:
+    """How to keep the panels at the hinge between two nodes apart, in words.
+
+    The energies of locking laws grow slowly, EnhancedLinear's with the logarithm of the angle:
+    panels that are pushed hard pass through, however small the steps.
+    """
+    ends = {one, other}
+    creases = structure.edge_nodes[: len(structure.fold_rest)].tolist()
+    fold = any(ends == {*pair} for row in creases for pair in pairwise(row) if ends & {*row})
+    kind = "fold" if fold else "bend"
+    law = structure.fold_law if fold else getattr(structure, "bend_law", None)
+    if law is None:
+        return "push the panel less, or more slowly: nothing but its stiffness resists"
+    if locks(law):
+        return (
+            f"the law of this {kind} ({law.name}) locks, but is overcome, and would be with any "
+            "step: push less, or more slowly, end before panels meet, or give the case contact: "
+            "fd.Contact()"
+        )
+    return (
+        f"a law that locks ({kind}_law = 'enhanced', EnhancedLinear) keeps panels apart, unless "
+        "they are pushed hard; contact, fd.Contact(), does however hard"
+    )
+
+
+FIRST_OF_A_SQUARE = 13.47  # omega L^2 sqrt(rho t/G) of a free square plate, nu = 0.3 (Leissa 1973)
+BELOW = 0.6  # of the plate frequency: limit up to which bars and hinges have the sheet's modes
+N5B8E, AMPLITUDES = 0.8, 2.0  # the same for n5b8e, and for n5b8e with internal amplitudes
+
+
+def plate_frequency(pattern: Pattern, sheet: Sheet, rigid: Collection[int] = ()) -> float:
+    """First frequency (Hz) of a free square plate as large as a panel.
+
+    The side is the panel's longest edge, or the root of its area if that is longer, as with five or
+    more corners. Returns the lowest frequency of all panels that are not rigid; inf without any,
+    nan for a sheet without density.
+    """
+    count, x = len(pattern.faces), pattern.vertices
+    speed = (sheet.values("bending_modulus", count) / sheet.values("areal_density", count)) ** 0.5
+    sides = (x[list(face)] - np.roll(x[list(face)], 1, axis=0) for face in pattern.faces)
+    longest = np.array([np.linalg.norm(side, axis=1).max() for side in sides])
+    side2 = np.maximum(longest**2, pattern.face_areas)
+    frequency = FIRST_OF_A_SQUARE / (2.0 * np.pi) * speed / side2
+    return float(np.delete(frequency, list(rigid)).min(initial=np.inf))
+
+
+def range_of(structure: Discretized, internal: int = 0) -> tuple[float, float]:
+    """Frequency (Hz) up to which a model has the sheet's modes, and its ratio to the plates' own.
+
+    inf for shells and for structures made by hand.
+    """
+    if structure.kind != "bars_and_hinges" or structure.pattern is None:
+        return np.inf, np.inf
+    share = BELOW if structure.options.scheme != "n5b8e" else AMPLITUDES if internal else N5B8E
+    rigid = rigid_panels(structure.options.rigid, len(structure.pattern.faces))
+    return share * plate_frequency(structure.pattern, structure.sheet, rigid), share

@@ -1,4 +1,4 @@
-"""Stiffness of folds, bends and bars from the sheet (MERLIN2's calibration).
+"""Stiffness of folds, bends and bars: MERLIN2's calibration from the sheet, or given for creases.
 
 With G = E t^3 / (12 (1 - nu^2)) and Ls the length-scale ratio:
 fold of length Lf            1/kf = Ls/G + 1/(0.55 G (Lf/t)^(1/3)), whole crease;
@@ -12,25 +12,32 @@ bars of every other panel    2 S t / ((1 - nu) sum L) for edges and inner bars a
 Sources: Filipov et al., Int. J. Solids Struct. 124, 2017; Liu and Paulino (MERLIN2). MERLIN2
 assigns two of these in a different order than their formulas say; `calibration="merlin2"`
 reproduces that exactly (`_merlin2_corners`, `_merlin2_edges`), as published results depend on it.
+
+Stiffness and rest angles of creases can also be given for all, for each, or by name.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError, warn
 from foldyn.patterns import Pattern
+from foldyn.patterns.crease_data import crease_values
 from foldyn.patterns.topology import around, edge_of
-from foldyn.structures.mesh import Mesh, double_areas, lengths
+from foldyn.structures.mesh import Mesh, double_areas, hinge_angles, lengths
 from foldyn.structures.sheet import Sheet
+from foldyn.values import doubt_degrees, number, numbers, show, single
 
 STIFFEST = 1e100  # N/m or kg: beyond, or below its inverse, squares and quotients overflow
 SAME = 1e-9  # relative difference below which thicknesses are equal
 WEAK = 1e-3  # of thickness times side: bar areas below it leave a panel (almost) free to shear
 
 
-def fold_stiffness(length: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
+def calibrated_folds(length: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
     """Stiffness of whole creases (nf,), N m/rad, of the given lengths (m).
 
     The two sides of a crease are springs in series, each with half the compliance of a crease
@@ -211,3 +218,88 @@ def _check_scale(sheet: Sheet, low: float, high: float) -> None:
                 f"{sheet.youngs_modulus:g} Pa, thickness = {sheet.thickness:g} m{density} and the "
                 f"pattern, whose edges have {low:.3g} to {high:.3g} m"
             )
+
+
+PerCrease = float | Sequence[float] | Mapping[str, float] | None
+
+
+def per_crease(name: str, value: Any) -> Any:
+    """Return values for creases as a number, a tuple, or a new dict by word; None unchanged.
+
+    Their number and words are checked later, with the pattern.
+    """
+    if isinstance(value, Mapping):
+        if not value:
+            raise InputError(": give a value by assignment or family, as { valley = 0.1 }", name)
+        strange = [word for word in value if not isinstance(word, str)]
+        if strange:
+            raise InputError(f": {show(strange[0])} is no assignment or family of creases", name)
+        return {word: number(f"{name}.{word}", value[word]) for word in value}
+    value = single(value)
+    if isinstance(value, list | tuple | np.ndarray):
+        return tuple(numbers(name, value).tolist())
+    return None if value is None else number(name, value)
+
+
+def fold_stiffness(given: PerCrease, pattern: Pattern, sheet: Sheet) -> NDArray:
+    """Stiffness of whole creases (nf,), N m/rad, calibrated or from the `given` one per length."""
+    length = lengths(pattern.vertices, pattern.creases)
+    if given is None:
+        return calibrated_folds(length, pattern, sheet)
+    per_length, chosen = _values("crease_stiffness", given, pattern)
+    if (per_length[chosen] < 0.0).any():
+        raise InputError("crease_stiffness: must not be negative")
+    if chosen.all():
+        return per_length * length
+    return np.where(chosen, per_length * length, calibrated_folds(length, pattern, sheet))
+
+
+def fold_rest(
+    given: PerCrease,
+    folds: NDArray,
+    x: NDArray,
+    pattern: Pattern,
+    crease: NDArray | None = None,
+) -> NDArray:
+    """Rest dihedrals (rad) of hinge rows, none of them closed.
+
+    crease : crease of each row; the creases in order by default.
+    """
+    crease = np.arange(len(folds)) if crease is None else crease
+    degrees, chosen = _values("crease_rest", given, pattern)
+    closed = degrees[chosen & ((degrees <= 0.0) | (degrees >= 360.0))]
+    if closed.size:
+        raise InputError(
+            f"crease_rest = {closed[0]:g}: must lie between 0 and 360 degrees (flat: 180)"
+        )
+    doubt_degrees("crease_rest", degrees[chosen])
+    rest, given_there = np.radians(degrees)[crease], chosen[crease]
+    if given_there.all():
+        return rest
+    drawn = hinge_angles(x, folds)
+    shut = (drawn < 1e-9) | (drawn > 2.0 * np.pi - 1e-9) | np.isnan(drawn)
+    shut |= np.abs(drawn - pattern.dihedrals[crease]) > np.pi  # closed according to its assignment
+    wrong = np.flatnonzero(shut & ~given_there)
+    if len(wrong):
+        number = crease[wrong[0]]
+        low, high = pattern.creases[number]
+        raise InputError(
+            f"crease {number} (vertices {low}, {high}) is folded flat upon itself: open "
+            "the pattern, or give crease_rest and start from an opened one"
+        )
+    return np.where(given_there, rest, drawn)
+
+
+def _values(field: str, given: PerCrease, pattern: Pattern) -> tuple[NDArray, NDArray]:
+    """Value of each crease (nf,), and a mask of the creases with a given value (nf,)."""
+    count = len(pattern.creases)
+    if given is None:
+        return np.zeros(count), np.zeros(count, bool)
+    if not isinstance(given, Mapping):
+        array = numbers(field, given)
+        if array.ndim > 1 or (array.ndim == 1 and len(array) != count):
+            raise InputError(
+                f"{field}: {array.size} values for {count} creases: give one, or one for each"
+            )
+        return np.broadcast_to(array, (count,)).copy(), np.ones(count, bool)
+    return crease_values(field, given, pattern)

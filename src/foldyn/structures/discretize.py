@@ -14,15 +14,20 @@ from foldyn.materials.plate_superlinear import plate_onset
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned, pattern_of
 from foldyn.ram_limit import check_memory
-from foldyn.structures import calibration as calibrate
-from foldyn.structures.beyond_range import doubt_locking, doubt_range
+from foldyn.structures.beyond_range import doubt_locking, doubt_range, doubt_units
+from foldyn.structures.calibration import (
+    PerCrease,
+    bar_areas,
+    bend_stiffness,
+    check_sheet,
+    fold_rest,
+    fold_stiffness,
+)
 from foldyn.structures.clamps import boundary_edges, clamp_rows, clamp_stiffness
-from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
 from foldyn.structures.membranes import membranes
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
 from foldyn.structures.plate import panel_plates, weld_stiffness
-from foldyn.structures.plausibility import doubt_units
 from foldyn.structures.presets import resolved
 from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
 from foldyn.structures.sheet import Sheet
@@ -150,11 +155,11 @@ def discretize(
         )
     nodes = len(pattern.vertices) + len(pattern.faces)
     check_memory("pattern", f"a structure of {nodes} nodes", PER_NODE * nodes, "take fewer panels")
-    calibrate.check_sheet(sheet, pattern)
+    check_sheet(sheet, pattern)
     points = _given_centers({} if centers is None else centers, pattern, options.scheme)
     mesh = n4b5(pattern) if options.scheme == "n4b5" else n5b8(pattern, points)
     merlin2 = options.calibration == "merlin2"
-    inner_area, edge_area = calibrate.bar_areas(
+    inner_area, edge_area = bar_areas(
         mesh, pattern, sheet, merlin2, alike=options.membrane == "panel"
     )
     area = np.concatenate([inner_area, [edge_area[a, b] for a, b in pattern.lines.tolist()]])
@@ -162,7 +167,7 @@ def discretize(
     folds = fold_stiffness(options.crease_stiffness, pattern, sheet)
     doubt_range(pattern, sheet, options, folds)
     welds, onset = weld_stiffness(pattern, sheet), np.zeros(0)
-    bends = np.concatenate([calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), welds])
+    bends = np.concatenate([bend_stiffness(mesh, pattern, sheet, merlin2), welds])
     plates, softness = None, np.zeros(len(folds))
     x, hinges = mesh.nodes, np.concatenate([mesh.bends, mesh.welds])
     clamps, clamped_triangle = clamp_rows(edges, mesh.triangles)

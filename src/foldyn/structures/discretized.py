@@ -15,13 +15,15 @@ from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, PlateSuperlinear, hinge_law
 from foldyn.materials.inelastic_law import memory_of
+from foldyn.materials.plate_superlinear import onset_parameters
 from foldyn.materials.series import in_series
+from foldyn.mechanics import Hinges
 from foldyn.mechanics.assembly import Assembly
 from foldyn.patterns.picture import picture
 from foldyn.patterns.topology import Edge
 from foldyn.structures.mass import Surface, center_of_mass, inertia_tensor, row_sums
 from foldyn.structures.mesh import double_areas, lengths
-from foldyn.structures.rigid_plates import Plate
+from foldyn.structures.rigid_plates import Plate, rigid_plates
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.swelling import Swelling
 
@@ -55,6 +57,12 @@ class HingeKind(NamedTuple):
         if self.softness is None or flows or isinstance(elastic, EnhancedLinear):
             return np.ones(len(self.stiffness))
         return 1.0 - self.softness * self.stiffness
+
+    @property
+    def arrays(self) -> Hinges:
+        """The hinges for the compiled kernels."""
+        parameters = None if self.onset is None else onset_parameters(self.onset)
+        return Hinges(self.nodes, self.stiffness, self.rest, self.law, parameters, self.share)
 
     def law_of(self, row: int) -> HingeLaw:
         """Law of one hinge."""
@@ -138,7 +146,6 @@ class Discretized:
     bowed_edges: Collection[Edge] = ()
     as_made: bool = False
     __dataclass_fields__: ClassVar[dict[str, Any]]
-    plates: tuple[Plate, ...] = ()
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -165,6 +172,14 @@ class Discretized:
     def total_mass(self) -> float:
         """Mass (kg)."""
         return float(self.mass.sum())
+
+    @cached_property
+    def plates(self) -> tuple[Plate, ...]:
+        """Its rigid panels."""
+        if self.pattern is None:
+            return ()
+        rigid, faces = getattr(self.options, "rigid", None), self.pattern.faces
+        return rigid_plates(rigid, faces, self.nodes, self.triangles, self.triangle_panel)
 
     def _repr_html_(self) -> str | None:
         """A picture for notebooks."""

@@ -70,12 +70,8 @@ class Grading(NamedTuple):
             )
         share = np.moveaxis(self.distances(reach), 0, -2)
         x, y = ((share * end)[..., None] for end in self.ends)
-        return (
-            corner
-            + x * (one - corner)
-            + y * (other - corner)
-            + x * y * (center - one - other + corner)
-        )
+        twist = center - one - other + corner
+        return corner + x * (one - corner) + y * (other - corner) + x * y * twist
 
     def reach(self, corners: NDArray) -> NDArray[np.float64]:
         """Lengths (..., 2 rays + 1) of the rays of pieces."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.errors import InputError
+from foldyn.mechanics.block_matrix import of_elements
 from foldyn.patterns.topology import around, edge_of
 from foldyn.structures.condensed_panel import panel_mass
 from foldyn.structures.panel_plate import TRIANGLE_MASS, outline
@@ -162,17 +163,8 @@ def consistent(surface: Surface) -> sparse.csr_array:
 
     Its rotational inertia is exact about every axis in the plane of a panel.
     """
-    return _assembled(surface.triangles, surface.triangle_mass, TRIANGLE_MASS, surface)
-
-
-def _assembled(
-    nodes: NDArray, total: NDArray, element: NDArray, surface: Surface
-) -> sparse.csr_array:
-    """Assemble elements with nodes (ne, k): each has its mass (ne,) times one matrix (k, k)."""
-    k, n = len(element), len(surface.nodes)
-    values = total[:, None, None] * element
-    rows, columns = np.repeat(nodes, k, axis=1).ravel(), np.tile(nodes, (1, k)).ravel()
-    return sparse.coo_array((values.ravel(), (rows, columns)), shape=(n, n)).tocsr()
+    matrices = surface.triangle_mass[:, None, None] * TRIANGLE_MASS
+    return of_elements(surface.triangles, matrices, len(surface.nodes))
 
 
 def bubble(surface: Surface) -> sparse.csr_array:
@@ -194,7 +186,8 @@ def bubble(surface: Surface) -> sparse.csr_array:
             triangle[p] = False
     rest = _without(surface, ~triangle)
     nodes = np.array(panels, np.int64).reshape(-1, 5)
-    return consistent(rest) + _assembled(nodes, surface.panel_mass[~triangle], BUBBLE, surface)
+    matrices = surface.panel_mass[~triangle][:, None, None] * BUBBLE
+    return consistent(rest) + of_elements(nodes, matrices, len(surface.nodes))
 
 
 def _bubble_element() -> NDArray:
@@ -222,16 +215,13 @@ def condensed(surface: Surface) -> sparse.csr_array:
     """
     panels = condensed_panels(surface)
     plated = np.isin(np.arange(len(surface.faces)), list(panels))
-    rows, columns, values = [], [], []
-    for p, matrix in panels.items():
-        nodes = surface.nodes_of(p)
-        rows.append(np.repeat(nodes, len(nodes)))
-        columns.append(np.tile(nodes, len(nodes)))
-        values.append(matrix.ravel())
-    n = len(surface.nodes)
-    entries = (_flat(values), (_flat(rows).astype(int), _flat(columns).astype(int)))
-    rest = _without(surface, plated)
-    return sparse.csr_array(sparse.coo_array(entries, shape=(n, n))) + consistent(rest)
+    mass = consistent(_without(surface, plated))
+    for size in {len(matrix) for matrix in panels.values()}:
+        alike = [p for p, matrix in panels.items() if len(matrix) == size]
+        nodes = np.array([surface.nodes_of(p) for p in alike])
+        matrices = np.array([panels[p] for p in alike])
+        mass = mass + of_elements(nodes, matrices, len(surface.nodes))
+    return mass
 
 
 def condensed_panels(surface: Surface) -> dict[int, NDArray]:
@@ -252,10 +242,6 @@ def condensed_panels(surface: Surface) -> dict[int, NDArray]:
         panel = outline(x[:m], x[m] if len(x) > m else None, clamped, straight, clamped=clamped)
         found[p] = total[p] * panel_mass(panel, 0.3)
     return found
-
-
-def _flat(parts: list[NDArray]) -> NDArray:
-    return np.concatenate([np.zeros(0), *parts])
 
 
 def _without(surface: Surface, panels: NDArray) -> Surface:

@@ -234,13 +234,7 @@ def coupling(
     soft = curved.T @ (curved / alone[:, None])
     across = back[:corners].T @ stiff[:corners, corners:]
     between = back.T @ whole @ back + curved @ np.linalg.solve(soft, curved.T)
-    out = np.empty((len(bars) + across.shape[1],) * 2)
-    out[: len(bars), : len(bars)], out[: len(bars), len(bars) :] = between, across
-    out[len(bars) :, : len(bars)], out[len(bars) :, len(bars) :] = (
-        across.T,
-        stiff[corners:, corners:],
-    )
-    return out
+    return np.block([[between, across], [across.T, stiff[corners:, corners:]]])
 
 
 def energies(

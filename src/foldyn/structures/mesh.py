@@ -278,8 +278,8 @@ def polygon_center(x: NDArray) -> NDArray:
 
     The sum is one of weighted distances to lines: convex and piecewise linear, so its minimum is
     at a crossing of two diagonals. Where several tie, the corners' mean if it is one of the
-    minimizers, else the mean of the tied crossings. A polygon that is not flat is projected on
-    its mean plane for this.
+    minimizers, else the mean of the tied crossings. A polygon that is not flat is
+    projected on its mean plane for this.
     """
     origin = x.mean(axis=0)
     _, _, axes = np.linalg.svd(x - origin)

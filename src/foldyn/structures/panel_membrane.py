@@ -28,10 +28,10 @@ from numpy.typing import NDArray
 from foldyn.algebra.condensing import Condensing
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.jit.eights import COUNT
+from foldyn.mechanics.block_matrix import pairs_within
 from foldyn.mechanics.triangle import PRODUCTS, add_triangles, squares
 from foldyn.structures.graded import ROOM, Grading, graded
-from foldyn.structures.panel_plate import Outline, across_edges, meshed, sides_of
-from foldyn.structures.shared import shared
+from foldyn.structures.panel_plate import Outline, across_edges, meshed, shared, sides_of
 
 COARSE, FINE = 4, 8  # pieces per edge in the two meshes; triangles have twice as many
 RAYS = 2  # rays of a graded mesh, in half a corner
@@ -292,7 +292,7 @@ def _plan(cut: Cut, bowing: bool, gives: bool) -> Plan:
     unknowns = _unknowns(cut, bowing, gives)
     starts, size = unknowns.starts, unknowns.size
     # for all ordered pairs of points of a triangle; the lower half of the matrix suffices
-    one, other = np.repeat(cut.elements, 6, axis=1).ravel(), np.tile(cut.elements, (1, 6)).ravel()
+    one, other = pairs_within(cut.elements).T
     counts = np.diff(starts)
     each = counts[one] * counts[other]
     one, other, first = (np.repeat(k, each) for k in (one, other, np.cumsum(each) - each))

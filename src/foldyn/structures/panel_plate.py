@@ -1,13 +1,14 @@
 """A panel as a thin plate of small triangles: outline, mesh, stiffness, mass, constraints.
 
 The triangles have constant curvature (Morley; in `mechanics.triangle`). Their unknowns are the
-heights of the points and the slopes across the sides.
+heights of the points and the slopes across the sides. Functions of panels that are expensive keep
+their values (`shared`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Hashable, Sequence
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.polynomial import Legendre
@@ -15,7 +16,50 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from foldyn.jit.eights import COUNT
+from foldyn.mechanics.block_matrix import of_elements
 from foldyn.mechanics.triangle import triangle_stiffness
+
+Value = TypeVar("Value")
+Find = Callable[[Sequence[tuple]], list[Value]]
+KEPT = 4096  # cached values of each kind; older ones are dropped
+
+
+class Shared(Generic[Value]):
+    """A function with cached values; see `shared`."""
+
+    def __init__(self, find: Find[Value], alike: Callable[..., Hashable]) -> None:
+        self._find, self._alike = find, alike
+        self._kept: dict[tuple, Value] = {}
+
+    def __call__(self, *given: Hashable) -> Value:
+        """The value for these arguments."""
+        return self.each([given])[0]
+
+    def each(self, many: Sequence[tuple]) -> list[Value]:
+        """The values for the arguments of many calls."""
+        found = {given: self._kept[given] for given in many if given in self._kept}
+        groups: dict[Hashable, list[tuple]] = {}
+        for given in dict.fromkeys(many):
+            if given not in found:
+                groups.setdefault(self._alike(*given), []).append(given)
+        for group in groups.values():
+            for first in range(0, len(group), COUNT):
+                some = group[first : first + COUNT]
+                found |= zip(some, self._find(some), strict=True)
+        if groups:
+            self._kept = dict([*{**self._kept, **found}.items()][-KEPT:])
+        return [found[given] for given in many]
+
+
+def shared(alike: Callable[..., Hashable]) -> Callable[[Find[Value]], Shared[Value]]:
+    """Decorator of functions from the arguments of at most `COUNT` calls to their values.
+
+    alike : callable
+        Maps the arguments of a call to a key; calls with equal keys are computed together.
+    """
+    return lambda find: Shared(find, alike)
+
 
 DIGITS = 11  # digits to which panels with the same shape agree
 TRIANGLE_MASS = (np.ones((3, 3)) + np.eye(3)) / 12.0  # total 1, linear between corners
@@ -149,9 +193,7 @@ class PanelPlate:
     def mass(self) -> sparse.csr_array:
         """Mass matrix of the unknowns for a panel of mass 1; slopes have no mass."""
         block = _parts(self.points, self.triangles)[:, None, None] * TRIANGLE_MASS
-        rows, columns = np.repeat(self.triangles, 3, axis=1), np.tile(self.triangles, (1, 3))
-        entries = (block.ravel(), (rows.ravel(), columns.ravel()))
-        return sparse.csr_array(sparse.coo_array(entries, shape=self.stiffness.shape))
+        return of_elements(self.triangles, block, self.stiffness.shape[0])
 
 
 def _edge_functions(
@@ -292,6 +334,4 @@ def _plate(
     """Stiffness for heights of the points and slopes across the sides, with G = 1."""
     block = plate_blocks(points[triangles], sign, poissons_ratio)
     dofs = np.concatenate([triangles, len(points) + side], axis=1)
-    rows, columns = np.repeat(dofs, 6, axis=1).ravel(), np.tile(dofs, (1, 6)).ravel()
-    size = len(points) + int(side.max()) + 1
-    return sparse.csr_array(sparse.coo_array((block.ravel(), (rows, columns)), shape=(size, size)))
+    return of_elements(dofs, block, len(points) + int(side.max()) + 1)

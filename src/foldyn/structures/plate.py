@@ -4,7 +4,7 @@ With G = E t^3 / (12 (1 - nu^2)) and A the area of a panel:
 
 quads                       bends G k and compliance c of creases such that the nodes move as the
                             corners of a plate do under forces that twist it and moments on its
-                            creases (`structures.quad_bends`);
+                            creases (`structures.quad_plates`);
 spoke of a larger polygon   4 (1 - nu) G A p / sum (h1^2 + h2^2), h1 and h2 the angles by which its
                             spokes turn in the two curvatures without mean, of size 1; p of
                             `POLYGON`, because a plate that only its corners bend is softer;
@@ -33,7 +33,7 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.structures.edge_angles import straight_creases
 from foldyn.structures.mesh import Mesh, double_areas, lengths, quad_centers
-from foldyn.structures.quad_bends import quad_bends
+from foldyn.structures.quad_plates import quad_bends
 from foldyn.structures.rigid_plates import rigid_panels
 from foldyn.structures.sheet import Sheet
 

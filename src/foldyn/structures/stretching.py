@@ -64,9 +64,7 @@ def remedy(structure: Discretized) -> str:
     return f"where closed and welded sheets are often 5 to 20 % off: {SHELL}"
 
 
-def stretch(
-    structure: Discretized, energies: Mapping[str, NDArray], displacement: Any
-) -> Stretch | None:
+def stretch(structure: Any, energies: Mapping[str, NDArray], displacement: Any) -> Stretch | None:
     """Share of stretching in states with energies (k,), J, by name; None if it is small.
 
     Also None for motions that hardly strain the structure; their energies include `kinetic`.
@@ -79,7 +77,7 @@ def stretch(
     total = np.nan_to_num(np.sum([energies[name] for name in structure.energy_groups], axis=0))
     at = int(total.argmax())
     kinetic = np.nan_to_num(energies.get("kinetic", np.zeros(1))).max()
-    felt = max(FELT * kinetic, LEAST**2 * _tension(structure) @ structure.bar_length**2)
+    felt = max(FELT * kinetic, LEAST**2 * structure.bar_stiffness @ structure.bar_length**2)
     if bars[at] <= felt:
         return None
     held = bars[at]
@@ -127,8 +125,3 @@ def _of_strains(structure: Discretized, strain: NDArray) -> NDArray:
     square = nu * np.abs(np.trace(strain, axis1=-2, axis2=-1)) ** 2
     square = square + (1.0 - nu) * (np.abs(strain) ** 2).sum(axis=(-2, -1))
     return (stiffness * square).sum(axis=-1)
-
-
-def _tension(structure: Any) -> NDArray:
-    """Stiffness (nb,) of the bars, N/m."""
-    return structure.sheet.youngs_modulus * structure.bar_area / structure.bar_length

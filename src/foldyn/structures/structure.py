@@ -22,7 +22,6 @@ from foldyn.materials import (
     bar_law,
     hinge_law,
 )
-from foldyn.materials.plate_superlinear import onset_parameters
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.clamps import RIDES, ClampsTerm
 from foldyn.mechanics.edge_gives import BalancedGivesTerm, EdgeGives, EdgeGivesTerm
@@ -31,10 +30,9 @@ from foldyn.mechanics.membranes import MembranesTerm
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm
-from foldyn.structures.bars_plates import BarsPlatesTerm
+from foldyn.structures.bars_plates import BarsPlatesTerm, CondensedPlatesTerm, balanced
+from foldyn.structures.calibration import PerCrease, per_crease
 from foldyn.structures.clamps import clamps
-from foldyn.structures.condensed_plates import CondensedPlatesTerm, balanced
-from foldyn.structures.creases import PerCrease, per_crease
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.edge_angles import (
     EdgePlates,
@@ -47,7 +45,7 @@ from foldyn.structures.mass import MASS_RULES, Surface, lumped
 from foldyn.structures.membranes import PanelKind, swelling
 from foldyn.structures.mesh import double_areas, hinge_angles
 from foldyn.structures.panel_plate import Outline
-from foldyn.structures.rigid_plates import Plate, rigid_panels, rigid_plates
+from foldyn.structures.rigid_plates import rigid_panels
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.swelling import Chords, Swelling, chords, mean_of_neighbors
 from foldyn.values import choice
@@ -177,6 +175,11 @@ class Structure(Discretized):
         """`panel_softness`, or zeros."""
         return self.panel_softness if len(self.panel_softness) else np.zeros(len(self.folds))
 
+    @property
+    def bar_stiffness(self) -> NDArray:
+        """E A / L (nb,) of the bars, N/m."""
+        return self.sheet.youngs_modulus * self.bar_area / self.bar_length
+
     @cached_property
     def bar_law(self) -> BarLaw:
         """Law of the bars."""
@@ -190,23 +193,8 @@ class Structure(Discretized):
     @cached_property
     def model(self) -> mechanics.BarsHinges:
         """Arrays for the compiled kernels."""
-        return mechanics.build(
-            self.nodes,
-            self.bars,
-            self.sheet.youngs_modulus * self.bar_area / self.bar_length,
-            self.bar_law,
-            tuple(
-                mechanics.Hinges(
-                    h.nodes,
-                    h.stiffness,
-                    h.rest,
-                    h.law,
-                    None if h.onset is None else onset_parameters(h.onset),
-                    h.share,
-                )
-                for h in self.hinge_kinds
-            ),
-        )
+        hinges = tuple(kind.arrays for kind in self.hinge_kinds)
+        return mechanics.build(self.nodes, self.bars, self.bar_stiffness, self.bar_law, hinges)
 
     @cached_property
     def body(self) -> Assembly:
@@ -249,14 +237,13 @@ class Structure(Discretized):
         return np.concatenate([self.folds, self.bends])[:, :2].tolist()
 
     def _plates_term(self, plates: EdgePlates) -> BarsPlatesTerm:
-        stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
         if self.edge_gives is not None and not self.without_edge_angles:  # unlike dofs of plates
             hinge = {frozenset(axis): k for k, axis in enumerate(self._axes)}
             gives = [hinge[frozenset(edge)] for edge in self.edge_gives.edge.tolist()]
             plates = plates._replace(rotation_hinge=np.append(plates.rotation_hinge, gives))
         model = plates_model(
-            self.nodes, self.bars, stiffness, self.bar_law, self.folds, self.fold_stiffness,
-            self.fold_rest, self.fold_law, self.bends, self.bend_rest, plates,
+            self.nodes, self.bars, self.bar_stiffness, self.bar_law, self.folds,
+            self.fold_stiffness, self.fold_rest, self.fold_law, self.bends, self.bend_rest, plates,
             self.clamps,
         )  # fmt: skip
         kind = CondensedPlatesTerm if self.without_edge_angles else BarsPlatesTerm
@@ -269,15 +256,6 @@ class Structure(Discretized):
             return None
         other = replace(self, without_edge_angles=True)
         return other.marked() if self.as_made else other
-
-    @cached_property
-    def plates(self) -> tuple[Plate, ...]:
-        """Its rigid panels."""
-        if self.pattern is None:
-            return ()
-        return rigid_plates(
-            self.options.rigid, self.pattern.faces, self.nodes, self.triangles, self.triangle_panel
-        )
 
     def _rows(self, group: int, hinges: NDArray) -> NDArray:
         """Rows in `model.hinges` of the folds (group 0) or bends (1), which may be interleaved."""
@@ -292,19 +270,11 @@ class Structure(Discretized):
         law = self.bend_law
         own = isinstance(law, PlateSuperlinear) and law.onset is None
         onset = self.bend_onset if own else None
+        folds = self.folds, self.fold_stiffness, self.fold_rest
+        bends = self.bends, self.bend_stiffness, self.bend_rest
         return (
-            HingeKind(
-                "fold",
-                self.fold_law,
-                self.folds,
-                self.fold_stiffness,
-                self.fold_rest,
-                None,
-                self._softness,
-            ),
-            HingeKind(
-                "bend", self.bend_law, self.bends, self.bend_stiffness, self.bend_rest, onset
-            ),
+            HingeKind("fold", self.fold_law, *folds, softness=self._softness),
+            HingeKind("bend", law, *bends, onset=onset),
         )
 
     @cached_property
@@ -331,10 +301,9 @@ class Structure(Discretized):
             own = self.membranes, self.edge_gives, self.nodes, strain
             parts, longer, push = swelling(*own)
         else:
-            stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
             free = mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
             stress, longer, push = self.bar_law.stress(1.0 + free), none, none
-            parts = [tensions(self.nodes, self.bars, -stiffness * stress)]
+            parts = [tensions(self.nodes, self.bars, -self.bar_stiffness * stress)]
         if self.edge_plates is not None:
             sheet = self.body.sheet
             turns, inner = np.zeros(len(sheet.rest_angles)), none

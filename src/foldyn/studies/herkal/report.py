@@ -19,7 +19,7 @@ from foldyn.plots import style
 from foldyn.report import Heading, Listing, Section, Table, Text, write_report
 from foldyn.report.album import Album
 from foldyn.report.sections import cell
-from foldyn.structures.plate_frequency import BELOW, plate_frequency
+from foldyn.structures.beyond_range import BELOW, plate_frequency
 from foldyn.studies.herkal import runs, sensitivity_page, stiffnesses_page, variations
 from foldyn.studies.herkal.claims import claims, paper_table, table1, tolerance
 from foldyn.studies.herkal.metric import FAR, LEAST_MAC, best
