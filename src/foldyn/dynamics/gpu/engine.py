@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from foldyn.dynamics.checkpoint import state_parts
 from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.gpu import card
-from foldyn.dynamics.gpu.launch import Launches, Places
+from foldyn.dynamics.gpu.launch import Launches, Places, take
 from foldyn.dynamics.motion_state import MotionState, Outcome, Samples, StepPlan
 from foldyn.dynamics.system import PackedCase
 
@@ -53,32 +53,19 @@ class CardEngine(Engine):
             first = int(tally.steps)
             last = min(end, first + int(self._launches.fits()[0]))
             skips = self._method.name == "central_difference" and first > 0
-            sample = int(tally.samples)
-            span = (np.array([number]) for number in (first + skips, last, sample))
+            span = (np.array([number]) for number in (first + skips, last, int(tally.samples)))
             written, wrong = self._launches.run(*span)
             if wrong.any() or not np.isfinite(written.energy).all():
                 return self._again(out, end - first)
-            self._take(written, out, sample, last - first)
+            take(written, 0, out, self._state, plan, last, self._method.evaluations)
+            self._fetch()
             if last == end:
                 break
         return int(Outcome.DONE), -1
 
-    def _take(self, written: Any, out: Samples, sample: int, steps: int) -> None:
-        """Copy the results of a launch to the state and the samples."""
-        state, tally, plan = self._state, self._state.tally, self._plan
-        count = written.u.shape[1]
-        rows = slice(sample - out.first, sample - out.first + count)
-        out.time[rows] = plan.start + np.arange(sample, sample + count) * plan.every * plan.dt
-        out.displacement[rows], out.velocity[rows] = written.u[0], written.v[0]
-        out.reaction[rows] = written.reaction[0]
-        energy = written.energy[:, 0] + 0.0
-        out.energy[rows] = energy[:-1]
-        tally.dissipated, tally.work = energy[-1, -2], energy[-1, -1]
-        tally.steps += steps
-        tally.samples += count
-        tally.time = plan.start + tally.steps * plan.dt
-        tally.evaluations += self._method.evaluations * steps
-        places = self._launches.places()
+    def _fetch(self) -> None:
+        """Copy the state of the models to the motion."""
+        state, places = self._state, self._launches.places()
         state.u[...], state.v[...], state.carry[...] = places.u[0], places.v[0], places.carry[0]
         state.angle[...], self._sums = places.angle[0], places.sums
 

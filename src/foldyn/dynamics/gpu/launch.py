@@ -15,7 +15,7 @@ from foldyn.dynamics.gpu import card
 from foldyn.dynamics.gpu.arrays import CaseArrays
 from foldyn.dynamics.gpu.kernels import CardState, Span, Written, kernel
 from foldyn.dynamics.gpu.ported import SIMULATED, cuda
-from foldyn.dynamics.motion_state import StepPlan
+from foldyn.dynamics.motion_state import MotionState, Samples, StepPlan
 from foldyn.dynamics.system import PackedCase
 
 BLOCK = 128  # threads per block of a grid with one model
@@ -34,6 +34,25 @@ class Places(NamedTuple):
     carry: NDArray  # (m, n, 3) acceleration, for methods that keep it
     sums: NDArray  # (m, 4) as in `State`, or (threads, 4) with the same launch shape
     angle: NDArray  # (m, nh)
+
+
+def take(
+    written: Written, k: int, out: Samples, state: MotionState, plan: StepPlan, last: int,
+    evaluations: int,
+) -> None:  # fmt: skip
+    """Store the samples of model k of a launch that ended at step `last`, and count its steps.
+
+    evaluations : of forces in a step.
+    """
+    tally, begun, energy = state.tally, int(state.tally.samples), written.energy[:, k] + 0.0
+    end = last // plan.every + 1
+    rows, own = slice(begun - out.first, end - out.first), slice(end - begun)
+    out.time[rows] = plan.start + np.arange(begun, end) * plan.every * plan.dt
+    out.displacement[rows], out.velocity[rows] = written.u[k, own], written.v[k, own]
+    out.reaction[rows], out.energy[rows] = written.reaction[k, own], energy[own]
+    tally.dissipated, tally.work = energy[-1, -2:]
+    tally.evaluations += evaluations * (last - int(tally.steps))
+    tally.steps, tally.samples, tally.time = last, end, plan.start + last * plan.dt
 
 
 class Launches:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from foldyn.dynamics.gpu.arrays import topology
 from foldyn.dynamics.gpu.checks import METHODS, lacking
 from foldyn.dynamics.gpu.engine import BlockEngine
-from foldyn.dynamics.gpu.launch import Launches, Places
+from foldyn.dynamics.gpu.launch import Launches, Places, take
 from foldyn.dynamics.motion import Motion
 from foldyn.errors import InputError
 
@@ -82,19 +82,11 @@ def _integrated(motions: Sequence[Motion]) -> NDArray:
         first = done + ((method.name == "central_difference") & (done > 0))
         first = np.where(moving, first, last + 1)
         written, wrong = launches.run(first, last, sample)
-        energy = np.moveaxis(written.energy, 0, 1) + 0.0  # (m, k + 1, columns)
-        sound &= ~wrong & np.isfinite(energy).all(axis=(1, 2))
+        sound &= ~wrong & np.isfinite(written.energy).all(axis=(0, 2))
         for k in np.flatnonzero(moving).tolist():
-            count = int(last[k]) // plans[k].every + 1 - int(sample[k])
-            rows, out = slice(int(sample[k]), int(sample[k]) + count), motions[k].output.window
-            out.displacement[rows] = written.u[k, :count]
-            out.velocity[rows] = written.v[k, :count]
-            out.reaction[rows], out.energy[rows] = written.reaction[k, :count], energy[k, :count]
-            sample[k] += count
-            tally = states[k].tally
-            tally.steps, tally.samples = last[k], sample[k]
-            tally.time = plans[k].start + last[k] * plans[k].dt
-            tally.evaluations = method.evaluations * last[k]
+            out, end = motions[k].output.window, int(last[k])
+            take(written, k, out, states[k], plans[k], end, method.evaluations)
+            sample[k] = motions[k].stored
         done = np.where(moving, last, done)
         look = moving & sound & ((done == checked) | (done == steps))
         if look.any():
@@ -102,8 +94,6 @@ def _integrated(motions: Sequence[Motion]) -> NDArray:
             for k in np.flatnonzero(look).tolist():
                 sound[k] = motions[k].may_continue(int(done[k]), u[k])
     share, engine = (time.perf_counter() - clock) / len(motions), BlockEngine()
-    for motion, plan in zip(motions, plans, strict=True):
-        times = plan.start + np.arange(motion.stored) * plan.every * plan.dt
-        motion.output.window.time[: motion.stored] = times
+    for motion in motions:
         motion.integrated_by(engine, share)
     return sound
