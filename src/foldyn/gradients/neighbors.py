@@ -172,8 +172,8 @@ def motions(
         packed = pack(other.case, motion.packed.system.waves.span, motion.origin)
         if not np.array_equal(packed.numbering.order, motion.packed.numbering.order):
             raise InputError(f"{NONE} a motion whose nodes are numbered otherwise")
-        state = begin(other.case, *start, None, None, motion.plan, packed)
-        beside.append(Companion(packed, state))
+        begun = begin(other.case, *start, None, None, motion.plan, packed)
+        beside.append(Companion(packed, begun))
     engines: list[Accompanied] = []
     scheme: Any = motion.method.scheme
     steps = motion.plan, jumps(case)
