@@ -208,8 +208,7 @@ def _swept(
                 say(f"  {course.done} of {total} points{failed}, {_left(course.left)}")
 
         folder = results.folder / KEPT
-        found = swept(plan, given.processes, given.scheduler, folder, tell)
-    return found
+        return swept(plan, given.processes, given.scheduler, folder, tell)
 
 
 def _left(seconds: float) -> str:

@@ -129,6 +129,11 @@ def highest(peaks: Peaks) -> int | None:
     return int(np.argmax(peaks.height)) if peaks.height.size else None
 
 
+def _highest(peaks: Peaks, name: str) -> float:
+    k = highest(peaks)
+    return np.nan if k is None else float(getattr(peaks, name)[k])
+
+
 def frequency_of(result: xr.Dataset, frequency: float) -> int:
     """Number of the nearest frequency (Hz) of a response, at most half the spacing away."""
     known = result["frequency"].values
@@ -148,16 +153,12 @@ def _response(
 
 @_measure(*CURVES, units="Hz", doc="frequency of the highest peak")
 def _peak_frequency(result: xr.Dataset, case: Case, node: int, axis: str | None = None) -> float:
-    peaks = curve_of(result, node, axis)[2]
-    k = highest(peaks)
-    return np.nan if k is None else float(peaks.frequency[k])
+    return _highest(curve_of(result, node, axis)[2], "frequency")
 
 
 @_measure(*CURVES, units="", doc="height of the highest peak (unit of the response)")
 def _peak_height(result: xr.Dataset, case: Case, node: int, axis: str | None = None) -> float:
-    peaks = curve_of(result, node, axis)[2]
-    k = highest(peaks)
-    return np.nan if k is None else float(peaks.height[k])
+    return _highest(curve_of(result, node, axis)[2], "height")
 
 
 @_measure(*CURVES, units="Hz", doc="frequency of a peak", dims=("peak",))
