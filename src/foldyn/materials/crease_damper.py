@@ -1,12 +1,12 @@
-"""A damper beside a crease whose turn is found with edge angles in balance: a branch of a law.
+"""A branch of a law: a damper parallel to a crease that turns in balance with edge angles.
 
-Its moment is c times the rate r of the turn d, or r / q per unit of the stiffness of the panels
-beside the crease, with q the rate at which they would bring it back. In a step of h the rate goes
-from r0 to r1 as a + b exp(-q t):
+Its moment is c times the rate r of the turn d. Per unit of the stiffness of the adjacent panels
+this is r / q, with q the rate at which these panels would return the crease. In a step of h the
+rate goes from r0 to r1 as a + b exp(-q t):
 
     d = h ((1 - w) r0 + w r1),    w = 1 / (1 - exp(-q h)) - 1 / (q h),
 
-which is the trapezoidal rule where steps are short, and the backward one where they are long (W.
+which is the trapezoidal rule for short steps, and the backward Euler method for long ones (W.
 Liniger and R. A. Willoughby, SIAM J. Numer. Anal. 7, 1970).
 """
 
@@ -23,7 +23,7 @@ from foldyn.materials.inelastic_law import Branch
 from foldyn.materials.law import columns
 
 CODE = 3  # among branches
-FEW = 1e-3  # of q h: below, series stand for what cancels
+FEW = 1e-3  # of q h: below it series avoid cancellation
 NO_TIME = 1e-6  # of 1 / q, in which loads that jump would turn a crease
 
 

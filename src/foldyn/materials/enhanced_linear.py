@@ -4,7 +4,7 @@ With p = pi/theta1 below theta1 (mirrored above theta2 with p = pi/(2 pi - theta
 M/k = (theta1 - theta0) + tan(p (theta - theta1)/2) / (p/2); linear between.
 Source: Liu and Paulino, Proc. R. Soc. A 473, 2017 (MERLIN).
 
-Where the rest angle theta0 lies beyond theta1 or theta2, the published law has a moment at
+If the rest angle theta0 lies beyond theta1 or theta2, the published law has a moment at
 rest. `rest="stress_free"` subtracts that moment (and the energy at rest), so that the pattern as
 drawn is in equilibrium; `rest="as_published"` keeps both.
 """
@@ -35,7 +35,7 @@ HALF_PI = 0.5 * math.pi
 
 @scalar
 def energy(theta, rest, theta1, theta2):
-    """Energy / k as published: not zero at rest where rest lies beyond theta1 or theta2."""
+    """Energy / k as published; at rest it is not zero if rest lies beyond theta1 or theta2."""
     if theta < theta1:
         d, r, span = rest - theta1, theta1 - theta, theta1
     elif theta > theta2:
@@ -89,7 +89,7 @@ def energy_by_rest(theta, rest):
 
 @scalar
 def moment_by_rest(theta, rest):
-    """Derivative of moment / k with respect to rest, beside the one by the moment at rest."""
+    """Derivative of moment / k with respect to rest, for a fixed moment at rest."""
     return -1.0
 
 
@@ -107,14 +107,14 @@ def relieved_moment(theta, rest, theta1, theta2, moment_at_rest):
 
 @inner_scalar
 def relieved_by_parameters(theta, rest, theta1, theta2, moment_at_rest):
-    """Derivatives of that by theta1, theta2 and the moment at rest."""
+    """Derivatives of its moment / k by theta1, theta2 and the moment at rest."""
     by_first, by_second = by_limits(theta, rest, theta1, theta2)
     return by_first, by_second, -1.0
 
 
 @inner_scalar
 def relieved_energy_by_rest(theta, rest, theta1, theta2):
-    """Derivative of its energy / k by rest, along which moment and energy at rest move."""
+    """Derivative of its energy / k by rest; moment and energy at rest change with it."""
     return slope(rest, rest, theta1, theta2) * (rest - theta)
 
 
@@ -176,7 +176,7 @@ class EnhancedLinear(HingeLaw):
 
     @property
     def code(self) -> int:
-        """Which of the two: one subtracts its moment at rest."""
+        """Code of its formulas, which depends on whether the moment at rest is subtracted."""
         return AS_PUBLISHED if self.rest == "as_published" else STRESS_FREE
 
     @property
@@ -186,7 +186,7 @@ class EnhancedLinear(HingeLaw):
 
     @property
     def closed_at_rest(self) -> bool:
-        """Not without stress: its moment there is infinite."""
+        """Only with the published law; the other one would subtract an infinite moment."""
         return self.rest == "as_published"
 
     def parameters(self, rest: NDArray) -> NDArray:
@@ -197,6 +197,6 @@ class EnhancedLinear(HingeLaw):
         return table
 
     def reach(self, theta: NDArray, rest: NDArray, parameters: NDArray) -> NDArray:
-        """See `HingeLaw`: the angles between which it is linear, and where the panels meet."""
+        """Distance to theta1, theta2 or the angles at which panels meet; see `HingeLaw`."""
         kinks = (0.0, *self.linear_between, TWO_PI)
         return np.min([np.abs(theta - kink) for kink in kinks], axis=0)

@@ -8,11 +8,11 @@ moment tilts (H. Eyring, J. Chem. Phys. 4, 1936),
 M0 per length of the crease. At a fixed angle tanh(M / 2 M0) falls as exp(-2 k r t / M0), and as
 long as M is well above M0 this is M(t) = M(0) - M0 ln(1 + t/t0), t0 = M0 / (k r) exp(-M(0)/M0): the
 logarithmic relaxation of folded sheets (B. Thiria and M. Adda-Bedia, Phys. Rev. Lett. 107, 2011; T.
-Jules, F. Lechenault and M. Adda-Bedia, Phys. Rev. Research 2, 2020). The elastic law has what is
-beyond: M = k (m(d) - c).
+Jules, F. Lechenault and M. Adda-Bedia, Phys. Rev. Research 2, 2020). With an elastic law m(d) that
+is not linear, M = k (m(d) - c).
 
 Over a step in which d changes by D at a constant rate, w = exp(-M/M0) satisfies the Riccati
-equation w' = (r k/M0) (1 - w^2) - (k D/M0 dt) w, whose solution is that of the step.
+equation w' = (r k/M0) (1 - w^2) - (k D/M0 dt) w, which is solved exactly.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ def update(p, before, after, dt, spring, other):
     turn = after - before
     now, slope = _relaxed(turn, dt, spring, p[0], p[1])
     lost = 0.5 * (spring + now) * (turn - (now - spring))
-    # the elastic law has the turn as a whole
+    # the elastic law counts the whole turn
     return now, 0.0, now - after, slope - 1.0, 0.5 * (now * now - after * after), lost
 
 
 @scalar
 def mean_moment(p, before, after, dt, spring, other):
-    """Mean of the moments at the ends, its slope, and 0: its work is what is stored and lost."""
+    """Mean of the moments at both ends, its slope, and 0: its work is exactly stored or lost."""
     now, slope = _relaxed(after - before, dt, spring, p[0], p[1])
     return 0.5 * (spring + now - before - after), 0.5 * (slope - 1.0), 0.0
 
@@ -83,8 +83,8 @@ class Eyring(MemoryLaw):
     Parameters
     ----------
     barrier_moment : float
-        Moment M0 per length of the crease (N m per m), above 0: that at which the rate of creep is
-        e times as large.
+        Moment M0 per length of the crease (N m per m), above 0: an increase by M0 makes the creep
+        e times as fast.
     rate : float
         Rate r (rad/s), above 0.
     law : str or HingeLaw
@@ -105,7 +105,7 @@ class Eyring(MemoryLaw):
     rate_dependent = True
 
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
-        """See `MemoryLaw`; small moments flow as a dashpot lets them."""
+        """See `MemoryLaw`; under small moments the creep is viscous."""
         barrier = self.barrier_moment * length / stiffness
         table = columns(len(barrier), barrier, self.rate)
         return (Branch(CODE, table, -1.0, 1.0, 2.0 * self.rate / barrier),)

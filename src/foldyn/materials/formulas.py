@@ -1,4 +1,4 @@
-"""What laws declare for kernels: compiled formulas, reached by the code of the law.
+"""Declarations of laws for kernels: compiled formulas, selected by the code of the law.
 
 A law's file declares all of it in one place, and a missing part is an error when it is imported.
 """
@@ -35,8 +35,8 @@ class BarFormulas:
 class HingeFormulas:
     """Formulas of a hinge law per unit stiffness, compiled as `scalar`.
 
-    Each takes `turn`, the dihedral less the rest angle, or `theta` and `rest`; then as many of the
-    four `HingeLaw.parameters` as it needs, by names of its own.
+    Each takes `turn`, the dihedral minus the rest angle, or `theta` and `rest`; then as many of the
+    four `HingeLaw.parameters` as it needs, under any names.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ class HingeFormulas:
         Derivatives of the moment by each parameter that it takes, three at most, as a tuple;
         needed if it takes any.
     energy_by_rest, moment_by_rest : compiled functions, optional
-        Derivatives by the rest angle; needed unless all formulas take the turn: then they are
-        those by the dihedral, with a minus.
+        Derivatives by the rest angle. Not needed if all formulas take the turn: they are then
+        minus the derivatives by the dihedral.
     follow : compiled function, optional
         Of (rest, parameters): sets the parameters of a hinge that depend on its rest angle;
         needed if there are any.
@@ -65,7 +65,7 @@ class HingeFormulas:
     follow: Any = None
 
     def __post_init__(self) -> None:
-        """Refuse what is incomplete: kernels would find nothing, or nan."""
+        """Refuse incomplete formulas, for which kernels would return nan."""
         formulas = self.energy, self.moment, self.slope
         by_rest = self.energy_by_rest, self.moment_by_rest
         lacks = []
@@ -85,11 +85,11 @@ class HingeFormulas:
         return _call(0, formula := getattr(self, name)), (formula,)
 
     def energy_slope(self) -> Branch:
-        """The same of the derivative of the energy by the rest angle."""
+        """The branch that returns the derivative of the energy by the rest angle."""
         return _by_rest(self.energy_by_rest, self.moment)
 
     def moment_slopes(self) -> Branch:
-        """The same of those of the moment by the rest angle and by three parameters."""
+        """The branch for derivatives of the moment by the rest angle and by three parameters."""
         by_rest, functions = _by_rest(self.moment_by_rest, self.slope)
         slopes, others = f"({by_rest},)", MOVING - parameters_of(self.moment)
         if self.by_parameters is not None:
@@ -104,7 +104,7 @@ class BranchFormulas:
 
     Both take `p, before, after, dt, one, other`: the (4,) parameters of the branch; the turn from
     the rest angle at the last accepted step, and now, rad; the time since then, s; and the state,
-    two numbers, at that step. What has not moved in no time stays as it is, bit by bit.
+    two numbers, at that step. Without a turn and without time the state keeps its bits.
 
     Parameters
     ----------
@@ -113,9 +113,9 @@ class BranchFormulas:
     update : compiled function
         State (two numbers), moment, its derivative by `after`, energy and loss.
     mean_moment : compiled function
-        Mean moment in the step, its derivative by `after`, and what is not lost: the work along
-        the turn is the change of the energy and the loss of `update` less that. None for what only
-        explicit motions have.
+        Mean moment in the step, its derivative by `after`, and a deficit: the work along the turn
+        is the change of the energy plus the loss of `update` minus this deficit. None for branches
+        that only explicit motions have.
     """
 
     code: int
@@ -129,7 +129,7 @@ def of_turn(formula: Any) -> bool:
 
 
 def parameters_of(formula: Any) -> int:
-    """How many parameters it takes."""
+    """Number of parameters that a formula of a hinge law takes."""
     return len(arguments_of(formula)) - (1 if of_turn(formula) else 2)
 
 

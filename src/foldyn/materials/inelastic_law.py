@@ -1,10 +1,10 @@
-"""Laws with memory: a hinge law, and branches beside it whose moment depends on the past.
+"""Laws with memory: a hinge law with parallel branches whose moments depend on the past.
 
 A hinge turned by d = theta - theta0 from its rest angle has the moment M = k (m(d) + sum of b),
-m the elastic law that the law with memory is given, and b a branch per unit stiffness k: a function
-of d, of the state of the branch at the last accepted step, of d there, and of the time since then.
+with m the elastic law and b the branches per unit stiffness k. A branch is a function of d, of d at
+the last accepted step, of the state of the branch at that step, and of the time since then.
 Kernels call all branches through one switch (`branch_switch`); the elastic part has the code of its
-own law, so that all that does not know of branches takes it as that law.
+own law: code that ignores branches works with the elastic part.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ class MemoryLaw(HingeLaw):
 
     law: str | HingeLaw
     lookup: ClassVar[Callable[..., HingeLaw]]
-    """`materials.hinge_law`; the registry, which knows these laws too, gives it to them."""
+    """`materials.hinge_law`, which the registry sets, as it knows these laws."""
     formulas: ClassVar[tuple[BranchFormulas, ...]] = ()
-    """Those of its branches, one for each of their codes."""
+    """Formulas of its branches, one for each code."""
     rate_dependent: ClassVar[bool]
     """Whether its moment depends on time, not on the path alone."""
     relaxes: ClassVar[bool] = False
-    """Whether its moment, the angle held, comes to that of the elastic part."""
+    """Whether its moment at a held angle relaxes to the moment of the elastic part."""
 
     @cached_property
     def elastic(self) -> HingeLaw:
@@ -61,7 +61,7 @@ class MemoryLaw(HingeLaw):
         return law
 
     def agree(self) -> None:
-        """Refuse an elastic part that is none."""
+        """Refuse an elastic part that has a memory itself."""
         _ = self.elastic
 
     @abstractmethod
@@ -75,11 +75,11 @@ class MemoryLaw(HingeLaw):
     closed_at_rest: Any = property(attrgetter("elastic.closed_at_rest"))
 
     def parameters(self, rest: NDArray) -> NDArray:
-        """Those of the elastic part."""
+        """Parameters of the elastic part."""
         return self.elastic.parameters(rest)
 
     def check(self, field: str) -> None:
-        """Refuse an elastic part that the law cannot stand beside."""
+        """Refuse an elastic part without stiffness at rest."""
         self.elastic.check("fold_law")
         stiff = self.elastic.slope(np.pi, np.pi)
         if not stiff > 0.0:

@@ -1,4 +1,4 @@
-"""What a scalar law is: the base classes of bar and hinge laws.
+"""Base classes of scalar laws, for bars and hinges.
 
 A law is scaled: a bar law is per unit Young's modulus, a hinge law per unit stiffness, so the
 same law object serves every element of a structure. Compiled kernels never see these objects;
@@ -32,9 +32,9 @@ class Law(Checked, ABC):
     """`BarFormulas` or `HingeFormulas` of each of its codes; its `code` is the first of these."""
     rest_state: tuple[float, ...]
     compiled: ClassVar[Callable[..., NDArray]]
-    """All functions of a law by its code; the switch, which knows the laws, gives it to them."""
+    """Table of all functions of a law by its code; set by the registry."""
     known: ClassVar[Mapping[int, Any]]
-    """The formulas by code that the switch has; likewise."""
+    """Formulas by code that the switch knows; set by the registry."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Let messages begin with the name of the class, and kernels find its formulas."""
@@ -49,7 +49,7 @@ class Law(Checked, ABC):
         return None
 
     def check(self, field: str) -> None:
-        """Refuse a law whose formulas the switch lacks: its code would have others, or none."""
+        """Refuse a law whose formulas the switch does not know under its code."""
         if type(self).addresses is not Law.addresses:  # asking for them would compile them
             return
         if self.known.get(self.code) not in self.formulas:
@@ -100,7 +100,7 @@ class HingeLaw(Law):
     """Whether a hinge can be at rest closed, with a dihedral of 0 or 2 pi."""
 
     def check(self, field: str) -> None:
-        """Refuse what kernels do not know, and parameters that would stay behind a rest angle."""
+        """Refuse unknown laws, and parameters that would not follow the rest angle."""
         super().check(field)
         one, other = self.parameters(np.array([math.pi, 0.5 * math.pi]))
         if (one != other).any() and self.known[self.code].follow is None:
@@ -115,7 +115,7 @@ class HingeLaw(Law):
         return np.zeros((len(rest), PARAMETERS))
 
     def reach(self, theta: NDArray, rest: NDArray, parameters: NDArray) -> NDArray:
-        """How far (rad) a kink or pole is from each dihedral (n,); smooth laws have none."""
+        """Distance (rad) from each dihedral (n,) to the nearest kink or pole; inf if smooth."""
         return np.full(len(theta), np.inf)
 
     def energy(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
@@ -150,7 +150,7 @@ class HingeLaw(Law):
 
 
 def columns(rows: int, *values: ArrayLike) -> NDArray:
-    """Parameters (n, 4) of hinges, the last ones zero."""
+    """Parameters (n, 4) of hinges from leading columns; the other columns are zero."""
     table = np.zeros((rows, PARAMETERS))
     for column, value in enumerate(values):
         table[:, column] = value

@@ -4,12 +4,12 @@ With the plastic turn p and the sum a of its sizes, per length of the crease,
 
     M = k (d - p),    f = |M - C p| - (M_y + H a) <= 0,    dp/dt = sgn(M - C p) da/dt,
 
-and a grows where f = 0 only. The elastic law has what is beyond: M = k (m(d) - p).
+and a grows only if f = 0. With an elastic law m(d) that is not linear, M = k (m(d) - p).
 
 A step is the return mapping (M. L. Wilkins, 1964; J. C. Simo and T. J. R. Hughes, Computational
-Inelasticity, 1998, box 1.5): where the trial state with the old p has f > 0, a grows by
-f / (k + H + C). It is exact for turns in one direction, whatever the step, and so is what is
-dissipated, int (M_y + H a) da. The slope of the moment within such a step is the consistent one,
+Inelasticity, 1998, box 1.5): if the trial state with the old p has f > 0, a grows by
+f / (k + H + C). For turns in one direction the moment and the dissipation, int (M_y + H a) da, are
+exact for any step. The slope of the moment within such a step is the consistent one,
 k (H + C) / (k + H + C).
 """
 
@@ -41,7 +41,7 @@ def update(p, before, after, dt, plastic, grown):
     driven = after - plastic - kinematic * plastic
     beyond = abs(driven) - (limit + isotropic * grown)
     slope, lost = 0.0, 0.0
-    if beyond > 0.0 and after != before:  # what has not moved stays, rounding or not
+    if beyond > 0.0 and after != before:  # without a turn, rounding must not cause yielding
         whole = 1.0 + isotropic + kinematic
         more = beyond / whole
         lost = more * (limit + isotropic * (grown + 0.5 * more))
@@ -54,11 +54,12 @@ def update(p, before, after, dt, plastic, grown):
 
 @scalar
 def mean_moment(p, before, after, dt, plastic, grown):
-    """Mean of the moments at the ends, its slope, and what its work lacks of what is lost.
+    """Mean of the moments at both ends, its slope, and the loss that its work does not cover.
 
-    It lacks something where the crease begins to yield within the turn. With the mean along the
-    turn dofs without mass would ring from step to step. What is left of the loss is not negative:
-    before the crease yields, it turns by twice the yield moment over its stiffness at most.
+    Some loss is not covered if the crease begins to yield within the turn. (The mean along the turn
+    would cover it, but dofs without mass would then oscillate from step to step.) The covered loss
+    is not negative: before a crease yields, it turns by at most twice the yield moment over its
+    stiffness.
     """
     now = update(p, before, after, dt, plastic, grown)
     turn, more, whole = abs(after - before), now[1] - grown, 1.0 + p[1] + p[2]

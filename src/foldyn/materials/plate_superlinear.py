@@ -23,7 +23,7 @@ from foldyn.materials.law import HingeLaw, columns
 from foldyn.values import number
 
 CODE = 4
-FEW = 1e-4  # of (d/d0)^2: below, the energy is its series
+FEW = 1e-4  # of (d/d0)^2: below it the energy is computed by a series
 
 
 @scalar
@@ -68,10 +68,10 @@ class PlateSuperlinear(HingeLaw):
     Parameters
     ----------
     onset : float, optional
-        Turn d0 (degrees) at which the two parts are equal. Without it each bend has its own: that
-        at which the bends of the standard calibration are as stiff as those of the plate, which
-        needs `calibration="plate"`. (Outside a structure it is then that of a square panel with
-        t/L = 0.01 and nu = 0.25: 1.37 degrees.)
+        Turn d0 (degrees) at which the two parts are equal. By default each bend has its own onset,
+        at which bends of the standard calibration and bends of a plate have equal moments; this
+        needs `calibration="plate"`. (Outside a structure the default is the onset of a square panel
+        with t/L = 0.01 and nu = 0.25: 1.37 degrees.)
 
     Examples
     --------
@@ -87,7 +87,7 @@ class PlateSuperlinear(HingeLaw):
     follows_rest = False
 
     def check(self, field: str) -> None:
-        """Refuse it for creases without an onset: only bends have one of their own."""
+        """Refuse the law for creases without a given onset: only bends have a default."""
         super().check(field)
         if field == "fold_law" and self.onset is None:
             raise InputError(
@@ -102,7 +102,7 @@ class PlateSuperlinear(HingeLaw):
         return onset_parameters(np.full(len(rest), onset))
 
     def reach(self, theta: NDArray, rest: NDArray, parameters: NDArray) -> NDArray:
-        """See `HingeLaw`: branch points in the complex plane, at the onset beside rest."""
+        """Distance of the branch points, which are complex: rest +- i onset; see `HingeLaw`."""
         return np.sqrt((theta - rest) ** 2 + 1.0 / parameters[:, 0])
 
 

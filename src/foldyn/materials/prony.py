@@ -1,7 +1,7 @@
 """Linear viscoelasticity: the generalized Maxwell law, whose relaxation is a Prony series.
 
-Beside the elastic law stand branches of a spring g k and a dashpot in series, with the relaxation
-time tau = eta / (g k). With e the part of the turn d that the spring takes,
+Branches act in parallel to the elastic law, each a spring g k and a dashpot in series, with the
+relaxation time tau = eta / (g k). With e the part of the turn d that the spring takes,
 
     M = k (m(d) + sum g e),    de/dt = dd/dt - e / tau,
 
@@ -14,10 +14,10 @@ Simo and T. J. R. Hughes, Computational Inelasticity, 1998, section 10.3):
 
     e' = exp(-x) e + D (1 - exp(-x)) / x,
 
-and so is what the dashpot takes, g int e^2 dt / tau.
+and so is the loss in the dashpot, g int e^2 dt / tau.
 
-A crease in series with panels (`series`), with a damper beside it or not, is such a law again: the
-poles of its stiffness are its rates (`in_series`).
+A crease in series with panels (`series`), with or without a parallel damper, is again such a law:
+its rates are the poles of its stiffness (`in_series`).
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from foldyn.materials.law import HingeLaw, columns
 from foldyn.values import number_or_list, show
 
 CODE = 0  # among branches
-FEW = 0.02  # of a relaxation time: below, the loss under a constant rate is its series
+FEW = 0.02  # of a relaxation time: below it the loss is computed by a series
 
 
 @scalar
@@ -62,7 +62,7 @@ def update(p, before, after, dt, spring, other):
 
 @scalar
 def mean_moment(p, before, after, dt, spring, other):
-    """Mean moment along the turn, its slope, and 0: its work is what is stored and lost."""
+    """Mean moment along the turn, its slope, and 0: its work is exactly stored or lost."""
     share, x = p[0], p[1] * dt
     mean = -math.expm1(-x) / x if x > 0.0 else 1.0
     if x < FEW:
@@ -80,7 +80,7 @@ def _branches(name: str, value: Any) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class Prony(MemoryLaw):
-    """Viscoelastic law: an elastic law and Maxwell branches beside it.
+    """Viscoelastic law: an elastic law with parallel Maxwell branches.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class Prony(MemoryLaw):
     times : float or sequence of float
         Relaxation time (s) of each, above 0.
     law : str or HingeLaw
-        The elastic law: that of slow turns, and what statics take.
+        The elastic law, for slow turns and for statics.
 
     Examples
     --------
@@ -107,7 +107,7 @@ class Prony(MemoryLaw):
     relaxes = True
 
     def agree(self) -> None:
-        """Ask for one of each per branch."""
+        """Refuse different numbers of ratios and times."""
         super().agree()
         ratios, times = np.atleast_1d(self.ratios), np.atleast_1d(self.times)
         if len(ratios) != len(times):
@@ -140,9 +140,9 @@ class Prony(MemoryLaw):
 
 @dataclass(frozen=True)
 class CreaseDampers(MemoryLaw):
-    """Dampers of creases between panels that give way, as a law without branches of its own.
+    """Dampers of creases between compliant panels, as a law without branches of its own.
 
-    They resist the turn of their creases, which is not that of the hinges.
+    They resist the turn of the creases, which differs from the turn of the hinges.
     """
 
     law: str | HingeLaw = "linear"
@@ -169,27 +169,27 @@ def in_series(
 ) -> tuple[NDArray, NDArray]:
     """Branches of n hinges whose creases are in series with panels.
 
-    With phi the turn of the crease, theta that of the hinge and a_j the turns of the dashpots, per
-    unit stiffness of the crease,
+    With phi the turn of the crease, theta the turn of the hinge and a_j the turns of the dashpots,
+    per unit stiffness of the crease,
 
         time dphi/dt = k (theta - phi) - phi - sum g_j (phi - a_j),   da_j/dt = rate_j (phi - a_j),
 
-    k = share / (1 - share) the stiffness of the panels. The moment k (theta - phi) is that of a
+    with k = share / (1 - share) the stiffness of the panels. The moment k (theta - phi) follows a
     generalized Maxwell law, whose rates are the eigenvalues of this symmetric system.
 
     Parameters
     ----------
     share : (n,)
-        Of the crease in a small turn, at most 1.
+        Share of the crease in a small turn, at most 1.
     ratio, rate : (n, b)
-        Of the crease's own branches, per unit of its stiffness; 1/s.
+        Ratios of the crease's own branches, per unit of its stiffness, and their rates, 1/s.
     time : (n,)
         Damping of the crease over its stiffness, s.
 
     Returns
     -------
     ratio, rate : (n, b + 1)
-        Per unit of the stiffness of the hinge; ratios of branches that are missing are 0.
+        Per unit of the stiffness of the hinge; missing branches have the ratio 0.
     """
     n, b = ratio.shape
     ratios, rates = np.zeros((n, b + 1)), np.ones((n, b + 1))

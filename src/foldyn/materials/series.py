@@ -1,14 +1,14 @@
-"""A crease in series with the panels beside it: hinges whose dihedral is not that of their crease.
+"""Creases in series with compliant panels: a hinge turns by more than its crease.
 
-Panels that bend as plates give way at their creases. The dihedral theta of such a hinge is that of
-the crease, phi, and what a linear spring of compliance c adds, which the panels are. The law m of
-the crease (per unit of its stiffness K) and the spring transmit one moment,
+Panels that bend as plates give way at their creases. The dihedral theta of such a hinge is the
+dihedral phi of the crease plus the turn of the panels, a linear spring of compliance c. The law m
+of the crease (per unit of its stiffness K) and the spring transmit one moment,
 
     M = K m(phi) = (theta - phi) / c.
 
 Per unit of the stiffness k = K s of the whole hinge, s = 1/(1 + c K) the share of the crease in
-small turns, M / k = m(phi) / s = (theta - phi) / (1 - s). Where m is linear that is the law itself
-at theta; elsewhere phi is found by Newton's method. A moment Q of the crease alone, which turns phi
+small turns, M / k = m(phi) / s = (theta - phi) / (1 - s). If m is linear, this is the law itself
+at theta; otherwise Newton's method finds phi. A moment Q of the crease alone, which turns phi
 but not the panels, acts as Q on the whole hinge whose law sees theta + c Q.
 """
 
@@ -38,7 +38,7 @@ TWO_PI = 2.0 * math.pi
 
 @inner
 def crease_angle(code, theta, rest, a, b, c, d, share, address):
-    """Dihedral phi (rad) of the crease of a hinge at theta; nan where Newton's method fails.
+    """Dihedral phi (rad) of the crease of a hinge at theta; nan if Newton's method fails.
 
     address : (3,) of the law's energy, moment and slope.
     """
@@ -65,13 +65,13 @@ def crease_angle(code, theta, rest, a, b, c, d, share, address):
 
 @inner_scalar
 def straight(code, share):
-    """Whether the law of a hinge is that of its crease: no panels give way, or all is linear."""
+    """Whether the law of the crease holds for the whole hinge: stiff panels, or a linear law."""
     return (share == 1.0) | (code == LINEAR)
 
 
 @inner
 def series_energy(code, theta, rest, a, b, c, d, share, address):
-    """Energy / k of a hinge at theta, that in the panels among it."""
+    """Energy / k of a hinge at theta, including the energy of the panels."""
     if straight(code, share):
         return hinge_energy(code, theta, rest, a, b, c, d, address[0])
     phi = crease_angle(code, theta, rest, a, b, c, d, share, address)

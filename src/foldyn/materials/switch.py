@@ -1,7 +1,7 @@
 """The one compiled switch from a law's integer code to its formulas.
 
-A new built-in law has its place in the list of its kind; the switch is made of the formulas that it
-declares. A user's law is called at `address`; an unknown code, which has none, gives nan
+A new built-in law is added to the list of its kind; the switch is made of the formulas that laws
+declare. A user's law is called at `address`; an unknown code without an address gives nan
 (`Law.check` refuses it earlier). Hinge parameters a, b, c, d are the four columns of
 `HingeLaw.parameters`.
 """
@@ -87,9 +87,10 @@ def bar_table(code, e, address):
 
 @kernel
 def hinge_table(code, theta, rest, p, address):
-    """Rows (8, n) of one law at theta (n,): energy, moment, slope and derivatives by other numbers.
+    """Rows (8, n) of one law at theta (n,): energy, moment, slope, and further derivatives.
 
-    Of the energy by the rest angle, and of the moment by that and by a, b and c.
+    These are the derivative of the energy by the rest angle, and the derivatives of the moment by
+    the rest angle and by a, b and c.
     """
     out = np.empty((8, theta.size))
     for i in range(theta.size):

@@ -113,7 +113,7 @@ class _Backward(NamedTuple):
     clamps: Clamps
     out: Clamps  # gradients
     points: NDArray  # (4, 3) scratch: positions of one clamp, m
-    moves: NDArray  # (4, 3) weights there
+    moves: NDArray  # (4, 3) weights of these points
     rows: int  # number of rows up to the last node
 
 

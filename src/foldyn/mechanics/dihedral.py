@@ -142,7 +142,7 @@ def dihedral_rates(
     hix, hiy, hiz = dfi * mx + fi * dmx, dfi * my + fi * dmy, dfi * mz + fi * dmz
     hlx, hly, hlz = dfl * nx + fl * dnx, dfl * ny + fl * dny, dfl * nz + fl * dnz
     less_rho, less_sigma = rho - 1.0, sigma - 1.0
-    # of the motion of the wings against the axis: the gradient of a translation is none
+    # by motions relative to the axis, as translations do not turn it
     rate = gix * drx + giy * dry + giz * drz + (sigma * glx - rho * gix) * dbx
     rate += (sigma * gly - rho * giy) * dby + (sigma * glz - rho * giz) * dbz
     rate -= glx * dsx + gly * dsy + glz * dsz

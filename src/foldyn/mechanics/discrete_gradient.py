@@ -37,7 +37,7 @@ ANGLE_NOISE = 4e-15  # the same for a dihedral, rad
 
 @inner_scalar
 def _extension(x):
-    """Stretch less one where stretch^2 - 1 is x."""
+    """Stretch minus one, from x = stretch^2 - 1."""
     return x / (1.0 + math.sqrt(1.0 + x))
 
 

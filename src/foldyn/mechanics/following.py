@@ -6,8 +6,8 @@ positions of its nodes and p, M, N its value times the factor:
 - a triangle with corners x1, x2, x3 under pressure p: p/6 (x2 - x1) x (x3 - x1) on each corner.
   On a closed surface this is p times the gradient of the volume inside;
 - a hinge with moment M: M times the gradient of its dihedral, potential -M angle. A virtual wing
-follows the mean displacement of the axis ends; - a bar from a to b with tension N (N/m, the second
-Piola-Kirchhoff force over the rest length):
+  follows the mean displacement of the axis ends;
+- a bar from a to b with tension N (N/m, the second Piola-Kirchhoff force over the rest length):
   -N d on b and N d on a, d = x_b - x_a. Potential N (|d|^2 - |d at rest|^2) / 2;
 - a hidden dof with a constant force (on a side rotation of a shell, it is a moment).
 

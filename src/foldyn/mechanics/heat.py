@@ -5,9 +5,9 @@ The stored energy is due to the difference from the free strains: the energy of 
 the potential of these loads, plus a constant that makes it zero if each part of the sheet has its
 free strain.
 
-- parts with quadratic energies: half the thermal forces times the free strains; - a bar of any law,
-free at the Green strain E and pushing with the stress S: V (S E - W(E)), V its
-  volume times Young's modulus.
+- parts with quadratic energies: half the thermal forces times the free strains;
+- a bar of any law, free at the Green strain E and pushing with the stress S: V (S E - W(E)), with V
+  its volume times Young's modulus.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Hinges with memory: the forces of the branches of their laws, added to the elastic parts.
+"""Hinges with memory: the branches of their laws, whose forces add to the elastic parts.
 
 The branches store the state at the last accepted step. Every evaluation computes a trial state from
 it, from the dihedrals then and now, and from the elapsed time; only `commit` accepts the trial

@@ -1,11 +1,10 @@
-"""Panels' membranes: panels that resist in their plane as their corners feel it.
+"""Membranes: coupled bars that give a panel its in-plane stiffness between corners.
 
-The strains of a panel are those of its b bars, E = (stretch^2 - 1)/2, quadratic in the positions.
-Its energy is 1/2 E^T S E with a full matrix S (`structures.membranes`): one bar's strain pulls at
-the others too. Bars by themselves are the same with a diagonal matrix. Turned as a whole, or folded
-along bars, a panel has no strain, however far.
+A panel is strained as its b bars are, E = (stretch^2 - 1)/2, quadratic in the positions. Its energy
+is 1/2 E^T S E with a full matrix S (`structures.membranes`), which couples all bars; independent
+bars would have a diagonal matrix. A panel that only turns, or folds along bars, has no strain.
 
-A term has all panels of one kind: with as many nodes, and bars between the same of them.
+A term has all panels of one kind: with the same number of nodes, and bars between the same ones.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ from foldyn.mechanics.term import (
 )
 from foldyn.mechanics.threads import Team, wait
 
-GROUP = 0  # of the energies: that of the bars, in whose place they are
+GROUP = 0  # energy group of the bars, which membranes replace
 
 
 class Membranes(NamedTuple):
@@ -57,7 +56,7 @@ class Membranes(NamedTuple):
 
 
 class Packed(NamedTuple):
-    """The same for the force kernel: flat arrays of groups of eight panels, filled up with 0."""
+    """Panels packed for the force kernel: flat arrays of groups of eight panels, padded with 0."""
 
     count: int  # p
     corners: int  # c
@@ -73,7 +72,7 @@ class Packed(NamedTuple):
 
 
 def packed(membranes: Membranes) -> Packed:
-    """Panels with memory on one thread."""
+    """Panels packed for one thread, with work arrays."""
     count, corners = membranes.nodes.shape
     bars = len(membranes.ends)
 
@@ -101,7 +100,7 @@ def taken(membranes: Membranes, which: NDArray) -> Membranes:
 
 @inner_scalar
 def strain_of(membranes, u, p, i, along):
-    """Strain of bar i of panel p, and its vector (m) to `along` (3,)."""
+    """Strain of bar i of panel p; puts its vector (m) into `along` (3,)."""
     a = membranes.nodes[p, membranes.ends[i, 0]]
     b = membranes.nodes[p, membranes.ends[i, 1]]
     excess = 0.0
@@ -162,10 +161,10 @@ def add_membrane_forces(own, u, low, high, force):
 
 @kernel
 def strains_toward(membranes, u0, u1):
-    """Strains (b, p) at u1 but for what grows with the square of the way from u0 to there.
+    """Strains (b, p) at u1, linearized about u0.
 
-    That is what bars of panels that turn are stretched by on their way along straight lines; see
-    `mechanics.step_tangent`.
+    This leaves out the stretch of turning bars whose nodes move along straight lines, which is of
+    second order; see `mechanics.step_tangent`.
     """
     count, bars = membranes.nodes.shape[0], membranes.ends.shape[0]
     out, along = np.empty((bars, count)), np.empty(3)
@@ -221,12 +220,12 @@ def membrane_blocks(membranes, u0, u1, strain):
 
 
 class Back(NamedTuple):
-    """Memory of the pullback for a group of eight panels, and the gradients to which it adds."""
+    """Work arrays of the pullback for a group of eight panels, and the gradients."""
 
     weight: NDArray  # (24 c,) of the nodes
-    between: NDArray  # (24 b,) what the weights of the ends of the bars differ by
-    excess: NDArray  # (8 b,) length now squared less that at rest, m2
-    growth: NDArray  # (8 b,) its rate where the nodes move by half their weights
+    between: NDArray  # (24 b,) differences of the weights at the bars' ends
+    excess: NDArray  # (8 b,) squared length minus squared rest length, m2
+    growth: NDArray  # (8 b,) its rate for nodal velocities of half the weights
     stress: NDArray  # (8 b,) S E
     pulled: NDArray  # (8 b,) S^T r, r the rates of the strains
     vector: NDArray  # (3 b, p'), p' the panels with room for whole groups
@@ -238,7 +237,7 @@ def back(membranes: Membranes) -> Back:
     """Memory for panels."""
     count, corners = membranes.nodes.shape
     bars = len(membranes.ends)
-    # an odd number of groups: else rows may stand in the same few places of the cache
+    # an odd number of groups: otherwise rows may compete for the same cache lines
     room = WIDTH * (-(-count // WIDTH) | 1)
     return Back(
         *(np.zeros(rows * WIDTH) for rows in (3 * corners, 3 * bars, bars, bars, bars, bars)),
@@ -335,7 +334,7 @@ class _Context(NamedTuple):
 def _forces(own, u, v, t, force, powers):
     moved, out = flat(rows_at(u, own.rows)), flat(rows_at(force, own.rows))
     add_membrane_forces(own.own, moved, own.low, own.high, out)
-    wait(own.team)  # until all have read what others move next
+    wait(own.team)  # until all members have read the displacements that others change next
 
 
 @energies
@@ -378,7 +377,7 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
 
 
 class MembranesTerm(Term):
-    """Panels of one kind, whose energy belongs to that of the sheet's bars.
+    """Panels of one kind; their energy counts as energy of the sheet's bars.
 
     Parameters
     ----------

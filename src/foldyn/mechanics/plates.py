@@ -1,13 +1,14 @@
-"""Bars, folds and plates: panels whose bends resist together, and give way at their edges.
+"""Bars, folds and plates: panels whose bends are coupled, and which give way at their edges.
 
-A plate has angles phi: the turns of its hinges from rest, and rotations beta of its edges against
-the facets there. Its energy is 1/2 phi^T K phi. A fold is a hinge between two plates whose angle is
-the dihedral of the facets less the two rotations beside it. At a clamped edge the sheet keeps its
-direction in space: the plate has there the angle of its facet with the mirror image at rest, a
-hinge whose last point is no node but rides on the ends of the edge (`mechanics.clamps`).
+A plate has angles phi: the turns of its hinges from rest, and rotations beta of its edges relative
+to the facets there. Its energy is 1/2 phi^T K phi. A fold is a hinge between two plates; its angle
+is the dihedral of the facets minus the two adjacent rotations. At a clamped edge the sheet keeps
+its direction in space: the angle of the plate is the one between its facet and the facet's mirror
+image at rest. The last point of this hinge is no node but rides on the ends of the edge
+(`mechanics.clamps`).
 
-Rotations are dofs without mass, beside the displacements u (n, 3). Their dofs x (r,) are lengths as
-well, m, so that norms over all dofs do not depend on the unit of length: beta is x times
+Rotations are massless dofs in addition to the displacements u (n, 3). Their dofs x (r,) are lengths
+too (m), so that norms over all dofs do not depend on the unit of length: beta is x times
 `per_reach`.
 """
 
@@ -58,7 +59,7 @@ class BarsPlates(NamedTuple):
     rotation_hinge: NDArray  # (r,) row in `hinges` that each rotation lies at
     hinges: NDArray  # (nf + nb, 4) of the folds, then of the bends
     wings: NDArray  # (c, 3) of clamped edges, from the middle of each, m
-    fold_rotations: NDArray  # (nf, 2) -1 where there is none
+    fold_rotations: NDArray  # (nf, 2) rotations beside each fold, or -1
     fold_stiffness: NDArray  # (nf,) N m/rad
     fold_rest: NDArray  # (nf,) rad
     fold_parameters: NDArray  # (nf, 4)
@@ -126,9 +127,9 @@ def rides(model, h):
 
 @inner_scalar
 def ride(model, h, share, points):
-    """Put the wing of a clamped edge, if hinge h is one, to where it rides on the ends, (4, 3).
+    """If hinge h is a clamped edge, move the wing in `points` (4, 3) along with the edge's ends.
 
-    share : of the wing's distance from the middle of the edge; 0 in differences of positions.
+    share : 1 for positions, 0 for differences of positions.
     """
     if rides(model, h):
         e = h - model.hinges.shape[0] + model.wings.shape[0]
@@ -149,9 +150,9 @@ def put_points(model, u, h, points):
 
 @inner_scalar
 def carry(model, h, gradient):
-    """Give to the second end of a clamped edge, if hinge h is one, its half of what a wing has.
+    """If hinge h is a clamped edge, distribute the wing's gradient to both ends, half each.
 
-    The other half stays, since the first end stands in the place of the wing.
+    The first end takes the place of the wing in `hinges`, so its half stays there.
     """
     if rides(model, h):
         for c in range(3):
@@ -224,7 +225,7 @@ def plates_energy(model, u, x, scratch, out):
 
 @inner
 def plates_force(model, u, x, force, couple, scratch):
-    """Internal force (n, 3), N, and that of the dofs of rotations (r,), N."""
+    """Internal forces on nodes (n, 3), and on the dofs of rotations (r,), N."""
     internal_force(model.bars, u, force, scratch.bars)
     turn_hinges(model, u, scratch)
     turn_moments(model, x, couple, scratch)

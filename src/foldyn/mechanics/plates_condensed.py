@@ -49,10 +49,10 @@ from foldyn.mechanics.pullback import Pulled, pullback
 from foldyn.mechanics.term import ENERGIES, FORCES, CompiledTerm, energies, forces
 from foldyn.mechanics.threads import Team
 
-STEPS = 100  # of Newton's method, at most
-BEYOND = 0.5  # of the work that a step began with, against it where it ends: it was too long
-BALANCED = 1e-12  # rad, of the last one,
-ROUNDED = 1e-9  # or where creases are so much stiffer than panels that rounding leaves more
+STEPS = 100  # most steps of Newton's method
+BEYOND = 0.5  # of the initial work of the forces: a step is too long if they resist its end by more
+BALANCED = 1e-12  # rad, largest change in the last step
+ROUNDED = 1e-9  # the same if rounding errors are larger, as creases are much stiffer than panels
 
 
 class CondensedPlates(NamedTuple):
@@ -76,7 +76,7 @@ class CondensedPlates(NamedTuple):
     band: NDArray
     factor: NDArray
     offset: NDArray  # (nf + r, 4) see `SheetTerm.series`
-    memory: NDArray  # (2,) address of what evaluates branches of folds, and of its context; or 0
+    memory: NDArray  # (2,) addresses of the kernel for branches of folds, and of its context; or 0
 
 
 class CondensedScratch(NamedTuple):
@@ -88,14 +88,14 @@ class CondensedScratch(NamedTuple):
     step: NDArray  # (r,) in the order of the band
     factor: NDArray  # (r, w + 1)
     branches: NDArray  # (nf, 2) moments, N m, and slopes, N m/rad, of branches of folds
-    angle: NDArray  # those of `plates`
+    angle: NDArray  # arrays of `plates`
     fold_angle: NDArray
     own: NDArray  # (2,) first and last + 1 of the rows
     team: Team
 
 
 def condensed_plates(model: BarsPlates, constant: bool) -> CondensedPlates:
-    """Arrays of the same model without rotations; `constant` as there."""
+    """Arrays of a model whose rotations are in balance; see `CondensedPlates`."""
     r, rows, columns, values = model.rotations, [], [], []
     for p in range(len(model.start) - 1):
         turned = model.angle[model.start[p] : model.start[p + 1]]
@@ -113,7 +113,7 @@ def condensed_plates(model: BarsPlates, constant: bool) -> CondensedPlates:
     joined = sparse.csr_array(
         abs(stiffness) + sparse.coo_array((np.ones(len(one)), (one, other)), shape=(r, r))
     )
-    order = np.zeros(0)  # where all panels are rigid
+    order = np.zeros(0)  # if all panels are rigid
     if r:
         order = reverse_cuthill_mckee(sparse.csr_array(joined + joined.T), symmetric_mode=True)
     rank = ranks(order.astype(np.int64))
@@ -199,7 +199,7 @@ def solve_band(factor, x):
 
 @inner
 def add_branches(model, scratch):
-    """Evaluate the branches of folds at their angles; their moments act on rotations too."""
+    """Evaluate the branches of folds, whose moments also act on rotations."""
     if model.memory[0] == 0:
         return
     run_at(model.memory[0], (model.memory[1], scratch.plates.fold_angle, scratch.branches))
@@ -220,20 +220,20 @@ def along_step(model, push, scratch):
 
 @inner
 def balance(model, u, scratch):
-    """Rotations in balance at displacements u, to scratch.x; nan where there are none."""
+    """Put the rotations in balance at displacements u into scratch.x; nan if none are found."""
     plates, push = model.plates, model.offset[model.plates.fold_rest.size :]
     turn_hinges(plates, u, scratch.plates)
     slope = scratch.plates.slope
     again = model.memory[0] != 0  # rates of creases are differences of turns
-    begun = 0.0  # forces along the last step, where it began
+    begun = 0.0  # work of the forces at the start of the last step
     for k in range(scratch.x.size):
-        if np.isnan(scratch.x[k]):  # there were none at the last displacements
+        if np.isnan(scratch.x[k]):  # none were found at the last displacements
             scratch.x[k] = 0.0
     for i in range(STEPS):
         turn_moments(plates, scratch.x, scratch.couple, scratch.plates)
         add_branches(model, scratch)
         along = along_step(model, push, scratch)
-        if 0.0 < begun < -along / BEYOND:  # a crease began or ceased to yield: to where they vanish
+        if 0.0 < begun < -along / BEYOND:  # a crease began or ceased to yield: go back
             share = begun / (begun - along)
             for k in range(scratch.x.size):
                 scratch.x[k] -= (1.0 - share) * scratch.step[model.rank[k]]
@@ -296,7 +296,7 @@ def condensed_kernels(model: CondensedPlates, scratch: CondensedScratch) -> Comp
 
 @inner
 def rate_couples(model, scratch, back, out):
-    """Rates of the forces on rotations with those of the dihedrals alone, to out (r,)."""
+    """Put the rates of the forces on rotations, due to dihedrals alone, into out (r,)."""
     out[:] = 0.0
     for f in range(model.fold_rest.size):
         scratch.slope[f] = model.fold_stiffness[f] * fold_slope(model, scratch, f)

@@ -1,13 +1,13 @@
 """The pullback of bars, folds and plates (`mechanics.pullback`), with rotations x as dofs.
 
-A prime is a rate where the nodes and rotations move by their weights. With the dihedrals theta, the
+A prime is a rate for nodes and rotations that move by their weights. With the dihedrals theta, the
 angles phi of folds, which have the moments M, and the angles phi of plates,
 
     w . F = sum of M phi' + sum of phi'^T K phi.
 
-A dihedral has therein the moment that multiplies theta', and one, `back`, that multiplies its
-changes: M_phi phi' of a fold, K^T phi' of a plate. Its nodes get moment g' + back g, g the gradient
-of the dihedral.
+Each dihedral has a moment, the factor of theta', and a second one, `back`, the factor of its
+changes: M_phi phi' from folds, K^T phi' from plates. Its nodes get moment g' + back g, with g the
+gradient of the dihedral.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ from foldyn.mechanics.term import parted_rows
 
 
 class Back(NamedTuple):
-    """Memory of the pullback of one evaluation, and what it adds to; nh = nf + nb."""
+    """Work arrays of the pullback, and the gradients that it adds to; nh = nf + nb."""
 
     out: BarsPlates  # gradients; of `bars` a `bars_hinges.Gradient`, of `per_reach` (1,)
     bars: PullbackScratch
     points: NDArray  # (4, 3) of a hinge, m
-    moves: NDArray  # (4, 3) weights there
+    moves: NDArray  # (4, 3) weights of these points
     by: NDArray  # (4, 3)
     rate: NDArray  # (nh,) of the dihedrals
     gradient_rate: NDArray  # (nh, 12) of their gradients
@@ -58,7 +58,7 @@ class Back(NamedTuple):
 
 
 def back_of(model: BarsPlates) -> Back:
-    """Memory for a model."""
+    """Work arrays for a model, and gradients of zero."""
     nh, most = len(model.hinges), int(np.diff(model.start).max(initial=0))
     out = zeros_for(model, "bars", "per_reach")
     out = out._replace(bars=gradient_of(model.bars), per_reach=np.zeros(1))
@@ -70,13 +70,13 @@ def back_of(model: BarsPlates) -> Back:
 
 
 def gradients(out: BarsPlates) -> Mapping[str, NDArray]:
-    """By the names of `pullback.arrays_of` a model."""
-    return arrays_of(out._replace(per_reach=out.per_reach.reshape(()))).numbers
+    """Gradients by name, as `pullback.arrays_of` names the arrays of a model."""
+    return arrays_of(out._replace(per_reach=np.reshape(out.per_reach, ()))).numbers
 
 
 @inner
 def rate_hinges(model, u, w, scratch, back):
-    """Dihedrals and their gradients at u, and their rates where the nodes move by w."""
+    """Dihedrals and their gradients at u, and their rates for nodal velocities w."""
     for h in range(model.hinges.shape[0]):
         put_points(model, u, h, back.points)
         for v in range(4):
@@ -91,7 +91,7 @@ def rate_hinges(model, u, w, scratch, back):
 
 @inner
 def rate_plate(model, y, back, p):
-    """Rates of the angles of plate p where rotations move by y, to back.turned."""
+    """Put the rates of the angles of plate p, for rates y of rotations, into back.turned."""
     for k in range(model.start[p + 1] - model.start[p]):
         h = model.angle[model.start[p] + k]
         back.turned[k] = back.rate[h] if h >= 0 else model.per_reach * y[-1 - h]
@@ -99,7 +99,7 @@ def rate_plate(model, y, back, p):
 
 @inner
 def pull_folds(model, x, y, scratch, back, by_x):
-    """Moments of folds, and what is their share in the gradients, `moment` and by_x (r,)."""
+    """Moments of folds, and their contributions to gradients, back moments and by_x (r,)."""
     turn_folds(model, x, scratch)
     out, p = back.out, model.fold_parameters
     for f in range(model.fold_rest.size):
@@ -127,7 +127,7 @@ def pull_folds(model, x, y, scratch, back, by_x):
 
 @inner
 def pull_plate(model, x, y, scratch, back, by_x, p):
-    """The same for plate p."""
+    """Moments of plate p, and its contributions to gradients, back moments and by_x (r,)."""
     count, folds, out = model.start[p + 1] - model.start[p], model.fold_rest.size, back.out
     turn_plate(model, x, scratch, p)
     rate_plate(model, y, back, p)
@@ -156,7 +156,7 @@ def pull_plate(model, x, y, scratch, back, by_x, p):
 
 @inner
 def pull_hinges(model, scratch, back, product):
-    """Add what the nodes of all hinges get, to `product` and to the gradients."""
+    """Add the contributions of all hinges to their nodes, in `product` and the gradients."""
     by, rest = back.by, back.out.bars.rest
     for h in range(model.hinges.shape[0]):
         moment, other = scratch.moment[h], back.moment[h]

@@ -1,8 +1,8 @@
 """Tangent stiffness of bars, folds and plates: exact, in a sparse matrix of a known pattern.
 
 Dofs are 3 node + axis, then the rotations. A *place* is a node, with three dofs, or a rotation,
-with one. What couples two places is a block of adjacent entries in each of its rows, so that an
-element needs the first entries of its blocks only. Places of a plate are the nodes of its hinges,
+with one. Two coupled places have a block, which is contiguous in each of its rows, so that elements
+store only the first entries of their blocks. Places of a plate are the nodes of its hinges,
 then its rotations; places of a fold are its four nodes, then its two rotations.
 """
 
@@ -30,15 +30,15 @@ from foldyn.mechanics.tangent import distinct
 
 
 class PlatesPattern(NamedTuple):
-    """Pattern of the tangent, and where the blocks of elements go; -1 where there is no place.
+    """Pattern of the tangent, and the positions of elements' blocks; -1 for no place.
 
     Entry (a, b) of a block comes a * (indptr[d + 1] - indptr[d]) + b entries after its first one,
-    d the first dof of its row.
+    with d the first dof of its row.
     """
 
     indptr: NDArray  # (size + 1,)
     indices: NDArray  # (nnz,)
-    bars: NDArray  # (entries of the tangent of the bars,) where they go, if bars act
+    bars: NDArray  # (entries of the bars' tangent,) their positions, if bars act
     fold_dof: NDArray  # (nf, 6) first dofs of the places of each fold
     fold: NDArray  # (nf, 36) first entries
     begin: NDArray  # (p + 1,) first place of each plate
@@ -46,14 +46,12 @@ class PlatesPattern(NamedTuple):
     dof: NDArray  # (places of all plates,) first dofs
     start: NDArray  # (p + 1,) first block of each plate
     plate: NDArray  # (blocks of all plates,) first entries
-    corner: (
-        NDArray  # (nq, 4) which of its plate's places the nodes of each hinge, or a rotation, are
-    )
-    owner: NDArray  # (nh, 2) a plate, and the angle (nq) that is the hinge; -1 without one
+    corner: NDArray  # (nq, 4) places of the hinge's nodes, or of the rotation, in the plate
+    owner: NDArray  # (nh, 2) a plate of the hinge, and its angle (nq) there; -1 if none
 
 
 def plates_pattern(model: BarsPlates, bars: tuple[NDArray, NDArray]) -> PlatesPattern:
-    """Pattern of the tangent, given that of the blocks of the bars: indptr and indices."""
+    """Pattern of the tangent, given the pattern of the bars' blocks: indptr and indices."""
     n, count = model.nodes, model.nodes + model.rotations
     hinges, plates = model.hinges, len(model.start) - 1
     of = np.repeat(np.arange(plates), np.diff(model.start))  # the plate of each angle
@@ -229,7 +227,7 @@ def _add_plates(model, pattern, x, scratch, bend, resist, block, data):
 
 @kernel
 def _add_bends(model, pattern, u, scratch, data):
-    """What the moments of the hinges of plates add."""
+    """Add the moments of the hinges of plates, times the second derivatives of dihedrals."""
     points, gradient, turned = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3, 4, 3))
     dof, first, block = np.empty(4, np.int32), np.empty(16, np.int32), turned.reshape(12, 12)
     for h in range(model.fold_rest.size, model.hinges.shape[0]):

@@ -298,7 +298,7 @@ class ViscousTerm(Term):
         return self._coupled[1:]
 
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
-        """Damping entries; forces on hidden dofs are scaled likewise, for symmetry; see `Term`."""
+        """Damping entries; forces on hidden dofs are scaled too, for symmetry. See `Term`."""
         gradient = np.zeros(self.elements.dofs.shape)
         put_gradients(self.elements, np.ravel(q), gradient)
         gradient[:, 12:] *= hidden**0.5

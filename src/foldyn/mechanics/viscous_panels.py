@@ -105,8 +105,10 @@ def _forces(own, u, v, t, force, powers):
 class _Backward(NamedTuple):
     panels: ViscousPanels
     out: ViscousPanels  # gradients
-    growth: NDArray  # (2, b) memory of one panel: rates of its bars' lengths, times length,
-    stress: NDArray  # (2, b) and C and C^T times those of strains, by the weights and velocities
+    growth: (
+        NDArray  # (2, b) length times length rate of a panel's bars, by weights and by velocities
+    )
+    stress: NDArray  # (2, b) C^T times strain rates by the weights, and C times those by velocities
     rows: int  # number of rows up to the last node
 
 

@@ -64,7 +64,7 @@ class ShellMesh:
 
 
 class _Points:
-    """Nodes as they are made."""
+    """Nodes of a mesh under construction."""
 
     def __init__(self, vertices: NDArray) -> None:
         self.all: list[NDArray] = list(vertices)
@@ -83,8 +83,8 @@ def shell_mesh(pattern: Pattern, divisions: int, graded: Grading | None = None) 
     """Cut every edge of a pattern into `divisions` pieces and its panels into triangles.
 
     Quadrilaterals get a grid whose cells are cut in two, triangles are divided evenly, and other
-    polygons are first cut into triangles about the mean of their corners. Where they are `graded`,
-    that says how all are cut.
+    polygons are first cut into triangles about the mean of their corners. A `graded` mesh cuts all
+    panels alike, finer toward their corners.
     """
     points = _Points(pattern.vertices)
     even = [step / divisions for step in range(1, divisions)]
@@ -288,7 +288,7 @@ def sides(
 def _without(
     rigid: NDArray, rotation: NDArray, pieces: NDArray, count: int
 ) -> tuple[NDArray, NDArray, int]:
-    """Rotations (3 nt,) and those of creases (c, 2) without those of rigid triangles (nt,)."""
+    """Renumber rotations (3 nt,), and of creases (c, 2), without the ones of rigid triangles."""
     kept = np.ones(count + 1, bool)  # the last entry stands for none
     kept[rotation[np.repeat(rigid, 3)]] = False
     number = np.where(kept, np.cumsum(kept) - 1, -1)
@@ -317,8 +317,8 @@ def stiffness(corners: NDArray, panel: NDArray, sheet: Sheet) -> tuple[NDArray, 
 def triangle_plates(ends: Sides, bending: NDArray) -> tuple[EdgePlates, NDArray, NDArray]:
     """Triangles as plates, with the stiffness `bending` (nt, 3, 3) of rotations of their sides.
 
-    And of each angle (nq,) the side that it turns, 3 t + k of triangle t, and how far in a turn of
-    one.
+    Also returns, for each angle (nq,), the side that it turns, 3 t + k for side k of triangle t,
+    and the turn of the side per unit of the angle.
     """
     size = (len(bending), 6)
     angle = np.stack([ends.hinge, -1 - ends.rotation], axis=2).reshape(size)

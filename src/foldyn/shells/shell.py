@@ -54,7 +54,7 @@ from foldyn.values import choice, length, show, whole
 
 MASSES = {"lumped": "centroid", "consistent": "consistent"}  # and the rules they are
 STIFF = 100.0  # times the stiffness in the plane: corners about vertices that count as rigid
-RANDOM = 0.05  # of rounding errors, how much is left where many of either sign add up
+RANDOM = 0.05  # of its bound: sum of many random rounding errors
 PER_NODE = 20_000.0
 """Bytes a node with its tangent: 14,200 and 16,000 measured with 3,721 and 14,641 nodes."""
 PER_DOUBLING, LEAST = 5900.0, 1450
@@ -63,7 +63,7 @@ PER_DOUBLING, LEAST = 5900.0, 1450
 
 @dataclass(frozen=True)
 class ShellOptions:
-    """Arguments of `shell` besides pattern and sheet; see there."""
+    """Arguments of `shell` other than pattern and sheet."""
 
     divisions: int = 16
     mass: str = "lumped"
@@ -125,7 +125,7 @@ class Shell(Discretized):
         return self.options.divisions
 
     def meshed(self, divisions: int) -> Shell:
-        """The same with so many pieces of every edge."""
+        """The shell with another number of pieces per edge."""
         return shell(self.pattern, self.sheet, **vars(replace(self.options, divisions=divisions)))
 
     kind: ClassVar[str] = "shell"
@@ -134,7 +134,7 @@ class Shell(Discretized):
 
     @property
     def massless(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Its dofs without mass, in words; none where all panels are rigid."""
+        """Its massless dofs, in words; empty if all panels are rigid."""
         return "the rotations of a shell" if self.rotations else ""
 
     @property
@@ -155,21 +155,21 @@ class Shell(Discretized):
 
     @cached_property
     def body(self) -> Assembly:
-        """What solvers take."""
+        """The model for solvers."""
         laws = self.fold_law, LinearHinge()
         sheet = ShellTerm(self.model, laws, self.sides.piece_crease, self._scale)
         return Assembly(sheet, *(MembranesTerm(own, sheet.rows) for _, own in self.membranes))
 
     @property
     def rotations(self) -> int:
-        """Number of rotations, which are dofs besides the displacements."""
+        """Number of rotations, which are dofs in addition to the displacements."""
         return self.sides.rotations
 
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
-        """See `Discretized`.
+        """Effect of swelling; see `Discretized`.
 
-        Triangles have a free strain of their sides and a free rotation beta0 of the sheet at them
-        (see `shells.mesh`): their energies are linear in those, which makes constant forces.
+        Triangles have free strains of their sides, and free rotations beta0 of the sheet there (see
+        `shells.mesh`). Their energies are linear in these, so that forces are constant.
         """
         panel, hinges, (plates, side, share) = self.triangle_panel, self.sides.hinges, self._plates
         bends = ~np.isin(panel, rigid_panels(self.options.rigid, len(self.pattern.faces)))
@@ -234,12 +234,12 @@ class Shell(Discretized):
 
     @property
     def _reach(self) -> float:
-        """Length (m) that turns a rotation into a displacement: that of a side."""
+        """Length (m) of a typical side: times a rotation it is a displacement."""
         return 1.0 / self.model.per_reach
 
     @cached_property
     def _stiffness(self) -> tuple[NDArray, NDArray]:
-        """Of the triangles (nt, 3, 3): J of strains of their sides, N m of rotations there."""
+        """Stiffness (nt, 3, 3) of triangles: for strains of their sides, J; for rotations, N m."""
         membrane, bending = stiffness(self.nodes[self.triangles], self.triangle_panel, self.sheet)
         if self.graded:
             membrane[(self.triangles < len(self.pattern.vertices)).any(axis=1)] *= STIFF
@@ -313,7 +313,7 @@ class Shell(Discretized):
     def energies(self, u: ArrayLike, rotation: ArrayLike | None = None) -> Mapping[str, float]:
         """Strain energies (J) of membrane, bending and folds at displacement u (n, 3), m.
 
-        rotation : (r,), rad; without it the one in balance.
+        rotation : (r,), rad; in balance by default.
         """
         u, x = self._state(u, rotation)
         energies = self.body.energies(np.append(u, x * self._reach))
@@ -344,7 +344,7 @@ class Shell(Discretized):
         return matrix
 
     def balanced(self, u: ArrayLike) -> NDArray:
-        """Rotations (r,) at which there are no moments at displacement u (n, 3)."""
+        """Rotations (r,) without moments at displacement u (n, 3)."""
         u, _ = self._state(u, np.zeros(self.rotations))
         return self.body.dofs(u)[u.size :] / self._reach
 

@@ -233,7 +233,7 @@ class BarsPlatesTerm(SheetTerm):
         return self._bars.longest()
 
     def soft_hinges(self, q: NDArray) -> SoftHinges:
-        """See `SheetTerm`: none."""
+        """No hinges, but refuse the superlinear law; see `SheetTerm`."""
         if self.model.code == Superlinear.code:
             raise InputError(
                 f' = "superlinear": {self._no_slope} frequency responses take "linear" or '
@@ -325,7 +325,7 @@ class BarsPlatesTerm(SheetTerm):
 
 
 def positions(model: BarsPlates) -> NDArray:
-    """Where the dofs are (3 rows, 3), m: rotations in the middle of their edges."""
+    """Positions (3 rows, 3) of the dofs, m; rotations are in the middle of their edges."""
     points = np.zeros((3 * model.rows, 3))
     n = model.nodes
     points[: 3 * n] = np.repeat(model.bars.rest, 3, axis=0)

@@ -49,7 +49,7 @@ def doubt_range(pattern: Pattern, sheet: Sheet, options: ModelOptions, folds: ND
 
 
 def doubt_locking(structure: Discretized) -> None:
-    """Warn of creases at rest in the range where the default fold law already locks."""
+    """Warn of creases whose rest angle lies in the locking range of the default fold law."""
     law, rest = structure.options.fold_law, structure.fold_rest
     if law != EnhancedLinear() or not len(rest):
         return

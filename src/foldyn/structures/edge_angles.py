@@ -1,8 +1,8 @@
 """The scheme n5b8e: bars and hinges whose panels bend as condensed plates, with edge angles.
 
-Nodes and bars are those of N5B8. Each panel has one constant matrix for the turns of its spokes and
-of its creased edges (`structures.condensed_panel`); a fold acts between the two edges beside it,
-with the stiffness of the crease alone.
+Nodes and bars are as in N5B8. Each panel has one constant matrix for the turns of its spokes and of
+its creased edges (`structures.condensed_panel`); a fold acts between its two adjacent edges, with
+the stiffness of the crease alone.
 
 A crease between panels in different planes stays straight, because bowing would stretch them: a bow
 w out of the plane of one panel is w sin(fold) in the plane of the other (w^2 against t^2). A crease

@@ -85,7 +85,7 @@ class Grading(NamedTuple):
 
     @property
     def ends(self) -> tuple[NDArray, NDArray]:
-        """Where the rays end in a patch (2 rays + 1,), toward the one edge and the other."""
+        """Ends (2 rays + 1,) of the rays in a patch, as coordinates along both edges."""
         rising, full = np.append(0.0, self.steps), np.ones(self.rays + 1)
         return np.append(full, rising[::-1]), np.append(rising, full)
 

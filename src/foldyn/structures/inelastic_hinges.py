@@ -48,7 +48,7 @@ class Remembering(NamedTuple):
 
     @property
     def alone(self) -> bool:
-        """Whether these are dampers beside edge angles in balance, without their own stiffness."""
+        """Whether these are dampers between edge angles in balance, without their own stiffness."""
         alone = isinstance(self.law, CreaseDampers)
         return alone and bool(np.isfinite(self.hinges.beside).any())
 

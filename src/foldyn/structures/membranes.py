@@ -47,12 +47,12 @@ STRAIGHT = 100.0  # resistance, over E t and the area, above which edges are str
 class PanelKind(NamedTuple):
     """Panels of one kind, and their membranes."""
 
-    panels: NDArray  # (p,), of a shell those of its triangles
+    panels: NDArray  # (p,); of a shell, the panel of each triangle
     membranes: Membranes
 
 
 class Sides(NamedTuple):
-    """How a panel's edges are held: which are straight, and what resists bows of the others."""
+    """A panel's edges: which are straight, and the resistance of the others against bows."""
 
     outline: Outline
     resistance: tuple[float, ...]

@@ -276,9 +276,9 @@ def quad_centers(x: NDArray) -> NDArray:
 def polygon_center(x: NDArray) -> NDArray:
     """Point of a polygon x (m, 3) that minimizes sum |(xj - c) x (xi - c)| / Lij^2 over diagonals.
 
-    The sum is one of weighted distances to lines: convex and piecewise linear, so its minimum is
-    at a crossing of two diagonals. Where several tie, the corners' mean if it is one of the
-    minimizers, else the mean of the tied crossings. A polygon that is not flat is
+    This sum of weighted distances to lines is convex and piecewise linear, so its minimum is at a
+    crossing of two diagonals. If several crossings tie, the result is the mean of the corners if
+    that is a minimizer too, else the mean of the tied crossings. A polygon that is not flat is
     projected on its mean plane for this.
     """
     origin = x.mean(axis=0)

@@ -260,7 +260,7 @@ def _edge_and_degree() -> tuple[NDArray, NDArray]:
 
 
 def _line(t: NDArray, derivative: int) -> tuple[NDArray, NDArray]:
-    """Two linear functions (n, 2) of coordinates t, and those that vanish at both ends (n, d)."""
+    """Two linear functions (n, 2) of coordinates t, and d that vanish at both ends (n, d)."""
     linear, bows = (
         np.stack([legendre.legval(t, c) for c in group], axis=-1)
         for group in _polynomials(derivative)
@@ -270,7 +270,7 @@ def _line(t: NDArray, derivative: int) -> tuple[NDArray, NDArray]:
 
 @cache
 def _polynomials(derivative: int) -> tuple[list[NDArray], list[NDArray]]:
-    """Legendre coefficients of these functions."""
+    """Legendre coefficients of the functions of `_line`."""
     ends = [np.array([0.5, -0.5]), np.array([0.5, 0.5])]
     inner = [legendre.legint(np.eye(j + 1)[j], lbnd=-1.0) for j in range(1, DEGREES[1])]
     linear, bows = ([legendre.legder(c, derivative) for c in group] for group in (ends, inner))

@@ -21,7 +21,7 @@ from foldyn.mechanics.contact.distances import VERTEX
 from foldyn.mechanics.threads import Team, part, team, total, wait
 
 # places of a member's notes to its team: shares of the mean velocity and of the mean motion since
-# pairs were listed, three each; the largest against those; the step it allows, how many pairs of
+# pairs were listed, three each; the largest deviations; the step it allows, how many pairs of
 # either kind are near, how many hinges; which nodes its sums reach; the energy of its share
 SPEED, MOTION, FAST, FAR, LIMIT, NEAR, HINGES, LOW, HIGH, ENERGY = 0, 3, 6, 7, 8, 9, 11, 12, 13, 14
 NOTES = 16  # two cache lines
