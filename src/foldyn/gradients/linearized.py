@@ -69,7 +69,7 @@ class Products:
     def add_stiffness(
         self, z: NDArray, x: NDArray, by: float, total: dict[str, NDArray]
     ) -> NDArray:  # fmt: skip
-        """Add the gradient of by z' K x, z and x (nf,); returns the part by the dofs (m,)."""
+        """Add the gradient of `by` z' K x, z and x (nf,); returns the part by the dofs (m,)."""
         weight, motion = (self._linear.whole(each[:, None])[:, 0] for each in (z, x))
         state = np.zeros(len(self.q))
         if by == 0.0 or not motion.any():
@@ -108,7 +108,7 @@ class Products:
         return Pullback(Assembly(alone))
 
     def add_mass(self, z: NDArray, x: NDArray, by: float, total: dict[str, NDArray]) -> None:
-        """Add the gradient of by z' M x, for z (nf,) and x (nf,) or of all nodes (n, 3)."""
+        """Add the gradient of `by` z' M x, for z (nf,) and x (nf,) or of all nodes (n, 3)."""
         one, other = (
             each if each.ndim > 1 else self._linear.expanded(each[:, None]).reshape(-1, 3)
             for each in (z, x)

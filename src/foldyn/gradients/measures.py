@@ -37,9 +37,9 @@ class Derivative(NamedTuple):
     """The derivative of a measure.
 
     seeds : function of a result, a case and the measure's arguments.
-    frozen : for a measure that also depends on the case directly. From the result (or the measure's
-        intermediate result), the case and the arguments it makes the measure as a function of
-        another case, with the result fixed. Differences are taken, so that must be smooth.
+    frozen : for a measure that also depends on the case directly. With the result (or the measure's
+        intermediate result), the case and the arguments, it returns the measure as a function of
+        another case, with the result held fixed: a smooth one, of which differences are taken.
     numbers : with the same arguments, derivatives of such a measure by numbers of the case.
     places : with the same arguments, for an extreme: all places where it is reached; `seeds` and
         `frozen` take one as `at`. The measure has a derivative if they all agree.
@@ -304,7 +304,7 @@ def _load_at(result: xr.Dataset, case: Case, node: int, axis: str, displacement:
 
 
 def _climb(start: int, end: int) -> Derivative:
-    """Energy from one stable state to the top on the way to another; it has no seeds."""
+    """Derivative of the energy from one stable state to the highest on the way to another."""
 
     def places(found: Landscape, case: Case) -> list[tuple[Equilibrium, Equilibrium]]:
         stable = found.stable

@@ -351,7 +351,7 @@ def deformed_motions(cell: UnitCell, patch: Patch, displacement: NDArray) -> tup
         moved, off = motion, np.linalg.norm(change, axis=1)
         if off.max() > SAME * pattern.size:
             other, left = motion_between(place[one], place[two], SAME * pattern.size)
-            # a turn that comes or goes with a small change is noise, or hidden by pairs on a line
+            # a turn that appears or vanishes in a small change is noise, or pairs on a line hide it
             if off.max() > near or other.turns == motion.turns:
                 moved, off = other, left
         if off.max() > near:
