@@ -227,7 +227,7 @@ PAIR = {"kind": "modes", "count": 8}
 
 def test_one_of_two_modes_with_one_frequency_has_no_derivative():
     k = pair()
-    with pytest.raises(InputError, match=r"have one frequency.*the sum of all.*along"):
+    with pytest.raises(InputError, match=r"have the same frequency.*the sum of all.*along"):
         fd.sensitivity(
             square, {"one": 0.02, "other": 0.02}, measures=f"frequency[{k}]", analysis=PAIR
         )

@@ -317,7 +317,7 @@ def test_advice_follows_from_the_numbers():
     coarse = advised([10.0, 20.0], [[0.0, 0.0], [0.0, 0.0]], mesh_error=np.array([0.0, -0.05]))
     assert "The finer mesh of the shell is itself about 5.0 % off" in coarse.advice
     unsettled = advised([10.0, 20.0], [[0.0, 0.0], [0.0, 0.0]], mesh_error=np.array([np.nan, 0.0]))
-    assert "The meshes of the shell have not converged for mode 1: what" in unsettled.advice
+    assert "The meshes of the shell have not converged for mode 1, so that" in unsettled.advice
     assert reach(partly.result, "plate", 3) == ("plate", 2, 0.02)
 
 

@@ -227,7 +227,7 @@ def test_models_that_do_not_repeat_are_refused():
     with pytest.raises(InputError, match=r"crease_stiffness: has no value for the crease between"):
         fd.bands(fd.UnitCell(fd.Case(each)), [[0.5, 0.5]])
     law = fd.discretize(pattern, SHEET, fold_law=fd.Prony([0.5], [1.0]))
-    with pytest.raises(InputError, match=r"fold_law = .*remembers"):
+    with pytest.raises(InputError, match=r"fold_law = .*has memory"):
         fd.bands(fd.UnitCell(fd.Case(law)), [[0.5, 0.5]])
     sideways = fd.Case(kresling().case.structure, [fd.Link([0, 1], axes="x")])
     with pytest.raises(InputError, match=r"supports\[0\].axes = .*a screw turns these axes"):

@@ -143,7 +143,7 @@ def test_what_has_no_order_is_refused_with_the_panels():
 
 def test_a_folded_state_that_lies_flat_says_its_order():
     folding = fd.fold(strip([1, 1, 1], "VM"), fraction=1.0, steps=4)
-    told = "2 creases are closed: panels lie upon each other in an order without"
+    told = "2 creases are closed: panels lie on each other in an order without"
     assert told in folding.report()
     # panel 1 lies upon the front of 0, and panel 2 at the back of 1
     assert folding.layers[[0, 2]].tolist() == [[0, 1, 1], [1, 2, -1]]
@@ -209,5 +209,5 @@ def test_no_order_is_told_of_layers_that_are_not_flat():
     folded, angles = flat(strip([1.0, 1.0, 1.0], "MV"))
     bent = folded.vertices + [[0, 0, 0.4 * (k == 3)] for k in range(len(folded.vertices))]
     folded = folded.changed(vertices=bent)
-    with pytest.raises(ComputationError, match="panels 0 and 1 lie upon each other"):
+    with pytest.raises(ComputationError, match="panels 0 and 1 lie on each other"):
         layer_order(folded, flat_state(folded, angles, CLOSED))

@@ -175,7 +175,7 @@ class Folding:
             else:
                 order = "in the order in which they arrived"
             count = len(self.closed)
-            lines.append(f"{count} creases are closed: panels lie upon each other {order}")
+            lines.append(f"{count} creases are closed: panels lie on each other {order}")
         if self.first_crossings:
             lines.append(f"panels cross {self._where_crossed}")
         else:
