@@ -121,16 +121,13 @@ def direction_triangles(case: Case, kind: type, points: Points, size: float, sig
         if support.direction is None:
             continue
         nodes, unit = resolve_nodes(case.structure, support.nodes), unit_vector(support.direction)
-        for node, value in zip(nodes, _values(support, len(nodes)), strict=True):
+        values = np.broadcast_to(getattr(support, "value", 0.0), (len(nodes),))
+        for node, value in zip(nodes, values, strict=True):
             # it pushes a moving node; else it stands below the sheet, or outside
             outward = unit[2] if abs(unit[2]) > 1e-9 else unit @ (middle - points[node])
             along = unit * (np.sign(value) or np.sign(outward) or 1.0)
             found.append(marks.billboard(points[node], along, size, 0.38 * size, sight))
     return np.array(found).reshape(-1, 3, 3)
-
-
-def _values(support: Fix | Impose, count: int) -> Points:
-    return np.broadcast_to(getattr(support, "value", 0.0), (count,))
 
 
 def links(case: Case, points: Points) -> list[Mark]:

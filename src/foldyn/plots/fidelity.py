@@ -66,10 +66,11 @@ def plot_fidelity(fidelity: Fidelity, title: str = "") -> Figure:
         arrow = look | {"marker": "$\\uparrow$", "markersize": 9.0, "linestyle": "none"}
         upper.plot(frequency[beyond], np.full(beyond.sum(), 107.0 * MOST), **arrow)
         lower.plot(frequency, result["mac"].values[:, k], **look, **line)
-        keys.append(style.key(_named(model), **look, **line))
+        name = "the case's own model" if model == "own" else model
+        keys.append(style.key(name, **look, **line))
     upper.set_ylim(bottom, top)
     lower.set_ylim(-0.05, 1.05)
-    _note(lower, "lost")
+    lower.text(0.006, 0.06, "lost", transform=lower.transAxes, va="bottom", **style.FINE)
     _along(upper, lower, frequency, fidelity.limit)
     if fidelity.limit < upper.get_xlim()[1]:
         for axes in (upper, lower):
@@ -78,15 +79,6 @@ def plot_fidelity(fidelity: Fidelity, title: str = "") -> Figure:
         dashes = {"color": style.BLACK, "linewidth": 1.0, "linestyle": (0, (4, 2))}
         keys.append(style.key(text, **dashes))
     return style.finish(figure, keys, columns=4, width=7.6)
-
-
-def _named(model: str) -> str:
-    return "the case's own model" if model == "own" else model
-
-
-def _note(axes: Axes, text: str) -> None:
-    """Write a note into the shaded part at the bottom."""
-    axes.text(0.006, 0.06, text, transform=axes.transAxes, ha="left", va="bottom", **style.FINE)
 
 
 def _along(upper: Axes, lower: Axes, frequency: np.ndarray, limit: float) -> None:

@@ -216,11 +216,12 @@ def legend_below(
     """
     if width is not None:
         columns = columns_that_fit(handles, width, columns)
+    rows = max(1, -(-len(handles) // columns))
     figure.legend(
         handles=list(handles),
         # only the layout engine can make room "outside"
         loc="outside lower center" if _constrained(figure) else "lower center",
-        ncols=_even_columns(len(handles), columns),
+        ncols=max(1, -(-len(handles) // rows)),  # fills the rows evenly
         fontsize=TICK,
         labelcolor=BLACK,
         labelspacing=0.5,
@@ -240,9 +241,3 @@ def finish(
     for axes in figure.axes:
         axes.tick_params(labelfontfamily=FAMILY)
     return figure
-
-
-def _even_columns(count: int, most: int) -> int:
-    """Number of columns, at most `most`, that fills the rows of a legend evenly."""
-    rows = max(1, -(-count // most))
-    return max(1, -(-count // rows))
