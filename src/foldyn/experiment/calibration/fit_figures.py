@@ -8,7 +8,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from foldyn.cases import Case
-from foldyn.experiment.calibration.fit_page import charts_of
+from foldyn.experiment.calibration.fit_charts import charts_of
 from foldyn.experiment.calibration.fitted import Fit
 from foldyn.experiment.calibration.measured import Shapes
 from foldyn.experiment.calibration.measurement import Measurement
