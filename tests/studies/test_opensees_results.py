@@ -24,6 +24,7 @@ from foldyn.studies.herkal.opensees.stored import (
     write_still,
 )
 from foldyn.studies.herkal.runs import CASES
+from pairwise import beyond
 from verification.opensees import compare, model
 from verification.opensees.model import panel_mesh
 
@@ -98,8 +99,7 @@ def test_a_coarse_shell_is_near(name):
     assert np.abs(frequency[:3]).max() < 0.022
 
 
-@pytest.mark.matrix
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", beyond(CASES))
 def test_a_fine_shell_agrees(name):
     """At worst 0.73 % (case 3, statics) and 0.40 % (case 1, second frequency)."""
     moved, frequency = compare.away(ours(name, FINEST), stored(name))
@@ -109,12 +109,11 @@ def test_a_fine_shell_agrees(name):
 
 def test_a_coarse_shell_moves_alike():
     """Case 1 with 8 divisions, relative L2 over 10 s: 4.6 %; 16 change ours by 4.4 %."""
-    motion = compare.our_motion("case1", 8, 0.01)
+    motion = compare.our_motion("case1", 8, 0.01, duration=3.0)
     assert compare.motion_away(motion, read_motion("case1", 8, 0.0025)) < 0.05
 
 
-@pytest.mark.matrix
-@pytest.mark.parametrize("name", [name for name in CASES if stored_motions(name)])
+@pytest.mark.parametrize("name", beyond([name for name in CASES if stored_motions(name)][::-1]))
 def test_motions_of_all_cases_begin_alike(name):
     """The first 2 s with 10 divisions: at worst 4.8 % (case 2); see docs/opensees.md for 10 s."""
     motion = compare.our_motion(name, 10, 0.01, duration=2.0)
