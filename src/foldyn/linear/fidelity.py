@@ -37,8 +37,9 @@ from foldyn.materials import Superlinear
 from foldyn.materials.law import Law
 from foldyn.mechanics.following import following_force, joined
 from foldyn.results import fidelity_dataset
-from foldyn.structures import ModelOptions, Structure, discretize
+from foldyn.structures import ModelOptions, discretize
 from foldyn.structures.beyond_range import BELOW, plate_frequency
+from foldyn.structures.discretized import Discretized
 from foldyn.values import choice, listed, number, show, whole
 
 MODELS: Mapping[str, Mapping[str, Any]] = {
@@ -290,7 +291,7 @@ def _compared(case: Case, models: Any) -> dict[str, Case]:
     return compared
 
 
-def named(models: Any, structure: Structure) -> Mapping[str, Mapping[str, Any]]:
+def named(models: Any, structure: Discretized) -> Mapping[str, Mapping[str, Any]]:
     """Arguments of `discretize` by the name of the model.
 
     By default the models of `BESIDE` that accept the other options of the structure.

@@ -102,6 +102,8 @@ class Reference:
     mesh_error : (k,)
         Relative errors of the finest mesh, by the order observed with the two coarser ones; nan if
         the meshes have not converged, or there is no limit.
+    mesh_frequency : (3, k)
+        Frequencies of these modes on each mesh, Hz; nan if a coarse mesh lacks one.
     shape : (k, n, 3)
         Shapes of the fine mesh.
     case : Case
@@ -112,6 +114,7 @@ class Reference:
 
     frequency: Annotated[NDArray, Unit("Hz")]
     mesh_error: NDArray
+    mesh_frequency: NDArray
     shape: NDArray
     case: Case
     found: xarray.Dataset
@@ -167,7 +170,9 @@ def reference_modes(cases: Sequence[Case], count: int) -> Reference:
     if touched_clamp(cases[-1].structure) is not None:
         error[:] = np.nan
     rank = np.argsort(limit, kind="stable")  # extrapolation may swap close modes of a coarse mesh
-    return Reference(limit[rank], error[rank], fine.shape[rank], cases[-1], fine.found)
+    return Reference(
+        limit[rank], error[rank], values[:, rank], fine.shape[rank], cases[-1], fine.found
+    )
 
 
 def is_graded(case: Case) -> bool:
