@@ -60,18 +60,19 @@ class Album:
             Heading("The structure"),
             *self.figure("structure", caption, lambda: plots.draw_structure(case)),
         ]
-        of_shell = case.structure.bar_law is None
+        made: Any = case.structure
+        of_shell = made.bar_law is None
         laws = (
             "Constitutive curves: moment of a fold, over the whole crease, against the dihedral."
             if of_shell
             else "Constitutive curves: moment of a fold and of a bend against the dihedral, stress "
             "of a bar against its stretch."
         )
-        if len(case.structure.folds) or not of_shell:
-            charts = Charts(law_charts(case.structure), laws)
-            sections += self.figure("laws", laws, lambda: plots.plot_laws(case.structure), charts)
+        if len(made.folds) or not of_shell:
+            charts = Charts(law_charts(made), laws)
+            sections += self.figure("laws", laws, lambda: plots.plot_laws(made), charts)
         if of_shell:
-            sections.append(Text(described_shell(case.structure)))
+            sections.append(Text(described_shell(made)))
         return sections
 
 

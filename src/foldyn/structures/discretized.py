@@ -140,6 +140,7 @@ class Discretized:
     energy_groups: ClassVar[Mapping[str, str]]
     kind: ClassVar[str]
     hinge_kinds: Any  # tuple of HingeKind, each model's own property
+    bar_law: Any  # BarLaw or None
     membranes: Sequence[Any]
     massless: ClassVar[str] = ""
     clamped_nodes: Sequence[NDArray] = ()
