@@ -12,6 +12,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.periodic.orbit import amplitudes_of
+from pairwise import beyond
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
@@ -287,12 +288,23 @@ CHECKS = (
 )  # fmt: skip
 
 
-@pytest.mark.matrix
+LONG = (
+    air_deployment, contact_tower, design_miura, hardening_miura, jumping_resonance, kresling_chaos,
+    shaken_miura,
+)  # fmt: skip
+SHORT = [check for check in CHECKS if check not in LONG]
+
+
 @pytest.mark.filterwarnings("ignore::foldyn.errors.CrossingWarning")
 @pytest.mark.filterwarnings("ignore:.* creases stay closed that were to open")  # of the crane
-@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+@pytest.mark.parametrize(
+    "check", [*beyond(SHORT, 1), *beyond(LONG, 4)], ids=lambda check: check.__name__
+)
 def test_example(check, tmp_path, monkeypatch, capsys):
+    """Of films a few pictures; plots have tests of their own."""
     monkeypatch.chdir(tmp_path)
+    animate = fd.plots.animate
+    monkeypatch.setattr(fd.plots, "animate", lambda *of, **how: animate(*of, **how | {"frames": 3}))
     check(runpy.run_path(str(ROOT / "examples" / f"{check.__name__}.py"), run_name="__main__"))
     assert capsys.readouterr().out
     assert {path.suffix for path in tmp_path.iterdir()} & {".png", ".gif"}
@@ -306,8 +318,7 @@ def test_examples_are_short_scripts_with_a_picture_each():
         assert f"examples/{path.name}" in gallery, path.name
 
 
-@pytest.mark.matrix
-@pytest.mark.parametrize("path", SCRIPTS, ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", beyond(SCRIPTS, 2), ids=lambda p: p.stem)
 def test_figures(path):
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None
