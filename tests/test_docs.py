@@ -212,6 +212,7 @@ def test_the_folding_page_folds_a_pattern_and_computes_its_modes():
     assert (names["modes"].frequency > 0.0).all()
 
 
+@pytest.mark.matrix
 def test_the_numbers_of_the_statics_page_are_what_its_script_computes():
     script = runpy.run_path(str(DOCS / "statics_figures.py"))
     page = (DOCS / "statics.md").read_text("utf-8")

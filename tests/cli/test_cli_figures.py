@@ -20,6 +20,7 @@ from foldyn.cli.main import main
 from foldyn.errors import InputError
 from foldyn.plots.writers import find_ffmpeg
 from foldyn.report import album
+from pairwise import beyond
 
 FEW = "output.interval = 0.02"
 PICTURES = ("structure.png", "laws.png", "load.png", "motion.png", "energies.png")
@@ -122,8 +123,7 @@ def test_a_page_without_figures(workplace, edited) -> None:
     assert "The structure" in page and "The motion" in page
 
 
-@pytest.mark.matrix
-@pytest.mark.parametrize("form", ["svg", "pdf"])
+@pytest.mark.parametrize("form", beyond(["svg", "pdf"]))
 def test_figures_for_a_paper_stand_beside_the_page(workplace, edited, form) -> None:
     workplace.write(edited(FEW))
     done = workplace.good("run", "case.toml", "--out", "r", "--figures", form)
