@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import runpy
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +42,12 @@ from verification.fidelity.statics import twisted, under_loads
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 SETS = ("documented", "drawn")
+
+
+@cache
+def true_of(number):
+    """The shell of a documented case."""
+    return reference(documented()[number])
 
 
 def test_large_sheets_have_membranes():
@@ -90,9 +97,8 @@ def test_limits_of_internal_amplitudes(name, near):
 
 
 def test_stored_first_modes_are_what_the_code_gives():
-    case = documented()[0]
+    case, true = documented()[0], true_of(0)
     (stored,) = [m for m in read(RESULTS / "documented_internal.csv") if m.case == case.name]
-    true = reference(case)
     for name, count in AMPLITUDES.items():
         for row, kept in zip(first_modes(case, true, count), stored.rows[name], strict=True):
             assert row.shell == pytest.approx(kept.shell, rel=1e-5)
@@ -114,7 +120,7 @@ def test_sets_are_large_enough():
 def test_stored_results_are_what_the_code_gives(number):
     case = documented()[number]
     (stored,) = [m for m in read(RESULTS / "documented.csv") if m.case == case.name]
-    true = reference(case)
+    true = true_of(number)
     for model in ("standard, consistent", "plate, consistent", "n5b8e, condensed, bars"):
         rows = compare(case, true, model)
         assert len(rows) == len(stored.rows[model])
@@ -260,12 +266,14 @@ def test_polygons_meet_at_their_dihedral(sides):
 
 @pytest.mark.matrix
 def test_the_command(tmp_path, monkeypatch, capsys):
+    """Each of its sets has one small case."""
     monkeypatch.setattr(command, "documented", lambda: documented()[:1])
+    monkeypatch.setattr(command, "sheets", lambda count: documented()[:1])
     monkeypatch.setattr(command, "statics_table", lambda: "small loads")
     monkeypatch.setattr(command, "large_table", lambda: "large loads")
     assert command.main(["--out", str(tmp_path), "--count", "1"]) == 0
     told = capsys.readouterr().out
-    assert "documented: 1 cases" in told
+    assert "documented: 1 cases" in told and "sheets: 1 cases" in told
     assert told.index("small loads") < told.index("large loads")
     assert all(model in told for model in MODELS)
     (first,) = read(tmp_path / "documented.csv")
