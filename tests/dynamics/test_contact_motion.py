@@ -18,6 +18,7 @@ from foldyn.dynamics.system import pack
 from foldyn.errors import ComputationError, FoldynWarning, InputError, PenetrationError
 from foldyn.mechanics.contact import term
 from foldyn.viewer.states import fields
+from pairwise import beyond
 
 ALPHA, CONSERVING = "generalized_alpha", "energy_momentum"
 
@@ -72,10 +73,7 @@ def test_the_conserving_method_keeps_all_in_a_collision(options):
 REBOUNDS = [
     ("rk4", [1600, 3200, 6400], 25600, 3.9),
     ("central_difference", [1600, 3200, 6400], 25600, 1.9),
-    *(
-        pytest.param(method, [200, 400], 1600, 1.9, marks=pytest.mark.matrix)
-        for method in ("newmark", ALPHA, CONSERVING)
-    ),
+    *beyond([(method, [200, 400], 1600, 1.9) for method in ("newmark", ALPHA, CONSERVING)], 2),
 ]
 
 
@@ -93,7 +91,8 @@ def test_a_rebound_converges_with_the_order_of_the_method(method, counts, fine, 
 
 
 @pytest.mark.parametrize(
-    ("method", "options"), [*((method, {}) for method in EXPLICIT), (ALPHA, {"dt": 5e-5})]
+    ("method", "options"),
+    [*((method, {}) for method in EXPLICIT), *beyond([(ALPHA, {"dt": 5e-5})])],
 )
 def test_a_strip_folded_from_both_ends_stops_where_it_touches(method, options):
     pytest.importorskip("ipctk")
@@ -165,7 +164,7 @@ def test_an_impact_too_violent_for_the_step_is_told():
         fd.simulate(tower(80.0, fd.Contact()), 0.03, method=ALPHA, dt=2e-5, interval=1e-4)
 
 
-@pytest.mark.parametrize("force", [38.0, 50.0, 80.0])
+@pytest.mark.parametrize("force", [80.0, *beyond([38.0, 50.0])])
 def test_the_tower_snaps_bounces_and_rests(force):
     pytest.importorskip("ipctk")
     case = tower(force, fd.Contact())
@@ -206,17 +205,18 @@ RUBBING = [
 ]
 
 
-@pytest.mark.matrix
+SLIDING = [
+    ("plane", "rk4", 0.2, None, 0.02, 0.03, 1e-2),
+    ("plane", ALPHA, 0.1, 2e-4, 0.02, 0.01, 1e-3),
+    ("plane", ALPHA, 0.1, 1e-4, 0.01, 0.01, 1e-3),  # the normal force lags by a step
+    ("plane", CONSERVING, 0.1, 1e-4, 0.02, 0.01, 1e-9),  # all that is taken is counted
+]
+
+
 @pytest.mark.filterwarnings("ignore:contact. at rest panels are nearer")
 @pytest.mark.parametrize(
     ("kind", "method", "duration", "dt", "near", "lost", "error"),
-    [
-        ("plane", "rk4", 0.2, None, 0.02, 0.03, 1e-2),
-        ("plane", ALPHA, 0.1, 2e-4, 0.02, 0.01, 1e-3),
-        ("plane", ALPHA, 0.1, 1e-4, 0.01, 0.01, 1e-3),  # the normal force lags by a step
-        ("plane", CONSERVING, 0.1, 1e-4, 0.02, 0.01, 1e-9),  # all that is taken is counted
-        *RUBBING,
-    ],
+    [*beyond(SLIDING, 1), *beyond(RUBBING, 2)],
 )
 def test_a_strip_slides_above_the_angle_of_friction(kind, method, duration, dt, near, lost, error):
     """A slope of 20 degrees; friction of 0.3 holds up to 16.7. On a panel it passes inner sides."""
@@ -237,10 +237,7 @@ def test_a_strip_slides_above_the_angle_of_friction(kind, method, duration, dt, 
         ("plane", "rk4", 0.4, None, 1e-9, 1e-3),
         ("plane", ALPHA, 0.2, 2e-4, 5e-12, 1e-3),
         ("plane", ALPHA, 0.2, None, 5e-12, 1e-3),
-        *(
-            pytest.param("panel", method, 0.4, dt, 1e-11, 1e-5, marks=pytest.mark.matrix)
-            for _, method, _, dt, *_ in RUBBING
-        ),
+        *beyond([("panel", method, 0.25, dt, 1e-11, 1e-5) for _, method, _, dt, *_ in RUBBING], 2),
     ],
 )
 def test_a_strip_sticks_below_the_angle_of_friction(kind, method, duration, dt, still, most):

