@@ -19,6 +19,7 @@ import foldyn as fd
 from foldyn.cases.document import from_document, to_document
 from foldyn.errors import FoldynError, FoldynWarning, InputError
 from foldyn.patterns import GENERATORS
+from pairwise import beyond
 from public_calls import DATA, PATTERNS, case, pattern, sheet, solved
 
 MADE = {"Structure", "Shell", "Folding", "Fidelity", "View"}
@@ -56,6 +57,7 @@ SOLVED = (
 )  # fmt: skip
 """Calls of `solved`, which computes."""
 NAMES = (*DATA, *PATTERNS, *SOLVED)
+EACH = [*DATA, *PATTERNS, *beyond(SOLVED, 2)]
 
 
 @pytest.mark.matrix
@@ -119,7 +121,7 @@ def put(value: Any, place: tuple, new: Any) -> Any:
     )
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", EACH)
 def test_numbers_of_numpy_are_numbers(calls, name):
     """Calls that compute have each as an array, which is least like a number, and as one more."""
     function, arguments = calls[name]
@@ -134,7 +136,7 @@ def test_numbers_of_numpy_are_numbers(calls, name):
             assert outcome(function, {**arguments, key: np.array(value)}) == expected, key
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", EACH)
 def test_what_is_of_the_wrong_kind_is_refused(calls, name):
     function, arguments = calls[name]
     for key in arguments:
