@@ -96,18 +96,17 @@ def closing(contact: fd.Contact | None = None, dihedral: float = 1.6) -> tuple[f
 
 
 @pytest.mark.matrix
-@pytest.mark.parametrize("method", METHODS)
-def test_threads_share_what_touches(monkeypatch, method):
+@pytest.mark.parametrize(("method", "threads"), zip(METHODS, (2, 3), strict=True))
+def test_threads_share_what_touches(monkeypatch, method, threads):
     what, start = closing()
     given = half_steps(what, method, 60, 30) | {"initial": start}
     alone = on(monkeypatch, 1, what, method, **given)
     assert (alone.contact_force.values[-1] > 0.0).mean() > 0.5  # panels touch,
     assert float(np.abs(alone.plane_force[-1]).max()) > 0.0  # and planes are met
     assert alone.attrs["shortest_contact_step"] < given["dt"]
-    for threads in (2, 3):
-        found = shared(monkeypatch, threads, alone, what, method, **given)
-        assert found.attrs["contact_lists"] == alone.attrs["contact_lists"]
-        assert found.attrs["energy_error"] == pytest.approx(alone.attrs["energy_error"], rel=1e-3)
+    found = shared(monkeypatch, threads, alone, what, method, **given)
+    assert found.attrs["contact_lists"] == alone.attrs["contact_lists"]
+    assert found.attrs["energy_error"] == pytest.approx(alone.attrs["energy_error"], rel=1e-3)
 
 
 @pytest.mark.parametrize("method", METHODS)
