@@ -83,7 +83,7 @@ def test_damped_backbone_follows_the_peaks_of_response_curves(resonant):
         exact_frequency(resonant.amplitude.values), rel=1e-5
     )
     curve = fd.response_curve(
-        oscillator(0.1), (0.22, 0.28), harmonics=9, longest_step=0.03, branches=0
+        oscillator(0.1), (0.22, 0.28), harmonics=9, longest_step=0.03, branches=0, steps=16
     )
     here = np.interp(0.1 / 0.5, resonant.level.values, resonant.amplitude.values)
     assert curve.amplitude.values.max() == pytest.approx(here, rel=5e-3)
