@@ -28,6 +28,7 @@ from shell_lab import (
 
 import foldyn as fd
 from foldyn.checks import observed_order
+from pairwise import FEW
 
 STRIP = fd.Sheet(1.2e6, 0.0, 0.1)
 EI = STRIP.youngs_modulus * STRIP.thickness**3 / 12.0  # of a width of one
@@ -192,10 +193,11 @@ def lifted_ring(across, around):
 @pytest.mark.matrix
 def test_slit_ring_lifted():
     table = np.array(list(SLIT_RING.values()))
-    cells = np.array([4, 8, 12])
+    few = np.array([4, 8]), 0.03, 1.0
+    cells, most, order = few if FEW else (np.array([4, 8, 12]), 0.017, 1.1)
     errors = np.array([lifted_ring(int(n), 8 * int(n)) / table - 1.0 for n in cells])
     assert (errors < 0.0).all()  # stiff: strains in the plane are constant in each triangle
-    assert np.abs(errors[-1]).max() < 0.017
+    assert np.abs(errors[-1]).max() < most
     assert np.abs(errors[:, 0]).max() < 0.02
-    for case in np.abs(errors).reshape(3, -1).T:
-        assert observed_order(1.0 / cells, case) > 1.1
+    for case in np.abs(errors).reshape(len(cells), -1).T:
+        assert observed_order(1.0 / cells, case) > order
