@@ -37,7 +37,7 @@ import reference
 for stage in STAGES:
     for name in stage:
         use(name)
-warm, others = {*asked}, list(reference.cases(""))[::10]
+warm, others = {*asked}, list(reference.cases(""))[::25]
 for name, compute in others:
     compute()
 print(len(warm), len(others), *asked - warm, sep="\\n")
@@ -72,9 +72,9 @@ def test_names_are_unique() -> None:
 
 @pytest.mark.matrix
 def test_other_cases_ask_for_no_kernel_that_is_not_compiled() -> None:
-    """Whichever of them are on disk: after `warm-up`, a tenth of the references asks for none."""
+    """Whichever of them are on disk: after `warm-up`, a part of the references asks for none."""
     command = [sys.executable, "-W", "ignore", "-c", ASKED + THEN, str(BENCHMARKS)]
     told = subprocess.run(command, capture_output=True, text=True, check=True)
     compiled, others, *more = told.stdout.splitlines()
-    assert int(compiled) > 100 and int(others) > 50
+    assert int(compiled) > 100 and int(others) > 20
     assert not more
