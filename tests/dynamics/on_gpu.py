@@ -5,6 +5,7 @@ On a machine with a GPU, ``python -m pytest tests/dynamics/on_gpu.py`` runs them
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from itertools import cycle
 
@@ -19,6 +20,8 @@ from foldyn.dynamics.gpu.checks import METHODS, lacking
 from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
 
 STEPS, END = {"dt": 1e-5, "every_steps": 2}, 4e-5
+SOME = ["central_difference"] if os.environ.get("NUMBA_ENABLE_CUDASIM") == "1" else METHODS
+"""Methods of most tests: the simulator, which is slow, has the one of fewer force evaluations."""
 LAWS = {
     "enhanced": (fd.EnhancedLinear(), fd.EnhancedLinear()),
     "locking": (fd.EnhancedLinear(120, 240, rest="as_published"), "superlinear"),
@@ -109,7 +112,7 @@ def test_a_motion_is_that_of_the_cpu(method, name):
     assert mine.attrs["device"]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", SOME)
 def test_many_are_those_of_the_cpu(method):
     cases = [case(k) for k in range(2)]
     given = {"method": method, "initial": [shaken(c, k) for k, c in enumerate(cases)], **STEPS}
@@ -119,7 +122,7 @@ def test_many_are_those_of_the_cpu(method):
     assert all(mine[name].equals(again[name]) for name in mine.data_vars)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", SOME)
 def test_samples_do_not_depend_on_the_pieces(monkeypatch, method):
     each = case(1)
     given = {"initial": shaken(each), "device": "gpu", **STEPS}
@@ -129,7 +132,7 @@ def test_samples_do_not_depend_on_the_pieces(monkeypatch, method):
     agree(fd.simulate_many([each], END, method=method, **given).isel(model=0), whole, 1e-12)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", SOME)
 def test_motions_side_by_side_have_steps_of_their_own(monkeypatch, method):
     from foldyn.dynamics.gpu.many import integrate_prepared  # no import where there is no GPU
 
@@ -185,7 +188,7 @@ def test_what_goes_wrong_is_told_as_by_the_cpu():
     assert str(many.outcome[0].values) == str(alone.value)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", SOME)
 def test_an_engine_goes_on_from_a_checkpoint(method):
     each = case(1)
     ends = []
