@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-import foldyn
+from package_copies import copied
 
 PROBE = """
 from foldyn.cases.waveforms import waveform
@@ -29,10 +28,9 @@ print(*probe(pack([fd.HalfSine(1.0)], Callbacks()), 0.5), sum(probe.stats.cache_
 """
 
 
-def copy_package(folder: Path) -> Path:
-    """Copy of the package below `folder`; returns its folder."""
-    package, without = folder / "foldyn", shutil.ignore_patterns("__pycache__")
-    shutil.copytree(Path(foldyn.__file__).parent, package, ignore=without)
+def copy_package(folder: Path, kernels: bool = False) -> Path:
+    """Copy of the package below `folder`, with its kernels if asked for; returns its folder."""
+    package = copied(folder, kernels)
     (package / "probes").mkdir()
     (package / "probes" / "__init__.py").touch()
     (package / "probes" / "probe.py").write_text(PROBE, "utf-8")
