@@ -218,6 +218,11 @@ NUMBERS = "must be numbers over node, axis; it has"
         (initial_state, lambda ds: ds.assign(displacement=ds["node"]), "displacement must be numb"),
         (
             initial_state,
+            lambda ds: ds.assign_coords(time=ds["time"].astype(object)),
+            "time must be numbers",
+        ),
+        (
+            initial_state,
             lambda ds: ds.assign(velocity=ds["velocity"].astype(str)),
             f"velocity {NUMBERS} <U3",
         ),

@@ -50,6 +50,8 @@ def initial_state(result: Any, at: int = -1) -> State:
         raise InputError(f"initial_state: got {type(result).__name__}, give a result (a dataset)")
     for dimension in ("time", "step"):
         if dimension in result.sizes:
+            if dimension in result.variables:  # which may be damaged
+                check_variable(result, dimension, (dimension,), place="initial_state: ")
             count = result.sizes[dimension]
             break
     else:
