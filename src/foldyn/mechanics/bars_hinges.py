@@ -81,7 +81,7 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
 
 
 def bars_hinges_kernels(model: BarsHinges, scratch: ForceScratch, groups: int) -> CompiledTerm:
-    """CompiledTerm bars and hinges, with `groups` energy groups."""
+    """Kernels of bars and hinges, with `groups` energy groups."""
     own = Context(_Context(model, scratch, groups))
     return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
