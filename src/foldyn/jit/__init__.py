@@ -1,7 +1,7 @@
 """Compilation: decorators of kernels, kernels on disk, and operations below Python.
 
-Importing this package starts Numba, with one clear message if environment variables prevent that;
-so modules that need Numba import from here first.
+Importing this package starts Numba, or raises one clear message if environment variables keep it
+from starting. So modules that need Numba import from here first.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import warnings
 
 from foldyn.errors import InputError, warn
 
-UNREADABLE = "could not be parsed"  # Numba's message for a value that it ignores
+UNREADABLE = "could not be parsed"  # part of Numba's message about a variable that it ignores
 
 
 def start() -> None:

@@ -1,12 +1,12 @@
-"""Decorators of compiled functions; nothing else in the package calls Numba's own.
+"""Decorators of compiled functions; only this module calls Numba's `njit` and `cfunc`.
 
 Compiled functions are stored on disk (`kernel_cache`) and self-contained: each function runs its
-own copies of the functions that it calls. Numba links a function's callees into its module and
-optimizes them there again, but leaves these copies weak: a function of the same name that the
-process has loaded before replaces them. So which of two versions runs, equal except for rounding,
-would depend on what was compiled or loaded earlier: a run that compiles would differ in the last
-bit from a run that loads the same kernels from disk. Here the copies that remain after optimization
-are private to the module.
+own copies of the functions that it calls. Numba links copies of a function's callees into its
+module and optimizes them there again, but leaves these copies weak: a function of the same name
+that the process has loaded before replaces them. So which of two versions runs, equal except for
+rounding, would depend on what was compiled or loaded earlier: a run that compiles would differ in
+the last bit from a run that loads the same kernels from disk. Here the copies that remain after
+optimization are private to the module.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from numba.core.compiler import Compiler
 
 from foldyn.jit.kernel_cache import Kept
 
-# fused multiply-adds are the only liberty taken: NaN must survive
+# of all fast-math options, only fused multiply-adds: NaN must survive
 _FUSED = {"contract"}
 
 
@@ -34,7 +34,7 @@ class AloneLibrary(JITCodeLibrary):
     called_alone = False  # whether only compiled functions call it
 
     def _finalize_final_module(self) -> None:
-        # linked into callers: Numba's usual version, which equal functions may replace
+        # callers link Numba's usual version, which equal functions may replace
         shared = self._final_module.clone()
         for function in self._final_module.functions:
             if function.is_declaration:
@@ -64,13 +64,14 @@ class Alone(Compiler):
 def _decorator(*, inner: bool = False, **options: Any) -> Callable[..., Any]:
     """Decorator of compiled functions.
 
-    inner : for calls from compiled functions only. A function that Python calls must unpack its
-    arguments first, which is more code than most functions of a whole model.
+    inner : for calls from compiled functions only. A function that Python calls needs code to
+    unpack its arguments; if the argument is a whole model, most functions are shorter than this
+    code.
     """
-    # error_model="numpy": a division by zero gives inf or nan (looked for by the solvers) instead
-    # of a branch in every loop
-    # nothing calls by address what has a name here; but without Numba's wrapper for that LLVM puts
-    # the function into the one for Python, which counts references: contact took twice as long
+    # error_model="numpy": a division by zero gives inf or nan, which the solvers check for, instead
+    # of needing a branch in every loop. No address of these functions is called; but without
+    # Numba's wrapper for such calls, LLVM inlines them into the wrapper for Python, which counts
+    # references: contact took twice as long
     options |= {"no_cpython_wrapper": inner, "no_cfunc_wrapper": inner}
     compiled = njit(error_model="numpy", pipeline_class=Alone, **options)
 
@@ -97,7 +98,7 @@ def _shut(dispatcher: Any) -> None:
 
 
 kernel = _decorator(fastmath=_FUSED)
-# the same, but inlined into each compiled caller and optimized there
+# like `kernel`, but inlined into each compiled caller and optimized there
 inlined = _decorator(fastmath=_FUSED, inline="always")
 # called by kernels only
 inner = _decorator(fastmath=_FUSED, inner=True)
@@ -108,7 +109,7 @@ inner_scalar = _decorator(fastmath=_FUSED, forceinline=True, inner=True)
 summing = _decorator(fastmath=_FUSED | {"reassoc"})
 # without Python's lock: for functions that threads run together
 shared = _decorator(fastmath=_FUSED, nogil=True)
-# exact arithmetic as written, for pictures
+# arithmetic exactly as written, for pictures
 strict = _decorator()
 strict_inlined = _decorator(inline="always")
 
@@ -155,5 +156,5 @@ def callback(signature: str, function: Callable[..., Any]) -> Any:
 
 
 def ready(function: Any) -> bool:
-    """Whether a compiled function is stored on disk; otherwise its first use compiles."""
+    """Whether a compiled function is stored on disk; otherwise its first use compiles it."""
     return function._cache.ready()

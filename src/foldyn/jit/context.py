@@ -53,7 +53,7 @@ class Context:
     Attributes
     ----------
     value : tuple
-        As it was given.
+        The given tuple.
     kind : ContextType
     address : int
     """
@@ -69,7 +69,7 @@ class Context:
         self._numba_type_ = self.kind
 
 
-_KINDS: dict[tuple, ContextType] = {}  # by the result of `_fill`
+_KINDS: dict[tuple, ContextType] = {}  # types of contexts, by the result of `_fill`
 
 
 @unbox(ContextType)
@@ -100,7 +100,7 @@ def _fill(value: Any, slots: list[int]) -> tuple:
 
 
 def _array(context: Any, builder: Any, kind: Any, numbers: Sequence[Any]) -> Any:
-    """Array view from its address, lengths and strides."""
+    """View of the array with a given address, lengths and strides."""
     out = make_array(kind)(context, builder)
     size = context.get_abi_sizeof(context.get_data_type(kind.dtype))
     populate_array(
@@ -136,7 +136,7 @@ class _Fields(AttributeTemplate):
 
 @lower_getattr_generic(ContextType)
 def _field(context: Any, builder: Any, owner: Any, address: Any, name: str) -> Any:
-    """Value of a field, which compiled code may load once, as nothing writes to slots."""
+    """Value of a field; compiled code may load it just once, because nothing writes to slots."""
     (fields,) = owner.types
     place = fields.fields.index(name)
     kind, first = fields.types[place], 8 * sum(map(_width, fields.types[:place]))
@@ -199,7 +199,7 @@ def _call(result: Any, kinds: Any) -> Callable[..., Any]:
 
 @intrinsic
 def run_at(typing_context, address, arguments):
-    """Call the function at an address with a tuple of numbers, and arrays by their addresses."""
+    """Call the function at an address with a tuple of numbers and of addresses of arrays."""
     return types.void(types.int64, arguments), _call(ir.VoidType(), arguments.types)
 
 

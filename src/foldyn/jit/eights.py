@@ -1,9 +1,9 @@
 """Eight numbers as one value in compiled code, with the arithmetic of a single number.
 
-Formulas without branches take them in place of numbers: `+ - * /`, comparisons, `abs`, `math.sqrt`,
-`choose`. The vectors are LLVM's own: they run on any processor, in narrower registers where it has
-no wide ones. In loops over numbers, the compiler must find the vectors itself, and does not if
-writes might alias later reads.
+Formulas without branches accept such values in place of numbers: `+ - * /`, comparisons, `abs`,
+`math.sqrt`, `choose`. The vectors are LLVM's own: they run on any processor, split into narrower
+registers if it has no wide registers. In loops over single numbers, the compiler would have to
+vectorize by itself, and it does not if a write might change what is read later.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def any_of(typing_context, truths):
 
 @intrinsic
 def per_cube_root(typing_context, x):
-    """x^(-1/3) of an eight or a number, from its exponent, with an error of 3 %."""
+    """Estimate x^(-1/3) of an eight or a number from its upper bits, with an error of 3 %."""
     many = isinstance(x, Eight)
 
     def codegen(context, builder, signature, arguments):

@@ -1,7 +1,7 @@
 """Numba intrinsics: addresses, views and memory operations below Python.
 
-The typing context is the first parameter in the definition of an intrinsic; compiled code calls it
-without.
+The typing context is the first parameter in the definition of an intrinsic; calls in compiled code
+omit it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ INT32, INT64, DOUBLE = ir.IntType(32), ir.IntType(64), ir.DoubleType()
 
 
 def intrinsic(function: Callable[..., Any]) -> Any:
-    """Numba's decorator, typed for the callers of its result."""
+    """Numba's `intrinsic`, typed so that type checkers accept calls without the typing context."""
     return extending.intrinsic(function)
 
 
@@ -32,7 +32,7 @@ def data_of(context: Any, builder: Any, kind: Any, array: Any) -> Any:
 
 
 # ------------------------------------------------------------------ functions by their address
-# the address is data, so a kernel that calls stays one and the same cached kernel for every law
+# the address is data, so one cached kernel serves all laws that it calls by address
 def _caller(result, *parameters):
     def codegen(context, builder, signature, arguments):
         kind = ir.FunctionType(result, parameters)
@@ -107,9 +107,9 @@ def borrowed(typing_context, value):
     """An array, or a tuple of arrays, tuples and numbers, without reference counts.
 
     Unless the compiler proves it unnecessary, compiled code counts references to the arrays of
-    every tuple that a function receives, with atomic operations: a third of the time of a step of a
-    small sheet. The caller of a loop keeps the arrays alive while it runs, so the loop can borrow
-    them.
+    every tuple that a function receives, with atomic operations. These take a third of the time of
+    a step of a small sheet. The caller of a loop keeps the arrays alive while it runs, so the loop
+    can borrow them.
     """
 
     def codegen(context, builder, signature, arguments):
@@ -121,8 +121,8 @@ def borrowed(typing_context, value):
 
 
 # ------------------------------------------------------------------ memory ahead of its use
-# The processor guesses what is read next where a loop reads on and on; kernels that read a little
-# of many arrays in turn leave it behind.
+# The processor prefetches by itself if a loop reads one array from start to end, but not if a
+# kernel reads a little of each of many arrays in turn.
 @intrinsic
 def prefetch(typing_context, array, index):
     """Prefetch array[index] into the cache; an index beyond the end does no harm."""
@@ -160,7 +160,7 @@ def fetch_add(typing_context, array, index, value):
 
 @intrinsic
 def look(typing_context, array, index):
-    """array[index] as other threads left it; their earlier writes are visible then, too."""
+    """array[index] as last written by a thread; earlier writes of that thread are visible, too."""
 
     def codegen(context, builder, signature, arguments):
         place = builder.gep(data_of(context, builder, array, arguments[0]), [arguments[1]])

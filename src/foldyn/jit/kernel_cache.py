@@ -1,15 +1,15 @@
 """Compiled functions on disk: a file for each function and its argument types.
 
-Numba's own cache identifies a function only by the text of its file: if a compiled function or a
-constant imported from another file changes, the old version is used; two processes that write at
-once may exchange their kernels; and a damaged file causes a traceback. Here the file name
+Numba's own cache identifies a function only by the text of its file: it uses an old version after a
+compiled function or a constant imported from another file has changed. With it, two processes that
+write at once may exchange their kernels, and a damaged file causes a traceback. Here the file name
 identifies the compiled version: its sources (`sources.digest`), its argument types, including all
-fields of named tuples, and the processor. So a stored file equals what would be compiled, whoever
-wrote it, and a checksum detects damage.
+fields of named tuples, and the processor. So a stored file equals what would be compiled now,
+whichever process wrote it, and a checksum detects damage.
 
 Kernels go to the first writable folder, in Numba's order: NUMBA_CACHE_DIR, `__pycache__` next to
-the source, the user's cache folder; then, with a warning, a temporary folder. As its files are
-loaded and run, only the user may have access to it.
+the source, the user's cache folder; then, with a warning, a temporary folder. Because the files in
+this temporary folder are loaded and run, only the user may have access to it.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ from foldyn.notice import NOTICE
 from foldyn.writing import remove_leftovers, write_bytes
 
 REMEDY = "set NUMBA_CACHE_DIR to a folder that can be written"
-OTHERS = 3  # older versions of a function to keep
+OTHERS = 3  # number of older versions of a function to keep
 _SEAL = hashlib.sha256().digest_size
-_IMPORTED: dict[Part, list[Kept]] = {}  # by the statements that define them
+_IMPORTED: dict[Part, list[Kept]] = {}  # functions, by the statements that define them
 
 
 class Kept(_Cache):
@@ -79,11 +79,11 @@ class Kept(_Cache):
         self._enabled = False
 
     def ready(self) -> bool:
-        """Whether a version for any arguments is on disk."""
+        """Whether at least one version is on disk, for whichever arguments."""
         return self._folder is not None and any(self._folder.glob(f"{self._version}.*.nbc"))
 
     def missing(self) -> list[Kept]:
-        """Compiled functions that it consists of, itself included, that are not on disk."""
+        """Compiled functions not on disk, among this one and all that it consists of."""
         made = (one for part in made_from(*self._source) for one in _IMPORTED.get(part, ()))
         return [one for one in made if not one.ready()]
 
@@ -131,7 +131,7 @@ class Kept(_Cache):
         for path in self._folder.glob(f"{self._stem}*"):
             made_from = path.name[len(self._stem) :].split(".")[:1]
             files.setdefault("".join(made_from), []).append(path)
-        with suppress(OSError):  # another process does the same
+        with suppress(OSError):  # another process may have removed it
             by_age = sorted(files, key=lambda made: max(p.stat().st_mtime for p in files[made]))
             for path in (path for made_from in by_age[: -1 - OTHERS] for path in files[made_from]):
                 path.unlink()
@@ -177,7 +177,7 @@ def folder_for(source: Path) -> Path | None:
         _warn(f"NUMBA_CACHE_DIR = {named!r} cannot be written: kernels are kept elsewhere")
     usual = [source / "__pycache__"]
     home = Path(AppDirs(appname="numba", appauthor=False).user_cache_dir)
-    if home.is_absolute():  # otherwise there is no home
+    if home.is_absolute():  # otherwise the user has no home folder
         usual.append(home / inside)
     for folder in usual:
         if _writable(folder):
@@ -195,7 +195,7 @@ def folder_for(source: Path) -> Path | None:
 
 @cache
 def _warn(text: str) -> None:
-    """Warn once of each text, with the remedy."""
+    """Issue a warning with the remedy, once for each text."""
     warn(f"{text}; {REMEDY}", "tutorial.md#install")
 
 
@@ -210,7 +210,7 @@ def _writable(folder: Path) -> bool:
 
 @cache
 def _private() -> Path | None:
-    """Temporary folder that nobody else can write to; private to this process, if need be."""
+    """Temporary folder that only this user can write to, or else one of this process alone."""
     user = os.getuid() if hasattr(os, "getuid") else "kernels"
     try:
         folder = Path(tempfile.gettempdir()) / f"foldyn-{user}"
@@ -229,5 +229,5 @@ def _ours(folder: Path) -> bool:
     """Whether a folder is not a link, belongs to the user, and is closed to all others."""
     status = folder.lstat()
     if not stat.S_ISDIR(status.st_mode) or not hasattr(os, "getuid"):
-        return stat.S_ISDIR(status.st_mode)  # temporary folders are private to each user there
+        return stat.S_ISDIR(status.st_mode)  # without getuid (Windows), each user has a private one
     return status.st_uid == os.getuid() and stat.S_IMODE(status.st_mode) & 0o077 == 0

@@ -1,9 +1,10 @@
 """Eight rows of coordinates at once in compiled code: load and transpose, transpose and add.
 
 Nodal arrays of the force kernels have rows of four numbers, the fourth unused, so that a row is one
-vector. Eight rows become three vectors of eight lanes, x, y and z, by shuffles in registers; one
-number at a time takes twice as long, and hardware gathers are no faster. The vectors are LLVM's
-own: they run on any processor, in narrower registers where it has no wide ones.
+vector. Shuffles in registers turn eight rows into three vectors of eight lanes: x, y and z. Loading
+one number at a time takes twice as long, and hardware gathers are no faster than that. The vectors
+are LLVM's own: they run on any processor, split into narrower registers if it has no wide
+registers.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def _store(builder, value, pointer):
 
 
 def _row_pointers(context, builder, kinds, values):
-    """Pointers to the rows of nodes[start + step q], q = 0..7, with masked node indices."""
+    """Pointers to eight rows, those with the indices nodes[start + step q] & mask, q = 0..7."""
     (rows, nodes), (row_values, node_values, start, step, mask) = kinds, values
     row_data = data_of(context, builder, rows, row_values)
     node_data = data_of(context, builder, nodes, node_values)
@@ -62,7 +63,7 @@ def _columns_at(builder, data, at, stride):
 
 @intrinsic
 def load_rows(typing_context, rows, nodes, start, step, mask, out, at, stride):
-    """Coordinates c = 0..2 of eight nodes to out[at + c stride :][:8]; see `_row_pointers`."""
+    """Write coordinate c = 0..2 of eight nodes to out[at + c stride :][:8]; see `_row_pointers`."""
     i8 = types.int64
 
     def codegen(context, builder, signature, arguments):

@@ -1,14 +1,14 @@
-"""The sources of a kernel, found from the sources themselves.
+"""The sources of a kernel, found by reading the text of its file and of the files it imports.
 
 A kernel contains the compiled functions and numbers that it names, and depends on the fields of the
 named tuples that it names. So its sources are its own text and the statements that define these
-names, in its file or in files of the package that it imports them from, recursively. Nothing else
-counts: neither functions without a decorator, which compiled ones cannot call, nor messages, nor
-lines above. Only contents are compared, never file times, which copies, checkouts or clocks change
-arbitrarily.
+names, in the same file or in the file of the package that they are imported from, recursively.
+Nothing else counts: neither functions without a decorator, which compiled ones cannot call, nor
+messages, nor the place of a line in its file. Only contents are compared, never file times, which
+copies, checkouts or clocks change arbitrarily.
 
 Statements start at the first column, and all words in their text count as names. Words that are not
-names, as in comments, only add dependencies, and never hide any.
+names, such as words of comments, only add dependencies, and never hide any.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ _STATEMENT = re.compile(r"^(?=[@\w])", re.MULTILINE)
 _DEFINES = re.compile(r"(?:def|class) +(\w+)|(\w+(?:, *\w+)*)(?: *:[^=\n]*)? *=(?!=)")
 _DECORATOR = re.compile(r"@(\w+)")
 _WORD = re.compile(r"[A-Za-z_]\w*")
-_NO_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")  # variables that do not affect the code
-# storage of kernels does not affect their code; the rest of `jit` may change Numba itself
+_NO_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")  # settings that do not affect the code
+# these files store kernels, which does not affect their code; the rest of `jit` may change Numba
 _KEEPING, _COMPILING = ("kernel_cache.py", "sources.py"), PACKAGE / "jit"
 _COMPILERS = ("foldyn.jit.compiled", "foldyn.mechanics.term")  # modules with decorators of kernels
 _NO_CODE_IN = ("from ", "import ", "if TYPE_CHECKING:")  # starts of statements without code
@@ -46,19 +46,19 @@ _READ: set[Path] = set()
 REST = ""  # stands for statements that define no name
 
 Part = tuple[Path, str]  # the statements of a file that define a name
-_WRITTEN: dict[Part, tuple[str, frozenset[Part]]] = {}  # generated text, and names in it
+_WRITTEN: dict[Part, tuple[str, frozenset[Part]]] = {}  # generated text, and parts it names
 
 
 class Module(NamedTuple):
     """Names that kernels may use from a file."""
 
     parts: dict[str, str]  # statements by the name that they define
-    names: dict[str, tuple[str, str]]  # module and name there, "" for all of it, by name here
+    names: dict[str, tuple[str, str]]  # by name here: module, and name there ("" for all of it)
 
 
 @cache
 def digest(source: Path, name: str) -> str:
-    """Digest of everything that a function or class of a file consists of, "1f0c6a2b9d3e4f58"."""
+    """Digest of all that a function or class of a file consists of, such as "1f0c6a2b9d3e4f58"."""
     parts = sorted(_content(part) for part in made_from(source, name))
     return hashlib.sha256(_tools().encode() + b"".join(parts)).hexdigest()[:16]
 
@@ -106,7 +106,7 @@ def _needed(path: Path, name: str) -> frozenset[Part]:
             elif original in parts:
                 wanted = {original}
             elif original and home.stem != original:
-                wanted = parts.keys()  # unknown which
+                wanted = parts.keys()  # unknown which part defines the name
             else:  # the word is a module
                 wanted = words & parts.keys() | {REST}
             needed |= {(home, part) for part in wanted}
@@ -197,7 +197,7 @@ def _text(path: Path) -> str:
 
 @cache
 def _tools() -> str:
-    """Further facts that determine a kernel's code; Numba checks the processor itself."""
+    """Versions and settings that affect a kernel's code; Numba itself checks the processor."""
     versions = (sys.version, np.__version__, numba.__version__, llvmlite.__version__)
     variables = getattr(config, "_env_reloader").old_environ  # noqa: B009 - of files too
     settings = sorted(item for item in variables.items() if item[0] not in _NO_CODE)

@@ -1,7 +1,8 @@
 """Compiled functions generated at import, with a branch for each entry.
 
-Kernels reach a formula that a class declares by its code, through one function with a branch for
-each code. That function is generated here from the declarations, so that nothing is listed twice.
+Classes declare formulas, each with a number as its code. Kernels reach a formula by its code,
+through one function with a branch for each code. This function is generated here from the
+declarations, so that nothing is listed twice.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ Branch = tuple[str, tuple[Any, ...]]
 def switch(
     module: str, name: str, arguments: str, branches: Mapping[int, Branch], otherwise: Branch
 ) -> Any:
-    """The function `name` of a module, of `arguments`: the first is the code of a branch."""
+    """Function `name` of a module; the first of its `arguments` is a code that selects a branch."""
     lines, known = ["@inner_scalar", f"def {name}({arguments}):"], {}
     for code, (formula, functions) in [*branches.items(), (None, otherwise)]:
         called = [f"{one.__module__}.{one.__name__}".replace(".", "_") for one in functions]
@@ -44,7 +45,7 @@ def _part(function: Any) -> tuple[Path, str]:
 
 
 def by_code(declared: Mapping[str, Iterable[Any]]) -> dict[int, Any]:
-    """Declarations of classes, by code; refuses a class without any, and duplicate codes."""
+    """Declarations of classes, by code; refuses classes without declarations, and double codes."""
     found: dict[int, Any] = {}
     owner: dict[int, str] = {}
     for name, formulas in declared.items():
