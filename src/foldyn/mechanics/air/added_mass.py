@@ -22,7 +22,7 @@ Flow = NDArray[np.float64] | sparse.csr_array
 
 @dataclass(frozen=True, eq=False)
 class AddedMass:
-    """Symmetric operator on displacements (3n,) or (3n, k), dof 3 node + axis; kg.
+    """Symmetric operator (kg) on displacements (3n,) or (3n, k), with dofs 3 node + axis.
 
     It is positive semidefinite: motions along the sheet move no fluid.
 
@@ -43,7 +43,7 @@ class AddedMass:
         return self.flux.shape[1], self.flux.shape[1]
 
     def __matmul__(self, motions: NDArray) -> NDArray[np.float64]:
-        """Forces (N) of the fluid on the nodes, for accelerations (m/s2) against them."""
+        """Forces (N) that the nodes exert on the fluid if they have these accelerations (m/s2)."""
         return self.flux.T @ (self.flow @ (self.flux @ motions))
 
     def diagonal(self) -> NDArray[np.float64]:
@@ -66,7 +66,7 @@ class AddedMass:
 
     @property
     def rows(self) -> NDArray[np.float64]:
-        """Rows G (u, 3n), kg^1/2, with the matrix equal to G'G; needs a full flow matrix."""
+        """Rows G (u, 3n), kg^1/2, whose product G'G is the matrix; needs a full flow matrix."""
         return np.asarray(self.flux.T @ cholesky(self.flow, lower=True)).T
 
     @cached_property
@@ -90,11 +90,11 @@ def flow_of(
     points : ndarray, shape (p, 3)
         Corners of the triangles, m.
     triangles : ndarray of int, shape (t, 3)
-        With consistent orientation.
+        Corners of each triangle, with consistent orientation.
     unknown : ndarray of int, shape (p,)
         Index of the unknown of each corner, -1 on an open edge.
     parts : ndarray of int, shape (t,), optional
-        Part of each triangle, from 0; each part is treated as alone in the fluid.
+        Part of each triangle, from 0; each part is computed as if it were alone in the fluid.
 
     Raises
     ------

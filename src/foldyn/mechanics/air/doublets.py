@@ -1,4 +1,4 @@
-"""Potential flow about an open surface of triangles, by doublets that are linear on each.
+"""Potential flow about an open surface, by doublets whose strength is linear on each triangle.
 
 The surface moves with the normal velocity w in a fluid that is at rest far away, and the only
 vortices are bound to the surface. The potential jumps across the surface by m, which is zero on the
@@ -8,8 +8,9 @@ edge. The kinetic energy of the fluid for given w is the maximum over m of
     D_ij = 1/(4 pi) int int curl phi_i . curl phi_j / |x - y| dS dS',   curl phi = n x grad phi
 
 (Nedelec 1982, Int. J. Numer. Methods Eng. 18; the jump m is a vortex sheet of strength curl m, and
-D its self-inductance). With m linear on triangles D is symmetric and positive definite, for any
-shape of triangles, and rho b'D^-1 b converges to the added mass from below as they are refined.
+D its self-inductance). With m linear on triangles, D is symmetric and positive definite for any
+shape of triangles, and rho b'D^-1 b converges to the added mass from below as the triangles are
+refined.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from foldyn.threads import in_threads
 
 BLOCK = 64e6  # bytes of the integrals in memory at once
 ROWS = 16  # rows per thread at a time
-FEW = 400  # triangles that one thread is enough for
+FEW = 400  # up to this many triangles, one thread is enough
 
 
 def inductance(points: NDArray, triangles: NDArray, unknown: NDArray) -> NDArray[np.float64]:
@@ -49,7 +50,7 @@ def inductance(points: NDArray, triangles: NDArray, unknown: NDArray) -> NDArray
     inner = 0.5 * (corners + centers[:, None])  # weights 2/3, 1/6, 1/6
     curls = (np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1)) / (
         2.0 * areas[:, None, None]
-    )  # curl of each corner's function: along the opposite side
+    )  # curl of each corner's shape function, along the opposite side
     numbers = unknown[triangles]
     size, count = int(unknown.max(initial=-1)) + 1, len(triangles)
     owner = sparse.csr_array(

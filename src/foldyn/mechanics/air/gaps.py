@@ -11,8 +11,8 @@ from scipy import sparse
 from foldyn.jit.compiled import kernel
 from foldyn.mechanics.contact.distances import point, vertex_distance
 
-APART = 0.25  # of the size of an element: least distance of panels without common corner
-JOINED = 0.01  # for panels that do: their grids open from it as the panels do
+APART = 0.25  # least distance of panels without a common corner, relative to the element size
+JOINED = 0.01  # the same for panels with a common corner, from which both grids diverge
 
 
 class Gap(NamedTuple):
@@ -27,7 +27,7 @@ class Gap(NamedTuple):
 def narrow_gap(
     points: NDArray, triangles: NDArray, panel: NDArray, joined: sparse.csr_array
 ) -> Gap | None:
-    """Find a gap between triangles of two panels that is below its limit; None if there is none.
+    """Find the gap between two panels that is farthest below its limit; None if all are above.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Integrals of 1/|x - y| over pairs of triangles: vortex sheets of constant strength on both.
+"""Integrals of 1/|x - y| over pairs of triangles, for vortex sheets of constant strength.
 
 The integral over one triangle has a closed form at any point (Wilton, Rao, Glisson, Schaubert,
 Al-Bundak and Butler 1984, IEEE Trans. Antennas Propag. 32, 276-281). Over the other triangle it is
@@ -16,7 +16,9 @@ import numpy as np
 from foldyn.jit.compiled import inner, shared
 from foldyn.mechanics.contact.distances import cross, dot, minus
 
-NEAR = 2.0 + 1e-9  # times the sum of both radii: closer centers, 2 in grids, use the closed form
+# pairs use the closed form if the distance of their centers, divided by the sum of both radii, is
+# less than this; neighbors in grids have a ratio of 2
+NEAR = 2.0 + 1e-9
 A1, B1, W1 = 0.797426985353087, 0.101286507323456, 0.125939180544827
 A2, B2, W2 = 0.059715871789770, 0.470142064105115, 0.132394152788506
 SEVEN = np.array([
@@ -30,7 +32,7 @@ SEVEN = np.array([
 def _finer(rule):
     """Apply the rule on the four subtriangles between corners and side midpoints."""
     corners = np.eye(3)
-    middles = 0.5 * (corners + np.roll(corners, -1, axis=0))  # of 01, 12, 20
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=0))  # of the sides 01, 12, 20
     parts = [
         [corners[0], middles[0], middles[2]], [middles[0], corners[1], middles[1]],
         [middles[2], middles[1], corners[2]], [middles[1], middles[2], middles[0]],
@@ -105,7 +107,7 @@ def _between(rule, row, a, b, c):
 
 @inner
 def _over(corners, normals, areas, rule, one, other):
-    """Sum of the potential of one triangle at points of another, m3."""
+    """Integral (m3) of the potential of one triangle over another, by a quadrature rule."""
     a, b, c = _corner(corners, one, 0), _corner(corners, one, 1), _corner(corners, one, 2)
     d, e, f = _corner(corners, other, 0), _corner(corners, other, 1), _corner(corners, other, 2)
     normal = normals[one, 0], normals[one, 1], normals[one, 2]
@@ -127,11 +129,11 @@ def inverse_distances(corners, normals, areas, centers, radii, points, rule, beg
     points : (t, 3, 3)
         Three points per triangle with equal weights, exact for quadratic functions.
     rule : (k, 4)
-        Corner weights of the points for close pairs, and area shares.
+        For close pairs: corner weights of the quadrature points, and their shares of the area.
     begin : int
         Triangle index of the first row.
     out : (rows, t)
-        Entries right of the diagonal; half of those on the diagonal; zero left of it.
+        Integrals right of the diagonal, half the integrals on the diagonal, zeros left of it.
     """
     for row in range(out.shape[0]):
         a = begin + row

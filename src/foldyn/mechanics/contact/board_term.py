@@ -31,8 +31,8 @@ from foldyn.mechanics.contact.kernels import add_contact, board_kernels
 from foldyn.mechanics.contact.term import ContactTerm, contact_tangent
 from foldyn.mechanics.term import CompiledTerm, nodal
 
-STRAIGHT = 0.1  # rad: for smaller turns, points move nearly along straight lines
-MOST = 64  # such pieces per step
+STRAIGHT = 0.1  # rad, largest turn in a piece of a step, so that points move nearly straight
+MOST = 64  # largest number of these pieces per step
 
 
 class BoardContactTerm(ContactTerm):
@@ -79,31 +79,31 @@ class BoardContactTerm(ContactTerm):
         return self._riding[2]
 
     def carried(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Points (m,) that chosen nodes alone move; see `ContactTerm`."""
+        """Points (m,) that depend on the chosen nodes only; see `ContactTerm`."""
         return carried(self.ride, chosen)
 
     def on_nodes(self, q: NDArray, force: NDArray) -> NDArray:
-        """Nodal forces of forces on the points; see `ContactTerm`."""
+        """Nodal forces that are equivalent to forces on the points; see `ContactTerm`."""
         out = np.zeros_like(self.ride.x)
         add_back(Context(self.ride), nodal(q), force, out)
         return out
 
     def step_back(self, u0: NDArray, u1: NDArray, force: NDArray) -> NDArray:
-        """Nodal forces in a step, doing the work of the points' forces; see `ContactTerm`."""
+        """Nodal forces that do the work of the points' forces in a step; see `ContactTerm`."""
         motion = step_jacobian(self.ride, u0, u1, self.ride.x.size)
         return (motion.T @ force.ravel()).reshape(-1, 3)
 
     def step_tangent(
         self, u0: NDArray, u1: NDArray, force: NDArray, inner: sparse.csr_array
     ) -> sparse.csr_array:
-        """Step tangent by nodes; the points' motion is first order in the step."""
+        """Step tangent with respect to nodes; takes the points' motion to first order."""
         ride, size = self.ride, u0.size
         motion, ahead = step_jacobian(ride, u0, u1, size), jacobian(ride, u1, size)
         bent = curvature(ride, 0.5 * (u0 + u1), force, size)
         return sparse.csr_array(motion.T @ inner @ ahead + 0.5 * bent)
 
     def tangent_at(self, q: NDArray, kept: Memory) -> sparse.csr_array:
-        """Tangent by nodes at the last evaluation; see `ContactTerm`."""
+        """Tangent with respect to nodes at the last evaluation; see `ContactTerm`."""
         tables, push = self.tables, np.zeros_like(kept.x)
         add_contact(
             Context(tables), kept.x - tables.rest, self._guarded.angles(q), push, Context(kept)
@@ -114,7 +114,7 @@ class BoardContactTerm(ContactTerm):
         return sparse.csr_array(motion.T @ inner @ motion + bent)
 
     def holds(self, q: NDArray) -> sparse.csr_array:
-        """Unit rows (s, m) of its internal constraints; see `Term`."""
+        """Unit rows (s, m) of the term's internal constraints; see `Term`."""
         rows = self.held(q, self.ride.rest.size) @ jacobian(self.ride, nodal(q), q.size)
         size = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel())
         return sparse.csr_array(sparse.diags_array(1.0 / size) @ rows)
@@ -122,7 +122,7 @@ class BoardContactTerm(ContactTerm):
     def clear_with(
         self, kept: Memory, q: NDArray, step: NDArray, moves: NDArray, keep: float
     ) -> float:
-        """Share of a step without crossing, over pieces in which points hardly turn."""
+        """Share of a step without crossing, found in pieces in which points hardly turn."""
         u, motion = nodal(q), nodal(step)
         turn = largest_turn(self.ride, u, motion)
         if not turn < math.inf:

@@ -1,25 +1,25 @@
-"""Boards: the contact surfaces of panels hinged off their middle surfaces, which ride on the mesh.
+"""Boards: contact surfaces, riding on the mesh, of panels hinged off their middle surfaces.
 
-The contact surface of a board is its middle surface. Neighboring boards have separate corners. The
-nodes of the mesh follow in the arrays, for the guards of hinges.
+The contact surface of a board is its middle surface. Neighboring boards have separate corners. In
+the arrays, the corners are followed by the nodes of the mesh, which the guards of hinges need.
 
-The middles of two boards are s = |h + h'| apart at a closed crease, h and h' the heights of its
-hinge line above them. Between sheets, s = 0 (`tables`), and boards hinged in their faces, s = t,
-which touch everywhere at once,
+At a closed crease, the middles of two boards are s = |h + h'| apart, with h and h' the heights of
+the hinge line above each middle. For sheets, s = 0 (`tables`). For boards hinged in their faces,
+s = t, and they touch everywhere at once. In general the contact distance is
 
     d0 = s + (1 - s/t) d0 of sheets, but at most l,
 
-with l the distance from the crease: boards that lie flat do not touch with their sides. Guards of
-hinges begin at 1 - s/t of the angle for sheets: if the middle surfaces stay apart, their distance
-already determines the side.
+with l the distance from the crease, so that boards that lie flat do not touch with their sides.
+Guards of hinges begin at 1 - s/t times the guard angle for sheets: if the middle surfaces stay
+apart, their distance already shows on which side of each other they lie.
 
 Corners of boards ride on the triangles of the mesh at an offset. A point that rides on a triangle
 of nodes x_i, with N = (x_b - x_a) x (x_c - x_a), n = N / |N|, is
 
     y = sum w_i x_i + h n,    sum w_i = 1;
 
-a corner of several triangles is the mean over them. With the edge e_i opposite to node i, dN/dx_i =
-[e_i x], so that
+a corner that several triangles share is the mean of its points on these triangles. With the edge
+e_i opposite to node i, dN/dx_i = [e_i x], so that
 
     dy/dx_i = w_i I + h P [e_i x] / |N|,    P = I - n n'.
 
@@ -55,7 +55,7 @@ from foldyn.mechanics.contact.candidates import (
 )
 from foldyn.mechanics.contact.distances import cross, dot, minus, point
 
-NOISE = 16.0 * float(np.finfo(float).eps)  # of a normal: rounding error
+NOISE = 16.0 * float(np.finfo(float).eps)  # relative rounding error of a normal
 LEVI_CIVITA = np.zeros((3, 3, 3))
 LEVI_CIVITA[[0, 1, 2], [1, 2, 0], [2, 0, 1]] = 1.0
 LEVI_CIVITA[[0, 2, 1], [2, 1, 0], [1, 0, 2]] = -1.0
@@ -68,9 +68,9 @@ class Ride(NamedTuple):
     rest: NDArray  # (m, 3) points at rest, m
     nodes: NDArray  # (t, 3)
     points: NDArray  # (t, 3) points at the corners
-    weights: NDArray  # (t, 3, 3) w of each point's share, over the nodes
-    heights: NDArray  # (t, 3) h, m
-    reach: NDArray  # (t, 3, 3) squared bounds of how far a node moves a point, in parts that add up
+    weights: NDArray  # (t, 3, 3) w of the nodes for each corner, divided by its number of triangles
+    heights: NDArray  # (t, 3) h, m, divided likewise
+    reach: NDArray  # (t, 3, 3) bounds of (motion of a corner / motion of a node)^2, to be added
 
 
 def ride_on(
@@ -144,7 +144,7 @@ def _normal(ride, u, t):
 
 @kernel
 def put_points(ride, u, out):
-    """Put the displacements (m, 3) of the points, m, for nodal displacements (rows, 3), m."""
+    """Write the points' displacements (m, 3) to `out`, given the nodes' (rows, 3), all in m."""
     first = len(out) - len(ride.x)
     for p in range(first):
         for axis in range(3):
@@ -162,7 +162,7 @@ def put_points(ride, u, out):
 
 @kernel
 def put_rates(ride, u, v, out):
-    """Put the velocities (m, 3) of the points, m/s, for nodal velocities (rows, 3), m/s."""
+    """Write the points' velocities (m, 3) to `out`, given the nodes' (rows, 3), all in m/s."""
     first = len(out) - len(ride.x)
     out[:first] = 0.0
     for i in range(len(ride.x)):
@@ -216,7 +216,7 @@ def add_back(ride, u, push, force):
 
 @inner
 def put_lightness(ride, lightness, out):
-    """Put upper bounds (m,) of 1 / mass of the points, given the nodes' (n,), 1/kg."""
+    """Write upper bounds (m,) of the points' 1 / mass to `out`, given the nodes' (n,), 1/kg."""
     first = len(out) - len(ride.x)
     out[:first] = 0.0
     for i in range(len(ride.x)):
@@ -244,13 +244,13 @@ def _crossing(e: NDArray) -> NDArray:
 
 
 def jacobian(ride: Ride, u: NDArray, size: int) -> sparse.csr_array:
-    """dy/dx (3 m, size) at displacements u (rows, 3)."""
+    """Matrix dy/dx (3 m, size) at displacements u (rows, 3)."""
     turn, _, area, across = _frames(ride, u)
     return _motion(ride, across[:, None] @ turn / area[:, None, None, None], size)
 
 
 def _motion(ride: Ride, turned: NDArray, size: int) -> sparse.csr_array:
-    """Matrix dy/dx (3 m, size), given the derivatives `turned` (t, 3, 3, 3) of normals by nodes."""
+    """Matrix dy/dx (3 m, size), given the derivatives dn/dx `turned` (t, 3, 3, 3) of normals."""
     blocks = ride.heights[:, :, None, None, None] * turned[:, None]
     blocks += ride.weights[:, :, :, None, None] * np.eye(3)
     n, first = ride.x.size, ride.rest.size - ride.x.size
@@ -265,10 +265,11 @@ def _motion(ride: Ride, turned: NDArray, size: int) -> sparse.csr_array:
 def step_jacobian(ride: Ride, u0: NDArray, u1: NDArray, size: int) -> sparse.csr_array:
     """Matrix G (3 m, size) with y1 - y0 = G (u1 - u0) that moves points rigidly with the mesh.
 
-    Rigidity refers to mid-step: for a rotation w, G gives w x (y0 + y1) / 2. With the normal m and
-    its derivative A at mid-step, the mean normal, and the rotation W z closest to nodal motions z,
-    this holds for A + [(m - mean) x] W; the remaining difference is corrected along the deforming
-    part of u1 - u0 (Gonzalez, J. Nonlinear Sci. 6, 1996).
+    Rigidity refers to mid-step: for a rotation w, G gives w x (y0 + y1) / 2. Let m be the normal at
+    mid-step and A its derivative, `mean` the mean of the normals at both ends, and W z the rotation
+    closest to nodal motions z. Then A + [(m - mean) x] W moves points rigidly; the remaining
+    difference is corrected along the deforming part of u1 - u0 (Gonzalez, J. Nonlinear Sci. 6,
+    1996).
     """
     n = len(ride.x)
     turn, normal, area, across = _frames(ride, 0.5 * (u0 + u1))
@@ -317,8 +318,8 @@ def largest_turn(ride: Ride, u: NDArray, step: NDArray) -> float:
     return float(np.linalg.norm(moved, axis=1).max(initial=0.0))
 
 
-JUST = 1.0 - 1e-9  # of d0: parts that just touch at rest exert no force
-LEAST = 0.02  # of the guard angle for sheets: least angle of a guard
+JUST = 1.0 - 1e-9  # factor on d0, so that parts that just touch at rest exert no force
+LEAST = 0.02  # least angle of a guard, relative to the guard angle for sheets
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,7 +342,7 @@ class BoardSheets(Sheets):
 def board_tables(
     sheets: BoardSheets, ride: Ride, panel: NDArray, node: NDArray, hinges: NDArray
 ) -> Tables:
-    """Contact arrays for points of a panel (m,) and a node (m,), and hinges of the mesh."""
+    """Contact arrays, given the panel (m,) and node (m,) of each point and the mesh's hinges."""
     mesh = Sheets(*(getattr(sheets, field.name) for field in fields(Sheets)))
     held = carried(ride, sheets.held)
     points = replace(mesh, nodes=ride.rest, triangles=ride.points, held=held)
@@ -372,9 +373,9 @@ def board_tables(
 def _neighbors(
     sheets: BoardSheets, ride: Ride, panel: NDArray, node: NDArray
 ) -> tuple[list[list[int]], list[dict[int, float]], dict[tuple[int, int], float]]:
-    """Panels of each point's node, its own first, and d0 (m) against others near it.
+    """Panels at each point's node, the point's own first, and d0 (m) against nearby panels.
 
-    Also returns s/t of panels that share a crease. Points belong to a panel (m,) and a node (m,).
+    Also returns s/t of panels that share a crease. panel, node : (m,) that each point belongs to.
     """
     at = {key: k for k, key in enumerate(zip(panel.tolist(), node.tolist(), strict=True))}
     sharing: list[list[int]] = [[] for _ in ride.x]

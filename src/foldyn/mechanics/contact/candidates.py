@@ -1,14 +1,15 @@
-"""Parts of a sheet that can touch, and their contact distances: constant during a motion.
+"""Parts of a sheet that can touch, and their contact distances, constant during a motion.
 
-Parts of one panel never touch. Two panels that share a crease or a corner are always close, so the
-contact distance d0 of a vertex of one against the other is reduced there:
+Parts of one panel never touch. Two panels that share a crease or a corner are always close to each
+other there. So the contact distance d0 of a vertex of one panel against the other panel is reduced:
 
-    d0 = t min(2, 2 l / w) beside a crease,    d0 = t min(1, 2 l / w) beside a corner,
+    d0 = t min(2, 2 l / w) near a crease,    d0 = t min(1, 2 l / w) near a corner,
 
-with l the vertex's distance from the shared crease or corner at rest, and w the largest l of its
-panel. Panels hinged at a crease then meet everywhere at once, at a dihedral of 2 t / w, and N
-layers stack to N t. Elsewhere d0 = t, the mean thickness of both. For two edges, d0 is the mean
-over the ends of one against the panel of the other, minimized over the combinations.
+with l the vertex's distance from the shared crease or corner at rest, and w the largest l of the
+vertex's panel. Panels hinged at a crease then meet everywhere at once, at a dihedral of 2 t / w,
+and N layers stack to N t. Elsewhere d0 = t, the mean thickness of both. For two edges, d0 is the
+mean of d0 of both ends of one edge against a panel of the other edge; the smallest mean of all
+combinations counts.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class Sheets:
         Positions at rest, m.
     triangles, panel : (t, 3), (t,)
     thickness : (p,)
-        Of the panels, m.
+        Thickness of each panel, m.
     stiffness : float
         k of the potential, N/m.
     panels : bool
@@ -43,8 +44,8 @@ class Sheets:
     friction : float
         Friction coefficient between panels.
     planes : (q, 11)
-        A point (m), the unit normal toward the sheet, the friction coefficient, the displacement
-        (m) at factor 1, and the row of its history.
+        For each plane: a point (m), the unit normal toward the sheet, the friction coefficient, the
+        displacement (m) at factor 1, and the row of its history.
     held : (n,)
         Fixed nodes, on which planes do not act.
     """
@@ -69,7 +70,7 @@ class Sheets:
 
 
 class Ranges(NamedTuple):
-    """Data for d0 of nodes and panels. Compiled code passes small tuples several times faster."""
+    """Data for d0 of nodes and panels, separate because small tuples are passed much faster."""
 
     node_thickness: NDArray  # (n,) m
     panel_thickness: NDArray  # (p,) m
@@ -77,7 +78,7 @@ class Ranges(NamedTuple):
     own: NDArray
     near_start: NDArray  # (n + 1,) start of the panels near each node's panels, in `near`
     near: NDArray
-    near_d0: NDArray  # d0 against these panels, m
+    near_d0: NDArray  # d0 against the panels in `near`, m
 
 
 class Tables(NamedTuple):
@@ -98,7 +99,7 @@ class Tables(NamedTuple):
     meeting: NDArray  # (m,) nodes that planes may meet
     hinges: NDArray  # (h, 4) nodes j, k, i, l
     hinge_row: NDArray  # (h,) position in the model's dihedrals
-    hinge_limit: NDArray  # (h,) dihedral below which they are guarded, rad
+    hinge_limit: NDArray  # (h,) dihedral below which a hinge is guarded, rad
     hinge_reach: NDArray  # (h,) largest turn per nodal displacement, rad/m
     hinge_stiffness: NDArray  # (h,) N m/rad
     planes: NDArray  # (q, 11)
@@ -108,12 +109,12 @@ class Tables(NamedTuple):
     skin: float  # of pair lists, m
 
 
-SKIN = 0.15  # of the mean edge: extra distance beyond d0 of listed pairs
+SKIN = 0.15  # extra distance beyond d0 of listed pairs, relative to the mean edge
 GUARDED = 1.0  # rad: largest dihedral at which a guard may begin
 
 
 def tables(sheets: Sheets, hinges: NDArray) -> Tables:
-    """Contact arrays for hinges (h, 4) of a model, with -1 for a virtual wing."""
+    """Contact arrays of sheets and of the hinges (h, 4) of a model; -1 marks a virtual wing."""
     nodes, triangles = np.ascontiguousarray(sheets.nodes, float), _whole(sheets.triangles)
     panel = _whole(sheets.panel)
     edges, side = edges_of(triangles)
@@ -173,7 +174,7 @@ def tables(sheets: Sheets, hinges: NDArray) -> Tables:
 
 
 def edges_of(triangles: NDArray) -> tuple[NDArray, NDArray]:
-    """Edges (e, 2), and each triangle's edges (t, 3) from its first, second and third corner."""
+    """Edges (e, 2); and each triangle's edges (t, 3) that begin at its corners 0, 1 and 2."""
     sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     edges, side = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
     return _whole(edges), side.reshape(-1, 3)
@@ -222,7 +223,7 @@ def near_panels(
 
 
 def shared_nodes(panel: int, corners: NDArray, own: list[list[int]]) -> dict[int, list[int]]:
-    """Other panels at the corners of a panel, and the corners they share."""
+    """Other panels at the corners of a panel, and the corners that each shares with it."""
     shared: dict[int, list[int]] = {}
     for node in corners.tolist():
         for other in own[node]:
@@ -232,7 +233,7 @@ def shared_nodes(panel: int, corners: NDArray, own: list[list[int]]) -> dict[int
 
 
 def distances(nodes: NDArray, corners: NDArray, common: list[int]) -> NDArray:
-    """Distances (k,) of nodes from a node, or from the line along several of them."""
+    """Distances (k,) of corners from a common node, or from the segment along several."""
     away = nodes[corners] - nodes[common[0]]
     if len(common) == 1:
         return np.linalg.norm(away, axis=1)
@@ -243,11 +244,11 @@ def distances(nodes: NDArray, corners: NDArray, common: list[int]) -> NDArray:
 
 
 class Pieces(NamedTuple):
-    """Edges that are pieces of a crease between two panels, c of them."""
+    """The c edges that are pieces of a crease between two panels."""
 
-    ends: NDArray  # (c, 2) increasing
-    height: NDArray  # (c,) half the width of the narrower panel over the crease, m
-    share: NDArray  # (c,) share of the length of all pieces
+    ends: NDArray  # (c, 2) nodes, the lower first
+    height: NDArray  # (c,) half the width of the narrower panel normal to the crease, m
+    share: NDArray  # (c,) share of the length of the crease
 
 
 def crease_pieces(
@@ -276,10 +277,10 @@ def hinge_guards(
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Guarded hinges, and for all hinges: start of the guard (rad), reach (rad/m), stiffness.
 
-    Faces of thickness t, with the lower wing at height h over the axis, meet at a dihedral of about
-    t / h; the guard has the stiffness k h^2, like a contact at the wing. On a piece of a crease the
-    wings are parts of panels, and h is the panels' height: the guards of all pieces begin when the
-    panels meet, and share the stiffness of one guard.
+    Faces of thickness t, with the lower wing at height h above the axis, meet at a dihedral of
+    about t / h; the guard has the stiffness k h^2, like a contact at the wing. On a piece of a
+    crease the wings are parts of panels, and h is the panels' height: the guards of all pieces
+    begin when the panels meet, and share the stiffness of one guard.
     """
     whole = np.flatnonzero(((hinges >= 0) & (hinges < len(nodes))).all(axis=1))
     limit, reach, strength = np.zeros((3, len(hinges)))

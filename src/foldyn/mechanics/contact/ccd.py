@@ -4,11 +4,11 @@ Explicit methods limit their steps by speeds (`step_limit`). A Newton step has n
 planes move along straight lines, and it is shortened so that each gap keeps a share of itself and
 no guarded hinge passes 0 or 2 pi. Pair lists are renewed when the motion leaves their range.
 
-Conservative advancement finds the first gap to close and needs only distances: a pair whose points
-move by at most l relative to each other keeps its gap g above its goal over the share (g - goal) /
-l of the motion; the next share follows from there (additive continuous collision detection; Li,
-Kaufman and Jiang, Codimensional Incremental Potential Contact, ACM Trans. Graph. 40, 2021, section
-5).
+Conservative advancement finds the first gap to close and needs only distances. If the points of a
+pair move by at most l relative to each other, the gap g of the pair stays above its goal during the
+share (g - goal) / l of the motion; the next share is found from there (additive continuous
+collision detection; Li, Kaufman and Jiang, Codimensional Incremental Potential Contact, ACM Trans.
+Graph. 40, 2021, section 5).
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from foldyn.mechanics.contact.planes import height
 from foldyn.mechanics.contact.search import farthest, fastest, list_pairs, place, use_all
 
 KEEP = 0.2  # share of each gap to keep
-NEAR = 0.01  # of the goal: gaps this close above it count as having reached it
-ADVANCES = 100  # per pair
-LISTS = 40  # pair lists per motion
-HALVINGS = 40  # if a hinge would pass
+NEAR = 0.01  # a gap has reached its goal if it exceeds it by at most this share
+ADVANCES = 100  # largest number per pair
+LISTS = 40  # largest number of pair lists per motion
+HALVINGS = 40  # largest number of halvings if a hinge would pass 0 or 2 pi
 
 
 @inner_scalar
@@ -117,9 +117,9 @@ def _hinges_share(tables, x, step, keep, best):
 
 @inner
 def _listed_share(tables, memory, u, step, keep, fast):
-    """Share of a motion from u, where memory.x is, that keeps all pairs apart.
+    """Share of a motion from u (positions memory.x) that keeps all pairs apart.
 
-    If the motion leaves the range of the pair list, it continues from there with a new one.
+    If the motion leaves the range of the pair list, it continues from there with a new list.
     """
     far, done = farthest(u, memory), 0.0
     if memory.counts.has_list == 0 or not far <= 0.25 * memory.facts.skin:

@@ -19,9 +19,9 @@ from foldyn.mechanics.contact.distances import (
 )
 from foldyn.mechanics.crossings import crossing_panels
 
-NEIGHBORS = 32  # nearest triangle centers that give a first bound
-TIE = 2e-9  # of the squared least distance: pairs of points within this tie
-MOST = 64  # number of such pairs that are reported
+NEIGHBORS = 32  # number of nearest triangle centers for a first bound
+TIE = 2e-9  # pairs of points tie if their squared distances differ by at most this share
+MOST = 64  # largest number of tied pairs that are reported
 
 
 class Clearance(NamedTuple):
@@ -30,7 +30,7 @@ class Clearance(NamedTuple):
     Attributes
     ----------
     distance : float
-        m; 0 if panels cross, inf if any two panels share a vertex.
+        m; 0 if panels cross, inf if every two panels share a vertex.
     nodes, weights : ndarray, shape (k, 4)
         The vector between both points is the weighted sum of the nodal positions, for each pair at
         this distance.
@@ -51,7 +51,7 @@ def clearance(points: NDArray, triangles: NDArray, panels: NDArray) -> Clearance
     triangles : ndarray of int, shape (m, 3)
         Triangles into which panels are cut.
     panels : ndarray of int, shape (m,)
-        The panel of each.
+        The panel of each triangle.
     """
     x = np.ascontiguousarray(points, float)
     rows, owners = np.asarray(triangles, np.int64), np.asarray(panels, np.int64)
@@ -88,9 +88,9 @@ def _entries(matrix: sparse.csr_array, rows: NDArray, columns: NDArray) -> NDArr
 
 @kernel
 def _closest(x, triangles, pairs, nodes, weights):
-    """Least distance of some pairs of triangles, and how many pairs reach it.
+    """Least distance of some pairs of triangles, and how many pairs of points have it.
 
-    Writes their nodes and weights to the last two arguments, in any order.
+    Writes the nodes and weights of these pairs to the last two arguments, in any order.
     """
     best, count = np.inf, 0
     for k in range(len(pairs)):
@@ -120,7 +120,7 @@ def _closest(x, triangles, pairs, nodes, weights):
 
 @inner
 def _kept(square, found, best, count, nodes, weights):
-    """Record a pair of points if it ties with the closest; a closer pair replaces all.
+    """Record a pair of points if it ties with the closest pairs; a closer pair replaces them.
 
     Returns the square of the least distance, and the number of pairs.
     """

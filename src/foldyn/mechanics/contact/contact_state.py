@@ -2,9 +2,10 @@
 
 A member owns nodes, as in `mechanics.strips`: it places them, handles their contact with planes and
 completes the force on them. Pairs and guarded hinges are split by index, regardless of who owns
-their nodes. Each member adds their forces to its own sums; then each adds up all members' sums on
-its own nodes, in member order. So the order of summation does not depend on the threads' speed. A
-single thread owns everything and adds to the force directly.
+their nodes. Each member adds the forces of its share of pairs and hinges to its own sums; then each
+member adds up the sums of all members on its own nodes, in member order. So the order of summation
+does not depend on the threads' speed. A single thread owns everything and adds to the force
+directly.
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ from foldyn.mechanics.contact.candidates import Tables
 from foldyn.mechanics.contact.distances import VERTEX
 from foldyn.mechanics.threads import Team, part, team, total, wait
 
-# places of a member's notes to its team: shares of the mean velocity and of the mean motion since
-# pairs were listed, three each; the largest deviations; the step it allows, how many pairs of
-# either kind are near, how many hinges; which nodes its sums reach; the energy of its share
+# positions in a member's notes to its team: its parts of the mean velocity and of the mean motion
+# since pairs were listed, three numbers each; its largest deviations from both means; the step it
+# allows; its numbers of near pairs of each kind and of near hinges; the range of nodes that its
+# sums reach; the energy of its share
 SPEED, MOTION, FAST, FAR, LIMIT, NEAR, HINGES, LOW, HIGH, ENERGY = 0, 3, 6, 7, 8, 9, 11, 12, 13, 14
 NOTES = 16  # two cache lines
 
@@ -32,11 +34,11 @@ class Share(NamedTuple):
 
     team: Team  # with its own notes, (k, NOTES)
     own: NDArray  # (2,) first and last + 1 of the member's nodes
-    meeting: NDArray  # (2,) and of its nodes that planes may meet
+    meeting: NDArray  # (2,) the same, of its nodes that planes may meet
     found: NDArray  # (2, m) near pairs in the order of discovery; for one thread, the list itself
     sums: NDArray  # (k, n, 3) pair forces of each member, N, else 0; (1, 0, 3) for one thread
     counts: NDArray  # (k, ...) int64, counters of all members
-    facts: NDArray  # (k, ...) and their measured values
+    facts: NDArray  # (k, ...) float64, measured values of all members
 
 
 @inner_scalar
@@ -94,20 +96,20 @@ def finish(share, force):
 
 @inner_scalar
 def energy_of_all(memory):
-    """Contact energy (J) of all members at the last force, after a `wait` for them."""
+    """Contact energy (J) of all members at the last force evaluation, after a `wait` for them."""
     if memory.share.team.size == 1:
         return memory.facts.energy
     return total(memory.share.team, ENERGY)
 
 
-ROOM = 64  # pairs per triangle, for each kind
+ROOM = 64  # room for pairs of each kind, per triangle
 
 
 class Memory(NamedTuple):
     """Memory of a motion of n nodes against q planes; room for m pairs of each kind.
 
-    Members of a thread team share the arrays, except `moved`, `counts` and `facts`: these take
-    equal values, except for the energy, which covers a member's share.
+    Members of a thread team share the arrays, except `moved`, `counts` and `facts`. Each member has
+    its own copies of these, with equal values except for the energy, which covers its share.
     """
 
     x: NDArray  # (n, 3) positions at the last evaluation, m
@@ -123,11 +125,11 @@ class Memory(NamedTuple):
     # (q, n, 4) anchor of friction's spring on the plane, m, and the normal force at the last
     # accepted step, N, 0 if there is no contact
     anchor: NDArray
-    friction: NDArray  # (q, n, 4) gradient of friction, N, and the normal force at the last force
+    friction: NDArray  # (q, n, 4) gradient of friction and normal force, last evaluated, N
     moved: NDArray  # (q, 6) displacement of the planes, m, and their velocity, m/s
     counts: np.record
     facts: np.record
-    share: Share  # of a team member
+    share: Share  # the share of a team member
 
 
 COUNTED = (
@@ -142,8 +144,8 @@ COUNTED = (
     "full",  # whether the last list did not fit
     "lagged",  # whether friction is limited by the normal force at the end of the last step
 )
-# energy at the last force (J), skin of the list (m), the shortest step asked for so far (s), the
-# longest one that resolves what touches now (s)
+# energy at the last force evaluation (J), skin of the list (m), the shortest step requested so far
+# (s), the longest step that resolves the current contacts (s)
 MEASURED = ("energy", "skin", "shortest", "resolved")
 COUNTS = np.dtype((np.record, [(name, np.int64) for name in COUNTED]))
 FACTS = np.dtype((np.record, [(name, np.float64) for name in MEASURED]))
@@ -157,7 +159,7 @@ def memory(tables: Tables, panels: bool = True) -> Memory:
 def memories(
     tables: Tables, panels: bool, members: Sequence[Team], own: Sequence[NDArray]
 ) -> list[Memory]:
-    """New memory of each member of a team, who owns the nodes own[0] to own[1]."""
+    """New memory of each member k of a team, with the first and last + 1 own[k] of its nodes."""
     n, q, size = len(tables.rest), len(tables.planes), len(members)
     room = ROOM * len(tables.triangles) + 256 if panels else 0
     near = np.empty((2, room), np.int32)

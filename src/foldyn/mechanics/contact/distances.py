@@ -12,7 +12,7 @@ import math
 from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
 
 INSIDE, SIDE_AB, SIDE_BC, SIDE_CA, CORNER_A, CORNER_B, CORNER_C = range(7)  # regions
-PARALLEL = 1e-14  # of the product of squared lengths: below it segments count as parallel
+PARALLEL = 1e-14  # segments e, g are parallel if |e x g|^2 is less than this times |e|^2 |g|^2
 
 
 @inner_scalar
@@ -41,7 +41,7 @@ def cross(a, b):
 
 @inner_scalar
 def apart(p, a, b, c, wa, wb, wc):
-    """Vector from the point of a triangle with some weights to p."""
+    """Vector to p from the point of a triangle with the weights wa, wb, wc."""
     return (
         p[0] - wa * a[0] - wb * b[0] - wc * c[0],
         p[1] - wa * a[1] - wb * b[1] - wc * c[1],
@@ -117,7 +117,7 @@ def closest_of_segments(a, b, c, d):
 
 @inner
 def closest_end(a, b, c, d):
-    """Fractions, on ab and cd, of the closest of the four pairs of an end and a segment."""
+    """Fractions on ab and cd of the closest two points of which one is an end."""
     s, t = 0.0, closest_on_segment(a, c, d)
     r = between(a, b, c, d, s, t)
     best = dot(r, r)
@@ -150,8 +150,8 @@ def nodes_of(triangles, edges, kind, one, other):
 def weights_of(kind, p, q):
     """Weights (4) of the vector from the second part of a pair to the first.
 
-    p, q : its end points: for a triangle, the weights of its second and third corner; for two
-    edges, the fractions of their lengths.
+    p, q : parameters of the vector's end points: for a triangle, the weights of its second and
+    third corner; for two edges, the fractions of their lengths.
     """
     if kind == VERTEX:
         return 1.0, p + q - 1.0, -p, -q
@@ -219,7 +219,7 @@ def gap_of(triangles, edges, x, kind, one, other):
 
 @inner
 def closest_of(triangles, edges, x, kind, one, other):
-    """Closest points of a pair, as in `weights_of`; whether inside both edges."""
+    """Closest points of a pair, as p, q of `weights_of`; whether they lie inside both edges."""
     a, b, c, d = nodes_of(triangles, edges, kind, one, other)
     pa, pb, pc, pd = point(x, a), point(x, b), point(x, c), point(x, d)
     if kind == VERTEX:

@@ -1,10 +1,10 @@
 """Friction along a path of equilibria: updates at accepted steps.
 
 Within a step friction is a function of the state: springs from the anchors and ties of the last
-accepted step, each limited to mu N, with N the current normal force (`planes`, `panel_friction`).
-So a step is the return mapping of Coulomb friction by the backward Euler method. A node or listed
-pair without contact is tied at its current position, so that friction acts from the step in which
-contact begins.
+accepted step pull with at most mu N each, with N the current normal force (`planes`,
+`panel_friction`). So a step is the return mapping of Coulomb friction by the backward Euler method.
+A node or listed pair without contact is tied at its current position, so that friction acts from
+the step in which contact begins.
 
 A sliding anchor dissipates its path times the mean of mu N at both ends of the step; a released
 spring loses its energy.
@@ -27,7 +27,7 @@ from foldyn.mechanics.contact.search import lay_ties, take_ties
 class Friction:
     """Anchors and ties of the friction springs, which change in place.
 
-    Its `commit`, `snapshot` and `recall` work as in `mechanics.inelastic.HingeMemory`.
+    The methods `commit`, `snapshot` and `recall` work as in `mechanics.inelastic.HingeMemory`.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Friction:
         self._coefficient = tables.planes[:, FRICTION, None]
 
     def start(self) -> None:
-        """Tie all nodes at the last evaluation; springs are without force."""
+        """Tie all nodes where they were last evaluated; the springs then exert no force."""
         self._kept.anchor[:], self._kept.tie[:] = 0.0, 0.0
         self._stored[:], self._lost[:] = 0.0, 0.0
         self._tie()
@@ -79,12 +79,12 @@ class Friction:
         return float(self._lost[0])
 
     def snapshot(self) -> tuple[NDArray, ...]:
-        """Copy of the last accepted step, for `recall`."""
+        """Copy of the state at the last accepted step, for `recall`."""
         tied = take_ties(self._kept) if self._tables.friction > 0.0 else ()
         return (*(array.copy() for array in self._state), *tied)
 
     def recall(self, snapshot: Sequence[NDArray]) -> None:
-        """Return to an accepted step."""
+        """Return to the state at an accepted step."""
         for array, kept in zip(self._state, snapshot, strict=False):
             array[:] = kept
         if self._tables.friction > 0.0:

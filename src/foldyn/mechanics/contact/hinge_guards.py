@@ -1,7 +1,7 @@
-"""Guards of hinges, as distance does not tell apart panels that share a crease.
+"""Guards of hinges: distance does not show whether panels that share a crease have crossed.
 
-For any hinge law, a dihedral theta has the additional energy K t0^2 f(theta / t0) below t0, and
-likewise 2 pi - theta: faces of thickness t with wing height h meet at t0 = t / h, K = k h^2.
+Whatever the hinge law, a dihedral theta below t0 has the additional energy K t0^2 f(theta / t0),
+and so has 2 pi - theta. Faces of thickness t with wing height h meet at t0 = t / h; K = k h^2.
 """
 
 from __future__ import annotations

@@ -37,8 +37,8 @@ from foldyn.mechanics.contact.planes import height
 from foldyn.mechanics.contact.potential import barrier
 from foldyn.mechanics.contact.search import place
 
-SLOWNESS = 2.0  # tau over the step: limits contact vibrations to half a radian per step
-STRETCH = 1.02  # of the resolving step: limit for steps that end at load jumps
+SLOWNESS = 2.0  # tau divided by the step: limits contact vibrations to half a radian per step
+STRETCH = 1.02  # steps that end at load jumps may exceed the resolving step by this factor
 
 
 class Added(NamedTuple):
@@ -46,7 +46,7 @@ class Added(NamedTuple):
 
     count: NDArray  # (1,) int64
     nodes: NDArray  # (room, 4)
-    gradient: NDArray  # (room, 4, 3) of the distance, or dihedral
+    gradient: NDArray  # (room, 4, 3) gradient of the distance, or of the dihedral
     ease: NDArray  # (room,) 1 / (tau^2 K)
     lightness: NDArray  # (room,) approximate 1 / moving mass of each
     lines: NDArray  # (4, room) scratch of the solver
@@ -62,7 +62,7 @@ def room_for(tables: Tables, memory: Memory) -> Added:
 
 @inner
 def _slow(added, k, stiffness, dt, beta, lightness):
-    """Whether a step does not resolve contact k with a stiffness; if so, adds its inertia."""
+    """Whether a step is too long to resolve contact k; if so, gives the contact inertia."""
     light = 0.0
     for i in range(4):
         for axis in range(3):

@@ -147,7 +147,7 @@ class _Riding(NamedTuple):
     tables: Tables
     memory: Memory
     angle: NDArray
-    moved: NDArray  # (m, 3) of the points, as of nodes elsewhere,
+    moved: NDArray  # (m, 3) this and the next three: of the points, in place of nodes
     speed: NDArray
     change: NDArray
     push: NDArray

@@ -1,12 +1,12 @@
 """A vertex against a triangle, and an edge against an edge: energy, force and tangent.
 
-If the point of a triangle closest to a vertex lies on a shared side or corner, each triangle there
-would count it. So shared parts are subtracted:
+If the point of a triangle closest to a vertex lies on a shared side or corner, each triangle with
+this side or corner would count it. So shared parts are subtracted:
 
     V = b(d_T) - 1/2 sum b(d_E) + sum b(d_V) / n
 
-summed over sides E of two triangles and corners V enclosed by n triangles. Over a flat sheet, the
-sum over all triangles is b(d), also above inner sides and corners.
+with sums over the sides E that two triangles share and over the corners V that n triangles enclose.
+Over a flat sheet, the sum over all triangles is b(d), also above inner sides and corners.
 
 An edge pair contributes only if the closest points lie inside both edges,
 
@@ -54,11 +54,11 @@ PARTS = 7  # parts of a triangle: itself, its sides, its corners
 
 @inner
 def _press(force, nodes, weights, r, d0, k):
-    """Energy k d0^2 f(d/d0) of a distance d = |r| over four nodes, and its force along d.
+    """Energy k d0^2 f(d/d0) of a distance d = |r| between four nodes, and the force along r.
 
-    Adds its gradient, unless force is None.
+    Adds the gradient to `force`, unless that is None.
 
-    weights : of the nodes' positions in r.
+    weights : coefficients of the nodes' positions in r.
     """
     d = math.sqrt(dot(r, r))
     if d >= d0:
@@ -78,7 +78,7 @@ def vertex_triangle(tables, x, force, v, t, d0):
 
     Adds the gradient to force (n, 3), unless that is None. Also returns the weights of the second
     and third corner at the closest point. Normal forces of a triangle's parts are summed like their
-    energies: over a flat sheet this equals the force everywhere.
+    energies, so that over a flat sheet the sum equals the force everywhere.
     """
     nodes, k = nodes_of(tables.triangles, tables.edges, VERTEX, v, t), tables.stiffness
     p, a, b, c = point(x, nodes[0]), point(x, nodes[1]), point(x, nodes[2]), point(x, nodes[3])
@@ -289,7 +289,7 @@ def edge_edge_tangent(tables, x, i, j, d0, out):
 
 @inner
 def square_of_cross(e, g):
-    """First and second derivatives, (12,) and (12, 12), of |e x g|^2 by the ends of both edges."""
+    """Derivatives (12,) and (12, 12) of |e x g|^2 with respect to the ends of both edges."""
     ee, gg, eg = dot(e, e), dot(g, g), dot(e, g)
     by_vectors, twice = np.empty(6), np.empty((6, 6))
     for p in range(3):

@@ -1,13 +1,13 @@
 """Friction between panels: springs between the points of first contact.
 
-A pair whose closest points differ by r, d = |r|, is tied between two points fixed to its parts,
-which differ by q. Their distance along the parts is
+Let the closest points of a pair differ by the vector r, with d = |r|. The pair is tied between two
+points that are fixed to its parts and differ by q. The distance of these points along the parts is
 
     s = sqrt(|q|^2 - d^2)
 
-which is invariant under rigid motions. The spring has the energy k s^2 / 2 and pulls with k s,
-limited to mu N, with N the normal force of the pair. At the end of a step the tied points follow a
-slipping pair, like anchors on planes (`planes`). With weights a_i of q and w_i of r on the four
+which is invariant under rigid motions. The spring has the energy k s^2 / 2 and pulls with k s, but
+at most with mu N, with N the normal force of the pair. At the end of a step the tied points follow
+a slipping pair, like anchors on planes (`planes`). With weights a_i of q and w_i of r on the four
 nodes the forces are k (a_i q - w_i r): two pairs of opposite forces along q and r, which have
 neither a resultant nor a moment.
 
@@ -70,7 +70,8 @@ def pressed_pair(tables, memory, x, kind, pair):
 def stretch_of_pair(tables, memory, x, kind, pair, p, q):
     """Stretch (m) of the spring of a pair whose closest points are p, q.
 
-    Preceded by the nodes, the weights of the tied and the closest points, and their vectors.
+    Returns the pair's nodes, the weights of the tied and of the closest points, the vector between
+    the tied and between the closest points, then the stretch.
     """
     tie = memory.tie[kind, pair]
     one, other = memory.pairs[kind, pair, 0], memory.pairs[kind, pair, 1]
@@ -90,7 +91,7 @@ def bound(tables, memory, kind, pair, pressed):
 
 @inner_scalar
 def pull_of(k, stretch, most):
-    """Spring force over its stretch (N/m)."""
+    """Ratio of spring force to stretch (N/m)."""
     return k if stretch <= most else k * most / stretch
 
 
@@ -186,7 +187,7 @@ def tie_pairs(tables, memory):
 
 @kernel
 def slip_pairs(tables, x, memory):
-    """Update ties at the end of a step: follow slipping pairs, begin and end with contact.
+    """Update ties at the end of a step: follow slipping pairs, tie and release pairs.
 
     Covers a member's share of near pairs. Returns the dissipated energy (J): the path of the ties
     times the mean of mu N at both ends of the step, and the energy of released springs.

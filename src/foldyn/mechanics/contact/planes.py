@@ -2,11 +2,11 @@
 
 A node at the distance d from a plane has the energy k d0^2 f(d/d0), with d0 half the sheet's
 thickness. Friction is a spring along the plane from the node to an anchor that moves with the
-plane: it pulls with k s, s its stretch, limited to mu N, N the normal force. At the end of a step
-the anchor follows a slipping node, and the energy that the spring loses is dissipated (the elastic
-predictor and slip of return mapping; Wriggers, Computational Contact Mechanics, 2006, section
-5.2.3). Implicit methods use N from the end of the last step: friction then has a potential within a
-step, and a symmetric tangent.
+plane: it pulls with k s, s its stretch, but at most with mu N, N the normal force. At the end of a
+step the anchor follows a slipping node, and the energy that the spring loses is dissipated (the
+elastic predictor and slip of return mapping; Wriggers, Computational Contact Mechanics, 2006,
+section 5.2.3). Implicit methods use N from the end of the last step: friction then has a potential
+within a step, and a symmetric tangent.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def farthest_stretch(tables, memory, p, i):
 
 @inner
 def stretch_of(tables, x, moved, memory, p, i):
-    """Stretch (m) of the spring of node i on plane p: its in-plane vector, its length.
+    """Stretch (m) of the spring of node i on plane p: three components, then their norm.
 
     moved : (q, 3) displacement of the planes, m.
     """
@@ -95,7 +95,7 @@ def stretch_of(tables, x, moved, memory, p, i):
 
 @kernel
 def slip(tables, x, memory):
-    """Update anchors at the end of a step: follow slipping nodes, begin and end with contact."""
+    """Update anchors at the end of a step: follow slipping nodes, begin or end a contact."""
     mine = memory.share.meeting
     for p in range(len(tables.planes)):
         plane, moved = tables.planes[p], memory.moved[p]

@@ -1,16 +1,17 @@
 """The potential of contact: k d0^2 f(d/d0) below the distance d0, f(x) = (1 - x)^3 / x^4.
 
 f is twice continuously differentiable at x = 1, where it ends, and diverges as surfaces meet.
-Potentials of this kind: Li et al., Incremental Potential Contact, ACM Trans. Graph. 39, 2020, there
--(x - 1)^2 ln x. The logarithm stores no more than some k d0^2 at any distance that floats
-distinguish from 0; the power x^-4 absorbs the energy of a snap with a tenth of d0 left.
+Potentials of this kind are from Li et al., Incremental Potential Contact, ACM Trans. Graph. 39,
+2020, who use -(x - 1)^2 ln x. With this logarithm, the energy stays below 1000 k d0^2 at any
+distance that floats can distinguish from 0; the power x^-4 absorbs the energy of a snap while a
+tenth of d0 is left.
 
 Between x0 and x1, with y = 1 - x and z = 1/x, f = y^3 z^4 has the difference quotient
 
     f[x0, x1] = y^3[x0, x1] z1^4 + y0^3 z^4[x0, x1],    y^3[x0, x1] = -(y0^2 + y0 y1 + y1^2),
     z^4[x0, x1] = -z0 z1 (z0^3 + z0^2 z1 + z0 z1^2 + z1^3),
 
-sums of terms of equal sign: no digits are lost, however close x0 and x1 are.
+These are sums of terms of equal sign, so no digits are lost, however close x0 and x1 are.
 
 The second derivative needs the Hessian of the distance. With r = sum w_i x_i, minimized over the
 free parameters a of the weights, the distance d = |r| obeys, by the implicit function theorem,
@@ -89,7 +90,7 @@ def half_square(corners, weights, moves, free, r, slope, second):
     """Set slope (12,) and second (12, 12) to the derivatives of d^2 / 2.
 
     corners : (4, 3) positions; weights : (4,) of r (3,); moves : (2, 4) derivatives of the weights
-    by the `free` parameters over which the distance is minimal.
+    with respect to the `free` parameters over which the distance is minimal.
     """
     jacobian, inverse, h = np.zeros((2, 3)), np.zeros((2, 2)), np.zeros((2, 12))
     for p in range(free):

@@ -2,8 +2,8 @@
 
 A list holds all pairs closer than d0 + skin, and all pairs tied by friction. It is valid until a
 node has moved by half the skin relative to the mean motion: common motion of all nodes closes no
-gap. Tied pairs stay listed wherever lists are made: a Newton step may lead far away before it is
-shortened.
+gap. Every new list keeps the tied pairs, however far apart they are: a Newton step may lead far
+away before it is shortened.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def _mean(now, before, first, last, n):
 
 @inner_scalar
 def _largest(now, before, first, last, a, b, c):
-    """Largest deviation of now - before of these nodes from a mean; inf if not finite."""
+    """Largest deviation of now - before from the mean (a, b, c); inf if that is not finite."""
     if not abs(a) + abs(b) + abs(c) < math.inf:
         return math.inf
     worst = 0.0
@@ -88,7 +88,7 @@ def motions(u, v, memory):
 
 @kernel
 def take_ties(memory):
-    """Kind, parts (m, 3), d0 and tie (m, 5) of all tied pairs."""
+    """Of all m tied pairs: kind and both parts (m, 3); d0 and tie (m, 5)."""
     count = 0
     for go in range(2):
         if go == 1:
@@ -176,8 +176,8 @@ def _begin(pairs, key, value, count):
     return low
 
 
-CELLS = 8.0  # at most, per node
-THINNEST = 1e-3  # of the skin: full lists halve it, at most down to this
+CELLS = 8.0  # largest number of cells per node
+THINNEST = 1e-3  # full lists halve the skin, but not below this share of it
 
 
 @inner
@@ -292,7 +292,7 @@ def _pairs(tables, x, kind, far, skin, low, size, counts, half, start, items, me
     """
     first, last = np.empty(3, np.int64), np.empty(3, np.int64)
     below, above = np.empty(3), np.empty(3)
-    # unpacked, as arrays in tuples would be reference-counted for each pair
+    # unpacked, because arrays in tuples would be reference-counted for each pair
     surface, panels, edge_panels = tables.surface, tables.panel, tables.edge_panels
     edge_nodes = tables.edge_nodes
     ranges, pairs = tables.ranges, memory.pairs[kind]
@@ -394,7 +394,7 @@ def list_pairs(tables, u, memory):
 
 @inner
 def relist(tables, u, memory):
-    """`list_pairs` by the first team member for all, after a `wait` for their positions."""
+    """Run `list_pairs` on the first team member for all, after a `wait` for all positions."""
     if memory.share.team.number == 0:
         list_pairs(tables, u, memory)
     pass_on(memory.share)

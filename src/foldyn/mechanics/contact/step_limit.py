@@ -35,9 +35,9 @@ from foldyn.mechanics.contact.search import motions, place, relist
 from foldyn.mechanics.threads import largest, part, wait
 
 APPROACH = 0.1
-REACH = 4.0  # times the fastest motion in a step: search range for pairs
+REACH = 4.0  # search range for pairs, divided by the fastest motion in a step
 TINY = 1e-300  # m/s
-MARGIN = 0.05  # of the skin: how much farther, as speeds change within a step
+MARGIN = 0.05  # extra range relative to the skin, because speeds change within a step
 
 
 class Pace(NamedTuple):
@@ -52,7 +52,7 @@ RESOLVED = Pace(0.25, 0.0)  # for methods without error estimate
 
 @inner_scalar
 def _spring_bound(limit, rate, pace):
-    """The smaller of a step and the limit of a spring with stiffness over mass `rate` (1/s2)."""
+    """The smaller of `limit` and the step limit of a spring with stiffness / mass `rate` (1/s2)."""
     return min(limit, pace.resolved / math.sqrt(rate)) if rate > 0.0 else limit
 
 
@@ -60,7 +60,7 @@ def _spring_bound(limit, rate, pace):
 def _bound(limit, d, d0, closing, change, stiffness, lightness, pace, facts):
     """The smaller of a step (s) and the limit of a gap d that closes at a given speed.
 
-    change : rate of that speed, which distinguishes resting from reversing contacts.
+    change : rate of the closing speed, which distinguishes resting from reversing contacts.
     """
     if closing > 0.0:
         limit = min(limit, (max(d - d0, 0.0) + APPROACH * min(d, d0)) / closing)
@@ -123,7 +123,7 @@ def _pairs_bound(tables, x, v, a, lightness, far, reach, limit, pace, memory):
 def _hinges_bound(tables, x, v, a, lightness, angle, reach, limit, pace, memory):
     """Step limit of a member's share of guarded hinges, see `_bound`.
 
-    Notes how many of them a motion by `reach` may bring to their guard.
+    Notes how many hinges a motion by `reach` may bring to their guards.
     """
     near, team = 0, memory.share.team
     first, last = part(team, tables.hinge_limit.size)
@@ -193,7 +193,7 @@ def limited(tables, u, v, a, angle, dt, pace, lightness, memory):
         fresh = counts.has_list == 1 and far < MARGIN * skin
         if counts.has_list == 0 or (not fresh and not far + 2.0 * fast * dt < 0.5 * skin):
             if rubs:
-                wait(team)  # for the ties of the others
+                wait(team)  # for the ties of the other members
             relist(tables, u, memory)
             far, skin = 0.0, memory.facts.skin
         if 2.0 * fast * dt > 0.5 * skin - far:

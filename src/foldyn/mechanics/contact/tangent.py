@@ -135,7 +135,7 @@ def friction_tangent(tables, x, moved, memory, p, i, stiffness, out):
 
 
 def held_by_planes(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
-    """Unit rows (s, size): normals of planes at contact nodes, all axes with friction."""
+    """Unit rows (s, size): plane normals at contact nodes; with friction, all axes."""
     plane, node = np.nonzero(kept.friction[:, :, 3])
     rubs = (own.planes[plane, FRICTION] > 0.0) & (kept.anchor[plane, node, 3] > 0.0)
     normals = own.planes[plane, NORMAL : NORMAL + 3]
@@ -145,7 +145,7 @@ def held_by_planes(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
 
 
 def held_by_panels(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
-    """Unit rows (s, size): distances of touching pairs, all relative motions with friction."""
+    """Unit rows (s, size): touching pairs' distances; with friction, all relative motions."""
     first, second = touching_pairs(own, kept)
     count = len(first) + len(second)
     nodes = np.empty((count, 4), np.int64)
@@ -161,7 +161,7 @@ def held_by_panels(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
 def _directions(tables, memory, first, second, nodes, weights, normals):
     """Nodes (k, 4), weights (k, 4) and direction (k, 3) of the distances of some listed pairs.
 
-    Also returns whether friction ties each (k,).
+    Also returns whether friction ties each pair (k,).
     """
     tied = np.zeros(first.size + second.size, np.bool_)
     for k in range(first.size + second.size):

@@ -38,17 +38,18 @@ GROUP = "contact"
 class ContactTerm(Term):
     """Contact; see `Term`.
 
-    Friction acts only with tied springs: on paths of equilibria (`rubbing`), and in motions, which
-    have their own memory.
+    Friction acts only if its springs are tied: on paths of equilibria (`rubbing`), and in motions,
+    which have their own memory.
 
-    The set of touching nodes changes, so the tangent has no fixed places in a step's matrix.
+    The set of touching nodes changes, so the entries of the tangent have no fixed places in a
+    step's matrix.
 
     Parameters
     ----------
     sheets : Sheets
         Contact surfaces.
     guarded : Assembly
-        The preceding terms, whose hinges it guards.
+        The preceding terms, whose hinges the contact guards.
 
     Attributes
     ----------
@@ -76,7 +77,7 @@ class ContactTerm(Term):
         return memory(self.tables, self.sheets.panels)
 
     def _copy(self, **changes: Any) -> ContactTerm:
-        """Copy with some attributes changed, with the same tables and, unless given, lists."""
+        """Copy with changed attributes, but the same tables and, unless given, lists."""
         _ = self._contexts  # creates tables and lists as well
         other = copy(self)
         if not changes.keys() & {"tables", "memory"}:
@@ -116,7 +117,7 @@ class ContactTerm(Term):
 
     def memories(self, parts: Sequence[Any]) -> list[Memory]:
         """Kernel memory for each thread; see `Term`."""
-        if len(parts) == 1:  # it owns further rows, if any
+        if len(parts) == 1:  # a single thread owns further rows, too
             return [memory(self.tables, self.sheets.panels)]
         teams, own = [part.team for part in parts], [part.own for part in parts]
         return memories(self.tables, self.sheets.panels, teams, own)
@@ -151,7 +152,7 @@ class ContactTerm(Term):
         return self.held(q, q.size)
 
     def held(self, q: NDArray, size: int) -> sparse.csr_array:
-        """Unit rows (s, size) of these constraints for the motions of the contact points."""
+        """Unit rows (s, size) of the internal constraints for motions of the contact points."""
         self.contact(q)
         on_planes = held_by_planes(self.tables, self.memory, size)
         on_panels = held_by_panels(self.tables, self.memory, size)
@@ -170,7 +171,7 @@ class ContactTerm(Term):
 
     # ------------------------------------------------------------------ points that touch
     def points(self, q: NDArray) -> NDArray:
-        """Displacements (m, 3) of the contact points, m: the nodes."""
+        """Displacements (m, 3), m, of the contact points, here the nodes."""
         return nodal(q)[: len(self.tables.rest)]
 
     @property
@@ -179,21 +180,21 @@ class ContactTerm(Term):
         return np.arange(len(self.tables.rest))
 
     def carried(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Contact points (m,) that chosen nodes (n,) alone move."""
+        """Contact points (m,) that depend on the chosen nodes (n,) only."""
         return chosen
 
     def on_nodes(self, q: NDArray, force: NDArray) -> NDArray:
-        """Nodal forces (n, 3) of forces (m, 3) on the contact points, N."""
+        """Nodal forces (n, 3), N, that are equivalent to forces (m, 3) on the contact points."""
         return force
 
     def step_back(self, u0: NDArray, u1: NDArray, force: NDArray) -> NDArray:
-        """Nodal forces (n, 3) in a step, doing the work of forces on the contact points, N."""
+        """Nodal forces (n, 3), N, that do the work of the contact points' forces in a step."""
         return force
 
     def step_tangent(
         self, u0: NDArray, u1: NDArray, force: NDArray, inner: sparse.csr_array
     ) -> sparse.csr_array:
-        """Derivative (m, m) of `step_back` by the end of the step, N/m; `inner`: by the points."""
+        """Derivative (m, m), N/m, of `step_back` with respect to u1; inner : to the points."""
         inner.resize((u0.size, u0.size))
         return inner
 
@@ -216,7 +217,7 @@ class ContactTerm(Term):
         """Contact energy (J) between panels, and the closest two panels.
 
         Returns the energy, the least ratio of distance to contact distance, and the panels (1, 2),
-        the lower first; inf and none, (0, 2), if no panels are near.
+        the lower first. If no panels are near, the ratio is inf, and the panels are (0, 2).
         """
         own = self.tables._replace(planes=self.tables.planes[:0])
         kept = memory(own, self.sheets.panels)  # lists pairs
@@ -252,7 +253,7 @@ class ContactTerm(Term):
     def clear_with(
         self, kept: Memory, q: NDArray, step: NDArray, moves: NDArray, keep: float
     ) -> float:
-        """Share of a step without crossing, for a memory with its current planes; see `clear`."""
+        """Share of a step without crossing, given a memory and its current planes; see `clear`."""
         return clear_share(self.tables, kept, self.points(q), self.points(step), moves, keep)
 
     def plane_forces(self, q: NDArray) -> NDArray:
@@ -269,8 +270,9 @@ class ContactTerm(Term):
     def plane_borders(self, q: NDArray, motion: NDArray) -> tuple[NDArray, NDArray, float]:
         """Derivatives, N/m, for a displacement of all planes along their motions (p, 3).
 
-        Returns the derivatives of the dof forces (m,) by the displacement, of the force on the
-        planes by the dofs (m,), and of that force by the displacement.
+        Returns the derivative of the dof forces (m,) with respect to the displacement; of the force
+        on the planes with respect to the dofs (m,); and of this force with respect to the
+        displacement.
         """
         self.contact(q)
         blocks = plane_tangents(self.tables, self.memory.x, self.memory)
@@ -280,7 +282,7 @@ class ContactTerm(Term):
         return self._on_dofs(q, column), self._on_dofs(q, row), own
 
     def _on_dofs(self, q: NDArray, force: NDArray) -> NDArray:
-        """Dof forces (m,) of forces on the contact points."""
+        """Dof forces (m,) that are equivalent to forces on the contact points."""
         out, nodes = np.zeros(q.size), self.on_nodes(q, force)
         out[: nodes.size] = nodes.ravel()
         return out
