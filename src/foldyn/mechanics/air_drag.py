@@ -39,7 +39,7 @@ class AirDrag(NamedTuple):
     wind: NDArray  # (3,) velocity of the air at factor 1, m/s
     factor: NDArray  # (1,) current factor of the wind
     normal: NDArray  # (t, 3) memory: unit normals
-    slope: NDArray  # (t, 3) current derivative of the force at each side midpoint by v_n, N s/m
+    slope: NDArray  # (t, 3) current d(force) / d(v_n) at each side midpoint, N s/m
 
 
 def air_drag(x: NDArray, triangles: NDArray, wind: NDArray) -> AirDrag:
@@ -58,14 +58,14 @@ def air_drag(x: NDArray, triangles: NDArray, wind: NDArray) -> AirDrag:
 class _Context(NamedTuple):
     air: AirDrag
     half: float  # 1/2 rho Cd, kg/m3
-    row: int  # of the wind's history
+    row: int  # row of the wind's history
     histories: int
     rows: int
 
 
 @inner_scalar
 def put_normal(sides, corners, u, out):
-    """Put the unit normal (3,) of a triangle at u (n, 3) into `out`; return its area, m2."""
+    """Put a triangle's unit normal (3,) at u (n, 3) into `out`; return the triangle's area, m2."""
     first, second, third = corners[0], corners[1], corners[2]
     ax = sides[0, 0] + u[second, 0] - u[first, 0]
     ay = sides[0, 1] + u[second, 1] - u[first, 1]
@@ -110,7 +110,7 @@ def _place(own, factors):
 
 
 class AirDragTerm(Term):
-    """Air drag of panels as a term; see `Term`. Its memory is in `AirDrag`.
+    """Air drag of panels as a term; see `Term`. The term's memory is in `AirDrag`.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ class AirDragTerm(Term):
         self.air, self.half, self.row, self.histories = air, half, row, histories
 
     def driven(self, row: int, histories: int) -> AirDragTerm:
-        """The drag in a wind that follows row `row` of these histories."""
+        """Copy with a wind that follows history number `row` of `histories`."""
         return AirDragTerm(self.air, self.half, row, histories)
 
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
@@ -144,11 +144,11 @@ class AirDragTerm(Term):
 
     @cached_property
     def damping_places(self) -> tuple[NDArray, NDArray]:
-        """Rows and columns (k,) of its damping entries; see `Term`."""
+        """Rows and columns (k,) of the term's damping entries; see `Term`."""
         return places_of(pairs_within(self.air.triangles))
 
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
-        """Derivative of the forces by velocity, at the velocities of the last evaluation."""
+        """Derivative of the forces with respect to the velocities of the last evaluation."""
         slope, n = 0.25 * self.air.slope, self.air.normal
         ends = np.zeros((len(n), 3, 3))
         for k, (a, b) in enumerate(((0, 1), (1, 2), (2, 0))):

@@ -41,8 +41,8 @@ from foldyn.mechanics.term import (
 from foldyn.mechanics.threads import ThreadPart
 
 ITERATIONS = 50
-BALANCED = 1e-13  # rad, last Newton step for hidden dofs
-LEAST_SLOPE = 1e-3  # of a fold's stiffness, in these steps
+BALANCED = 1e-13  # rad, largest last Newton step for hidden dofs
+LEAST_SLOPE = 1e-3  # least slope of a fold in these steps, relative to the fold's stiffness
 
 Kind = TypeVar("Kind", bound=Term)
 
@@ -113,7 +113,7 @@ class Assembly:
     ) -> NDArray:  # fmt: skip
         """Dof vector (m,) for displacements (n, 3), with the hidden dofs in balance.
 
-        push : forces (m,), N, of which those on the hidden dofs count; none by default.
+        push : forces (m,), N, none by default; only forces on hidden dofs count.
         memory : hinges with memory that add stiffness to the sheet.
         held : initial hidden dofs (r,), and rows (k, r) along which they are held.
         kept : stores the last factors for reuse in the next state, while they converge fast.
@@ -192,7 +192,7 @@ class Assembly:
         return self._at(q, np.zeros(0))
 
     def hinge_forces(self, q: NDArray) -> NDArray:
-        """Internal forces of hinges (bends and folds) alone, at play even at rest."""
+        """Internal forces of hinges (bends and folds) alone: a force scale even without loads."""
         alone = self.hinges_alone
         return np.zeros(self.size) if alone is None else alone.internal(q)
 
@@ -205,7 +205,7 @@ class Assembly:
 
     # ------------------------------------------------------------------ tangents
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """Derivative (m, m) of the forces; slopes per unit stiffness below `floor` are raised."""
+        """Derivative (m, m) of the forces; slopes per unit stiffness are at least `floor`."""
         return self._plus(self.sheet.tangent(q, floor), q, q, floor)
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
@@ -220,7 +220,7 @@ class Assembly:
         known = [type(term).tangent is Term.tangent for term in self.others]
         for term in compress(self.others, known):
             matrix = term.slots.added(matrix, term.step_entries(flat, (old, flat), floor))
-        for term in compress(self.others, np.logical_not(known)):  # whose places change
+        for term in compress(self.others, np.logical_not(known)):  # terms whose places change
             matrix = sparse.csr_array(matrix + term.tangent(flat, floor))
         return matrix
 
@@ -236,7 +236,7 @@ class Assembly:
         return [part._replace(kept=tuple(own[k] for own in kept)) for k, part in enumerate(parts)]
 
     def _parts(self, threads: int) -> list[ThreadPart]:
-        """These parts without the memory of terms."""
+        """The parts of `thread_parts`, without the memory of terms."""
         alone = not all(term.shared for term in self.terms)
         found = [
             ThreadPart(own.team, own.own, own.angle, own.fold_angle, own)
@@ -245,7 +245,7 @@ class Assembly:
         count = sum(len(term.hinges) for term in self.others)
         if not count:
             return found
-        angle = np.empty(len(found[0].angle) + count)  # the others follow the sheet's hinges
+        angle = np.empty(len(found[0].angle) + count)  # the sheet's hinges come first
         own = angle[:-count]
         scratch = found[0].scratch._replace(angle=own, fold_angle=own)
         return [found[0]._replace(angle=angle, fold_angle=own, scratch=scratch)]
@@ -278,7 +278,7 @@ class Assembly:
         return np.concatenate([term.hinges.astype(np.int64) for term in self.terms])
 
     def angles(self, q: NDArray) -> NDArray:
-        """Their dihedrals (nh,), rad."""
+        """Dihedrals (nh,) of all hinges, rad."""
         return np.concatenate([term.angles(q) for term in self.terms])
 
     def turn(self, q: NDArray, other: NDArray) -> float:
@@ -289,7 +289,7 @@ class Assembly:
         return turn
 
     def scale(self) -> NDArray:
-        """Force scale (m,), N, per dof for unit strain: its rounding errors are unavoidable."""
+        """Force (m,), N, on each dof at unit strain, whose rounding errors are unavoidable."""
         scale = self.sheet.scale()
         for term in self.others:
             term.add_scale(scale)
@@ -329,7 +329,7 @@ class Assembly:
         return body, self.numbering(order)
 
     def numbering(self, order: NDArray) -> Numbering:
-        """Numbering of its dofs if node order[k] is stored at place k."""
+        """Numbering of the assembly's dofs if node order[k] is stored at place k."""
         return Numbering(order, ranks(order), self.rows)
 
     def nominal(self, q: NDArray) -> Assembly:
@@ -339,7 +339,7 @@ class Assembly:
         return Assembly(sheet, *(term.on(sheet) for term in others if term is not None))
 
     def unstrained(self, q: NDArray) -> Unstrained | None:
-        """Assembly without strain at q; None if only rigid motions could keep it so."""
+        """Assembly without strain at q; None if every motion but a rigid one would strain it."""
         whole = self.sheet.unstrained(q)
         if whole is None:
             return None
@@ -449,7 +449,7 @@ class Numbering(NamedTuple):
         return (3 * rank[np.asarray(dofs) // 3] + np.asarray(dofs) % 3).astype(np.int64)
 
     def matrix(self, matrix: sparse.csr_array) -> sparse.csr_array:
-        """Nodal matrix (n, n), or one of all dofs, in memory order."""
+        """Nodal matrix (n, n), or matrix of all dofs, in memory order."""
         places, size = self.order, self.rows
         if matrix.shape[0] > len(places):
             places = (3 * places[:, None] + np.arange(3)).ravel()

@@ -9,7 +9,7 @@ with w the difference of the weights at its ends. A hinge with the moment M(thet
 
     w . F = M theta',    K w = M g' + M' theta' g,
 
-with g the gradient of the dihedral theta; primes of theta and g are their rates for nodal
+with g the gradient of the dihedral theta; theta' and g' are the rates of theta and g for nodal
 velocities w.
 """
 
@@ -61,7 +61,7 @@ class _Context(NamedTuple):
 
 @forces
 def _forces(own, u, v, t, force, powers):
-    """Forces of bars and hinges; the first term of all, it overwrites `force`."""
+    """Forces of bars and hinges; overwrites `force`, because this term is the first."""
     rows = own.model.rest.shape[0]
     internal_force(own.model, rows_at(u, rows), rows_at(force, rows), own.scratch)
 
@@ -81,14 +81,14 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
 
 
 def bars_hinges_kernels(model: BarsHinges, scratch: ForceScratch, groups: int) -> CompiledTerm:
-    """Kernels of bars and hinges, with `groups` energy groups."""
+    """`CompiledTerm` of bars and hinges, with `groups` energy groups."""
     own = Context(_Context(model, scratch, groups))
     return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
 
 ALL = (1 << 32) - 1  # mask of buffers that hold all nodes
 LAW = 7  # values per law, from `series_derivatives`
-TINY = 1e-280  # rad^2: below it the slope is 0
+TINY = 1e-280  # rad^2: at much smaller squared turns the slope is 0
 
 
 class PullbackScratch(NamedTuple):
@@ -247,7 +247,7 @@ def _laws(model, code, address, low, high, first, m, angle, law):
 
 @inner
 def pull_hinges(model, scratch, out):
-    """Add K w of the hinges to scratch.sums, and their gradients except by `rest` to `out`."""
+    """Add K w of the hinges to scratch.sums, and their gradients, except for `rest`, to `out`."""
     x, g, law, ones = scratch.points, scratch.rates, scratch.law, scratch.ones
     position, weight, sums = flat(scratch.position), flat(scratch.weight), flat(scratch.sums)
     hinges, p, by_p = flat(model.hinges), flat(model.hinge_parameters), flat(out.hinge_parameters)

@@ -10,7 +10,7 @@ BETWEEN = np.array([[1.0, -1.0], [-1.0, 1.0]])
 
 
 def pairs_within(nodes: NDArray) -> NDArray:
-    """Pairs (n k k, 2), row and column, that n elements of k nodes or dofs each (n, k) couple."""
+    """Rows and columns (n k k, 2) that n elements couple, each with k nodes or dofs (n, k)."""
     count = nodes.shape[1]
     rows, columns = np.repeat(nodes, count, axis=1), np.tile(nodes, (1, count))
     return np.stack([rows, columns], axis=2).reshape(-1, 2)
@@ -27,7 +27,7 @@ def blocks_of_ends(ends: NDArray, resistance: NDArray) -> NDArray:
 
     Elements with one end on the ground, marked -1, come first.
 
-    resistance : (s, 3, 3) to motions of one end while the other is fixed.
+    resistance : (s, 3, 3) matrices for motions of one end while the other end is fixed.
     """
     grounded = ends[:, 1] < 0
     between = np.einsum("ij,sab->sijab", BETWEEN, resistance[~grounded]).reshape(-1, 3, 3)

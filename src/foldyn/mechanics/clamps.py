@@ -1,8 +1,8 @@
 """Clamped edges, which hold the tangents of panels.
 
 A *clamp* at an edge j-k is a hinge (j, k, i, wing) with a linear law, whose wing is a virtual point
-that follows the mean displacement of j and k. It keeps its direction in space and causes no strain
-when the edge is translated.
+that follows the mean displacement of j and k. Seen from the edge, the point keeps its direction in
+space; translating the edge causes no strain.
 """
 
 from __future__ import annotations
@@ -220,11 +220,11 @@ class ClampsTerm(Term):
         return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     def arrays(self) -> Arrays:
-        """Arrays that its forces depend on; see `Term`."""
+        """Arrays that the term's forces depend on; see `Term`."""
         return arrays_of(self.clamps)
 
     def pulled(self) -> Pulled:
-        """Pullback of its forces; see `Term`."""
+        """Pullback of the term's forces; see `Term`."""
         out = zeros_for(self.clamps)
         points, moves = np.zeros((2, 4, 3))
         rows = 1 + int(self.clamps.nodes.max(initial=0))
@@ -233,7 +233,7 @@ class ClampsTerm(Term):
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:
-        """Rows and columns (k,) of its tangent entries; see `Term`."""
+        """Rows and columns (k,) of the term's tangent entries; see `Term`."""
         return places_of(pairs_within(self.clamps.nodes))
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
@@ -247,12 +247,12 @@ class ClampsTerm(Term):
 
     @property
     def hinges(self) -> NDArray:
-        """Rows (nh, 4) of its hinges; see `Term`."""
+        """Rows (nh, 4) of the term's hinges; see `Term`."""
         own = self.clamps.nodes
         return np.column_stack([own, np.full(len(own), RIDES)])
 
     def angles(self, q: NDArray) -> NDArray:
-        """Dihedrals (nh,) of its hinges, rad; see `Term`."""
+        """Dihedrals (nh,) of the term's hinges, rad; see `Term`."""
         return clamp_angles(self.clamps, nodal(q))[0]
 
     def holds(self, q: NDArray) -> sparse.csr_array:
@@ -260,11 +260,11 @@ class ClampsTerm(Term):
         return unit_rows(self.clamps.nodes, clamp_angles(self.clamps, nodal(q))[1], q.size)
 
     def turning_moments(self) -> float:
-        """Sum of its hinges' moments (N m) for a unit turn; see `Term`."""
+        """Sum of the moments of the term's hinges (N m) for a unit turn; see `Term`."""
         return float(self.clamps.stiffness.sum())
 
     def strains(self, others: Strains) -> Strains:
-        """Strains with clamps; a clamp's wing repeats its first end (`viscous.hinge_gradient`)."""
+        """Strains with clamps; a wing repeats the first axis node (`viscous.hinge_gradient`)."""
         clamps = self.clamps
         return others._replace(
             hinges=np.concatenate([others.hinges, clamps.nodes[:, [0, 1, 2, 0]]]),

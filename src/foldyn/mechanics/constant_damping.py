@@ -112,12 +112,12 @@ class DampingMatrix(Term):
         return CompiledTerm(Context(own), {FORCES: _of_matrix})
 
     def arrays(self) -> Arrays:
-        """Arrays that its forces depend on; see `Term`."""
+        """Arrays that the term's forces depend on; see `Term`."""
         layout = {"indptr": self.matrix.indptr, "indices": self.matrix.indices}
         return Arrays({"data": self.matrix.data}, layout)
 
     def pulled(self) -> Pulled:
-        """Pullback of its forces; see `Term`."""
+        """Pullback of the term's forces; see `Term`."""
         start, column = self.matrix.indptr.astype(np.int64), self.matrix.indices.astype(np.int64)
         out = np.zeros_like(self.matrix.data)
         own = _MatrixBackward(start, column, self.matrix.data, out)
@@ -125,7 +125,7 @@ class DampingMatrix(Term):
 
     @cached_property
     def damping_places(self) -> tuple[NDArray, NDArray]:
-        """Rows and columns (k,) of its damping entries; see `Term`."""
+        """Rows and columns (k,) of the term's damping entries; see `Term`."""
         return self.matrix.tocoo().coords
 
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
@@ -138,7 +138,7 @@ class DampingMatrix(Term):
 
 
 class DampingRows(Term):
-    """Full rows G (r, m), sqrt(N s/m), added to factors in implicit steps; see `Term`."""
+    """Damping by full rows G (r, m), sqrt(N s/m), added to factors in implicit steps."""
 
     damps = True
     without = ("damping",)
@@ -151,16 +151,16 @@ class DampingRows(Term):
         return CompiledTerm(Context(_Rows(self.rows)), {FORCES: _of_rows})
 
     def arrays(self) -> Arrays:
-        """Arrays that its forces depend on; see `Term`."""
+        """Arrays that the term's forces depend on; see `Term`."""
         return Arrays({"rows": self.rows}, {})
 
     def pulled(self) -> Pulled:
-        """Pullback of its forces; see `Term`."""
+        """Pullback of the term's forces; see `Term`."""
         out = np.zeros_like(self.rows)
         return Pulled(Context(_RowsBackward(self.rows, out)), _rows_pullback, {"rows": out})
 
     def damping(self, q: NDArray) -> sparse.csr_array:
-        """Damping matrix, full, for few dofs; see `Term`."""
+        """Damping matrix, which is full: only for few dofs; see `Term`."""
         return sparse.csr_array(self.rows.T @ self.rows)
 
     def placed(self, order: NDArray, before: Assembly) -> DampingRows:

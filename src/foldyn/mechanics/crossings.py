@@ -1,15 +1,15 @@
 """Panels that pass through each other, as opposed to panels that touch.
 
 Two triangles in different planes cross if each has corners on both sides of the other's plane, and
-the line segments that the planes cut from them overlap. Touching is not crossing: a shared corner
-or side, one that lies on the other triangle, or stacked layers. But panels may cross along sides of
-their triangles, each of which only touches (two flaps of equal size that fold over a panel meet in
-their middles). So the test is whether panels lie on both sides of each other, over all their
-overlapping triangles.
+the line segments that the planes cut from them overlap. Triangles that share a corner or side, that
+have a corner or side on the other triangle, or that are stacked only touch: this is not crossing.
+But panels may cross along sides of their triangles, where each triangle only touches (for example
+two flaps of equal size that fold over a panel and meet in their middles). So the test is whether
+panels lie on both sides of each other, over all their overlapping triangles.
 
 Two triangles with one common corner can cross along a line from it, and are compared like others.
-Two with a common side cannot, except by an angle that passes 0 or 2 pi, which is checked with the
-angles. Triangles of one panel are compared only if they share no corner.
+Two triangles with a common side cannot cross, unless the angle between them passes 0 or 2 pi, which
+is checked with the angles. Triangles of one panel are compared only if they share no corner.
 
 Bounding boxes of the triangles are sorted into a regular grid with cells of average box size, and
 boxes that share a cell are compared: time and memory grow linearly with their number.
@@ -24,15 +24,15 @@ from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner, kernel
 
-TOUCHING = 1e-9  # of a triangle's size: a corner this close to a plane lies in it
-LEVEL = 1e-3  # rad between planes: below it triangles are stacked
-OVERLAP = 1e-5  # of the smaller triangle's size: overlaps below this only touch
+TOUCHING = 1e-9  # relative to a triangle's size: a corner this close to a plane lies in it
+LEVEL = 1e-3  # rad: triangles whose planes differ by less are stacked
+OVERLAP = 1e-5  # relative to the smaller triangle's size: smaller overlaps only touch
 ABOVE, BELOW = 1, 2  # sides of a plane that contain parts of a triangle
 BOTH = 3
 FEWEST, SPREAD = 64, 2  # minimum number of cells, plus this many cells per triangle
-LARGEST = 0.0625  # of the largest box: least cell size
+LARGEST = 0.0625  # least cell size, relative to the largest box
 ROOM = 64  # initial room for pairs
-MOST_SHOWN = 8  # pairs of panels named in a text
+MOST_SHOWN = 8  # largest number of pairs of panels that a text names
 
 
 class Boxes(NamedTuple):
@@ -55,7 +55,7 @@ class Grid(NamedTuple):
 
 
 def crossing_panels(points: NDArray, triangles: NDArray, panels: NDArray) -> NDArray[np.int64]:
-    """Pairs of panels (k, 2), the lower first, that cross; equal for a panel that crosses itself.
+    """Pairs of panels (k, 2), the lower first, that cross; equal if a panel crosses itself.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def crossing_panels(points: NDArray, triangles: NDArray, panels: NDArray) -> NDA
     triangles : ndarray of int, shape (m, 3)
         Triangles into which panels are cut.
     panels : ndarray of int, shape (m,)
-        The panel of each.
+        The panel of each triangle.
     """
     x = np.array(points, np.float64, order="C")
     rows, owners = np.array(triangles, np.int64), np.array(panels, np.int64)
@@ -83,7 +83,7 @@ def crossing_panels(points: NDArray, triangles: NDArray, panels: NDArray) -> NDA
 
 
 def pairs_text(panels: NDArray) -> str:
-    """Pairs of panels (k, 2) in words: "0 and 2, 5 itself and 3 more pairs"."""
+    """Pairs of panels (k, 2) in words, such as "0 and 2, 5 itself and 3 more pairs"."""
     named = [f"{a} and {b}" if a != b else f"{a} itself" for a, b in panels[:MOST_SHOWN].tolist()]
     more = len(panels) - len(named)
     return ", ".join(named) + (f" and {more} more pair{'s' if more > 1 else ''}" if more else "")
@@ -91,7 +91,7 @@ def pairs_text(panels: NDArray) -> str:
 
 @kernel
 def _overlapping(x, triangles, panels, boxes, grid, found):
-    """Panels of overlapping triangles, and the sides of the other on which each lies.
+    """Panels of overlapping triangles, and on which sides of the other each triangle lies.
 
     Writes rows (lower panel, higher panel, sides of the first, of the second) to `found` as far as
     there is room; returns their number.
@@ -111,7 +111,7 @@ def _overlapping(x, triangles, panels, boxes, grid, found):
                     apart |= lower > min(high[i, axis], high[j, axis])
                     place = min(int((lower - grid.origin[axis]) / grid.cell), shape[axis] - 1)
                     at = at * shape[axis] + place
-                if apart or at != here:  # two may meet in several cells
+                if apart or at != here:  # two boxes may meet in several cells
                     continue
                 shared = 0
                 for a in range(3):
@@ -157,8 +157,8 @@ def _cut(x, triangles, normal, one, other, origin, least, lx, ly, lz):
     """Sides of the other's plane on which a triangle lies, and its intersection with the plane.
 
     The intersection is the segment of both planes' common line from `first` to `last` along (lx,
-    ly, lz), measured from a corner of triangle `origin`. The sides are 0 if it does not reach the
-    plane.
+    ly, lz), measured from a corner of triangle `origin`. The sides are 0 if the triangle does not
+    reach the plane.
     """
     base, zero = triangles[other, 0], triangles[origin, 0]
     nx, ny, nz = normal[other, 0], normal[other, 1], normal[other, 2]

@@ -102,7 +102,7 @@ def dihedral_rates(
 ):  # fmt: skip
     """Dihedral (rad), its gradient, and the rates of both for given point velocities.
 
-    1 + 12 numbers, then their rates, 1 + 12 numbers.
+    Returns 1 + 12 numbers, then the rates of these, 1 + 12 numbers.
     """
     bx, by, bz = kx - jx, ky - jy, kz - jz
     rx, ry, rz = ix - jx, iy - jy, iz - jz
@@ -142,7 +142,7 @@ def dihedral_rates(
     hix, hiy, hiz = dfi * mx + fi * dmx, dfi * my + fi * dmy, dfi * mz + fi * dmz
     hlx, hly, hlz = dfl * nx + fl * dnx, dfl * ny + fl * dny, dfl * nz + fl * dnz
     less_rho, less_sigma = rho - 1.0, sigma - 1.0
-    # by motions relative to the axis, as translations do not turn it
+    # from motions relative to the axis, because translations do not turn the hinge
     rate = gix * drx + giy * dry + giz * drz + (sigma * glx - rho * gix) * dbx
     rate += (sigma * gly - rho * giy) * dby + (sigma * glz - rho * giz) * dbz
     rate -= glx * dsx + gly * dsy + glz * dsz
@@ -249,7 +249,7 @@ def add_hessian(points, gradient, moment, block):
 
 @inner_scalar
 def carry_wing(block):
-    """Distribute a block's entries (4, 3, 4, 3) at the last node to the first two, half each."""
+    """Distribute a block's entries (4, 3, 4, 3) at the last node to the first two nodes."""
     for row in range(2):
         for a in range(3):
             for w in range(4):

@@ -12,9 +12,10 @@ Hinges: f = (dW/dtheta) g, with g a discrete gradient of the dihedral, g . dx = 
 mean of two rotated positions is smaller than either, which would change the dihedral. With w the
 Cayley vector of the rotation of the hinge's four points (least squares) and A = (1 -
 skew(w)^2/4)^(1/2), the positions A x avoid that, and A^-1 grad theta(A x) has no resultant and no
-moment about x. Its work differs from the change of the angle by second order in the deformation
-within the step, by third order without rotation. The remaining difference is corrected along the
-deformation, dx without its rigid part, which has no resultant and no moment either.
+moment about x. The work of this gradient differs from the change of the angle by second order in
+the deformation within the step, or by third order if there is no rotation. The remaining difference
+is corrected along the deformation, dx without its rigid part, which has no resultant and no moment
+either.
 """
 
 from __future__ import annotations
@@ -29,10 +30,10 @@ from foldyn.mechanics.dihedral import add_hessian, gradient_at
 from foldyn.mechanics.energy import hinge_dihedral
 from foldyn.mechanics.tangent import add_to_bar, add_to_hinge
 
-GAUSS = 0.5 - math.sqrt(3.0) / 6.0  # first of the two Gauss points
-NOISE = 16.0 * float(np.finfo(float).eps)  # of an energy: smaller differences are rounding errors
+GAUSS = 0.5 - math.sqrt(3.0) / 6.0  # first of the two Gauss points between 0 and 1
+NOISE = 16.0 * float(np.finfo(float).eps)  # rounding errors, relative to an energy
 LEAST = 1e-9  # strain or rad: for smaller changes the Gauss rule is exact
-ANGLE_NOISE = 4e-15  # the same for a dihedral, rad
+ANGLE_NOISE = 4e-15  # rad: smaller differences of a dihedral are rounding errors
 
 
 @inner_scalar
@@ -45,8 +46,8 @@ def _extension(x):
 def mean_stress(code, address, x, change):
     """Mean stress S / E_y of a bar whose stretch^2 - 1 goes from x to x + 2 change, and its slope.
 
-    The difference quotient of energy over strain: Gauss quadrature plus its error. The slope is
-    with respect to the end strain.
+    The mean stress is the difference quotient of energy and strain, computed as Gauss quadrature
+    plus the error of this quadrature. The slope is the derivative with respect to the end strain.
     """
     stress, slope = 0.0, 0.0
     for point in (GAUSS, 1.0 - GAUSS):
@@ -63,7 +64,7 @@ def mean_stress(code, address, x, change):
 
 @kernel
 def mean_moment(code, address, p, share, rest, theta, change):
-    """Mean moment / k of a hinge that turns by `change` from theta, and its slope; like bars."""
+    """Mean moment / k of a hinge that turns by `change` from theta, and its slope; cf. `mean_stress`."""
     moment, slope, a, b, c, d = 0.0, 0.0, p[0], p[1], p[2], p[3]
     for point in (GAUSS, 1.0 - GAUSS):
         t = theta + point * change
@@ -89,7 +90,7 @@ def _mean_moment(model, e, code, address, theta, change):
 
 @inner_scalar
 def _bar_step(model, e, u0, u1, mean):
-    """Stretch^2 - 1 of bar e at u0, and the change of its strain; puts its mean vector (3,)."""
+    """Stretch^2 - 1 of bar e at u0, and the change of strain; puts the mean vector into `mean`."""
     a, b, per = model.bars[e, 0], model.bars[e, 1], model.bar_per_length2[e]
     x, change = 0.0, 0.0
     for c in range(3):
@@ -220,7 +221,7 @@ def add_hinge_forces(model, u0, u1, angle0, angle1, force):
 def add_bar_tangent(model, u0, u1, stress, slots, data):
     """Add the derivative of the bars' mean forces with respect to u1 to blocks (nnz, 3, 3).
 
-    stress : (nb,) of the bars, for the geometric part.
+    stress : (nb,) stresses of the bars, for the geometric part.
     """
     mean, end = np.empty(3), np.empty(3)
     for run in range(model.bar_runs.shape[0]):
@@ -242,7 +243,7 @@ def add_bar_tangent(model, u0, u1, stress, slots, data):
 
 @kernel
 def add_hinge_tangent(model, u0, u1, angle0, floor, slots, data):
-    """Add the derivative of the hinges' mean forces; gradients to first order in the step.
+    """Add the derivative of the hinges' mean forces, with gradients to first order in the step.
 
     floor : least slope of built-in laws per unit stiffness.
     """

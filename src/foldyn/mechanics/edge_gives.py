@@ -13,8 +13,8 @@ weights, and h the weights of the gives:
 
     w . F = r^T A g + h^T A^T E + h^T K g.
 
-Gives in balance have the same derivatives, with h = -K^-1 A^T r from their own change, as K is
-symmetric.
+For gives in balance, the same derivatives hold with h = -K^-1 A^T r, which is how the gives
+themselves change, because K is symmetric.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class EdgeGives(NamedTuple):
     """Arrays of p panels with up to c nodes, b bars and k gives; padded with zeros."""
 
     count: int  # g, number of all gives
-    edge: NDArray  # (g, 2) its vertices
+    edge: NDArray  # (g, 2) vertices of each give's edge
     panel: NDArray  # (p,) numbers
     nodes: NDArray  # (p, c)
     ends: NDArray  # (p, b, 2) indices among a panel's nodes
@@ -65,7 +65,7 @@ class EdgeGives(NamedTuple):
     across: NDArray  # (p, b, k) A, J/m
     stiffness: NDArray  # (p, k, k) K, N/m
     strain: NDArray  # (b,) scratch of one panel
-    along: NDArray  # (b, 3) vectors of its bars, m
+    along: NDArray  # (b, 3) vectors of this panel's bars, m
 
     @property
     def matrix(self) -> sparse.csc_array:
@@ -329,7 +329,7 @@ def _balanced_pullback(own, u, v, t, weight, product, rate):
     h[:] = 0.0
     for p in range(gives.nodes.shape[0]):
         strain_panel(gives, moved, p)
-        for i in range(gives.strain.size):  # their rates, in place of the strains
+        for i in range(gives.strain.size):  # rates of the strains, in place of the strains
             a, b = gives.nodes[p, gives.ends[p, i, 0]], gives.nodes[p, gives.ends[p, i, 1]]
             growth = 0.0
             for c in range(3):
@@ -358,7 +358,7 @@ class EdgeGivesTerm(Term):
     ----------
     gives : EdgeGives
     rows : int
-        Of the arrays that hold the dofs.
+        Number of rows of the arrays that hold the dofs.
     first : int
         Dof of the first give.
     """
@@ -375,11 +375,11 @@ class EdgeGivesTerm(Term):
         return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     def arrays(self) -> Arrays:
-        """Arrays that its forces depend on; see `Term`."""
+        """Arrays that the term's forces depend on; see `Term`."""
         return arrays_of(self.gives, *WORK)
 
     def pulled(self) -> Pulled:
-        """Pullback of its forces; see `Term`."""
+        """Pullback of the term's forces; see `Term`."""
         return _pulled(_pullback, self.gives, self.rows, self.first, NO_FACTOR)
 
     @cached_property
@@ -392,7 +392,7 @@ class EdgeGivesTerm(Term):
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:
-        """Rows and columns (k,) of its tangent entries; see `Term`."""
+        """Rows and columns (k,) of the term's tangent entries; see `Term`."""
         row, column = pairs_within(self._dofs).T
         return row, column
 
@@ -436,7 +436,7 @@ class BalancedGivesTerm(EdgeGivesTerm):
         return CompiledTerm(own, {FORCES: _balanced_forces, ENERGIES: _balanced_energies})
 
     def pulled(self) -> Pulled:
-        """Pullback of its forces; see `Term`."""
+        """Pullback of the term's forces; see `Term`."""
         kernel, factor = _balanced_pullback, self.gives.factor()
         return _pulled(kernel, self.gives, self.rows, 3 * self.rows, factor)
 
@@ -454,7 +454,7 @@ class BalancedGivesTerm(EdgeGivesTerm):
         return self._condensed(q, self._gives(q)).ravel()
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """Tangent, without the places, which would need more room than the matrix; see `Term`."""
+        """Tangent; `places` would need more room than the matrix. See `Term`."""
         return sparse.csr_array(self._condensed(q, self._gives(q)))
 
     def mean_entries(self, q0: NDArray, q1: NDArray, way: Way, floor: float) -> NDArray:
@@ -481,8 +481,8 @@ class BalancedGivesTerm(EdgeGivesTerm):
 def panel_tangents(gives: EdgeGives, u0: NDArray, u1: NDArray, g: NDArray) -> NDArray:
     """Tangents (p, 3c + k, 3c + k), N/m, of all panels at u0 = u1 and gives g (g,).
 
-    From u0 to another u1, with g the mean gives, it is twice the derivative of the mean forces by
-    u1 and the end gives.
+    If u1 differs from u0, and g are the mean gives, the result is twice the derivative of the mean
+    forces with respect to u1 and the gives at the end.
     """
     (panels, corners), (bars, given) = gives.nodes.shape, gives.across.shape[1:]
     end = 3 * corners

@@ -11,10 +11,11 @@ positions of its nodes and p, M, N its value times the factor:
   -N d on b and N d on a, d = x_b - x_a. Potential N (|d|^2 - |d at rest|^2) / 2;
 - a hidden dof with a constant force (on a side rotation of a shell, it is a moment).
 
-The derivative of a pressure's forces is not symmetric triangle by triangle; on a closed surface,
-and on an open one whose rim is held, the sum is (Hibbitt, Int. J. Solids Struct. 15, 1979).
+The derivative of the pressure forces on one triangle is not symmetric. Summed over a closed
+surface, or over an open surface whose rim is held, it is symmetric (Hibbitt, Int. J. Solids Struct.
+15, 1979).
 
-Vectors of dofs are flat, 3 node + axis and then the hidden ones, or arrays of rows of three.
+Vectors of dofs are flat (3 node + axis, then the hidden dofs), or arrays with rows of three.
 """
 
 from __future__ import annotations
@@ -49,9 +50,9 @@ class Following(NamedTuple):
     sides: NDArray = _none(2, 3)  # (t, 2, 3) rest vectors from the first corner to the others, m
     pressure: NDArray = _none()  # (t,) Pa, positive along the front's normal
     pressure_row: NDArray = _none(kind=int)  # (t,)
-    hinges: NDArray = _none(4, kind=int)  # (h, 4) axis j, k, wings i, l; -1 for a wing l that rides
-    corners: NDArray = _none(4, 3)  # (h, 4, 3) their rest positions from any origin nearby, m
-    moment: NDArray = _none()  # (h,) N m, positive where it opens the dihedral
+    hinges: NDArray = _none(4, kind=int)  # (h, 4) axis j, k, wings i, l; -1 for a virtual l
+    corners: NDArray = _none(4, 3)  # (h, 4, 3) rest positions from any origin nearby, m
+    moment: NDArray = _none()  # (h,) N m, positive if it opens the dihedral
     moment_row: NDArray = _none(kind=int)  # (h,)
     bars: NDArray = _none(2, kind=int)  # (b, 2) nodes
     vectors: NDArray = _none(3)  # (b, 3) rest vectors from the first to the second, m
@@ -113,7 +114,7 @@ def pushes(dofs: NDArray, push: NDArray) -> Following:
 
 
 def joined(parts: Iterable[tuple[Following, int]]) -> Following:
-    """All entries of several, each part with the row of its history."""
+    """All entries of several parts, each given with the row of its history."""
     numbered = [Following()]
     for part, row in parts:
         rows = {
@@ -141,7 +142,7 @@ def following_force(loads: Following, u: NDArray, factor: NDArray) -> NDArray:
 
 
 def following_tangent(loads: Following, u: NDArray, factor: NDArray) -> sparse.csr_array:
-    """Minus the derivative (m, m) of `following_force`, N/m: its contribution to the stiffness."""
+    """Minus the derivative (m, m) of `following_force`, N/m: the loads' share of the stiffness."""
     row, column = following_places(loads)
     values = np.empty(len(row))
     put_following(loads, np.ascontiguousarray(u, float).reshape(-1), factor, False, values)
@@ -149,7 +150,7 @@ def following_tangent(loads: Following, u: NDArray, factor: NDArray) -> sparse.c
 
 
 def asymmetry(matrix: sparse.csr_array) -> float:
-    """Ratio of the norms of a matrix's antisymmetric part and the matrix; 0 for zeros."""
+    """Ratio of the norm of a matrix's antisymmetric part to the matrix's norm; 0 for zeros."""
     whole = float(np.linalg.norm(matrix.data))
     apart = sparse.csr_array(matrix - matrix.T)
     return 0.5 * float(np.linalg.norm(apart.data)) / whole if whole else 0.0
@@ -169,7 +170,7 @@ def following_places(loads: Following) -> tuple[NDArray, NDArray]:
 
 @inner
 def _edges(loads, u, t, a, b):
-    """Vectors from the first corner of a triangle to the others, to a and b (3,)."""
+    """Write the vectors from a triangle's first corner to the other two into a and b (3,)."""
     first, second, third = loads.triangles[t, 0], loads.triangles[t, 1], loads.triangles[t, 2]
     for c in range(3):
         a[c] = loads.sides[t, 0, c] + u[3 * second + c] - u[3 * first + c]
@@ -229,7 +230,7 @@ def add_following(loads, u, factor, out):
 def push_following(loads, u, v, factor, pushed, bracket):
     """Move the forces at u from `bracket` to `pushed`; returns their power on v, W.
 
-    All (rows, 3).
+    All arrays are (rows, 3).
     """
     force, left, speed = flat(pushed), flat(bracket), flat(v)
     for i in range(force.size):
@@ -246,7 +247,7 @@ def push_following(loads, u, v, factor, pushed, bracket):
 def put_following(loads, u, factor, symmetric, out):
     """Write minus the derivative of the forces to out (e,), ordered as `following_places`.
 
-    symmetric : whether to write only its symmetric part.
+    symmetric : whether to write only the symmetric part of the derivative.
     """
     a, b, side = np.empty(3), np.empty(3), np.empty((3, 3))
     points, gradient, block = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3, 4, 3))

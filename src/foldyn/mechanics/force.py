@@ -1,11 +1,11 @@
 """Internal force of bars and hinges: gather a block, compute without branches, scatter.
 
 The compute passes run over blocks of 64 elements in structure-of-arrays form, which the compiler
-vectorizes; the moment pass is separate, so that laws with branches or powers do not prevent that.
-The scratch arrays are flat and addressed as row * BLOCK + lane: with a stride known when compiling
-the compiler proves that loads and stores do not overlap (two-dimensional scratch: 5 times slower).
-Nodal values are in buffers with rows of four, which load and store as vectors (`rows`), and which
-hold a window of a large sheet (`strips`).
+vectorizes; the moment pass is separate, so that laws with branches or powers do not prevent
+vectorization. The scratch arrays are flat and addressed as row * BLOCK + lane: with a stride known
+at compile time, the compiler proves that loads and stores do not overlap (two-dimensional scratch
+is 5 times slower). Nodal values are in buffers with rows of four, which load and store as vectors
+(`rows`), and which hold a window of a large sheet (`strips`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from foldyn.mechanics.strips import Strips, strips
 from foldyn.mechanics.threads import Team, team, wait
 
 LINE = 8  # numbers in a cache line
-SHIFT = 5 * LINE  # between scratch arrays: a multiple of 4096 bytes would cause cache conflicts
+SHIFT = 5 * LINE  # offset of scratch arrays: multiples of 4096 bytes would cause cache conflicts
 
 
 class ForceScratch(NamedTuple):
@@ -59,7 +59,7 @@ def force_scratch(model: BarsHinges) -> ForceScratch:
 
 
 def force_scratches(model: BarsHinges, threads: int) -> list[ForceScratch]:
-    """Scratch of each thread; of fewer than requested if the model cannot be split so far."""
+    """Scratch of each thread; fewer threads than requested if the model has too few parts."""
     parts = strips(model, threads)
     angle = np.empty(len(model.hinges))
     return [
@@ -69,7 +69,7 @@ def force_scratches(model: BarsHinges, threads: int) -> list[ForceScratch]:
 
 
 def _aligned(rows: int) -> list[NDArray]:
-    """The first six arrays, each from the start of a cache line."""
+    """The first six arrays of `ForceScratch`, each from the start of a cache line."""
     shapes = [(12 * BLOCK,), (13 * BLOCK,), (2 * BLOCK,), (rows, 4), (rows, 4), (rows, 4)]
     sizes = [math.prod(shape) for shape in shapes]
     starts = np.cumsum([0, *(math.ceil(size / LINE) * LINE + SHIFT for size in sizes)])
@@ -290,7 +290,7 @@ def add_hinge_forces(model, low, high, scratch):
                 linear_moments(stiffness, rest, offset, first, m, angle, value)
             elif (code == superlinear.CODE) and not gives_way(share, first, m):
                 superlinear_moments(stiffness, rest, first, m, angle, value)
-            elif (code == STRESS_FREE) | (code == AS_PUBLISHED):  # theta1, theta2 are the run's
+            elif (code == STRESS_FREE) | (code == AS_PUBLISHED):  # theta1, theta2 hold for the run
                 enhanced_moments(
                     code, address, stiffness, rest, p, share, offset,
                     p[4 * start], p[4 * start + 1], first, m, angle, value,

@@ -24,7 +24,7 @@ from foldyn.materials.switch import bar_energy, bar_slope, bar_stress
 from foldyn.mechanics.following import Following, hinge_of
 
 ITERATIONS = 30  # Newton iterations for the free strain of a bar; a few suffice
-SHARP = 1e-15  # Green strain
+SHARP = 1e-15  # Green strain: largest last Newton step
 
 
 class Heat(NamedTuple):
@@ -34,14 +34,14 @@ class Heat(NamedTuple):
     angles: NDArray  # (k,) rest dihedrals of the loaded hinges, rad
     groups: NDArray  # (2,)
     quadratic: NDArray  # (2, h, h) J
-    stress: NDArray  # (s, b) of bars, over Young's modulus
-    row: NDArray  # (s,) of the histories
-    volume: NDArray  # (b,) times Young's modulus, J
+    stress: NDArray  # (s, b) of bars, divided by Young's modulus
+    row: NDArray  # (s,) row of each state's history
+    volume: NDArray  # (b,) volume of bars times Young's modulus, J
     code: int  # law of the bars
-    addresses: NDArray  # (3,) of its energy, stress and slope
+    addresses: NDArray  # (3,) of the law's energy, stress and slope
     inner: NDArray  # (s, r) forces on dofs in balance, N
     offset: NDArray  # (., 4) see `SheetTerm.series`; dofs in balance are the last r rows
-    seen: NDArray  # (2,) heat correction at the start of a motion, and its largest value, J
+    seen: NDArray  # (2,) heat correction at the start of a motion, and its largest change since, J
 
 
 class Warm(NamedTuple):
@@ -55,7 +55,7 @@ class Warm(NamedTuple):
 
 @inner_scalar
 def free_energy(code, stress, addresses):
-    """S E - W(E), over Young's modulus, of a bar at the free Green strain E of a stress."""
+    """(S E - W(E)) / Young's modulus of a bar, with E the Green strain where S is `stress`."""
     green, e = 0.0, 0.0
     for _ in range(ITERATIONS):
         step = (stress - bar_stress(code, e, addresses[1])) / bar_slope(code, e, addresses[2])

@@ -1,8 +1,8 @@
 """Hinges with memory: the branches of their laws, whose forces add to the elastic parts.
 
 The branches store the state at the last accepted step. Every evaluation computes a trial state from
-it, from the dihedrals then and now, and from the elapsed time; only `commit` accepts the trial
-state. A step that is rejected or repeated leaves no trace.
+the stored state, from the dihedrals at that step and now, and from the elapsed time; only `commit`
+accepts the trial state. A step that is rejected or repeated leaves no trace.
 """
 
 from __future__ import annotations
@@ -59,24 +59,24 @@ class MemoryHinges(NamedTuple):
     corners: NDArray  # (h, 4, 3) m
     hidden_turn: NDArray  # (h, 2) rad/m
     rest: NDArray  # (h,) rad
-    row: NDArray  # (h,) int64: of the offsets
+    row: NDArray  # (h,) int64: row of the offsets
     stiffness: NDArray  # (h,) N m/rad
-    group: NDArray  # (h,) int64: of the model's energies
+    group: NDArray  # (h,) int64: energy group of the model
     first: NDArray  # (h + 1,) int64: hinge e has the branches first[e] to first[e + 1] - 1
     code: NDArray  # (b,) int64
     parameters: NDArray  # (b, 4)
     arm: NDArray  # (h,) m: displacement of the wings per rad
     angle: NDArray  # (h,) at the last accepted step, rad
-    state: NDArray  # (b, 2) then
+    state: NDArray  # (b, 2) at the last accepted step
     turned: NDArray  # (h,) at the last evaluation, rad
-    rate: NDArray  # (h, 2) at that step and at that evaluation, rad/s
-    reached: NDArray  # (b, 2) then
-    moment: NDArray  # (h,) of the branches then, N m
+    rate: NDArray  # (h, 2) at the last accepted step and at the last evaluation, rad/s
+    reached: NDArray  # (b, 2) state at the last evaluation
+    moment: NDArray  # (h,) of the branches at the last evaluation, N m
     slope: NDArray  # (h,) derivative of the moment with respect to the angle, N m/rad
-    mean: NDArray  # (h, 2) mean moment of a step from the accepted one, and its slope
+    mean: NDArray  # (h, 2) mean moment from the last accepted step to the last evaluation; slope
     stored: NDArray  # (h,) energy of the branches, J
     lost: NDArray  # (2,) energy dissipated up to the last accepted step, and since, J
-    elapsed: NDArray  # (1,) time since then, s
+    elapsed: NDArray  # (1,) time since the last accepted step, s
     gradient: NDArray  # (14,) scratch of one hinge
 
 
@@ -96,7 +96,7 @@ def evaluate_branches(own, offset, e, turn):
         stored += found[4]
         lost += found[5]
     own.turned[e] = turn
-    offset[own.row[e], 1] += own.stiffness[e] * moment - own.moment[e]  # adds to other laws
+    offset[own.row[e], 1] += own.stiffness[e] * moment - own.moment[e]  # plus other laws' moments
     own.moment[e], own.slope[e] = own.stiffness[e] * moment, own.stiffness[e] * slope
     own.stored[e] = own.stiffness[e] * stored
     return own.stiffness[e] * lost
@@ -163,7 +163,7 @@ def memory_tangents(own, u, out):
 
 @kernel
 def mean_memory_tangents(own, floor, u0, u1, out):
-    """Derivatives (h, 14, 14) by u1 of the mean forces from u0 to u1, once these are known.
+    """Derivatives (h, 14, 14) with respect to u1 of mean forces from u0 to u1, after these forces.
 
     floor : least slope of the mean moments per unit stiffness.
     """
@@ -222,13 +222,13 @@ def _forces(term, u, v, t, force, powers):
 @energies
 def _energies(term, u, out):
     own, energy = term.own, numbers_at(out, term.groups)
-    for e in range(own.rest.size):  # as at the last evaluation, at u
+    for e in range(own.rest.size):  # from the last evaluation, which was at u
         energy[own.group[e]] += own.stored[e]
 
 
 @mean_forces
 def _mean_forces(term, u0, u1, before, h, t, force, powers):
-    """Do the work that branches store and dissipate in the step; offsets have their end values."""
+    """Forces that do the work that branches store and dissipate; offsets have their end values."""
     own, g, work, lost, lacking = term.own, term.own.gradient, 0.0, 0.0, 0.0
     start, end = flat(rows_at(u0, term.rows)), flat(rows_at(u1, term.rows))
     out, both = flat(rows_at(force, term.rows)), numbers_at(powers, 2)
@@ -254,7 +254,7 @@ def _mean_forces(term, u0, u1, before, h, t, force, powers):
             out[dofs[c]] += moment * gradient[c // 3, c % 3]
         for c in range(2):
             out[dofs[12 + c]] -= moment * hidden[c]
-        work += moment * (own.turned[e] - own.angle[e] - (after - begin))  # of the offset
+        work += moment * (own.turned[e] - own.angle[e] - (after - begin))  # work of the offset
     own.lost[1] = lost
     both[0] += work / h
     both[1] -= lacking / h
@@ -286,7 +286,7 @@ def _branch_states(term, out):
 
 @step_error
 def _step_error(term, scale):
-    """Error ratio of the last evaluation, as dihedrals do not change at constant rates.
+    """Error ratio of the last evaluation, because dihedrals do not change at constant rates.
 
     The reference path is a parabola with the rates of both ends, evaluated at its middle and
     turning point.
@@ -294,7 +294,7 @@ def _step_error(term, scale):
     own = term.own
     h, wrong = own.elapsed[0], 0.0
     for e in range(own.rest.size):
-        if own.code[own.first[e]] == DAMPER:  # its rates are rounding errors in short steps
+        if own.code[own.first[e]] == DAMPER:  # a damper's rates are rounding errors in short steps
             continue
         begin, turn = own.angle[e], own.turned[e] - own.angle[e]
         scale = max(scale, own.arm[e] * max(abs(begin), abs(own.turned[e])))
@@ -318,7 +318,7 @@ def _step_error(term, scale):
 class HingeMemory(Term):
     """Branches of hinges, added to the elastic parts of their laws on a sheet; see `Term`.
 
-    Their state changes in place, and terms derived from this one share it.
+    The state of the branches changes in place, and terms derived from this term share it.
 
     Parameters
     ----------
@@ -362,11 +362,11 @@ class HingeMemory(Term):
         self.own.elapsed[0] = 0.0
 
     def snapshot(self) -> tuple[NDArray, ...]:
-        """Copy of the last accepted step, for `recall`."""
+        """Copy of the state at the last accepted step, for `recall`."""
         return tuple(array.copy() for array in self._kept)
 
     def recall(self, snapshot: Sequence[NDArray]) -> None:
-        """Return to an accepted step."""
+        """Return to the state at an accepted step."""
         for array, kept in zip(self._kept, snapshot, strict=True):
             array[:] = kept
         self.still()
@@ -404,7 +404,7 @@ class HingeMemory(Term):
 
     @property
     def places(self) -> tuple[NDArray, NDArray]:
-        """Rows and columns (k,) of its tangent entries; see `Term`."""
+        """Rows and columns (k,) of the term's tangent entries; see `Term`."""
         return self._coupled[1:]
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:

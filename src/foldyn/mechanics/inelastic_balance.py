@@ -1,4 +1,4 @@
-"""Creases with memory between edge angles in balance: n5b8e in explicit motions.
+"""Creases with memory between edge angles in balance, for n5b8e in explicit motions.
 
 The moment of a crease branch depends on the turn of the crease itself, which is solved together
 with the adjacent edge angles: their balance calls the branches, by address, in every iteration
@@ -27,7 +27,7 @@ from foldyn.mechanics.term import ADDRESS, FORCES, CompiledTerm, forces
 from foldyn.mechanics.viscous import hinge_gradient
 
 ROUNDS = 200  # maximum iterations for the turns of creases in a given state
-FOUND = 1e-14  # rad, last change of these turns
+FOUND = 1e-14  # rad, largest last change of these turns
 
 
 class _Branches(NamedTuple):
@@ -94,7 +94,7 @@ class BalancedMemory(HingeMemory):
         return CompiledTerm(found.context, {**found.kernels, FORCES: _forces})
 
     def start(self, q: NDArray, state: NDArray | str | None = None) -> None:
-        """Start as `HingeMemory.start`; in a given state, creases turn until in balance."""
+        """Start like `HingeMemory.start`; in a given state, creases turn until they balance."""
         own, sheet = self.own, Assembly(self._sheet)
         for array in (own.angle, own.state, own.rate, own.elapsed, own.lost):
             array[:] = 0.0

@@ -30,7 +30,7 @@ SHARED = ("bars", "bar_runs", "hinges", "hinge_runs", "hinge_group", "addresses"
 
 
 def lanes(models: Sequence[BarsHinges]) -> BarsHinges:
-    """A model with the topology of the first and the values of WIDTH models."""
+    """One model with the topology of the first of WIDTH models and the values of all."""
     numbers = [name for name in BarsHinges._fields if name not in SHARED]
     own = {name: side_by_side([getattr(model, name) for model in models]) for name in numbers}
     return models[0]._replace(**own)
@@ -106,9 +106,9 @@ def add_bars(model, u, force, value, strain):
 def add_hinges(model, position, force, angles, wrong, value, strain):
     """Add the forces of the hinges at the positions to `force`, both (3 n WIDTH,).
 
-    Updates the angles, and marks models in which a hinge has passed through 0 or 360 degrees since
-    as `wrong` (WIDTH,). value (WIDTH,) is scratch. Adds strain energies (J) of group g to
-    strain[1 + g], unless it is empty.
+    Updates the angles, and sets `wrong` (WIDTH,) for models in which a hinge has passed through 0
+    or 360 degrees since the last call. value (WIDTH,) is scratch. Adds strain energies (J) of group
+    g to strain[1 + g], unless it is empty.
     """
     hinges, p = model.hinges, model.hinge_parameters
     for run in range(model.hinge_runs.shape[0]):

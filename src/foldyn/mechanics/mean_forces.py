@@ -4,10 +4,10 @@ From u0 to u1 = u0 + du, with F the forces at the midpoint and W the energy,
 
     f = F + (W1 - W0 - F . du - h P) du / |du|^2,
 
-P the power that the term puts in minus the power that it dissipates (Gonzalez, J. Nonlinear Sci. 6,
-1996). The correction along du, for all dofs of the term at once, is of third order in du. It has a
-resultant and a moment, so that momenta are not conserved: terms that conserve them have their own
-`mean_forces`.
+with P the power that the term puts in minus the power that it dissipates (Gonzalez, J. Nonlinear
+Sci. 6, 1996). The correction along du, for all dofs of the term at once, is of third order in du.
+It has a resultant and a moment, so that momenta are not conserved: terms that conserve them have
+their own `mean_forces`.
 
 Hidden dofs have no inertia. With midpoint forces they would oscillate from step to step; with the
 mean of the forces at both ends they do not, and the correction acts along the displacements.
@@ -28,20 +28,20 @@ from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.term import ENERGIES, FORCES, MEAN_FORCES, CompiledTerm, Term, mean_forces
 from foldyn.mechanics.threads import ThreadPart
 
-NOISE = 16.0 * float(np.finfo(float).eps)  # of an energy: smaller differences are rounding errors
+NOISE = 16.0 * float(np.finfo(float).eps)  # rounding errors, relative to an energy
 
 
 class _Context(NamedTuple):
-    term: int  # its context,
-    forces: int  # and its kernels
+    term: int  # address of the term's context
+    forces: int  # addresses of the term's kernels
     energies: int
-    dofs: NDArray  # (d,) dofs with mass, on which its forces depend
+    dofs: NDArray  # (d,) dofs with mass on which the term's forces depend
     hidden: NDArray  # (r,)
-    found: NDArray  # (3, rows, 3) its forces at the midpoint and, if it has hinges, at u0 and u1
+    found: NDArray  # (3, rows, 3) forces at the midpoint and, if the term has hinges, at u0 and u1
     middle: NDArray  # (rows, 3)
     speed: NDArray  # (rows, 3)
     energy: NDArray  # (groups,)
-    powers: NDArray  # (3, 3) with its forces
+    powers: NDArray  # (3, 3) powers of the same evaluations
 
 
 @mean_forces
@@ -50,7 +50,7 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
     start, end, out = flat(rows_at(u0, rows)), flat(rows_at(u1, rows)), flat(rows_at(force, rows))
     for i in range(out.size):
         flat(middle)[i], flat(speed)[i] = 0.5 * (start[i] + end[i]), (end[i] - start[i]) / h
-    for k in range(found.shape[0]):  # the end is last, whose dihedrals remain
+    for k in range(found.shape[0]):  # u1 comes last, so that its dihedrals remain
         place = middle if k == 0 else rows_at(u0 if k == 1 else u1, rows)
         found[k], own.powers[k] = 0.0, 0.0
         run_at(own.forces, (own.term, place, speed, t, found[k], own.powers[k]))

@@ -4,7 +4,7 @@ A panel is strained as its b bars are, E = (stretch^2 - 1)/2, quadratic in the p
 is 1/2 E^T S E with a full matrix S (`structures.membranes`), which couples all bars; independent
 bars would have a diagonal matrix. A panel that only turns, or folds along bars, has no strain.
 
-A term has all panels of one kind: with the same number of nodes, and bars between the same ones.
+A term has all panels of one kind: with equal numbers of nodes, and bars between the same nodes.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Packed(NamedTuple):
     count: int  # p
     corners: int  # c
     ends: NDArray  # (b, 2)
-    nodes: NDArray  # rows (c, 8) of each group, uint32: others would be tested for wraparound
+    nodes: NDArray  # rows (c, 8) of each group, uint32: signed would be tested for wraparound
     vector: NDArray  # rows (3 b, 8)
     per_length2: NDArray  # rows (b, 8)
     stiffness: NDArray  # rows (b b, 8)
@@ -77,7 +77,7 @@ def packed(membranes: Membranes) -> Packed:
     bars = len(membranes.ends)
 
     def groups(array: NDArray, kind: type = float) -> NDArray:
-        """Of rows (..., p)."""
+        """Groups of eight from rows (..., p)."""
         rows = array.reshape(math.prod(array.shape[:-1]), count)
         filled = np.zeros((len(rows), -(-count // WIDTH) * WIDTH), kind)
         filled[:, :count] = rows
@@ -100,7 +100,7 @@ def taken(membranes: Membranes, which: NDArray) -> Membranes:
 
 @inner_scalar
 def strain_of(membranes, u, p, i, along):
-    """Strain of bar i of panel p; puts its vector (m) into `along` (3,)."""
+    """Strain of bar i of panel p; puts the bar's vector (m) into `along` (3,)."""
     a = membranes.nodes[p, membranes.ends[i, 0]]
     b = membranes.nodes[p, membranes.ends[i, 1]]
     excess = 0.0
@@ -183,7 +183,8 @@ def strains_toward(membranes, u0, u1):
 def membrane_blocks(membranes, u0, u1, strain):
     """Tangent (p, c, c, 3, 3), N/m, of all panels at u0 = u1, with the stresses of strains (b, p).
 
-    From u0 to another u1 it is twice the derivative of their mean forces by u1.
+    If u1 differs from u0, this is twice the derivative of the panels' mean forces with respect to
+    u1.
     """
     count, bars = membranes.nodes.shape[1], membranes.ends.shape[0]
     out = np.zeros((membranes.nodes.shape[0], count, count, 3, 3))
@@ -225,10 +226,10 @@ class Back(NamedTuple):
     weight: NDArray  # (24 c,) of the nodes
     between: NDArray  # (24 b,) differences of the weights at the bars' ends
     excess: NDArray  # (8 b,) squared length minus squared rest length, m2
-    growth: NDArray  # (8 b,) its rate for nodal velocities of half the weights
+    growth: NDArray  # (8 b,) rate of `excess` for nodal velocities of half the weights
     stress: NDArray  # (8 b,) S E
     pulled: NDArray  # (8 b,) S^T r, r the rates of the strains
-    vector: NDArray  # (3 b, p'), p' the panels with room for whole groups
+    vector: NDArray  # (3 b, p') gradient, p' the panels with room for whole groups
     per_length2: NDArray  # (b, p')
     stiffness: NDArray  # (b b, p')
 
@@ -353,7 +354,7 @@ def _energies(own, u, out):
 
 @mean_forces
 def _mean_forces(own, u0, u1, before, h, t, force, powers):
-    """By mean strains and the vectors halfway, as energies are quadratic in strains."""
+    """Uses mean strains and mid-step vectors, because energies are quadratic in strains."""
     membranes, out = own.whole, rows_at(force, own.rows)
     start, end = rows_at(u0, own.rows), rows_at(u1, own.rows)
     bars, ends = membranes.ends.shape[0], membranes.ends
@@ -383,7 +384,7 @@ class MembranesTerm(Term):
     ----------
     membranes : Membranes
     rows : int
-        Of the arrays that hold the dofs.
+        Number of rows of the arrays that hold the dofs.
     """
 
     shared = True
@@ -417,7 +418,7 @@ class MembranesTerm(Term):
     def pulled(self) -> Pulled:
         """See `Term`."""
         own = back(self.membranes)
-        gradient = {  # without the room
+        gradient = {  # without the padding
             name: getattr(own, name).reshape(*array.shape[:-1], -1)[..., : array.shape[-1]]
             for name, array in self.arrays().numbers.items()
         }

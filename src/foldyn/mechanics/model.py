@@ -51,7 +51,8 @@ class Hinges(NamedTuple):
     """Hinges of one group: rows (axis j, k, wings i, l), stiffness, rest angle and law.
 
     parameters : (nh, 4) of each hinge, if they differ from the law's.
-    share : (nh,) of the crease in a turn (`materials.series`), if adjacent panels are compliant.
+    share : (nh,) the crease's share of a turn (`materials.series`), if adjacent panels are
+    compliant.
     """
 
     nodes: NDArray
@@ -69,7 +70,7 @@ def element_order(nodes: NDArray) -> NDArray:
     lowest = nodes.min(axis=1).astype(np.int64)
     order = np.argsort(lowest, kind="stable")
     lowest = lowest[order]
-    turn = np.arange(len(order)) - np.searchsorted(lowest, lowest)  # first, second, ... of its node
+    turn = np.arange(len(order)) - np.searchsorted(lowest, lowest)  # first, second, ... of a node
     return order[np.lexsort((lowest, turn, lowest // GROUP))]
 
 

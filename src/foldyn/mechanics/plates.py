@@ -3,13 +3,13 @@
 A plate has angles phi: the turns of its hinges from rest, and rotations beta of its edges relative
 to the facets there. Its energy is 1/2 phi^T K phi. A fold is a hinge between two plates; its angle
 is the dihedral of the facets minus the two adjacent rotations. At a clamped edge the sheet keeps
-its direction in space: the angle of the plate is the one between its facet and the facet's mirror
+its direction in space: the angle of the plate is the angle between its facet and the facet's mirror
 image at rest. The last point of this hinge is no node but rides on the ends of the edge
 (`mechanics.clamps`).
 
-Rotations are massless dofs in addition to the displacements u (n, 3). Their dofs x (r,) are lengths
-too (m), so that norms over all dofs do not depend on the unit of length: beta is x times
-`per_reach`.
+Rotations are massless dofs in addition to the displacements u (n, 3). The dofs x (r,) of rotations
+are lengths, too (m), so that norms over all dofs do not depend on the unit of length: beta is x
+times `per_reach`.
 """
 
 from __future__ import annotations
@@ -49,21 +49,21 @@ from foldyn.mechanics.threads import Team, team
 class BarsPlates(NamedTuple):
     """Arrays of n nodes with bars, nf folds, nb bends and p plates of nq angles in all.
 
-    The last of the bends, c of them, are clamped edges: in the place of a wing their hinges name
-    the first end of the edge.
+    The last c bends are clamped edges: their hinges have the first end of the edge in place of a
+    wing.
     """
 
     bars: BarsHinges  # without hinges
     rotations: int  # r
     per_reach: float  # rotation (rad) of a dof of 1 m, 1/m
-    rotation_hinge: NDArray  # (r,) row in `hinges` that each rotation lies at
+    rotation_hinge: NDArray  # (r,) row in `hinges` of each rotation's edge
     hinges: NDArray  # (nf + nb, 4) of the folds, then of the bends
-    wings: NDArray  # (c, 3) of clamped edges, from the middle of each, m
-    fold_rotations: NDArray  # (nf, 2) rotations beside each fold, or -1
+    wings: NDArray  # (c, 3) virtual wings of clamped edges, from the edge's middle, m
+    fold_rotations: NDArray  # (nf, 2) rotations on both sides of each fold, or -1
     fold_stiffness: NDArray  # (nf,) N m/rad
     fold_rest: NDArray  # (nf,) rad
     fold_parameters: NDArray  # (nf, 4)
-    code: int  # of the folds' law
+    code: int  # code of the folds' law
     addresses: NDArray  # (3,) of a user's law
     bend_rest: NDArray  # (nb,) rad
     start: NDArray  # (p + 1,) first angle of each plate
@@ -78,7 +78,7 @@ class BarsPlates(NamedTuple):
 
     @property
     def rows(self) -> int:
-        """Rows of three that hold displacements and then rotations, the last one filled up."""
+        """Rows of three that hold displacements and then rotations, the last row padded."""
         return self.nodes + -(-self.rotations // 3)
 
 
@@ -90,7 +90,7 @@ class PlatesScratch(NamedTuple):
     gradient: NDArray  # (nh, 12)
     moment: NDArray  # (nh,) N m
     fold_angle: NDArray  # (nf,) rad
-    slope: NDArray  # (nf,) of the folds' law
+    slope: NDArray  # (nf,) slope of the folds' law
     turn: NDArray  # (the most angles of a plate,) rad
     own: NDArray  # (2,) first and last + 1 of the rows
     team: Team
@@ -171,7 +171,7 @@ def turn_folds(model, x, scratch):
 
 @inner
 def turn_plate(model, x, scratch, p):
-    """Angles phi of plate p, to scratch.turn."""
+    """Angles phi of plate p, into scratch.turn."""
     folds = model.fold_rest.size
     for k in range(model.start[p + 1] - model.start[p]):
         h = model.angle[model.start[p] + k]
@@ -270,7 +270,7 @@ def add_plate_moments(model, couple, scratch, p):
             moment += model.stiffness[model.entry[p] + k * count + m] * scratch.turn[m]
         h = model.angle[model.start[p] + k]
         if h >= 0:
-            scratch.moment[h] += moment  # of two plates at a weld
+            scratch.moment[h] += moment  # a weld adds the moments of two plates
         else:
             couple[-1 - h] += model.per_reach * moment
 
@@ -279,8 +279,8 @@ class _Context(NamedTuple):
     model: BarsPlates
     scratch: PlatesScratch
     rows: int
-    groups: NDArray  # (3,) of the energies of bars, folds and bends
-    energy: NDArray  # (3,) these, J
+    groups: NDArray  # (3,) energy groups of bars, folds and bends
+    energy: NDArray  # (3,) energies of bars, folds and bends, J
 
 
 @forces
@@ -350,6 +350,6 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
 def plates_kernels(
     model: BarsPlates, scratch: PlatesScratch, rows: int, groups: tuple[int, int, int]
 ) -> CompiledTerm:
-    """Bars, folds and plates, whose dofs fill so many rows, with the groups of their energies."""
+    """Kernels of bars, folds and plates with dofs in `rows` rows, and their energy groups."""
     own = Context(_Context(model, scratch, rows, np.array(groups), np.zeros(3)))
     return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})

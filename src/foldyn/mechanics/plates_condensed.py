@@ -1,15 +1,15 @@
 """Plates whose rotations are in balance at every displacement: for methods that need mass.
 
 The rotations x (r,) of `mechanics.plates` balance the forces on them, which curling panels and
-moments of creases exert. Newton's method finds them at every evaluation, starting from the last
-ones. Their stiffness consists of the constant stiffness of the plates and of the folds, which
-couple the two rotations beside them. It is factorized as a band (Cholesky), only once if the law of
-the folds is linear.
+moments of creases exert. Newton's method finds them at every evaluation, starting from the
+rotations of the last evaluation. The stiffness of the rotations is the constant stiffness of the
+plates plus the stiffness of the folds; each fold couples the rotations on both sides. It is
+factorized as a band (Cholesky), only once if the law of the folds is linear.
 
 The pullback (`mechanics.pullback`) holds the forces on the rotations at the push s, f(u, x) = s.
-With y = -f_x^-1 f_u w, the rates of the rotations if the nodes move by the weights w, its
-derivatives are those of the forces on nodes and rotations (`mechanics.plates_pullback`) for the
-weights (w, y), and -y with respect to s.
+Let y = -f_x^-1 f_u w be the rates of the rotations if the nodes have the velocities w. Then the
+pullback for w is the pullback of the forces on nodes and rotations (`mechanics.plates_pullback`)
+for the weights (w, y); the derivative with respect to s is -y.
 """
 
 from __future__ import annotations
@@ -49,10 +49,10 @@ from foldyn.mechanics.pullback import Pulled, pullback
 from foldyn.mechanics.term import ENERGIES, FORCES, CompiledTerm, energies, forces
 from foldyn.mechanics.threads import Team
 
-STEPS = 100  # most steps of Newton's method
-BEYOND = 0.5  # of the initial work of the forces: a step is too long if they resist its end by more
+STEPS = 100  # largest number of steps of Newton's method
+BEYOND = 0.5  # a step is too long if forces resist its end by more than this, relative to its start
 BALANCED = 1e-12  # rad, largest change in the last step
-ROUNDED = 1e-9  # the same if rounding errors are larger, as creases are much stiffer than panels
+ROUNDED = 1e-9  # the same with larger rounding errors, if creases are much stiffer than panels
 
 
 class CondensedPlates(NamedTuple):
@@ -87,7 +87,7 @@ class CondensedScratch(NamedTuple):
     couple: NDArray  # (r,) N
     step: NDArray  # (r,) in the order of the band
     factor: NDArray  # (r, w + 1)
-    branches: NDArray  # (nf, 2) moments, N m, and slopes, N m/rad, of branches of folds
+    branches: NDArray  # (nf, 2) moments (N m) and slopes (N m/rad) of branches of folds
     angle: NDArray  # arrays of `plates`
     fold_angle: NDArray
     own: NDArray  # (2,) first and last + 1 of the rows
@@ -224,10 +224,10 @@ def balance(model, u, scratch):
     plates, push = model.plates, model.offset[model.plates.fold_rest.size :]
     turn_hinges(plates, u, scratch.plates)
     slope = scratch.plates.slope
-    again = model.memory[0] != 0  # rates of creases are differences of turns
+    again = model.memory[0] != 0  # rates of creases follow from differences of turns
     begun = 0.0  # work of the forces at the start of the last step
     for k in range(scratch.x.size):
-        if np.isnan(scratch.x[k]):  # none were found at the last displacements
+        if np.isnan(scratch.x[k]):  # no balance was found at the last displacements
             scratch.x[k] = 0.0
     for i in range(STEPS):
         turn_moments(plates, scratch.x, scratch.couple, scratch.plates)
@@ -261,7 +261,7 @@ def balance(model, u, scratch):
         if close or not largest < np.inf:
             for k in range(scratch.x.size):
                 push[k, 1] = scratch.x[k]
-                if np.isnan(push[k, 3]):  # where a motion begins
+                if np.isnan(push[k, 3]):  # at the start of a motion
                     push[k, 3] = scratch.x[k]
             return
     scratch.x[:] = np.nan
@@ -289,7 +289,7 @@ def _energies(own, u, out):
 
 
 def condensed_kernels(model: CondensedPlates, scratch: CondensedScratch) -> CompiledTerm:
-    """Bars, folds and plates with their rotations in balance."""
+    """Kernels of bars, folds and plates with rotations in balance."""
     own = Context(_Context(model, scratch))
     return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies})
 
@@ -353,7 +353,7 @@ def _pullback(own, u, v, t, weight, product, rate):
 
 
 def condensed_pulled(model: CondensedPlates) -> Pulled:
-    """Bars, folds and plates with their rotations in balance, differentiated."""
+    """Pullback of bars, folds and plates with rotations in balance."""
     back, (y, push) = back_of(model.plates), np.zeros((2, model.plates.rotations))
     own = Context(_Backward(model, condensed_scratch(model), back, y, push))
     return Pulled(own, _pullback, {**gradients(back.out), "push": push})

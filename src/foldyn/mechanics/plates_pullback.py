@@ -1,13 +1,13 @@
 """The pullback of bars, folds and plates (`mechanics.pullback`), with rotations x as dofs.
 
-A prime is a rate for nodes and rotations that move by their weights. With the dihedrals theta, the
-angles phi of folds, which have the moments M, and the angles phi of plates,
+A prime denotes a rate, for nodes and rotations whose velocities are their weights. With the
+dihedrals theta, the angles phi of folds, which have the moments M, and the angles phi of plates,
 
     w . F = sum of M phi' + sum of phi'^T K phi.
 
-Each dihedral has a moment, the factor of theta', and a second one, `back`, the factor of its
-changes: M_phi phi' from folds, K^T phi' from plates. Its nodes get moment g' + back g, with g the
-gradient of the dihedral.
+Each dihedral has a moment, which is the factor of theta', and a second moment, `back`, which is the
+factor of changes of theta: M_phi phi' from folds, K^T phi' from plates. The nodes of the hinge get
+moment g' + back g, with g the gradient of the dihedral.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ class Back(NamedTuple):
     moves: NDArray  # (4, 3) weights of these points
     by: NDArray  # (4, 3)
     rate: NDArray  # (nh,) of the dihedrals
-    gradient_rate: NDArray  # (nh, 12) of their gradients
-    moment: NDArray  # (nh,) back
+    gradient_rate: NDArray  # (nh, 12) rates of the dihedrals' gradients
+    moment: NDArray  # (nh,) `back` above
     turned: NDArray  # (the most angles of a plate,) rates of its angles
-    resisted: NDArray  # (the most angles of a plate,) K^T times them
+    resisted: NDArray  # (the most angles of a plate,) K^T times `turned`
 
 
 def back_of(model: BarsPlates) -> Back:
@@ -207,7 +207,7 @@ def _pullback(own, u, v, t, weight, product, rate):
 
 
 def plates_pulled(model: BarsPlates) -> Pulled:
-    """Bars, folds and plates differentiated."""
+    """Pullback of bars, folds and plates."""
     back = back_of(model)
     own = Context(_Context(model, plates_scratch(model), back, model.rows))
     return Pulled(own, _pullback, gradients(back.out))

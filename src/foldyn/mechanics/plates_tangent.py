@@ -46,7 +46,7 @@ class PlatesPattern(NamedTuple):
     dof: NDArray  # (places of all plates,) first dofs
     start: NDArray  # (p + 1,) first block of each plate
     plate: NDArray  # (blocks of all plates,) first entries
-    corner: NDArray  # (nq, 4) places of the hinge's nodes, or of the rotation, in the plate
+    corner: NDArray  # (nq, 4) places in the plate of an angle's nodes or rotation
     owner: NDArray  # (nh, 2) a plate of the hinge, and its angle (nq) there; -1 if none
 
 
@@ -83,11 +83,11 @@ def plates_pattern(model: BarsPlates, bars: tuple[NDArray, NDArray]) -> PlatesPa
     every = distinct(np.concatenate([np.arange(count) * (count + 1), sides, pairs.ravel(), own]))
 
     width = np.where(np.arange(count) < n, 3, 1)
-    dof = np.concatenate([[0], np.cumsum(width)])  # first of each place
+    dof = np.concatenate([[0], np.cumsum(width)])  # first dof of each place
     row, column = np.divmod(every, count)
     behind = np.concatenate([[0], np.cumsum(width[column])])  # entries of one row of each place
     ends = behind[np.searchsorted(row, np.arange(count + 1))]
-    length = np.repeat(np.diff(ends), width)  # of the rows of the matrix
+    length = np.repeat(np.diff(ends), width)  # length of the rows of the matrix
     indptr = np.concatenate([[0], np.cumsum(length)])
     first = indptr[dof[row]] + behind[:-1] - ends[row]  # entry of each pair
     once = np.repeat(dof[column] - behind[:-1], width[column]) + np.arange(behind[-1])
@@ -138,14 +138,14 @@ def _scatter(indptr, dof, first, nodes, block, data):
 
 @inner_scalar
 def _curvature(model, u, scratch, h, points, gradient, out):
-    """Moment of hinge h times the second derivative of its dihedral, to out (4, 3, 4, 3)."""
+    """Put the moment of hinge h times its dihedral's second derivative into out (4, 3, 4, 3)."""
     put_points(model, u, h, points)
     for v in range(4):
         for c in range(3):
             gradient[v, c] = scratch.gradient[h, 3 * v + c]
     if rides(model, h):
         for c in range(3):
-            gradient[3, c] *= 2.0  # `carry` has given half of it away
+            gradient[3, c] *= 2.0  # because `carry` has moved half of it
     out[:] = 0.0
     add_hessian(points, gradient, scratch.moment[h], out)
     if rides(model, h):
@@ -255,7 +255,7 @@ def add_plates_tangent(
     """Add the tangent of folds and plates at displacements u (n, 3) and rotations x (r,).
 
     scratch : `PlatesScratch` without moments.
-    floor : slopes of the folds' law per unit stiffness below it are raised to it.
+    floor : least slope of the folds' law per unit stiffness; smaller slopes are raised to it.
     """
     turn_hinges(model, u, scratch)
     turn_folds(model, x, scratch)

@@ -1,10 +1,10 @@
 """Pullback of forces: derivatives of the weighted forces of a model, term by term.
 
 For weights w and the forces F of a term at a state, a term's pullback adds the derivatives of w . F
-by the displacements (the tangent times w), by the velocities, and by each of the term's own arrays:
-stiffness, rest angles, rest positions. Solvers need nothing else for exact gradients: the adjoint
-method never forms the derivative of F by an array (Griewank and Walther, Evaluating Derivatives,
-2008, chapter 3).
+with respect to the displacements (the tangent times w), the velocities, and each of the term's own
+arrays, such as stiffness, rest angles and rest positions. Solvers need nothing else for exact
+gradients: the adjoint method never forms the derivative of F with respect to an array (Griewank and
+Walther, Evaluating Derivatives, 2008, chapter 3).
 
 The kernel of a term has the signature
 
@@ -33,7 +33,7 @@ pullback = addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS, ADDRESS)
 class Arrays(NamedTuple):
     """Arrays that the forces of a term depend on.
 
-    numbers : float arrays that they depend on, by name.
+    numbers : float arrays that the forces depend on, by name.
     layout : arrays that must be equal in models that differ only in the numbers: nodes, runs,
     codes.
     """
@@ -51,7 +51,7 @@ class Pulled(NamedTuple):
 
 
 def arrays_of(model: Any, *but: str) -> Arrays:
-    """Arrays of a named tuple, nested named tuples included, except some."""
+    """Arrays of a named tuple and of nested named tuples, except for fields named in `but`."""
     numbers: dict[str, NDArray] = {}
     layout: dict[str, NDArray] = {}
     for name, value in model._asdict().items():
@@ -92,12 +92,12 @@ class Pullback:
     ----------
     terms : Pullbacks
     gradient : dict of ndarray
-        Keys are the position of the term and the name of the array: "0.bar_stiffness".
+        Keys are the position of the term and the name of the array, such as "0.bar_stiffness".
 
     Raises
     ------
     InputError
-        A term cannot be differentiated: contact, laws with memory.
+        A term cannot be differentiated, such as contact or laws with memory.
     """
 
     def __init__(self, body: Any) -> None:
@@ -161,7 +161,7 @@ def refuse_lacking(what: str, lacks: Mapping[str, bool]) -> None:
 
 @inner_scalar
 def pulled_back(terms, u, v, t, weight, product, rate):
-    """Add the derivatives of weight . F by u and v, at u, v and t, to `product` and `rate`."""
+    """Add d(weight . F)/du to `product` and d(weight . F)/dv to `rate`, both at u, v and t."""
     for k in range(terms.context.size):
         run_at(terms.kernel[k], (terms.context[k], u, v, t, weight, product, rate))
 

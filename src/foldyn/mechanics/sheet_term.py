@@ -47,18 +47,18 @@ class FoldHinges(NamedTuple):
     per_hidden: float  # rad/m
     rest: NDArray  # (k,) rad
     stiffness: NDArray  # (k,) N m/rad
-    softness: NDArray  # (k,) rad/(N m), of the adjacent panels
-    row: NDArray  # (k,) row of each in `SheetTerm.series`
-    beside: NDArray | float = np.inf  # (k,) N m/rad, of adjacent panels with edge angles in balance
+    softness: NDArray  # (k,) rad/(N m), softness of the adjacent panels
+    row: NDArray  # (k,) row of each hinge in `SheetTerm.series`
+    beside: NDArray | float = np.inf  # (k,) N m/rad, adjacent panels with edge angles in balance
 
     @property
     def length(self) -> NDArray:
-        """Length of each (k,), m."""
+        """Length (k,) of each hinge, m."""
         return np.linalg.norm(self.corners[:, 1] - self.corners[:, 0], axis=1)
 
     @property
     def share(self) -> NDArray:
-        """Length of each hinge (k,) over the length of its whole fold."""
+        """Ratio (k,) of each hinge's length to the length of its whole fold."""
         length = self.length
         return length / np.bincount(self.fold, length)[self.fold]
 
@@ -69,7 +69,7 @@ class FoldHinges(NamedTuple):
 
     @property
     def hidden_turn(self) -> NDArray:
-        """Turn (k, 2) of each per unit of its hidden dofs, rad/m: 0 if it has none."""
+        """Turn (k, 2) of each hinge per unit of its hidden dofs, rad/m: 0 if it has none."""
         return np.where(self.hidden == NO_DOF, 0.0, self.per_hidden)
 
 
@@ -104,8 +104,8 @@ class Blocks(Protocol):
 
         of : the owner of the blocks, or a copy with other rest angles.
 
-        before : the start of the step or, `again`, the last iterate, from which stresses are
-        extrapolated to u; all (rows, 3).
+        before : the start of the step or, if `again`, the last iterate, from which stresses are
+        extrapolated to u. u and before are (rows, 3).
         """
         ...
 
@@ -113,7 +113,7 @@ class Blocks(Protocol):
         self, of: Any, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray, before: NDArray,
         again: bool, out: NDArray,
     ) -> None:  # fmt: skip
-        """Fill `out` with the derivative by u1 of the mean forces from u0 to u1; see `put`.
+        """Fill `out` with the derivative of the mean forces from u0 to u1 by u1; see `put`.
 
         angle : (nh,) dihedrals at u0.
         """
@@ -127,13 +127,13 @@ class Blocks(Protocol):
 class SheetTerm(Term):
     """A sheet with its rest angles, m dofs; see `Term`.
 
-    Its kernels write forces and energies; kernels of other terms add to them. Defaults suit a sheet
-    without hinges and hidden dofs.
+    The sheet's kernels write forces and energies; kernels of other terms add to these. Defaults
+    suit a sheet without hinges and hidden dofs.
 
     Attributes
     ----------
     model : named tuple
-        The arrays of its kernels.
+        The arrays of the sheet's kernels.
     size, rows : int
         Number m of the dofs, and rows of the arrays that hold them.
     hidden : ndarray of int
@@ -155,7 +155,7 @@ class SheetTerm(Term):
     # ------------------------------------------------------------------ mechanics
     @abstractmethod
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """Derivative (m, m) of its forces; slopes per unit stiffness below `floor` are raised."""
+        """Derivative (m, m) of the forces; slopes per unit stiffness are at least `floor`."""
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
         """Matrix for a Newton step at q, after an iterate `before`."""
@@ -200,13 +200,13 @@ class SheetTerm(Term):
     def plate_energies(self, q: NDArray, turn: NDArray) -> NDArray:
         """Energy (p,), J, of bending of each panel, or of each triangle of a shell.
 
-        turn : angles (rad) without stress of warm panels, as `Swelling` has them, or none, (0,).
+        turn : angles (rad) at which warm panels have no stress (see `Swelling`), or none, (0,).
         """
         return np.zeros(0)
 
     @abstractmethod
     def scale(self) -> NDArray:
-        """Force scale (m,), N, per dof for unit strain: its rounding errors are unavoidable."""
+        """Force (m,), N, on each dof at unit strain, whose rounding errors are unavoidable."""
 
     @abstractmethod
     def longest(self) -> float:
@@ -217,7 +217,7 @@ class SheetTerm(Term):
         return SoftHinges(np.zeros(0), np.zeros(0), sparse.csr_array((0, self.size)))
 
     def soft_tangent(self, q: NDArray, slope: NDArray) -> sparse.csr_array:
-        """Tangent (m, m) of these hinges alone, without moment, for given slopes / k (h,)."""
+        """Tangent (m, m) of the soft hinges alone, without moments, for given slopes / k (h,)."""
         return sparse.csr_array((self.size, self.size))
 
     def weakened(self, hinges: NDArray) -> Self:
@@ -225,13 +225,13 @@ class SheetTerm(Term):
         return self
 
     def own_strains(self) -> Strains | None:
-        """Its bars and hinges; None if panels bend as plates."""
+        """Bars and hinges of the sheet; None if panels bend as plates."""
         return None
 
     # ------------------------------------------------------------------ rest angles
     @property
     def rest_angles(self) -> NDArray:
-        """Rest angles (nr,), rad, that loads may change: first of the folds.
+        """Rest angles (nr,), rad, that loads may change, those of folds first.
 
         The last `offsets` entries are not rest angles but offsets of the folds' dihedrals, or
         forces on dofs in balance, N.
@@ -268,16 +268,16 @@ class SheetTerm(Term):
     def series(self) -> tuple[NDArray, NDArray]:
         """For all actuated hinges: the share of the crease in a small turn, and offsets.
 
-        Offsets (., 4) are added to the dihedrals (rad); then follow the moment of memory branches
-        (N m), and both offset and total moment at the last accepted step. Rows of dofs in balance
-        follow: force (N), dof (m), and both at that step. In a sheet from `actuated` they change in
-        place.
+        Columns of the offsets (., 4): the angle added to the dihedral (rad); the moment of memory
+        branches (N m); the offset and the total moment at the last accepted step. Rows of dofs in
+        balance follow: force (N), dof (m), and both at that step. In a sheet from `actuated` they
+        change in place.
         """
         count = len(self.turned()[0])
         return np.ones(count), np.zeros((count, 4))
 
     def offsets_under(self, moments: NDArray) -> NDArray:
-        """The last `rest_angles` for moments (nf,), N m, on creases alone."""
+        """The last `offsets` entries of `rest_angles` for moments (nf,), N m, on creases alone."""
         return np.zeros(0)
 
     def lowest_nodes(self, turned: NDArray) -> NDArray:

@@ -18,7 +18,7 @@ class Slots:
         self._found: tuple[NDArray, ...] = ()  # pattern of the last matrix, and derived data
 
     def added(self, matrix: sparse.csr_array, entries: NDArray) -> sparse.csr_array:
-        """The matrix, changed, or a fuller one, with entries (k,) added."""
+        """Add entries (k,) to the matrix, in place or in a matrix with more places; return it."""
         if not len(entries):
             return matrix
         matrix.sort_indices()

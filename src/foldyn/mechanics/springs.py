@@ -47,7 +47,7 @@ class Springs(NamedTuple):
     stiffness: NDArray  # (d,) N/m
     axial_ends: NDArray  # (a, 2)
     vector: NDArray  # (a, 3) from the first end to the second at rest, m
-    length: NDArray  # (a,) its length, m
+    length: NDArray  # (a,) length of `vector`, m
     stretch: NDArray  # (a,) length in excess of the force-free length, m
     axial_stiffness: NDArray  # (a,) N/m
 
@@ -78,7 +78,7 @@ def axial_extension(springs, u, s):
 
 @inner_scalar
 def axial_pull(springs, u, s):
-    """Force over length (N/m) of an axial spring; k if its ends may meet."""
+    """Ratio of force to length (N/m) of an axial spring; k if its ends may meet."""
     extension, length = axial_extension(springs, u, s)
     per_length = springs.axial_stiffness[s]
     if springs.stretch[s] < springs.length[s]:
@@ -104,7 +104,7 @@ def axial_blocks(springs, u, loose):
         a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
         extension, length = axial_extension(springs, u, s)
         across, along = 1.0, 1.0
-        if springs.stretch[s] < springs.length[s]:  # otherwise it is k in all directions
+        if springs.stretch[s] < springs.length[s]:  # otherwise the stiffness is k in all directions
             across = 0.0 if loose else extension / length
         for p in range(3):
             x = springs.vector[s, p] + u[b, p] - u[a, p]
@@ -142,7 +142,7 @@ def _pullback(own, u, v, t, weight, product, rate):
     for s in range(springs.axial_stiffness.size):
         a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
         extension, length = axial_extension(springs, moved, s)
-        share = 1.0  # force over k l
+        share = 1.0  # force divided by k l
         if springs.stretch[s] < springs.length[s]:
             share = extension / length
         grown = 0.0  # rate of the ends' separation for velocities equal to the weights, times l
@@ -151,7 +151,7 @@ def _pullback(own, u, v, t, weight, product, rate):
             grown += (weights[b, c] - weights[a, c]) * x
         k = springs.axial_stiffness[s]
         by_extension = k * grown / length if length > 0.0 else 0.0
-        by_length = by_extension * (1.0 - share)  # by l, on which the extension depends
+        by_length = by_extension * (1.0 - share)  # derivative with respect to l
         out.axial_stiffness[s] += share * grown
         out.stretch[s] += by_extension
         if length > 0.0:
@@ -237,11 +237,11 @@ class SpringsTerm(Term):
         return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     def arrays(self) -> Arrays:
-        """Arrays that its forces depend on; see `Term`."""
+        """Arrays that the term's forces depend on; see `Term`."""
         return arrays_of(self.springs)
 
     def pulled(self) -> Pulled:
-        """Pullback of its forces; see `Term`."""
+        """Pullback of the term's forces; see `Term`."""
         rows = 1 + int(self._ends.max(initial=GROUND))
         out = zeros_for(self.springs)
         own = Context(_Backward(self.springs, out, rows))
@@ -254,7 +254,7 @@ class SpringsTerm(Term):
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:
-        """Rows and columns (k,) of its tangent entries; see `Term`."""
+        """Rows and columns (k,) of the term's tangent entries; see `Term`."""
         return places_of(pairs_of_ends(self._ends))
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:

@@ -1,4 +1,4 @@
-"""Tangent for Newton steps: floored slopes, and bar stresses suited to them.
+"""Tangent for Newton steps: slopes with a lower bound, and bar stresses suited to such steps.
 
 As a sheet bends, panels turn far while their bars hardly stretch. A Newton step moves nodes along
 straight lines, which stretches turning bars to second order, and the huge spurious stresses would
@@ -31,7 +31,7 @@ from foldyn.mechanics.model import BarsHinges, node_order, ranks
 from foldyn.mechanics.sheet_term import SheetTerm
 from foldyn.mechanics.tangent import Sparsity, add_tangent, add_to_bar, block_keys, sparsity
 
-FLOOR = 1e-3  # of a hinge's stiffness: least slope in Newton steps, as in MERLIN2
+FLOOR = 1e-3  # least slope in Newton steps, relative to a hinge's stiffness, as in MERLIN2
 
 
 def put_tangent(
@@ -43,8 +43,8 @@ def put_tangent(
     ----------
     model, pattern
     u, before : ndarray, shape (n, 3)
-        The iterate; the start of the step, or, `again`, the last iterate, from which stresses are
-        extrapolated to u.
+        The iterate u; and the start of the step or, if `again`, the last iterate, from which
+        stresses are extrapolated to u.
     again : bool
     out : ndarray, shape (nnz, 3, 3)
     """
@@ -145,7 +145,7 @@ class SparseBlocks:
     Parameters
     ----------
     tangent : csr_array, shape (m, m)
-        Its sparsity, with the entries of `SheetTerm.step_tangent` in the same order.
+        A matrix with the entries of `SheetTerm.step_tangent` in the same order.
     rows : int
     position : ndarray, shape (3 rows, 3)
         Positions of the dofs, m.
@@ -188,7 +188,7 @@ class SparseBlocks:
         out.reshape(-1)[self._places(pattern)] = matrix.data
 
     def filled(self, pattern: Sparsity) -> NDArray:
-        """Mask of the entries that `put` may fill: three dofs of a row may lie far apart."""
+        """Mask of the entries that `put` may fill; three dofs of one row may lie far apart."""
         filled = np.zeros((len(pattern.indices), 3, 3), bool)
         filled.reshape(-1)[self._places(pattern)] = True
         return filled

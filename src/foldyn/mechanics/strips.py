@@ -1,15 +1,15 @@
 """Order in which the force kernel passes over a sheet: strip after strip of nodes.
 
-With nodes numbered along the sheet (`model.renumber`) an element's nodes have numbers close to its
-lowest one. A kernel that takes the elements in the order of their lowest nodes then needs the nodal
-values of a narrow window only. They are copied to ring buffers that stay in the cache: node i has
-the row i & mask. Once all elements with lowest nodes up to i are done, the force on node i is
-finished and leaves its buffer.
+With nodes numbered along the sheet (`model.renumber`), the node numbers of an element are close to
+the lowest of them. A kernel that takes the elements in the order of their lowest nodes then needs
+the nodal values of a narrow window only. They are copied to ring buffers that stay in the cache:
+node i has the row i & mask. Once all elements with lowest nodes up to i are done, the force on node
+i is finished and leaves its buffer.
 
 Threads cut the sheet across. An element belongs to the thread that owns its lowest node. The last
 strip of a thread reaches into the nodes of the next one: all threads do these edge strips first,
 leave the sums in the force array, wait for each other and go on with their other strips, which
-touch only their own nodes; there the sums of the edge strips are added. So the order of summation
+touch only their own nodes; then the sums of the edge strips are added. So the order of summation
 does not depend on the threads' speed.
 """
 
@@ -31,11 +31,11 @@ class Strips(NamedTuple):
 
     own: NDArray  # (2,) nodes whose force the thread finishes
     lowest: NDArray  # (s, 2) lowest nodes of the strip's elements
-    fresh: NDArray  # (s, 2) nodes that it touches first
+    fresh: NDArray  # (s, 2) nodes that the strip is the first to touch
     finished: NDArray  # (s, 2) nodes whose sums leave the buffer after the strip
-    adds: NDArray  # (s,) 1 if they are added to the sums of an edge strip
+    adds: NDArray  # (s,) 1 if the finished sums are added to the sums of an edge strip
     edge: int  # number of strips before the threads wait for each other: 0 or 1
-    rows: int  # of the buffers
+    rows: int  # number of rows of the buffers
     mask: int
 
 
@@ -57,7 +57,7 @@ def shares(model: BarsHinges, threads: int) -> NDArray:
     if threads <= 1:
         return np.array([0, n])
     width = _rounded(reach(model))
-    work = np.full(n, 2)  # in bars: a hinge counts two, and so do a node's vector operations
+    work = np.full(n, 2)  # a bar counts 1, a hinge 2, and the vector operations of a node 2
     for nodes, cost in ((model.bars, 1), (model.hinges, 2)):
         work += cost * np.bincount(np.minimum.reduce(nodes.T), minlength=n)
     done = np.cumsum(work)

@@ -32,7 +32,7 @@ def block_keys(indptr: NDArray, indices: NDArray) -> NDArray:
 
 
 def distinct(keys: NDArray) -> NDArray:
-    """Each once, in increasing order: quicker than np.unique."""
+    """Each key once, in increasing order; faster than np.unique."""
     ordered = np.sort(keys)
     return ordered[np.diff(ordered, prepend=-1) > 0]
 
@@ -77,7 +77,7 @@ def joined(pattern: Sparsity, more: NDArray) -> Sparsity:
 
 @inner_scalar
 def add_to_bar(data, slots, e, p, q, value):
-    """Add a value to entry (p, q) of both end blocks of a bar; subtract it between them."""
+    """Add a value to entry (p, q) of both end blocks of a bar; subtract it from the others."""
     data[slots[e, 0, 0], p, q] += value
     data[slots[e, 1, 1], p, q] += value
     data[slots[e, 0, 1], p, q] -= value
@@ -149,8 +149,8 @@ def tangent(
 ) -> sparse.bsr_array:
     """Tangent stiffness (3n, 3n), N/m, at displacement u (n, 3), as 3x3 blocks.
 
-    floor : hinge slopes per unit stiffness below it are raised to it. The default changes
-    nothing; 1.0 bounds the stiffness of laws that are soft at rest from above.
+    floor : least slope of hinges per unit stiffness; smaller slopes are raised to it. The default
+    changes nothing; 1.0 gives an upper bound for the stiffness of laws that are soft at rest.
     """
     n = len(model.rest)
     data = np.zeros((len(pattern.indices), 3, 3))

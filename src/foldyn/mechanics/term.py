@@ -9,31 +9,34 @@ terms. A missing kernel has the address 0.
 Arrays reach a kernel by their addresses, as `rows_at` and `numbers_at` find them: u, v and force
 are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of the context:
 
-    forces(u, v, t, force, powers)   adds its forces at u, v and the time t to `force`, N, and to
-                                     `powers` the powers that it puts in, dissipates and loses to
-                                     the air, W; the sheet's comes first, and overwrites
-    energies(u, out)                 adds its energies to their groups; the sheet's are written
+    forces(u, v, t, force, powers)   adds the term's forces at u, v and the time t to `force`, N,
+                                     and to `powers` the powers that the term puts in, dissipates
+                                     and loses to the air, W; the sheet's kernel runs first and
+                                     overwrites `force`
+    energies(u, out)                 adds the term's energies to their groups; the sheet's kernel
+                                     overwrites `out`
     limit(u, v, a, h, beta, energy, lightness) -> h
                                      the longest step (s), at most h, that resolves all contacts:
                                      before each step, after the forces at the end of the last one;
-                                     a is the acceleration there, beta and energy are those of
-                                     `contact.step_limit.Pace`; lightness (n,) is 1 / mass of the
-                                     nodes, 1/kg
+                                     a is the acceleration at that end, beta and energy are the
+                                     fields of `contact.step_limit.Pace`; lightness (n,) is 1 / mass
+                                     of the nodes, 1/kg
     place_obstacles(factors)         sets obstacles and air to the factors (h, 3) of their histories
     advance_clock(since)             the next evaluation is `since` (s) after the last accepted step
     commit()                         accepts the step that ends at the last evaluation
-    dissipated() -> J                energy that its laws have dissipated up to there
-    branch_states(out)               writes the states (b, 2) of its branches there
-    step_error(scale) -> ratio       their error if the step that ends there is accepted: as a turn,
-                                     over the largest turn or the turn that moves nodes by `scale`
-                                     (m)
+    dissipated() -> J                energy that the term's laws have dissipated up to the last
+                                     evaluation
+    branch_states(out)               writes the states (b, 2) of the branches at the last evaluation
+    step_error(scale) -> ratio       error of the branches if the step that ends at the last
+                                     evaluation is accepted: a turn, divided by the largest turn or
+                                     by the turn that moves nodes by `scale` (m)
     mean_forces(u0, u1, before, h, t, force, powers)
-                                     adds forces whose work from u0 to u1 is the change of its
-                                     energy plus the dissipation of its laws, in a step h (s) about
-                                     the time t, and writes its dihedrals at u1; before (nh,) are
-                                     all dihedrals at u0. Adds other powers as `forces` does. If a
-                                     term has none, `mechanics.mean_forces` derives them from its
-                                     other kernels
+                                     adds forces whose work from u0 to u1 is the change of the
+                                     term's energy plus the dissipation of its laws, in a step h (s)
+                                     about the time t, and writes the term's dihedrals at u1; before
+                                     (nh,) are all dihedrals at u0. Adds other powers like `forces`.
+                                     If a term has no such kernel, `mechanics.mean_forces` derives
+                                     these forces from its other kernels
 """
 
 from __future__ import annotations
@@ -59,9 +62,9 @@ from foldyn.values import writable
     FORCES, ENERGIES, LIMIT, PLACE_OBSTACLES, ADVANCE_CLOCK, COMMIT, DISSIPATED, BRANCH_STATES,
     STEP_ERROR,
 ) = EVERY = range(9)  # fmt: skip
-MEAN_FORCES = 9  # only for `dynamics.energy_momentum`
+MEAN_FORCES = 9  # kind of kernel only for `dynamics.energy_momentum`
 ADDRESS, NUMBER = types.int64, types.float64
-Way = tuple[NDArray, NDArray]  # states: from one, stresses are extrapolated to the other
+Way = tuple[NDArray, NDArray]  # two states: stresses are extrapolated from the first to the second
 
 forces = addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS)
 energies = addressed(ADDRESS, ADDRESS)
@@ -78,7 +81,7 @@ PARTS = {
     "damping": {"damping_places", "damping_entries"},
     "gradients": {"arrays", "pulled"},
 }
-WHOLE = {"stiffness": "tangent", "damping": "damping"}  # may replace both parts
+WHOLE = {"stiffness": "tangent", "damping": "damping"}  # method that may replace both parts
 
 
 class CompiledTerm(NamedTuple):
@@ -93,11 +96,11 @@ class Unstrained(NamedTuple):
 
     tangent: sparse.csr_array  # (m, m)
     hinges: sparse.csr_array  # (m, m) of the hinges alone
-    stretch: Callable[[NDArray], float]  # bar elongation in a motion (m,), over the possible one
+    stretch: Callable[[NDArray], float]  # bar elongation in a motion (m,) / the largest possible
 
 
 class Strains(NamedTuple):
-    """Bars, p of them, hinges, h, and panels with membranes, with their stiffness at rest."""
+    """The stiffness at rest of p bars, h hinges, and panels with membranes."""
 
     bars: NDArray  # (p, 2) nodes
     vector: NDArray  # (p, 3) from the first to the second at rest, m
@@ -123,7 +126,7 @@ class Term(ABC):
     energy_groups : mapping of str to str
         Its own energy groups, with descriptions; empty if it adds to groups of other terms.
     of_hinges : bool
-        Whether its forces are hinge moments, which are at play even at rest.
+        Whether its forces are hinge moments, which count for the force scale even without loads.
     shared : bool
         Whether threads may share a model with this term.
     owns_hidden : bool
@@ -133,7 +136,7 @@ class Term(ABC):
     undifferentiated : str
         Name for messages that refuse gradients, for a term without `pulled`.
     without : tuple of str
-        "stiffness" or "damping" if solvers obtain it elsewhere, or there is none.
+        "stiffness" or "damping" if solvers obtain it elsewhere, or the term has none.
     """
 
     energy_groups: ClassVar[Mapping[str, str]] = {}
@@ -149,7 +152,7 @@ class Term(ABC):
         super().__init_subclass__(**options)
         names = [name for name in vars(Term) if not name.startswith("_")]
         if any(getattr(getattr(cls, name), "__isabstractmethod__", False) for name in names):
-            return  # an abstract base
+            return  # an abstract base class
         has = {name for name in names if getattr(cls, name) is not getattr(Term, name)}
         needed = "damping" if cls.damps else "stiffness"
         for whole, parts in PARTS.items():
@@ -162,13 +165,13 @@ class Term(ABC):
     def compiled(self, part: ThreadPart, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels of the term for a thread.
 
-        part : the thread's, one of `Assembly.thread_parts`.
+        part : the thread's part, one of `Assembly.thread_parts`.
         kept : the term's memory, from `memories` or `memory`.
-        group : its first energy group.
+        group : the term's first energy group.
         """
 
     def memories(self, parts: Sequence[ThreadPart]) -> Sequence[Any]:
-        """Memory of its kernels, for each thread of a motion."""
+        """Memory of the term's kernels, for each thread of a motion."""
         return [None] * len(parts)
 
     @property
@@ -186,13 +189,13 @@ class Term(ABC):
     # ------------------------------------------------------------------ stiffness
     @property
     def places(self) -> tuple[NDArray, NDArray]:
-        """Rows and columns (k,) of the dofs that its tangent can couple."""
+        """Rows and columns (k,) of the dofs that the term's tangent can couple."""
         none = np.zeros(0, np.int64)
         return none, none
 
     @cached_property
     def slots(self) -> Slots:
-        """Slots of these entries in the tangent of a model."""
+        """Slots of the term's entries in the tangent of a model."""
         return Slots(*self.places)
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
@@ -203,13 +206,13 @@ class Term(ABC):
         return np.zeros(0)
 
     def step_entries(self, q: NDArray, way: Way, floor: float) -> NDArray:
-        """What a step of Newton's method takes for these (k,), with the stresses of a way."""
+        """Tangent entries (k,) for a Newton step, with stresses extrapolated along `way`."""
         return self.entries(q, floor)
 
     def mean_entries(self, q0: NDArray, q1: NDArray, way: Way, floor: float) -> NDArray:
-        """Derivative (k,) likewise of its mean forces from q0 to q1, after these, by q1.
+        """Entries (k,) of the derivative of the mean forces from q0 to q1 with respect to q1.
 
-        way : of the stresses at q1.
+        Call it after the mean forces. way : states that give the stresses at q1.
         """
         return 0.5 * self.entries(0.5 * (q0 + q1), floor)
 
@@ -225,14 +228,15 @@ class Term(ABC):
     # ------------------------------------------------------------------ damping
     @property
     def damping_places(self) -> tuple[NDArray, NDArray]:
-        """Rows and columns (k,) of the dofs that its damping can couple."""
+        """Rows and columns (k,) of the dofs that the term's damping can couple."""
         none = np.zeros(0, np.int64)
         return none, none
 
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
-        """Derivative (k,) of its forces by velocity, N s/m, at `damping_places`; added likewise.
+        """Derivative (k,) of the forces with respect to velocity, N s/m, at `damping_places`.
 
-        hidden : velocity change of hidden dofs relative to other dofs.
+        Entries of the same place are added. hidden : velocity change of hidden dofs relative to
+        other dofs.
         """
         return np.zeros(0)
 
@@ -243,36 +247,36 @@ class Term(ABC):
 
     # ------------------------------------------------------------------ gradients
     def arrays(self) -> Any:
-        """`pullback.Arrays` that its forces depend on; None without gradients."""
+        """`pullback.Arrays` that the term's forces depend on; None without gradients."""
         return None
 
     def pulled(self) -> Any:
-        """Pullback of its forces, as `pullback.Pulled`; None without gradients."""
+        """Pullback of the term's forces, as `pullback.Pulled`; None without gradients."""
         return None
 
     # ------------------------------------------------------------------ measures
     @property
     def hinges(self) -> NDArray:
-        """Rows (nh, 4) of its hinges; -1 for a virtual wing."""
+        """Rows (nh, 4) of the term's hinges; -1 for a virtual wing."""
         return np.zeros((0, 4), np.int64)
 
     def angles(self, q: NDArray) -> NDArray:
-        """Dihedrals (nh,) of its hinges, rad."""
+        """Dihedrals (nh,) of the term's hinges, rad."""
         return np.zeros(0)
 
     def add_scale(self, scale: NDArray) -> None:  # noqa: B027
-        """Add its force scale, N, at the dofs (m,), for unit strain."""
+        """Add the term's force scale, N, at the dofs (m,), for unit strain."""
 
     def holds(self, q: NDArray) -> sparse.csr_array:
-        """Unit rows (s, m) of its internal constraints: motions along them cause strain."""
+        """Unit rows (s, m) of the term's internal constraints: motions along them cause strain."""
         return sparse.csr_array((0, q.size))
 
     def turning_moments(self) -> float:
-        """Sum of its hinges' moments (N m) for a unit turn."""
+        """Sum of the moments of the term's hinges (N m) for a unit turn."""
         return 0.0
 
     def strains(self, others: Strains) -> Strains | None:
-        """Bars and hinges of the preceding terms with its own; None if it has other strains."""
+        """Bars and hinges of this and the preceding terms; None if this term has other strains."""
         return others
 
     # ------------------------------------------------------------------ other terms
@@ -294,7 +298,7 @@ class Term(ABC):
 
 
 def nodal(q: NDArray) -> NDArray:
-    """Nodal displacements, and whole rows of hidden dofs, from dofs (m,) or (rows, 3)."""
+    """Nodal displacements and complete rows of hidden dofs, from dofs (m,) or (rows, 3)."""
     flat = writable(q).reshape(-1)
     return flat[: flat.size // 3 * 3].reshape(-1, 3)
 
@@ -315,7 +319,7 @@ class Folds(NamedTuple):
 
 
 class Terms(NamedTuple):
-    """Terms of a body as compiled loops see them: of one type for any of them."""
+    """Terms of a body as compiled loops see them, with the same type for every body."""
 
     context: NDArray  # (k,) addresses
     kernel: NDArray  # (k, 9) addresses, or 0
@@ -331,7 +335,7 @@ class ThreadTerms:
     part : ThreadPart
         One of `Assembly.thread_parts`.
     kinds : sequence of int
-        Kernels to compile; others are not.
+        Kinds of the kernels to compile.
 
     Attributes
     ----------
@@ -346,7 +350,7 @@ class ThreadTerms:
         self.call(kinds)
 
     def call(self, kinds: Sequence[int]) -> None:
-        """Compile these kernels, too."""
+        """Compile kernels of these kinds, too."""
         for row, term in zip(self.terms.kernel, self._held, strict=True):
             for kind in kinds:
                 if kind in term.kernels and not row[kind]:
@@ -417,7 +421,7 @@ def step_error_of(terms, scale):
 
 @kernel
 def evaluate(terms, u, v, force, energy):
-    """Internal forces (rows, 3), N, and strain energies (J) unless empty, for Python."""
+    """Internal forces (rows, 3), N, and, unless `energy` is empty, strain energies (J)."""
     forces_of(terms, u, v, 0.0, force)
     if energy.size > 0:
         energies_of(terms, u, energy)

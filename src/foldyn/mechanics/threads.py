@@ -26,7 +26,7 @@ from foldyn.mechanics.strips import shares
 
 HINGES_EACH = 4000  # hinges per thread: half as many pay off only on an idle machine
 MOST = 8  # threads: more have not been measured
-SPINS = 100  # checks of the others before the processor is yielded
+SPINS = 100  # checks for other members before the processor is yielded
 ARRIVED, ROUND, BROKEN = 0, 8, 16  # positions in `Team.state`, each on its own cache line
 
 
@@ -71,7 +71,7 @@ def threads_for(model: BarsHinges) -> int:
     """Fastest number of threads for a motion of the model: one below 8000 hinges.
 
     Never more than NUMBA_NUM_THREADS (by default the processors that this process may use) or
-    OMP_NUM_THREADS, or than the reach of its elements permits.
+    OMP_NUM_THREADS, or than the reach of the model's elements permits.
     """
     allowed = [MOST, int(config.NUMBA_NUM_THREADS)]  # type: ignore[attr-defined]
     text = os.environ.get("OMP_NUM_THREADS", "")

@@ -18,8 +18,8 @@ def triangle_stiffness(
 ) -> tuple[NDArray, NDArray]:
     """Membrane and bending stiffness (nt, 3, 3) of triangles with corners (nt, 3, 3).
 
-    They act on the side strains, and on the turns of the sheet at the sides relative to the plane
-    of the corners (Morley). Side k runs from corner k to corner k + 1.
+    The matrices act on the side strains, and on the turns of the sheet at the sides relative to the
+    plane of the corners (Morley). Side k runs from corner k to corner k + 1.
 
     Parameters
     ----------
@@ -55,13 +55,13 @@ def triangle_stiffness(
     return membrane, curved
 
 
-MIDDLES = 0.5 * (np.ones((3, 3)) - np.eye(3))  # of the sides: three points integrate exactly
+MIDDLES = 0.5 * (np.ones((3, 3)) - np.eye(3))  # side midpoints integrate exactly
 
 
 def products() -> NDArray:
-    """Integrals (6, 2, 6, 2) of products of shape function slopes, over twice the area.
+    """Integrals (6, 2, 6, 2) of products of shape function slopes, divided by twice the area.
 
-    In the coordinates that are 1 at the second and at the third corner.
+    Slopes are derivatives by the two coordinates that are 1 at the second and third corner.
     """
     out, linear = np.zeros((6, 2, 6, 2)), np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
     for place in MIDDLES:
@@ -77,7 +77,7 @@ PRODUCTS = products()
 
 
 def squares(corners: NDArray, stiffness: NDArray) -> NDArray:
-    """Slope products (nt, 4, 4, 8) of the coordinates, integrated, for `add_triangles`.
+    """Products (nt, 4, 4, 8) of the coordinates' slopes, as weights for `add_triangles`.
 
     corners : (nt, 3, 2, 8), counter-clockwise.
     stiffness : (nt, 8) E t/(1 - nu^2).
@@ -103,7 +103,7 @@ def turned(products, a, b, numbers, at):
 def add_triangles(elements, starts, places, shapes, squares, products, ratio, numbers):
     """Add the stiffness of triangles to `numbers`.
 
-    elements : (nt, 6) their points.
+    elements : (nt, 6) points of the triangles.
     starts : (n + 1,) start of each point's unknowns; each has two eights in `shapes`.
     places : positions in `numbers` of the entries of all triangles in turn, for ordered pairs of
     points and of their unknowns; negative for entries to skip, such as one of both halves.

@@ -4,8 +4,8 @@ Each resists the rate of a scalar s(q) of the dofs, a distance or an angle, with
 grad s, ds/dt = grad s . v. It dissipates the power c (ds/dt)^2, which is zero in rigid motions, and
 its matrix in a state is c grad s grad s'. Grad s is sparse: its columns are in `dofs`.
 
-The angle of a hinge is its dihedral minus multiples of two hidden dofs, if it has them, like a
-piece of a shell's crease.
+The angle of a hinge is its dihedral; if it has two hidden dofs, such as a piece of a shell's
+crease, multiples of these are subtracted.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def hinge_gradient(x, dofs, hidden_turn, moved, out):
     A wing that repeats the first axis node is virtual, as in a clamp: it follows the mean of both
     axis nodes.
 
-    x : (4, 3) rest positions of its nodes, m; dofs, hidden_turn : see `Viscous`.
+    x : (4, 3) rest positions of the hinge's nodes, m; dofs, hidden_turn : see `Viscous`.
     """
     ride = 3 if dofs[9] == dofs[0] else 9
     found = dihedral_gradient(
@@ -222,7 +222,7 @@ def _turn_gradient(elements, moved, e, z, points, out):
 
 @pullback
 def _pullback(own, u, v, t, weight, product, rate):
-    """w . F = c (g . w) (g . v): by positions c times the rate of g along (g.w) v + (g.v) w."""
+    """Of w . F = c (g . w) (g . v); d/dx: c times the rate of g along (g.w) v + (g.v) w."""
     elements, g, z, by, out = own.elements, own.elements.gradient, own.moves, own.by, own.out
     moved, speed, weights = (
         numbers_at(u, own.size), numbers_at(v, own.size), numbers_at(weight, own.size)
@@ -274,11 +274,11 @@ class ViscousTerm(Term):
         return CompiledTerm(own, {FORCES: _forces})
 
     def arrays(self) -> Arrays:
-        """Arrays that its forces depend on; see `Term`."""
+        """Arrays that the term's forces depend on; see `Term`."""
         return arrays_of(self.elements, "gradient")
 
     def pulled(self) -> Pulled:
-        """Pullback of its forces; see `Term`."""
+        """Pullback of the term's forces; see `Term`."""
         out = zeros_for(self.elements, "gradient")
         moves, by = np.zeros((2, WIDTH))
         size = 1 + int(self.elements.dofs.max(initial=0))
@@ -294,7 +294,7 @@ class ViscousTerm(Term):
 
     @property
     def damping_places(self) -> tuple[NDArray, NDArray]:
-        """Rows and columns (k,) of its damping entries; see `Term`."""
+        """Rows and columns (k,) of the term's damping entries; see `Term`."""
         return self._coupled[1:]
 
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
@@ -306,7 +306,7 @@ class ViscousTerm(Term):
         return (weighted[:, :, None] * gradient[:, None, :])[self._coupled[0]]
 
     def turns(self, hidden: NDArray) -> sparse.csr_array:
-        """Rows (k, r) by which hidden dofs (r,) turn hinges, relative to the largest entry."""
+        """Rows (k, r) by which hidden dofs (r,) turn hinges, relative to each row's largest."""
         turn, dofs = self.elements.hidden_turn, self.elements.dofs[len(self.elements.axial) :, 12:]
         some = turn.any(axis=1)
         row, end = np.nonzero(turn[some])

@@ -1,8 +1,8 @@
-"""Viscous panels, whose strain rates are resisted in proportion to their stiffness.
+"""Viscous panels, which resist strain rates in proportion to their stiffness.
 
 With E the strains of a panel's bars, and S their coupling matrix (`mechanics.membranes`), the
-stresses are C dE/dt, C = beta S. They dissipate the power dE/dt' C dE/dt, zero if a panel turns or
-folds.
+stresses are C dE/dt, C = beta S. They dissipate the power dE/dt' C dE/dt, which is zero if a panel
+only turns or folds.
 
 All panels have the same array sizes: panels with fewer nodes or bars are padded with their first
 node, and with bars of length^-2 = 0, which have no strain.
@@ -106,9 +106,9 @@ class _Backward(NamedTuple):
     panels: ViscousPanels
     out: ViscousPanels  # gradients
     growth: (
-        NDArray  # (2, b) length times length rate of a panel's bars, by weights and by velocities
+        NDArray  # (2, b) length times length rate of a panel's bars, for weights and for velocities
     )
-    stress: NDArray  # (2, b) C^T times strain rates by the weights, and C times those by velocities
+    stress: NDArray  # (2, b) C^T times strain rates of weights, and C times these of velocities
     rows: int  # number of rows up to the last node
 
 
@@ -185,11 +185,11 @@ class ViscousPanelsTerm(Term):
         return CompiledTerm(own, {FORCES: _forces})
 
     def arrays(self) -> Arrays:
-        """Arrays that its forces depend on; see `Term`."""
+        """Arrays that the term's forces depend on; see `Term`."""
         return arrays_of(self.panels, *WORK)
 
     def pulled(self) -> Pulled:
-        """Pullback of its forces; see `Term`."""
+        """Pullback of the term's forces; see `Term`."""
         out = zeros_for(self.panels, *WORK)
         growth, stress = np.zeros((2, 2, len(self.panels.rate)))
         rows = 1 + int(self.panels.nodes.max(initial=0))
@@ -198,7 +198,7 @@ class ViscousPanelsTerm(Term):
 
     @cached_property
     def damping_places(self) -> tuple[NDArray, NDArray]:
-        """Rows and columns (k,) of its damping entries; see `Term`."""
+        """Rows and columns (k,) of the term's damping entries; see `Term`."""
         return places_of(pairs_within(self.panels.nodes))
 
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
