@@ -41,7 +41,7 @@ from foldyn.mechanics.term import (
 from foldyn.mechanics.threads import ThreadPart
 
 ITERATIONS = 50
-BALANCED = 1e-13  # rad, largest last Newton step for hidden dofs
+BALANCED = 1e-13  # rad: Newton's method for hidden dofs ends at smaller steps
 LEAST_SLOPE = 1e-3  # least slope of a fold in these steps, relative to the fold's stiffness
 
 Kind = TypeVar("Kind", bound=Term)
@@ -289,7 +289,7 @@ class Assembly:
         return turn
 
     def scale(self) -> NDArray:
-        """Force (m,), N, on each dof at unit strain, whose rounding errors are unavoidable."""
+        """Force (m,), N, on each dof at unit strain; rounding errors are proportional to it."""
         scale = self.sheet.scale()
         for term in self.others:
             term.add_scale(scale)
@@ -339,7 +339,7 @@ class Assembly:
         return Assembly(sheet, *(term.on(sheet) for term in others if term is not None))
 
     def unstrained(self, q: NDArray) -> Unstrained | None:
-        """Assembly without strain at q; None if every motion but a rigid one would strain it."""
+        """Model without strain at q; None if every motion but a rigid one would strain it."""
         whole = self.sheet.unstrained(q)
         if whole is None:
             return None

@@ -24,7 +24,7 @@ from foldyn.materials.switch import bar_energy, bar_slope, bar_stress
 from foldyn.mechanics.following import Following, hinge_of
 
 ITERATIONS = 30  # Newton iterations for the free strain of a bar; a few suffice
-SHARP = 1e-15  # Green strain: largest last Newton step
+SHARP = 1e-15  # Green strain: Newton's method ends at smaller steps
 
 
 class Heat(NamedTuple):
@@ -55,7 +55,7 @@ class Warm(NamedTuple):
 
 @inner_scalar
 def free_energy(code, stress, addresses):
-    """(S E - W(E)) / Young's modulus of a bar, with E the Green strain where S is `stress`."""
+    """(S E - W(E)) / Young's modulus of a bar, with E the Green strain at the stress S."""
     green, e = 0.0, 0.0
     for _ in range(ITERATIONS):
         step = (stress - bar_stress(code, e, addresses[1])) / bar_slope(code, e, addresses[2])

@@ -96,7 +96,7 @@ def evaluate_branches(own, offset, e, turn):
         stored += found[4]
         lost += found[5]
     own.turned[e] = turn
-    offset[own.row[e], 1] += own.stiffness[e] * moment - own.moment[e]  # plus other laws' moments
+    offset[own.row[e], 1] += own.stiffness[e] * moment - own.moment[e]  # other laws add to it
     own.moment[e], own.slope[e] = own.stiffness[e] * moment, own.stiffness[e] * slope
     own.stored[e] = own.stiffness[e] * stored
     return own.stiffness[e] * lost

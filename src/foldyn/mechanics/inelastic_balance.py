@@ -27,7 +27,7 @@ from foldyn.mechanics.term import ADDRESS, FORCES, CompiledTerm, forces
 from foldyn.mechanics.viscous import hinge_gradient
 
 ROUNDS = 200  # maximum iterations for the turns of creases in a given state
-FOUND = 1e-14  # rad, largest last change of these turns
+FOUND = 1e-14  # rad: iterations end at smaller changes of these turns
 
 
 class _Branches(NamedTuple):

@@ -64,7 +64,7 @@ class BarsPlates(NamedTuple):
     fold_rest: NDArray  # (nf,) rad
     fold_parameters: NDArray  # (nf, 4)
     code: int  # code of the folds' law
-    addresses: NDArray  # (3,) of a user's law
+    addresses: NDArray  # (3,) addresses of a user's law
     bend_rest: NDArray  # (nb,) rad
     start: NDArray  # (p + 1,) first angle of each plate
     angle: NDArray  # (nq,) row in `hinges`, or -1 - number of a rotation

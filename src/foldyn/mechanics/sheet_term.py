@@ -113,7 +113,7 @@ class Blocks(Protocol):
         self, of: Any, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray, before: NDArray,
         again: bool, out: NDArray,
     ) -> None:  # fmt: skip
-        """Fill `out` with the derivative of the mean forces from u0 to u1 by u1; see `put`.
+        """Fill `out` with the derivative d/du1 of the mean forces from u0 to u1; see `put`.
 
         angle : (nh,) dihedrals at u0.
         """
@@ -206,7 +206,7 @@ class SheetTerm(Term):
 
     @abstractmethod
     def scale(self) -> NDArray:
-        """Force (m,), N, on each dof at unit strain, whose rounding errors are unavoidable."""
+        """Force (m,), N, on each dof at unit strain; rounding errors are proportional to it."""
 
     @abstractmethod
     def longest(self) -> float:

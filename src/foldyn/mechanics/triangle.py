@@ -55,13 +55,14 @@ def triangle_stiffness(
     return membrane, curved
 
 
-MIDDLES = 0.5 * (np.ones((3, 3)) - np.eye(3))  # side midpoints integrate exactly
+MIDDLES = 0.5 * (np.ones((3, 3)) - np.eye(3))  # side midpoints, an exact quadrature
 
 
 def products() -> NDArray:
     """Integrals (6, 2, 6, 2) of products of shape function slopes, divided by twice the area.
 
-    Slopes are derivatives by the two coordinates that are 1 at the second and third corner.
+    Slopes are derivatives with respect to the two coordinates that are 1 at the second and at the
+    third corner.
     """
     out, linear = np.zeros((6, 2, 6, 2)), np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
     for place in MIDDLES:
@@ -77,8 +78,9 @@ PRODUCTS = products()
 
 
 def squares(corners: NDArray, stiffness: NDArray) -> NDArray:
-    """Products (nt, 4, 4, 8) of the coordinates' slopes, as weights for `add_triangles`.
+    """Products (nt, 4, 4, 8) of two slopes, times stiffness and twice the area.
 
+    Slopes are gradients of the two coordinates of `products`, two numbers each.
     corners : (nt, 3, 2, 8), counter-clockwise.
     stiffness : (nt, 8) E t/(1 - nu^2).
     """

@@ -222,7 +222,7 @@ def _turn_gradient(elements, moved, e, z, points, out):
 
 @pullback
 def _pullback(own, u, v, t, weight, product, rate):
-    """Of w . F = c (g . w) (g . v); d/dx: c times the rate of g along (g.w) v + (g.v) w."""
+    """Of w . F = c (g . w) (g . v), d/dx is c times the rate of g along (g.w) v + (g.v) w."""
     elements, g, z, by, out = own.elements, own.elements.gradient, own.moves, own.by, own.out
     moved, speed, weights = (
         numbers_at(u, own.size), numbers_at(v, own.size), numbers_at(weight, own.size)

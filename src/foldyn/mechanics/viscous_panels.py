@@ -108,7 +108,7 @@ class _Backward(NamedTuple):
     growth: (
         NDArray  # (2, b) length times length rate of a panel's bars, for weights and for velocities
     )
-    stress: NDArray  # (2, b) C^T times strain rates of weights, and C times these of velocities
+    stress: NDArray  # (2, b) C^T times strain rates for weights; C times strain rates for motion
     rows: int  # number of rows up to the last node
 
 
