@@ -83,7 +83,7 @@ class Kept(_Cache):
         return self._folder is not None and any(self._folder.glob(f"{self._version}.*.nbc"))
 
     def missing(self) -> list[Kept]:
-        """Compiled functions not on disk, among this one and all that it consists of."""
+        """Compiled functions that this one consists of, if not on disk; may include itself."""
         made = (one for part in made_from(*self._source) for one in _IMPORTED.get(part, ()))
         return [one for one in made if not one.ready()]
 

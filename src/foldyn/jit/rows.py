@@ -41,7 +41,7 @@ def _store(builder, value, pointer):
 
 
 def _row_pointers(context, builder, kinds, values):
-    """Pointers to eight rows, those with the indices nodes[start + step q] & mask, q = 0..7."""
+    """Pointers to eight rows, with the indices nodes[start + step q] & mask, q = 0..7."""
     (rows, nodes), (row_values, node_values, start, step, mask) = kinds, values
     row_data = data_of(context, builder, rows, row_values)
     node_data = data_of(context, builder, nodes, node_values)

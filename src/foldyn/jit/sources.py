@@ -191,7 +191,7 @@ def _imported(source: Path) -> frozenset[Path]:
 
 @cache
 def _text(path: Path) -> str:
-    """Text of a file when first read in this process: before its import, or soon after."""
+    """Text of a file as first read in this process, before or soon after the file's import."""
     return path.read_text("utf-8")
 
 

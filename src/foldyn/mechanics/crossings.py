@@ -7,9 +7,10 @@ But panels may cross along sides of their triangles, where each triangle only to
 two flaps of equal size that fold over a panel and meet in their middles). So the test is whether
 panels lie on both sides of each other, over all their overlapping triangles.
 
-Two triangles with one common corner can cross along a line from it, and are compared like others.
-Two triangles with a common side cannot cross, unless the angle between them passes 0 or 2 pi, which
-is checked with the angles. Triangles of one panel are compared only if they share no corner.
+Two triangles with one common corner can cross along a line from it, and are compared like other
+triangles. Two triangles with a common side cannot cross, unless the angle between them passes 0 or
+2 pi, which is checked with the angles. Triangles of one panel are compared only if they share no
+corner.
 
 Bounding boxes of the triangles are sorted into a regular grid with cells of average box size, and
 boxes that share a cell are compared: time and memory grow linearly with their number.

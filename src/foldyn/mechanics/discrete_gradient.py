@@ -64,7 +64,7 @@ def mean_stress(code, address, x, change):
 
 @kernel
 def mean_moment(code, address, p, share, rest, theta, change):
-    """Mean moment / k of a hinge that turns by `change` from theta; its slope; cf. `mean_stress`."""
+    """Mean moment / k, and its slope, of a hinge that turns by `change`; see `mean_stress`."""
     moment, slope, a, b, c, d = 0.0, 0.0, p[0], p[1], p[2], p[3]
     for point in (GAUSS, 1.0 - GAUSS):
         t = theta + point * change

@@ -7,7 +7,7 @@ positions of its nodes and p, M, N its value times the factor:
   On a closed surface this is p times the gradient of the volume inside;
 - a hinge with moment M: M times the gradient of its dihedral, potential -M angle. A virtual wing
   follows the mean displacement of the axis ends;
-- a bar from a to b with tension N (N/m, the second Piola-Kirchhoff force over the rest length):
+- a bar from a to b with tension N (N/m, the second Piola-Kirchhoff force per rest length):
   -N d on b and N d on a, d = x_b - x_a. Potential N (|d|^2 - |d at rest|^2) / 2;
 - a hidden dof with a constant force (on a side rotation of a shell, it is a moment).
 
@@ -228,7 +228,7 @@ def add_following(loads, u, factor, out):
 
 @inner
 def push_following(loads, u, v, factor, pushed, bracket):
-    """Move the forces at u from `bracket` to `pushed`; returns their power on v, W.
+    """Move the forces at u from `bracket` to `pushed`; returns the forces' power at v, W.
 
     All arrays are (rows, 3).
     """

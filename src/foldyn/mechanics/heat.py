@@ -45,7 +45,7 @@ class Heat(NamedTuple):
 
 
 class Warm(NamedTuple):
-    """Heat in a motion: its data, and the energies (groups,) to correct."""
+    """Heat in a motion: the data, and the energies (groups,) to correct."""
 
     heat: Heat
     displacement: NDArray

@@ -163,7 +163,7 @@ def memory_tangents(own, u, out):
 
 @kernel
 def mean_memory_tangents(own, floor, u0, u1, out):
-    """Derivatives (h, 14, 14) with respect to u1 of mean forces from u0 to u1, after these forces.
+    """Derivatives (h, 14, 14) with respect to u1 of the known mean forces from u0 to u1.
 
     floor : least slope of the mean moments per unit stiffness.
     """
@@ -247,7 +247,7 @@ def _mean_forces(term, u0, u1, before, h, t, force, powers):
             )  # fmt: skip
             own.mean[e, 0] += own.stiffness[e] * found[0]
             own.mean[e, 1] += own.stiffness[e] * found[1]
-            lacking += own.stiffness[e] * found[2]  # of what the laws dissipate
+            lacking += own.stiffness[e] * found[2]  # dissipation without work
         moment = own.mean[e, 0]
         _mean_gradient(own, e, start, end, after - begin, one, other, gradient)
         for c in range(12):

@@ -38,7 +38,7 @@ class _Branches(NamedTuple):
 
 @addressed(ADDRESS, ADDRESS)
 def _evaluate(term, angle, out):
-    """Moments and slopes of the branches of all folds, into out (nf, 2), at their angles (nf,)."""
+    """Put moments and slopes of the branches at the folds' angles (nf,) into out (nf, 2)."""
     own, folds, lost = term.own, term.folds, 0.0
     turned, found = numbers_at(angle, folds), numbers_at(out, 2 * folds)
     for k in range(2 * folds):

@@ -37,7 +37,7 @@ def lanes(models: Sequence[BarsHinges]) -> BarsHinges:
 
 
 def side_by_side(arrays: Sequence[NDArray]) -> NDArray:
-    """WIDTH arrays of equal shapes as one flat array from the start of a cache line."""
+    """WIDTH arrays of equal shapes side by side in a flat array, which starts at a cache line."""
     room = np.empty(WIDTH * arrays[0].size + WIDTH)
     out = room[-room.ctypes.data % LINE // room.itemsize :][: room.size - WIDTH]
     np.stack(arrays, axis=-1, out=out.reshape(*arrays[0].shape, WIDTH))

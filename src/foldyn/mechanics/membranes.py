@@ -1,8 +1,9 @@
 """Membranes: coupled bars that give a panel its in-plane stiffness between corners.
 
-A panel is strained as its b bars are, E = (stretch^2 - 1)/2, quadratic in the positions. Its energy
-is 1/2 E^T S E with a full matrix S (`structures.membranes`), which couples all bars; independent
-bars would have a diagonal matrix. A panel that only turns, or folds along bars, has no strain.
+The strains of a panel are the strains of its b bars, E = (stretch^2 - 1)/2, quadratic in the
+positions. Its energy is 1/2 E^T S E with a full matrix S (`structures.membranes`), which couples
+all bars; independent bars would have a diagonal matrix. A panel that only turns, or folds along
+bars, has no strain.
 
 A term has all panels of one kind: with equal numbers of nodes, and bars between the same nodes.
 """

@@ -99,7 +99,7 @@ def rate_plate(model, y, back, p):
 
 @inner
 def pull_folds(model, x, y, scratch, back, by_x):
-    """Moments of folds, and their contributions to gradients, back moments and by_x (r,)."""
+    """Compute the moments of folds; add to gradients, back moments and by_x (r,)."""
     turn_folds(model, x, scratch)
     out, p = back.out, model.fold_parameters
     for f in range(model.fold_rest.size):
@@ -127,7 +127,7 @@ def pull_folds(model, x, y, scratch, back, by_x):
 
 @inner
 def pull_plate(model, x, y, scratch, back, by_x, p):
-    """Moments of plate p, and its contributions to gradients, back moments and by_x (r,)."""
+    """Compute the moments of plate p; add to gradients, back moments and by_x (r,)."""
     count, folds, out = model.start[p + 1] - model.start[p], model.fold_rest.size, back.out
     turn_plate(model, x, scratch, p)
     rate_plate(model, y, back, p)

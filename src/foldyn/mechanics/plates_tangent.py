@@ -59,7 +59,7 @@ def plates_pattern(model: BarsPlates, bars: tuple[NDArray, NDArray]) -> PlatesPa
     corners = of[hinged, None] * count + hinges[model.angle[hinged]]
     within, inverse = np.unique(corners, return_inverse=True)
     keys = np.concatenate([within, of[turned] * count + n - 1 - model.angle[turned]])
-    order = np.argsort(keys, kind="stable")  # of each plate its nodes, then its rotations
+    order = np.argsort(keys, kind="stable")  # plate by plate: nodes, then rotations
     place, of_place = keys[order] % count, keys[order] // count
     begin = np.searchsorted(of_place, np.arange(plates + 1))
     number = np.argsort(order) - begin[keys // count]
@@ -174,7 +174,7 @@ def _add_folds(model, pattern, u, scratch, floor, data):
 
 @inner_scalar
 def _plate_block(model, pattern, scratch, p, bend, resist, block):
-    """The matrix of plate p between its dofs, to `block`; adds the moments of its hinges."""
+    """Put the matrix of plate p for the plate's dofs into `block`; add its hinges' moments."""
     first, nodes = model.start[p], pattern.nodes[p]
     count, wide = model.start[p + 1] - first, 3 * nodes
     size = wide + pattern.begin[p + 1] - pattern.begin[p] - nodes

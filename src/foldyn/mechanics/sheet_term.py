@@ -125,7 +125,7 @@ class Blocks(Protocol):
 
 
 class SheetTerm(Term):
-    """A sheet with its rest angles, m dofs; see `Term`.
+    """A sheet with m dofs and its rest angles; see `Term`.
 
     The sheet's kernels write forces and energies; kernels of other terms add to these. Defaults
     suit a sheet without hinges and hidden dofs.
@@ -231,7 +231,7 @@ class SheetTerm(Term):
     # ------------------------------------------------------------------ rest angles
     @property
     def rest_angles(self) -> NDArray:
-        """Rest angles (nr,), rad, that loads may change, those of folds first.
+        """Rest angles (nr,), rad, that loads may change, folds first.
 
         The last `offsets` entries are not rest angles but offsets of the folds' dihedrals, or
         forces on dofs in balance, N.
@@ -286,7 +286,7 @@ class SheetTerm(Term):
 
     # ------------------------------------------------------------------ other sheets
     def renumbered(self) -> tuple[Self, NDArray]:
-        """The sheet for long motions, and the nodes (n,) in its order."""
+        """The sheet in a node order for long motions, and that order (n,) of the nodes."""
         return self, np.arange((self.size - len(self.hidden)) // 3)
 
 

@@ -35,7 +35,7 @@ class Slots:
         return matrix
 
     def _find(self, indices: NDArray, indptr: NDArray) -> tuple[NDArray, ...]:
-        """Pattern of the sum, and slots in it of the matrix and of the added entries."""
+        """Pattern of the sum, and the slots of the matrix's entries and of added entries in it."""
         size = len(indptr) - 1
         own = np.repeat(np.arange(size), np.diff(indptr)) * size + indices
         new = self._row * size + self._column

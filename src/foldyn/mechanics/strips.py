@@ -6,11 +6,11 @@ the nodal values of a narrow window only. They are copied to ring buffers that s
 node i has the row i & mask. Once all elements with lowest nodes up to i are done, the force on node
 i is finished and leaves its buffer.
 
-Threads cut the sheet across. An element belongs to the thread that owns its lowest node. The last
-strip of a thread reaches into the nodes of the next one: all threads do these edge strips first,
-leave the sums in the force array, wait for each other and go on with their other strips, which
-touch only their own nodes; then the sums of the edge strips are added. So the order of summation
-does not depend on the threads' speed.
+For several threads, the sheet is cut crosswise. An element belongs to the thread that owns its
+lowest node. The last strip of a thread reaches into the nodes of the next thread: all threads do
+these edge strips first, leave the sums in the force array, wait for each other and go on with their
+other strips, which touch only their own nodes; then the sums of the edge strips are added. So the
+order of summation does not depend on the threads' speed.
 """
 
 from __future__ import annotations

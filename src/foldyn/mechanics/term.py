@@ -6,8 +6,8 @@ tangent and other properties, and compiles itself into a context, a named tuple 
 kernels as data, by address, so that a loop is compiled once, not once for every combination of
 terms. A missing kernel has the address 0.
 
-Arrays reach a kernel by their addresses, as `rows_at` and `numbers_at` find them: u, v and force
-are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of the context:
+Kernels receive arrays as addresses, from which `rows_at` and `numbers_at` make arrays: u, v and
+force are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of the context:
 
     forces(u, v, t, force, powers)   adds the term's forces at u, v and the time t to `force`, N,
                                      and to `powers` the powers that the term puts in, dissipates
@@ -17,10 +17,10 @@ are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of 
                                      overwrites `out`
     limit(u, v, a, h, beta, energy, lightness) -> h
                                      the longest step (s), at most h, that resolves all contacts:
-                                     before each step, after the forces at the end of the last one;
-                                     a is the acceleration at that end, beta and energy are the
-                                     fields of `contact.step_limit.Pace`; lightness (n,) is 1 / mass
-                                     of the nodes, 1/kg
+                                     called before each step, after the forces at the end of the
+                                     last step; a is the acceleration at that end, beta and energy
+                                     are the fields of `contact.step_limit.Pace`; lightness (n,) is
+                                     1 / mass of the nodes, 1/kg
     place_obstacles(factors)         sets obstacles and air to the factors (h, 3) of their histories
     advance_clock(since)             the next evaluation is `since` (s) after the last accepted step
     commit()                         accepts the step that ends at the last evaluation
@@ -183,7 +183,7 @@ class Term(ABC):
         """Set the memory to the term's state before an evaluation."""
 
     def stored(self) -> float:
-        """Energy (J) in its own group that its kernels leave out, after an evaluation."""
+        """Energy (J) of the term's group that the kernels leave out, after an evaluation."""
         return 0.0
 
     # ------------------------------------------------------------------ stiffness

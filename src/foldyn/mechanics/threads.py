@@ -47,7 +47,7 @@ class ThreadPart(NamedTuple):
     own: NDArray  # (2,) first and last + 1 of its rows
     angle: NDArray  # (nh,) dihedrals of all hinges at the last force evaluation, rad
     fold_angle: NDArray  # (k,) dihedrals of the actuated hinges, rad
-    scratch: Any  # of the sheet's kernels
+    scratch: Any  # scratch of the sheet's kernels
     kept: tuple[Any, ...] = ()  # memory of the other terms
 
 

@@ -108,7 +108,7 @@ def add_triangles(elements, starts, places, shapes, squares, products, ratio, nu
     elements : (nt, 6) points of the triangles.
     starts : (n + 1,) start of each point's unknowns; each has two eights in `shapes`.
     places : positions in `numbers` of the entries of all triangles in turn, for ordered pairs of
-    points and of their unknowns; negative for entries to skip, such as one of both halves.
+    points and of their unknowns; negative for entries to skip, such as half of a symmetric matrix.
     squares, ratio : see `squares`; (8,) Poisson's ratio.
     """
     nu, k = eight(ratio, 0), 0

@@ -92,7 +92,7 @@ def hinge_dofs(hinges: NDArray, hidden: NDArray) -> NDArray:
 
 
 def coupled(dofs: NDArray, own: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Mask (e, w, w) of the pairs of dofs (e, w) that elements have; their rows and columns.
+    """Mask (e, w, w) of the pairs of dofs (e, w) that elements have; rows and columns of these.
 
     own : (e, w) bool, which of the dofs an element has.
     """

@@ -69,7 +69,7 @@ class Ride(NamedTuple):
     nodes: NDArray  # (t, 3)
     points: NDArray  # (t, 3) points at the corners
     weights: NDArray  # (t, 3, 3) w of the nodes for each corner, divided by its number of triangles
-    heights: NDArray  # (t, 3) h, m, divided likewise
+    heights: NDArray  # (t, 3) h, m, divided by the same number
     reach: NDArray  # (t, 3, 3) bounds of (motion of a corner / motion of a node)^2, to be added
 
 

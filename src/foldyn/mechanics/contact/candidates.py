@@ -106,7 +106,7 @@ class Tables(NamedTuple):
     stiffness: float  # N/m
     friction: float  # friction coefficient between panels
     farthest: float  # largest d0, m
-    skin: float  # of pair lists, m
+    skin: float  # skin of pair lists, m
 
 
 SKIN = 0.15  # extra distance beyond d0 of listed pairs, relative to the mean edge

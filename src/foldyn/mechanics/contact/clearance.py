@@ -25,7 +25,7 @@ MOST = 64  # largest number of tied pairs that are reported
 
 
 class Clearance(NamedTuple):
-    """Closest points of two panels; their distance is the norm of a weighted sum over four nodes.
+    """Closest points of two panels; the distance is the norm of a weighted sum of four nodes.
 
     Attributes
     ----------

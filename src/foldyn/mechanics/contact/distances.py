@@ -61,7 +61,7 @@ def between(a, b, c, d, s, t):
 
 @kernel
 def closest_on_triangle(p, a, b, c):
-    """Weights of the point of a triangle that is closest to p, and its region."""
+    """Weights of the point of a triangle that is closest to p, and that point's region."""
     ab, ac, ap = minus(b, a), minus(c, a), minus(p, a)
     d1, d2 = dot(ab, ap), dot(ac, ap)
     if d1 <= 0.0 and d2 <= 0.0:
@@ -93,7 +93,7 @@ def closest_on_triangle(p, a, b, c):
 
 @inner_scalar
 def closest_on_segment(p, a, b):
-    """Fraction along segment ab of its point closest to p."""
+    """Fraction along segment ab of the point closest to p."""
     ab = minus(b, a)
     return min(1.0, max(0.0, dot(minus(p, a), ab) / dot(ab, ab)))
 
@@ -160,7 +160,7 @@ def weights_of(kind, p, q):
 
 @inner_scalar
 def weighted(x, nodes, weights):
-    """Sum of four nodes' rows of x (n, 3), times their weights."""
+    """Weighted sum of the rows of four nodes in x (n, 3)."""
     a, b, c, d = point(x, nodes[0]), point(x, nodes[1]), point(x, nodes[2]), point(x, nodes[3])
     e, f, g, h = weights
     return (

@@ -74,7 +74,7 @@ def _press(force, nodes, weights, r, d0, k):
 
 @kernel
 def vertex_triangle(tables, x, force, v, t, d0):
-    """Energy (J) of vertex v against triangle t at positions x (n, 3), and their normal force (N).
+    """Energy (J) of vertex v against triangle t at positions x (n, 3), and the normal force (N).
 
     Adds the gradient to force (n, 3), unless that is None. Also returns the weights of the second
     and third corner at the closest point. Normal forces of a triangle's parts are summed like their
@@ -106,7 +106,7 @@ def _on_side(s, side, first, second):
 
 @inner
 def _closest_on_part(p, a, b, c, which):
-    """Weights of the closest point on a part of a triangle, and its region.
+    """Weights of the closest point on a part of a triangle, and the point's region.
 
     which : 0 for the triangle, 1 to 3 for its sides, 4 to 6 for its corners.
     """
@@ -190,7 +190,7 @@ def mollifier(cc, c0):
 
 @kernel
 def edge_edge(tables, x, force, i, j, d0):
-    """Energy (J) of edges i and j at positions x (n, 3), and their normal force (N).
+    """Energy (J) of edges i and j at positions x (n, 3), and the normal force (N).
 
     Adds the gradient to force (n, 3), unless that is None. Also returns the fractions of the
     closest points on both edges.

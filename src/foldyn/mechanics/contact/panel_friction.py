@@ -269,7 +269,7 @@ def add_rub_tangent(tables, memory, x, kind, pair, share, out):
 
 @inner
 def _add_slope(corners, weights, d0, k, out):
-    """Add the gradient of -k d0 f'(d/d0) to out (12,); return its value (N)."""
+    """Add the gradient of the force -k d0 f'(d/d0) to out (12,); return the force (N)."""
     r = np.empty(3)
     d = math.sqrt(apart_of(corners, weights, r))
     if d >= d0:

@@ -112,7 +112,7 @@ def take_ties(memory):
 
 @kernel
 def lay_ties(memory, parts, ties):
-    """Make a list of the pairs from `take_ties` only, which the next list takes over."""
+    """Make a list of only the pairs from `take_ties`; the next list takes them over."""
     counts = memory.counts
     counts.has_list = counts.listed_first = counts.listed_second = 0
     for m in range(len(parts)):

@@ -104,7 +104,7 @@ class ContactTerm(Term):
         return self._copy(memory=own), Friction(self.tables, own)
 
     def driven(self, rows: Mapping[int, int]) -> ContactTerm:
-        """Copy whose planes, by index, follow the histories with these rows."""
+        """Copy whose planes follow histories; `rows` has each history's row by plane index."""
         planes = self.sheets.planes.copy()
         for plane, row in rows.items():
             planes[plane, HISTORY] = row
