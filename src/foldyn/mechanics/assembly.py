@@ -420,7 +420,7 @@ class Numbering(NamedTuple):
     Input and output use the structure's node numbers. Place k in memory holds node order[k]; node i
     stands at place rank[i].
 
-    Rows of hidden dofs follow the nodes in their original order.
+    Rows of hidden dofs follow the nodes; the order of these rows does not change.
     """
 
     order: NDArray  # (n,)
@@ -444,7 +444,7 @@ class Numbering(NamedTuple):
         return np.ascontiguousarray(values[self.rank])
 
     def dofs(self, dofs: NDArray) -> NDArray:
-        """Dofs 3 place + axis of dofs 3 node + axis and of hidden dofs."""
+        """Convert dofs 3 node + axis, and hidden dofs, to dofs 3 place + axis in memory."""
         rank = np.append(self.rank, np.arange(len(self.rank), self.rows))
         return (3 * rank[np.asarray(dofs) // 3] + np.asarray(dofs) % 3).astype(np.int64)
 

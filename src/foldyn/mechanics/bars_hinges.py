@@ -107,7 +107,8 @@ class PullbackScratch(NamedTuple):
 class Gradient(NamedTuple):
     """Gradients with respect to arrays of `BarsHinges`, and to the excess of bars.
 
-    The excess is lambda^2 - 1 at rest, for bars longer than their natural length: 0 in a model.
+    The excess of a bar is lambda^2 - 1 at rest: 0 in a model, positive if the bar is longer than
+    its natural length.
     """
 
     rest: NDArray
@@ -208,7 +209,7 @@ def pull_bars(model, scratch, out):
 
 @inner
 def _laws(model, code, address, low, high, first, m, angle, law):
-    """Law values of the m hinges of a block with dihedrals `angle`, into `law`."""
+    """Put the law's values for the m hinges of a block with dihedrals `angle` into `law`."""
     p, offset = flat(model.hinge_parameters), flat(model.hinge_offset)
     locks = (code == STRESS_FREE) | (code == AS_PUBLISHED)
     beyond = 0

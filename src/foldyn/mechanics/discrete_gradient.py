@@ -8,14 +8,14 @@ momenta for any step (Simo and Tarnow, Z. Angew. Math. Phys. 43, 1992; Gonzalez,
 Bars: E = (stretch^2 - 1)/2 is quadratic in the positions, so that f = (dW/dE) grad E(x) satisfies
 this, with dW/dE the difference quotient.
 
-Hinges: f = (dW/dtheta) g, with g a discrete gradient of the dihedral, g . dx = theta1 - theta0. The
-mean of two rotated positions is smaller than either, which would change the dihedral. With w the
-Cayley vector of the rotation of the hinge's four points (least squares) and A = (1 -
-skew(w)^2/4)^(1/2), the positions A x avoid that, and A^-1 grad theta(A x) has no resultant and no
-moment about x. The work of this gradient differs from the change of the angle by second order in
-the deformation within the step, or by third order if there is no rotation. The remaining difference
-is corrected along the deformation, dx without its rigid part, which has no resultant and no moment
-either.
+Hinges: f = (dW/dtheta) g, with g a discrete gradient of the dihedral, g . dx = theta1 - theta0. If
+the hinge rotates in the step, the mean of both positions is contracted, which would change the
+dihedral. With w the Cayley vector of the rotation of the hinge's four points (least squares) and A
+= (1 - skew(w)^2/4)^(1/2), the positions A x avoid that, and A^-1 grad theta(A x) has no resultant
+and no moment about x. The work of this gradient differs from the change of the angle by second
+order in the deformation within the step, or by third order if there is no rotation. The remaining
+difference is corrected along the deformation, dx without its rigid part, which has no resultant and
+no moment either.
 """
 
 from __future__ import annotations

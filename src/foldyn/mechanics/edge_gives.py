@@ -1,7 +1,8 @@
 """Edges that give way near their ends, under in-plane forces concentrated at vertices.
 
-Near each end of an edge, its points slide along it by an amplitude g (a *give*), which the adjacent
-panels share (`structures.membranes`). With E the strains of a panel's bars, gives add to its energy
+Near each end of an edge, the points of the edge slide along it by an amplitude g (a *give*), which
+the adjacent panels share (`structures.membranes`). With E the strains of a panel's bars, gives add
+to the panel's energy
 
     E^T A g + 1/2 g^T K g.
 

@@ -31,7 +31,7 @@ class SoftHinges(NamedTuple):
 
 
 class FoldHinges(NamedTuple):
-    """Hinges of the folds, k of them: a fold may consist of several hinges in a row.
+    """The k hinges of the folds; a fold may consist of several hinges in a row.
 
     The bends of hinge models have the same form, each like a fold of one hinge.
 

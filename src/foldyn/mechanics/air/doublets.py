@@ -37,7 +37,7 @@ def inductance(points: NDArray, triangles: NDArray, unknown: NDArray) -> NDArray
     Parameters
     ----------
     points : ndarray, shape (p, 3)
-        m.
+        Positions of the points, m.
     triangles : ndarray of int, shape (t, 3)
         Corners, with consistent orientation.
     unknown : ndarray of int, shape (p,)

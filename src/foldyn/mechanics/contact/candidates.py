@@ -90,7 +90,7 @@ class Tables(NamedTuple):
     edge_nodes: NDArray  # (e, 2) mesh nodes at the ends; edges with a common node do not touch
     edge_square: NDArray  # (e,) squared lengths at rest, m2
     shared_side: NDArray  # (t, 3) 1/2 for sides of two triangles, else 0
-    shared_corner: NDArray  # (n,) 1/n for nodes enclosed by n triangles, else 0
+    shared_corner: NDArray  # (n,) 1/k for nodes enclosed by k triangles, else 0
     panel: NDArray  # (t,)
     edge_panels: NDArray  # (e, 2) panels; -1 if there is no second one
     node_thickness: NDArray  # (n,) m

@@ -1,8 +1,9 @@
 """Continuous collision detection: how far a step may go before parts cross.
 
 Explicit methods limit their steps by speeds (`step_limit`). A Newton step has no speed: nodes and
-planes move along straight lines, and it is shortened so that each gap keeps a share of itself and
-no guarded hinge passes 0 or 2 pi. Pair lists are renewed when the motion leaves their range.
+planes move along straight lines, and the step is shortened so that each gap keeps a share of its
+width and no guarded hinge passes 0 or 2 pi. Pair lists are renewed when the motion leaves their
+range.
 
 Conservative advancement finds the first gap to close and needs only distances. If the points of a
 pair move by at most l relative to each other, the gap g of the pair stays above its goal during the

@@ -6,8 +6,8 @@ accepted step pull with at most mu N each, with N the current normal force (`pla
 A node or listed pair without contact is tied at its current position, so that friction acts from
 the step in which contact begins.
 
-A sliding anchor dissipates its path times the mean of mu N at both ends of the step; a released
-spring loses its energy.
+A sliding anchor dissipates the length of its path times the mean of mu N at both ends of the step;
+a released spring dissipates its energy.
 """
 
 from __future__ import annotations

@@ -6,9 +6,9 @@ K gets the inertia tau^2 K, of the order of the step squared,
 
     (M + tau^2 sum K g_i g_i') a = F,
 
-which limits its vibration to the frequency 1/tau. Slow relative motions and rigid motions are not
-affected, so that both momenta are conserved; `step_limit` bounds the energy in such contacts. This
-module selects the contacts; integrators solve for the accelerations.
+which limits the vibration of g to the frequency 1/tau. Slow relative motions and rigid motions are
+not affected, so that both momenta are conserved; `step_limit` bounds the energy in such contacts.
+This module selects the contacts; integrators solve for the accelerations.
 
 Selective mass scaling: Olovsson, Simonsson and Unosson, Int. J. Numer. Meth. Engng 63, 2005.
 """
@@ -48,7 +48,7 @@ class Added(NamedTuple):
     nodes: NDArray  # (room, 4)
     gradient: NDArray  # (room, 4, 3) gradient of the distance, or of the dihedral
     ease: NDArray  # (room,) 1 / (tau^2 K)
-    lightness: NDArray  # (room,) approximate 1 / moving mass of each
+    lightness: NDArray  # (room,) approximate 1 / moving mass of each contact
     lines: NDArray  # (4, room) scratch of the solver
 
 

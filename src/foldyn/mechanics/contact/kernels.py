@@ -43,7 +43,8 @@ from foldyn.mechanics.threads import part, wait
 def _add_pairs(tables, angle, force, memory):
     """Energy (J) of a member's share of near pairs and guards.
 
-    Adds its gradient, and friction, to force (n, 3). Records the range of affected nodes.
+    Adds the gradient of this energy, and friction, to force (n, 3). Records the range of affected
+    nodes.
     """
     counts, team, x, energy = memory.counts, memory.share.team, memory.x, 0.0
     low, high = len(x), 0
@@ -84,7 +85,7 @@ def add_contact(tables, u, angle, force, memory):
     if near or len(tables.planes) > 0:
         place(tables, u, memory)
     if near:
-        wait(team)  # for positions and dihedrals of the others
+        wait(team)  # for positions and dihedrals of the other members
         if counts.watched == 0:
             follow(tables, u, memory)
         into = force if team.size == 1 else share.sums[team.number]

@@ -132,7 +132,7 @@ def weigh_triangle(corners, which, weights, moves):
 
     corners : (4, 3) of the vertex and the triangle; which : see `_closest_on_part`.
 
-    Returns the number of parameters over which the distance is minimal; see `potential`.
+    Returns the number of parameters over which the distance is minimized; see `potential`.
     """
     p, a, b, c = point(corners, 0), point(corners, 1), point(corners, 2), point(corners, 3)
     wa, wb, wc, region = _closest_on_part(p, a, b, c, which)
@@ -234,7 +234,7 @@ def weigh_edges(corners, which, weights, moves):
     corners : (4, 3) of the first edge and the second.
     which : 0 for the edges, 1 for the closest end.
 
-    Returns the number of parameters over which the distance is minimal, and whether the closest
+    Returns the number of parameters over which the distance is minimized, and whether the closest
     points lie inside both edges.
     """
     a, b, c, d = point(corners, 0), point(corners, 1), point(corners, 2), point(corners, 3)

@@ -70,8 +70,8 @@ def pressed_pair(tables, memory, x, kind, pair):
 def stretch_of_pair(tables, memory, x, kind, pair, p, q):
     """Stretch (m) of the spring of a pair whose closest points are p, q.
 
-    Returns the pair's nodes, the weights of the tied and of the closest points, the vector between
-    the tied and between the closest points, then the stretch.
+    Returns the pair's nodes, the weights of the tied and of the closest points, the vectors between
+    the tied points and between the closest points, then the stretch.
     """
     tie = memory.tie[kind, pair]
     one, other = memory.pairs[kind, pair, 0], memory.pairs[kind, pair, 1]

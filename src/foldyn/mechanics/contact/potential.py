@@ -9,7 +9,7 @@ tenth of d0 is left.
 Between x0 and x1, with y = 1 - x and z = 1/x, f = y^3 z^4 has the difference quotient
 
     f[x0, x1] = y^3[x0, x1] z1^4 + y0^3 z^4[x0, x1],    y^3[x0, x1] = -(y0^2 + y0 y1 + y1^2),
-    z^4[x0, x1] = -z0 z1 (z0^3 + z0^2 z1 + z0 z1^2 + z1^3),
+    z^4[x0, x1] = -z0 z1 (z0^3 + z0^2 z1 + z0 z1^2 + z1^3).
 
 These are sums of terms of equal sign, so no digits are lost, however close x0 and x1 are.
 
@@ -90,7 +90,7 @@ def half_square(corners, weights, moves, free, r, slope, second):
     """Set slope (12,) and second (12, 12) to the derivatives of d^2 / 2.
 
     corners : (4, 3) positions; weights : (4,) of r (3,); moves : (2, 4) derivatives of the weights
-    with respect to the `free` parameters over which the distance is minimal.
+    with respect to the `free` parameters over which the distance is minimized.
     """
     jacobian, inverse, h = np.zeros((2, 3)), np.zeros((2, 2)), np.zeros((2, 12))
     for p in range(free):

@@ -130,7 +130,7 @@ def lay_ties(memory, parts, ties):
 
 @inner
 def put_ties(tables, memory, parts, ties, loose, found):
-    """Tie pairs of a new list, of found[kind] pairs, as `take_ties` returned them.
+    """In a new list of found[kind] pairs, tie the pairs that `take_ties` returned.
 
     Missing pairs are added and counted in `found`; `loose`: whether to include pairs that did not
     touch. New lists are ordered by triangles and first edges.

@@ -175,7 +175,7 @@ def limited(tables, u, v, a, angle, dt, pace, lightness, memory):
     """Longest step (s), at most dt, from displacement u with velocity v, all (rows, 3).
 
     Renews lists, gathers pairs that may touch in the step, and lets friction slip: call it once
-    before each step, at the end of the last one. Each team member checks its share; all get the
+    before each step, at the end of the last step. Each team member checks its share; all get the
     same step.
 
     a : acceleration, used for contacts that need not be resolved; angle : dihedrals (nh,) at u;

@@ -194,7 +194,10 @@ class ContactTerm(Term):
     def step_tangent(
         self, u0: NDArray, u1: NDArray, force: NDArray, inner: sparse.csr_array
     ) -> sparse.csr_array:
-        """Derivative (m, m), N/m, of `step_back` with respect to u1; inner : to the points."""
+        """Derivative (m, m), N/m, of `step_back` with respect to u1.
+
+        inner : derivative of the forces with respect to the displacements of the contact points.
+        """
         inner.resize((u0.size, u0.size))
         return inner
 
