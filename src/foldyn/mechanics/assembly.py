@@ -268,7 +268,7 @@ class Assembly:
 
     @property
     def threads(self) -> int:
-        """Fastest number of threads for a motion."""
+        """Number of threads that run a motion fastest."""
         return self.sheet.threads if all(term.shared for term in self.terms) else 1
 
     # ------------------------------------------------------------------ measures

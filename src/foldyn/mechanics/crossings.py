@@ -13,7 +13,7 @@ triangles. Two triangles with a common side cannot cross, unless the angle betwe
 corner.
 
 Bounding boxes of the triangles are sorted into a regular grid with cells of average box size, and
-boxes that share a cell are compared: time and memory grow linearly with their number.
+boxes that share a cell are compared: time and memory grow linearly with the number of boxes.
 """
 
 from __future__ import annotations

@@ -188,7 +188,7 @@ def rates_at(x, v):
 
 @inner_scalar
 def hinge_at(x, hinges, e):
-    """`dihedral_gradient` of hinge e of rows (nh, 4) of points x (n, 3)."""
+    """`dihedral_gradient` of row e of `hinges` (nh, 4), for points at x (n, 3)."""
     j, k, i, l = hinges[e, 0], hinges[e, 1], hinges[e, 2], hinges[e, 3]  # noqa: E741
     return dihedral_gradient(
         x[j, 0], x[j, 1], x[j, 2], x[k, 0], x[k, 1], x[k, 2],

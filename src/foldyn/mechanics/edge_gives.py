@@ -57,7 +57,7 @@ class EdgeGives(NamedTuple):
 
     count: int  # g, number of all gives
     edge: NDArray  # (g, 2) vertices of each give's edge
-    panel: NDArray  # (p,) numbers
+    panel: NDArray  # (p,) numbers of the panels
     nodes: NDArray  # (p, c)
     ends: NDArray  # (p, b, 2) indices among a panel's nodes
     vector: NDArray  # (p, b, 3) rest vector from the first end to the second, m

@@ -245,7 +245,7 @@ def push_following(loads, u, v, factor, pushed, bracket):
 
 @kernel
 def put_following(loads, u, factor, symmetric, out):
-    """Write minus the derivative of the forces to out (e,), ordered as `following_places`.
+    """Write minus the derivative of the forces to out (e,), in the order of `following_places`.
 
     symmetric : whether to write only the symmetric part of the derivative.
     """

@@ -114,7 +114,7 @@ def scatter(rows, mask, nodes, width, v, first, m, vector, at, factor, start):
 
 @inner_scalar
 def first_above(nodes, width, start, end, node):
-    """First of the elements start to end whose lowest node is at least `node`, a strip's end."""
+    """First of the elements start to end whose lowest node is at least `node`."""
     while start < end:
         middle = (start + end) // 2
         low = nodes[width * middle]

@@ -247,7 +247,7 @@ def _mean_forces(term, u0, u1, before, h, t, force, powers):
             )  # fmt: skip
             own.mean[e, 0] += own.stiffness[e] * found[0]
             own.mean[e, 1] += own.stiffness[e] * found[1]
-            lacking += own.stiffness[e] * found[2]  # dissipation without work
+            lacking += own.stiffness[e] * found[2]  # dissipation that is not work of the moments
         moment = own.mean[e, 0]
         _mean_gradient(own, e, start, end, after - begin, one, other, gradient)
         for c in range(12):

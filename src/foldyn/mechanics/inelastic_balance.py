@@ -1,4 +1,4 @@
-"""Creases with memory between edge angles in balance, for n5b8e in explicit motions.
+"""Creases with memory between edge angles in balance, for explicit motions of n5b8e models.
 
 The moment of a crease branch depends on the turn of the crease itself, which is solved together
 with the adjacent edge angles: their balance calls the branches, by address, in every iteration

@@ -2,7 +2,7 @@
 
 Each value of a node or an element is stored as WIDTH consecutive numbers, one per model, so that
 nothing has to be gathered. The formulas are the same as in `mechanics.force`, for one element of
-WIDTH models at once, from load to sum in registers.
+WIDTH models at once, whose values stay in registers from load to sum.
 """
 
 from __future__ import annotations

@@ -336,7 +336,7 @@ class _Context(NamedTuple):
 def _forces(own, u, v, t, force, powers):
     moved, out = flat(rows_at(u, own.rows)), flat(rows_at(force, own.rows))
     add_membrane_forces(own.own, moved, own.low, own.high, out)
-    wait(own.team)  # until all members have read the displacements that others change next
+    wait(own.team)  # until all have read the displacements that other members change next
 
 
 @energies

@@ -38,16 +38,16 @@ class PlatesPattern(NamedTuple):
 
     indptr: NDArray  # (size + 1,)
     indices: NDArray  # (nnz,)
-    bars: NDArray  # (entries of the bars' tangent,) their positions, if bars act
+    bars: NDArray  # (entries of the bars' tangent,) positions of these entries, if bars act
     fold_dof: NDArray  # (nf, 6) first dofs of the places of each fold
     fold: NDArray  # (nf, 36) first entries
     begin: NDArray  # (p + 1,) first place of each plate
-    nodes: NDArray  # (p,) how many of its places are nodes
+    nodes: NDArray  # (p,) how many places of each plate are nodes
     dof: NDArray  # (places of all plates,) first dofs
     start: NDArray  # (p + 1,) first block of each plate
     plate: NDArray  # (blocks of all plates,) first entries
     corner: NDArray  # (nq, 4) places in the plate of an angle's nodes or rotation
-    owner: NDArray  # (nh, 2) a plate of the hinge, and its angle (nq) there; -1 if none
+    owner: NDArray  # (nh, 2) a plate of each hinge, and the hinge's angle (nq) in it; -1 if none
 
 
 def plates_pattern(model: BarsPlates, bars: tuple[NDArray, NDArray]) -> PlatesPattern:

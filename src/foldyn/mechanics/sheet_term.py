@@ -1,7 +1,7 @@
 """The first term of a model: the sheet, which numbers the dofs.
 
 A sheet model consists of a named tuple of arrays, its kernels, a `SheetTerm` that compiles them,
-and a structure that puts it into its `mechanics.assembly.Assembly`.
+and a structure that puts this term into a `mechanics.assembly.Assembly`.
 """
 
 from __future__ import annotations
@@ -189,7 +189,7 @@ class SheetTerm(Term):
 
     @property
     def threads(self) -> int:
-        """Fastest number of threads for a motion."""
+        """Number of threads that run a motion fastest."""
         return 1
 
     # ------------------------------------------------------------------ measures
@@ -210,7 +210,7 @@ class SheetTerm(Term):
 
     @abstractmethod
     def longest(self) -> float:
-        """Length (m) of the longest bar or side; without any, the extent of the nodes."""
+        """Length (m) of the longest bar or side, or the extent of the nodes if there is none."""
 
     def soft_hinges(self, q: NDArray) -> SoftHinges:
         """Hinges of the superlinear law; InputError if the model needs their slopes."""

@@ -1,10 +1,10 @@
 """Terms of a model: contributions to its energy and forces, called by address.
 
-A model is a flat list of terms (`mechanics.assembly`). Each is a `Term`, which gives solvers its
-tangent and other properties, and compiles itself into a context, a named tuple of its data
-(`jit.context`), and kernels of fixed signatures, each compiled once per kind of term. Loops receive
-kernels as data, by address, so that a loop is compiled once, not once for every combination of
-terms. A missing kernel has the address 0.
+A model is a flat list of terms (`mechanics.assembly`). Each is a `Term`, which provides solvers
+with a tangent and other properties, and compiles itself into a context (`jit.context`), which is a
+named tuple of the term's data, and into kernels of fixed signatures, each compiled once per kind of
+term. Loops receive kernels as data, by address, so that a loop is compiled once, not once for every
+combination of terms. A missing kernel has the address 0.
 
 Kernels receive arrays as addresses, from which `rows_at` and `numbers_at` make arrays: u, v and
 force are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of the context:

@@ -68,7 +68,7 @@ def _pause() -> int:
 
 
 def threads_for(model: BarsHinges) -> int:
-    """Fastest number of threads for a motion of the model: one below 8000 hinges.
+    """Number of threads that run a motion of the model fastest: one below 8000 hinges.
 
     Never more than NUMBA_NUM_THREADS (by default the processors that this process may use) or
     OMP_NUM_THREADS, or than the reach of the model's elements permits.

@@ -4,8 +4,8 @@ Each resists the rate of a scalar s(q) of the dofs, a distance or an angle, with
 grad s, ds/dt = grad s . v. It dissipates the power c (ds/dt)^2, which is zero in rigid motions, and
 its matrix in a state is c grad s grad s'. Grad s is sparse: its columns are in `dofs`.
 
-The angle of a hinge is its dihedral; if it has two hidden dofs, such as a piece of a shell's
-crease, multiples of these are subtracted.
+The angle of a hinge is its dihedral. If the hinge has two hidden dofs, like a piece of a shell's
+crease, multiples of these dofs are subtracted.
 """
 
 from __future__ import annotations
