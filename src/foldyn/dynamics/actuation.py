@@ -1,10 +1,11 @@
-"""Hinges whose rest angles move in time: they do work on the structure without a force on nodes.
+"""Hinges whose rest angles change in time, and so do work without a force on any node.
 
 The rest angle of a hinge is its start value plus the contributions of all actuators on it, each
-with its own history. The energy audit needs the power, k (dW/d rest) d rest/dt per hinge, with W
-the energy of its law per unit stiffness. Offsets, by which crease moments turn the adjacent panels
-(`materials.series`), may jump with the moments: their work is the mean moment over a step times the
-change of the offset. Forces on dofs in balance may jump as well, and the dofs with them.
+with a history of its own. For the energy audit an actuated hinge has the power k (dW/d rest)
+d rest/dt, with k the stiffness and W the energy of the law per unit stiffness. Crease moments turn
+the adjacent panels by offsets (`materials.series`), which may jump with the moments: the work of an
+offset is its mean moment over a step times its change. Forces on dofs in balance may also jump, and
+these dofs jump with them.
 """
 
 from __future__ import annotations
@@ -24,20 +25,20 @@ from foldyn.mechanics.term import Folds
 class Actuators(NamedTuple):
     """Actuators: what changes the rest angle of a hinge, or its offset.
 
-    Its value is start[k] plus the sum over its parts, from part[k, 0] to part[k, 1], of span times
-    the factor of history row, rad.
+    The value of actuator k, rad, is start[k] plus a sum over the parts i from part[k, 0] to
+    part[k, 1] - 1: span[i] times the factor of the history in row[i].
     """
 
     folds: Folds  # all hinges that can be actuated
-    hinge: NDArray  # (a,) row of these, or of offsets after those
-    lowest: NDArray  # (a,) lowest node of the hinge, in increasing order
+    hinge: NDArray  # (a,) row in `folds`; further rows are offsets of dofs in balance
+    lowest: NDArray  # (a,) lowest node of each hinge; actuators are sorted by it
     is_offset: NDArray  # (a,) bool
-    start: NDArray  # (a,)
-    part: NDArray  # (a, 2)
-    code: NDArray  # (a,) of its law
-    address: NDArray  # (a, 3) of the law's functions, if it is the user's own
-    span: NDArray  # (p,)
-    row: NDArray  # (p,) of the waveforms
+    start: NDArray  # (a,) value without contributions, rad
+    part: NDArray  # (a, 2) first and last + 1 of the parts
+    code: NDArray  # (a,) code of the hinge's law
+    address: NDArray  # (a, 3) addresses of a user law's functions, otherwise 0
+    span: NDArray  # (p,) amplitude of each part, rad
+    row: NDArray  # (p,) row of each part's waveform
     share: NDArray  # see `SheetTerm.series`
     offset: NDArray
 
@@ -47,7 +48,7 @@ def actuators(
 ) -> tuple[Assembly, Actuators]:
     """Return a body with rest angles that can change, and its actuators.
 
-    numbers, span, row : (p,) index of each rest angle, its amplitude (rad), and its waveform.
+    numbers, span, row : (p,) index of each rest angle, its amplitude (rad), and its waveform's row.
     """
     order = np.argsort(numbers, kind="stable")
     turned, first, count = np.unique(numbers[order], return_index=True, return_counts=True)
@@ -83,7 +84,7 @@ def actuators(
 
 @inner_scalar
 def turned_by(actuators, factor, k, derivative):
-    """Sum of the contributions to actuator k, its start value included, or its time derivative."""
+    """Sum of the contributions to actuator k without its start value, or the time derivative."""
     total = 0.0
     for i in range(actuators.part[k, 0], actuators.part[k, 1]):
         total += actuators.span[i] * factor[actuators.row[i], derivative]
@@ -92,7 +93,7 @@ def turned_by(actuators, factor, k, derivative):
 
 @kernel
 def turn(actuators, factor):
-    """Set the rest angles for the factors (h, 3); one outside 0..2 pi becomes nan."""
+    """Set the rest angles for the factors (h, 3); a rest angle outside 0..2 pi becomes nan."""
     turn_part(actuators, factor, 0, actuators.hinge.size)
 
 
@@ -111,13 +112,13 @@ def turn_part(actuators, factor, first, last):
 
 @inner
 def actuator_power(actuators, factor, angle):
-    """Power (W) that the actuators put into the structure; `angle` (nh,) are the dihedrals, rad."""
+    """Power (W) that the actuators put into the structure at dihedrals `angle` (nh,), rad."""
     return power_of_part(actuators, factor, angle, 0, actuators.hinge.size)
 
 
 @inner
 def power_of_part(actuators, factor, angle, first, last):
-    """Power (W) of the actuators first to last - 1, without offsets; `angle` (nh,): all hinges."""
+    """Power (W) of actuators first to last - 1, without offsets; `angle` (nh,) has all hinges."""
     folds = actuators.folds
     rest_angle, p, stiffness = folds.rest, folds.parameters, folds.stiffness
     power = 0.0
@@ -135,13 +136,13 @@ def power_of_part(actuators, factor, angle, first, last):
 
 @kernel
 def note_offsets(actuators, angle):
-    """Store the offsets after they have jumped, at dihedrals `angle` (nh,)."""
+    """Store the offsets after a jump, at the dihedrals `angle` (nh,)."""
     offset_work(actuators, angle, 0, actuators.hinge.size, True)
 
 
 @inner
 def offset_work(actuators, angle, first, last, accepted):
-    """Work (J) of offsets since the last accepted step, for the actuators first to last - 1.
+    """Work (J) that the offsets of actuators first to last - 1 did since the last accepted step.
 
     accepted : whether the step that ends in the present state is accepted.
     """

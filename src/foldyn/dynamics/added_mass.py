@@ -1,10 +1,10 @@
-"""Added mass: fluid that moves with a sheet, in motions: T = w'F w / 2, w = B (v - U).
+"""Added mass: the fluid that moves with a sheet; T = w'F w / 2 with w = B (v - U).
 
-U(t) is the velocity of the wind, the same everywhere: the flow is what the sheet does to it. B(u)
-takes velocities of the nodes to the flux at the unknowns of the flow, by the area vectors of the
-panels' triangles, which follow the motion; F is the flow (`cases.added_mass`) in one state of
-folding. A rigid rotation leaves F unchanged, so it costs no accuracy; a sheet that folds gets a new
-F when a hinge has turned by `TURN` (`renewed_flow`). With F constant Lagrange's equations are
+U(t) is the velocity of the wind, the same everywhere; the flow is the disturbance by the sheet.
+B(u) turns velocities of the nodes into the flux at the unknowns of the flow. It is made of the area
+vectors of the panels' triangles, which follow the motion. F is the flow (`cases.added_mass`) in one
+state of folding. A rigid rotation leaves F unchanged, so it costs no accuracy; when a hinge has
+turned by `TURN`, F is computed again (`renewed_flow`). With F constant, Lagrange's equations are
 
     (M + B'F B) a + B'F (B. (v - U) - B U.) + B.'F w - d(q.B (v - U))/du = p - F_int,   q = F w,
 
@@ -13,11 +13,11 @@ accelerations follow from
 
     (F^-1 + B M^-1 B') z = B M^-1 r,   a = M^-1 (r - B'z),
 
-solved by conjugate gradients; the initial guess uses the inverse of that matrix in the state where
-F was computed.
+which are solved by conjugate gradients; the initial guess uses the inverse of the matrix where F
+was computed.
 
-The forces f of the fluid take the power f.U from the wind. They add up to -P., with P = sum of B'q
-the momentum of the fluid: the air has received the energy U.P and receives the power -P.U.
+The forces f of the fluid take the power f.U from the wind. The sum of f is -P., with P, the sum
+of B'q, the momentum of the fluid: the air has received the energy U.P and the power -P.U.
 """
 
 from __future__ import annotations
@@ -43,32 +43,32 @@ from foldyn.statics.rigid import free_rigid_motions
 from foldyn.structures.mesh import double_areas
 
 TURN = math.radians(3.0)  # turn of a hinge after which the flow is computed again
-LOOK_EVERY = 16  # steps between two checks of that turn
-MOST = 1500  # unknowns of the flow
-TOLERANCE = 1e-13  # of the accelerations' residual
+LOOK_EVERY = 16  # steps between two checks whether a hinge has turned by `TURN`
+MOST = 1500  # largest number of unknowns of the flow
+TOLERANCE = 1e-13  # relative residual to which accelerations are solved
 ITERATIONS = 200
-SCALED = 0.25, 4.0  # by how much a new flow may scale the deformation energy: at least, at most
+SCALED = 0.25, 4.0  # least and largest factor by which a new flow may scale the deformation energy
 
 
 class AddedMass(NamedTuple):
-    """The flow about t triangles with u unknowns, and its scratch."""
+    """The flow about t triangles with u unknowns, and scratch arrays."""
 
     triangles: NDArray  # (t, 3) nodes
     sides: NDArray  # (t, 2, 3) rest vectors from the first corner to the others, m
-    start: NDArray  # (u + 1,) first of the entries of each unknown: what it catches of
-    corner: NDArray  # (k,) area vector . velocity of corners, 3 triangle + corner,
-    catch: NDArray  # (k,) times this
+    start: NDArray  # (u + 1,) first entry of each unknown in `corner` and `catch`
+    corner: NDArray  # (k,) index 3 triangle + corner of an entry
+    catch: NDArray  # (k,) factor of area vector . velocity at that corner
     flow: NDArray  # (u, u) F, kg/m4
-    resistance: NDArray  # (u, u) its inverse
+    resistance: NDArray  # (u, u) F^-1
     guess: NDArray  # (u, u) inverse of the matrix of the accelerations where F was computed
-    area: NDArray  # (t, 3) memory: area vectors, m2,
-    rate: NDArray  # (t, 3) and their changes, m2/s
-    through: NDArray  # (3 t,) memory of corners
+    area: NDArray  # (t, 3) memory: area vectors, m2
+    rate: NDArray  # (t, 3) memory: rates of the area vectors, m2/s
+    through: NDArray  # (3 t,) memory: one number per corner
     lines: NDArray  # (6, u) memory
     nodal: NDArray  # (2, rows, 3) memory
-    vectors: NDArray  # (4, 3) memory of one triangle
-    angle: NDArray  # (nh,) dihedrals where F was made, rad
-    made: NDArray  # (2,) number of flows since the start, and the sum of energies (J) left over
+    vectors: NDArray  # (4, 3) memory: vectors of one triangle
+    angle: NDArray  # (nh,) dihedrals where F was computed, rad
+    made: NDArray  # (2,) number of flows since the start, and the energy (J) not conserved by them
     wind: NDArray  # (3,) velocity of the air at factor 1, m/s
     gust: int  # row of the wind's history, -1 where it is steady
     blown: NDArray  # (2, 3) memory: the air's velocity, m/s, and acceleration, m/s2
@@ -84,16 +84,16 @@ def added_mass(
     case: Case, start: NDArray | None, rank: NDArray, rows: int, hinges: int,
     histories: Sequence[History],
 ) -> AddedMass:  # fmt: skip
-    """Added mass of a case whose nodes are stored at the places rank (n,) of `rows`.
+    """Added mass of a case; node i is stored at place rank[i] of `rows`.
 
-    start : displacement (n, 3) where the motion began; rest by default. `begin_flow` computes the
-        flow.
+    start : displacement (n, 3) where the motion began; rest by default. The flow is computed
+        later, by `begin_flow`.
     histories : all histories of the case, including the wind's.
 
     Raises
     ------
     InputError
-        Too many unknowns; supports that move.
+        The flow has too many unknowns, or supports move.
     """
     air, nodes = case.air, case.structure.nodes
     if air is None or not air.added_mass:
@@ -123,7 +123,7 @@ def added_mass(
 def _with_memory(
     triangles: NDArray, nodes: NDArray, catch: sparse.csr_array, rows: int, hinges: int
 ) -> AddedMass:
-    """Added mass of triangles (t, 3) on nodes (n, 3) with their matrix `catch` (u, 3t)."""
+    """Added mass of triangles (t, 3) on nodes (n, 3), and their matrix `catch` (u, 3t)."""
     unknown, count = catch.shape[0], len(triangles)
     corners = nodes[triangles.astype(np.int64)]
     flow, resistance, guess = np.zeros((3, unknown, unknown))
@@ -153,7 +153,7 @@ def _with_memory(
 
 
 def _catch(fluid: Fluid, x: NDArray) -> sparse.csr_array:
-    """Matrix (u, 3t) from area vector . velocity of the triangles' corners to the unknowns."""
+    """Matrix (u, 3t) from area vector . velocity of each corner to the unknowns of the flow."""
     area = 0.5 * np.linalg.norm(double_areas(x, fluid.triangles), axis=1)
     elements = np.arange(len(fluid.under)).repeat(3)
     columns = (3 * fluid.under[:, None] + np.arange(3)).ravel()
@@ -175,11 +175,11 @@ def begin_flow(case: Case, packed: Any, state: Any, place: NDArray) -> None:
 
 
 def renewed_flow(case: Case, packed: Any, state: Any) -> bool:
-    """Compute the flow again if a hinge has turned by `TURN` since the last time; return whether.
+    """Compute the flow again if a hinge has turned by `TURN` since; return whether it was.
 
-    The momentum of sheet and fluid is conserved on every free dof. Scaling the deforming part of
-    the velocity, which keeps the momenta, conserves their energy in excess of the undisturbed
-    wind, within the bounds `SCALED`. Any remainder is counted as exchanged with the air.
+    The momentum of sheet and fluid is conserved on every free dof. The deforming part of the
+    velocity is then scaled, which keeps the momenta, so that the energy in excess of the
+    undisturbed wind is conserved, within the bounds `SCALED`. The rest counts as lost to the air.
     """
     own, mass, v = packed.added, packed.mass, state.v
     if np.abs(state.angle - own.angle).max(initial=0.0) <= TURN:
@@ -213,12 +213,12 @@ def _blow(case: Case, own: AddedMass, state: Any) -> None:
 
 
 def _conserved(own: AddedMass, mass: Inertia, v: NDArray) -> float:
-    """Energy (J) that a steady wind conserves: energy of sheet and flow, and U.P."""
+    """Energy (J) that is conserved in a steady wind: of the sheet, of the flow, and U.P."""
     return whole_energy(own, mass, v) - energy_of_fluid(own, np.zeros_like(v) + own.blown[0])
 
 
 def _rigid_part(case: Case, packed: Any, state: Any) -> NDArray:
-    """Rigid motion (rows, 3), within the supports, with the momenta of sheet and fluid."""
+    """Rigid motion (rows, 3) that the supports allow, with the momenta of sheet and fluid."""
     own, by, v = packed.added, packed.numbering, state.v
     place = case.structure.nodes + by.outward(state.u)
     free = free_rigid_motions(place, case.constraints).T
@@ -234,7 +234,7 @@ def _rigid_part(case: Case, packed: Any, state: Any) -> NDArray:
 
 
 def _find_flow(case: Case, own: AddedMass, mass: Inertia, outward: NDArray, u: NDArray) -> None:
-    """Compute the flow at `outward` (n, 3) in the order of the case, u (rows, 3) in memory."""
+    """Compute the flow at displacements `outward` (n, 3), and u (rows, 3) in memory order."""
     flow: Any = fluid_at(case, outward).flow
     own.flow[:] = flow if isinstance(flow, np.ndarray) else flow.toarray()
     own.resistance[:] = inverse(own.flow.copy())
@@ -250,7 +250,7 @@ def _find_flow(case: Case, own: AddedMass, mass: Inertia, outward: NDArray, u: N
 # ------------------------------------------------------------------ fluxes
 @inner
 def put_sides(own, u, t):
-    """Put the sides of a triangle at u (rows, 3) into the first two of the vectors."""
+    """Put the sides of triangle t displaced by u (rows, 3) into the first two vectors."""
     first, second, third = own.triangles[t, 0], own.triangles[t, 1], own.triangles[t, 2]
     for c in range(3):
         own.vectors[0, c] = own.sides[t, 0, c] + u[second, c] - u[first, c]
@@ -291,7 +291,7 @@ def put_rates(own, u, v):
 
 @kernel
 def flux(own, area, v, out):
-    """Flux (u,) of velocities v (rows, 3) through area vectors (t, 3), to `out`."""
+    """Put the flux (u,) of velocities v (rows, 3) through area vectors (t, 3) into `out`."""
     for t in range(area.shape[0]):
         for k in range(3):
             node, total = own.triangles[t, k], 0.0
@@ -307,7 +307,7 @@ def flux(own, area, v, out):
 
 @inner
 def put_through(own, jump):
-    """Put the forces on corners that unit area vectors get from jumps (u,), N/m2."""
+    """Put the force per area vector at each corner, due to pressure jumps (u,), N/m2."""
     for e in range(own.through.size):
         own.through[e] = 0.0
     for i in range(jump.size):
@@ -327,7 +327,7 @@ def add_push(own, area, jump, force):
 
 @inner
 def times(matrix, x, out):
-    """out = A x for a symmetric matrix, both (u,)."""
+    """out = A x for a symmetric matrix A; x and `out` (u,)."""
     for i in range(x.size):
         out[i] = 0.0
     for j in range(x.size):  # by columns, so that sums need no fixed order
@@ -347,7 +347,7 @@ def dot(x, y):
 
 @inner
 def lighten(mass, force, out, line):
-    """out = M^-1 force on free dofs, both (rows, 3); `line` is scratch."""
+    """out = M^-1 force on free dofs, both (rows, 3); `line` is scratch memory."""
     if mass.lumped:
         inverse, given, found = flat(mass.inverse), flat(force), flat(out)
         for i in range(inverse.size):
@@ -373,10 +373,10 @@ def move(own, mass, jump, out, line):
 # ------------------------------------------------------------------ parts of the equation of motion
 @addressed(ADDRESS, ADDRESS, ADDRESS)
 def turn_flow(m, u, v, powers):
-    """Add the forces, N, that turning area vectors need, and the drag alpha M v.
+    """Add the forces, N, due to turning area vectors and an accelerating wind, and drag alpha M v.
 
-    Also what an air takes that accelerates. Sets the second and third of the powers (3,) to those
-    of the drag and of the wind, W; the fluid has no others.
+    Sets the second and third of the powers (3,) to the power dissipated by the drag and the power
+    lost to the wind, W; the fluid has no other power.
     """
     own, rows, power, air = m.added, m.s.force.shape[0], 0.0, 0.0
     moved, speed, past, pushed = rows_at(u, rows), rows_at(v, rows), own.nodal[0], own.nodal[1]
@@ -437,13 +437,13 @@ def solve_with_fluid(m, out):
 
 @kernel
 def press(own, jump, force):
-    """Add the nodal forces B' jump (rows, 3), N."""
+    """Add the nodal forces B' jump to `force` (rows, 3), N."""
     add_push(own, own.area, jump, force)
 
 
 @kernel
 def solve(own, mass, force, a, line):
-    """Accelerations a (rows, 3), m/s2, due to forces, with the stored area vectors."""
+    """Accelerations a (rows, 3), m/s2, due to `force`, with the stored area vectors."""
     lines = own.lines
     z, left, along, better, moved = lines[0], lines[1], lines[2], lines[3], lines[4]
     lighten(mass, force, a, line)
@@ -477,7 +477,7 @@ def solve(own, mass, force, a, line):
 
 @kernel
 def energy_of_fluid(own, v):
-    """Kinetic energy (J) of fluid at rest for velocities v (rows, 3) with the stored areas."""
+    """Kinetic energy (J) of fluid in still air at velocities v (rows, 3), with the stored areas."""
     flux(own, own.area, v, own.lines[0])
     times(own.flow, own.lines[0], own.lines[1])
     return 0.5 * dot(own.lines[0], own.lines[1])
@@ -485,7 +485,7 @@ def energy_of_fluid(own, v):
 
 @inner
 def put_uniform(velocity, out):
-    """Give all nodes one velocity (3,)."""
+    """Give all nodes the same velocity (3,)."""
     for i in range(out.shape[0]):
         for c in range(3):
             out[i, c] = velocity[c]
@@ -501,7 +501,7 @@ def put_relative(own, v):
 
 @kernel
 def energy_of_flow(own, v):
-    """Kinetic energy (J) of the flow for sheet velocities v (rows, 3); stores U.P."""
+    """Kinetic energy (J) of the flow for sheet velocities v (rows, 3); also stores U.P."""
     put_relative(own, v)
     energy = energy_of_fluid(own, own.nodal[0])
     put_uniform(own.blown[0], own.nodal[0])
@@ -512,13 +512,13 @@ def energy_of_flow(own, v):
 
 @kernel
 def whole_energy(own, mass, v):
-    """Kinetic energy (J) of the sheet and of the fluid."""
+    """Kinetic energy (J) of sheet and fluid together."""
     return kinetic_energy(mass, v, (0, v.shape[0])) + energy_of_fluid(own, v)
 
 
 @addressed(ADDRESS, ADDRESS)
 def observe_fluid(m, v, a):
-    """Add the inertial force of the fluid, N, and remove the drag, for reactions.
+    """Add the inertial force of the fluid, N, and remove the drag, to obtain the reactions.
 
     Returns the energy of the flow, J.
     """

@@ -17,14 +17,14 @@ from foldyn.mechanics.pullback import Pullback, arrays_of_body, pull_all, refuse
 class ByMotion(NamedTuple):
     """Gradients with respect to loads, support motion, mass and alpha."""
 
-    loads: NDArray  # (l,) by `System.loads`
-    moved: NDArray  # (s,) by `System.moved`
-    mass: NDArray  # (entries,) by the entries of the nodal mass matrix
+    loads: NDArray  # (l,) with respect to `System.loads`
+    moved: NDArray  # (s,) with respect to `System.moved`
+    mass: NDArray  # (entries,) with respect to the entries of the nodal mass matrix
     alpha: NDArray  # (1,)
 
 
 class Adjoint(ABC):
-    """Backward pass through a motion, from the derivatives of a scalar with respect to its samples.
+    """Backward pass through a motion, from derivatives of a scalar with respect to the samples.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Adjoint(ABC):
         self._weight, self._product, self._rate = np.zeros((3, packed.system.rows, 3))
 
     def add_supports(self, t: float, by_u: NDArray, by_v: NDArray) -> None:
-        """Add the derivatives with respect to support motion, from those by a sample at t (s)."""
+        """Add derivatives with respect to support motion, given those for a sample at t (s)."""
         self._evaluate(t)
         moved, factor = self._system.moved, self._scratch.factor
         rate = factor[moved.row]
@@ -55,8 +55,8 @@ class Adjoint(ABC):
     def backward(self, first: int, last: int, by_u: NDArray, by_v: NDArray) -> None:
         """Step backward from step number `last` to step number `first`.
 
-        by_u, by_v : derivatives (n, 3) of the scalar with respect to the state at the last;
-        overwritten with the derivatives with respect to the state at the first.
+        by_u, by_v : derivatives (n, 3) of the scalar with respect to the state at step `last`;
+        overwritten with the derivatives with respect to the state at step `first`.
         """
 
     def gradient(self, by_u: NDArray, by_v: NDArray) -> dict[str, NDArray]:
@@ -87,13 +87,13 @@ class Adjoint(ABC):
         self._weight, self._product, self._rate = np.zeros((3, *self._product.shape))
 
     def _pull(self, u: NDArray, v: NDArray, weight: NDArray) -> None:
-        """Add the derivatives of weight . b, as evaluated last, to the sums since `_forget`."""
+        """Add the derivatives of weight . b, as last evaluated, to the sums begun by `_forget`."""
         self._weight += weight
         time = float(self._scratch.time[0])
         pull_all(self._pullback.terms, u, v, time, weight, self._product, self._rate)
 
     def _add_supports(self) -> None:
-        """Add the derivatives by loads and support motion of all pulls since `_forget`."""
+        """Add derivatives with respect to loads and supports for all pulls since `_forget`."""
         loads, moved, factor = self._system.loads, self._system.moved, self._scratch.factor
         self._by.loads[:] += self._weight.ravel()[loads.dof] * factor[loads.row, 0]
         self._by.moved[:] -= self._product.ravel()[moved.dof] * factor[moved.row, 0]
@@ -107,7 +107,7 @@ class Adjoint(ABC):
         self._by.alpha[0] -= mass.data @ np.einsum("ea,ea->e", pushed, w[mass.indices])
 
     def _push(self, by_a: NDArray) -> NDArray:
-        """Return M^-1 by_a (n, 3): minus the derivatives by b, given those by a = -M^-1 b."""
+        """Return M^-1 by_a (n, 3): minus the derivatives with respect to b, as a = -M^-1 b."""
         if self._mass.lumped:
             return self._mass.inverse * by_a
         out = np.zeros_like(by_a)
@@ -117,7 +117,7 @@ class Adjoint(ABC):
     def _add_acceleration(
         self, a: NDArray, w: NDArray, by_a: NDArray, by_u: NDArray, by_v: NDArray
     ) -> None:  # fmt: skip
-        """Propagate derivatives by a = -M^-1 b - alpha w to all its arguments, after `_pull`."""
+        """Propagate derivatives for a = -M^-1 b - alpha w to all arguments of a, after `_pull`."""
         self._add_supports()
         self._add_mass(self._push(by_a), a, w)
         by_u -= self._product

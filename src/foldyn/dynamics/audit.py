@@ -1,12 +1,12 @@
-"""Energy audit: kinetic + strain + air + dissipated - work keeps its initial value.
+"""Energy audit: kinetic + strain + air + dissipated - work must keep its initial value.
 
 "Air" is the energy that the sheet has lost to the air. Heat acts by forces whose work a free sheet
-stores and returns (`mechanics.heat`): strain energies and work both exclude it, but the energy at
-play, which the error is relative to, includes it.
+stores and returns (`mechanics.heat`). Strain energies and work both exclude this work, but the
+energy at play, to which the error is relative, includes it.
 
-The audit makes no statement if the energies at play do not exceed rounding errors, which have three
-sources: the energies themselves, the bar forces at displacements of that size, and the dihedrals,
-which are computed from positions. All follow from the motion; none is a fixed number.
+If the energies at play do not exceed rounding errors, the audit makes no statement. Rounding errors
+come from the energies themselves, from the bar forces at such displacements, and from the
+dihedrals, which are computed from positions. All bounds follow from the motion; none is fixed.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from foldyn.dynamics.motion_state import StepPlan
 from foldyn.mechanics.assembly import Assembly
 
 EPS = float(np.finfo(float).eps)
-MARGIN = 16.0  # times the rounding error of a single operation: bound for their sum
-ANGLE = 16.0 * EPS  # rad: rounding of a dihedral
+MARGIN = 16.0  # bound for the sum of rounding errors, relative to the error of one operation
+ANGLE = 16.0 * EPS  # rounding error of a dihedral, rad
 INACCURATE = 1e-2  # relative energy error above which to warn
-BEGUN = 1e-6  # of the longest bar: motions with smaller displacements are not judged unbounded
+BEGUN = 1e-6  # motions below this share of the longest bar are not judged unbounded
 
 AIR = "air"
 AUDITED = ("kinetic", "dissipated", "work")
@@ -63,11 +63,11 @@ class EnergyBalance:
     Attributes
     ----------
     start : ndarray, shape (1, columns)
-        Energies (J) of the first sample, as audited; shape (0, columns) before it.
+        Energies (J) of the first sample, as audited; shape (0, columns) before the first sample.
     count : int
-        Samples seen.
+        Number of samples added.
     error, scale, largest, farthest : float
-        Largest energy error (J), energy at play (J), single energy (J), and displacement (m).
+        Largest energy error, energy at play and single energy (J), largest displacement (m).
     """
 
     NUMBERS = ("error", "scale", "largest", "farthest")
@@ -97,13 +97,13 @@ class EnergyBalance:
         return self.error / self.scale if self.scale > 0.0 else 0.0
 
     def off(self, energy: NDArray, limit: float) -> NDArray:
-        """Whether each of the samples has an error above `limit` times the energies at play."""
+        """Whether the error of each sample exceeds `limit` times the energies at play."""
         seen = np.concatenate([self.start, energy])
         return np.abs(energy_error(seen))[1:] > limit * self.scale
 
 
 class Rounding:
-    """Rounding errors of the energies in motions of a body."""
+    """Bounds for the rounding errors of energies in motions of a body."""
 
     def __init__(self, body: Assembly) -> None:
         self.length = body.sheet.longest()
@@ -112,7 +112,7 @@ class Rounding:
     def energy(self, energy: NDArray | float, moved: float) -> float:
         """Bound (J) for rounding errors of the energies, with displacements up to `moved` (m).
 
-        energy : (samples, columns), as audited, or the largest of them.
+        energy : (samples, columns), as audited, or the largest energy.
         """
         strain = moved / self.length
         bars = self._force * moved * min(strain, 1.0)
@@ -134,7 +134,7 @@ class Rounding:
 
 
 def is_off(balance: EnergyBalance, rounding: Rounding) -> bool:
-    """Whether the energy balance of a motion is off by more than rounding."""
+    """Whether the energy balance of a motion is off by more than rounding errors."""
     hidden = rounding.energy(balance.largest, balance.farthest)
     return balance.relative > INACCURATE and balance.scale > hidden
 
@@ -152,7 +152,7 @@ def doubts(
     size : float
         Largest displacement (m), the scale of the step errors; 0 with fixed steps.
     remedy : str
-        What makes the motion more accurate.
+        How to make the motion more accurate.
     """
     farthest, least = balance.farthest, rounding.least_motion(INACCURATE)
     if 0.0 < farthest < least:

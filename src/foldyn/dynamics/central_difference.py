@@ -1,8 +1,8 @@
-"""Central differences as kick, drift, kick (velocity Verlet): one force evaluation a step.
+"""Central differences as kick, drift, kick (velocity Verlet): one force evaluation per step.
 
 Without damping the method is symplectic: the energy of a free motion stays bounded, and linear
-and angular momentum are kept to rounding. Damping forces take the velocity extrapolated to the
-end of the step, v + dt a, which keeps the second order without solving for it.
+and angular momentum are conserved to rounding. Damping forces use the velocity extrapolated to the
+end of the step, v + dt a, which keeps order 2 without an equation to solve.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics.contact.step_limit import RESOLVED
 
 ORDER = 2
-NEWTON = 4  # iterations: c is small, so that few suffice
+NEWTON = 4  # iterations; few suffice, as c is small
 ROUNDING = 1e-15
 
 
@@ -25,8 +25,8 @@ def growth(omega, damping, dt):
     """Largest factor by which a step of dt multiplies a free vibration, per frequency.
 
     With u' = u + v + a/2, a' = -w^2 u' - c (v + a) and v' = v + (a + a')/2, in units of the step,
-    the factors are the roots of z^3 + p z^2 + q z + c/2. The one near -c/2 is found by Newton's
-    method, the others are those of a quadratic.
+    the factors are the roots of z^3 + p z^2 + q z + c/2. The root near -c/2 is found by Newton's
+    method, the other two are the roots of a quadratic.
     """
     w, c = np.broadcast_arrays(omega * dt, damping * dt)
     p, q = w**2 - 2.0 + 1.5 * c, 1.0 - 2.0 * c
@@ -41,7 +41,7 @@ def growth(omega, damping, dt):
     pair = np.sqrt(np.abs(product))
     pair = np.where(apart < 0.0, pair, np.abs(half) + np.sqrt(np.maximum(apart, 0.0)))
     out = np.maximum(np.abs(z), pair)
-    if not found.all():  # damping so strong that roots merge
+    if not found.all():  # damping is so strong that roots merge
         p, q, d = (each[~found] for each in (p, q, 0.5 * c))
         zero, one = np.zeros_like(p), np.ones_like(p)
         step = np.array([[-p, -q, -d], [one, zero, zero], [zero, one, zero]])
@@ -53,8 +53,8 @@ def growth(omega, damping, dt):
 def advance(handle, state, plan, room, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
-    `state.carry` is the acceleration, kept from one step and stretch to the next; the tally keeps
-    powers and energies. Each thread of a team advances its own nodes.
+    `state.carry` is the acceleration, kept from step to step and from stretch to stretch; the tally
+    keeps powers and energies. Each thread of a team advances its own nodes.
     """
     state = borrowed(state)
     team, stage, a, powers = handle.team, handle.stage, state.carry, handle.before
@@ -68,7 +68,7 @@ def advance(handle, state, plan, room, stretch):
         work_in, work_out, work_air, wrong = 0.0, 0.0, 0.0, 0
         span = plan.dt if step > 0 else 0.0
         left = span
-        while True:  # one pass, unless contact asks for shorter steps
+        while True:  # one pass, unless contact needs shorter steps
             dt = 0.0
             if step > 0:
                 dt = longest_step(handle, state.u, state.v, a, left, RESOLVED)

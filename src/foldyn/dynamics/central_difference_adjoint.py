@@ -4,8 +4,8 @@ A step maps displacement u, velocity v and the stored acceleration a to
 
     v' = v + dt/2 a,   u1 = u + dt v',   a1 = a(u1, v' + dt/2 a),   v1 = v' + dt/2 a1.
 
-Steps are recomputed, bit for bit, from stored states; for one segment at a time, the points of
-force evaluation and the accelerations are stored.
+Stored states allow the steps to be recomputed, bit for bit. One segment of steps at a time, the
+points of force evaluation and the accelerations are stored.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 from foldyn.dynamics.adjoint import Adjoint
 from foldyn.dynamics.equation import EquationOfMotion, accelerate
 
-ROOM = 4e6  # bytes for the states of a segment
+ROOM = 4e6  # memory for the states of a segment, bytes
 
 
 class Evaluated(NamedTuple):
     """Point of a force evaluation in a step, and the acceleration there."""
 
     u: NDArray  # (n, 3) m
-    ahead: NDArray  # m/s
-    a: NDArray  # m/s2
+    ahead: NDArray  # (n, 3) velocity extrapolated to the step's end, m/s
+    a: NDArray  # (n, 3) m/s2
 
 
 class CentralDifferenceAdjoint(Adjoint):
@@ -72,7 +72,7 @@ class CentralDifferenceAdjoint(Adjoint):
     def _through(
         self, t: float, at: Evaluated, by_u: NDArray, by_v: NDArray, by_a: NDArray
     ) -> None:  # fmt: skip
-        """Propagate derivatives by an acceleration to its displacement and velocity."""
+        """Propagate derivatives from an acceleration to displacement and velocity."""
         self._forget()
         self._pull(*self._whole(t, at.u, at.ahead), self._push(by_a))
         self._add_acceleration(at.a, at.ahead, by_a, by_u, by_v)
@@ -80,7 +80,7 @@ class CentralDifferenceAdjoint(Adjoint):
     def _taken(
         self, first: int, last: int, u: NDArray, v: NDArray, a: NDArray
     ) -> tuple[tuple[NDArray, NDArray, NDArray], list[Evaluated]]:
-        """Repeat the steps `first` to `last`: the final state, and the points of force evaluation.
+        """Repeat the steps `first` to `last`; return the final state and all force evaluations.
 
         Reproduces the forward run bit for bit.
         """

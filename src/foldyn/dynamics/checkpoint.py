@@ -1,9 +1,10 @@
 """Checkpoints: how an interrupted motion is stored on disk and resumed.
 
-Next to the result file, a folder holds the samples, which are only appended, and a checkpoint: the
-identity of the motion, the number of valid samples, their checksums, and a snapshot of everything
-that the next steps depend on. The checkpoint carries a checksum and is replaced atomically, after
-its samples are on disk. One process at a time may write a motion: it holds the lock file.
+Next to the result file, a folder holds the samples, which are only appended, and a checkpoint. The
+checkpoint consists of the identity of the motion, the number and checksums of the valid samples,
+and a snapshot of everything that the next steps depend on. It has a checksum of its own and is
+replaced atomically, after its samples are on disk. A lock file lets only one process at a time
+write a motion.
 """
 
 from __future__ import annotations
@@ -42,15 +43,15 @@ if TYPE_CHECKING:
     import xarray
 
 SECONDS = 60.0
-"""Time between checkpoints where the user does not say."""
+"""Default time between checkpoints, s."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Errors of a disk, or of what one may use of it, that is full."""
+"""Error numbers of a full disk, an exhausted quota, or a file above the allowed size."""
 CHECKPOINT = "checkpoint.npz"
 _ABOUT = "about"
 KEY = "motion"
-"""Attribute of a result that was kept meanwhile: what the motion is, as a digest."""
+"""Attribute of a result whose motion was stored on the way: digest of the motion's identity."""
 CONSTANT = ("team", "strips", "packed", "_packed", "_state", "_plan", "share")
-"""Fields that stay what they are, or serve one evaluation."""
+"""Fields that never change, or are used within one evaluation only."""
 
 
 class Keeping:
@@ -59,16 +60,16 @@ class Keeping:
     Parameters
     ----------
     file : Path
-        Of the result.
+        File of the result.
     seconds : float
-        Between checkpoints. A motion that ends before the first one, with few samples, writes
-        nothing to disk.
+        Time between checkpoints. A motion that ends before the first checkpoint, with few samples,
+        writes nothing to disk.
     resume : bool
         Whether to continue an interrupted motion.
     anew : bool
         Whether to discard an interrupted motion.
     how : tuple of str
-        How the user asks to resume, and to start over, for messages.
+        How the user can resume, and how to start over, for messages.
 
     Attributes
     ----------
@@ -129,7 +130,7 @@ class Keeping:
             yield
 
     def finished(self, key: str) -> xarray.Dataset | None:
-        """Finished result of this motion if it exists and is to be resumed, else None."""
+        """Finished result of this motion, if `resume` is on and the file holds it; else None."""
         if not self.resume or self.folder.exists() or not self.file.is_file():
             return None
         result = load(self.file, whole=False)
@@ -158,8 +159,8 @@ class Keeping:
         Raises
         ------
         InputError
-            There is a checkpoint, but `resume` is off, or it belongs to another motion, or is
-            damaged.
+            There is a checkpoint, but `resume` is off, or the checkpoint belongs to another motion
+            or is damaged.
         """
         self._about, self._rows, self._last = dict(about), dict(rows), time.monotonic()
         if self._anew:
@@ -205,7 +206,7 @@ class Keeping:
             self._fail(error)
 
     def checkpoint(self, arrays: Mapping[str, NDArray], reached: float) -> None:
-        """Write a checkpoint at the time (s) reached, after `append` of all samples so far."""
+        """Write a checkpoint at the time reached (s), after `append` has stored all samples."""
         told = {
             "motion": self._about, "samples": self.columns.count, "sums": self.columns.sums,
             "reached": reached,
@@ -230,7 +231,7 @@ class Keeping:
 
     @property
     def summary(self) -> str:
-        """End of a message: what is stored and how to resume; empty without a checkpoint."""
+        """End of a message: what is stored and how to resume it; empty without a checkpoint."""
         if self._reached is None:
             return ""
         return f"; {self.folder} keeps it up to t = {self._reached:.6g} s: go on by {self.how[0]}"
@@ -303,9 +304,9 @@ def check_keeping(store: Any, checkpoint: Any, resume: Any) -> Keeping:
 def identity(
     case: Case, method: Any, plan: StepPlan, state: Iterable[Any], sampled: Iterable[str],
 ) -> dict[str, Any]:  # fmt: skip
-    """Identity of a motion: values by name, the case-file key where there is one.
+    """Identity of a motion: values by name, with the case-file key as the name where one exists.
 
-    User functions count only by their position, as their source is unknown.
+    User functions enter only by their position, as their source is unknown.
 
     Parameters
     ----------
@@ -337,7 +338,7 @@ def identity(
 
 
 def identity_digest(about: Mapping[str, Any]) -> str:
-    """Digest of an identity, "1f0c6a2b9d3e4f58"."""
+    """Digest of an identity, such as "1f0c6a2b9d3e4f58"."""
     text = json.dumps(about, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -382,7 +383,7 @@ def state_parts(packed: PackedCase, state: MotionState) -> dict[str, Any]:
 
 
 class _Place(NamedTuple):
-    """Something mutable: an array or a record, changed in place, or a number of its owner."""
+    """A place of mutable state: an array or record, changed in place, or a number of its owner."""
 
     name: str
     owner: Any
@@ -396,13 +397,13 @@ def snapshot(parts: Mapping[str, Any]) -> dict[str, NDArray]:
     Parameters
     ----------
     parts : mapping of str to ndarray, named tuple, list or object
-        Arrays and records, also those within tuples and lists; of other objects their own arrays,
-        tuples and numbers.
+        Arrays and records, including those within tuples and lists; of any other object, the
+        arrays, tuples and numbers among its attributes.
 
     Returns
     -------
     dict of str to ndarray
-        What `restore` takes, by the names of the places.
+        Values by the names of their places, for `restore`.
     """
     kept = {}
     for place in _places(parts):
@@ -416,7 +417,7 @@ def snapshot(parts: Mapping[str, Any]) -> dict[str, NDArray]:
 
 
 def restore(parts: Mapping[str, Any], kept: Mapping[str, NDArray]) -> None:
-    """Restore a snapshot of such parts.
+    """Restore a snapshot of the same parts.
 
     Raises
     ------
@@ -437,7 +438,7 @@ def restore(parts: Mapping[str, Any], kept: Mapping[str, NDArray]) -> None:
 
 
 def _places(parts: Mapping[str, Any]) -> Iterator[_Place]:
-    """Mutable places in parts; an array that threads share appears once."""
+    """Mutable places in parts; an array shared by several threads appears once."""
     seen: set[int] = set()
     for place in _all_places(parts):
         if isinstance(place.value, np.ndarray):

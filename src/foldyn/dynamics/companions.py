@@ -1,10 +1,10 @@
-"""Motions of slightly different cases, along the implicit steps of one motion and its matrices.
+"""Motions of slightly different cases, computed along the implicit steps of one main motion.
 
-The difference between a companion and the main motion is smooth in time. After each step of the
-main motion, a parabola through the last differences predicts the companion. Newton iterations with
-the main motion's factors then bring the companion's residual to the residual that the main motion
-has left: both are equally close to their solutions, so their difference is the difference of the
-solutions.
+A companion uses the matrices of the main motion. The difference between the two is smooth in time.
+After each step of the main motion, a parabola through the last differences predicts the companion.
+Newton iterations with the main motion's factors then bring the companion's residual to the residual
+that the main motion has left. Both are then equally close to their solutions, so their difference
+is the difference of the solutions.
 """
 
 from __future__ import annotations
@@ -30,10 +30,12 @@ from foldyn.errors import ComputationError
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
 
-MOST = 20  # iterations
-FADED = 1e-2  # of the largest difference: smaller differences are measured against this
-ROUNDING = 1e-13  # of the displacement in a step: changes below this are zero
-STALL, ENOUGH = 0.5, 1e-3  # of the last change, and of the difference: stall at rounding
+MOST = 20  # largest number of iterations
+FADED = 1e-2  # smaller differences are measured against this share of the largest difference
+ROUNDING = 1e-13  # changes below this share of a step's displacement count as zero
+# rounding stops the iteration if a change exceeds the first share of the last change, and is
+# below the second share of the difference
+STALL, ENOUGH = 0.5, 1e-3
 
 
 class Companion(NamedTuple):
@@ -86,7 +88,7 @@ class Accompanied(ImplicitEngine):
                 other.scheme.begin(max(end, jump))
 
     def _factors(self, h: float) -> StepMatrix:
-        """Factors of the matrix for a step h (s), or the last ones, for a nearby step."""
+        """Factors of the matrix for a step h (s), or the last ones if their step is close to h."""
         made = self._newton.origin
         if self._matrix.factorized and len(made) and abs(h - made[0][0]) <= SAME_STEP * h:
             return self._matrix
@@ -111,11 +113,11 @@ class _Beside:
     def __init__(self, scheme: Alpha, share: float) -> None:
         self.scheme, self._share = scheme, share
         shape = scheme.shift.shape
-        self._apart = np.zeros((3, *shape))  # last three differences of shifts, newest first
+        self._apart = np.zeros((3, *shape))  # last three differences of shifts, the newest first
         self._known, self._h, self._largest = 0, 0.0, 0.0
 
     def follow(self, one: Scheme, matrix: StepMatrix, h: float, t: float) -> None:
-        """Take the same step h (s), to the time t (s), as the main motion."""
+        """Take the same step h (s) to the time t (s) that the main motion has taken."""
         scheme, apart = self.scheme, self._apart
         if abs(h - self._h) > SAME_STEP * h:
             self._known, self._h = 0, h
@@ -157,10 +159,10 @@ def _found(size, apart, whole, last, share):
 
 @kernel
 def follow(step, shift, target, h, t, band, free, least, share, most):
-    """Iterate from a step's shift until its residual (n, 3), N, equals a target.
+    """Iterate from a step's shift until the residual (n, 3), N, equals `target`; return the count.
 
-    shift : (n, 3) of the main motion, m: the difference is found to a share of its norm, or of the
-    norm `least`.
+    shift : (n, 3) of the main motion, m. The iteration ends when the change of the difference to it
+    falls below `share` times the norm of this difference, or times `least` if that is larger.
     """
     d, left, own, goal = flat(step.shift), flat(step.out), flat(shift), flat(target)
     change, ties, last = np.empty(free.size), step.case.system.ties, np.inf

@@ -1,9 +1,9 @@
-"""Damping of a case as terms: dashpots, creases, strains, beta K0, modes; air drag.
+"""Damping of a case as terms: dashpots, creases, strain rates, beta K0, modes; air drag.
 
 The drag alpha M v is not a term: `dynamics.equation` adds it.
 
-Dashpots with a fixed direction, and isotropic ones to ground, have a constant matrix. Dashpots
-along the line between their nodes and creases are `mechanics.viscous`.
+Dashpots with a fixed direction, and isotropic dashpots to ground, have a constant matrix. Creases,
+and dashpots along the line between two nodes, are terms of `mechanics.viscous`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from foldyn.mechanics.viscous_panels import ViscousPanelsTerm, viscous_panels
 
 
 def damping_terms(case: Case, start: Origin | None, modal: ModalRows) -> list[Term]:
-    """All damping terms of a motion that began at `start`, or at rest; `modal`: modal damping."""
+    """All damping terms of a motion that began at `start` (None: rest); `modal`: modal damping."""
     terms, rayleigh = dampers(case), case.rayleigh
     if rayleigh.beta > 0.0:
         state, body = about(case, start if rayleigh.state == "initial" else None)
@@ -38,7 +38,7 @@ def damping_terms(case: Case, start: Origin | None, modal: ModalRows) -> list[Te
 
 
 def air_terms(case: Case, histories: Sequence[History]) -> list[Term]:
-    """Air drag of a case, in a wind that follows one of its histories."""
+    """Air drag of a case, in a wind that follows one of `histories`."""
     if case.air is None or not case.air.drag:
         return []
     structure, air = case.structure, case.air
@@ -51,9 +51,9 @@ def air_terms(case: Case, histories: Sequence[History]) -> list[Term]:
 
 
 def _tangent(body: Assembly, q: NDArray) -> sparse.csr_array:
-    """Tangent (m, m) at the dofs q (m,) with all entries that the model can couple.
+    """Tangent (m, m) at the dofs q (m,), with an entry for all pairs of dofs that can couple.
 
-    Explicit zeros stay, so that the sparsity does not depend on the model's values.
+    Explicit zeros stay, so that the sparsity pattern does not depend on the values.
     """
     parts = [term.tangent(q).tocoo() for term in body.terms]
     data, rows, columns = (
@@ -71,9 +71,9 @@ def damping_matrix(case: Case, q: NDArray, quasi_static: bool = False) -> sparse
 def dampers(case: Case, quasi_static: bool = False) -> list[Term]:
     """Dashpots, damped creases and strain damping of a case, on its m dofs.
 
-    Dampers of creases between compliant panels are left out: the hinge has a memory instead
-    (`Case.remembering`). In slow motions such a hinge has the damping of its crease times the
-    square of the crease's share in its turn; with `quasi_static` it is included with that.
+    Dampers of creases between compliant panels are left out: their hinges have memory instead
+    (`Case.remembering`). In slow motions such a hinge is damped by the damper of its crease times
+    the square of the crease's share of the turn; `quasi_static` includes it with this value.
 
     Raises
     ------

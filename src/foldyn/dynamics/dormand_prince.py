@@ -1,9 +1,9 @@
 """The Runge-Kutta pair of order 5(4) of Dormand and Prince, with error control and dense output.
 
-Coefficients: Dormand and Prince, J. Comput. Appl. Math. 6, 1980; the interpolant of order 4:
-Shampine, Math. Comput. 46, 1986; the control of the step: Hairer, Norsett and Wanner, Solving
-Ordinary Differential Equations I, section II.4 (the proportional and integral control of
-Gustafsson). The last stage of a step is the first of the next one: six force evaluations a step.
+Coefficients: Dormand and Prince, J. Comput. Appl. Math. 6, 1980. Interpolant of order 4: Shampine,
+Math. Comput. 46, 1986. Step control: Hairer, Norsett and Wanner, Solving Ordinary Differential
+Equations I, section II.4 (the proportional and integral control of Gustafsson). The last stage of a
+step is the first stage of the next step: six force evaluations per step.
 """
 
 from __future__ import annotations
@@ -59,16 +59,16 @@ P = np.array(
         [0.0, 40617522 / 29380423, -110615467 / 29380423, 69997945 / 29380423],
     ]
 )
-SMALLEST = 1e-13  # step relative to the end of the motion
-RESOLVED = 0.6  # radians of a contact's vibration per step: the error control covers the rest
-EASED = 0.1  # of the tolerance: share of the energy that unresolved slow contacts may have
-ROUNDING = 1e-9  # of a step: how far a sample may lie beyond its end
+SMALLEST = 1e-13  # smallest step relative to the end time of the motion
+RESOLVED = 0.6  # radians of a contact's vibration per step; error control does the rest
+EASED = 0.1  # share of kinetic energy that unresolved slow contacts may have, per tolerance
+ROUNDING = 1e-9  # how far a sample may lie beyond the end of a step, relative to the step
 
 
 def growth(omega, damping, dt):
     """Largest factor by which a step of dt multiplies a free vibration, per frequency.
 
-    The exponential series to the fifth power, plus z^6 / 600.
+    The factor is the exponential series to the fifth power, plus z^6 / 600.
     """
     z = roots(omega, damping) * dt
     series = 1 / 2 + z * (1 / 6 + z * (1 / 24 + z * (1 / 120 + z / 600)))
@@ -77,7 +77,7 @@ def growth(omega, damping, dt):
 
 @inner
 def _combine(base, slopes, weights, h, count, out):
-    """out = base + h sum of weights times the first `count` slopes; all but weights (., n)."""
+    """out = base + h sum of weights times the first `count` slopes; arrays (., n), weights (.,)."""
     for i in range(base.size):
         total = 0.0
         for j in range(count):
@@ -87,7 +87,7 @@ def _combine(base, slopes, weights, h, count, out):
 
 @inner
 def _integral(start, slopes, h, weights, count):
-    """Start + h sum of weights times the first `count` slopes."""
+    """Return start + h times the sum of weights times the first `count` slopes."""
     for j in range(count):
         start += h * weights[j] * slopes[j]
     return start
@@ -95,7 +95,7 @@ def _integral(start, slopes, h, weights, count):
 
 @inner
 def _keep(found, powers, stage):
-    """Store the powers that `acceleration` found for a stage."""
+    """Store the powers that `acceleration` has computed for a stage."""
     powers[0, stage], powers[1, stage], powers[2, stage] = found
 
 
@@ -109,7 +109,7 @@ def _largest(values):
 
 @inner
 def _error(slopes, h):
-    """Largest entry of h sum of E times slopes (7, n); nan if one is nan."""
+    """Largest entry of h times the sum of E times slopes (7, n); nan if any entry is nan."""
     out, wrong = 0.0, 0
     for i in range(slopes.shape[1]):
         total = 0.0
@@ -122,7 +122,7 @@ def _error(slopes, h):
 
 @inner
 def _weights(theta, out):
-    """Weights (7,) of the slopes at the fraction theta of a step, over the step."""
+    """Weights (7,) of the slopes, in units of the step, up to the fraction theta of a step."""
     for j in range(7):
         p = P[j]
         out[j] = theta * (p[0] + theta * (p[1] + theta * (p[2] + theta * p[3])))
@@ -130,7 +130,7 @@ def _weights(theta, out):
 
 @inner
 def _longest(handle, q, w, a, plan, tally):
-    """Longest step for contact; slow contacts that can get inertia need not be resolved."""
+    """Longest step that contact allows; slow contacts that can get inertia may stay unresolved."""
     tally.kinetic = max(tally.kinetic, slow_energy(handle, w))
     pace = Pace(RESOLVED, EASED * plan.tolerance * tally.kinetic)
     return longest_step(handle, q, w, a, plan.dt, pace)
@@ -140,9 +140,9 @@ def _longest(handle, q, w, a, plan, tally):
 def advance(handle, state, plan, room, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
-    The error of a step is the worst node's, relative to the largest displacement and the largest
-    velocity that the motion has had so far. Steps end at the stops of the plan, where loads may
-    jump.
+    The error of a step is the error of the worst node, relative to the largest displacement and the
+    largest velocity that the motion has had so far. Steps end at the stops of the plan, where loads
+    may jump.
     """
     state = borrowed(state)
     tally, n = state.tally, state.u.size
@@ -178,7 +178,7 @@ def advance(handle, state, plan, room, stretch):
         stops = stop < plan.stops.size
         goal = plan.stops[stop] if stops else plan.end
         h = min(wanted, goal - t)
-        if t + 1.01 * h >= goal:  # no tiny last step
+        if t + 1.01 * h >= goal:  # avoid a tiny last step
             h = goal - t
         stops = stops and h == goal - t
         if h < SMALLEST * max(abs(plan.end), abs(t)):
@@ -252,7 +252,7 @@ def advance(handle, state, plan, room, stretch):
             u[i], v[i] = fut[i], speeds[6, i]
             speeds[0, i] = speeds[6, i]
         jumps = stops and handle.spent != 0
-        if tally.samples > first and (handle.commit != 0 or jumps):  # its terms
+        if tally.samples > first and (handle.commit != 0 or jumps):  # back at the end
             advance_clock(handle, h)
             acceleration(handle, state.u, state.v, moment, a)
             tally.evaluations += 1
@@ -268,7 +268,7 @@ def advance(handle, state, plan, room, stretch):
             tally.work -= spent(handle, state.u)
             _keep(acceleration(handle, state.u, state.v, after, a), powers, 0)
             tally.evaluations += 1
-            tally.work += spent(handle, state.u)  # jumped offsets, of any law
+            tally.work += spent(handle, state.u)  # work of offsets that jumped, for any law
             work_of_offsets(handle, True)
             for i in range(n):
                 raw[i] = fa[i]

@@ -40,12 +40,12 @@ if TYPE_CHECKING:
     import xarray
 
 DAMPING_COST = 10.0  # factor by which beta may shrink the critical step without a warning
-SHARPEST = 1e-9  # of the start time: shorter steps are lost in rounding
-MANY_STEPS = 20_000_000  # beyond which the user is warned before the run
+SHARPEST = 1e-9  # steps below this share of the start time are lost in rounding
+MANY_STEPS = 20_000_000  # number of steps above which the user is warned
 TOLERANCE = 1e-6  # default relative error of adaptive steps
-IMPLICIT_TOLERANCE = 1e-5  # the same for methods of order 2: 130 steps per period
-FLOOR = 1e-8  # of the longest bar: least displacement that errors are measured against
-FINER = 4  # by how much to shorten steps of central differences that were too long
+IMPLICIT_TOLERANCE = 1e-5  # default for methods of order 2; gives 130 steps per period
+FLOOR = 1e-8  # least displacement that errors are relative to, as a share of the longest bar
+FINER = 4  # factor to shorten steps of central differences that were too long
 
 
 def simulate(
@@ -74,48 +74,48 @@ def simulate(
     ----------
     case : Case
     duration : float
-        Simulated time (s). The last step is the last that does not go beyond it.
+        Simulated time (s). The last step ends at or before this time.
     method : str, default "auto"
-        Integrator, one of those that `foldyn info` lists. "auto" picks the one expected to be
-        fastest, and switches to another if its energies do not balance; the documentation has a
+        Name of an integrator in the list of `foldyn info`. "auto" picks the one expected to be
+        fastest, and switches to another if the energies do not balance; the documentation has a
         page on integrators.
     dt : float, optional
-        Time step (s). Explicit methods: without it half the critical step, shortened to divide
-        `interval`. Implicit methods and `dormand_prince`, which choose their steps by their error:
-        with `tolerance` the largest step; `dt` alone fixes the step of an implicit method.
+        Time step (s). Explicit methods: by default half the critical step, shortened to divide
+        `interval`. Implicit methods and `dormand_prince` choose their steps by error control: `dt`
+        alone fixes the step of an implicit method; with `tolerance`, `dt` is the largest step.
     every_steps : int, optional
-        Steps between samples; every step is one by default.
+        Number of steps between samples; by default every step is sampled.
     interval : float, optional
-        Instead, the time between samples (s).
+        Time between samples (s), instead of `every_steps`.
     initial : State, optional
-        Displacement and velocity at the start; rest by default. Supported nodes stay at these
-        positions, base motions start from them, and imposed displacements must agree with them.
+        Displacement and velocity at the start; rest by default. Supported nodes stay at their
+        initial positions, base motions start there, and imposed displacements must agree with them.
     force : bool, default False
-        Integrate even with a step above the critical one.
+        Integrate even if the step is above the critical step.
     tolerance : float, optional
         Relative error per step of adaptive methods, by default 1e-6 with `dormand_prince`, 1e-5
-        with implicit methods: error of the worst node's displacement and velocity, relative to the
-        largest ones so far in the motion.
+        with implicit methods: error of displacement and velocity at the worst node, relative to the
+        largest values so far in the motion.
     start : float, default 0.0
-        Time (s) of the first sample. Use it to continue a stored motion with its histories.
+        Time (s) of the first sample. Set it to continue a stored motion, so that histories go on.
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress` several times a second.
     spectral_radius : float, optional
-        Of `generalized_alpha`: factor by which a step multiplies the fastest vibrations, from 0
+        For `generalized_alpha`: factor by which a step multiplies the fastest vibrations, from 0
         (removed) to 1 (kept); 0.8 by default.
     sample : mapping of str to callable or Quantity, optional
         Further variables of the result: functions of displacement (n, 3), m, velocity (n, 3),
-        m/s, and time, s, which return a number or an array; as `fd.Quantity(units, text, dims,
-        function)` with its unit, meaning and dimensions. They are evaluated at every sample.
+        m/s, and time, s, that return a number or an array. ``fd.Quantity(units, text, dims,
+        function)`` adds unit, meaning and dimensions. Functions are evaluated at every sample.
     store : path, optional
-        File for the result, as "run.nc". Samples then go to disk as they are computed, into the
-        folder "run.nc.unfinished", so that its length is not limited by memory.
+        File for the result, such as "run.nc". Samples then go to disk as they are computed, into
+        the folder "run.nc.unfinished", so that memory does not limit the length of the motion.
     checkpoint : float, default 60.0
         With `store`: computing time (s) between checkpoints, from which the motion can resume.
     resume : bool, default False
         With `store`: resume the same motion from the last checkpoint of an interrupted run, with
         bit-identical results; without a checkpoint it starts from the beginning. A finished motion
-        is only read.
+        is read from its file.
     device : {"cpu", "gpu"}
         Where steps are computed; "gpu" needs an NVIDIA GPU and numba-cuda, an explicit method with
         fixed steps, and bars and hinges. The documentation has a page on when it pays off.
@@ -125,9 +125,9 @@ def simulate(
     xarray.Dataset
         `displacement` (m) and `velocity` (m/s) with dimensions time, node, axis; `reaction` (N) at
         supported dofs; energies (J): `kinetic`, `strain_bars`, `strain_folds`, `strain_bends`,
-        `dissipated`, `work` (of loads, moving supports and actuated folds). First sample at the
-        start. Attributes hold the statistics of the run; the dataset also contains the case
-        (`foldyn.case_of`). With `store` its variables are read from the file on first use, as by
+        `dissipated`, `work` (of loads, moving supports and actuated folds). The first sample is
+        at the start. Attributes hold the statistics of the run; the dataset also contains the case
+        (`foldyn.case_of`). With `store`, variables are read from the file on first use, as by
         ``fd.load("run.nc", whole=False)``.
 
     Raises
@@ -137,7 +137,7 @@ def simulate(
         interrupted motion that differs from this one; the message names what differs.
     ComputationError
         A function of `sample` failed, changed its shape or returned a value that is not finite,
-        after the start. Or the disk is full: the last checkpoint remains to resume from.
+        after the start. Or the disk is full; the last checkpoint remains, to resume from.
     InstabilityError, PenetrationError
         The motion grew without bound or became NaN; panel passed through panel. The exception's
         `partial` holds the samples computed so far.
@@ -145,7 +145,7 @@ def simulate(
     Warns
     -----
     FoldynWarning
-        The energy balance is off by more than 1 % of the energies at play; or it was, and "auto"
+        The energy balance is off by more than 1 % of the energies at play, or it was, and "auto"
         has repeated the motion with another method or step.
     CrossingWarning
         Panels pass through each other at one of the checked samples.
@@ -154,7 +154,7 @@ def simulate(
     -----
     Histories are evaluated at every stage time t_n + c dt with t_n = start + n dt. The damping
     matrices, alpha M + beta K0 and modal damping, are constant: K0 and the modes are taken at rest
-    or, with the damping's state = "initial", in the state where the motion began: the initial
+    or, if the damping has state = "initial", in the state where the motion began: the initial
     displacement or, if `initial` is a sample of a motion, the start of that motion. Dashpots
     between nodes and damped creases follow the motion.
     """
@@ -186,8 +186,8 @@ def prepare(
 ) -> Motion:
     """Check all input of `simulate` and choose the step, without computing the motion.
 
-    Arguments and exceptions are those of `simulate`; `Motion.run` starts the motion. With `kept`,
-    samples go to disk and may exceed the memory.
+    Arguments and exceptions are the same as for `simulate`; `Motion.run` starts the motion. With
+    `kept`, samples go to disk and may exceed the memory.
     """
     of_kind("case", case, Case)
     choice("method", method, (*METHODS, AUTO))
@@ -289,7 +289,7 @@ def _plan(
     sampling: timing.SampleSpacing, critical: float, force: bool, tolerance: float | None,
     start: float,
 ) -> StepPlan:  # fmt: skip
-    """Plan of steps and samples for the arguments of `simulate`."""
+    """Plan of steps and samples that the arguments of `simulate` define."""
     if tolerance is not None:
         number("tolerance", tolerance, above=0.0)
         if not method.adaptive and not method.implicit:
@@ -309,7 +309,7 @@ def _plan(
 
 
 def _warn_of_damping(case: Case, method: Integrator, u: NDArray, critical: float) -> None:
-    """Warn if damping other than alpha makes the explicit step very small."""
+    """Warn if damping other than alpha makes the critical step very small."""
     if not math.isfinite(critical) or not case.damped:
         return
     fast = [f"beta = {case.rayleigh.beta:g} s"] if case.rayleigh.beta > 0.0 else []
