@@ -117,7 +117,7 @@ class _Beside:
         self._known, self._h, self._largest = 0, 0.0, 0.0
 
     def follow(self, one: Scheme, matrix: StepMatrix, h: float, t: float) -> None:
-        """Take the same step h (s) to the time t (s) that the main motion has taken."""
+        """Repeat the main motion's step h (s) to the time t (s)."""
         scheme, apart = self.scheme, self._apart
         if abs(h - self._h) > SAME_STEP * h:
             self._known, self._h = 0, h

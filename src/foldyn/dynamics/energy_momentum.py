@@ -3,17 +3,17 @@
     (q1 - q0)/h = (w0 + w1)/2,   M (w1 - w0)/h + alpha M (w0 + w1)/2 + b = 0,
     b = F - (p0 + p1)/2,
 
-with F the mean forces of the terms (`mechanics.mean_forces`; damping at (u0 + u1)/2 and the
-velocity (u1 - u0)/h, so that a rigid motion dissipates nothing) and of contact
-(`implicit.contact_step`), and p all loads at each end of the step, displacement-dependent ones
-included. Without damping and loads, the energy of any structure and the momenta of a free one are
-conserved with any step, to the tolerance of the equations and to rounding; with them the energy
-balance closes equally well. Of order 2 (Simo and Tarnow 1992, Gonzalez 1996). Vibrations that a
-step does not resolve are not damped.
+with F the mean forces of the terms (`mechanics.mean_forces`) and of contact
+(`implicit.contact_step`), and p all loads at each end of the step, including those that depend on
+the displacement. Damping forces are taken at (u0 + u1)/2 and at the velocity (u1 - u0)/h, so that a
+rigid motion dissipates nothing. Without damping and loads, any step conserves the energy of any
+structure and the momenta of a free one, to the tolerance of the equations and to rounding; with
+damping and loads, the energy balance closes equally well. The method has order 2 (Simo and Tarnow
+1992, Gonzalez 1996) and does not damp vibrations that a step does not resolve.
 
-Massless dofs satisfy F = p in the mean of the step: the residual at its end is minus the residual
-at its start, plus a small contribution of nonlinear laws. This residual is part of what the method
-conserves.
+On average over a step, massless dofs satisfy F = p: their residual at its end is minus the residual
+at its start, plus a small contribution of nonlinear laws. The method conserves an energy that
+includes this residual.
 """
 
 from __future__ import annotations
@@ -56,23 +56,23 @@ class MeanStep(NamedTuple):
     """Data that the compiled functions of a step need."""
 
     case: ThreadCase
-    terms: NDArray  # (k,) contexts of all but contact,
-    forces: NDArray  # (k,) their mean-force kernels,
-    powers: NDArray  # (3,) powers that they put in, dissipate and lose to air, W
+    terms: NDArray  # (k,) contexts of all terms but contact
+    forces: NDArray  # (k,) mean-force kernels of these terms
+    powers: NDArray  # (3,) powers that these terms put in, dissipate and lose to air, W
     old: StepEnd
     new: StepEnd
-    mean: NDArray  # (h, 3) factors of the histories
+    mean: NDArray  # (h, 3) mean factors of the histories
     shift: NDArray
     out: NDArray
-    before: NDArray  # (nh,) dihedrals at the start, rad
-    touch: NDArray  # (n, 3) force of contact, N, or none (0, 3)
+    before: NDArray  # (nh,) dihedrals at the step's start, rad
+    touch: NDArray  # (n, 3) force of contact, N; (0, 3) without contact
 
 
 class EnergyMomentum(Scheme):
-    """Steps of the method; see `Scheme`."""
+    """Steps of the conserving method; see `Scheme`."""
 
     symmetric = False
-    tolerance = 1e-11  # the remaining residual is an energy error
+    tolerance = 1e-11  # as the residual that is left is an energy error
 
     def __init__(self, packed: PackedCase, state: MotionState) -> None:
         super().__init__(packed, state)
@@ -107,7 +107,7 @@ class EnergyMomentum(Scheme):
         return [*super().numbers(), np.array([self._before])]
 
     def resume(self, numbers: Sequence[NDArray]) -> None:
-        """Resume from such numbers; see `Scheme.resume`."""
+        """Resume from the values that `numbers` returned; see `Scheme.resume`."""
         super().resume(numbers)
         self._before = float(numbers[-1][0])
 
@@ -151,7 +151,7 @@ class EnergyMomentum(Scheme):
         return self._contact.rub
 
     def works(self, h: float) -> tuple[float, float, float]:
-        """Works of a step, exactly the works of its forces; see `Scheme.works`."""
+        """Works of a step, which are exactly the works of its forces; see `Scheme.works`."""
         system = self.packed.system
         done, lost = step_works(self._step, h, self.new.force, self.new.force)
         put_in, taken, to_air = (h * self._terms.powers).tolist()
@@ -160,13 +160,13 @@ class EnergyMomentum(Scheme):
         return done + put_in, lost + taken, to_air
 
     def change(self, h: float) -> NDArray:
-        """Error estimate of a step, with accelerations at midpoints; see `Scheme.change`."""
+        """Error estimate of a step, from accelerations at midpoints; see `Scheme.change`."""
         return h**3 / (6.0 * (h + self._before)) * (self.new.a - self.old.a)
 
 
 @kernel
 def residual(step, h, t):
-    """Residual of a step into `out`; returns its norm and the norm of the forces at play, N."""
+    """Put the residual of a step into `out`; return its norm and that of the forces at play, N."""
     old, new, out = step.old, step.new, step.out
     system, mass, s = step.case.system, step.case.mass, step.case.s
     q0, w0, q1, w1, a1 = flat(old.q), flat(old.w), flat(new.q), flat(new.w), flat(new.a)
@@ -187,7 +187,7 @@ def residual(step, h, t):
     step.powers[:] = 0.0
     middle = t - 0.5 * h
     for k in range(step.terms.size):
-        if system.turns:  # terms that remember the step's start need the end
+        if system.turns:  # terms that store the step's start also need its end
             turn(system.actuators, mean if k == 0 else new.factor)
         ends = step.terms[k], s.displacement, s.velocity
         run_at(step.forces[k], (*ends, step.before, h, middle, new.force, step.powers))
@@ -224,7 +224,7 @@ def mean_factors(step):
 
 @kernel
 def _actuation(step, u0, u1):
-    """Work (J) of the actuators in a step: energy change as rest angles turn at its two ends."""
+    """Work (J) of the actuators in a step: energy change as rest angles turn at u0 and at u1."""
     terms, old, new = step.case.terms, step.old, step.new
     done, mean, system, s = 0.0, mean_factors(step), step.case.system, step.case.s
     turn(system.actuators, old.factor)
@@ -238,7 +238,7 @@ def _actuation(step, u0, u1):
 
 @inner
 def _energy_of_sheet(terms, u, out):
-    """Strain energy (J) of the first term."""
+    """Strain energy (J) of the first term, which is the sheet."""
     out[:] = 0.0
     run_at(terms.kernel[0, ENERGIES], (terms.context[0], u, out))
     return out.sum()

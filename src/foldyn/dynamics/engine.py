@@ -1,4 +1,4 @@
-"""`Engine`: what advances a motion, on a processor or on a card."""
+"""`Engine`: the base class of what advances a motion, on a processor or on a GPU."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from foldyn.dynamics.motion_state import Samples
 
 
 class Engine(ABC):
-    """Base class of what advances a `MotionState` in place.
+    """Advances a `MotionState` in place; base class.
 
     Attributes
     ----------
     threads : int
-        Number of threads that it runs on.
+        Number of threads that the engine runs on.
     """
 
     threads = 1
@@ -29,7 +29,7 @@ class Engine(ABC):
 
     @abstractmethod
     def changing(self) -> dict[str, Any]:
-        """What the next steps depend on, apart from the case, between two stretches."""
+        """What the next steps depend on, apart from the case, when a stretch has ended."""
 
     def checkpoint_arrays(self) -> dict[str, NDArray]:
         """All arrays and numbers of `changing`, by name."""

@@ -33,9 +33,9 @@ from foldyn.structures.stretching import most, remedy, stretch
 from foldyn.values import choice, flag, of_kind, show, whole
 
 METHOD = "central_difference"
-LANES = 2.5  # speedup of models in lanes
+LANES = 2.5  # speedup by running models in lanes
 COMMON = ("duration", "dt", "every_steps", "interval", "start", "method", "device")
-"""Arguments that are those of all cases."""
+"""Arguments of `simulate_many` with one value for all cases."""
 
 
 def simulate_many(
@@ -56,7 +56,7 @@ def simulate_many(
 
     All models have the same number of nodes and memory branches, the same supported dofs and the
     same strain energy groups; everything else may differ. Each motion equals ``simulate(case,
-    duration, method, dt)`` up to rounding. By central differences, models with the same bars,
+    duration, method, dt)`` up to rounding. With central differences, models with the same bars,
     hinges and kinds of laws run in SIMD lanes, eight per vector, and threads share the vectors: two
     to three times faster than sequential runs for small models. On a GPU all models advance at
     once.
@@ -64,19 +64,19 @@ def simulate_many(
     Parameters
     ----------
     cases : sequence of Case, m of them
-        Lanes take bars and hinges with laws of the package, lumped mass, fixed supports, dead loads
-        and damping by alpha. Other cases are computed one after the other, as by `simulate`; so is,
-        once more, a motion that ends early.
+        Lanes support bars and hinges with laws of the package, lumped mass, fixed supports, dead
+        loads and damping by alpha. Other cases are computed one after the other, as by `simulate`;
+        a motion that ends early is also computed once more in this way.
     duration, every_steps, interval, start, force :
-        As of `simulate`.
+        As for `simulate`.
     dt : float, optional
-        Time step (s), one for all; by default half the least critical step.
+        Time step (s) of all motions; by default half the smallest critical step.
     initial : State, or a sequence of m of them, optional
-        Displacement and velocity at the start, of all or of each; None is rest.
+        Displacement and velocity at the start, one State for all or one for each; None is rest.
     threads : int, optional
-        All processors of this process by default.
+        Number of threads; by default all processors of this process.
     method : str, default "central_difference"
-        An explicit method with fixed steps: this, or "rk4".
+        An explicit method with fixed steps: "central_difference" or "rk4".
     device : {"auto", "cpu", "gpu"}
         Where steps are computed; a GPU also supports panel membranes, springs and dampers. "auto"
         chooses a GPU if one is present, has kernels for all terms, and is expected to be faster.
@@ -85,7 +85,7 @@ def simulate_many(
     -------
     xarray.Dataset
         The variables of a motion with the dimension `model` before `time`: `displacement` (m) and
-        `velocity` (m/s) over model, time, node, axis; `reaction` (N) and the energies (J).
+        `velocity` (m/s) with dimensions model, time, node, axis; `reaction` (N); energies (J).
         `outcome` (model) is "done" or, as in `simulate`, the reason why a motion ended early; later
         samples are nan. The stored case is the first one. Attributes name the device (`device`)
         and, with "auto", the reason for it (`device_reason`).
@@ -93,7 +93,7 @@ def simulate_many(
     Raises
     ------
     InputError
-        A case that does not fit the others; what `simulate` refuses.
+        A case that does not fit the others, or input that `simulate` refuses.
 
     Warns
     -----
@@ -167,9 +167,9 @@ def simulate_many(
 
 
 def _origins(motions: Sequence[Motion], times: NDArray) -> dict[str, Any]:
-    """Origins of motions at sample times, per model; empty unless something depends on them.
+    """Origins of motions at sample times, for each model; empty unless something depends on them.
 
-    The flow is valid for the last sample if they end there.
+    The flow of added mass is valid for the last sample if the motions end there.
     """
     plan = motions[0].plan
     end = math.nan if plan.steps % plan.every else float(times[-1])
@@ -183,7 +183,7 @@ def _origins(motions: Sequence[Motion], times: NDArray) -> dict[str, Any]:
 def device_for(
     motions: Sequence[Motion], count: int, threads: int | None = None
 ) -> tuple[str, str]:
-    """Device that "auto" resolves to, and the reason, for `count` motions like these."""
+    """Device that "auto" chooses for `count` motions like these, and the reason."""
     lanes = motions[0].method.name == METHOD
     return choose(motions, count, LANES * _threads(threads, count) if lanes else 1.0)
 
@@ -208,7 +208,7 @@ def _from_start(like: Motion, initial: State | None) -> Motion:
     growth, critical, u = like.method.growth, like.critical, u_v[0]
     rate = damper_rate(case, u) + like.packed.modal.rate
     bound = frequency_bound(case, u)
-    assert growth is not None  # of explicit methods
+    assert growth is not None  # explicit methods have one
     if not (np.isfinite(bound) and is_stable(growth, bound, case.rayleigh, like.plan.dt, rate)):
         critical = like.method.critical_step(case, u, like.packed.modal)
     sampler = Sampler(case, {}, *u_v, like.plan.start)
@@ -219,7 +219,7 @@ def _from_start(like: Motion, initial: State | None) -> Motion:
 
 
 def _shape(case: Case) -> dict[str, Any]:
-    """Properties that the results of all cases must share."""
+    """Properties that all cases must share so that their results fit together."""
     supported, energies = case.reaction_dofs.tolist(), [*case.energy_groups]
     energies += ["air"] * (case.air is not None)
     branches = sum(part.count for part in case.remembering)
@@ -241,15 +241,15 @@ def _name(device: str) -> str:
 def _integrate(
     motions: Sequence[Motion], out: Samples, threads: int, device: str
 ) -> dict[int, str]:
-    """Integrate all motions; return reasons for those that ended early.
+    """Integrate all motions; return the reasons for those that ended early.
 
-    Motions that lanes do not support, and motions that fail in lanes, are computed alone, which
-    gives the reason.
+    Motions that lanes do not support, and motions that fail in lanes, are computed one by one.
+    A failing motion then gets its reason.
     """
     side_by_side = _on_gpu if device == "gpu" else _in_lanes
     ended = dict[int, str]()
     for k in sorted(side_by_side(motions, out, threads)):
-        motions[k].device = "cpu"  # gives the reason
+        motions[k].device = "cpu"  # a run on the CPU gives the reason
         try:
             motions[k].integrate()
         except ComputationError as error:
@@ -268,7 +268,7 @@ def _alike(keys: Iterable[Any], motions: Sequence[Motion]) -> dict[Any, list[tup
 
 
 def _in_lanes(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]:
-    """Integrate what lanes support; return the indices of the other motions and of failures."""
+    """Integrate what lanes support; return indices of unsupported motions and of failures."""
     lanes = motions[0].method.name == METHOD
     alike = _alike([topology(motion) if lanes else () for motion in motions], motions)
     alone = {k for k, _ in alike.pop((), ())}
@@ -278,14 +278,14 @@ def _in_lanes(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]
 
 
 def _on_gpu(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]:
-    """Integrate all on the GPU; return the indices of motions that fail."""
+    """Integrate all motions on the GPU; return the indices of motions that fail."""
     from foldyn.dynamics.gpu import many
 
     return many.integrate(motions)
 
 
 def _cases(numbers: Iterable[int]) -> str:
-    """Cases on one line, truncated."""
+    """Names of cases on one line, shortened if there are many."""
     return listed([f"cases[{k}]" for k in numbers])
 
 
@@ -326,7 +326,7 @@ def _warn(motions: Sequence[Motion], ended: Mapping[int, str], out: Samples) -> 
 def _dataset(
     case: Case, out: Samples, outcome: list[str], origins: dict, facts: dict
 ) -> xarray.Dataset:
-    """The result."""
+    """The dataset that `simulate_many` returns."""
     known = {**MOTION, **energies_of(case)}
     values = {"displacement": out.displacement, "reaction": out.reaction, "velocity": out.velocity}
     values |= zip(

@@ -1,10 +1,10 @@
-"""The equation of motion behind a few addresses, which every integrator calls; compiled once.
+"""The equation of motion behind a few addresses that every integrator calls; compiled once.
 
-Terms are called by address, so every case has the same types. Loops receive the addresses of the
-functions here and contain only their own arithmetic. Optional parts (histories, moving supports and
-rest angles, contact, a mass matrix that is not diagonal) are compiled on first use; a motion
-without them has the address 0. Dead loads, drag and a diagonal mass, which nearly all motions have,
-are built in, because calls cost time.
+Terms are called by address, so all cases have the same types. Loops receive the addresses of the
+functions in this module and contain only their own arithmetic. Optional parts (histories, moving
+supports and rest angles, contact, a mass matrix that is not diagonal) are compiled on first use;
+the address of an unused part is 0. Dead loads, drag and a diagonal mass, which nearly all motions
+have, are built in, because calls cost time.
 """
 
 from __future__ import annotations
@@ -59,31 +59,31 @@ PENETRATION = int(Outcome.PENETRATION)
 
 
 class LoopHandle(NamedTuple):
-    """What a time loop has of the equation: addresses, and arrays of its thread.
+    """What a time loop knows of the equation: addresses, and arrays of its thread.
 
-    Addresses of what a case lacks are 0.
+    The address of a part that the case lacks is 0.
     """
 
     acceleration: int
     case: int  # context of the `ThreadCase`
-    powers: NDArray  # (3,) in, out and to the air at the last acceleration, W
-    before: NDArray  # (3,) and at the last step, for methods that keep them
+    powers: NDArray  # (3,) power in, out and to the air at the last acceleration, W
+    before: NDArray  # (3,) the same at the last step, for methods that keep them
     team: Team
     own: NDArray  # (2,) first and last + 1 of the thread's rows
     stage: NDArray  # (3, n, 3) scratch of methods with several stages
     angle: NDArray  # (nh,) dihedrals at the last acceleration, rad
-    clock: int = 0  # of laws with memory,
-    commit: int = 0  # likewise,
-    step_error: int = 0  # and likewise
-    offsets: int = 0  # 0 if nothing turns
-    spent: int = 0  # 0 likewise, or in methods that end steps only at jumps
-    limit: int = 0  # of a step by contact
-    gather: int = 0  # finds slow contacts that get inertia,
-    slow_down: int = 0  # uses it,
-    slow_kinetic: int = 0  # has its energy,
-    slow: int = 0  # and their context
+    clock: int = 0  # sets the time of laws with memory
+    commit: int = 0  # accepts a step of laws with memory
+    step_error: int = 0  # error ratio of laws with memory
+    offsets: int = 0  # work of offsets; 0 if no rest angles change
+    spent: int = 0  # energy of terms; 0 if no rest angles change, or with fixed steps
+    limit: int = 0  # longest step that contact allows
+    gather: int = 0  # finds slow contacts, which get inertia
+    slow_down: int = 0  # changes accelerations for this inertia
+    slow_kinetic: int = 0  # kinetic energy of this inertia
+    slow: int = 0  # context of the functions for slow contacts
     sample: int = 0
-    recorder: int = 0  # its context
+    recorder: int = 0  # context of `sample`
 
 
 class Recorder(NamedTuple):
@@ -92,10 +92,10 @@ class Recorder(NamedTuple):
     case: ThreadCase
     state: MotionState
     out: Samples
-    fluid: int  # adds what moves the fluid; 0 without added mass
-    warm: int  # evaluates the heat correction of the strain energies; 0 without heat,
-    heat: int  # its context,
-    lacking: NDArray  # (groups,) and its result, J
+    fluid: int  # adds the force that moves the fluid; 0 without added mass
+    warm: int  # evaluates the heat correction of the strain energies; 0 without heat
+    heat: int  # context of `warm`
+    lacking: NDArray  # (groups,) result of `warm`, J
 
 
 # ------------------------------------------------------------------ the equation
@@ -114,7 +114,7 @@ def _acceleration(m, q, w, t, out, powers):
         run_each(m.terms, PLACE_OBSTACLES, (factor,))
     u = m.s.displacement if m.carry != 0 else rows_at(q, rows)
     v = m.s.velocity if m.carry != 0 else rows_at(w, rows)
-    wait(m.team)  # for q and w of the other threads
+    wait(m.team)  # until the other threads have written q and w
     power_in, power_out, power_air = forces_of(m.terms, u, v, t, force)
     bracket, speed, loads, found = flat(force), flat(v), system.loads, numbers_at(powers, 3)
     for k in range(m.s.loads[0], m.s.loads[1]):
@@ -157,9 +157,9 @@ def _acceleration(m, q, w, t, out, powers):
 def _record(m, tally, q, w, a, out, k):
     """Write row k of the samples after `acceleration` at q and w (n, 3).
 
-    The reaction is the force of the supports: M (a + alpha v) + F_int + beta K0 v - p there. The
-    energies are the strain energies, the energy lost to air if there is any, the kinetic energy,
-    the dissipated energy and the work.
+    The reaction is the force of the supports: M (a + alpha v) + F_int + beta K0 v - p on their
+    dofs. The energies are the strain energies, the energy lost to air (if the sheet is in air), the
+    kinetic energy, the dissipated energy and the work.
     """
     system, s, reactions = m.system, m.s, m.system.ties.reactions
     displacement, velocity = out.displacement[k], out.velocity[k]
@@ -186,7 +186,7 @@ def _record(m, tally, q, w, a, out, k):
     if last - 2 > groups:
         energy[groups] = tally.air
     energy[last - 1] = tally.dissipated + dissipated_by(m.terms)
-    # work includes the energy that accelerated moving supports, which may come in jolts
+    # work includes the energy that accelerated moving supports, which may do so in jolts
     energy[last] = tally.work + moving_energy(system.moved_mass, s.factor)
 
 
@@ -208,7 +208,7 @@ def _sample(r, u, v, a, t):
         for g in range(r.lacking.size):
             out.energy[k, g] += r.lacking[g]
             total += r.lacking[g]
-        if state.tally.samples == 0:  # energy stored at the start is not work
+        if state.tally.samples == 0:  # energy that is stored at the start does not count as work
             state.tally.work -= total
             out.energy[k, last] -= total
         out.energy[k, last] += total
@@ -225,13 +225,13 @@ def _sample(r, u, v, a, t):
 # ------------------------------------------------------------------ what loops call
 @inner_scalar
 def acceleration(handle, q, w, t, a):
-    """Acceleration q'' (n, 3) at time t, q and w the displacement and velocity without S f.
+    """Acceleration q'' (n, 3) at time t; q and w are displacement and velocity without S f.
 
-    q'' = - M^-1 (F_int + beta K0 v - p) - alpha w on free dofs. Returns the power of loads,
-    supports and actuators, the power dissipated, and the power lost to the air (W); leaves the
-    bracket in `Scratch.force`.
+    q'' = - M^-1 (F_int + beta K0 v - p) - alpha w on free dofs. Returns three powers, W: of loads,
+    supports and actuators, the power dissipated, and the power lost to the air. `Scratch.force`
+    then holds the bracket.
 
-    A team member computes its own nodes only, and may have changed q and w only there.
+    A team member computes its own nodes only, and must have changed q and w only there.
     """
     run_at(handle.acceleration, (handle.case, q, w, t, a, handle.powers))
     return handle.powers[0], handle.powers[1], handle.powers[2]
@@ -239,16 +239,16 @@ def acceleration(handle, q, w, t, a):
 
 @inner_scalar
 def advance_clock(handle, since):
-    """Tell laws with memory the time (s) from the last accepted step to the next evaluation."""
+    """Give laws with memory the time (s) from the last accepted step to the next evaluation."""
     if handle.clock != 0:
         run_at(handle.clock, (handle.case, since))
 
 
 @inner_scalar
 def step_error(handle, scale):
-    """Error ratio of laws with memory if the step that ends at the last evaluation is accepted.
+    """Error ratio of laws with memory, if the step that ends at the last evaluation is accepted.
 
-    scale : displacement (m) that errors are relative to, unless turns cause larger ones.
+    scale : displacement (m) that errors are relative to, unless turns of hinges cause larger ones.
     """
     if handle.step_error == 0:
         return 0.0
@@ -265,7 +265,7 @@ def work_of_offsets(handle, accepted):
 
 @inner_scalar
 def spent(handle, q):
-    """Energy (J) stored and dissipated by terms, after `acceleration` at q."""
+    """Energy (J) that terms store and have dissipated, after `acceleration` at q."""
     return value_at(handle.spent, (handle.case, q)) if handle.spent != 0 else 0.0
 
 
@@ -279,12 +279,12 @@ def sample(handle, u, v, a, t):
 def observe(handle, state, plan, a, step):
     """Finish a fixed step after its `acceleration`; every team member calls it.
 
-    Adds up the members' works. Ends the motion if it is no longer finite or if panels pass through
-    each other; writes a sample every plan.every steps. Returns (outcome, hinge), the same for all
-    members.
+    Adds up the works of the members. Ends the motion if it is no longer finite or if panels pass
+    through each other. Writes a sample every plan.every steps. Returns (outcome, hinge), the same
+    for all members.
     """
     team, tally = handle.team, state.tally
-    wait(team)  # for accelerations, dihedrals and notes of the other threads
+    wait(team)  # until the other threads have written accelerations, dihedrals and notes
     t = plan.start + step * plan.dt
     if handle.offsets != 0:
         team.note[team.number, WORK] += work_of_offsets(handle, True)
@@ -328,7 +328,7 @@ def write(handle, q, w, t, a):
     return sample(handle, q, w, a, t)
 
 
-# ------------------------------------------------------------------ its owner
+# ------------------------------------------------------------------ owner of the contexts
 class EquationOfMotion:
     """The equation of motion of a case on one thread; it owns all contexts.
 
@@ -336,7 +336,7 @@ class EquationOfMotion:
     ----------
     packed : PackedCase
     own : ThreadPart
-        One of `Assembly.thread_parts`.
+        An item of `Assembly.thread_parts`.
     s : Scratch
     state : MotionState
     slows : bool, optional
@@ -345,9 +345,9 @@ class EquationOfMotion:
     Attributes
     ----------
     case : Context
-        `ThreadCase`.
+        Context of the `ThreadCase`.
     handle : Context
-        `LoopHandle`, without samples.
+        Context of a `LoopHandle` that writes no samples.
     """
 
     def __init__(
@@ -385,8 +385,8 @@ class EquationOfMotion:
         self._out: Samples | None = None
 
     def recording(self, out: Samples) -> Context:
-        """`LoopHandle` that writes samples to `out`."""
-        if self._out is not out:  # Python fills contexts: once per window of samples
+        """Context of a `LoopHandle` that writes samples to `out`."""
+        if self._out is not out:  # filling a context in Python is slow: once per window
             case, heat = self.case, self._heat
             fluid = observe_fluid.at(case) if case.value.added.acts else 0
             lacks: tuple[int, int, NDArray] = 0, 0, np.zeros(0)
@@ -409,7 +409,7 @@ def _thread_case(packed: PackedCase, own: ThreadPart, terms: Terms, s: Scratch) 
     case = ThreadCase(
         terms, system, mass, added, s, own.angle, own.fold_angle, own.own, own.team, drag
     )
-    at = Context(case)  # of the type that the parts are compiled for
+    at = Context(case)  # has the type that the parts are compiled for
     solve = parts.solve_constrained if len(mass.ties.slave) else parts.solve
     solve = solve_with_fluid if added.acts else solve
     diagonal = mass.lumped and not added.acts

@@ -1,13 +1,13 @@
-"""Contact in explicit steps: limits of their length, and inertia for slow contacts.
+"""Contact in explicit steps: limits of the step length, and inertia for slow contacts.
 
-Optional parts of the equation of motion (`equation`): their address is 0 if unused. With inertia of
-slow contacts (`mechanics.contact.inertia`), (M + sum g g' / e) a = F is solved for the contact
-forces y by conjugate gradients,
+These are optional parts of the equation of motion (`equation`), with the address 0 if unused. With
+the inertia of slow contacts (`mechanics.contact.inertia`), (M + sum g g' / e) a = F is solved for
+the contact forces y by conjugate gradients,
 
     (e + G M^-1 G') y = G (a0 + alpha w),    a = a0 - M^-1 G' y,
 
 with a0 the accelerations without this inertia, including the drag -alpha w, and g the rows of G.
-The drag acts on this inertia as on all mass; otherwise its vibrations would never decay.
+The drag acts on this inertia as on any mass; otherwise its vibrations would never decay.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.term import ADDRESS, NUMBER, limit_of
 from foldyn.mechanics.threads import ThreadPart
 
-ACCURATE = 1e-10  # of the contact accelerations
+ACCURATE = 1e-10  # relative accuracy of the contact accelerations
 ITERATIONS = 200
 
 
 class SlowContacts(NamedTuple):
-    """A case on one thread, and the contacts that get inertia in a step."""
+    """A case on one thread, with the contacts that get inertia in a step."""
 
     case: ThreadCase
     tables: Tables
@@ -55,7 +55,7 @@ def _gather(m, u, dt, beta):
 
 @inner
 def _pushed(m, y, out):
-    """out = M^-1 G' y (n, 3), via the nodal forces."""
+    """out = M^-1 G' y (n, 3), computed via nodal forces."""
     added, r = m.added, m.case.s.force
     for i in range(len(r)):
         for c in range(3):
@@ -86,7 +86,7 @@ def _along(added, k, a):
 def slow_down(m, w, a):
     """Modify accelerations a (n, 3) at velocities w for the inertia of slow contacts.
 
-    m : `SlowContacts`.
+    m : a `SlowContacts`.
     """
     added, alpha, out = m.added, m.case.system.alpha, m.case.s.stage[0]
     size = added.count[0]
@@ -131,9 +131,9 @@ def _slow_down(m, w, a):
 def longest_step(handle, q, w, a, dt, pace):
     """Longest step (s), at most dt, that contact allows, after `acceleration` at q and w.
 
-    Call it once before each step, at the end of the last one.
+    Call it once at the end of each step, before the next one.
 
-    a : the acceleration there; pace : see `contact.step_limit`.
+    a : acceleration after the last step; pace : see `contact.step_limit`.
     """
     if handle.limit == 0:
         return dt
@@ -142,7 +142,7 @@ def longest_step(handle, q, w, a, dt, pace):
 
 @inner_scalar
 def slow_energy(handle, w):
-    """Kinetic energy (J) at velocities w if slow contacts get inertia, else 0."""
+    """Kinetic energy (J) at velocities w if slow contacts get inertia, otherwise 0."""
     return value_at(handle.slow_kinetic, (handle.case, w)) if handle.slow_kinetic != 0 else 0.0
 
 
@@ -150,7 +150,7 @@ def slow_energy(handle, w):
 def gather_slow(handle, u, dt, beta):
     """Find the contacts that a step of dt (s) from u does not resolve, for `slow_contacts_down`.
 
-    beta : radians of a contact's vibration that a step may take.
+    beta : largest angle (rad) by which a step may advance a contact's vibration.
     """
     if handle.gather != 0:
         run_at(handle.gather, (handle.slow, u, dt, beta))
@@ -166,7 +166,7 @@ def slow_contacts_down(handle, w, a):
 def slow_contacts(packed: PackedCase, part: ThreadPart, case: ThreadCase) -> Context | None:
     """Context of slow contacts; None if their inertia would resist supports or planes.
 
-    Boards have none either, as their contacts involve more nodes.
+    Boards have no such context either, as their contacts involve more nodes.
     """
     system, body, contact = packed.system, packed.body, packed.body.find(ContactTerm)
     if contact is None or not contact.eased or system.moves or system.presses:
@@ -178,7 +178,7 @@ def slow_contacts(packed: PackedCase, part: ThreadPart, case: ThreadCase) -> Con
 def contact_parts(case: Context, limited: bool, slow: Context | None) -> dict[str, int]:
     """Fields of a `LoopHandle` for contact.
 
-    case : of a `ThreadCase`; limited : whether contact limits steps.
+    case : context of a `ThreadCase`; limited : whether contact limits steps.
     """
     found = {"limit": _limit.at(case)} if limited else {}
     if slow is not None:

@@ -16,11 +16,11 @@ from foldyn.structures.bars_plates import CondensedPlatesTerm
 from foldyn.structures.beyond_range import kept_apart
 
 SWING = 0.5  # turn (rad) of a hinge per step, too large for any law
-MET = 1e-3  # rad from closed: panels that touch
+MET = 1e-3  # rad from closed: panels this close touch
 
 
 class Failed(Protocol):
-    """Properties of a motion whose last step failed."""
+    """What `failure` needs of a motion whose last step failed."""
 
     case: Case
     method: Integrator
@@ -35,7 +35,7 @@ def failure(
 ) -> tuple[type[InstabilityError | PenetrationError], str]:
     """Exception class and message for a motion whose last step failed.
 
-    code : an `Outcome`.
+    code : a value of `Outcome`.
     hinge : index of the hinge whose dihedral jumped.
     """
     plan, tally, order = motion.plan, motion.state.tally, motion.packed.numbering.order
@@ -87,7 +87,7 @@ def smaller_step(motion: Failed) -> str:
 
 
 def _apart(motion: Failed, hinge: int) -> str:
-    """How to keep the panels at a hinge apart; its dihedral is from the last step."""
+    """Remedy text: how to keep the panels at a hinge apart, given its dihedral at the last step."""
     angle = motion.state.angle[hinge]
     if motion.plan.dt > motion.critical or _from_closed(angle) > SWING:
         return f"the hinge has turned too far within a step: {smaller_step(motion)}"

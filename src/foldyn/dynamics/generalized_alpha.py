@@ -1,6 +1,6 @@
 """The generalized-alpha method of Chung and Hulbert, J. Appl. Mech. 60, 1993, and Newmark's.
 
-With accelerations a and h the step, displacements and velocities follow Newmark,
+With accelerations a and the step h, displacements and velocities follow Newmark's formulas,
 
     q1 = q0 + h w0 + h^2 ((1/2 - beta) a0 + beta a1),   w1 = w0 + h ((1 - gamma) a0 + gamma a1),
 
@@ -8,13 +8,14 @@ and the equation of motion holds between both ends,
 
     M ((1 - am) a1 + am a0) + alpha M ((1 - af) w1 + af w0) + (1 - af) b1 + af b0 = 0,
 
-with b = F_int + beta K0 v - p at each end: the forces are averaged, not the displacements, so that
+with b = F_int + beta K0 v - p at each end. Forces are averaged rather than displacements, so that
 b1 is what equilibrium at the end needs (Erlicher, Bonaventura and Bursi, Comput. Mech. 28, 2002).
 
-Both methods are of order 2 and unconditionally stable for linear systems. The spectral radius r,
-the factor by which a step multiplies the free vibrations of infinite frequency, is a parameter:
-am = (2r - 1)/(r + 1), af = r/(r + 1), gamma = 1/2 - am + af, beta = (1 - am + af)^2 / 4. Of all
-methods that damp the highest frequencies so, it damps the low ones least.
+Both methods have order 2 and are unconditionally stable for linear systems. A parameter of the
+generalized-alpha method is the spectral radius r, the factor by which a step multiplies free
+vibrations of infinite frequency: am = (2r - 1)/(r + 1), af = r/(r + 1), gamma = 1/2 - am + af,
+beta = (1 - am + af)^2 / 4. Of all methods with this damping of the highest frequencies, it damps
+low frequencies least.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ SPECTRAL_RADIUS = 0.8
 
 
 class Parameters(NamedTuple):
-    """Parameters of a method of the family."""
+    """Parameters of a method of the generalized-alpha family."""
 
     am: float
     af: float
@@ -66,7 +67,7 @@ class Parameters(NamedTuple):
 
 
 def parameters(spectral_radius: float) -> Parameters:
-    """Parameters of the method for a spectral radius from 0 to 1."""
+    """Parameters of the generalized-alpha method for a spectral radius from 0 to 1."""
     am = (2.0 * spectral_radius - 1.0) / (spectral_radius + 1.0)
     af = spectral_radius / (spectral_radius + 1.0)
     return Parameters(am, af, 0.25 * (1.0 - am + af) ** 2, 0.5 - am + af)
@@ -84,7 +85,7 @@ class AlphaStep(NamedTuple):
     out: NDArray
     earlier: NDArray
     damping: NDArray  # (k,) indices of the damping terms
-    drag: NDArray  # and of the air drag terms
+    drag: NDArray  # (k,) indices of the air drag terms
 
 
 class Alpha(Scheme):
@@ -106,7 +107,7 @@ class Alpha(Scheme):
         )  # fmt: skip
 
     def begin(self, t: float) -> None:
-        """Make `old` the start of a motion, or of its part after a jump; see `Scheme.begin`."""
+        """Make `old` the start of a motion, or of a part after a jump; see `Scheme.begin`."""
         super().begin(t)
         if len(self.damping) or len(self.drag):
             for old, new in zip(self.old, self.new, strict=True):
@@ -115,7 +116,7 @@ class Alpha(Scheme):
             self.old.damped[:], self.old.resisted[:] = self.new.damped, self.new.resisted
 
     def weights(self, h: float) -> Weights:
-        """Weights of the step matrix, alpha M included in the mass; see `Scheme.weights`."""
+        """Weights of the step matrix, with alpha M included in the mass; see `Scheme.weights`."""
         am, af, beta, gamma = self.parameters
         rate = (1.0 - af) * gamma / (beta * h)
         mass = (1.0 - am) / (beta * h * h) + rate * self.packed.system.alpha
@@ -129,7 +130,7 @@ class Alpha(Scheme):
         self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
         most: int,
     ) -> tuple[int, float, int]:  # fmt: skip
-        """Iterate, in a single compiled function if the matrix is a band; see `Scheme.iterate`."""
+        """Iterate, for a band matrix in a single compiled function; see `Scheme.iterate`."""
         if matrix.band is None:
             return super().iterate(matrix, goal, h, t, last, lowest, most)
         return _iterate(self.context, h, t, matrix.band, matrix.free, goal, last, lowest, most)
@@ -139,7 +140,7 @@ class Alpha(Scheme):
         body, u = self.packed.body, self.moved()
         matrix.blocks.put(body, matrix.pattern, u, before, again, matrix.stiffness)
         matrix.add_following(u, self.new.factor, 1.0)
-        matrix.follow(u, 0.5)  # dofs without mass have the mean velocity of the step
+        matrix.follow(u, 0.5)  # dofs without mass have the step's mean velocity
 
     def works(self, h: float) -> tuple[float, float, float]:
         """Works of a step with averaged forces, exact for linear systems; see `Scheme.works`."""
@@ -156,8 +157,9 @@ class Alpha(Scheme):
     def change(self, h: float) -> NDArray:
         """Estimate of the displacement error of a step; see `Scheme.change`.
 
-        Since a stands for the acceleration at t + (am - af) h, the displacement's error is
-        (am/2 - af/2 + beta - 1/6) h^3 times its third derivative: 1/12 for the trapezoidal rule.
+        As a stands for the acceleration at t + (am - af) h, the error of the displacement is
+        (am/2 - af/2 + beta - 1/6) h^3 times the third derivative of the displacement; for the
+        trapezoidal rule this factor is 1/12.
         """
         am, af, beta, _ = self.parameters
         constant = 0.5 * (am - af) + beta - 1.0 / 6.0
@@ -167,13 +169,13 @@ class Alpha(Scheme):
 newmark = partial(Alpha, parameters=Parameters(am=0.0, af=0.0, beta=0.25, gamma=0.5))
 """Newmark's method with constant average acceleration, the trapezoidal rule.
 
-N. M. Newmark, A method of computation for structural dynamics, J. Eng. Mech. Div. 85, 1959. Without
-numerical damping: a linear system keeps its energy; another one may gain some with large steps.
+N. M. Newmark, A method of computation for structural dynamics, J. Eng. Mech. Div. 85, 1959. It does
+not damp: a linear system keeps its energy; a nonlinear system may gain energy in large steps.
 """
 
 
 def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[PackedCase, MotionState], Alpha]:
-    """Make the steps of the method for a spectral radius."""
+    """Return a function that creates the steps of the method, for a spectral radius."""
     facts = {"spectral_radius": spectral_radius}
     return partial(Alpha, parameters=parameters(spectral_radius), facts=facts)
 
@@ -194,7 +196,7 @@ def move(step, h):
 
 @inner
 def slowed(step):
-    """Put what the mass acts on in a step into `moving`: acceleration plus alpha times velocity."""
+    """Put acceleration plus alpha times velocity, on which the mass acts, into `moving`."""
     old, new, am, af = step.old, step.new, step.p.am, step.p.af
     w0, a0, w1, a1 = flat(old.w), flat(old.a), flat(new.w), flat(new.a)
     alpha, x = step.case.system.alpha, flat(step.case.s.moving)
@@ -205,7 +207,7 @@ def slowed(step):
 
 @kernel
 def balanced(step, target, h):
-    """Finish a step whose residual is (n, 3), N, with the end force that leaves this residual."""
+    """Finish a step whose residual is `target` (n, 3), N: set the end force that leaves it."""
     af = step.p.af
     move(step, h)
     slowed(step)
@@ -217,7 +219,7 @@ def balanced(step, target, h):
 
 @kernel
 def residual(step, h, t):
-    """Residual of a step into `out`; returns its norm and the norm of the forces at play, N."""
+    """Put the residual of a step into `out`; return its norm and that of the forces at play, N."""
     handle, old, new, out = step.handle, step.old, step.new, step.out
     system, mass, s = step.case.system, step.case.mass, step.case.s
     af = step.p.af
@@ -272,7 +274,7 @@ def _taken(step):
 
 @inner
 def _taken_by(step, numbers, before, after):
-    """Energy (J) dissipated by some terms in a step: mean force times displacement."""
+    """Energy (J) dissipated in a step by the terms `numbers`: mean force times displacement."""
     terms, s = step.case.terms, step.case.s
     one, other, du, work = flat(before), flat(after), flat(s.displacement), 0.0
     for i in range(other.size):
@@ -287,7 +289,7 @@ def _taken_by(step, numbers, before, after):
 
 @kernel
 def _actuation(step, angle0, angle1):
-    """Work (J) of the actuators in a step between the dihedrals angle0 and angle1."""
+    """Work (J) of the actuators in a step from the dihedrals angle0 to angle1."""
     actuators, old, new = step.case.system.actuators, step.old, step.new
     change = np.zeros_like(new.factor)
     change[:, 1] = 0.5 * (new.factor[:, 0] - old.factor[:, 0])

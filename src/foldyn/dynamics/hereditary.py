@@ -1,4 +1,4 @@
-"""Laws with memory in a motion: the model with them, their state, and their instant stiffness."""
+"""Laws with memory in a motion: the model that includes them, their state and instant stiffness."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from foldyn.structures.inelastic_hinges import memory
 
 
 def with_memory(case: Case, body: Assembly, by: Numbering) -> Assembly:
-    """Model of a motion, in memory order, with the branches of its laws with memory.
+    """Model of a motion, in memory order, including the branches of laws with memory.
 
     Raises
     ------
@@ -37,12 +37,12 @@ def with_memory(case: Case, body: Assembly, by: Numbering) -> Assembly:
 
 
 def memory_of_case(case: Case) -> HingeMemory:
-    """State of the branches of a case, which begins at rest; dofs in the order of the structure."""
+    """State at rest of a case's memory branches; dofs in the order of the structure."""
     return memory(case.remembering, case.body)
 
 
 def instant_stiffness(case: Case, u: NDArray) -> sparse.csr_array | None:
-    """Instant stiffness (m, m) of memory branches at u (n, 3); None without branches."""
+    """Instant stiffness (m, m) of the memory branches at u (n, 3); None without branches."""
     parts = case.remembering
     if not parts:
         return None

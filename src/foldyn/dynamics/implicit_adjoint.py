@@ -1,4 +1,4 @@
-"""Discrete adjoint of Newmark's and the generalized-alpha method.
+"""Discrete adjoint of Newmark's method and the generalized-alpha method.
 
 The unknown of a step of `dynamics.generalized_alpha` is the shift d = q1 - q0. With c = 1/(beta
 h^2),
@@ -6,23 +6,23 @@ h^2),
     a1 = c (d - h w0) - (1/2 - beta)/beta a0,   w1 = w0 + h ((1 - gamma) a0 + gamma a1),
     M ((1 - am) a1 + am a0 + alpha ((1 - af) w1 + af w0)) + (1 - af) b1 + af b0 = 0
 
-on the free dofs. Backward, let lq, lw, la be the derivatives of a scalar with respect to the end
-state, and z' the multipliers of the next step's balance, which also contains b1. The multipliers z
-of this step solve
+on the free dofs. In the backward pass, let lq, lw, la be the derivatives of a scalar with respect
+to the end state, and z' the multipliers of the next step's balance, which also contains b1. The
+multipliers z of this step solve
 
     A' z = lq - P' + c (la + h gamma (lw - R')),
 
 with A the matrix at the end of the step, and P' and R' the derivatives of af z' . b1 with respect
 to q1 and w1: the pullback of the forces (`mechanics.pullback`) has the total weights W = (1 - af) z
-+ af z'. The equation is solved iteratively with the factors that the forward steps use, also with
-those from an earlier step, although they neglect the rotation of dampers: the pullback itself gives
++ af z'. The equation is solved iteratively with the factors that the forward steps use, or with
+factors from an earlier step. These neglect the rotation of dampers, but the pullback itself gives
 the residual of the balance of z, and the gradient.
 
-The gradient is exact for steps that are solved exactly. Newton's method stops at a residual of
-`Scheme.tolerance`, mostly far below it, which bounds the difference to the computed motion.
+The gradient is exact for steps that are solved exactly. Newton's method stops at a residual of at
+most `Scheme.tolerance`, usually far below it; this bounds the difference to the computed motion.
 
-Steps are recomputed, bit for bit, from states where an engine can resume; one segment of them is
-stored at a time.
+Steps are recomputed, bit for bit, from stored states at which an engine can resume. One segment of
+steps is stored at a time.
 """
 
 from __future__ import annotations
@@ -49,10 +49,10 @@ from foldyn.errors import ComputationError, InputError
 from foldyn.threads import one_thread
 
 METHODS = ("newmark", "generalized_alpha")
-ROOM = 16e6  # bytes for the states of a segment
+ROOM = 16e6  # memory for the states of a segment, bytes
 ITERATIONS = 30
-TOLERANCE = 1e-12  # of the residual of the balance of z
-ENOUGH = 1e-7  # the same if it has stalled
+TOLERANCE = 1e-12  # relative residual of the balance of z
+ENOUGH = 1e-7  # relative residual that is accepted if the iteration has stalled
 FAST = 0.1  # residual reduction above which an old matrix is renewed
 STALL = 0.5  # residual reduction above which the iteration has stalled
 
@@ -69,24 +69,24 @@ class Reached(NamedTuple):
 class Taken(NamedTuple):
     """An accepted step, or part of one."""
 
-    number: int  # of the step, from 0
-    h: float  # s
+    number: int  # number of the step, from 0
+    h: float  # length, s
     start: Reached
     end: Reached
-    begins: bool  # whether `Scheme.begin` made its start
+    begins: bool  # whether `Scheme.begin` computed the step's start
 
 
 class Segment(NamedTuple):
     """Start of a segment of steps, with everything that an engine needs to resume there."""
 
-    number: int  # of the step
+    number: int  # number of the first step
     state: Reached
     begins: bool
     engine: dict[str, NDArray]
 
 
 class Retraced(ImplicitEngine):
-    """A motion by fixed implicit steps, recomputed: yields its steps from last to first."""
+    """A motion by fixed implicit steps, recomputed to yield its steps from last to first."""
 
     def __init__(self, motion: Any) -> None:
         _refuse(motion)
@@ -95,7 +95,7 @@ class Retraced(ImplicitEngine):
             1, len(packed.numbering.order), len(motion.case.reaction_dofs),
             motion.output.window.energy.shape[1],
         )  # fmt: skip
-        unseen = plan._replace(every=plan.steps + 1)  # records the start only
+        unseen = plan._replace(every=plan.steps + 1)  # the start is the only sample
         given = packed, motion.beginning, unseen, jumps(motion.case)
         super().__init__(motion.method.scheme, *given)
         self.advance(self._room, 0)
@@ -128,7 +128,7 @@ class Retraced(ImplicitEngine):
                 yield from reversed(self._taken[low:high])
 
     def changing(self) -> dict[str, Any]:
-        """What the next steps depend on; the engine's own counters are left out."""
+        """What the next steps depend on, without the engine's own counters."""
         return {name: part for name, part in super().changing().items() if name != "engine"}
 
     def _reached(self, t: float) -> Reached:
@@ -157,7 +157,7 @@ class ImplicitAdjoint(Adjoint):
     ----------
     motion : Motion
     steps : Retraced
-        Its steps.
+        The steps of the motion.
     """
 
     def __init__(self, motion: Any, steps: Retraced) -> None:
@@ -167,11 +167,11 @@ class ImplicitAdjoint(Adjoint):
         shape = self._scheme.shift.shape
         free = np.zeros(shape, bool)
         free.ravel()[self._matrix.free] = True
-        free.ravel()[packed.system.ties.slave] = True  # their masters get their share
-        self._kinds = free, free & ~self._scheme.massless[:, None]  # and with mass
-        # derivatives by the current acceleration, and z of the following step
+        free.ravel()[packed.system.ties.slave] = True  # slaves pass their share to their masters
+        self._kinds = free, free & ~self._scheme.massless[:, None]  # all, and those with mass
+        # derivatives with respect to the current acceleration, and z of the following step
         self._by_a, self._z = np.zeros(shape), np.zeros(shape)
-        self._made = 0.0  # step of the factorized matrix
+        self._made = 0.0  # length of the step of the factorized matrix
         self._forget()
 
     def backward(self, first: int, last: int, by_u: NDArray, by_v: NDArray) -> None:
@@ -183,7 +183,7 @@ class ImplicitAdjoint(Adjoint):
                     self._back_to_begin(taken.start, by_u, by_v)
 
     def gradient(self, by_u: NDArray, by_v: NDArray) -> dict[str, NDArray]:
-        """Complete the gradient; massless dofs start in balance. See `Adjoint`."""
+        """Complete the gradient; massless dofs start in balance. See `Adjoint.gradient`."""
         body = self._packed.body
         if len(hidden := body.hidden):
             start = next(self._steps.back(0, 1)).start
@@ -243,7 +243,7 @@ class ImplicitAdjoint(Adjoint):
         self._z = z
 
     def _back_to_begin(self, start: Reached, by_u: NDArray, by_v: NDArray) -> None:
-        """Step backward through the acceleration -M^-1 b - alpha w at the start of a part."""
+        """Step backward through a = -M^-1 b - alpha w, the acceleration at the start of a part."""
         (_, af, _, _), (t, q, w, a) = self._scheme.parameters, start
         self._forget()
         self._pull(*self._whole(t, q, w), af * self._z + self._push(self._by_a))
@@ -262,7 +262,7 @@ class ImplicitAdjoint(Adjoint):
 
 
 def _refuse(motion: Any) -> None:
-    """Refuse steps without an adjoint, with a remedy."""
+    """Refuse motions whose steps have no adjoint, with a remedy."""
     if motion.method.name not in METHODS:
         raise InputError(
             f" = {motion.method.name!r}: motions by it have no gradients; take rk4, "

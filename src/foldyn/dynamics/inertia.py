@@ -1,9 +1,9 @@
 """The mass matrix inside compiled loops: M v and the solution of M a = r on free dofs.
 
-A lumped matrix is a division. A consistent one is factored once per distinct set of supported nodes
-(axes with equal supports share it) and solved by sparse triangular substitution. With constraints,
-the matrix of the free dofs of all axes, Z' M Z with v = Z v_free, is factored and a = Z (Z' M Z)^-1
-Z' r, whether M is lumped or not.
+A lumped matrix only needs divisions. A consistent matrix is factored once per distinct set of
+supported nodes (axes with equal supports share the factors) and solved by sparse triangular
+substitution. With constraints, v = Z v_free, the matrix Z' M Z of the free dofs of all axes is
+factored, whether M is lumped or not, and a = Z (Z' M Z)^-1 Z' r.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from foldyn.jit.intrinsics import flat
 
 
 class Inertia(NamedTuple):
-    """Mass matrix (nodal, CSR), its inverse if diagonal, otherwise its factors."""
+    """Mass matrix (nodal, CSR), with its inverse if diagonal, otherwise with its factors."""
 
-    lumped: bool  # diagonal, and without constraints
-    diagonal: NDArray  # (n,) with constraints the least mass that the node's free dofs feel
+    lumped: bool  # whether it is diagonal and there are no constraints
+    diagonal: NDArray  # (n,) mass; with constraints the least that a node's free dofs feel
     inverse: NDArray  # (n, 3) 1/m on free dofs, 0 on fixed ones; empty if not lumped
     indptr: NDArray
     indices: NDArray
@@ -34,7 +34,7 @@ class Inertia(NamedTuple):
     ties: Ties
     factor_of_axis: NDArray  # (3,) index of the factor for each axis
     start: NDArray  # (factors + 1,) first row of each factor in the arrays below
-    nodes: NDArray  # free nodes of each factor; with constraints free dofs
+    nodes: NDArray  # free nodes of each factor; with constraints, free dofs
     row_order: NDArray
     column_order: NDArray
     lower_ptr: NDArray  # strictly lower part of L, by columns
@@ -96,7 +96,7 @@ def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties) -> Inertia:
 
 
 def lightness(mass: Inertia) -> NDArray:
-    """Upper bound (n,), 1/kg, of the inverse mass of each node."""
+    """Upper bound (n,) of the inverse mass of each node, 1/kg."""
     # a consistent matrix of triangles is at least half of its diagonal
     share = 1.0 if mass.lumped else 0.5
     own = share * mass.diagonal
@@ -111,7 +111,7 @@ def _least(diagonal: NDArray, ties: Ties, own: NDArray) -> NDArray:
 
 
 def _factor(mass: sparse.csr_array, nodes: NDArray) -> tuple:
-    """Mass factors of `nodes`: free nodes, orders, L and U without diagonals, and pivots."""
+    """Factors of the mass of `nodes`: free nodes, orders, L and U without diagonals, and pivots."""
     if not len(nodes):
         empty = sparse.csc_array((0, 0))
         return nodes, nodes, nodes, empty, empty, np.zeros(0)
@@ -133,7 +133,7 @@ def _join(factors: list[tuple]) -> tuple[NDArray, ...]:
     )
     joined = [column(parts, np.int64) for parts in (nodes, rows, columns)]
     for triangles in (lowers, uppers):
-        # each factor has its own closing pointer, so factor k's columns start at start[k] + k
+        # each factor ends with a closing pointer, so columns of factor k start at start[k] + k
         base = np.cumsum([0, *(m.nnz for m in triangles)])
         joined += [
             column((m.indptr + b for m, b in zip(triangles, base[:-1], strict=True)), np.int64),
@@ -159,7 +159,7 @@ def times_mass(m, v, out):
 def substitute(m, r, a, scratch):
     """Solve M a = r with the factors of a consistent matrix; a is zero on fixed dofs.
 
-    scratch holds n numbers, 3 n where there are constraints.
+    scratch holds n numbers; 3 n with constraints.
     """
     if m.ties.slave.size > 0:
         solve_tied(m, flat(r), flat(a), scratch)
@@ -169,7 +169,7 @@ def substitute(m, r, a, scratch):
 
 @inner_scalar
 def _substitute(m, k, x):
-    """Solve with factor k in place; x is in the order of its rows before, of its columns after."""
+    """Solve with factor k in place; x starts in the order of rows and ends in that of columns."""
     first, offset = m.start[k], m.start[k] + k
     count = m.start[k + 1] - first
     for j in range(count):
@@ -222,7 +222,7 @@ def _lumped_sum(diagonal, v):
 
 @kernel
 def moving_energy(mass, factor):
-    """Kinetic energy (J) of support motion S f'; `mass` is `moved_mass`, factors are (h, 3)."""
+    """Kinetic energy (J) of support motion S f'; `mass` is `moved_mass`, `factor` is (h, 3)."""
     total = 0.0
     for k in range(mass.shape[0]):
         for l in range(mass.shape[0]):  # noqa: E741

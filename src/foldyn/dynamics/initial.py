@@ -1,4 +1,4 @@
-"""Initial state of a motion: from a result, checked against supports and their motions."""
+"""Initial state of a motion: taken from a result, checked against supports and their motions."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from foldyn.results.quantities import CONTINUATIONS, ORIGIN
 from foldyn.values import whole
 
 AXES = "xyz"
-FIRST = 0.15  # first step over the largest one, times the fifth root of the tolerance
-SLOW_WIND = 0.05  # of the initial speed: a slower wind is negligible
-LOOKS = 501  # times at which supports and planes are checked, in addition to knots of histories
-ZERO = 1e-10  # of the largest stiffness: smaller eigenvalues count as zero
+FIRST = 0.15  # ratio of first to largest step, divided by the fifth root of the tolerance
+SLOW_WIND = 0.05  # a wind below this share of the initial speed is negligible
+LOOKS = 501  # number of times at which supports and planes are checked, besides knots
+ZERO = 1e-10  # eigenvalues below this share of the largest stiffness count as zero
 
 
 def initial_state(result: Any, at: int = -1) -> State:
@@ -42,15 +42,15 @@ def initial_state(result: Any, at: int = -1) -> State:
     ----------
     result : xarray.Dataset
         A trajectory or a path. Damping with ``state = "initial"`` and added mass keep their values
-        from the trajectory; a plain `State` of its displacement and velocity resets them.
+        from a trajectory; a plain `State` of the same displacement and velocity resets them.
     at : int, default -1
-        Number of the sample; negative ones count from the end.
+        Number of the sample; negative numbers count from the end.
     """
     if not hasattr(result, "sizes") or "displacement" not in result:
         raise InputError(f"initial_state: got {type(result).__name__}, give a result (a dataset)")
     for dimension in ("time", "step"):
         if dimension in result.sizes:
-            if dimension in result.variables:  # which may be damaged
+            if dimension in result.variables:  # the stored coordinate may be damaged
                 check_variable(result, dimension, (dimension,), place="initial_state: ")
             count = result.sizes[dimension]
             break
@@ -91,7 +91,7 @@ def origin_of(sample: Any, place: str) -> Origin | None:
 
 
 def _continuation(sample: Any) -> Continuation | None:
-    """Continuation data that an implicit method stored with the first or last sample, if any."""
+    """Data that an implicit method stored with the sample to continue from it, if any."""
     for name in CONTINUATIONS:
         if name in sample:
             found = check_variable(sample, name, ("continued",), place="initial_state: ")
@@ -140,7 +140,7 @@ def check_touching(case: Case, u: NDArray, start: float, end: float) -> None:
     times = np.union1d(np.linspace(start, end, LOOKS), turns)
     try:
         factors = np.array([np.broadcast_to(history(times), times.shape) for history in given])
-    except InputError:  # a failing function: the motion will stop there and say why
+    except InputError:  # a failing function: the motion will stop there, with the reason
         return
     along, shapes = factors[len(obstacles) :], [shape for shape, _ in driven]
     check_driven(
@@ -174,7 +174,7 @@ def _check_tied_velocity(case: Case, velocity: NDArray) -> None:
 
 
 def check_steady(case: Case, start: float, end: float) -> None:
-    """Refuse jumps of supports, planes and folds, and of a wind with added mass."""
+    """Refuse jumps of supports, planes and folds, and jumps of the wind with added mass."""
     for what, history in histories(case):
         times = [time for time in history.jumps() if start < time < end]
         drags = what == "the wind" and not (case.air and case.air.added_mass)
@@ -189,7 +189,7 @@ def check_steady(case: Case, start: float, end: float) -> None:
 
 
 def warn_of_unstable_damping(case: Case, start: Origin) -> None:
-    """Warn if damping follows the stiffness of a start where it is not positive definite."""
+    """Warn if stiffness-proportional damping uses a start where the stiffness is indefinite."""
     if case.rayleigh.beta == 0.0 or case.rayleigh.state != "initial":
         return
     free = np.asarray(case.free_dofs)
@@ -213,7 +213,7 @@ def warn_of_unstable_damping(case: Case, start: Origin) -> None:
 
 
 def warn_of_standing_in_wind(case: Case, v: NDArray) -> None:
-    """Warn of the moment that panels in a wind lack, unless the sheet starts much faster.
+    """Warn of a moment that added mass lacks for panels in a wind, unless the sheet is much faster.
 
     v : (n, 3) velocities at the start, m/s.
     """

@@ -1,6 +1,6 @@
 """Central differences of up to WIDTH motions side by side, in the lanes of `mechanics.lanes`.
 
-All take the same steps; each is checked along the way like a single motion.
+All motions take the same steps; each motion is checked on the way like a single motion.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ class LaneState(NamedTuple):
     """State of WIDTH models with d dofs."""
 
     dofs: NDArray  # (5, d WIDTH) displacement, velocity, acceleration, force, position (SI)
-    angle: NDArray  # (nh WIDTH,) at the last step, rad
-    work: NDArray  # (4, WIDTH) work and dissipated energy, J, and their powers, W
+    angle: NDArray  # (nh WIDTH,) dihedrals at the last step, rad
+    work: NDArray  # (4, WIDTH) work and dissipated energy, J, and the powers of both, W
     wrong: NDArray  # (WIDTH,) nonzero after a value that is not finite, or a hinge jump by pi
 
 
 class LaneLoads(NamedTuple):
-    """Loads on k dofs, in t terms with one history each; masses and drag."""
+    """Loads on k dofs, in t terms with one history each, with masses and drag."""
 
     dof: NDArray  # (k,)
-    value: NDArray  # (t, k WIDTH) N
+    value: NDArray  # (t, k WIDTH) loads, N
     inverse: NDArray  # (d WIDTH,) 1/kg, 0 on fixed dofs
     mass: NDArray  # (d WIDTH,) kg
-    alpha: NDArray  # (WIDTH,) 1/s
+    alpha: NDArray  # (WIDTH,) of the drag alpha M v, 1/s
 
 
 class LanePlaces(NamedTuple):
-    """Destinations of lane data in the results: n nodes, s supported dofs."""
+    """Places in the results for lane data: n nodes, s supported dofs."""
 
     motion: NDArray  # (models,) number of the motion in each lane
     node: NDArray  # (n,) node number at each place in memory
@@ -70,7 +70,7 @@ def write_samples(mass, state, strain, places, out, k):
 def advance_lanes(model, loads, factor, state, plan, places, out, first, last):
     """Advance WIDTH models from step first to last; step 0 is the start.
 
-    factor : (last - first + 1, t WIDTH) of the histories, at the ends of these steps.
+    factor : (last - first + 1, t WIDTH) of the histories, at the ends of the steps.
     """
     model, loads, state = borrowed(model), borrowed(loads), borrowed(state)
     dofs, work, groups, scratch = state.dofs, state.work, out.energy.shape[2] - 3, np.zeros(WIDTH)
@@ -118,9 +118,9 @@ def advance_lanes(model, loads, factor, state, plan, places, out, first, last):
 
 
 def topology(motion: Motion) -> tuple[bytes, ...]:
-    """Properties that motions in lanes must share; () for motions that lanes do not support.
+    """Properties that motions in one set of lanes share; () if lanes do not support the motion.
 
-    Supported are bars and hinges with the package's laws, lumped masses, drag, and dead loads.
+    Lanes support bars and hinges with the package's laws, lumped masses, drag, and dead loads.
     """
     packed, system = motion.packed, motion.packed.system
     drives = system.moves, system.turns, system.follows
@@ -135,8 +135,8 @@ def topology(motion: Motion) -> tuple[bytes, ...]:
 def integrate(motions: Sequence[tuple[int, Motion]], out: Samples) -> set[int]:
     """Integrate up to WIDTH motions of one topology and plan; return the indices of failures.
 
-    motions : with their numbers in `out`.
-    out : sample arrays: times (k,), all others (m, k, ...).
+    motions : each with its number in `out`.
+    out : sample arrays: time (k,), all others (m, k, ...).
     """
     numbers, own = zip(*motions, strict=True)
     plan, system = own[0].plan, own[0].packed.system
