@@ -1,8 +1,8 @@
-"""The choice between explicit and implicit integration, with its reason in words.
+"""The choice between explicit and implicit integration, with the reason in words.
 
-Both costs are estimated: number of steps times cost per step. An explicit method always takes half
-its critical step. An implicit method takes steps that resolve the motion, at a frequency estimated
-here, to the requested tolerance, and end at samples.
+The cost of each is estimated as number of steps times cost per step. An explicit method always
+takes half its critical step. An implicit method takes steps that resolve the motion, at a frequency
+estimated here, to the requested tolerance, and that end at samples.
 """
 
 from __future__ import annotations
@@ -25,21 +25,22 @@ from foldyn.dynamics.timing import DEFAULT_FRACTION, histories
 from foldyn.mechanics.following import following_force
 
 AUTO = "auto"
-LONG = 30.0  # periods beyond which an undamped motion needs a conserving method
-CONTENT = 2.0  # times the steps for the vibration alone, as it carries faster ones
-FEWEST = 50.0  # steps of an implicit run
-MOST_TIMES = 4000  # times at which loads are evaluated
-AT_REST = 1e-6  # of the loads: smaller out-of-balance forces set nothing in motion
-SMOOTH = 1e-3  # least share of a vibration that is assumed
+LONG = 30.0  # periods above which an undamped motion needs a conserving method
+CONTENT = 2.0  # factor of the number of steps, as the vibration carries faster ones
+FEWEST = 50.0  # least number of steps of an implicit run
+MOST_TIMES = 4000  # largest number of times at which loads are evaluated
+AT_REST = 1e-6  # out-of-balance forces below this share of the loads set nothing in motion
+SMOOTH = 1e-3  # least assumed share of the displacement that vibrates
 RESOLVED = 0.2  # rad per step of a vibration: RK4 loses 1 % of its energy in 11,000 steps
 ACCURATE = "dormand_prince"
-DEARER = 10.0  # times the cost of a motion: limit for a more accurate method
+DEARER = 10.0  # a more accurate method may cost this many times as much
 
 
 class Choice(NamedTuple):
     """A method, the reason for it, and a fallback if its energies do not balance.
 
-    The fallback is the same method with a shorter step if its errors do not accumulate.
+    If the errors of the method do not accumulate, the fallback is the same method with a shorter
+    step.
     """
 
     method: str
@@ -53,9 +54,9 @@ def choose(
 ) -> Choice:  # fmt: skip
     """Choose the faster method for a motion from u and v (n, 3) at `start`, with the reason.
 
-    dt and tolerance are arguments of `simulate`, default is the tolerance of implicit methods
-    without one, interval is the time between samples (s), 0.0 where steps are counted, and modal
-    the modal damping of the motion.
+    dt and tolerance are arguments of `simulate`; default is the tolerance of implicit methods if
+    tolerance is None. interval is the time between samples (s), 0.0 if steps are counted instead.
+    modal is the modal damping of the motion.
     """
     if case.air is not None and case.air.added_mass and not case.structure.massless:
         return Choice(ACCURATE, "explicit: the added mass of the air moves with the panels")
@@ -105,13 +106,13 @@ def choose(
 
 
 def _explicit_cost(case: Case, evaluations: int) -> float:
-    """Seconds per step, measured between 39 and 22,000 dofs."""
+    """Seconds per explicit step, measured between 39 and 22,000 dofs."""
     substitution = 1.0 if is_lumped(case.mass) else 2.0
     return evaluations * (5e-7 + 2.5e-8 * substitution * case.structure.nodes.size)
 
 
 def _implicit_cost(case: Case, conserved: bool) -> float:
-    """Seconds per step with residuals, tangents and factorizations, measured likewise.
+    """Seconds per implicit step with residuals, tangents and factorizations, measured likewise.
 
     The conserving method costs more: discrete-gradient forces and unsymmetric matrices.
     """
@@ -131,9 +132,10 @@ def _seconds(cost: float) -> str:
 def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
     """Angular frequency (rad/s) of the motion caused by loads, supports and the initial state.
 
-    Rayleigh's quotients of the displacements under slow loads (as slow as the duration, for bodies
-    without supports) and of the deforming part of the initial velocity, or the angular velocity of
-    its rigid part. Hinges count with at least their nominal stiffness.
+    The largest of three estimates: Rayleigh's quotient of the displacements under slow loads (as
+    slow as the duration, for bodies without supports), Rayleigh's quotient of the deforming part
+    of the initial velocity, and the angular velocity of its rigid part. Hinges have at least their
+    nominal stiffness.
     """
     structure, free = case.structure, np.asarray(case.free_dofs)
     stiffness = case.elastic_body.tangent(u, 1.0)
@@ -159,8 +161,8 @@ def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
 def fast_share(case: Case, u: NDArray, v: NDArray, omega: float) -> float:
     """Share of the kinetic energy of v (n, 3) in vibrations about u faster than omega (rad/s).
 
-    A vibration of w counts with (w^2 / (w^2 + omega^2))^2 of its energy; hinges have at least their
-    nominal stiffness.
+    A vibration of frequency w counts with (w^2 / (w^2 + omega^2))^2 of its energy; hinges have at
+    least their nominal stiffness.
     """
     free, m = np.asarray(case.free_dofs), case.free_mass
     moving = v.ravel()[free]
@@ -181,8 +183,8 @@ def vibrating_share(
 ) -> float:
     """Share of the displacement that vibrates: 1 after a release, less under slow loads.
 
-    For a motion from rest in balance it is the curvature of the load factors over half a period,
-    relative to their size.
+    For a motion that starts at rest and in balance, the share is the curvature of the load factors
+    over half a period, relative to the size of the factors.
     """
     if v.any() or _out_of_balance(case, u, start):
         return 1.0
@@ -203,7 +205,7 @@ def vibrating_share(
 
 
 def _applied(case: Case, u: NDArray) -> NDArray:
-    """Forces (3n,) at u by loads and actuated folds, without internal forces, N."""
+    """Forces (3n,), N, that loads and actuated folds apply at u, without internal forces."""
     body = case.elastic_body
     force = -body.internal(u)
     for load, _ in case.load_terms:
@@ -243,7 +245,7 @@ def _out_of_balance(case: Case, u: NDArray, start: float) -> bool:
 
 
 def _split(x: NDArray, v: NDArray) -> tuple[float, NDArray, NDArray]:
-    """Angular velocity (rad/s) of velocities v at x (n, 3); v without its rigid part; its mean."""
+    """Angular velocity (rad/s) of v at x (n, 3); v without its rigid part; mean of v."""
     arm, rest = x - x.mean(axis=0), v - v.mean(axis=0)
     inertia = (arm**2).sum() * np.eye(3) - arm.T @ arm
     spin = np.linalg.lstsq(inertia, np.cross(arm, rest).sum(axis=0), rcond=None)[0]

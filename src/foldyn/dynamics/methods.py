@@ -42,7 +42,7 @@ from foldyn.values import of_kind
 
 
 class ExplicitEngine(Engine):
-    """An explicit method with a fully compiled loop.
+    """Engine of an explicit method whose loop is fully compiled.
 
     Parameters
     ----------
@@ -53,9 +53,9 @@ class ExplicitEngine(Engine):
     state : MotionState
     plan : StepPlan
     threads : int
-        Maximum number of threads; fewer if elements couple distant nodes.
+        Maximum number of threads; fewer are used if elements couple distant nodes.
     slows : bool
-        Whether slow contacts get inertia: on one thread only.
+        Whether slow contacts get inertia; possible on one thread only.
     further : tuple
         Further arguments of the loop.
     """
@@ -75,7 +75,7 @@ class ExplicitEngine(Engine):
         self.threads = len(self._threads)
 
     def start_with(self, powers: NDArray) -> None:
-        """Set the powers (2,) in and out, W, of the last step."""
+        """Set the powers (2,) at the last step, in and out, W."""
         for scratch in self._scratches:
             scratch.powers[:2] = powers if scratch is self._scratches[0] else 0.0
 
@@ -115,10 +115,10 @@ class ExplicitEngine(Engine):
 
 
 def threads_of(packed: PackedCase) -> int:
-    """Fastest number of threads for a motion of a case.
+    """Number of threads with which a motion of a case runs fastest.
 
-    One if the case has parts that threads cannot share: user functions, displacement-dependent
-    loads, constraints, added mass, and some terms.
+    One thread if the case has parts that threads cannot share: user functions, constraints, added
+    mass, loads that depend on the displacement, and some terms.
     """
     system = packed.system
     called = bool((system.waves.code == CALLED).any())
@@ -137,23 +137,23 @@ class Integrator:
     order : int
         Order of convergence, checked by tests.
     loop : callable
-        Compiled core: the step loop of an explicit method, with the arguments of
-        `central_difference.advance`; the residual of a step of an implicit one.
+        Compiled core. Explicit method: the step loop, with the arguments of
+        `central_difference.advance`. Implicit method: the residual of a step.
     growth : callable, optional
-        Of an explicit method: the largest factor by which a step multiplies a free vibration, as
+        For an explicit method: the largest factor by which a step multiplies a free vibration, as
         a function of omega, damping and dt.
     evaluations : int
-        Of an explicit method: force evaluations per step.
+        For an explicit method: number of force evaluations per step.
     adaptive : bool
-        Whether it always controls its steps by their error.
+        Whether the method always controls its steps by their error.
     scheme : callable, optional
-        Of an implicit method: creates its `Scheme` from a case and its state.
+        For an implicit method: creates its `Scheme` from a case and the state of the motion.
     massless : bool
-        Whether it supports massless dofs, such as the edge rotations of a shell.
+        Whether the method supports massless dofs, such as the edge rotations of a shell.
     looks : tuple of float
-        Fractions of a step, from 0 to 1, at which it evaluates the loads.
+        Fractions of a step, from 0 to 1, at which the method evaluates the loads.
     tableau : Tableau, optional
-        Of an explicit Runge-Kutta method of fixed step: last argument of its loop,
+        For an explicit Runge-Kutta method of fixed step: last argument of its loop,
         `runge_kutta.advance`.
     """
 
@@ -169,7 +169,7 @@ class Integrator:
     tableau: Tableau | None = None
 
     def __post_init__(self) -> None:
-        """Refuse an explicit method without step limit or cost."""
+        """Check that an explicit method has growth and evaluations, and an implicit one a scheme."""
         if self.scheme is None and (self.growth is None or not self.evaluations):
             raise TypeError(
                 f"{self.name}: an explicit method needs growth, which limits its steps, and "
@@ -178,7 +178,7 @@ class Integrator:
 
     @property
     def implicit(self) -> bool:
-        """Whether a step solves equations, so that only accuracy limits it."""
+        """Whether steps solve equations, so that only accuracy limits the step length."""
         return self.scheme is not None
 
     def engine(
@@ -210,7 +210,7 @@ class Integrator:
 
 
 def _explicit(module: Any, evaluations: int, **traits: Any) -> Integrator:
-    """Integrator of a module, with the module's name."""
+    """Integrator whose name and loop are those of a module."""
     name = module.__name__.rpartition(".")[2]
     return Integrator(name, module.ORDER, module.advance, module.growth, evaluations, **traits)
 
@@ -245,14 +245,14 @@ METHODS: Mapping[str, Integrator] = {
 
 
 def method_of(name: str) -> Integrator:
-    """Integrator by its name."""
+    """Integrator of this name."""
     if not isinstance(name, str) or name not in METHODS:
         raise InputError(f" = {name!r}: choose auto or one of {', '.join(METHODS)}", "method")
     return METHODS[name]
 
 
 def suited(name: str, case: Case) -> Integrator:
-    """Integrator by its name; refuses one that does not suit the case."""
+    """Integrator of this name; refuses a method that does not suit the case."""
     method = method_of(name)
     if lack := lacking(method, case):
         fit = ", ".join(other.name for other in METHODS.values() if not lacking(other, case))
@@ -264,7 +264,7 @@ def suited(name: str, case: Case) -> Integrator:
 
 
 def with_mass(method: Integrator, case: Case) -> Case:
-    """The case, without massless dofs if the method needs mass."""
+    """The case itself; without its massless dofs if the method needs mass."""
     return case if method.massless else massive(case)
 
 
@@ -290,16 +290,17 @@ def critical_step(case: Case, method: str = "rk4", *, state: State | None = None
     ----------
     case : Case
     method : str
-        Integrator, as of `simulate`; inf for an implicit one, whose step only accuracy limits.
+        Integrator, as for `simulate`; the result is inf for implicit methods, whose step is limited
+        by accuracy only.
     state : State, optional
-        About which the stiffness is taken; rest by default.
+        State about which the stiffness is taken; rest by default.
 
     Notes
     -----
-    With the damped spectrum s^2 + (alpha + beta w^2 + r) s + w^2 = 0, the limit is the largest dt
-    for which no vibration grows, for all frequencies w up to the structure's highest and all r from
-    0 to the largest damping rate of modal damping, dashpots and creases: for RK4 ``|R(s dt)| <=
-    1``.
+    Free vibrations of the damped structure satisfy s^2 + (alpha + beta w^2 + r) s + w^2 = 0. The
+    limit is the largest dt for which none of them grows, for all frequencies w up to the highest of
+    the structure and all r from 0 to the largest damping rate of modal damping, dashpots and
+    creases. For RK4 this means ``|R(s dt)| <= 1``.
     """
     of_kind("case", case, Case)
     chosen, place = suited(method, case), None

@@ -1,13 +1,13 @@
-"""Modal damping as rows g_k of the dofs: C = sum of g_k' g_k.
+"""Modal damping as rows g_k on the dofs: C = sum of g_k' g_k.
 
 With M-orthonormal modes Phi on the free dofs f, C_ff = M Phi diag(2 zeta omega) Phi' M, a product
-with one row per mode (Wilson and Penzien, Int. J. Numer. Methods Eng. 4, 1972). The quasi-static
-motion with the supports s, -K_ff^-1 K_fs u_s at the free dofs, is not damped; only the motion
-relative to it is. Since Phi' K_ff = Lambda Phi' M_ff,
+with one row per mode (Wilson and Penzien, Int. J. Numer. Methods Eng. 4, 1972). A quasi-static
+motion with the supports s moves the free dofs by -K_ff^-1 K_fs u_s. It is not damped; only the
+motion relative to it is. Since Phi' K_ff = Lambda Phi' M_ff,
 
     g_k = sqrt(2 zeta_k omega_k) (phi_k' M_ff,  phi_k' K_fs / lambda_k),
 
-which vanishes for rigid translations.
+so that g_k vanishes for rigid translations.
 """
 
 from __future__ import annotations
@@ -30,14 +30,15 @@ from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import following_tangent, joined
 from foldyn.statics.rigid import free_rigid_motions
 
-SOFT = 0.01  # of k: below this slope a superlinear hinge is at rest up to rounding
-# (4e-7 rad from it, which is what the tolerance of statics leaves undetermined)
+# a superlinear hinge with a slope below this share of k is at rest up to rounding: 4e-7 rad from
+# rest, which the tolerance of statics leaves undetermined
+SOFT = 0.01
 MOST_MODES = 2000  # largest number of free dofs with all modes damped
 RIGID = 1.0 - 1e-6  # share of a shape in the space of rigid motions above which it is rigid
-SLOW = 1e-6  # of the largest eigenvalue found: a rigid shape's eigenvalue is below
-STILL = 1e-9  # of a hinge's gradient: below this projection constraints prevent its turn
-ALIKE = 1e-6  # of a squared frequency: distance below which two are equal
-BEYOND = 6  # additional modes to compute: the rigid ones
+SLOW = 1e-6  # a rigid shape's eigenvalue is below this share of the largest one found
+STILL = 1e-9  # constraints keep a hinge from turning if less than this of its gradient is left
+ALIKE = 1e-6  # relative difference below which two squared frequencies are equal
+BEYOND = 6  # number of modes to compute in addition, as six may be rigid
 
 
 def soft_slopes(case: Case, body: Assembly, q: NDArray) -> tuple[sparse.csr_array | None, int]:
@@ -50,8 +51,8 @@ def soft_slopes(case: Case, body: Assembly, q: NDArray) -> tuple[sparse.csr_arra
 def soft_at_rest(case: Case, body: Assembly, q: NDArray) -> tuple[NDArray[np.bool_], NDArray]:
     """Whether superlinear hinges (h,) stand at their rest angle, and their slopes / k (h,).
 
-    Their slope is the root of rounding errors. Hinges that constraints keep from turning do not
-    count.
+    The slope of such hinges is only the root of rounding errors. Hinges that constraints keep from
+    turning do not count.
     """
     hinges = body.sheet.soft_hinges(q)
     slope = Superlinear().slope(hinges.offset, np.zeros(len(hinges.offset)))
@@ -59,7 +60,7 @@ def soft_at_rest(case: Case, body: Assembly, q: NDArray) -> tuple[NDArray[np.boo
 
 
 def _turns(case: Case, gradient: sparse.csr_array) -> NDArray[np.bool_]:
-    """Whether constraints let each hinge (h,) turn; gradient (h, m) of the angles."""
+    """Whether constraints let each hinge (h,) turn; `gradient` (h, m) is that of the angles."""
     ties = case.constraints
     if not ties:
         return np.ones(gradient.shape[0], bool)
@@ -69,12 +70,12 @@ def _turns(case: Case, gradient: sparse.csr_array) -> NDArray[np.bool_]:
 
 
 class ModalRows(NamedTuple):
-    """Modal damping as rows of the m dofs."""
+    """Modal damping as rows over the m dofs."""
 
     rows: NDArray  # (r, m), sqrt(N s/m)
-    rate: float  # 1/s, the largest 2 zeta omega
-    soft: int  # hinges without slope in the state: modes are left out
-    alike: int = 0  # modes of equal frequency with different ratios, which get the mean
+    rate: float  # largest 2 zeta omega, 1/s
+    soft: int  # number of hinges without slope, whose modes are left out
+    alike: int = 0  # number of modes that get a mean ratio, being equal in frequency
 
     def warn(self) -> None:
         """Warn if modes are left out or share a mean ratio."""
@@ -96,12 +97,12 @@ class ModalRows(NamedTuple):
 
 
 def modal_rows(case: Case, start: Origin | None = None) -> ModalRows:
-    """Modal damping of a case for a motion that began at `start`, or at rest.
+    """Modal damping of a case for a motion that began at `start` (None: at rest).
 
     Raises
     ------
     InputError
-        The state is unstable, or there are fewer modes.
+        The state is unstable, or the structure has fewer modes.
     """
     damping = case.modal_damping
     if damping is None:
@@ -127,14 +128,14 @@ def about(case: Case, start: Origin | None) -> tuple[NDArray, Assembly]:
 
 
 def mass_of(case: Case) -> sparse.csr_array:
-    """Mass (m, m) of all dofs of a case: its nodal mass, zero elsewhere."""
+    """Mass (m, m) of all dofs of a case: the nodal mass, with zeros for other dofs."""
     mass = sparse.csr_array(sparse.kron(case.mass, sparse.eye_array(3), format="csr"))
     mass.resize((case.elastic_body.size, case.elastic_body.size))
     return mass
 
 
 def moving_mass(case: Case, displacement: NDArray) -> sparse.csr_array:
-    """Mass (m, m), with the fluid around the sheet at a displacement (n, 3)."""
+    """Mass (m, m) of a case, including the fluid around the sheet at a displacement (n, 3)."""
     mass, added = mass_of(case), added_mass_at(case, displacement)
     if added is None:
         return mass
@@ -148,7 +149,7 @@ def rows_of(
 ) -> ModalRows:  # fmt: skip
     """Modal damping for a stiffness and a mass (m, m) at a displacement (n, 3).
 
-    Additional dofs after the body's own are free.
+    The dofs of the matrices that follow the body's own dofs are free.
     """
     ties, body = case.constraints, case.elastic_body
     more = np.arange(body.size, stiffness.shape[0])
@@ -170,11 +171,11 @@ def rows_of(
 
 
 def _canonical(rows: NDArray) -> NDArray:
-    """Rows (r, m) with the same C that depend smoothly on the design, as gradients need.
+    """Rows (r, m) with the same C that depend smoothly on the design, which gradients need.
 
     The sign of a mode shape is arbitrary, and so is the basis of shapes of equal frequency.
-    Orthogonal combinations of rows keep C; the one chosen makes the products with r fixed vectors
-    upper triangular with a positive diagonal.
+    Orthogonal combinations of rows keep C; the combination chosen here makes the products of the
+    rows with r fixed vectors upper triangular with a positive diagonal.
     """
     fixed = np.random.default_rng(0).standard_normal(rows.shape[::-1])
     sums, triangle = np.linalg.qr(rows @ fixed)
@@ -195,7 +196,7 @@ def _ratios(damping: ModalDamping, values: NDArray) -> tuple[NDArray, int]:
 def _swinging(
     pencil: Pencil, damping: ModalDamping, case: Case, state: NDArray, free: NDArray
 ) -> Spectrum:
-    """The lowest vibration modes: all damped ones, and others with the frequency of the last."""
+    """The lowest vibration modes: all damped modes, and others as low as the last of them."""
     wanted = damping.modes
     if wanted is None and pencil.finite > MOST_MODES:
         inner = int((free >= case.elastic_body.size).sum())
@@ -237,7 +238,7 @@ def _apart(values: NDArray, wanted: int) -> bool:
 def _rigid(
     pencil: Pencil, spectrum: Spectrum, case: Case, state: NDArray, free: NDArray
 ) -> NDArray:
-    """Which modes (k,) are rigid motions with almost no stiffness."""
+    """Whether each mode (k,) is a rigid motion with almost no stiffness."""
     motions = free_rigid_motions(case.structure.nodes + state, case.constraints)
     space = np.zeros((pencil.size, motions.shape[1]))
     nodal = free < len(motions)

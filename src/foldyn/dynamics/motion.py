@@ -47,16 +47,16 @@ if TYPE_CHECKING:
 
     from foldyn.dynamics.gpu.engine import BlockEngine
 
-RECHECKS = 20  # checks of the critical step during a motion
-CHUNK = 256  # steps in the first stretch; later ones last about REPORT_EVERY seconds
+RECHECKS = 20  # number of checks of the critical step during a motion
+CHUNK = 256  # steps in the first stretch; later stretches last about REPORT_EVERY s
 REPORT_EVERY = 0.25
-BETWEEN = 0.382  # of the time between samples: no period has all its rest instants there
+BETWEEN = 0.382  # share of the time between samples: no vibration rests at all these times
 EXPLODED = 1.0  # relative energy error at which the motion is stopped
-# Crossing panels are searched for at samples spaced so that the search takes little time
-PER_LOOK = 500  # force evaluations of an explicit method between two searches, at least
-IMPLICIT_WORK = 25  # force evaluations per evaluation of an implicit method, with its solution
-LOOKS = 100  # samples at which turning panels are checked
-FEW = 1000  # triangles whose check takes negligible time
+# Crossing panels are searched for at samples so far apart that the search takes little time
+PER_LOOK = 500  # least force evaluations of an explicit method between two searches
+IMPLICIT_WORK = 25  # force evaluations that an implicit evaluation and its solution cost
+LOOKS = 100  # number of samples at which turning panels are checked
+FEW = 1000  # number of triangles that are checked in negligible time
 
 
 class Motion:
@@ -91,22 +91,22 @@ class Motion:
 
     @property
     def continues(self) -> bool:
-        """Whether the motion may continue an earlier one, with more than its state."""
+        """Whether the motion may continue an earlier one, with data beyond its state."""
         return self._initial[3] is not None
 
     @property
     def expected_samples(self) -> int:
-        """Number of samples; a lower bound if steps vary and are counted."""
+        """Number of samples; a lower bound if steps vary and samples are counted in steps."""
         return expected_samples(self.plan)
 
     @property
     def stored(self) -> int:
-        """Samples computed so far."""
+        """Number of samples computed so far."""
         return int(self.state.tally.samples)
 
     @property
     def recheck_after(self) -> int:
-        """Steps between checks of their stability."""
+        """Number of steps between checks of the critical step."""
         return max(1000, -(-self.plan.steps // RECHECKS))
 
     def run(
@@ -114,7 +114,7 @@ class Motion:
     ) -> xarray.Dataset:
         """Integrate the motion; see `simulate`.
 
-        The checkpoint folder stays until the result is saved, with its samples if there are many.
+        The checkpoint folder, with the samples if there are many, stays until the result is saved.
         """
         again = keeping is not None and keeping.resume and self._other
         if keeping and again and keeping.keeps(again._identity()):
@@ -163,7 +163,7 @@ class Motion:
         return result
 
     def _stretch(self, result: xarray.Dataset) -> str:
-        """Warning if stretching panels hold much of the strain energy; otherwise empty."""
+        """Warning if stretching panels hold much of the strain energy; empty if not."""
         names = audited(self.case.energy_groups, self.case.air is not None)
         energies = {name: result[name].values for name in names}
         found = stretch(self.case.structure, energies, result["displacement"])
@@ -177,7 +177,7 @@ class Motion:
 
     @cached_property
     def _other(self) -> Motion | None:
-        """The motion by the better method, if there is one."""
+        """The motion with the better method, if there is one."""
         other = self._better() if self._better else None
         if other is not None:
             off = f"with {self._unlike(other)[0]} the energy balance was off by more than"
@@ -185,7 +185,7 @@ class Motion:
         return other
 
     def _unlike(self, other: Motion) -> tuple[str, str]:
-        """Difference of its method from another motion's: in words, and as an argument."""
+        """How the method differs from that of another motion: in words, and as an argument."""
         if self.method is other.method:
             return f"steps of {self.plan.dt:.3g} s", f"dt = {self.plan.dt:.6g}"
         return self.method.name, f'method = "{self.method.name}"'
@@ -220,7 +220,7 @@ class Motion:
     ) -> None:  # fmt: skip
         """Integrate the motion; see `simulate`.
 
-        engine_of : creates the engine, at the start of the motion; by default its method's engine.
+        engine_of : creates the engine when the motion starts; by default the engine of its method.
         """
         self.restart(keeping)
         self.make_room()
@@ -247,7 +247,7 @@ class Motion:
     def restart(self, keeping: Keeping | None = None) -> None:
         """Return to the start, without samples: a motion may be integrated any number of times.
 
-        keeping : where its samples go next.
+        keeping : destination of further samples.
         """
         self.state, self._keeping, self._looked = self.beginning, keeping, False
         self._flow = self._initial[0] if self.origin.flow is None else self.origin.flow
@@ -265,12 +265,12 @@ class Motion:
         self.output.begin()
 
     def integrated_by(self, engine: BlockEngine, seconds: float) -> None:
-        """Take over the samples from an engine that integrated it along with others."""
+        """Take over the samples from an engine that integrated several motions."""
         self._engine, self.seconds = engine, seconds
 
     @property
     def _origin(self) -> str:
-        """What the motion started from, in words."""
+        """What the motion started from, in words for the result."""
         continues = isinstance(self._engine, ImplicitEngine) and self._engine.continues
         return "end of a motion" if continues else "rest" if self.at_rest else "state"
 
@@ -286,7 +286,7 @@ class Motion:
         plan, state, output = self.plan, self.state, self.output
         memory = scratch(system)
         earlier, began = self._resumed(engine), None
-        length = 0  # the first call only records the start, as it may have to compile
+        length = 0  # the first call records the start only, as it may have to compile
         while True:
             done = int(state.tally.steps)
             clock = time.perf_counter()
@@ -323,7 +323,7 @@ class Motion:
             length = max(least, min(int(length * min(growth, 8.0)), 100_000))
 
     def _looked_at(self, step: int) -> int:
-        """Steps, at step number `step`, since the last check of the flow of added mass."""
+        """Number of steps, at number `step`, since the last check of the flow of added mass."""
         return (self.origin.looked + step) % LOOK_EVERY
 
     def _renew_flow(self, engine: Engine) -> None:
@@ -348,7 +348,7 @@ class Motion:
 
     @property
     def reached(self) -> Origin | None:
-        """Origin of the motion, with the flow at its end; None if nothing depends on it."""
+        """Origin of the motion, with the flow at the end; None if nothing depends on the origin."""
         acts, steps = self.packed.added.acts, int(self.state.tally.steps)
         if not acts and not self.case.damped_at_start:
             return None
@@ -356,10 +356,10 @@ class Motion:
         return replace(self.origin, flow=flow, looked=looked)
 
     def _continuations(self) -> dict[str, tuple[float, Continuation]]:
-        """What an implicit method continued from, and its continuation at the last sample.
+        """What an implicit method continued from, and what continues from its last sample.
 
         With contact a motion always starts afresh: the state that ties nodes to planes is not
-        included.
+        stored.
         """
         engine, found = self._engine, {}
         if self.case.contact is not None:
@@ -381,7 +381,7 @@ class Motion:
         return identity(self.case, self.method, self.plan, state, self._sampler.rows)
 
     def finished(self, keeping: Keeping) -> xarray.Dataset | None:
-        """Stored result of the motion, if it is finished and to be resumed."""
+        """Stored result of the motion, if it is finished and `resume` is on."""
         found = keeping.finished(identity_digest(self._identity()))
         if found is None and keeping.resume and self._other is not None:
             return self._other.finished(keeping)
@@ -398,7 +398,7 @@ class Motion:
         self._keeping.checkpoint(arrays, float(self.state.tally.time))
 
     def _resumed(self, engine: Engine) -> float:
-        """Resume from the last checkpoint, if any; returns the seconds spent until then."""
+        """Resume from the last checkpoint, if any; return the seconds computed until then."""
         if self._keeping is None:
             return 0.0
         about = self._identity() | {"threads": engine.threads}
@@ -414,7 +414,7 @@ class Motion:
         return float(kept["seconds"])
 
     def _sample(self) -> None:
-        """Evaluate the user's quantities at new samples."""
+        """Evaluate the user's quantities at the new samples."""
         try:
             self.output.take(self.stored)
         except SamplingError as error:
@@ -425,7 +425,7 @@ class Motion:
         raise kind(message, self._dataset()) from cause
 
     def audit(self) -> float:
-        """Relative energy error so far; raises if the energy has exploded."""
+        """Return the relative energy error so far; raise an error if the energy has exploded."""
         balance = self.output.update_balance(self.stored)
         if balance.relative > EXPLODED and self._rounding.reveals(balance):
             self._look_between()
@@ -453,7 +453,7 @@ class Motion:
         return doubts(self.output.balance, self._rounding, self.plan, size, remedy)
 
     def _look_between(self) -> None:
-        """Add energies at play between the first two samples: at samples it may be at rest."""
+        """Measure energies at play between the first two samples: at samples all may be at rest."""
         plan = self.plan
         if self._looked or plan.every == 1 or not (plan.steps or plan.interval):
             return
@@ -465,7 +465,7 @@ class Motion:
             length = BETWEEN * plan.interval
             plan = plan._replace(end=plan.start + length, interval=length)
         sampler = Sampler(self.case, {}, *self.start, plan.start)
-        # with its own memory, as this motion may continue
+        # with a memory of its own, as this motion may continue
         packed = pack(self.case, apart(plan, self.critical), self.origin)
         motion = Motion(
             self.case, self.method, plan, self.critical, True, self._initial, self.origin, packed,
@@ -474,13 +474,13 @@ class Motion:
         motion._looked = True
         try:
             motion.integrate()
-        except ComputationError:  # the main motion has reported this
+        except ComputationError:  # the main motion has reported the error
             return
         balance = self.output.balance
         balance.scale = max(balance.scale, motion.output.balance.scale)
 
     def may_continue(self, step: int, u: NDArray) -> bool:
-        """Whether audit and `recheck` let a motion continue after a step, at u (n, 3) in memory."""
+        """Whether audit and `recheck` let a motion go on after a step; u (n, 3) in memory order."""
         with suppress(ComputationError):
             self.audit()
             if step < self.plan.steps:

@@ -19,35 +19,35 @@ class Outcome(IntEnum):
     DONE = 0
     NOT_FINITE = 1
     PENETRATION = 2
-    FULL = 3  # no room for another sample
+    FULL = 3  # there is no room for another sample
     STUCK = 4  # the error requires a step below the resolution of time
-    NOT_CONVERGED = 5  # an implicit step could not be solved, however small
+    NOT_CONVERGED = 5  # an implicit step could not be solved, however short
 
 
-SHORTEST = 1e-6  # part of a fixed step: shorter contact steps are not taken
-WORK, DISSIPATED, AIR, WRONG, HINGE, OUTCOME = range(6)  # columns of a member's notes to its team
+SHORTEST = 1e-6  # contact may not shorten steps below this part of a fixed step
+WORK, DISSIPATED, AIR, WRONG, HINGE, OUTCOME = range(6)  # columns of a member's notes for its team
 
 
 class StepPlan(NamedTuple):
-    """Steps and samples. A fixed step n is at start + n dt; variable steps use `end`."""
+    """Steps and samples. Fixed step n is at start + n dt; variable steps go on until `end`."""
 
     start: float  # s
     end: float  # s
-    dt: float  # the step, or the largest one, s
-    steps: int  # of a fixed step; else 0
-    every: int  # steps between samples; 0: samples are `interval` apart
+    dt: float  # fixed step, or the largest variable step, s
+    steps: int  # number of fixed steps; 0 if steps vary
+    every: int  # steps between samples; if 0, samples are `interval` apart
     interval: float  # s
     tolerance: float  # relative error per step; 0 with a fixed step
     floor: float  # least displacement that errors are relative to, m
-    stops: NDArray  # times (s) in order at which variable steps end: knots of the histories
+    stops: NDArray  # sorted times (s) at which variable steps end: knots of the histories
 
 
 # counters of a motion: steps done, samples written, steps rejected, force evaluations
 COUNTED = ("steps", "samples", "refused", "evaluations")
-# What is measured: work of the loads, energy dissipated and lost to the air (J), their powers at
-# the last step (W); the time reached, and of steps that vary the next one wanted, the last,
-# shortest and longest (s); the last one's error over the tolerance; the largest displacement (m),
-# velocity (m/s) and kinetic energy (J) so far
+# Measured values: work of the loads, energy dissipated and lost to the air (J), and the powers of
+# these at the last step (W). The time reached; for variable steps, the next step wanted and the
+# last, shortest and longest step (s), and the error of the last step divided by the tolerance. The
+# largest displacement (m), velocity (m/s) and kinetic energy (J) so far
 MEASURED = (
     "work", "dissipated", "air", "power_in", "power_out", "power_air", "time", "wanted", "last",
     "shortest", "longest", "error", "farthest", "fastest", "kinetic",
@@ -58,29 +58,29 @@ TALLY = np.dtype(
 
 
 class MotionState(NamedTuple):
-    """State of a motion between two stretches of steps, updated in place."""
+    """State of a motion between two stretches of steps, which update it in place."""
 
     u: NDArray  # (n, 3) displacement without support motion, m
-    v: NDArray  # (n, 3) velocity likewise, m/s
+    v: NDArray  # (n, 3) velocity without support motion, m/s
     carry: NDArray  # (n, 3) acceleration, for methods that store it
-    tally: np.record  # `TALLY`
+    tally: np.record  # record of type `TALLY`
     angle: NDArray  # (nh,) dihedrals at the last checked step, rad
 
 
 class Samples(NamedTuple):
-    """Room for k samples from number `first` on; s supported dofs."""
+    """Room for k samples, the first of which is number `first`; s supported dofs."""
 
     time: NDArray  # (k,) s
     displacement: NDArray  # (k, n, 3)
     velocity: NDArray  # (k, n, 3)
     reaction: NDArray  # (k, s)
-    energy: NDArray  # (k, columns) as `audit.audited` names them
+    energy: NDArray  # (k, columns) energies as `audit.audited` names them, J
     memory: NDArray  # (k, b, 2) states of the b branches of laws with memory
     first: int  # number of earlier samples, stored elsewhere
 
     @property
     def end(self) -> int:
-        """Number of the first sample that no longer fits."""
+        """Number of the first sample beyond the room."""
         return self.first + len(self.time)
 
     def doubled(self) -> Samples:
@@ -89,7 +89,7 @@ class Samples(NamedTuple):
         return Samples._make((*arrays, self.first))
 
     def until(self, number: int) -> Samples:
-        """The samples before this number."""
+        """The samples with lower numbers than this."""
         arrays = (array[: number - self.first] for array in self[:-1])
         return Samples._make((*arrays, self.first))
 
@@ -109,7 +109,7 @@ def samples(count: int, nodes: int, supported: int, energies: int, branches: int
 
 @inner_scalar
 def passed_through(now, before, first, last):
-    """Index of a hinge from first to last - 1 whose dihedral jumped by more than pi, or -1.
+    """Index of a hinge from first to last - 1 whose dihedral has jumped by more than pi, or -1.
 
     Overwrites the dihedrals `before` (nh,) with `now`.
     """
@@ -127,7 +127,7 @@ def passed_through(now, before, first, last):
 
 @inner_scalar
 def split_step(longest, left):
-    """Length (s), at most `longest`, of the equal parts of the interval `left`."""
+    """Length (s), at most `longest`, of the equal parts that divide the interval `left`."""
     if longest >= left:
         return left
     return left / math.ceil(min(left / max(longest, SHORTEST * left), 1.0 / SHORTEST))
@@ -135,6 +135,6 @@ def split_step(longest, left):
 
 @inner_scalar
 def post_totals(team, work_in, work_out, work_air, wrong):
-    """Note for the team the work, the energies lost (J), and the count of non-finite values."""
+    """Note for the team the work, the energies lost (J), and the number of non-finite values."""
     note = team.note[team.number]
     note[WORK], note[DISSIPATED], note[AIR], note[WRONG] = work_in, work_out, work_air, wrong

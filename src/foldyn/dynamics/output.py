@@ -1,4 +1,4 @@
-"""The samples of a motion: all in memory or, if stored on disk, the last ones."""
+"""The samples of a motion: all in memory, or the last ones if earlier ones are on disk."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LEAST = 16  # least number of samples in a window
 
 
 class Output:
-    """Room for the samples of a motion, and statistics of the written ones.
+    """Room for the samples of a motion, and statistics of the samples written so far.
 
     Parameters
     ----------
@@ -35,18 +35,18 @@ class Output:
     sampler : Sampler
         The user's quantities.
     branches : int
-        Branches of laws with memory.
+        Number of branches of laws with memory.
     keeping : Keeping, optional
-        Destination of samples once their memory is full.
+        Destination of samples when their memory is full.
     heat : Heat, optional
-        Its energy exchange with the sheet counts as at play in the balance.
+        Heat, whose energy exchange with the sheet counts as energy at play.
 
     Attributes
     ----------
     window : Samples
         Room that compiled loops write to.
     balance : EnergyBalance
-        Of all samples so far.
+        Energy balance of all samples so far.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Output:
         self._case, self._plan, self._sampler, self._branches = case, plan, sampler, branches
         self._keeping, self._air = keeping, case.air is not None
         self._names = audited(case.energy_groups, self._air)
-        at_once = 1  # most samples in a step
+        at_once = 1  # largest number of samples in a step
         if not plan.steps and not plan.every:
             at_once = math.floor(plan.dt / plan.interval) + 2
         self._at_once = at_once
@@ -82,16 +82,16 @@ class Output:
 
     @property
     def rows(self) -> dict[str, tuple[int, ...]]:
-        """Shapes of a sample's parts, by name."""
+        """Shapes of the parts of one sample, by name."""
         own = self.window._asdict()
         del own["first"]
         return {name: array.shape[1:] for name, array in own.items()} | self._sampler.rows
 
     # ------------------------------------------------------------------ while it runs
     def fits(self, length: int, steps: int, stored: int) -> int:
-        """Number of steps, at most `length`, whose samples fit; makes room if it is none.
+        """Number of steps, at most `length`, whose samples fit; makes room if no step fits.
 
-        steps, stored : steps and samples so far.
+        steps, stored : numbers of steps and samples so far.
         """
         if self._keeping is None:
             return length
@@ -110,7 +110,7 @@ class Output:
         self._sampler.take(self.window, stored)
 
     def update_balance(self, stored: int) -> EnergyBalance:
-        """Energy balance, updated with all new samples."""
+        """Return the energy balance after adding all new samples."""
         new = self.written(stored)
         seen = self.balance.count - new.first
         self.balance.add(new.energy[seen:], new.displacement[seen:])
@@ -144,7 +144,7 @@ class Output:
             self.flush(stored)
 
     def flush(self, stored: int) -> None:
-        """Write the samples to disk, which empties the window."""
+        """Write the samples to disk and empty the window."""
         assert self._keeping is not None
         out = self.written(stored)
         self.update_balance(stored)
@@ -163,7 +163,7 @@ class Output:
         }
 
     def resume_from(self, arrays: Mapping[str, NDArray], count: int) -> None:
-        """Continue after the samples on disk."""
+        """Continue after `count` samples on disk, with the statistics in `arrays`."""
         self.window = self.window._replace(first=count)
         self._sampler.drop(count)
         own = self.balance
@@ -171,7 +171,7 @@ class Output:
         for name, value in zip(EnergyBalance.NUMBERS, arrays["balance"].tolist(), strict=True):
             setattr(own, name, value)
 
-    # ------------------------------------------------------------------ what there is
+    # ------------------------------------------------------------------ what has been written
     def written(self, stored: int) -> Samples:
         """Samples in the window."""
         return self.window.until(max(stored, self.window.first))
@@ -199,7 +199,7 @@ class Output:
         return float(self._keeping.columns["time"][sample])
 
     def first(self, stored: int) -> tuple[Samples, dict[str, tuple[Quantity, NDArray]]]:
-        """Samples with the user's quantities: all of them or, with samples on disk, the first."""
+        """Samples with the user's quantities: all of them or, if they are on disk, the first."""
         columns, known = self._on_disk(stored), self._sampler.known
         if columns is None:
             own = self._sampler.columns(stored)
@@ -211,7 +211,7 @@ class Output:
         )
 
     def whole(self, result: xarray.Dataset, stored: int) -> xarray.Dataset:
-        """Complete a result made of `first`: all samples, read from disk on first use."""
+        """Complete a result made of `first` with all samples, read from disk on first use."""
         columns = self._on_disk(stored)
         if columns is None:
             return result

@@ -1,7 +1,7 @@
 """Optional parts of the equation of motion, as kernels called by address.
 
-They are compiled on first use; a motion without them has the address 0 in their place. Parts for
-contact are in `explicit_contact`.
+A part is compiled on first use; in a motion without it, its address is 0. Parts for contact are in
+`explicit_contact`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from foldyn.mechanics.threads import Team, wait
 
 
 class ThreadCase(NamedTuple):
-    """A case on one thread: its arrays, and addresses of the optional parts, 0 where it has none.
+    """A case on one thread: its arrays, and addresses of the optional parts, 0 if unused.
 
     Each part takes this record as its context.
     """
@@ -48,21 +48,21 @@ class ThreadCase(NamedTuple):
     fold_angle: NDArray  # (k,) dihedrals of the actuated hinges, rad
     own: NDArray  # (2,) first and last + 1 of the thread's rows
     team: Team
-    drag: float  # alpha, 1/s; 0 with added mass, which has the sheet's drag
-    histories: int = 0  # evaluates them
-    turn: int = 0  # moves rest angles
+    drag: float  # alpha, 1/s; 0 with added mass, which adds the drag of the sheet
+    histories: int = 0  # evaluates the histories
+    turn: int = 0  # changes rest angles
     carry: int = 0  # moves supports
     follow: int = 0  # adds loads that depend on the displacement
-    turn_flow: int = 0  # adds forces of added mass as it turns, and drag
+    turn_flow: int = 0  # adds forces due to turning panels with added mass, and drag
     solve: int = 0  # M^-1; 0 if M is diagonal
-    kinetic: int = 0  # kinetic energy; 0 likewise
+    kinetic: int = 0  # kinetic energy; 0 if M is diagonal
     moving_power: int = 0  # power of moving supports
-    turning_power: int = 0  # power of turning rest angles
+    turning_power: int = 0  # power of changing rest angles
 
 
 @addressed(NUMBER)
 def histories(m, t):
-    """Evaluate the histories at t, unless done: two stages of a step may share their time."""
+    """Evaluate the histories at t, unless done: successive stages may have the same time."""
     if t != m.s.time[0]:
         derive = m.system.moves or m.system.turns or m.system.presses
         evaluate(m.system.waves, t, derive, m.s.factor)
@@ -77,7 +77,7 @@ def turn(m):
 
 @addressed(ADDRESS, ADDRESS)
 def carry(m, q, w):
-    """Add support motion to q and w: displacement and velocity."""
+    """Add support motion to displacement q and velocity w."""
     rows, own = m.s.force.shape[0], m.own
     dofs, supports = (3 * own[0], 3 * own[1]), (m.s.moved[0], m.s.moved[1])
     here, there, moved = flat(m.s.displacement), flat(m.s.velocity), m.system.moved
@@ -87,7 +87,7 @@ def carry(m, q, w):
 
 @addressed(ADDRESS, ADDRESS)
 def follow(m, u, v):
-    """Add displacement-dependent loads; returns their power, W. On one thread only."""
+    """Add displacement-dependent loads; returns their power, W. Runs on one thread only."""
     rows, loads = m.s.force.shape[0], m.system.following
     moved, speed = rows_at(u, rows), rows_at(v, rows)
     return push_following(loads, moved, speed, m.s.factor, m.s.pushed, m.s.force)
@@ -97,14 +97,14 @@ def follow(m, u, v):
 def solve(m, out):
     """Solve with a mass matrix that is not diagonal."""
     rows, team = m.s.force.shape[0], m.team
-    wait(team)  # for the forces of the others, and until they have read this member's velocities
+    wait(team)  # until the others have written forces and read this member's velocities
     solve_mass(m.mass, m.s.force, rows_at(out, rows), m.s.line, team.number, team.size)
-    wait(team)  # until each has solved for its axes
+    wait(team)  # until all members have solved for their axes
 
 
 @addressed(ADDRESS)
 def solve_constrained(m, out):
-    """Solve with constraints. On one thread only."""
+    """Solve with constraints. Runs on one thread only."""
     values = flat(rows_at(out, m.s.force.shape[0]))
     solve_tied(m.mass, flat(m.s.force), values, m.s.line)
 
@@ -126,7 +126,7 @@ def moving_power(m):
 
 @addressed()
 def turning_power(m):
-    """Power (W) of turning rest angles."""
+    """Power (W) of changing rest angles."""
     return power_of_part(
         m.system.actuators, m.s.factor, m.fold_angle, m.s.turned[0],
         m.s.turned[1],
@@ -144,7 +144,7 @@ def offsets(m, accepted):
 
 @addressed(ADDRESS)
 def spent(m, q):
-    """Energy (J) that terms store, and have dissipated, at their last evaluation, at q."""
+    """Energy (J) that terms store and have dissipated, at q, where they were last evaluated."""
     u = m.s.displacement if m.system.moves else rows_at(q, m.s.force.shape[0])
     energies_of(m.terms, u, m.s.energy)
     return m.s.energy.sum() + dissipated_by(m.terms)

@@ -1,6 +1,6 @@
 """Explicit Runge-Kutta methods of fixed step, in one compiled loop for any `Tableau`.
 
-RK4 is the classic method of order 4, as used in the paper.
+RK4 is the classic method of order 4, which the paper uses.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from foldyn.mechanics.contact.step_limit import RESOLVED
 
 
 class Coefficients(NamedTuple):
-    """A method of s stages as compiled loops see it."""
+    """An explicit Runge-Kutta method of s stages, as compiled loops use it."""
 
     time: NDArray  # (s,) times of the stages, in steps
-    ahead: NDArray  # (s, s) weights of earlier stages' slopes in a stage
+    ahead: NDArray  # (s, s) weights, for each stage, of the slopes of earlier stages
     mixed: int  # 1 if a stage uses slopes other than the last one, else 0
     weight: NDArray  # (s,) weights of the slopes in the step, times `whole`
     whole: float
@@ -38,7 +38,7 @@ class Tableau(NamedTuple):
     order : int
         Order of convergence, checked by tests.
     stages : tuple of tuples of float
-        For each stage but the first, the weights of the slopes of all earlier stages.
+        For each stage except the first, the weights of the slopes of all earlier stages.
     weights : tuple of float
         Weights of the slopes of all stages in the step, up to a common factor.
     """
@@ -63,13 +63,14 @@ class Tableau(NamedTuple):
 
     @property
     def looks(self) -> tuple[float, ...]:
-        """Fractions of a step, from 0 to 1, at which it evaluates the loads."""
+        """Fractions of a step, from 0 to 1, at which the method evaluates the loads."""
         return tuple(sorted({0.0, 1.0, *self.coefficients.time.tolist()}))
 
     def growth(self, omega: NDArray, damping: NDArray, dt: float) -> NDArray:
         """Largest factor by which a step of dt multiplies a free vibration, per frequency.
 
-        |R(s dt)| over both roots of s^2 + damping s + omega^2 = 0, R(z) the step of y' = z y.
+        The larger |R(s dt)| of the two roots of s^2 + damping s + omega^2 = 0, where R(z) is the
+        factor of a step of y' = z y.
         """
         z, own = roots(omega, damping) * dt, self.coefficients
         slopes = np.zeros((len(own.weight), *z.shape), complex)
@@ -84,7 +85,7 @@ RK4 = Tableau("rk4", 4, ((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1.0, 2.0, 2.0, 1
 
 @inner_scalar
 def _keep_slopes(method, k, dt, vt, fa, others):
-    """Add the slopes of stage k, weighted, to the later stages but the next, (s, 2, n)."""
+    """Add the weighted slopes of stage k to `others` (s, 2, n), for the stages after the next."""
     for later in range(k + 2, others.shape[0]):
         ahead = method.ahead[later, k] * dt
         if ahead != 0.0:
@@ -106,7 +107,7 @@ def _add_kept(k, others, ut, vt):
 def next_stage(method, k, dt, u, v, ut, vt, fa, du, dv, others):
     """Add the slopes vt, fa of stage k to those of the step, and set ut, vt to stage k + 1.
 
-    All but `others`, (s, 2, n) or (0, ...), have n entries.
+    `others` is (s, 2, n) or (0, ...); all other arrays have n entries.
     """
     weight, ahead = method.weight[k], method.ahead[k + 1, k] * dt
     if method.mixed > 0:
@@ -124,9 +125,9 @@ def next_stage(method, k, dt, u, v, ut, vt, fa, du, dv, others):
 def advance(handle, state, plan, room, stretch, method):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
-    method : `Coefficients`.
+    method : a `Coefficients`.
 
-    Work and dissipated energy are integrated with the method's own weights. Each thread of a team
+    The weights of the method also integrate work and dissipated energy. Each thread of a team
     advances its own nodes.
     """
     state = borrowed(state)
@@ -145,7 +146,7 @@ def advance(handle, state, plan, room, stretch, method):
     post_totals(team, 0.0, 0.0, 0.0, 0)
     for step in range(begun, end + 1):
         work_in, work_out, work_air, wrong, left = 0.0, 0.0, 0.0, 0, plan.dt
-        while left > 0.0:  # one pass, unless contact asks for shorter steps
+        while left > 0.0:  # one pass, unless contact needs shorter steps
             first = left == plan.dt
             now = plan.start + step * plan.dt + (plan.dt - left)
             part_in, part_out, part_air, dt = 0.0, 0.0, 0.0, left

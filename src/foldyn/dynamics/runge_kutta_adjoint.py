@@ -1,8 +1,8 @@
 """Discrete adjoint of explicit Runge-Kutta methods: exact gradients of the computed motion.
 
-A step takes the state y = (u, v) to y + dt sum of w_s k_s, k_s = f(y_s) the slopes at its stages
-y_s = y + dt sum of c_sr k_r. Backward, with the derivatives l of a scalar with respect to the end
-state, a stage gets
+A step takes the state y = (u, v) to y + dt sum of w_s k_s, where k_s = f(y_s) are the slopes at the
+stages y_s = y + dt sum of c_sr k_r. In the backward pass, with the derivatives l of a scalar with
+respect to the end state, a stage gets
 
     l_s = dt (w_s l + sum of c_rs m_r),    m_s = (df/dy at y_s)' l_s,
 
@@ -33,7 +33,7 @@ from foldyn.mechanics.pullback import pulled_back
 if TYPE_CHECKING:
     import xarray
 
-ROOM = 1e6, 4e6  # bytes for the stage states of a segment, and for the stored states
+ROOM = 1e6, 4e6  # memory for stage states of a segment and for stored states, bytes
 
 
 @inner_scalar
@@ -47,9 +47,9 @@ def _into(source, out):
 def retrace(handle, u, v, plan, method, first, count, stages):
     """Recompute `count` steps from number `first` on; u and v change in place.
 
-    method : `Coefficients`.
-    stages : (count, s, 3, n, 3) or (0, ...), displacement, velocity and acceleration at each
-        stage. Reproduces `runge_kutta.advance` bit for bit.
+    method : a `Coefficients`.
+    stages : (count, s, 3, n, 3) for displacement, velocity and acceleration at each stage, or
+    (0, ...). Reproduces `runge_kutta.advance` bit for bit.
     """
     stage = handle.stage
     at_u, at_v, a = stage[0], stage[1], stage[2]
@@ -81,7 +81,7 @@ def pull_steps(
 ):
     """Process the steps of `stages` backward; by_u and by_v (n, 3) change in place.
 
-    memory : (7, n, 3). by_slope : (s, 2, n, 3), zeros, for the sums of m. mass : `Inertia`.
+    memory : (7, n, 3). by_slope : (s, 2, n, 3), zeros, for the sums of m_r. mass : `Inertia`.
     moved : `System.moved`.
     """
     dt, loads, alpha, scratch = plan.dt, case.system.loads, case.drag, case.s
@@ -165,7 +165,7 @@ class RungeKuttaAdjoint(Adjoint):
     motion : Motion
         As `dynamics.driver.prepare` returns it.
     samples : xarray.Dataset
-        Its result: states from which steps are recomputed.
+        Result of the motion, with the states from which steps are recomputed.
     """
 
     def __init__(self, motion: Any, samples: xarray.Dataset) -> None:
@@ -188,11 +188,11 @@ class RungeKuttaAdjoint(Adjoint):
         self._stages = np.empty((steps_at_once(count, system.rows), *shape))
 
     def backward(self, first: int, last: int, by_u: NDArray, by_v: NDArray) -> None:
-        """Step backward from step number `last` to `first`, which has a sample; see `Adjoint`."""
+        """Step backward from step `last` to step `first`, which has a sample; see `Adjoint`."""
         self._backward(first, last, *self._state(first // self._plan.every), by_u, by_v)
 
     def _state(self, k: int) -> tuple[NDArray, NDArray]:
-        """State (n, 3) at a sample without support motion, as steps use it."""
+        """State (n, 3) at sample k without support motion, as steps use it."""
         self._evaluate(self._times[k])
         moved, factor = self._system.moved, self._scratch.factor
         u, v = (self._packed.numbering.inward(each[k]) for each in self._states)
@@ -202,7 +202,7 @@ class RungeKuttaAdjoint(Adjoint):
     def _backward(
         self, first: int, last: int, u: NDArray, v: NDArray, by_u: NDArray, by_v: NDArray
     ) -> None:
-        """Step backward from step number `last` to `first`, where the state is u and v (n, 3)."""
+        """Step backward from step `last` to step `first`, whose state is u and v (n, 3)."""
         count, most = last - first, len(self._stages)
         if count <= most:
             stages = self._stages[:count]
@@ -213,7 +213,7 @@ class RungeKuttaAdjoint(Adjoint):
                 self._out,
             )  # fmt: skip
             return
-        # states are stored as far apart as memory requires: mostly, one pass is enough
+        # states are stored as far apart as memory requires: usually one pass is enough
         apart = max(most, -(-count // max(2, int(ROOM[1] / (2 * 8 * u.size)))))
         kept, q, w = [], u.copy(), v.copy()
         for at in range(first, last, apart):
@@ -234,10 +234,10 @@ def steps_at_once(stages: int, rows: int) -> int:
 
 
 def segment(motion: Any) -> int:
-    """Steps between stored samples of a motion for the backward pass: as asked for, or fewer.
+    """Number of steps between stored samples for the backward pass: as asked for, or fewer.
 
-    Few enough that all stages between two samples fit in memory, if there is room for so many
-    samples.
+    It is small enough for memory to hold all stages between two samples, as long as that many
+    samples also fit.
     """
     plan, rows = motion.plan, motion.packed.system.rows
     at_once = steps_at_once(len(motion.method.tableau.weights), rows)

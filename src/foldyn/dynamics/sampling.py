@@ -31,7 +31,7 @@ class Sampler:
     ----------
     case : Case
     given : mapping of str to callable or Quantity
-        As of `simulate`.
+        See the argument `sample` of `simulate`.
     u, v : ndarray, shape (n, 3)
         Initial state, at which each function is tested.
     start : float
@@ -40,7 +40,7 @@ class Sampler:
     Raises
     ------
     InputError
-        A name that results already use; a function that fails, or does not return a finite number
+        A name that results already use, or a function that fails or does not return a finite number
         or array with the dimensions that it declares.
     """
 
@@ -76,7 +76,7 @@ class Sampler:
         self.drop(0)
 
     def drop(self, count: int) -> None:
-        """Drop the values of the first `count` samples and continue with the next one."""
+        """Drop the values of the first `count` samples and continue with the next sample."""
         self._values: dict[str, list[NDArray]] = {name: [] for name in self._quantities}
         self._first = self._taken = count
 
@@ -107,7 +107,7 @@ class Sampler:
             self._taken = k + 1
 
     def columns(self, count: int) -> dict[str, NDArray]:
-        """Values at the samples up to `count` that were not dropped, nan if missing."""
+        """Values at those samples up to `count` that were not dropped; nan where missing."""
         columns, count = {}, count - self._first
         for name, (_, shape) in self._quantities.items():
             column, values = np.full((count, *shape), np.nan), self._values[name][:count]
@@ -117,7 +117,7 @@ class Sampler:
 
 
 def _value(quantity: Quantity, u: NDArray, v: NDArray, time: float) -> NDArray:
-    """Value at a state; the function gets copies and cannot change it."""
+    """Value at a state; the function gets copies, so that it cannot change the state."""
     if not callable(quantity.function):
         raise SamplingError("has no function: give one of (displacement, velocity, time)")
     try:
@@ -134,7 +134,7 @@ def _value(quantity: Quantity, u: NDArray, v: NDArray, time: float) -> NDArray:
 
 
 def _contact_quantities(case: Case) -> dict[str, Quantity]:
-    """Quantities sampled with contact; empty without contact."""
+    """Quantities that are sampled with contact; empty without contact."""
     if case.contact is None:
         return {}
     planes = case.contact.planes

@@ -1,9 +1,9 @@
 """Largest stable time step of an explicit method, and the frequency that determines it.
 
-A step is stable where the free vibrations of a damped linear system do not grow. Each satisfies s^2
-+ c s + k = 0 with the quotients c = phi* C phi and k = phi* K phi of its complex shape, phi* M phi
-= 1, and only these matter to a method. So a step is stable if it is stable for all k between 0 and
-the largest eigenvalue, and for all possible sums c of the damping parts.
+A step is stable if no free vibration of a damped linear system grows. Each vibration satisfies
+s^2 + c s + k = 0, with the quotients c = phi* C phi and k = phi* K phi of its complex shape phi,
+phi* M phi = 1, and a method depends on nothing but c and k. So a step is stable if it is stable for
+all k between 0 and the largest eigenvalue, and for all possible sums c of the damping parts.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import ComputationError
 from foldyn.values import of_kind
 
-MARGIN = 0.9  # of the stability limit, to allow for stiffening
+MARGIN = 0.9  # critical step relative to the stability limit, to allow for stiffening
 _DENSE = 60  # dofs below which a dense eigensolver is faster and safer
-# frequencies (n,), damping (n,), step -> largest factor of a free vibration per step (n,)
+# a function of frequencies (n,), damping (n,) and step: growth factor of free vibrations (n,)
 Growth = Callable[[NDArray, NDArray, float], NDArray]
 _FRACTIONS = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 400)])
 _RATES = np.linspace(0.0, 1.0, 5)[:, None]
-ROUNDING = 1e-7  # tolerance of a factor of 1: eigenvalues of rigid motions are double
+ROUNDING = 1e-7  # tolerance for a factor of 1, as rigid motions have double eigenvalues
 
 
 def roots(omega: NDArray, damping: NDArray) -> NDArray:
@@ -45,8 +45,8 @@ def is_stable(
 ) -> bool:
     """Whether no free vibration with a frequency up to `omega` (rad/s) grows for steps of dt.
 
-    The spectrum is s^2 + c s + w^2 = 0, c the damping rate at w and up to `rate` (1/s) more, for
-    all w from 0 to omega.
+    Vibrations satisfy s^2 + c s + w^2 = 0 for all w from 0 to omega, with c between the damping
+    rate at w and that rate plus `rate` (1/s).
     """
     w, c = _spectrum(omega, damping, rate)
     return bool((growth(w, c, dt) <= 1.0 + ROUNDING).all())
@@ -64,7 +64,7 @@ def _spectrum(omega: float, damping: Rayleigh, rate: float) -> tuple[NDArray, ND
 def stability_limit(growth: Growth, omega: float, damping: Rayleigh, rate: float = 0.0) -> float:
     """Largest stable dt, as `is_stable` defines it.
 
-    inf for a system that neither vibrates nor decays.
+    The result is inf for a system that neither vibrates nor decays.
     """
     if omega <= 0.0 and damping.alpha <= 0.0 and rate <= 0.0:
         return np.inf
@@ -94,15 +94,15 @@ def limit_below(
 def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     """Largest angular frequency (rad/s) of a case about displacement u (n, 3), rest by default.
 
-    Hinges count with at least their nominal stiffness, so that superlinear bends, which have none
-    at rest, do not lower the result. Laws with memory count with their instant stiffness.
+    Hinges count with at least their nominal stiffness; otherwise superlinear bends, which have no
+    stiffness at rest, would lower the result. Laws with memory count with their instant stiffness.
     """
     case = massive(of_kind("case", case, Case))
     return float(np.sqrt(max(_largest_quotient(case, _tangent(case, u)), 0.0)))
 
 
 def massive(case: Case) -> Case:
-    """The case without massless dofs, if its structure can condense them."""
+    """The case without its massless dofs, if its structure can condense them."""
     other = case.structure.condensed
     return case if other is None else case.altered(structure=other)
 
@@ -110,8 +110,8 @@ def massive(case: Case) -> Case:
 def frequency_bound(case: Case, u: ArrayLike | None = None) -> float:
     """Upper bound (rad/s) for the largest frequency, at low cost.
 
-    By Gershgorin's theorem: from the largest absolute row sum of M^-1/2 K M^-1/2. inf unless the
-    mass is lumped.
+    Gershgorin's theorem gives it from the largest absolute row sum of M^-1/2 K M^-1/2. The result
+    is inf unless the mass is lumped.
     """
     if not is_lumped(case.free_mass):
         return np.inf
@@ -122,14 +122,14 @@ def frequency_bound(case: Case, u: ArrayLike | None = None) -> float:
 
 
 def damper_rate(case: Case, u: ArrayLike | None = None) -> float:
-    """Largest damping rate (1/s) of dashpots, creases and strains about u (n, 3)."""
+    """Largest damping rate (1/s) of dashpots, creases and strain damping about u (n, 3)."""
     if not case.dashpots and not case.crease_damping.any() and not case.strain_damping:
         return 0.0
     return _largest_quotient(case, damping_matrix(case, case.body.dofs(_state(case, u))))
 
 
 def _tangent(case: Case, u: ArrayLike | None) -> sparse.csr_array:
-    """Stiffness that limits the step, about u (n, 3)."""
+    """Stiffness about u (n, 3) that limits the step."""
     tangent = case.elastic_body.tangent(_state(case, u), 1.0)
     added = instant_stiffness(case, _state(case, u))
     return tangent if added is None else sparse.csr_array(tangent + added)
@@ -140,7 +140,7 @@ def _state(case: Case, u: ArrayLike | None) -> NDArray:
 
 
 def _largest_quotient(case: Case, matrix: sparse.csr_array) -> float:
-    """Largest eigenvalue of a matrix (m, m) relative to the mass, on the free dofs."""
+    """Largest eigenvalue, relative to the mass, of a matrix (m, m) on the free dofs."""
     free = np.asarray(case.free_dofs)
     k = sparse.csr_array(case.constraints.matrix(matrix)[free][:, free])
     if not k.count_nonzero():

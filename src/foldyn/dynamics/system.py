@@ -1,10 +1,10 @@
 """A case as arrays: M a + C v + F_int(u, rest angles) = sum of load vectors times factors.
 
 With moving supports, displacements are u = q + S f(t) and velocities v = w + S f'(t), with f the
-factors of the histories and S their displacements: the prescribed ones at supports, and -M_ff^-1
-M_fs times these at free nodes (zero with a lumped matrix). Then M_ff q'' = -(F_int + C v - p)_f
-holds without an acceleration of the supports, even where their velocity jumps, and every integrator
-advances q and w as if the supports were fixed.
+factors of the histories. The columns of S are displacements: the prescribed ones at supports, and
+-M_ff^-1 M_fs times the prescribed ones at free nodes (zero with a lumped matrix). Then
+M_ff q'' = -(F_int + C v - p)_f does not contain the acceleration of the supports, even where their
+velocity jumps, and every integrator advances q and w as if the supports were fixed.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.following import Following, joined
 from foldyn.mechanics.heat import Heat
 
-ROUNDING = 1e-14  # of support motion: smaller motions of other nodes are zero
+ROUNDING = 1e-14  # motions of other nodes below this share of support motion are zero
 
 
 class Entries(NamedTuple):
@@ -48,7 +48,7 @@ class Entries(NamedTuple):
 
     dof: NDArray  # (l,) 3 place + axis, in increasing order
     value: NDArray  # (l,)
-    row: NDArray  # (l,) of the waveforms
+    row: NDArray  # (l,) row of the waveforms
 
 
 class System(NamedTuple):
@@ -56,14 +56,14 @@ class System(NamedTuple):
 
     varies: bool  # whether some histories are not constant
     moves: bool  # whether supports move
-    turns: bool  # rest angles that change
+    turns: bool  # whether rest angles change
     follows: bool  # whether loads depend on the displacement
-    touches: bool  # contact
-    presses: bool  # obstacles that move, or a wind that varies
+    touches: bool  # whether there is contact
+    presses: bool  # whether obstacles move or a wind varies
     rows: int  # rows of arrays: n, plus rows for hidden dofs
     energies: int  # number of strain energy groups
     order: NDArray  # (n,) node number of each place in memory
-    supported: NDArray  # (s,) held dofs 3 place + axis, in the case's order
+    supported: NDArray  # (s,) supported dofs 3 place + axis, in the case's order
     waves: Waveforms
     loads: Entries  # N
     moved: Entries  # S, m
@@ -71,14 +71,14 @@ class System(NamedTuple):
     actuators: Actuators
     following: Following
     ties: Ties
-    alpha: float  # 1/s, of the drag alpha M v
-    lightness: NDArray  # (n,) 1 / mass of the nodes with contact, else (0,), 1/kg
+    alpha: float  # factor of the drag alpha M v, 1/s
+    lightness: NDArray  # (n,) 1 / mass of each node, 1/kg; (0,) without contact
 
 
 class Scratch(NamedTuple):
-    """Scratch of the equation of motion on one thread.
+    """Scratch arrays of the equation of motion on one thread.
 
-    Threads share them, except for histories, powers, `line`, and the ranges of their own nodes.
+    Threads share the arrays, except for histories, powers, `line`, and the ranges of their nodes.
     """
 
     force: NDArray  # (n, 3) F_int + beta K0 v - p
@@ -88,14 +88,14 @@ class Scratch(NamedTuple):
     time: NDArray  # (1,) time of the last evaluation of the histories, s
     factor: NDArray  # (h, 3) factors of the histories and their first two derivatives
     displacement: NDArray  # (n, 3) u; updated at every evaluation if supports move
-    velocity: NDArray  # (n, 3) v likewise
+    velocity: NDArray  # (n, 3) v, updated in the same way
     moving: NDArray  # (n, 3) acceleration including support motion, at samples
     stage: NDArray  # (3, n, 3) for methods of several stages
-    loads: NDArray  # (2,) first and last + 1 of the loads on the thread's own nodes,
-    moved: NDArray  # (2,) of the moving supports there,
-    turned: NDArray  # (2,) and of the actuators there
-    powers: NDArray  # (3,) in, out, to the air at the last step, for methods that store them, W
-    pushed: NDArray  # (n, 3) displacement-dependent loads, N; or none (0, 3)
+    loads: NDArray  # (2,) first and last + 1 of the loads on the thread's own nodes
+    moved: NDArray  # (2,) first and last + 1 of the moving supports there
+    turned: NDArray  # (2,) first and last + 1 of the actuators there
+    powers: NDArray  # (3,) powers in, out and to the air at the last step, if stored, W
+    pushed: NDArray  # (n, 3) displacement-dependent loads, N; (0, 3) if there are none
 
 
 class PackedCase(NamedTuple):
@@ -106,7 +106,7 @@ class PackedCase(NamedTuple):
     mass: Inertia
     callbacks: Callbacks
     numbering: Numbering
-    modal: ModalRows  # in the case's dof order
+    modal: ModalRows  # modal damping, in the case's dof order
     added: AddedMass
     heat: Heat | None
 
@@ -116,7 +116,7 @@ class PackedCase(NamedTuple):
         return self.body.sheet.model
 
     def begun(self) -> PackedCase:
-        """Copy for a new motion, with its own record of the heat at play."""
+        """Copy for a new motion, with a separate record of the heat at play."""
         if self.heat is None:
             return self
         return self._replace(heat=self.heat._replace(seen=np.array([np.nan, 0.0])))
@@ -125,10 +125,10 @@ class PackedCase(NamedTuple):
 def pack(
     case: Case, span: float, start: Origin | None = None, modal: ModalRows | None = None
 ) -> PackedCase:
-    """Pack a case into arrays; `span` (s) is short compared to variations of the loads.
+    """Pack a case into arrays; `span` (s) is a time in which loads hardly change.
 
     start : origin of the motion, the reference state of damping; rest by default.
-    modal : modal damping of a motion from there, if known.
+    modal : modal damping of a motion from `start`, if known.
     """
     histories: list[History] = []
     forces, supports = (*case.load_terms, *case.following_terms), case.imposed_terms
@@ -184,7 +184,7 @@ def pack(
 
 
 def _driven(case: Case, histories: list[History]) -> Assembly:
-    """Body of a case, with its obstacles driven by these histories."""
+    """Body of a case, whose obstacles follow the given histories."""
     if not case.obstacle_terms:
         return case.body
     rows = {plane: histories.index(history) for plane, history in case.obstacle_terms}
@@ -209,7 +209,7 @@ def _ordered(entries: Entries) -> Entries:
 
 
 def carry_supports(mass: Inertia, shape: NDArray) -> NDArray:
-    """Motion (n, 3) of all nodes with supports that move by `shape`: S in the module docstring.
+    """Motion (n, 3) of all nodes as supports move by `shape`; see S in the module docstring.
 
     shape : (n, 3), including nodes tied to supports by constraints.
     """
@@ -233,12 +233,12 @@ def _moved_mass(mass: sparse.csr_array, moves, histories) -> NDArray:
 
 
 def scratch(system: System) -> Scratch:
-    """Scratch of a single thread."""
+    """Scratch arrays of a single thread."""
     return scratches(system, [np.array([0, system.rows])])[0]
 
 
 def scratches(system: System, owned: Sequence[NDArray]) -> list[Scratch]:
-    """Scratch of each thread of a team, which own the rows owned[k][0] to owned[k][1] - 1."""
+    """Scratch arrays for each thread; thread k owns the rows owned[k][0] to owned[k][1] - 1."""
     rows, histories = system.rows, len(system.waves.code)
     force, product, displacement, velocity, moving = np.zeros((5, rows, 3))
     energy, stage = np.zeros(system.energies), np.zeros((3, rows, 3))
@@ -266,7 +266,7 @@ def scratches(system: System, owned: Sequence[NDArray]) -> list[Scratch]:
 
 
 def place(system: System, q: NDArray, w: NDArray, t: float, s: Scratch) -> None:
-    """Displacement and velocity at time t, q + S f and w + S f', into `s`."""
+    """Put displacement q + S f and velocity w + S f' at time t into `s`."""
     if system.varies:
         evaluate(system.waves, t, True, s.factor)
     s.time[0] = t
@@ -275,7 +275,7 @@ def place(system: System, q: NDArray, w: NDArray, t: float, s: Scratch) -> None:
 
 
 def carried(moved: Entries, factor: NDArray, still: NDArray) -> NDArray:
-    """Motion (n, 3) plus support motion, for factors (h,) or one of their derivatives."""
+    """Motion `still` (n, 3) plus support motion, for factors (h,) or a time derivative of them."""
     if not len(moved.dof):
         return still
     out = still.copy()
@@ -285,14 +285,14 @@ def carried(moved: Entries, factor: NDArray, still: NDArray) -> NDArray:
 
 @inner
 def carry(moved, factor, still, out):
-    """out = motion plus support motion; see `carried`."""
+    """out = `still` plus support motion; see `carried`."""
     values, rest = flat(out), flat(still)
     carry_part(moved, factor, rest, values, (0, values.size), (0, moved.dof.size))
 
 
 @inner
 def carry_part(moved, factor, rest, values, dofs, supports):
-    """Add support motion on the dofs dofs[0] to dofs[1] - 1, of the given range of supports."""
+    """Add the motion of a range of supports on the dofs from dofs[0] to dofs[1] - 1."""
     for i in range(dofs[0], dofs[1]):
         values[i] = rest[i]
     for k in range(supports[0], supports[1]):
@@ -301,7 +301,7 @@ def carry_part(moved, factor, rest, values, dofs, supports):
 
 @inner
 def power_of_moved(moved, force, factor, first, last):
-    """Power (W) of some moving supports against the bracket of forces."""
+    """Power (W) of moving supports first to last - 1 against the bracket of forces."""
     power, bracket = 0.0, flat(force)
     for k in range(first, last):
         power += bracket[moved.dof[k]] * moved.value[k] * factor[moved.row[k], 1]

@@ -1,8 +1,8 @@
 """Constraints in compiled loops: slaves follow their masters and pass their forces to them.
 
 Motions relative to the supports satisfy G v = 0. The free dofs determine such a motion: each slave
-is a linear combination of some of them, its masters, with constant coefficients. Forces on slaves
-act on the masters with the same coefficients. See `cases.constraints`.
+is a linear combination of some free dofs, its masters, with constant coefficients. A force on a
+slave acts on its masters with the same coefficients. See `cases.constraints`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from foldyn.mechanics.assembly import Numbering
 
 
 class Rows(NamedTuple):
-    """Linear combinations of dofs 3 place + axis: row k has entries start[k] to start[k + 1]."""
+    """Linear combinations of dofs 3 place + axis; row k: entries start[k] to start[k + 1] - 1."""
 
     start: NDArray  # (k + 1,)
     dof: NDArray
@@ -27,7 +27,7 @@ class Rows(NamedTuple):
 
 
 class Ties(NamedTuple):
-    """s slaves, dofs 3 place + axis; none where a case has no constraints."""
+    """The s slaves, as dofs 3 place + axis, and what they follow; none without constraints."""
 
     slave: NDArray  # (s,)
     masters: Rows  # masters of each slave
@@ -36,7 +36,7 @@ class Ties(NamedTuple):
 
 
 def ties_of(constraints: Constraints, by: Numbering) -> Ties:
-    """Constraints in memory order."""
+    """Constraints as `Ties`, in memory order."""
     if not constraints:
         nothing, empty = np.zeros(0, np.int64), Rows(np.zeros(1, np.int64), *np.zeros((2, 0)))
         empty = empty._replace(dof=nothing)

@@ -1,8 +1,8 @@
-"""Steps and samples: fit duration, time step and output interval to each other and to loads.
+"""Steps and samples: makes duration, time step, output interval and loads fit together.
 
-Pulses between the ends of steps would be lost silently. Adaptive methods end steps at the knots of
-the histories and check between them. With a fixed step, the user is warned beforehand how much of a
-history the method misses.
+A pulse between the ends of steps would be lost silently. Adaptive methods therefore end steps at
+the knots of the histories and check between knots. With a fixed step, a warning beforehand
+tells how much of a history the method misses.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from foldyn.errors import InputError, warn
 from foldyn.ram_limit import GIB, check_memory
 from foldyn.values import number, whole
 
-MOST_STEPS = 1e13  # years of computing for any structure
-DEFAULT_FRACTION = 0.5  # of the critical step, by default
-SAME_TIME = 1e-12  # of the largest time: stops closer than this are one
+MOST_STEPS = 1e13  # largest number of steps; takes years for any structure
+DEFAULT_FRACTION = 0.5  # default step relative to the critical step
+SAME_TIME = 1e-12  # stops closer than this share of the largest time are one
 NOTICED = 0.01  # share of a load that is missed, above which to warn
-MOST_LOOKS = 20_000  # times to evaluate; in longer motions, only steps near knots and some others
-MOST_CALLS = 500  # the same for user functions, which are slow
+MOST_LOOKS = 20_000  # evaluations; longer motions are checked near knots and at some places
+MOST_CALLS = 500  # largest number of evaluations of a user function, which is slow
 MOST_PLACES = 100
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
-MEMORY, IMPLICIT_MEMORY = 200, 20  # steps of a vibration's memory
-LARGEST_STEP = 1e-3  # of the largest step: short compared to loads that steps resolve
-SPAN = 0.05  # of a step: distance of the points for differentiating user histories
+MEMORY, IMPLICIT_MEMORY = 200, 20  # number of steps for which a vibration remembers a load
+LARGEST_STEP = 1e-3  # share of the largest step: short compared to loads that steps resolve
+SPAN = 0.05  # distance of points that differentiate user histories, relative to a step
 
 
 def apart(plan: StepPlan, critical: float) -> float:
@@ -42,12 +42,12 @@ def apart(plan: StepPlan, critical: float) -> float:
 class SampleSpacing(NamedTuple):
     """Sampling rule of a motion: a step count or a time interval."""
 
-    steps: int  # between samples; 0: use `interval`
-    interval: float  # s; 0.0: use `steps`
+    steps: int  # number of steps between samples; 0 to use `interval`
+    interval: float  # time between samples, s; 0.0 to use `steps`
 
 
 def sampling(duration: float, every_steps: int | None, interval: float | None) -> SampleSpacing:
-    """Sampling from the arguments of `simulate`: every step by default."""
+    """Sampling rule for the arguments of `simulate`; every step by default."""
     if interval is None:
         steps = 1 if every_steps is None else every_steps
         return SampleSpacing(whole("every_steps", steps, least=1, what="steps"), 0.0)
@@ -66,7 +66,7 @@ def fixed_steps(
 ) -> StepPlan:
     """Fit a time step and the sampling to a duration.
 
-    Without `dt` the step is half the critical one, shortened so that it divides the sampling
+    Without `dt` the step is half the critical step, shortened so that it divides the sampling
     interval and the duration.
     """
     per_sample, interval = sampling
@@ -102,8 +102,8 @@ def variable_steps(
 ) -> StepPlan:  # fmt: skip
     """Plan of a motion with error-controlled steps; `dt` is the largest step.
 
-    Without `dt` it is `largest`, at most a tenth of the motion. Drops knots outside the motion, and
-    knots that rounding cannot separate from the previous one.
+    Without `dt`, the largest step is `largest`, but at most a tenth of the motion. Knots outside
+    the motion are dropped, and so are knots that rounding cannot separate from the previous one.
     """
     dt = min(largest, 0.1 * duration) if dt is None else _given_step(duration, dt)
     _check_count(duration, dt)
@@ -114,7 +114,7 @@ def variable_steps(
 
 
 def expected_samples(plan: StepPlan) -> int:
-    """Number of samples including the start; a lower bound if steps vary and are counted."""
+    """Number of samples including the start; a lower bound if variable steps are counted."""
     if plan.steps:
         return plan.steps // plan.every + 1
     if plan.every:
@@ -195,12 +195,12 @@ def histories(case: Case) -> Iterator[tuple[str, History]]:
 
 
 def knots(case: Case) -> NDArray[np.float64]:
-    """Times (s) of jumps or corners of loads, supports, planes, the wind or rest angles."""
+    """Times (s) of jumps or corners of loads, supports, planes, wind and rest angles."""
     return np.unique([time for _, history in histories(case) for time in history.knots() or ()])
 
 
 def jumps(case: Case) -> tuple[float, ...]:
-    """Times (s) at which loads or wind jump or may jump, as declared for user functions."""
+    """Times (s) at which loads or wind jump; for user functions, the declared times."""
     times: set[float] = set()
     for _, history in (*case.load_terms, *case.following_terms, *case.wind_terms):
         called = history.code == CALLED
@@ -209,7 +209,7 @@ def jumps(case: Case) -> tuple[float, ...]:
 
 
 def warn_of_functions(case: Case) -> None:
-    """Warn of user functions of time, which variable steps sample only here and there."""
+    """Warn of user functions of time, which variable steps sample at few points only."""
     for what, history in histories(case):
         if history.knots() is None:
             warn(
@@ -245,10 +245,10 @@ def overlooked(
 ) -> float:
     """Share of a history that fixed steps miss; see `warn_of_coarse_steps`.
 
-    The largest integral over `memory` steps of the distance between the history and the polynomial
-    through the evaluated points, relative to the largest integral of the history.
+    It is the largest integral over `memory` steps of the distance between the history and the
+    polynomial through the evaluated points, relative to the largest integral of the history.
 
-    jumps : whether steps are divided at load jumps.
+    jumps : whether steps are divided where loads jump.
     """
     unseen, whole = 0.0, 0.0
     try:
@@ -259,7 +259,7 @@ def overlooked(
             gap, size = _integrals(history, ends, looks, jumps)
             unseen = max(unseen, _largest_sum(gap, memory))
             whole = max(whole, _largest_sum(size, memory))
-    except InputError:  # a failing function: the motion will stop there and say why
+    except InputError:  # a failing function: the motion will stop there, with the reason
         return 0.0
     return unseen / whole if whole > 0.0 else 0.0
 
@@ -283,7 +283,7 @@ def _stretches(history: History, plan: StepPlan, memory: int) -> list[tuple[int,
 def _integrals(
     history: History, ends: NDArray, looks: tuple[float, ...], jumps: bool
 ) -> tuple[NDArray, NDArray]:
-    """Integrals over each step between `ends` of a history's missed part, and of its size."""
+    """Integrals, for each step between `ends`, of the missed part of a history and of its size."""
     turns = np.array([t for t in history.knots() or () if ends[0] < t < ends[-1]])
     pieces = np.union1d(ends, turns)
     length = 0.5 * np.diff(pieces)

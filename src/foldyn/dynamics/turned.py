@@ -1,14 +1,14 @@
-"""Energy that constant damping takes from turning panels, though rotation causes no strain.
+"""Energy that constant damping takes from turning panels, although rotation causes no strain.
 
-beta K0 and modal damping use the matrix C of one state, with the panel orientations of that state.
-To C, a panel that has turned by theta about an axis a and keeps turning at the rate w appears to
-have, in addition to a rotation, the straining velocity w sin(theta) a x (a x x), which dissipates
-w^2 sin^2(theta) kappa,
+Beta K0 and modal damping use the matrix C of one state, with the panel orientations of that state.
+Consider a panel that has turned by theta about an axis a and keeps turning at the rate w. By C it
+has, in addition to a rotation, the straining velocity w sin(theta) a x (a x x), which dissipates
+the power w^2 sin^2(theta) kappa,
 
     kappa = x' A C A x,    A = a a' - 1,
 
-in total, up to theta, w kappa (theta / 2 - sin(2 theta) / 4). Each panel takes a share proportional
-to its area.
+and the energy w kappa (theta / 2 - sin(2 theta) / 4) up to theta. Each panel takes a share
+proportional to its area.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.dynamics.system import PackedCase
 
-SHARE = 0.01  # of the energies at play: threshold of the warning
+SHARE = 0.01  # threshold of the warning, as a share of the energies at play
 
 
 def resists_turns(case: Case, packed: PackedCase) -> bool:
-    """Whether a case has panels and such damping."""
+    """Whether a case has panels and beta K0 or modal damping."""
     constant = case.rayleigh.beta > 0.0 or len(packed.modal.rows) > 0
     return constant and len(case.structure.triangles) > 0
 
@@ -34,11 +34,11 @@ def turns_told(
     case: Case, packed: PackedCase, start: NDArray, displacement: NDArray, velocity: NDArray,
     scale: float,
 ) -> str:  # fmt: skip
-    """Warning about a motion in which panels turn far; empty otherwise.
+    """Warning about a motion in which panels turn far; empty if they do not.
 
     start : (n, 3) displacement at the start, m.
     displacement, velocity : (k, n, 3) at some samples, m and m/s.
-    scale : energy at play, J.
+    scale : energies at play, J.
     """
     if scale == 0.0 or not (np.isfinite(displacement).all() and np.isfinite(velocity).all()):
         return ""
@@ -82,7 +82,7 @@ def turned(
 
 
 def _strained(case: Case, packed: PackedCase, there: NDArray) -> NDArray:
-    """F' C F (9, 9) of the displacements E x, E each unit matrix, x where C is from, `there`."""
+    """F' C F (9, 9), with F the fields E x for each unit matrix E and x the positions at `there`."""
     x = case.structure.nodes + there
     x -= x.mean(axis=0)
     fields = np.zeros((x.size, 9))
