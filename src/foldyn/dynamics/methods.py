@@ -169,7 +169,7 @@ class Integrator:
     tableau: Tableau | None = None
 
     def __post_init__(self) -> None:
-        """Check that an explicit method has growth and evaluations, and an implicit one a scheme."""
+        """Check that an explicit method has growth and evaluations, an implicit one a scheme."""
         if self.scheme is None and (self.growth is None or not self.evaluations):
             raise TypeError(
                 f"{self.name}: an explicit method needs growth, which limits its steps, and "

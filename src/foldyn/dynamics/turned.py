@@ -82,7 +82,7 @@ def turned(
 
 
 def _strained(case: Case, packed: PackedCase, there: NDArray) -> NDArray:
-    """F' C F (9, 9), with F the fields E x for each unit matrix E and x the positions at `there`."""
+    """F' C F (9, 9), with F the fields E x for each unit matrix E, x the positions at `there`."""
     x = case.structure.nodes + there
     x -= x.mean(axis=0)
     fields = np.zeros((x.size, 9))

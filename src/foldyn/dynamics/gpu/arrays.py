@@ -1,4 +1,4 @@
-"""Cases of one topology as arrays for the GPU: the CPU's arrays, stacked over the models."""
+"""Cases of one topology as arrays for the GPU: the arrays of the CPU, stacked over the models."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NO_DAMPERS = viscous(
 
 
 class CaseArrays:
-    """Cases of one topology as arrays of the host.
+    """Cases of one topology as arrays on the host.
 
     Parameters
     ----------
@@ -41,10 +41,10 @@ class CaseArrays:
     ----------
     elements : Elements
     nodes : Nodes
-        Except for the rows of the loads, which `load_rows` (m, l) holds by history.
+        Everything except the rows of the loads, which `load_rows` (m, l) holds by history.
     counts : Counts
     histories : list
-        (case, row) of each row of the factors.
+        Pair (case, row) for each row of the factors.
     """
 
     def __init__(self, cases: Sequence[PackedCase]) -> None:
@@ -84,7 +84,7 @@ class CaseArrays:
 
     @staticmethod
     def _terms(bodies: Sequence[Any], kind: type) -> list[list[Any]]:
-        """Terms of a kind: for each one, the list over all models."""
+        """Terms of a kind: for each term, a list over all models."""
         rows = [[term for term in body.others if isinstance(term, kind)] for body in bodies]
         return [list(own) for own in zip(*rows, strict=True)]
 
@@ -94,7 +94,7 @@ class CaseArrays:
         self._slots += len(nodes)
 
     def _again(self, nodes: NDArray, plus: int, first: int = 0) -> None:
-        """Use the same slots for other nodes; negative nodes get none."""
+        """Use the slots that were reserved last for other nodes too; negative nodes get none."""
         slots = first + np.arange(len(nodes))
         own = np.asarray(nodes).astype(np.int64)
         some = own >= 0
@@ -161,7 +161,7 @@ class CaseArrays:
 
 
 def topology(packed: PackedCase) -> tuple[Any, ...]:
-    """Properties that the cases of one launch share."""
+    """Properties that all cases of one launch share."""
     arrays = [getattr(packed.model, name) for name in TOPOLOGY]
     arrays += [packed.system.order, packed.system.supported]
     kinds = []
@@ -179,14 +179,14 @@ def topology(packed: PackedCase) -> tuple[Any, ...]:
 
 
 def _one_or_all(arrays: Sequence[NDArray]) -> NDArray:
-    """Arrays of all models stacked, or of one model if all are equal."""
+    """Stack the arrays of all models, or return that of one model if all are equal."""
     first = arrays[0]
     alike = all(array is first or np.array_equal(array, first) for array in arrays[1:])
     return np.ascontiguousarray(arrays[0][None] if alike else np.stack(arrays))
 
 
 def _stacked(own: Sequence[Any], same: Sequence[str]) -> Any:
-    """A tuple of arrays, stacked over the models except for the names in `same`."""
+    """A named tuple whose arrays are stacked over the models, except for the names in `same`."""
     names = [name for name in own[0]._fields if name not in same]
     numbers = {name: _one_or_all([getattr(each, name) for each in own]) for name in names}
     kept = {name: np.ascontiguousarray(getattr(own[0], name)) for name in same}
@@ -194,7 +194,7 @@ def _stacked(own: Sequence[Any], same: Sequence[str]) -> Any:
 
 
 def _with_force(model: BarsHinges) -> BarsHinges:
-    """The model without bars outside all runs, which membranes replace."""
+    """The model with only those bars that have a law; membranes replace the others."""
     count = int(model.bar_runs[:, 1].max(initial=0))
     bars = ("bars", "bar_vector", "bar_per_length2", "bar_stiffness")
     return model._replace(**{name: getattr(model, name)[:count] for name in bars})

@@ -9,7 +9,7 @@ from numba import config
 
 from foldyn.errors import InputError
 
-SHARED = 48 * 1024  # bytes per block
+SHARED = 48 * 1024  # shared memory per block, bytes
 GIB = 2.0**30
 
 
@@ -33,7 +33,7 @@ def free_memory() -> float:
 
 
 def check_size(needed: float, what: str) -> None:
-    """Refuse a case whose size (bytes) exceeds the free GPU memory."""
+    """Refuse a case that needs more than the free GPU memory; `needed` is in bytes."""
     free = free_memory()
     if needed > free:
         raise InputError(
@@ -51,9 +51,9 @@ def size_of(values: Any) -> int:
 
 
 def flat_strides(array: np.ndarray) -> np.ndarray:
-    """A contiguous array with contiguous strides, also along axes of length one.
+    """A contiguous array whose strides are contiguous too, even along axes of length one.
 
-    Axes made by `None` have stride 0, and Numba processes such arrays row by row.
+    An axis made by `None` has stride 0, and Numba processes such arrays row by row.
     """
     return np.ascontiguousarray(array).reshape(-1).reshape(array.shape)
 

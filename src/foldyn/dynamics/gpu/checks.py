@@ -1,4 +1,4 @@
-"""Check, before any import of CUDA, whether a case suits a GPU and whether there is one."""
+"""Check, before CUDA is imported, whether a GPU supports a case and whether there is one."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ from foldyn.mechanics.springs import SpringsTerm
 from foldyn.mechanics.viscous import ViscousTerm
 from foldyn.structures.bars_hinges import BarsHingesTerm
 
-FIELDS = "structure", "supports", "loads", "damping", "masses", "contact"  # of a case, looked at
+# fields of a case that are checked
+FIELDS = "structure", "supports", "loads", "damping", "masses", "contact"
 METHODS = "rk4", "central_difference"
-OLDEST = 12, 0  # minimum CUDA version of the driver
+OLDEST = 12, 0  # oldest CUDA version of a driver that works
 TERMS = MembranesTerm, SpringsTerm, DampingMatrix, ViscousTerm
-MOST_GROUPS, MOST_BARS, MOST_KINDS = 8, 16, 3  # of strain energy; of a panel; of panels
+MOST_GROUPS, MOST_BARS, MOST_KINDS = 8, 16, 3  # energy groups; bars of a panel; kinds of panels
 
 
 def check_gpu(method: str) -> None:
-    """Refuse a method without GPU kernels, or a machine without a GPU; name what is missing."""
+    """Refuse a method without GPU kernels or a machine without GPU, and name what is missing."""
     if method not in METHODS:
         raise InputError(
             f' = "gpu": {method} has no GPU kernel; choose one of {", ".join(METHODS)}, or '
@@ -38,7 +39,7 @@ def check_gpu(method: str) -> None:
 
 
 def no_card() -> str:
-    """Reason why no GPU is usable here, with the remedy; empty if one is."""
+    """Reason why no GPU can be used here, with the remedy; empty if one can."""
     if config.ENABLE_CUDASIM:  # type: ignore[attr-defined]
         return ""
     if importlib.util.find_spec("numba_cuda") is None:
@@ -69,9 +70,9 @@ def check_taken(case: Case, packed: PackedCase, place: str = "device") -> None:
 
 
 def lacking(case: Case, packed: PackedCase) -> str:
-    """Name of a part of the case that has no GPU kernel; empty if all have one.
+    """Name of a part of the case that has no GPU kernel; empty if all parts have one.
 
-    Only fields and terms listed here count as supported.
+    A field or term that is not listed here counts as unsupported.
     """
     for field in fields(case):
         if field.name not in FIELDS and not _is_default(field, getattr(case, field.name)):

@@ -1,4 +1,4 @@
-"""The choice between CPU and GPU for many models where the user leaves it open."""
+"""The choice between CPU and GPU for many models, if the user leaves it open."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from foldyn.dynamics.gpu.checks import METHODS, lacking, no_card
 from foldyn.dynamics.motion import Motion
 
 DEVICES = "auto", "cpu", "gpu"
-FEWEST = 10  # models
-LARGEST = 3000  # dofs: for larger models a block of threads is too slow
-EVALUATION = 35e-9  # s per dof of a force evaluation: on a CPU core, and in a block of threads
-ABREAST = 200  # blocks that run as fast as a single one
-COMPILING = 12.0  # s
+FEWEST = 10  # least number of models for a GPU
+LARGEST = 3000  # largest number of dofs: for more, a block of threads is too slow
+EVALUATION = 35e-9  # time per dof and force evaluation, on a core and in a block, s
+ABREAST = 200  # number of blocks that run as fast as a single block
+COMPILING = 12.0  # time to compile kernels, s
 
 
 def choose(
@@ -22,7 +22,7 @@ def choose(
 
     count : number of motions; `motions` are representative samples.
     cores : number of CPU cores to compare with, each running one motion at a time.
-    preparing : time (s) to prepare each motion; sequential if a GPU runs them.
+    preparing : time (s) to prepare each motion; a GPU run prepares them one after the other.
     """
     if count < FEWEST:
         return "cpu", f"a GPU pays from {FEWEST} models on"

@@ -1,4 +1,4 @@
-"""Elements on the GPU: each thread handles some and writes their corner forces to slots.
+"""Elements on the GPU: each thread handles some elements and writes corner forces to slots.
 
 Elements and slots belong to one model; arrays of several models have a leading model axis.
 """
@@ -27,14 +27,14 @@ class Counts(NamedTuple):
     """Numbers of elements, nodes and slots."""
 
     nodes: int
-    slots: int  # of force vectors
-    groups: int  # of strain energy
+    slots: int  # number of slots, each for a force vector
+    groups: int  # number of strain energy groups
     spring_group: int
     damped: int  # rows of the damping matrix: all nodes, or 0
 
 
 class Damping(NamedTuple):
-    """A constant damping matrix of the dofs."""
+    """A constant damping matrix over the dofs, in CSR format."""
 
     start: Any
     column: Any
@@ -45,8 +45,8 @@ class Elements(NamedTuple):
     """The elements of m models; arrays have a leading axis of m, or of 1 if all are equal."""
 
     model: BarsHinges
-    bar_code: Any  # (nb,)
-    hinge_code: Any  # (nh,)
+    bar_code: Any  # (nb,) law code of each bar
+    hinge_code: Any  # (nh,) law code of each hinge
     membranes: tuple[Membranes, ...]
     springs: Springs
     viscous: Viscous
@@ -56,11 +56,11 @@ class Elements(NamedTuple):
 if SIMULATED:
 
     def rows_of(array, first, rows):  # type: ignore[no-redef]
-        """Rows of three from a place in a flat array."""
+        """Rows of three numbers, beginning at a place in a flat array."""
         return array[first : first + 3 * rows].reshape(rows, 3)
 
     def at(array, m):  # type: ignore[no-redef]
-        """Array of model m, or the one that all models share."""
+        """Array of model m, or the array that all models share."""
         return array[m if array.shape[0] > 1 else 0]
 
 else:
@@ -75,7 +75,7 @@ else:
 
     @intrinsic
     def rows_of(typing_context, array, first, rows):
-        """Intrinsic version of `rows_of`: NumPy's reshape would call the run-time library."""
+        """Intrinsic version of `rows_of`, as NumPy's reshape would call the run-time library."""
         view = types.Array(array.dtype, 2, "C")
 
         def codegen(context, builder, signature, arguments):
@@ -92,7 +92,7 @@ else:
 
     @intrinsic
     def at(typing_context, array, m):
-        """Intrinsic version of `at`: a device function may not return an array."""
+        """Intrinsic version of `at`, as a device function may not return an array."""
         view = types.Array(array.dtype, array.ndim - 1, "C")
 
         def codegen(context, builder, signature, arguments):
@@ -120,7 +120,7 @@ def put(slot, size, s, x, y, z):
 
 @on_device
 def bars_to(own, code, u, slot, size, who, crowd, sampled, strain):
-    """Write bar forces at their second ends; add energies at a sample."""
+    """Write the bar forces at the second ends; add the energies at a sample."""
     for e in range(who, own.bars.shape[0], crowd):
         stretch = bar_extension(own, u, e)
         s = own.bar_stiffness[e] * bar_stress(code[e], stretch, 0)
@@ -138,7 +138,7 @@ def bars_to(own, code, u, slot, size, who, crowd, sampled, strain):
 
 @on_device
 def hinges_to(own, code, u, slot, size, at_slot, who, crowd, sampled, looks, angle, strain):
-    """Write hinge forces; return the number of hinges that passed through 0 or 360 degrees."""
+    """Write hinge forces; return the number of hinges that have passed 0 or 360 degrees."""
     count, p, jumped = own.hinges.shape[0], own.hinge_parameters, 0
     for e in range(who, count, crowd):
         found = hinge_dihedral(own, u, e)
@@ -169,7 +169,7 @@ def hinges_to(own, code, u, slot, size, at_slot, who, crowd, sampled, looks, ang
 
 @on_device
 def springs_to(all_springs, m, group, u, slot, size, at_slot, who, crowd, sampled, strain):
-    """Write spring forces, directed ones at their first ends; return the next free slot."""
+    """Write spring forces, directed springs only at the first end; return the next free slot."""
     own = Springs(
         all_springs.ends, at(all_springs.direction, m), at(all_springs.stiffness, m),
         all_springs.axial_ends, at(all_springs.vector, m), at(all_springs.length, m),

@@ -1,4 +1,4 @@
-"""GPU engines: of one motion, in place of an `ExplicitEngine`, and of one motion among many."""
+"""GPU engines: for one motion, in place of an `ExplicitEngine`, and for one motion among many."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from foldyn.dynamics.system import PackedCase
 
 
 class CardEngine(Engine):
-    """An explicit method on the card, for one motion.
+    """An explicit method on the GPU, for one motion.
 
     If a stretch fails, the CPU repeats it and reports the reason.
 
@@ -72,7 +72,7 @@ class CardEngine(Engine):
     def _again(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Repeat a stretch on the CPU, from the state where the GPU began it."""
         if self._alone is None:
-            case: Any = None  # implicit methods alone need it
+            case: Any = None  # only implicit methods need the case
             self._alone = self._method.engine(case, self._packed, self._state, self._plan)
         tally = self._state.tally
         self._alone.start_with(self._sums[:, :2].sum(axis=0))
@@ -82,7 +82,7 @@ class CardEngine(Engine):
         return result
 
     def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
-        """Resume from such arrays; see `Engine`."""
+        """Resume from checkpoint arrays; see `Engine`."""
         self._sums = np.array(arrays["card_sums"])
         super().resume_from(arrays)
         self._launches = self._launched()
@@ -97,7 +97,7 @@ class CardEngine(Engine):
 
 
 class BlockEngine:
-    """Engine placeholder of a motion that ran with others on the GPU."""
+    """Stands for the engine of a motion that ran with others on the GPU."""
 
     threads = 1
 

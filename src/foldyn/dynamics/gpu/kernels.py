@@ -1,11 +1,11 @@
 """Explicit methods as CUDA kernels: one model per block of threads, or one on the whole grid.
 
-A force evaluation has two halves, separated by a barrier. First, threads share the elements: each
-writes its corner forces to its own slots. Then threads share the nodes: each adds up the slots of
-its nodes, in a fixed order, and moves them. Nothing is added atomically, so the same input gives
-the same bits on the same card.
+A force evaluation has two halves, separated by a barrier. First, the threads share the elements:
+each writes the corner forces of its elements to slots of their own. Then the threads share the
+nodes: each adds up the slots of its nodes, in a fixed order, and moves the nodes. Nothing is added
+atomically, so the same input gives the same bits on the same GPU.
 
-A model per block is stored in the block's shared memory; a model per grid in global memory.
+One model per block lives in the block's shared memory; one model per grid in global memory.
 """
 
 from __future__ import annotations
@@ -34,43 +34,43 @@ from foldyn.mechanics.viscous import Viscous
 
 strain_of = ported(membranes.strain_of)
 viscous_gradient = ported(viscous.element_gradient)
-REGISTERS = 168  # per thread of a grid with one model: with fewer, more threads run at once
+REGISTERS = 168  # registers per thread of a grid with one model; fewer let more threads run
 
 
 class Nodes(NamedTuple):
-    """Arrays for the node half of an evaluation."""
+    """Arrays for the second half of an evaluation, which works on nodes."""
 
     start: Any  # (n + 1,) first entry of each node
-    entry: Any  # slots, or -1 - slot where it is subtracted
-    order: Any  # (n,) the structure's number of each node
-    support: Any  # (3 n,) number of the supported dof, or -1
+    entry: Any  # slots to add; -1 - slot for a slot to subtract
+    order: Any  # (n,) number of each node in the structure
+    support: Any  # (3 n,) number of each dof among the supported ones, or -1
     mass: Any  # (m, n)
     inverse: Any  # (m, n, 3)
     alpha: Any  # (m,)
     load_start: Any  # (m, 3 n + 1) first load of each dof
-    load: Any  # (m, l) N
-    load_row: Any  # (m, l) rows of the factors
+    load: Any  # (m, l) loads, N
+    load_row: Any  # (m, l) row of the factors for each load
 
 
 class CardState(NamedTuple):
-    """State of m models; `note` and `sums` have a row per thread, block after block."""
+    """State of m models; `note` and `sums` have one row per thread, block after block."""
 
     u: Any  # (m, n, 3)
     v: Any
-    first: Any  # (m, n, 3) sums of the method, or its acceleration
+    first: Any  # (m, n, 3) sums of slopes, or the acceleration
     second: Any
     ahead_u: Any  # (m, n, 3) point of force evaluation, unless in shared memory
     ahead_v: Any
-    slot: Any  # (m, 3 slots) likewise
+    slot: Any  # (m, 3 slots) force vectors, unless in shared memory
     angle: Any  # (m, nh)
     wrong: Any  # (m,) int64
     note: Any  # (threads, columns)
-    sums: Any  # (threads, 4) powers in and out at the last step, W; work and dissipated so far, J
+    sums: Any  # (threads, 4) powers in and out at the last step, W; work and dissipation, J
     barrier: Any  # (1,) int64
 
 
 class Written(NamedTuple):
-    """Samples of one launch; the last row of the energies belongs to the end of the launch."""
+    """Samples of one launch; the last row of energies belongs to the end of the launch."""
 
     u: Any  # (m, k, n, 3)
     v: Any
@@ -79,18 +79,18 @@ class Written(NamedTuple):
 
 
 class Span(NamedTuple):
-    """Steps of a launch, for m models; a last step before the first means none."""
+    """Steps of a launch, for m models; `last` before `first` means no step."""
 
     first: Any  # (m,)
     last: Any
     dt: Any
     every: Any
-    sample: Any  # (m,) number of the next sample, and of the launch's first
+    sample: Any  # (m,) number of the launch's first sample, then of the next one
 
 
 @on_device
 def panels_to(kind, m, u, slot, size, at_slot, who, crowd, sampled, strain):
-    """Write forces of the panels of one kind at their corners; return the next free slot."""
+    """Write corner forces of the panels of one kind; return the next free slot."""
     own = Membranes(
         kind.nodes, kind.ends, at(kind.vector, m), at(kind.per_length2, m), at(kind.stiffness, m)
     )
@@ -118,7 +118,7 @@ def panels_to(kind, m, u, slot, size, at_slot, who, crowd, sampled, strain):
 
 @on_device
 def dampers_to(dampers, m, u, v, slot, size, at_slot, who, crowd):
-    """Write forces of viscous elements at their four nodes; return the dissipated power, W."""
+    """Write forces of viscous elements on their four nodes; return the dissipated power, W."""
     own = Viscous(
         dampers.dofs, at(dampers.axial, m), at(dampers.corners, m), at(dampers.hidden_turn, m),
         at(dampers.coefficient, m), at(dampers.gradient, m),
@@ -143,7 +143,7 @@ def dampers_to(dampers, m, u, v, slot, size, at_slot, who, crowd):
 def forces_to(
     elements, counts, m, u, flat_u, flat_v, slot, angle, who, crowd, sampled, looks, strain
 ):
-    """First half: forces of all elements; returns the number of failures, and W dissipated."""
+    """First half: forces of all elements; return the number of failures and the power lost, W."""
     model, size = elements.model, counts.slots
     own = BarsHinges(
         at(model.rest, m), model.bars, at(model.bar_vector, m), at(model.bar_per_length2, m),
@@ -157,7 +157,7 @@ def forces_to(
         own, elements.hinge_code, u, slot, size, s, who, crowd, sampled, looks, angle, strain
     )
     s += 4 * own.hinges.shape[0]
-    kinds = elements.membranes  # unrolled: Numba cannot loop over tuples on the GPU
+    kinds = elements.membranes  # unrolled, as Numba cannot loop over tuples on the GPU
     s = panels_to(kinds[0], m, u, slot, size, s, who, crowd, sampled, strain)
     s = panels_to(kinds[1], m, u, slot, size, s, who, crowd, sampled, strain)
     s = panels_to(kinds[2], m, u, slot, size, s, who, crowd, sampled, strain)
@@ -186,7 +186,7 @@ def sum_to(nodes, slot, size, i, out):
 
 @on_device
 def load_on(nodes, load_start, load, load_row, factor, time, dof):
-    """The load (N) on a dof."""
+    """Load on a dof, N."""
     total = 0.0
     for k in range(load_start[dof], load_start[dof + 1]):
         total += load[k] * factor[load_row[k], time]
@@ -195,7 +195,7 @@ def load_on(nodes, load_start, load, load_row, factor, time, dof):
 
 @on_device
 def meet(state, blocks, arrived):
-    """Wait for all threads of the grid; return the number of such waits."""
+    """Wait for all threads of the grid; return the number of times they have met."""
     cuda.syncthreads()
     if cuda.threadIdx.x == 0:
         cuda.threadfence()
@@ -219,7 +219,7 @@ def note_down(state, thread, groups, strain, kinetic, work_out, work_in):
 
 @on_device
 def add_notes(state, row, columns):
-    """Sum the notes over the threads of a block, with its first threads."""
+    """Add up the notes of all threads of a block; its first threads do it."""
     first, count = cuda.blockIdx.x * cuda.blockDim.x, cuda.blockDim.x
     for c in range(cuda.threadIdx.x, columns, count):
         total = 0.0
@@ -232,7 +232,7 @@ def add_notes(state, row, columns):
 def kernel(method: str, wide: bool, shared: bool) -> Any:
     """Compile the time loop of a method.
 
-    wide : whether the grid holds one model; otherwise each block holds one.
+    wide : whether one model uses the whole grid; otherwise each block has one model.
     shared : whether the model is in shared memory.
     """
     runge = method == "rk4"
@@ -363,7 +363,7 @@ def kernel(method: str, wide: bool, shared: bool) -> Any:
                 work_in += dt / 6.0 * part_in
                 work_out += dt / 6.0 * part_out
         sums[0], sums[1], sums[2], sums[3] = before_in, before_out, work_in, work_out
-        cuda.syncthreads()  # notes of a last sample are complete
+        cuda.syncthreads()  # until the notes of a last sample are complete
         note_down(state, thread, groups, strain, 0.0, work_out, work_in)
         cuda.syncthreads()
         add_notes(state, out.energy[out.energy.shape[0] - 1], groups + 3)

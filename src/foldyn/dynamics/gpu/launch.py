@@ -1,4 +1,4 @@
-"""Launches of a method's kernel: models on the GPU, with their steps in pieces."""
+"""Launches of a method's kernel: models on the GPU, whose steps are computed piece by piece."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ from foldyn.dynamics.motion_state import MotionState, Samples, StepPlan
 from foldyn.dynamics.system import PackedCase
 
 BLOCK = 128  # threads per block of a grid with one model
-FEWEST, MOST = 64, 256  # threads per block with one model each: few, unless there are few models
-WINDOW = 0.25  # of the free memory: samples of a launch
-SAMPLES = 2.0**30  # bytes: upper limit, as the host holds them too
-FACTORS = 2**28  # bytes: load factors of a launch
-LOOKS = {"rk4": (0.0, 0.5, 1.0), "central_difference": (0.0,)}  # in a step, at the loads
+FEWEST, MOST = 64, 256  # threads per block with a model each: few if there are many models
+WINDOW = 0.25  # largest share of the free memory for the samples of a launch
+SAMPLES = 2.0**30  # upper limit for these samples, as the host holds them too, bytes
+FACTORS = 2**28  # upper limit for the load factors of a launch, bytes
+# fractions of a step at which a method evaluates the loads
+LOOKS = {"rk4": (0.0, 0.5, 1.0), "central_difference": (0.0,)}
 
 
 class Places(NamedTuple):
@@ -32,7 +33,7 @@ class Places(NamedTuple):
     u: NDArray  # (m, n, 3)
     v: NDArray
     carry: NDArray  # (m, n, 3) acceleration, for methods that keep it
-    sums: NDArray  # (m, 4) as in `State`, or (threads, 4) with the same launch shape
+    sums: NDArray  # (m, 4) as in `CardState`; (threads, 4) in the same launch shape
     angle: NDArray  # (m, nh)
 
 
@@ -40,9 +41,9 @@ def take(
     written: Written, k: int, out: Samples, state: MotionState, plan: StepPlan, last: int,
     evaluations: int,
 ) -> None:  # fmt: skip
-    """Store the samples of model k of a launch that ended at step `last`, and count its steps.
+    """Store the samples of model k from a launch that ended at step `last`; count the steps.
 
-    evaluations : of forces in a step.
+    evaluations : number of force evaluations per step.
     """
     tally, begun, energy = state.tally, int(state.tally.samples), written.energy[:, k] + 0.0
     end = last // plan.every + 1
@@ -56,24 +57,24 @@ def take(
 
 
 class Launches:
-    """Models of one topology on the card.
+    """Models of one topology on the GPU.
 
     Parameters
     ----------
     cases : sequence of PackedCase
     plans : sequence of StepPlan
-        Their steps, which may differ between models.
+        Steps of each model, which may differ between models.
     method : str
         One of `checks.METHODS`.
     places : Places
-        Where they start.
+        State from which the models start.
     wide : bool
-        Whether one model uses the whole GPU; otherwise each has a block.
+        Whether one model uses the whole GPU; otherwise each model has a block.
 
     Raises
     ------
     InputError
-        They exceed the GPU memory.
+        The models exceed the GPU memory.
     """
 
     def __init__(
@@ -109,9 +110,9 @@ class Launches:
         self._start(places)
 
     def _histories(self) -> list[tuple[int, int] | None]:
-        """Distinct histories at distinct steps, as (case, row); None for constant ones.
+        """Distinct histories at distinct steps, as (case, row); None stands for a constant history.
 
-        Sets `_of_case`, their numbers by the rows of each case.
+        Sets `_of_case` to the numbers of the histories for each row of each case.
         """
         numbers: dict[Any, int] = {}
         found: list[Any] = []
@@ -174,7 +175,7 @@ class Launches:
         )  # fmt: skip
 
     def fits(self) -> NDArray:
-        """Largest number of steps (m,) per launch for which samples and factors have room."""
+        """Largest number of steps (m,) per launch for which samples and factors fit in memory."""
         (m, n), looks = self._shape, len(LOOKS[self._method])
         sample = 8.0 * m * (6 * n + self._supported) + 8.0 * self._blocks * 11
         samples = max(1, int(min(SAMPLES, WINDOW * card.free_memory()) / sample))
@@ -182,7 +183,7 @@ class Launches:
         return np.minimum(samples * self._every, factors)
 
     def _factors(self, first: NDArray, last: NDArray) -> NDArray:
-        """Factors (h, looks) of all histories for these steps."""
+        """Factors (h, looks) of all histories in the steps from first to last."""
         looks = np.array(LOOKS[self._method])
         out = np.ones((len(self._rows), len(looks) * max(1, int((last - first).max() + 1))))
         for own, found in zip(out, self._rows, strict=True):
@@ -198,9 +199,9 @@ class Launches:
     def run(self, first: NDArray, last: NDArray, sample: NDArray) -> tuple[Written, NDArray]:
         """Advance models (m,) from step first to last; write samples from number `sample` (m,) on.
 
-        Returns the samples as host arrays, their energies (k + 1, m, columns), the last row at the
-        end of the launch; and the failed models (m,). The arrays fit the model with the most
-        samples.
+        Returns the samples as host arrays, and which models (m,) failed. The energies
+        (k + 1, m, columns) have a last row for the end of the launch. The arrays fit the model with
+        the most samples.
         """
         m, n = self._shape
         count = max(0, int((last // self._every + 1 - sample).max()))
@@ -236,7 +237,7 @@ class Launches:
         return cuda.to_device(np.zeros((count + 1, self._blocks, self._counts.groups + 3)))
 
     def _fit_grid(self, arguments: tuple[Any, ...]) -> None:
-        """Compile; with one model, use as many blocks as the GPU runs at once."""
+        """Compile the kernel; for one model, use as many blocks as the GPU runs at once."""
         self._compiled = self._kernel.specialize(*arguments)
         if self._wide:
             made: Any = next(iter(self._compiled.overloads.values()))

@@ -1,4 +1,4 @@
-"""Motions of many models on the GPU, one block of threads each."""
+"""Motions of many models on the GPU, with one block of threads for each model."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from foldyn.dynamics.gpu.launch import Launches, Places, take
 from foldyn.dynamics.motion import Motion
 from foldyn.errors import InputError
 
-AT_ONCE = 16384  # models per launch: more are no faster
+AT_ONCE = 16384  # models per launch; more would not be faster
 
 
 def integrate(motions: Sequence[Motion]) -> set[int]:
-    """Integrate motions with room for their samples; return the indices of failures.
+    """Integrate motions that have room for samples; return the indices of failures.
 
     Motions with the same topology and method run together; their steps may differ.
     """
     alike: dict[Any, list[int]] = {}
-    known: dict[int, Any] = {}  # preparation that several starts share
+    known: dict[int, Any] = {}  # preparations, which several starts can share
     for k, motion in enumerate(motions):
         packed = motion.packed
         if id(packed) not in known:
@@ -62,7 +62,7 @@ def _is_taken(motion: Motion) -> bool:
 
 
 def _integrated(motions: Sequence[Motion]) -> NDArray:
-    """Integrate motions of one topology and method; return which (m,) succeeded."""
+    """Integrate motions of one topology and method; return whether each (m,) succeeded."""
     clock = time.perf_counter()
     plans, method = [motion.plan for motion in motions], motions[0].method
     states = [motion.state for motion in motions]

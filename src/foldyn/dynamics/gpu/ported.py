@@ -1,7 +1,7 @@
 """Device functions ported from the CPU functions: the same formulas, compiled for the GPU.
 
-CPU-only parts are replaced: the vectors' `choose`, the initial guess of a cube root from the bits
-of a number, and calls by address, which user laws need.
+Parts that only run on a CPU are replaced: `choose` for vectors, the initial guess of a cube root
+from the bits of a number, and calls by address, which user laws need.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numba import cuda as _cuda
 
 from foldyn.jit import eights, intrinsics
 
-cuda: Any = _cuda  # types unknown to type checkers
+cuda: Any = _cuda  # its types are unknown to type checkers
 SIMULATED: bool = config.ENABLE_CUDASIM  # type: ignore[attr-defined]
 
 
@@ -35,7 +35,7 @@ def _cube_root(x):
 
 
 def on_device(function: Callable[..., Any]) -> Any:
-    """Compile a function for the device; the simulator calls it unchanged."""
+    """Compile a function for the GPU; the simulator calls it unchanged."""
     return function if SIMULATED else cuda.jit(device=True)(function)
 
 
@@ -59,7 +59,7 @@ _made: dict[Any, Any] = {
 
 
 def ported(function: Any) -> Any:
-    """Device version of a function that is compiled for the CPU."""
+    """GPU version of a function that is compiled for the CPU."""
     if function not in _made:
         source = function.py_func
         code = list(dis.get_instructions(source))
@@ -77,7 +77,7 @@ def ported(function: Any) -> Any:
 
 
 def _replaced(value: Any, names: set[str]) -> Any:
-    """Replacement on the device for a name in the CPU function."""
+    """GPU replacement for a value that the CPU function uses."""
     if isinstance(value, ModuleType):
         if value is not np and not value.__name__.startswith("foldyn"):
             return value

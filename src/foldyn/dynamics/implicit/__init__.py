@@ -1,1 +1,1 @@
-"""Parts shared by implicit integrators: Newton's method, its matrix, the step control."""
+"""Parts that implicit integrators share: Newton's method, its matrix, and the step control."""

@@ -1,15 +1,15 @@
 """Discrete gradients of functions of the mutual distances of four points.
 
 In a step the points move by dx about their mean positions x, and a measure e, such as a squared
-distance, goes from e0 to e1. With D the deforming part of dx, i.e. without rigid motion (least
-squares about x),
+distance, changes from e0 to e1. Let D be the deforming part of dx, without the rigid motion (least
+squares about x). Then
 
     g = grad e(x) + (e1 - e0 - grad e(x) . dx) D / |D|^2
 
-does the work e1 - e0 exactly, and has neither a resultant nor a moment about x: the gradient of a
-measure has none, and neither has a vector orthogonal to all rigid motions (Gonzalez, J. Nonlinear
-Sci. 6, 1996). The correction is of third order in the step. It vanishes for the squared distance of
-points that remain the closest ones.
+does exactly the work e1 - e0. It has neither a resultant nor a moment about x, because the gradient
+of a measure has none and D, which is orthogonal to all rigid motions, has none (Gonzalez, J.
+Nonlinear Sci. 6, 1996). The correction is of third order in the step. It vanishes for the squared
+distance of points that remain the closest ones.
 """
 
 from __future__ import annotations
@@ -22,29 +22,29 @@ from numpy.typing import NDArray
 from foldyn.jit.compiled import inner, inner_scalar
 from foldyn.jit.intrinsics import flat
 
-NOISE = 16.0 * float(np.finfo(float).eps)  # of positions: rounding error of a measure
+NOISE = 16.0 * float(np.finfo(float).eps)  # rounding error of a measure, relative to positions
 
 
 class Move(NamedTuple):
-    """Motion of four points in a step, and scratch for a measure."""
+    """Motion of four points in a step, and scratch arrays for a measure."""
 
     start: NDArray  # (4, 3) m
     middle: NDArray  # (4, 3) m
     end: NDArray  # (4, 3) m
     motion: NDArray  # (4, 3) dx, m
     deform: NDArray  # (4, 3) D, m
-    by_end: NDArray  # (12, 12) derivative of D by the end positions
-    slope: NDArray  # (12,) gradient of a measure at the midpoint
+    by_end: NDArray  # (12, 12) derivative of D with respect to the end positions
+    slope: NDArray  # (12,) gradient of a measure at the midpoint of the step
     second: NDArray  # (12, 12) second derivative at the midpoint
     after: NDArray  # (12,) gradient at the end
     gradient: NDArray  # (12,) discrete gradient
-    weights: NDArray  # (4,) of a distance; see `mechanics.contact.potential`
-    moves: NDArray  # (2, 4)
-    apart: NDArray  # (3,) m
+    weights: NDArray  # (4,) weights of a distance; see `mechanics.contact.potential`
+    moves: NDArray  # (2, 4) ways in which the weights may change
+    apart: NDArray  # (3,) distance vector, m
 
 
 def new_move() -> Move:
-    """Scratch for four points."""
+    """Scratch arrays for four points."""
     start, middle, end, motion, deform = np.zeros((5, 4, 3))
     slope, after, gradient = np.zeros((3, 12))
     by_end, second = np.zeros((2, 12, 12))
@@ -59,7 +59,7 @@ def new_move() -> Move:
 def go(move, tangent):
     """Compute the move from start and end; return |D|^2 (m2) and the largest coordinate (m).
 
-    tangent : whether to compute the derivative of D.
+    tangent : whether to compute the derivative of D too.
     """
     r, d, farthest = np.empty((4, 3)), move.deform, 0.0
     for c in range(3):
@@ -95,7 +95,7 @@ def go(move, tangent):
 
 @inner_scalar
 def _moment(r, d):
-    """Sum of r x d, both (4, 3)."""
+    """Sum of r x d over the points; both are (4, 3)."""
     t0, t1, t2 = 0.0, 0.0, 0.0
     for v in range(4):
         a, b, c = r[v, 0], r[v, 1], r[v, 2]
@@ -125,7 +125,7 @@ def _inertia_inverse(r):
 
 @inner_scalar
 def _turned_by(inverse, t0, t1, t2):
-    """Rotation vector of points with this inverse inertia under some moment."""
+    """Rotation vector of points with this inverse inertia, due to the moment (t0, t1, t2)."""
     axx, ayy, azz, axy, axz, ayz = inverse
     return (
         axx * t0 + axy * t1 + axz * t2,
@@ -136,7 +136,7 @@ def _turned_by(inverse, t0, t1, t2):
 
 @inner
 def _by_end(move, r, w, inverse):
-    """Derivative of D = dx - w x r by the end, which moves r by half and w by its turn."""
+    """Derivative of D = dx - w x r with respect to the end, which moves r by half, and w."""
     one, moved = np.zeros(3), np.zeros(3)
     for v in range(4):
         for c in range(3):
@@ -164,12 +164,12 @@ def _by_end(move, r, w, inverse):
 
 @inner
 def add_measure(move, size, farthest, change, law, law_slope, tangent, force, block):
-    """Add the force (12,) of a measure, and its derivative (12, 12) by the end positions.
+    """Add the force (12,) of a measure, and the derivative (12, 12) with respect to the end.
 
     size, farthest : results of `go`.
     change : change of the measure in the step.
-    law, law_slope : the quotient of an energy and the measure, N per unit of its gradient, and its
-        derivative with respect to the measure at the end.
+    law, law_slope : quotient of the changes of an energy and of the measure, N per unit of the
+        measure's gradient, and the derivative of this quotient with respect to the end measure.
     tangent : whether to compute the derivative.
     """
     dx, deform = flat(move.motion), flat(move.deform)

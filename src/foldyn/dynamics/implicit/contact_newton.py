@@ -1,16 +1,17 @@
 """Newton's method for steps with contact: no iterate lets parts penetrate.
 
-The contact potential is undefined after penetration and grows without bound before it. So the
-prediction of a step and every iteration are limited to the share in which no gap closes by more
-than a fraction of itself (`mechanics.contact.ccd`), and then by a line search: the iteration is
-shortened until the residual along it no longer has a large opposite sign, which would mean that the
-energy has passed its minimum. If no equilibrium is found, the step is rejected and halved.
+The contact potential grows without bound as parts approach each other, and is undefined once they
+penetrate. So the prediction of a step and every iteration are first limited to the share in which
+no gap closes by more than a fraction of itself (`mechanics.contact.ccd`). A line search may then
+shorten an iteration further, until the residual along it no longer has a large opposite sign: this
+would mean that the energy has passed its minimum. If no equilibrium is found, the step is rejected
+and halved.
 
-Which nodes touch changes from one iteration to the next. The tangent of contact is a sparse matrix
-of its own, added to that of the structure before the factorization.
+The nodes in contact change from one iteration to the next. The tangent of contact is therefore a
+sparse matrix of its own, which is added to that of the structure before the factorization.
 
 As long as nothing touches, a step is first solved without contact, with a matrix that may serve
-several steps, and accepted if the straight path to its end is free of contact.
+several steps. The result is accepted if the straight path to it is free of contact.
 
 Friction uses the normal force at the end of the last step, so that it has a potential within a
 step. Anchors and ties of slipping contacts are updated when a step is accepted, as in explicit
@@ -42,11 +43,11 @@ from foldyn.mechanics.contact.planes import move_planes, slip
 from foldyn.mechanics.contact.search import place as put_at
 from foldyn.mechanics.contact.term import ContactTerm
 
-MOST = 60  # iterations, many of them shortened
-CUTS = 12  # of one iteration by the residual along it
-OVERSHOT = 0.5  # of the residual along an iteration: allowed opposite value at its end
-SMALLEST, LARGEST = 0.1, 0.5  # factor by which an iteration that goes too far is shortened
-PREDICTIONS = (1.0, 0.5, 0.25, 0.0)  # shares of the predicted motion to try when obstacles move
+MOST = 60  # largest number of iterations, many of which are shortened
+CUTS = 12  # how often the line search may shorten one iteration
+OVERSHOT = 0.5  # opposite residual allowed at an iteration's end, relative to its start
+SMALLEST, LARGEST = 0.1, 0.5  # least and largest factor that shortens an iteration
+PREDICTIONS = (1.0, 0.5, 0.25, 0.0)  # shares to try of the prediction, if obstacles move
 
 
 class TouchingNewton(Newton):
@@ -62,8 +63,8 @@ class TouchingNewton(Newton):
         self._free = np.zeros(3 * scheme.packed.system.rows, bool)
         self._free[matrix.free] = True
         self._moved = np.zeros((len(self._tables.planes), 3))  # planes at the step's start
-        self._pushed = self._memory.friction.copy()  # and friction on nodes there
-        self._rubbed = np.zeros_like(self._memory.x)  # friction between panels there
+        self._pushed = self._memory.friction.copy()  # friction on nodes at the step's start
+        self._rubbed = np.zeros_like(self._memory.x)  # friction between panels at the step's start
         self._touched = False
 
     @property
@@ -72,7 +73,7 @@ class TouchingNewton(Newton):
         return self._memory
 
     def begin(self) -> None:
-        """Take the state of the last force evaluation as the start of the next step."""
+        """Make the state of the last force evaluation the start of the next step."""
         kept = self._memory
         self._moved[:], self._pushed[:] = kept.moved[:, :3], kept.friction
         self._touched = float(kept.facts.energy) > 0.0
@@ -82,7 +83,7 @@ class TouchingNewton(Newton):
             slip_pairs(self._tables, kept.x, kept)
 
     def works(self) -> tuple[float, float]:
-        """Work (J) of moving planes in a solved step, and energy dissipated by friction."""
+        """Work (J) of moving planes in a solved step, and energy (J) dissipated by friction."""
         kept, scheme, done, lost = self._memory, self.scheme, 0.0, 0.0
         points = self._contact.points
         motion = points(scheme.moved()) - points(scheme.displacement())
@@ -103,7 +104,7 @@ class TouchingNewton(Newton):
         return force
 
     def solve(self, h: float, t: float) -> int:
-        """Move scheme.shift to equilibrium at the end t of a step h (s); see `Newton.solve`."""
+        """Move scheme.shift to equilibrium at the end t (s) of a step h (s); see `Newton.solve`."""
         scheme, matrix = self.scheme, self.matrix
         if not self._predict(t):
             self._lasting = False
@@ -156,7 +157,7 @@ class TouchingNewton(Newton):
         return tangent if tangent.nnz else None
 
     def _along(self, h: float, t: float, step: NDArray) -> tuple[float, float]:
-        """Move along a step (rows, 3) as far as the line search allows; residual norms there."""
+        """Move along a step (rows, 3) as far as the line search allows; return residual norms."""
         scheme, start = self.scheme, self.scheme.shift.copy()
         slope = float((scheme.out * step).sum())
         share = self._clear(scheme.moved(), step, np.zeros_like(self._moved))
@@ -170,14 +171,14 @@ class TouchingNewton(Newton):
         return norm, reference
 
     def _clear(self, u: NDArray, step: NDArray, moves: NDArray, keep: float = KEEP) -> float:
-        """Share of a step from u, both (rows, 3), free of penetration, as planes move by (q, 3)."""
+        """Share of a step from u, both (rows, 3), without penetration, as planes move by (q, 3)."""
         return self._contact.clear_with(self._memory, u, step, moves, keep)
 
     def _predict(self, t: float) -> bool:
         """Shorten the predicted motion until nothing penetrates; return whether that is possible.
 
-        Supports and planes move to the end of the step at once: planes push nodes aside; if that
-        does not help, the step is too long.
+        Supports and planes move to the end of the step at once, and planes push nodes aside. If
+        parts still penetrate then, the step is too long.
         """
         scheme = self.scheme
         predicted, start = scheme.shift.copy(), scheme.displacement().copy()
@@ -195,12 +196,12 @@ class TouchingNewton(Newton):
         return False
 
     def _start(self, u: NDArray, step: NDArray, moves: NDArray) -> float:
-        """`_clear` from the start of the step, with planes at their start positions."""
+        """`_clear` from the start of the step, with planes where they are at this start."""
         self._memory.moved[:, :3] = self._moved
         return self._clear(u, step, moves)
 
     def _at(self, t: float) -> tuple[NDArray, NDArray]:
-        """Displacement (rows, 3) at time t for the current shift, and motion of planes (q, 3)."""
+        """Displacement (rows, 3) at time t (s) for the current shift, and plane motion (q, 3)."""
         scheme, kept = self.scheme, self._memory
         s, old = scheme.scratch, scheme.old
         place(scheme.packed.system, old.q + scheme.shift, old.w, t, s)

@@ -1,9 +1,9 @@
 """Contact pairs in a step: forces that do exactly the work of their potential.
 
-The potential is a sum over distances d. As with bars, each term's difference quotient with respect
-to d^2 / 2, times the discrete gradient of d^2 / 2, does its work (`contact_measure`). The potential
-of two edges, V = m B, changes by mean(m) (B1 - B0) + mean(B) (m1 - m0); the second part depends on
-the squared cross product of the edges.
+The potential is a sum over distances d. As with bars, the force of each term is the difference
+quotient with respect to d^2 / 2 times the discrete gradient of d^2 / 2, which does exactly the
+term's work (`contact_measure`). The potential of two edges, V = m B, changes by mean(m) (B1 - B0)
++ mean(B) (m1 - m0); the second part depends on the squared cross product of the edges.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from foldyn.mechanics.contact.potential import apart_of, barrier, difference_quo
 
 @inner
 def _weigh(kind, which, corners, move):
-    """Weights and moves of a distance; number of free weights, and whether an edge pair counts."""
+    """Set weights and moves; return the number of free weights, and whether an edge pair counts."""
     if kind == VERTEX:
         return weigh_triangle(corners, which, move.weights, move.moves), True
     return weigh_edges(corners, which, move.weights, move.moves)
@@ -37,9 +37,9 @@ def _weigh(kind, which, corners, move):
 
 @inner
 def _add_distance(kind, which, d0, k, move, size, tangent, force, block, push):
-    """Add force and tangent of the potential k d0^2 f(d/d0); return its energies (J) at both ends.
+    """Add force and tangent of the potential k d0^2 f(d/d0); return the energies (J) at both ends.
 
-    size : result of `go`; push : (12,) receives the energy gradient at the end.
+    size : result of `go`; push : (12,) to which the energy gradient at the end is added.
     """
     _weigh(kind, which, move.start, move)
     x0 = math.sqrt(apart_of(move.start, move.weights, move.apart)) / d0
@@ -65,9 +65,9 @@ def _add_distance(kind, which, d0, k, move, size, tangent, force, block, push):
 
 @kernel
 def vertex_step(tables, t, d0, move, tangent, force, block):
-    """Add force (12,) and tangent (12, 12) of a vertex and triangle t for a step.
+    """Add force (12,) and tangent (12, 12) of a vertex with triangle t for a step.
 
-    Computes the tangent only if `tangent`. Returns the energy (J) at the end.
+    The tangent is computed only if `tangent`. Returns the energy (J) at the end.
     """
     size, energy, push = go(move, tangent), 0.0, np.zeros(12)
     for which in range(PARTS):
@@ -78,7 +78,7 @@ def vertex_step(tables, t, d0, move, tangent, force, block):
 
 @kernel
 def edges_step(tables, i, j, d0, move, tangent, force, block):
-    """Add force and tangent of edges i and j, whose closest points must lie inside."""
+    """Add force and tangent of edges i and j, whose closest points must lie inside the edges."""
     inside = _weigh(EDGES, 0, move.end, move)[1]
     if not inside and not _weigh(EDGES, 0, move.start, move)[1]:
         return 0.0
@@ -107,7 +107,7 @@ def edges_step(tables, i, j, d0, move, tangent, force, block):
 
 @inner
 def _across(corners, c0):
-    """Squared cross product of two edges over c0."""
+    """Squared cross product of two edges, divided by c0."""
     n = cross(*_edges(corners))
     return dot(n, n) / c0
 
@@ -121,9 +121,9 @@ def _edges(corners):
 
 @inner
 def _mollified(u0, u1):
-    """Difference quotient of the mollifier m, and its derivative by u1.
+    """Difference quotient of the mollifier m, and the derivative of it with respect to u1.
 
-    m = 1 - v^2, v = max(1 - u, 0).
+    m = 1 - v^2 with v = max(1 - u, 0).
     """
     v0, v1 = max(0.0, 1.0 - u0), max(0.0, 1.0 - u1)
     if u0 < 1.0 and u1 < 1.0:
@@ -139,7 +139,7 @@ def _mollified(u0, u1):
 def _add_mollifier(
     u0, u1, c0, before, after, move, size, tangent, inner, push, force, block
 ):  # fmt: skip
-    """Add the contribution of the mollifier of two nearly parallel edges."""
+    """Add the part due to the mollifier of two nearly parallel edges to force and tangent."""
     value, slope = _mollified(u0, u1)
     value, slope, energy = value / c0, slope / (c0 * c0), 0.5 * (before + after)
     e, g = _edges(move.end)

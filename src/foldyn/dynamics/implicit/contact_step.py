@@ -1,9 +1,9 @@
 """Contact in a step of the conserving method: forces that do exactly the potential's work.
 
-Pairs: see `contact_pairs`. Guards of hinges: the difference quotient of energy over dihedral, times
-the discrete gradient of the dihedral, as for hinge moments. Planes: the difference quotient of
-energy over distance, along the normal. Friction: the spring at mid-step, limited by the normal
-force at the start of the step.
+Pairs are in `contact_pairs`. Guards of hinges: the difference quotient of the energy with respect
+to the dihedral, times the discrete gradient of the dihedral, as for hinge moments. Planes: the
+difference quotient of the energy with respect to the distance, along the normal. Friction: the
+force of the spring at mid-step, limited by the normal force at the start of the step.
 """
 
 from __future__ import annotations
@@ -46,16 +46,16 @@ class StepContact:
     ----------
     contact : ContactTerm
     memory : Memory
-        Its positions, planes and energy are updated to the end of each step.
+        Contact memory, whose positions, planes and energy are updated to the end of each step.
     rows : int
-        Rows of nodal arrays.
+        Number of rows of nodal arrays.
 
     Attributes
     ----------
     force : ndarray, shape (rows, 3)
-        Mean gradient (N) of the potential in a step, and friction.
+        Mean gradient (N) of potential and friction in a step.
     push : ndarray, shape (q, m, 4)
-        Mean friction gradient (N) of each plane at each contact point, and the normal force.
+        Mean friction gradient (N) of each plane at each contact point, and mean normal force.
     rub : ndarray, shape (m, 3)
         Mean gradient (N) of friction between panels.
     """
@@ -73,16 +73,16 @@ class StepContact:
         self._move = new_move()
 
     def put(self, u0: NDArray, u1: NDArray, factor0: NDArray, factor1: NDArray) -> None:
-        """Compute `force` for a step between displacements u0 and u1 (rows, 3).
+        """Compute `force` for a step from displacement u0 to u1 (rows, 3).
 
-        factor0, factor1 : (h, 3) of the histories at both ends.
+        factor0, factor1 : (h, 3) of the histories at the start and the end.
         """
         kept = self._memory
         for moved, factor in zip(self._moved, (factor0, factor1), strict=True):
             move_planes(self._tables, factor, kept)
             moved[:] = kept.moved[:, :3]
         for end, u in zip(self._ends, (u0, u1), strict=True):
-            end[:] = u  # planes and factors change in place
+            end[:] = u  # the contact term changes planes and factors in place
         force = self._on_points
         p0, p1 = self._contact.points(u0), self._contact.points(u1)
         force[:] = 0.0
@@ -100,7 +100,7 @@ class StepContact:
     def _steps(self, tangent: bool, force: NDArray) -> tuple[NDArray, NDArray, float]:
         """Add the forces of touching pairs; return nodes (k, 4), tangents (k, 12, 12), energy (J).
 
-        Tangents are zero unless `tangent`.
+        Tangents are only computed if `tangent`; otherwise they are zero.
         """
         count = sum(self._counts)
         nodes, blocks = np.empty((count, 4), np.int64), np.zeros((count, 12, 12))
@@ -111,7 +111,7 @@ class StepContact:
         return nodes, blocks, energy
 
     def tangent(self) -> sparse.csr_array:
-        """Derivative (m, m), N/m, of the last step's force by the displacement at its end."""
+        """Derivative (m, m), N/m, of the last step's force with respect to the end displacement."""
         own, kept = self._tables, self._memory
         nodes, blocks, _ = self._steps(True, np.zeros_like(self._on_points))
         guards = np.zeros((len(own.hinge_limit), 4, 3, 4, 3))
@@ -132,9 +132,9 @@ class StepContact:
 
 @kernel
 def _find(tables, u0, u1, start, middle, memory, pairs):
-    """Positions of a step, and the pairs that touch at its start or its end.
+    """Set the positions of a step, and find the pairs that touch at the start or the end.
 
-    Writes pair indices to `pairs`; returns the number of each kind.
+    Writes pair indices to `pairs`; returns the number of pairs of each kind.
     """
     place(tables, u0, memory)
     start[:] = memory.x
@@ -142,7 +142,7 @@ def _find(tables, u0, u1, start, middle, memory, pairs):
         _list(tables, u0, u1, memory)
     place(tables, u1, memory)
     middle[:] = 0.5 * (start + memory.x)
-    # bound for the difference of a distance at the midpoint and at the ends
+    # bound for the difference between a distance at the midpoint and at the ends
     reach, found = fastest(memory.x - start, len(start)), np.zeros(2, np.int64)
     triangles, edges = tables.triangles, tables.edges
     for kind in range(2):
@@ -161,7 +161,7 @@ def _find(tables, u0, u1, start, middle, memory, pairs):
 
 @inner
 def _list(tables, u0, u1, memory):
-    """List all pairs that come near between u0 and u1; none if the motion is too long."""
+    """List all pairs that come close between u0 and u1; no pairs if the motion is too long."""
     far = math.inf
     if memory.counts.has_list == 1:
         far = max(farthest(u0, memory), farthest(u1, memory))
@@ -178,9 +178,9 @@ def _list(tables, u0, u1, memory):
 def _pair_steps(
     tables, start, middle, memory, pairs, first, second, move, tangent, nodes, blocks, force
 ):  # fmt: skip
-    """Nodes (k, 4), tangents (k, 12, 12) and forces of the pairs that touch; their energy (J).
+    """Compute nodes (k, 4), tangents (k, 12, 12) and forces of touching pairs; return energy (J).
 
-    first, second : number of pairs of each kind.
+    first, second : number of pairs of each of the two kinds.
     """
     push, energy = np.empty(12), 0.0
     triangles, edges = tables.triangles, tables.edges
@@ -206,7 +206,7 @@ def _pair_steps(
 
 @kernel
 def _add_rubs(tables, middle, memory, pairs, first, second, rub, force):
-    """Add friction of the touching pairs, with their springs at mid-step, also to `rub`."""
+    """Add friction of touching pairs, by springs at mid-step, to `rub` and `force`."""
     rub[:] = 0.0
     for k in range(first + second):
         kind = VERTEX if k < first else EDGES
@@ -222,7 +222,10 @@ def _add_rubs(tables, middle, memory, pairs, first, second, rub, force):
 
 @inner
 def _guard(tables, h, theta0, theta1):
-    """Mean moment (N m) of a guard, its slope by the end dihedral, and its end energy (J)."""
+    """Mean moment (N m) of a guard, its slope, and the end energy (J).
+
+    The slope is the derivative with respect to the dihedral at the end.
+    """
     limit, k = tables.hinge_limit[h], tables.hinge_stiffness[h]
     moment, slope, energy = 0.0, 0.0, 0.0
     for sign in (1.0, -1.0):
@@ -237,7 +240,7 @@ def _guard(tables, h, theta0, theta1):
 
 @inner
 def _turn(tables, h, start, end, move, points, plain, gradient):
-    """Discrete gradient of a guarded hinge's dihedral; its dihedrals, and the end gradient.
+    """Discrete gradient of a guarded hinge's dihedral, both dihedrals, and the end gradient.
 
     See `discrete_gradient`.
     """
@@ -254,7 +257,7 @@ def _turn(tables, h, start, end, move, points, plain, gradient):
 
 @inner
 def _add_guards(tables, start, memory, move, force):
-    """Add the moments of the guards, and their end energy to the energy of contact."""
+    """Add the moments of the guards; add the energy at the end to the energy of contact."""
     points, plain, gradient = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
     for h in range(tables.hinge_limit.size):
         theta0 = gradient_at(tables, start, h)[0]
@@ -271,9 +274,9 @@ def _add_guards(tables, start, memory, move, force):
 
 @kernel
 def _guard_tangents(tables, start, end, move, blocks):
-    """Derivatives (h, 4, 3, 4, 3) of the guards, and whether each acts (h,).
+    """Derivatives (h, 4, 3, 4, 3) of the guards' forces, and whether each guard acts (h,).
 
-    The derivatives of the gradients are accurate to first order in the step, as for other hinges.
+    Derivatives of discrete gradients are accurate to first order in the step, as for other hinges.
     """
     acts = np.zeros(tables.hinge_limit.size, np.bool_)
     points, plain, gradient = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
@@ -306,9 +309,9 @@ def _add_others(tables, start, middle, moved, memory, move, push, force):
 
 @inner
 def _plane_quotient(tables, start, moved, memory, p, i):
-    """Mean normal force over -k d0 of node i at plane p, its slope, and its end energy (J).
+    """Mean normal force of node i at plane p divided by -k d0, its slope, and the end energy (J).
 
-    moved : (2, q, 3) displacements of the planes at both ends.
+    moved : (2, q, 3) displacements of the planes at the start and the end.
     """
     d0 = 0.5 * tables.node_thickness[i]
     before = height(tables, start, moved[0], p, i) / d0
@@ -320,7 +323,7 @@ def _plane_quotient(tables, start, moved, memory, p, i):
 
 @inner
 def _add_planes(tables, start, middle, moved, memory, push, force):
-    """Add the forces of the planes, also to push (q, n, 4)."""
+    """Add the forces of the planes to `force`, and to `push` (q, n, 4)."""
     k, halfway = tables.stiffness, 0.5 * (moved[0] + moved[1])
     push[:] = 0.0
     for p in range(len(tables.planes)):
@@ -345,7 +348,7 @@ def _add_planes(tables, start, middle, moved, memory, push, force):
 
 @kernel
 def _plane_tangents(tables, start, middle, moved, memory, out):
-    """Derivatives (n, 3, 3) of the forces of planes."""
+    """Derivatives (n, 3, 3) of the planes' forces on each node."""
     spring, halfway = np.empty((3, 3)), 0.5 * (moved[0] + moved[1])
     for p in range(len(tables.planes)):
         plane = tables.planes[p]

@@ -1,7 +1,7 @@
-"""Implicit engine: steps solved one after the other, samples, error control.
+"""Implicit engine: solves one step after the other, writes samples, controls the error.
 
-The step loop runs in Python: a step's tangent and factorization cost far more than the interpreter.
-Force, residual and tangent are compiled.
+The step loop runs in Python, as a step's tangent and factorization cost far more than the
+interpreter. Force, residual and tangent are compiled.
 """
 
 from __future__ import annotations
@@ -29,25 +29,25 @@ from foldyn.dynamics.system import PackedCase
 from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.threads import one_thread
 
-LEAST_STEP = 2.0**-20  # of the wanted step: if Newton's method fails below, the motion fails
-LEAST_TIME = 1e-13  # step relative to the end of the motion
-TURN = math.pi  # limit for a dihedral's change per step, unless panels collide
-MEMORY = 0.9  # decay per step of an earlier error that still counts
-SAME_TIME = 1e-9  # of a step: times closer than that are equal
+LEAST_STEP = 2.0**-20  # the motion fails if Newton's method fails below this share of a step
+LEAST_TIME = 1e-13  # smallest step relative to the end time of the motion
+TURN = math.pi  # largest change of a dihedral per step, unless panels collide
+MEMORY = 0.9  # factor per step of an earlier error, which still counts
+SAME_TIME = 1e-9  # times closer than this share of a step are equal
 SAME_STATE = 1e-9  # relative difference below which states and forces are equal
 # step size control
 SAFETY = 0.9
-GROWTH = 2.0  # largest growth of a step
-WORTHWHILE = 1.25  # growth below which the step is kept, and the matrix with it
-NEAR, CUT = 0.95, 0.85  # factor below which the step shrinks in advance, and by how much
-LEAST = 0.2  # least share of a rejected step to try next
+GROWTH = 2.0  # largest factor from one step to the next
+WORTHWHILE = 1.25  # for a smaller growth, the step and its matrix are kept
+NEAR, CUT = 0.95, 0.85  # below the first factor, the step shrinks in advance by the second
+LEAST = 0.2  # least factor from a rejected step to the next attempt
 # measures of the motion that the next step depends on
 MEASURED = ("wanted", "last", "error", "farthest")
 OUTCOMES = {SOLVED: Outcome.DONE, NOT_FINITE: Outcome.NOT_FINITE}
 
 
 class ImplicitEngine(Engine):
-    """Implicit engine: advances a motion with a scheme.
+    """Advances a motion with an implicit scheme.
 
     Parameters
     ----------
@@ -57,12 +57,12 @@ class ImplicitEngine(Engine):
     state : MotionState
     plan : StepPlan
     jumps : tuple of float
-        Times (s), in order, at which loads jump: steps end there, so that no step sees a jump.
+        Sorted times (s) at which loads jump. Steps end there, so that no step contains a jump.
 
     Attributes
     ----------
     continues : bool
-        Whether it continues from the end of another motion.
+        Whether the motion continues from the end of another motion.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class ImplicitEngine(Engine):
         self._touching = TouchingNewton(self._scheme, self._matrix) if touches else None
         self._newton = self._touching or Newton(self._scheme, self._matrix)
         self._halved = 0
-        self._horizon = 0.0  # s, duration of an impulse's effect
+        self._horizon = 0.0  # duration of an impulse's effect, s
         self._end: NDArray | None = None
         self.continues = False
 
@@ -85,7 +85,7 @@ class ImplicitEngine(Engine):
         return self._packed.body.find(HingeMemory)
 
     def facts(self) -> dict[str, Any]:
-        """Statistics of the run."""
+        """Statistics of the run; see `Engine`."""
         return dict(self._scheme.facts) | {
             "iterations": self._newton.iterations,
             "factorizations": self._matrix.factorizations,
@@ -100,16 +100,16 @@ class ImplicitEngine(Engine):
         return np.concatenate([array.ravel() for array in state])
 
     def continue_from(self, values: NDArray) -> None:
-        """Continue as the motion whose `continuation` was `values`.
+        """Continue like the motion whose `continuation` was `values`.
 
-        Displacement, velocity and the resulting acceleration must equal those stored: otherwise the
-        state or the case has been changed, and the motion begins at its own start. After the first
-        sample, `continues` says which.
+        Displacement, velocity and the resulting acceleration must equal the stored ones. If they do
+        not, the state or the case has been changed, and the motion begins at a start of its own.
+        After the first sample, `continues` holds which of the two happened.
         """
         self._end = values
 
     def _resume(self, values: NDArray) -> bool:
-        """Resume from the numbers of `continuation`; return whether the motion is the same."""
+        """Resume from the numbers of `continuation`; return whether they fit this motion."""
         scheme, old, tally = self._scheme, self._scheme.old, self._state.tally
         own = [*self._numbers(), old.a]
         if values.shape != (sum(array.size for array in own),) or not np.isfinite(values).all():
@@ -141,7 +141,7 @@ class ImplicitEngine(Engine):
         return True
 
     def _acceleration(self) -> NDArray:
-        """Current acceleration (n, 3) of nodes with mass."""
+        """Current acceleration (n, 3); zero for nodes without mass."""
         memory, out = self._memory, np.zeros_like(self._scheme.old.a)
         if memory is not None:
             memory.still()
@@ -152,7 +152,7 @@ class ImplicitEngine(Engine):
         return out
 
     def _numbers(self) -> list[NDArray]:
-        """State that the next steps depend on, apart from the case and the time."""
+        """Numbers that the next steps depend on, apart from the case and the time."""
         measured = [float(self._state.tally[name]) for name in MEASURED]
         state = [self._state.angle.copy(), np.array([*measured, self._horizon])]
         return [*self._scheme.numbers(), *state, *self._newton.numbers()]
@@ -229,7 +229,7 @@ class ImplicitEngine(Engine):
         return write(scheme.equation.recording(out), state.u, state.v, t, scheme.out)
 
     def _fixed(self, out: Samples) -> tuple[int, int]:
-        """Take one step of dt, subdivided at load jumps or if Newton's method fails."""
+        """Take one step of dt, divided at load jumps and where Newton's method fails."""
         plan, tally = self._plan, self._state.tally
         step = int(tally.steps) + 1
         t, end, h = float(tally.time), plan.start + step * plan.dt, plan.dt
@@ -238,7 +238,7 @@ class ImplicitEngine(Engine):
             goal, jump = self._next_jump(t, end, SAME_TIME * plan.dt)
             part, stop, jump = equal_step(t, goal, h, jump)
             if abs(part - plan.dt) <= SAME_TIME * plan.dt:
-                part = plan.dt  # free of rounding in times
+                part = plan.dt  # dt itself, free of rounding errors of times
             outcome, hinge = self._attempt(part, stop, jump)
             if outcome == Outcome.DONE:
                 self._accept(part, stop, jump)
@@ -255,7 +255,7 @@ class ImplicitEngine(Engine):
         return Outcome.DONE, -1
 
     def _adaptive(self, out: Samples) -> tuple[int, int]:
-        """Take one step with an error within the tolerance."""
+        """Take one step whose error is within the tolerance."""
         plan, tally = self._plan, self._state.tally
         t = float(tally.time)
         due, waits = self._due(out)
@@ -281,7 +281,7 @@ class ImplicitEngine(Engine):
         self._accept(h, end, jump)
         tally.steps += 1
         tally.time, tally.farthest = end, scale
-        # a vibration's error vanishes twice per period, so that earlier errors still count
+        # the error of a vibration vanishes twice per period; therefore earlier errors still count
         error = max(error, MEMORY * tally.error * (h / (tally.last or h)) ** 3)
         tally.error, tally.last = error, h
         tally.wanted = max(wanted if end == goal else 0.0, next_step(h, error))
@@ -301,7 +301,7 @@ class ImplicitEngine(Engine):
         return plan.end, time < plan.end + SAME_TIME * plan.interval
 
     def _next_jump(self, t: float, end: float, near: float) -> tuple[float, float | None]:
-        """Latest end of a step from t, and the load jump there if any."""
+        """Latest end of a step from t, and the load jump at this end, if any."""
         k = bisect_right(self._jumps, t + near)
         if k == len(self._jumps) or self._jumps[k] > end + near:
             return end, None
@@ -309,7 +309,7 @@ class ImplicitEngine(Engine):
         return (end if abs(jump - end) <= near else jump), jump
 
     def _attempt(self, h: float, end: float, jump: float | None) -> tuple[int, int]:
-        """Solve a step that ends before the jump, if any; returns (outcome, hinge)."""
+        """Solve a step that ends just before the jump, if any; returns (outcome, hinge)."""
         self._scheme.predict(h)
         moment = end if jump is None else math.nextafter(min(end, jump), -math.inf)
         verdict = self._newton.solve(h, moment)
@@ -321,7 +321,7 @@ class ImplicitEngine(Engine):
         return OUTCOMES.get(verdict, Outcome.NOT_CONVERGED), -1
 
     def _hopeless(self, h: float) -> bool:
-        """Whether a smaller step would fail as well."""
+        """Whether smaller steps would fail as well."""
         return h < LEAST_STEP * self._plan.dt or self._packed.callbacks.error is not None
 
     def _accept(self, h: float, end: float, jump: float | None) -> None:
@@ -343,7 +343,7 @@ class ImplicitEngine(Engine):
             state.tally.work += scheme.settle(max(end, jump))
             scheme.begin(max(end, jump))
             system = self._packed.system
-            if self._memory is not None:  # creases that turn instantly
+            if self._memory is not None:  # creases with memory turn instantly
                 self._memory.commit()
             if system.turns:
                 note_offsets(system.actuators, scheme.part.fold_angle)
@@ -351,14 +351,14 @@ class ImplicitEngine(Engine):
                 self._touching.begin()
 
     def _error(self, t: float, h: float) -> tuple[float, float]:
-        """Error of the worst node in a step from t, over the tolerance, and its new scale.
+        """Error of the worst node in a step from t relative to the tolerance, and the new scale.
 
         The scale is the largest displacement so far. Solving with the step matrix turns the change
-        of the acceleration into a displacement, which filters out stiff bars. The load that the
-        method misses between the ends of the step is treated alike. In a slow motion it causes a
-        displacement error of order h^2 at once, like the error of the whole motion, and may reach
-        the tolerance to the power 2/3, which is that error. In a step shorter than a vibration it
-        acts as an impulse: its error is the displacement that it causes later.
+        of the acceleration into a displacement, which filters out stiff bars. The load variation
+        that the method misses within the step is treated in the same way. In a slow motion, it
+        causes a displacement error of order h^2 at once. The error of the whole motion is also of
+        this order, so this error may reach the tolerance to the power 2/3. In a step shorter than a
+        vibration, it acts as an impulse: its error is the displacement that it causes later.
         """
         scheme, matrix, plan = self._scheme, self._matrix, self._plan
         scale = max(float(self._state.tally.farthest), _largest(scheme.moved()))
@@ -386,7 +386,7 @@ def _largest(values: NDArray) -> float:
 
 
 def next_step(h: float, error: float) -> float:
-    """Next step after an accepted one of h (s), with the error relative to the tolerance."""
+    """Next step (s) after an accepted step h (s), with the error relative to the tolerance."""
     factor = GROWTH if error <= 0.0 else min(GROWTH, SAFETY * error ** (-1.0 / 3.0))
     if factor < NEAR:
         return h * CUT
@@ -394,7 +394,7 @@ def next_step(h: float, error: float) -> float:
 
 
 def smaller_step(h: float, error: float) -> float:
-    """Next step after a rejected one of h (s)."""
+    """Next step (s) after a rejected step h (s), with the error relative to the tolerance."""
     return h * min(0.9, max(LEAST, SAFETY * error ** (-1.0 / 3.0)))
 
 
@@ -407,7 +407,7 @@ def next_stop(plan: StepPlan, t: float, end: float, near: float) -> float:
 def equal_step(
     t: float, goal: float, wanted: float, jump: float | None
 ) -> tuple[float, float, float | None]:
-    """First of equal steps from t to the goal, its end, and the jump if it ends there."""
+    """First of equal steps from t to the goal, the end of this step, and the jump there, if any."""
     parts = max(1, math.ceil((goal - t) / wanted * (1.0 - SAME_TIME)))
     h = (goal - t) / parts
     return (h, goal, jump) if parts == 1 else (h, t + h, None)
@@ -416,11 +416,11 @@ def equal_step(
 def impulse_duration(
     scheme: Scheme, matrix: StepMatrix, packed: PackedCase, duration: float
 ) -> float:
-    """Time (s) during which an impulse acts on a motion; at most a duration.
+    """Time (s) during which an impulse acts on a motion; at most `duration`.
 
-    1/omega of the vibration that the histories set in motion, with omega^2 Rayleigh's quotient of
-    the displacements under slow loads: as slow as the duration, for bodies without supports. Hinges
-    count with their nominal stiffness.
+    It is 1/omega of the vibration that the histories cause. Rayleigh's quotient of the
+    displacements under slow loads (as slow as the duration, for bodies without supports) gives
+    omega^2. Hinges count with their nominal stiffness.
     """
     u = scheme.displacement()
     force = scheme.push(scheme.old, np.ones(len(scheme.old.factor)))

@@ -1,11 +1,10 @@
-"""The matrix of a Newton iteration: weighted stiffness, mass and damping of a step.
+"""The matrix of a Newton iteration: weighted sum of stiffness, mass and damping of a step.
 
-All three are stored as 3x3 blocks with the same pattern. One pass over them writes the entries of
-the free dofs directly into the matrix to factorize: a band matrix with the nodes numbered along the
-sheet or, if the band would be too wide, a sparse matrix.
-
-Modal damping, a product with rows G of all dofs, would fill the matrix. Woodbury's formula adds it
-to the factorization instead.
+These three matrices consist of 3x3 blocks with the same pattern. One pass over them writes the
+entries of the free dofs directly into the matrix to factorize. This is a band matrix with the nodes
+numbered along the sheet or, if the band would be too wide, a sparse matrix. Modal damping, a
+product with rows G over all dofs, would fill the matrix; Woodbury's formula adds it to the
+factorization instead.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from foldyn.mechanics.constant_damping import DampingRows
 from foldyn.mechanics.following import following_places, put_following
 from foldyn.mechanics.tangent import Sparsity, block_keys, entry_slots, joined
 
-FULL = 200  # dofs up to which a full matrix with added terms is faster than a sparse one
+FULL = 200  # up to this many dofs a full matrix is faster than a sparse one with added terms
 
 
 class Weights(NamedTuple):
@@ -38,11 +37,11 @@ class Weights(NamedTuple):
 
     stiffness: float
     mass: float  # 1/s2
-    damping: float  # 1/s, of the damping except alpha M
+    damping: float  # 1/s, weight of the damping except alpha M
 
 
 class Matrices(NamedTuple):
-    """The three matrices as blocks, (nnz, 3, 3) each."""
+    """Stiffness, mass and damping as blocks, (nnz, 3, 3) each."""
 
     stiffness: NDArray
     mass: NDArray
@@ -56,12 +55,12 @@ class StepMatrix:
     ----------
     packed : PackedCase
     symmetric : bool
-        Whether the stiffness blocks will be symmetric.
+        Whether the stiffness blocks are symmetric.
 
     Attributes
     ----------
     pattern : Sparsity
-        Of the blocks.
+        Pattern of the blocks.
     stiffness : ndarray, shape (nnz, 3, 3)
         Blocks that the caller fills.
     free : ndarray of int
@@ -120,9 +119,9 @@ class StepMatrix:
         self.factorizations = 0
 
     def add_following(self, u: NDArray, factor: NDArray, share: float) -> None:
-        """Add a share of the stiffness of displacement-dependent loads at u (n, 3).
+        """Add `share` times the stiffness of displacement-dependent loads at u (n, 3).
 
-        factor : (h, 3) of the histories. A symmetric matrix gets the symmetric part.
+        factor : (h, 3) of the histories. A symmetric matrix only gets the symmetric part.
         """
         if not self._following.acts:
             return
@@ -145,7 +144,7 @@ class StepMatrix:
             self._factors = Updated(self._factors, self._modal, weights.damping)
 
     def _factorized(self, weights: Weights) -> Any:
-        """Factors of the matrix without modal damping."""
+        """Factors of the matrix without the modal damping."""
         if self.added is not None and self._full is not None:
             added = (self._across @ (self._across @ self.added.toarray()).T).T
             return self._full(weights, self._matrices, weights.stiffness * added)
@@ -161,7 +160,7 @@ class StepMatrix:
         return self._sparse(weights, self._matrices)
 
     def follow(self, u: NDArray, hidden: float) -> None:
-        """Update the damping to its value at u (n, 3); see `Term.damping_entries` for `hidden`."""
+        """Update the damping to that at u (n, 3); see `Term.damping_entries` for `hidden`."""
         if len(self._damped):
             entries = [term.damping_entries(u, hidden) for term in self._damping]
             out = self._matrices.damping.reshape(-1)
@@ -169,7 +168,7 @@ class StepMatrix:
 
     @property
     def changing(self) -> list[NDArray]:
-        """Blocks that change along a motion."""
+        """Arrays of blocks that change along a motion."""
         return [self._matrices.stiffness, self._matrices.damping]
 
     def forget(self) -> None:
@@ -189,7 +188,7 @@ class StepMatrix:
     def solve(self, residual: NDArray, out: NDArray) -> NDArray:
         """Solve A x = residual at the free dofs of `out`; other dofs keep their values; all (n, 3).
 
-        Slaves of constraints follow.
+        Slaves of constraints follow their masters.
         """
         if not len(self._ties.slave):
             out.ravel()[self.free] = self._factors.solve(residual.ravel()[self.free])
@@ -202,16 +201,16 @@ class StepMatrix:
 
 
 class _Entries(NamedTuple):
-    """Entries of the free dofs: row, column, and their sources in the blocks.
+    """Entries of the matrix on the free dofs: row, column, and their sources in the blocks.
 
-    With constraints an entry may occur several times: each is scaled by its value, and all are
-    added.
+    With constraints, a place may have several entries; each entry is scaled by its value and added
+    to the place.
     """
 
     row: NDArray
     column: NDArray
     take: NDArray
-    value: NDArray  # empty without constraints
+    value: NDArray  # factor of each entry; empty without constraints
 
 
 class _Band:
@@ -231,7 +230,7 @@ class _Band:
 
     @cached_property
     def _everywhere(self) -> NDArray:
-        """Flat positions (n, n) in the band's memory of all entries, by columns."""
+        """Flat positions (n, n), in the memory of the band, of all entries, by columns."""
         size, rows = self._memory.T.shape
         number = np.arange(size)
         return (rows - 1) * number[:, None] + number + self._diagonal
@@ -254,7 +253,7 @@ class _Sparse:
     def __init__(self, entries: _Entries, size: int, symmetric: bool) -> None:
         row, column, take, self._value = entries
         self._put = np.arange(len(take))
-        if len(self._value):  # several entries share a place
+        if len(self._value):  # several entries may share a place
             place, self._put = np.unique(row + size * column, return_inverse=True)
             row, column, self._take = place % size, place // size, take
         numbered = sparse.csc_array((np.arange(1, len(row) + 1), (row, column)), (size, size))
@@ -278,7 +277,7 @@ class _Sparse:
 
 
 def _onto(free: NDArray, ties: Ties, dofs: int) -> sparse.csr_array:
-    """Map (dofs, f) from the free dofs to all dofs, constraint slaves included."""
+    """Map (dofs, f) from the free dofs to all dofs, including the slaves of constraints."""
     number = np.full(dofs, -1)
     number[free] = np.arange(len(free))
     start, master, value = _masters(number, free, ties)
@@ -286,7 +285,7 @@ def _onto(free: NDArray, ties: Ties, dofs: int) -> sparse.csr_array:
 
 
 def _entries(pattern: Sparsity, free: NDArray, filled: NDArray, ties: Ties) -> _Entries:
-    """Entries of the `filled` blocks between free dofs, also through constraint slaves."""
+    """Entries between free dofs from the `filled` blocks, also through slaves of constraints."""
     dofs = 3 * (len(pattern.indptr) - 1)
     number = np.full(dofs, -1)
     number[free] = np.arange(len(free))
@@ -311,7 +310,7 @@ def _entries(pattern: Sparsity, free: NDArray, filled: NDArray, ties: Ties) -> _
 
 
 def _masters(number: NDArray, free: NDArray, ties: Ties) -> tuple[NDArray, NDArray, NDArray]:
-    """For every dof the free dofs it depends on, with their coefficients, in CSR format."""
+    """For each dof, the free dofs that it depends on and their coefficients, in CSR format."""
     dof = np.concatenate([free, np.repeat(ties.slave, np.diff(ties.masters.start))])
     master = number[np.concatenate([free, ties.masters.dof])]
     value = np.concatenate([np.ones(len(free)), ties.masters.value])
@@ -322,7 +321,7 @@ def _masters(number: NDArray, free: NDArray, ties: Ties) -> tuple[NDArray, NDArr
 
 @kernel
 def _gather(weights, matrices, take, put, out):
-    """out[put] = weighted sum of the matrices at `take`, all flat."""
+    """out[put] = weighted sum of the entries `take` of the matrices; all are flat."""
     stiffness, mass, damping = flat(matrices.stiffness), flat(matrices.mass), flat(matrices.damping)
     for k in range(take.size):
         e = take[k]
@@ -332,7 +331,7 @@ def _gather(weights, matrices, take, put, out):
 
 @kernel
 def _gather_tied(weights, matrices, take, value, put, out):
-    """Add the weighted sum of the matrices at `take`, times `value`, to out[put], all flat."""
+    """Add to out[put] `value` times the weighted sum of the entries `take`; all are flat."""
     stiffness, mass, damping = flat(matrices.stiffness), flat(matrices.mass), flat(matrices.damping)
     for k in range(take.size):
         e = take[k]

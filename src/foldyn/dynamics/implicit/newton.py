@@ -1,7 +1,7 @@
 """Newton's method for the end of a step.
 
-The matrix is updated in each iteration unless the residual falls fast with the last one: panels
-that turn within a step change the directions of their stiff bars, and with outdated directions the
+The matrix is updated in each iteration unless the residual falls fast with the last matrix. Panels
+that turn within a step change the directions of their stiff bars; with outdated directions the
 iteration converges slowly or not at all. An iteration that reuses the matrix costs one force
 evaluation and one substitution.
 """
@@ -17,17 +17,17 @@ from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.scheme import NEW_MATRIX, NOT_CONVERGED, SOLVED, Scheme
 
-MOST = 25  # iterations
+MOST = 25  # largest number of iterations
 SAME_STEP = 1e-3  # relative difference of steps that may share a matrix
 
 
 class Newton:
-    """Newton's method, with a matrix that it may reuse in later steps.
+    """Newton's method with a matrix that may be reused in later steps.
 
     Attributes
     ----------
     origin : tuple of ndarray
-        State in which the matrix was made: the step, and the arguments of `Scheme.back`; empty
+        State in which the matrix was made: the step h, and the arguments of `Scheme.back`. Empty
         without a matrix.
     """
 
@@ -35,15 +35,15 @@ class Newton:
         self.scheme, self.matrix = scheme, matrix
         self.iterations = 0
         self.evaluations = 0
-        self._h = 0.0  # step of the last factorization
+        self._h = 0.0  # step of the last factorization, s
         self.origin: tuple[NDArray, ...] = ()
-        self._lasting = False  # whether one matrix served a whole step: the next one starts with it
+        self._lasting = False  # whether one matrix served a whole step; the next step reuses it
 
     def prepare(self, h: float, t: float) -> None:
         """Compile everything that a step needs."""
         scheme = self.scheme
         offset = scheme.packed.system.actuators.offset
-        before = offset[:, 2:].copy()  # offsets of the last accepted step
+        before = offset[:, 2:].copy()  # offsets at the last accepted step
         scheme.shift[:] = 0.0
         scheme.residual(h, t)
         scheme.tangent(self.matrix, scheme.displacement(), False)
@@ -66,7 +66,7 @@ class Newton:
         self._h, self.origin = h, (np.array([h, again]), before.copy(), *self.scheme.origin())
 
     def remake(self) -> None:
-        """Factorize the matrix of the last update again, from its blocks."""
+        """Factorize the matrix again, from the blocks of the last update."""
         self.matrix.factorize(self.scheme.weights(self._h))
 
     def numbers(self) -> list[NDArray]:
@@ -77,7 +77,7 @@ class Newton:
         return [np.array([float(kept)]), *origin]
 
     def resume(self, numbers: Sequence[NDArray]) -> None:
-        """Move the scheme to where the matrix was made by such numbers, and make it again."""
+        """Move the scheme to the state that `numbers` describe, and make the matrix again."""
         (kept,), (h, again), before, *origin = numbers
         if kept:
             self.scheme.back(h, origin)
@@ -85,9 +85,9 @@ class Newton:
         self._lasting = bool(kept)
 
     def solve(self, h: float, t: float) -> int:
-        """Move scheme.shift from its prediction to equilibrium at the end t of a step h (s).
+        """Move scheme.shift from the prediction to equilibrium at the end t (s) of a step h (s).
 
-        Returns `SOLVED`, or the reason for failure.
+        Returns `SOLVED`, or the code of the reason for failure.
         """
         scheme, matrix = self.scheme, self.matrix
         goal = scheme.goal(h)

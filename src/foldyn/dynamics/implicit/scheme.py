@@ -29,32 +29,32 @@ from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.mechanics.viscous import ViscousTerm
 
 EPS = float(np.finfo(float).eps)
-FAST = 0.3  # residual reduction per iteration below which the matrix is reused
+FAST = 0.3  # the matrix is reused if an iteration leaves less than this share of the residual
 GROWTH = 1e8  # growth of the residual at which the iteration has diverged
-# the residual has stalled at rounding if it is below one of these
-ENOUGH = 1e-8  # of the forces at play
-ROUNDING = 8.0  # times the rounding error of forces
-OF_MOTION = 1e-5  # of the inertial force of the predicted step: largest residual
-STALL = 0.5  # residual reduction per iteration above which it has stalled
+# the residual has stalled at rounding errors if it is below one of these bounds
+ENOUGH = 1e-8  # share of the forces at play
+ROUNDING = 8.0  # multiple of the rounding error of forces
+OF_MOTION = 1e-5  # largest residual, relative to the inertial force of the predicted step
+STALL = 0.5  # it has stalled if an iteration leaves more than this share of it
 
 SOLVED, GO_ON, NEW_MATRIX, NOT_CONVERGED, NOT_FINITE = range(5)
 
 
 class Goal(NamedTuple):
-    """Convergence criteria for the residual, N."""
+    """Convergence criteria for the residual; forces in N."""
 
-    tolerance: float  # relative to the forces at play
+    tolerance: float  # largest residual, relative to the forces at play
     least: float  # lower bound for the forces at play
-    most: float  # upper bound for the residual: for small motions about a preload with large forces
-    rounding: float  # of the bar forces and, in a very short step, of the inertia
+    most: float  # largest residual, for small motions about a state with large forces
+    rounding: float  # rounding error of bar forces and, in very short steps, of inertia
 
 
 @kernel
 def judge(goal, norm, reference, last, lowest):
-    """Decide what to do next, given the residual norm (N) now, before (`last`) and at its lowest.
+    """Decide how to go on, given the norm (N) of the residual now, before, and at its lowest.
 
     reference : forces at play, N.
-    last : 0 if there is no matrix yet, inf before the first iteration with an old one.
+    last : norm before; 0 if there is no matrix yet, inf before the first iteration with an old one.
     """
     if not norm < np.inf:
         return NOT_FINITE
@@ -69,27 +69,27 @@ def judge(goal, norm, reference, last, lowest):
 
 
 class StepEnd(NamedTuple):
-    """State at one time: arrays (n, 3); q and w exclude support motion."""
+    """State at one time, in arrays (n, 3); q and w exclude support motion."""
 
     q: NDArray  # m
     w: NDArray  # m/s
     a: NDArray  # m/s2
-    force: NDArray  # F_int + beta K0 v - p, N
+    force: NDArray  # the bracket F_int + beta K0 v - p, N
     factor: NDArray  # (h, 3) of the histories
-    pushed: NDArray  # forces of displacement-dependent loads, N; or none (0, 3)
-    damped: NDArray  # forces of damping, for methods that need them, N; or none
-    resisted: NDArray  # forces of the air likewise
+    pushed: NDArray  # forces of displacement-dependent loads, N; (0, 3) if there are none
+    damped: NDArray  # forces of damping, N; empty if not needed
+    resisted: NDArray  # forces of the air, N; empty if not needed
 
 
 class Scheme(ABC):
-    """A time step from `old` to `new` whose unknown is its displacement increment `shift`.
+    """A time step from `old` to `new`; the unknown is `shift`, the increment of displacement.
 
     Parameters
     ----------
     packed : PackedCase
         The case.
     state : MotionState
-        Current state of the motion: q, w and a of `old` are its arrays.
+        Current state of the motion; its arrays are q, w and a of `old`.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class Scheme(ABC):
     tolerance : float
         Residual, relative to the forces at play, at which a step is accepted.
     facts : mapping
-        Parameters, for the result's attributes.
+        Parameters of the scheme, for the result's attributes.
     """
 
     symmetric: ClassVar[bool]
@@ -112,7 +112,7 @@ class Scheme(ABC):
         self.equation = EquationOfMotion(packed, self.part, self.scratch, state, None)
         shape, histories = state.u.shape, self.scratch.factor.shape
         self.out, self.step = np.zeros(shape), np.zeros(shape)
-        self.shift = np.zeros(shape)  # new.q - old.q, stored as the difference would lose digits
+        self.shift = np.zeros(shape)  # new.q - old.q, stored because subtracting would lose digits
         self.earlier = np.zeros(shape)  # new.q before the last iteration
         self._gap, self._pushed = np.zeros(histories[0]), np.zeros(shape)
         self.air = packed.body.find(AirDragTerm)
@@ -135,7 +135,7 @@ class Scheme(ABC):
 
     @abstractmethod
     def residual(self, h: float, t: float) -> tuple[float, float]:
-        """Residual force of a step h (s) to the time t (s), into `out`.
+        """Compute the residual force of a step h (s) to the time t (s) into `out`.
 
         Updates `new` from `shift`. Returns the norms of the residual on the free dofs and of the
         forces at play, N.
@@ -147,7 +147,7 @@ class Scheme(ABC):
 
     @abstractmethod
     def works(self, h: float) -> tuple[float, float, float]:
-        """Work of loads, supports and actuators in a step, dissipated, and lost to the air, J."""
+        """Work of loads, supports and actuators in a step, energy dissipated and lost to air, J."""
 
     @abstractmethod
     def change(self, h: float) -> NDArray:
@@ -158,14 +158,14 @@ class Scheme(ABC):
         return contact.tangent_at(self.moved(), memory)
 
     def plane_push(self, before: NDArray, after: NDArray) -> NDArray:
-        """Friction gradient and normal force of planes, N, whose work is exact over a step.
+        """Friction gradient and normal force of planes, N, that do the exact work of a step.
 
         before, after : (q, n, 4) at the ends of the step; see `mechanics.contact.contact_state`.
         """
         return 0.5 * (before + after)
 
     def rub(self, before: NDArray, after: NDArray) -> NDArray:
-        """Gradient of friction between panels, N, whose work is exact over a step.
+        """Gradient of friction between panels, N, that does the exact work of a step.
 
         before, after : (n, 3) at the ends of the step.
         """
@@ -188,7 +188,7 @@ class Scheme(ABC):
         return NOT_CONVERGED, norm, most
 
     def begin(self, t: float) -> None:
-        """Make `old` the start of a motion, or of its part after a jump, at t (s)."""
+        """Make `old` the start of a motion, or of a part after a jump, at t (s)."""
         old, s = self.old, self.scratch
         accelerate(self.equation.handle, old.q, old.w, t, old.a)
         old.a[self.massless] = 0.0
@@ -198,10 +198,10 @@ class Scheme(ABC):
         self.folds[:] = self.part.fold_angle
 
     def settle(self, t: float) -> float:
-        """Let massless parts follow loads that jump at t (s); returns the work on them, J.
+        """Let massless parts follow loads that jump at t (s); return the work done on them, J.
 
-        Offsets follow at once, and so do massless dofs, apart from turns of damped creases; dofs in
-        a damping matrix do not.
+        Offsets follow at once. So do massless dofs, except for turns of damped creases and for dofs
+        in a damping matrix.
         """
         body, system, s = self.packed.body, self.packed.system, self.scratch
         matrix, viscous = body.find(DampingMatrix), body.find(ViscousTerm)
@@ -234,7 +234,7 @@ class Scheme(ABC):
         return Goal(self.tolerance, self.hinge_forces(), most, rounding)
 
     def hinge_forces(self) -> float:
-        """Norm (N) of the hinge forces at old.q: at play even if everything is at rest."""
+        """Norm (N) of the hinge forces at old.q, at play even if everything is at rest."""
         forces = self.packed.body.hinge_forces(self.displacement())
         return float(np.linalg.norm(forces))
 
@@ -251,10 +251,10 @@ class Scheme(ABC):
         return carried(self.packed.system.moved, factor[:, 0], q)
 
     def unseen(self, first: float, last: float) -> NDArray | None:
-        """Force (n, 3), N, that the histories' variation within a step would exert at its end.
+        """Force (n, 3), N, at the end of a step, equivalent to how histories vary within the step.
 
-        None if the histories are linear there. The dihedrals of the last evaluation remain those of
-        the step's end.
+        None if the histories are linear within the step. The stored dihedrals remain those at the
+        step's end.
         """
         packed, new = self.packed, self.new
         if not packed.system.varies:
@@ -263,10 +263,10 @@ class Scheme(ABC):
         return self.push(new, self._gap) if self._gap.any() else None
 
     def push(self, phase: StepEnd, change: NDArray) -> NDArray:
-        """Force (n, 3), N, due to a change (h,) of the factors at a phase; overwrites `out`."""
+        """Force (n, 3), N, due to a change (h,) of the factors at a step end; overwrites `out`."""
         s = self.scratch
         for moved, force in ((change, self._pushed), (np.zeros_like(change), self.out)):
-            s.factor[:], s.time[0] = phase.factor, 0.0  # evaluated as if at this time
+            s.factor[:], s.time[0] = phase.factor, 0.0  # as if they had been evaluated at time 0
             s.factor[:, 0] += moved
             accelerate(self.equation.handle, phase.q, phase.w, 0.0, self.earlier)
             force[:] = s.force
@@ -277,13 +277,13 @@ class Scheme(ABC):
     def predict(self, h: float) -> None:
         """Predict the shift by extrapolating the mean velocities of the last steps.
 
-        If steps do not resolve a vibration, end velocities oscillate; mean velocities do not.
+        If steps do not resolve a vibration, end velocities oscillate, but mean velocities do not.
         """
         ahead = 0.5 * (h + self._last)
         self.shift[:] = h * (self._speed + ahead * self._growth)
 
     def numbers(self) -> list[NDArray]:
-        """Numbers that the next step depends on, apart from case and time; q, w and a first."""
+        """Numbers that the next step depends on, without case and time; q, w and a come first."""
         old = self.old
         return [
             array.copy()
@@ -291,7 +291,7 @@ class Scheme(ABC):
         ]
 
     def resume(self, numbers: Sequence[NDArray]) -> None:
-        """Resume from such numbers, after `begin` at its displacement and velocity."""
+        """Resume from the values of `numbers`, after `begin` at their displacement and velocity."""
         own = (self.old.q, self.old.w, self.old.a, self._speed, self._growth)
         for array, kept in zip(own, numbers, strict=False):
             array[:] = kept
@@ -305,13 +305,13 @@ class Scheme(ABC):
         return tuple(array.copy() for array in (*arrays, *kept))
 
     def back(self, h: float, origin: Sequence[NDArray]) -> None:
-        """Return to the state where the matrix of a step h (s) was made; go on with `resume`."""
+        """Return to the state where the matrix of a step h (s) was made; then call `resume`."""
         q, factor, shift, ahead, angle, *kept = origin
         old, memory, s = self.old, self.packed.body.find(HingeMemory), self.scratch
         if memory is not None:
             memory.recall(kept)
         old.q[:], old.factor[:], self.shift[:], self.state.angle[:] = q, factor, shift, angle
-        s.factor[:], s.time[0] = ahead, 0.0  # evaluated as if at this time
+        s.factor[:], s.time[0] = ahead, 0.0  # as if they had been evaluated at time 0
         self.residual(h, 0.0)
         s.time[0] = np.nan
 
@@ -327,7 +327,7 @@ class Scheme(ABC):
 
 @inner_scalar
 def copy(source, out):
-    """out = source, of equal size: Numba's own size check would compile its message."""
+    """out = source, of equal size; Numba's own size check would have to compile a message."""
     values, given = flat(out), flat(source)
     for i in range(values.size):
         values[i] = given[i]
@@ -337,12 +337,12 @@ def copy(source, out):
 def norms(system, force, inertia, factor, following):
     """Norms of a residual (n, 3) on the free dofs, and of the forces at play, N.
 
-    Sets the residual to zero at supports, where it is a reaction, and at constraint slaves, which
-    pass theirs on to their masters.
+    Sets the residual to zero at supports, where it is a reaction, and at slaves of constraints,
+    which pass their residual on to their masters.
 
-    inertia : sum of squares of the inertial forces, N2.
+    inertia : sum of the squared inertial forces, N2.
     factor : (h, 3) of the histories, for the loads.
-    following : forces of displacement-dependent loads (n, 3), N; or none (0, 3).
+    following : displacement-dependent loads (n, 3), N; (0, 3) if there are none.
     """
     values, reactions, pushed, left = flat(force), 0.0, 0.0, 0.0
     for k in range(system.supported.size):
@@ -367,23 +367,23 @@ def norms(system, force, inertia, factor, following):
 
 @inner
 def settle_massless(step, h):
-    """Set velocities and accelerations of massless nodes at the end of a step, and of slaves."""
+    """Set velocities and accelerations of massless nodes, and of slaves, at the end of a step."""
     mass, ties, d = step.case.mass, step.case.system.ties, flat(step.shift)
     w1, a1 = flat(step.new.w), flat(step.new.a)
     for node in range(mass.diagonal.size):
-        if mass.diagonal[node] <= 0.0:  # velocities would ring forever
+        if mass.diagonal[node] <= 0.0:  # otherwise velocities would ring forever
             for i in range(3 * node, 3 * node + 3):
                 a1[i], w1[i] = 0.0, d[i] / h
-    if ties.slave.size > 0:  # masters may be such nodes
+    if ties.slave.size > 0:  # masters may be massless nodes
         follow_masters(ties, a1)
         follow_masters(ties, w1)
 
 
 @kernel
 def step_works(step, h, before, after):
-    """Work put in by loads and supports, and energy lost to drag, in a step, J.
+    """Work (J) put in by loads and supports in a step, and energy (J) lost to the drag.
 
-    before, after : brackets of forces (n, 3), N, whose mean acts on moving supports.
+    before, after : brackets of forces (n, 3), N; their mean acts on moving supports.
 
     Leaves the displacement in the step in `Scratch.displacement`.
     """
