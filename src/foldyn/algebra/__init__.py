@@ -1,1 +1,1 @@
-"""Linear solvers of all analyses: sparse symmetric and banded factorizations, and their choice."""
+"""Linear solvers of all analyses: sparse symmetric and banded factorizations; which one to use."""

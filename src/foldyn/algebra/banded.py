@@ -1,7 +1,7 @@
 """Factorizations of banded matrices by LAPACK.
 
-With nodes numbered along the sheet, a sheet's matrix is a band. Up to some ten thousand dofs, the
-band factorization is faster than the sparse one, especially for small matrices.
+With nodes numbered along a sheet, the matrix of the sheet is a band. Up to about ten thousand dofs,
+a band factorization is faster than a sparse one, especially for small matrices.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from foldyn.jit.compiled import summing
 
 
 class Cholesky:
-    """Factors U' U of a symmetric positive definite band, which they overwrite.
+    """Factors U' U of a symmetric positive definite band; they overwrite the band.
 
     Parameters
     ----------
@@ -41,12 +41,12 @@ class Cholesky:
 
 
 class BandLU:
-    """LU factors of a band with partial pivoting, which overwrite it.
+    """LU factors of a band with partial pivoting; they overwrite the band.
 
     Parameters
     ----------
     band : ndarray, shape (3 width + 1, n)
-        In Fortran order: entry (i, j) at [2 width + i - j, j].
+        Band in Fortran order: entry (i, j) at [2 width + i - j, j].
 
     Raises
     ------
@@ -68,7 +68,7 @@ class BandLU:
 
 @summing
 def substitute(columns, b):
-    """Overwrite b (n,) with the solution of U' U x = b, U a band by columns; see `Cholesky`."""
+    """Overwrite b (n,) with the solution of U' U x = b; U is a band by columns as in `Cholesky`."""
     width = columns.shape[1] - 1
     for j in range(b.size):
         first = max(0, j - width)

@@ -12,17 +12,18 @@ from scipy.linalg import lapack
 from foldyn.algebra.superlu import SingularTangentError, Solution, factorize
 from foldyn.algebra.woodbury import Updated
 
-LOST = 1e-3  # of the solution: larger rounding errors mean a resonance without damping
-PIVOT = 0.01  # of the largest entry in a column: least pivot on the diagonal
-BESIDE = 64.0  # times rounding: perturbation of A for which its factors are exact
-REFINED, ROUNDS = 1e-12, 4  # of the solution: change at which refinement stops; most rounds
+LOST = 1e-3  # relative rounding error above which a resonance lacks damping
+PIVOT = 0.01  # least pivot on the diagonal, relative to the largest entry in the column
+BESIDE = 64.0  # perturbation of A in rounding errors, for which the factors are exact
+# relative change of the solution at which refinement stops, and largest number of rounds
+REFINED, ROUNDS = 1e-12, 4
 FULL = 0.2  # share of nonzeros above which a matrix counts as full
-SPARSE = 40.0  # full-matrix products in the time of a sparse entry's solution
+SPARSE = 40.0  # time to solve for one sparse entry, in products of a full matrix
 _EPS = float(np.finfo(np.float64).eps)
 
 
 class Gram:
-    """A matrix G'G of rows G (r, n), which is added to many matrices."""
+    """A matrix G'G of rows G (r, n) that is added to many matrices."""
 
     def __init__(self, rows: NDArray) -> None:
         self.rows = rows
@@ -35,8 +36,8 @@ class Gram:
     def fills(self, matrix: sparse.csc_array) -> bool:
         """Whether factorizing the full sum with a sparse matrix is faster than Woodbury's formula.
 
-        The latter takes a sparse solution per row, a product of size r r n, and factors of an r by
-        r matrix.
+        The formula takes a sparse solution for each row, a product of size r r n, and factors of an
+        r by r matrix.
         """
         r, n = self.rows.shape
         return SPARSE * r * matrix.nnz + r**2 * n + r**3 / 3.0 > n**3 / 4.0
@@ -47,19 +48,19 @@ def solve(
 ) -> NDArray[np.complex128]:
     """Solution of (A + w G'G) x = load, A complex symmetric; nan if rounding spoils it.
 
-    Rounding changes each entry of the matrix by a relative amount of about eps. One more
-    substitution gives the effect of such changes, all in phase with the solution: near a resonance,
-    where the solution is nearly the mode, this is the worst case.
+    Rounding changes each entry of the matrix by about eps times the entry. One more substitution
+    gives the effect of such changes on the solution if they are in phase with it. Near a
+    resonance, where the solution is nearly the mode, this is the worst case.
 
     Parameters
     ----------
     matrix : csc_array, shape (n, n)
-        A.
+        The matrix A.
     load : ndarray, shape (n,)
     gram : Gram, optional
-        G'G; zero by default.
+        The matrix G'G; zero by default.
     weight : complex
-        w.
+        The factor w.
     """
     return solved(matrix, load, gram, weight)[0]
 
@@ -67,7 +68,7 @@ def solve(
 def solved(
     matrix: sparse.csc_array, load: NDArray, gram: Gram | None = None, weight: complex = 0.0
 ) -> tuple[NDArray[np.complex128], Solution | None]:
-    """Solution as from `solve`, and the factors; None if there are none."""
+    """Solution as from `solve`, and the factors; the factors are None if the solution is nan."""
     lost = np.full(len(load), np.nan, np.complex128), None
     if gram is None or weight == 0.0:
         gram = Gram(np.zeros((0, len(load))))
@@ -95,10 +96,10 @@ def solved(
 
 
 def _factors(matrix: sparse.csc_array, gram: Gram, weight: complex) -> Solution:
-    """Factors of A + w G'G, for refinement.
+    """Factors of A + w G'G, precise enough for refinement.
 
-    At a resonance that only G damps, A is singular and Woodbury's formula fails. A is therefore
-    damped by more than its rounding error, but so little that refinement still converges whenever
+    At a resonance that only G damps, A is singular and Woodbury's formula fails. A small damping
+    is therefore added to A. It exceeds the rounding error, but lets refinement converge whenever
     rounding does not spoil the solution.
     """
     rows, full = gram.rows, matrix.nnz > FULL * matrix.shape[0] ** 2
@@ -112,7 +113,7 @@ def _factors(matrix: sparse.csc_array, gram: Gram, weight: complex) -> Solution:
 
 
 class _Full:
-    """LU factors of a full matrix; the oldest supported SciPy has no symmetric ones."""
+    """LU factors of a full matrix; the oldest supported SciPy has no symmetric factors."""
 
     def __init__(self, matrix: NDArray) -> None:
         self._factors, self._pivots, failed = lapack.zgetrf(matrix.T, overwrite_a=True)

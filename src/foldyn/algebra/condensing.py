@@ -1,7 +1,7 @@
-"""Definite matrices of equal sparsity, condensed to their last unknowns, eight at a time.
+"""Condensing definite matrices of equal sparsity to their last unknowns, eight at a time.
 
 The symbolic Cholesky factorization is done once, in an order with little fill-in. The values of
-eight matrices are stored side by side: one pass over the entries factorizes all eight.
+eight matrices are stored side by side, so that one pass over the entries factorizes all eight.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from foldyn.jit.eights import COUNT, eight, put
 
 
 class Condensing:
-    """Condensation of matrices (size, size) to their `kept` last unknowns.
+    """Condenses matrices (size, size) to the `kept` last unknowns.
 
     Parameters
     ----------
     pairs : (k, 2)
-        Unknowns with an entry, each pair once, in any order, including the whole diagonal.
+        Pairs of unknowns with an entry, each pair once, in any order, including the whole diagonal.
     size, kept : int
 
     Attributes
@@ -31,7 +31,7 @@ class Condensing:
     entries : int
         Number of entries of the factors.
     places : (k,)
-        Position of each pair among them.
+        Position of each pair among the entries of the factors.
     """
 
     def __init__(self, pairs: NDArray, size: int, kept: int) -> None:
@@ -43,7 +43,7 @@ class Condensing:
         for i, j in zip(row.tolist(), column.tolist(), strict=True):
             below[j].add(i)
         found: list[int] = []
-        for own in below:  # fill-in: eliminating an unknown couples all its neighbors
+        for own in below:  # fill-in: eliminating an unknown couples all neighbors of it
             coupled = sorted(own)
             found += coupled
             if len(coupled) > 1:
@@ -71,7 +71,9 @@ class Condensing:
         return self.left(numbers)[: values.shape[1]]
 
     def left(self, numbers: NDArray) -> NDArray:
-        """Condensed matrices (8, kept, kept) of eight (`entries`, 8), overwritten by factors.
+        """Condense eight matrices with `numbers` (`entries`, 8) to (8, kept, kept).
+
+        The factors overwrite `numbers`.
 
         Raises
         ------
@@ -87,9 +89,9 @@ class Condensing:
 
 
 def _order(pairs: NDArray, size: int) -> NDArray:
-    """Positions (size,) of unknowns in an order with little fill-in.
+    """Positions (size,) of the unknowns in an order with little fill-in.
 
-    It is found from any definite matrix with these pairs of unknowns.
+    The order is found from some definite matrix with these pairs of unknowns.
     """
     off = pairs[pairs[:, 0] != pairs[:, 1]]
     diagonal = np.arange(size)
@@ -104,10 +106,11 @@ def _order(pairs: NDArray, size: int) -> NDArray:
 def condense(rows, pointers, entry, until, starts, free, where, numbers):
     """Eliminate the first `free` unknowns of eight matrices.
 
-    rows, pointers : (k,) rows of the entries by columns, the diagonal first; (n + 1,).
-    entry, until, starts : (e,) off-diagonal entries by rows, in eliminated columns; the ends of
-    their columns; (n + 1,).
-    where : (n,) scratch.
+    rows, pointers : (k,) rows of the entries by columns, the diagonal first; (n + 1,) first entry
+    of each column.
+    entry, until, starts : (e,) off-diagonal entries by rows, in eliminated columns only; (e,) ends
+    of the columns that they are in; (n + 1,) first of them in each row.
+    where : (n,) scratch memory.
     numbers : (8 k,) entries; overwritten by the factors and, in the last columns, by the condensed
     matrices.
     """

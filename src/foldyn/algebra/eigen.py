@@ -1,17 +1,18 @@
-"""The lowest modes of K phi = lambda M phi, none missed.
+"""The lowest modes of K phi = lambda M phi, without missing any.
 
 Small problems are solved as full matrices, others by shift-invert Lanczos (ARPACK) with one
-factorization of K - s M, the shift s below every eigenvalue: K - s M is then positive definite even
-if K is singular or indefinite, and the modes closest to the shift are the lowest. The eigenvalues
-below the shift, and below a gap after the last mode, are counted; modes that Lanczos missed, as may
-happen for multiple eigenvalues, are searched for again, orthogonal to the known ones.
+factorization of K - s M. The shift s is below every eigenvalue: K - s M is then positive definite
+even if K is singular or indefinite, and the modes closest to the shift are the lowest. The
+eigenvalues below the shift, and those below a gap after the last mode, are counted. Lanczos may
+miss modes of multiple eigenvalues; missed modes are searched for again, orthogonal to known ones.
 
 A factorization of K - s M has as many negative eigenvalues as the problem has eigenvalues below s
 (Sylvester's law of inertia). Two counts, below and above a set of computed modes, prove that none
-between was missed. M is positive definite, except for massless dofs that follow the others (edge
-rotations of shells): they have no modes and, as K is positive definite on them, do not count.
+between them was missed. M is positive definite, except for massless dofs that follow the others
+(edge rotations of shells). These have no modes and, as K is positive definite on them, do not
+count.
 
-Modes known beforehand (rigid ones) are excluded from the search, so that they remain exact.
+Modes known beforehand (rigid motions) are excluded from the search, so that they remain exact.
 """
 
 from __future__ import annotations
@@ -31,16 +32,16 @@ from foldyn.errors import ComputationError, InputError
 
 MOST_DENSE = 6000  # dofs up to which nearly all modes may be requested
 DENSE = 60  # dofs up to which all modes are computed at once (equally fast)
-SHIFT = 1e-10  # of the pencil's scale: first shift below zero
-LOWER = 16.0  # times the last shift: next shift
+SHIFT = 1e-10  # first shift below zero, relative to the pencil's scale
+LOWER = 16.0  # factor from one shift to the next
 LOWERINGS = 12
-LEAST_BASIS = 20  # least number of Lanczos vectors, as too few modes break it down
-GUARD = 3  # additional modes in which to search for a gap
+LEAST_BASIS = 20  # least number of Lanczos vectors, as Lanczos breaks down with few
+GUARD = 3  # number of additional modes in which to search for a gap
 GAP = 1e-6  # relative distance of eigenvalues that a count can separate
-ROUNDS = 12  # searches for missed modes
+ROUNDS = 12  # largest number of searches for missed modes
 EPS = float(np.finfo(float).eps)
-ROUNDING = 5.0 * EPS  # of |phi|' |K| |phi|: rounding error of an eigenvalue at zero
-NUDGES = 4  # of a shift that hits an eigenvalue
+ROUNDING = 5.0 * EPS  # rounding error of an eigenvalue at zero, relative to |phi|' |K| |phi|
+NUDGES = 4  # largest number of small moves of a shift that hits an eigenvalue
 NUDGE = 1e-7
 
 
@@ -60,12 +61,12 @@ class Pencil:
 
     @property
     def scale(self) -> float:
-        """Ratio of the mean diagonals of K and M, rad2/s2: large compared to the lowest modes."""
+        """Ratio of the mean diagonals of K and M, rad2/s2, which is large compared to low modes."""
         stiffness = np.abs(self.stiffness.diagonal())[self.heavy]
         return float(stiffness.sum() / self.mass.diagonal().sum())
 
     def factorize(self, shift: float) -> Factorization:
-        """Factors of K - s M; s is moved slightly if that is singular."""
+        """Factors of K - s M; s is moved slightly if this matrix is singular."""
         for attempt in range(NUDGES):
             moved = shift + NUDGE * attempt * (abs(shift) or self.scale * EPS)
             self.factorizations += 1
@@ -100,7 +101,7 @@ class Pencil:
         return np.einsum("ik,ik->k", shapes, self.stiffness @ shapes) / modal
 
     def residuals(self, values: NDArray, shapes: NDArray) -> NDArray:
-        """|K phi - lambda M phi| relative to its terms (k,); nan for shapes of zeros."""
+        """Norm of K phi - lambda M phi relative to both terms (k,); nan for shapes of zeros."""
         inertia = (self.mass @ shapes) * values
         terms = np.linalg.norm(self._sizes @ np.abs(shapes), axis=0)
         return np.linalg.norm(self.stiffness @ shapes - inertia, axis=0) / terms
@@ -112,9 +113,9 @@ class Spectrum:
 
     values: NDArray
     shapes: NDArray
-    shift: float  # no eigenvalue is below this; nan if all were computed
-    checked: int  # number of lowest modes proved complete by a count
-    missed: int  # modes that the count includes but that were not found
+    shift: float  # no eigenvalue is below this shift; nan if all were computed
+    checked: int  # number of lowest modes that a count proves to be complete
+    missed: int  # number of modes that were counted but not found
 
 
 def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> Spectrum:
@@ -124,19 +125,19 @@ def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> S
     ----------
     pencil : Pencil
     count : int
-        At most the number of its modes.
+        Number of modes; at most that of the pencil.
     known : (n, r)
         M-orthonormal modes with the eigenvalue zero.
     verify : bool
-        Whether to count the eigenvalues below a gap after the last mode, with another
+        Whether to count the eigenvalues below a gap after the last mode; this takes another
         factorization.
 
     Raises
     ------
     InputError
-        More modes than there are, or more than half of them for many dofs.
+        `count` exceeds the number of modes, or half of it if there are many dofs.
     ComputationError
-        Lanczos did not converge; the pencil cannot be factorized.
+        Lanczos did not converge, or the pencil cannot be factorized.
     """
     if count > pencil.finite:
         raise InputError(f" = {count}: the case has only {pencil.finite} free dofs", "count")
@@ -164,7 +165,7 @@ def _all(pencil: Pencil, known: NDArray) -> tuple[NDArray, NDArray]:
     mass = pencil.mass.toarray()[np.ix_(heavy, heavy)]
     stiffness = pencil.stiffness[heavy][:, heavy].toarray()
     follow = np.zeros((0, len(heavy)))
-    if len(light):  # massless dofs follow statically
+    if len(light):  # massless dofs follow the others statically
         across = pencil.stiffness[light][:, heavy].toarray()
         follow = -np.linalg.solve(pencil.stiffness[light][:, light].toarray(), across)
         stiffness = stiffness + across.T @ follow
@@ -198,7 +199,7 @@ def _sparse(pencil: Pencil, count: int, known: NDArray, verify: bool) -> Spectru
 
 
 def _shift(pencil: Pencil) -> tuple[float, Factorization, int]:
-    """A shift below every eigenvalue, its factors, and the number of negative eigenvalues."""
+    """A shift below every eigenvalue, the factors, and the number of negative eigenvalues."""
     shift, unstable = -SHIFT * pencil.scale, 0
     for attempt in range(LOWERINGS):
         factors = pencil.factorize(shift)
@@ -241,7 +242,7 @@ def _lanczos(
             f"modes: {len(error.eigenvalues)} of {count} modes converged; ask for fewer, or for "
             "more if many frequencies coincide"
         ) from error
-    if pencil.finite < size:  # M does not act on massless dofs
+    if pencil.finite < size:  # M is zero on massless dofs
         shapes = np.stack([inverse(force) for force in (mass @ shapes).T], axis=1)
     shapes = shapes / np.sqrt(np.einsum("ik,ik->k", shapes, mass @ shapes))
     return pencil.quotients(shapes), shapes
@@ -250,7 +251,7 @@ def _lanczos(
 def _sorted(
     pencil: Pencil, values: NDArray, shapes: NDArray, known: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """All modes by eigenvalue; eigenvalues at rounding level become zero, known modes first."""
+    """All modes sorted by eigenvalue, known modes first; eigenvalues at rounding level are zero."""
     rounding = pencil.noise(shapes) + EPS * SHIFT * pencil.scale
     values = np.where(np.abs(values) <= rounding, 0.0, values)
     values = np.r_[np.zeros(known.shape[1]), values]
@@ -259,11 +260,11 @@ def _sorted(
 
 
 def _gap(pencil: Pencil, values: NDArray, count: int) -> tuple[int, float]:
-    """Number of sorted values (m,) below a gap near the count-th, and the middle of the gap.
+    """Number of sorted values (m,) below a gap near number `count`, and the middle of the gap.
 
     A gap after the last requested mode proves that all were found. If a multiple eigenvalue leaves
-    no gap, the last gap before it is used: the requested modes are then an arbitrary choice among
-    its modes.
+    no gap there, the last gap before it is used: the requested modes are then an arbitrary choice
+    among the modes of that eigenvalue.
     """
     apart = np.diff(values)
     clear = apart > GAP * (np.abs(values[:-1]) + np.abs(values[1:])) + SHIFT * pencil.scale * 1e-3

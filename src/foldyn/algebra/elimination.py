@@ -1,15 +1,15 @@
-"""Linear equations G u = g between dofs, solved for some of them: the slaves.
+"""Linear equations G u = g between dofs, solved for some of these dofs: the slaves.
 
-Each equation determines one dof, its slave, from others. With x the vector u in which each slave is
-replaced by the value g of its equation, u = E x: each slave is a combination of free dofs, held
-dofs, and values g. Columns of E that belong to free dofs span the motions that the equations and
+Each equation determines one dof, the slave, from others. Let x be the vector u in which each slave
+is replaced by the value g of its equation. Then u = E x, where each slave is a combination of free
+dofs, held dofs and values g. The columns of E for free dofs span the motions that the equations and
 the supports allow. The transpose of E turns forces on u into forces on x: driving forces on free
 dofs, support reactions on held dofs, and the multipliers of the equations on slaves.
 
-The equations are processed one after the other. Earlier slaves are substituted into each; a free
-dof with a sufficient coefficient becomes its slave, preferably the first one in the equation, and
-is then eliminated from all earlier equations. An equation without remaining free dofs follows from
-the others, or contradicts them.
+The equations are processed one after the other. Slaves of earlier equations are substituted first.
+A free dof with a sufficient coefficient, preferably the first in the equation, becomes the slave
+and is then eliminated from all earlier equations. An equation without remaining free dofs follows
+from the others, or contradicts them.
 """
 
 from __future__ import annotations
@@ -21,25 +21,26 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-NAMED = 0.5  # of the largest coefficient: least coefficient of the first dof to become the slave
-DEPENDENT = 1e-9  # of an equation's coefficients: remainder below which it follows from the others
-ROUNDING = 1e-14  # of them: coefficients below this are zero
+NAMED = 0.5  # the first dof becomes the slave above this share of the largest coefficient
+# relative to the coefficients of an equation: it follows from the others if less than this remains
+DEPENDENT = 1e-9
+ROUNDING = 1e-14  # coefficients below this share of an equation's coefficients are zero
 
 
 class Elimination(NamedTuple):
-    """k equations between m dofs, s of them independent."""
+    """Solution of k equations between m dofs; s equations are independent."""
 
     slaves: NDArray  # (s,) dofs
     kept: NDArray  # (s,) equation of each slave
-    left: NDArray  # (k - s,) equations that determine nothing
+    left: NDArray  # (k - s,) equations that determine no dof
     basis: sparse.csr_array  # E (m, m)
 
 
 def eliminate(equations: sparse.csr_array, held: NDArray) -> Elimination:
-    """Solve equations G (k, m) for slaves among the dofs not in the mask `held` (m,)."""
+    """Solve equations G (k, m) for slaves among the dofs that are not in the mask `held` (m,)."""
     size = equations.shape[1]
     known: dict[int, dict[int, float]] = {}  # slaves as combinations of entries of x
-    users: defaultdict[int, set[int]] = defaultdict(set)  # slaves that depend on a free dof
+    users: defaultdict[int, set[int]] = defaultdict(set)  # slaves that depend on each free dof
     kept, left = [], []
     bounds = zip(equations.indptr[:-1].tolist(), equations.indptr[1:].tolist(), strict=True)
     for number, (first, last) in enumerate(bounds):
@@ -70,7 +71,7 @@ def eliminate(equations: sparse.csr_array, held: NDArray) -> Elimination:
 
 
 def _inserted(row: dict[int, float], known: dict[int, dict[int, float]]) -> dict[int, float]:
-    """A combination of dofs with its slaves substituted."""
+    """Substitute the known slaves into a combination of dofs."""
     out: defaultdict[int, float] = defaultdict(float)
     for dof, value in row.items():
         for j, part in known.get(dof, {dof: 1.0}).items():
@@ -81,7 +82,7 @@ def _inserted(row: dict[int, float], known: dict[int, dict[int, float]]) -> dict
 def _pivot(
     row: dict[int, float], named: list[int], held: NDArray, known: dict[int, Any], least: float
 ) -> int:
-    """Free dof that an equation is solved for, -1 if none is left."""
+    """Free dof for which an equation is solved; -1 if none is left."""
     open_ = {j: abs(value) for j, value in row.items() if not held[j] and j not in known}
     largest = max(open_.values(), default=0.0)
     if largest <= least:

@@ -1,13 +1,13 @@
 """Limits of values on finer and finer meshes (Richardson's extrapolation).
 
-With n pieces of every edge an error of order p is c n^-p. If the order is known, two meshes give
-the limit; three meshes with n1 < n2 < n3 pieces also give the observed order:
+With n pieces of every edge, an error of order p is c n^-p. If the order is known, two meshes give
+the limit. Three meshes with n1 < n2 < n3 pieces also give the observed order p:
 
     (f2 - f1) / (f3 - f2) = (n1^-p - n2^-p) / (n2^-p - n3^-p).
 
-Only meshes whose observed order is about the order of the elements, 2, allow an error estimate
-(Roache, Annu. Rev. Fluid Mech. 29, 1997; Eca and Hoekstra, J. Comput. Phys. 262, 2014): if errors
-of opposite signs compete, the changes may be small, or of any sign, far from the limit.
+An error estimate is only possible for meshes whose observed order is about 2, the order of the
+elements (Roache, Annu. Rev. Fluid Mech. 29, 1997; Eca and Hoekstra, J. Comput. Phys. 262, 2014). If
+errors of opposite signs compete, changes far from the limit may be small or have any sign.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-ORDER = 2.0  # of the elements
-LEAST, MOST = 1.0, 3.0  # observed orders that count as close to it
-SETTLED = 1e-3  # of the value: smaller changes show no order
+ORDER = 2.0  # order of the elements
+LEAST, MOST = 1.0, 3.0  # least and largest observed order that count as close to it
+SETTLED = 1e-3  # changes below this share of the value show no order
 
 
 class Convergence(NamedTuple):
@@ -29,10 +29,10 @@ class Convergence(NamedTuple):
     Attributes
     ----------
     order : (k,)
-        Observed; 2 for values that hardly change; nan if it is not between 1 and 3: the meshes have
-        not converged.
+        Observed order; 2 for values that hardly change; nan if it is not between 1 and 3, as the
+        meshes have then not converged.
     limit : (k,)
-        Limit of the values; nan likewise.
+        Limit of the values; nan if the order is nan.
     """
 
     order: NDArray[np.float64]
@@ -40,14 +40,14 @@ class Convergence(NamedTuple):
 
 
 def extrapolated(coarse: Any, fine: Any, ratio: float, order: Any = ORDER) -> Any:
-    """Limit of values on two meshes, the fine one with `ratio` times the divisions."""
+    """Limit of values on two meshes; the fine mesh has `ratio` times the divisions."""
     return fine + (fine - coarse) / (ratio**order - 1.0)
 
 
 def convergence(values: ArrayLike, divisions: Sequence[int]) -> Convergence:
     """Observed order and limit of values (3, k) on meshes with increasing divisions.
 
-    Orders above 2 count as 2 in the limit, which overestimates the error.
+    For the limit, orders above 2 count as 2, which overestimates the error.
     """
     first, second, third = np.asarray(values, float)
     early, late = second - first, third - second
@@ -59,9 +59,9 @@ def convergence(values: ArrayLike, divisions: Sequence[int]) -> Convergence:
 
 
 def limits(values: ArrayLike, divisions: Sequence[int], *, observed: bool) -> NDArray[np.float64]:
-    """Limits of values (3, k), by the order of the elements or by the observed one, if any.
+    """Limits of values (3, k) by the order of the elements, or by the observed order if known.
 
-    Elements have their order on even meshes without singularities.
+    Elements reach their order on even meshes without singularities.
     """
     _, second, third = np.asarray(values, float)
     limit = extrapolated(second, third, divisions[2] / divisions[1])
@@ -70,11 +70,11 @@ def limits(values: ArrayLike, divisions: Sequence[int], *, observed: bool) -> ND
 
 
 def doubt(values: ArrayLike, divisions: Sequence[int]) -> NDArray[np.float64]:
-    """Estimated error of limits by the observed order, relative (k,).
+    """Estimated relative errors (k,) of limits that use the observed order.
 
-    The distance to the limit by the order of the elements, or a quarter of the error of the finest
-    mesh (Roache's factor of safety 1.25), whichever is larger, and at least a thousandth: such
-    small changes show no order. If the meshes have not converged, their full difference.
+    Each is the largest of three numbers: the distance to the limit by the order of the elements, a
+    quarter of the error of the finest mesh (Roache's factor of safety 1.25), and a thousandth, as
+    such small changes show no order. If the meshes have not converged, it is the range of values.
     """
     values = np.asarray(values, float)
     limit = limits(values, divisions, observed=True)
@@ -85,7 +85,7 @@ def doubt(values: ArrayLike, divisions: Sequence[int]) -> NDArray[np.float64]:
 
 
 def _observed(early: float, late: float, divisions: Sequence[int]) -> float:
-    """Observed order of two changes; nan if it is not close to the order of the elements."""
+    """Observed order for two changes; nan if it is not close to the order of the elements."""
 
     def miss(order: float) -> float:
         one, two, three = (float(n) ** -order for n in divisions)
@@ -93,6 +93,6 @@ def _observed(early: float, late: float, divisions: Sequence[int]) -> float:
 
     if not miss(LEAST) * miss(MOST) < 0.0:
         return np.nan
-    from scipy.optimize import brentq  # takes a tenth of a second, rarely needed
+    from scipy.optimize import brentq  # the import takes a tenth of a second and is rarely needed
 
     return float(brentq(miss, LEAST, MOST))

@@ -1,15 +1,15 @@
-"""Factorization by PARDISO of Intel's Math Kernel Library, for large structures.
+"""Factorization by PARDISO, from Intel's Math Kernel Library, for large structures.
 
-The matrix is passed as real symmetric indefinite (type -2), upper triangle by rows: as fast as the
-factorization of a definite matrix, and it counts the eigenvalues by sign. Pivots stay within blocks
-of the diagonal (Bunch and Kaufman), so only the count is known: critical points are then located by
-bisection on it.
+The matrix is passed as real symmetric indefinite (type -2), upper triangle by rows. This is as
+fast as the factorization of a definite matrix, and also counts the eigenvalues by sign. Pivots stay
+within blocks of the diagonal (Bunch and Kaufman), so only the count is known: critical points are
+then located by bisection on the count.
 
 Nested dissection and the symbolic factorization take a third of the time of the numeric one. They
-depend only on the sparsity pattern: as long as it stays, they are done once, and once more for each
-set of factors that is alive at the same time. Parameters are those of `iparm` in the Developer
-Reference of oneMKL, counted from 0. The package mkl is a set of libraries without Python, which are
-called by their C interface.
+depend only on the sparsity pattern. As long as it stays the same, they are done once, and once more
+for each further set of factors that is alive at the same time. Parameters are those of `iparm` in
+the Developer Reference of oneMKL, counted from 0. The package mkl consists of libraries without
+Python, which are called through their C interface.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SYMMETRIC_INDEFINITE = -2
 ANALYSIS, NUMERIC, SOLVE, RELEASE = 11, 22, 33, -1
 OWN_VALUES, ORDERING, PERTURBATION, REPLACED, NEGATIVE, REPRODUCIBLE = 0, 1, 9, 13, 22, 33
 NESTED_DISSECTION = 2
-SMALL = 16  # pivots below 10^-16 of the matrix are replaced: they are zero to rounding
+SMALL = 16  # pivots below 10^-16 of the matrix are zero to rounding, and replaced
 NO_MEMORY = {-2, -9}
 _NONE = np.zeros(1)
 
@@ -45,10 +45,10 @@ class _Pattern:
     def __init__(self, matrix: sparse.csc_array) -> None:
         self._indptr, self._indices = matrix.indptr, matrix.indices
         size, count = matrix.shape[0], len(matrix.indices)
-        # a symmetric matrix stored by columns is the same read by rows
+        # a symmetric matrix stored by columns is the same if read by rows
         row = np.repeat(np.arange(size), np.diff(matrix.indptr))
         kept = np.flatnonzero(matrix.indices >= row)
-        # PARDISO needs all diagonal entries: missing ones are appended as zeros
+        # PARDISO needs all diagonal entries: missing entries are appended as zeros
         there = np.zeros(size, bool)
         there[row[matrix.indices == row]] = True
         none = np.flatnonzero(~there)
@@ -84,10 +84,10 @@ class _Memory:
         self.parameters[PERTURBATION] = SMALL
         self.parameters[REPRODUCIBLE] = library().MKL_Get_Max_Threads()
         end = weakref.finalize(self, _call, RELEASE, self._handle, self.parameters, pattern, _NONE)
-        end.atexit = False  # the process frees all memory
+        end.atexit = False  # the process frees all memory at its end
 
     def call(self, phase: int, values: NDArray, b: NDArray = _NONE, x: NDArray = _NONE) -> None:
-        """Run one phase of a solution."""
+        """Run one phase of PARDISO."""
         error = _call(phase, self._handle, self.parameters, self.pattern, values, b, x)
         if error in NO_MEMORY:
             raise ComputationError(
@@ -111,9 +111,9 @@ class Pardiso:
         Raises
         ------
         SingularTangentError
-            It is singular or not finite.
+            The matrix is singular or not finite.
         ComputationError
-            There is no memory for its factors.
+            There is no memory for the factors.
         """
         if not np.isfinite(matrix.data).all():
             raise SingularTangentError("the tangent is not finite")
@@ -134,7 +134,7 @@ class Pardiso:
 
 
 class PardisoFactors:
-    """Factors by PARDISO; their memory is reused once they are released."""
+    """Factors by PARDISO; when they are released, their memory is reused."""
 
     def __init__(self, memory: _Memory, values: NDArray) -> None:
         self._memory, self._values = memory, values
@@ -148,16 +148,16 @@ class PardisoFactors:
         return x
 
     def pivots(self) -> None:
-        """None: 2x2 pivots are not available."""
+        """None, as 2x2 pivots are not available."""
         return
 
     def negative(self) -> int:
-        """Count of negative eigenvalues."""
+        """Number of negative eigenvalues."""
         return self._negative
 
 
 def _hand_back(spare: list[_Memory], memory: _Memory) -> None:
-    """Keep the memory of released factors for the next ones."""
+    """Keep the memory of released factors for the next factors."""
     if not spare:
         spare.append(memory)
 
@@ -166,7 +166,7 @@ def _call(
     phase: int, handle: NDArray, parameters: NDArray, pattern: _Pattern, values: NDArray,
     b: NDArray = _NONE, x: NDArray = _NONE,
 ) -> int:  # fmt: skip
-    """Call PARDISO; return its error code, 0 for none."""
+    """Call PARDISO; return the error code, 0 if there is no error."""
     error = ctypes.c_int32(0)
     whole = [ctypes.c_int32(value) for value in (1, 1, SYMMETRIC_INDEFINITE, phase, pattern.size)]
     none, sides, quiet = np.zeros(1, np.int32), ctypes.c_int32(b[0].size), ctypes.c_int32(0)

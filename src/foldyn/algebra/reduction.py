@@ -1,4 +1,4 @@
-"""The free dofs' block of matrices with a fixed sparsity pattern."""
+"""The block of the free dofs, taken from matrices with a fixed sparsity pattern."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-ROUNDING = 1e-12  # of the largest entry: smaller differences from the transpose count as zero
+ROUNDING = 1e-12  # differences from the transpose below this share of the largest entry are zero
 
 
 class Block(NamedTuple):
-    """A block by columns, and its symmetric part: the same object if symmetric to rounding."""
+    """A block by columns, and its symmetric part; one object if it is symmetric to rounding."""
 
     exact: sparse.csc_array
     symmetric: sparse.csc_array
 
     @property
     def is_symmetric(self) -> bool:
-        """Whether it is symmetric to rounding."""
+        """Whether the block is symmetric to rounding."""
         return self.exact is self.symmetric
 
 
@@ -42,7 +42,7 @@ class Reduction:
         mirrored = values[self._mirror]
         apart, largest = np.abs(values - mirrored), np.abs(values)
         if not apart.max(initial=0.0) > ROUNDING * largest.max(initial=0.0):
-            rows = self._by_columns(values)  # equal to its rows, as the matrix is symmetric
+            rows = self._by_columns(values)  # columns equal rows, as the matrix is symmetric
             return Block(rows, rows)
         return Block(self._by_columns(mirrored), self._by_columns(0.5 * (values + mirrored)))
 
@@ -64,4 +64,4 @@ class Reduction:
         other.sort_indices()
         alike = np.array_equal(other.indptr, block.indptr)
         alike = alike and np.array_equal(other.indices, block.indices)
-        self._mirror = other.data if alike else None  # position of the transposed entry
+        self._mirror = other.data if alike else None  # position of each transposed entry

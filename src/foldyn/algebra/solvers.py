@@ -1,4 +1,4 @@
-"""The linear solvers: their choice by matrix size, and the memory of their factors."""
+"""The linear solvers: which one suits a matrix size, and the memory of the factors."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from foldyn.values import choice
 
 
 class Backend(NamedTuple):
-    """A linear solver of symmetric matrices."""
+    """A linear solver for symmetric matrices."""
 
-    make: Callable[[], Factorizer]  # for successive matrices, ideally of the same pattern
-    package: str  # package that provides it
+    make: Callable[[], Factorizer]  # makes a factorizer, best used for matrices of one pattern
+    package: str  # package that provides the solver
     found: Callable[[], bool]  # whether that package is installed
-    worthwhile: int  # rows above which it is worth its overhead
-    band: float  # operations up to which a band factorization is faster
-    memory: float  # memory of its factors, relative to SuperLU's
+    worthwhile: int  # number of rows above which the solver is worth its overhead
+    band: float  # number of operations up to which a band factorization is faster
+    memory: float  # memory of the factors, relative to SuperLU's
 
 
 SOLVERS: Mapping[str, Backend] = {
@@ -33,9 +33,9 @@ SOLVERS: Mapping[str, Backend] = {
 
 
 def factorizer(name: str, size: int) -> tuple[str, Factorizer]:
-    """Name of a backend, and its factorizer for matrices with `size` rows.
+    """Name of a backend, and a factorizer by it for matrices with `size` rows.
 
-    "auto" is the last of `SOLVERS` that is installed and worthwhile for the size.
+    "auto" chooses the last of `SOLVERS` that is installed and worthwhile for the size.
     """
     choice("solver", name, ("auto", *SOLVERS))
     if name == "auto":
@@ -54,13 +54,13 @@ def factorized(matrix: sparse.csc_array) -> Factorization:
     return factorizer("auto", matrix.shape[0])[1](matrix)
 
 
-MOST_UNSYMMETRIC = 4e9  # products of an unsymmetric band above which SuperLU is faster
+MOST_UNSYMMETRIC = 4e9  # number of products of an unsymmetric band above which SuperLU is faster
 
 
 def takes_band(size: int, width: int, symmetric: bool) -> bool:
-    """Whether a matrix with `size` rows is factorized as a band.
+    """Whether to factorize a matrix with `size` rows as a band of a given width.
 
-    A band factorization takes about rows times width squared operations.
+    A band factorization takes about rows times squared width operations.
     """
     most = SOLVERS[factorizer("auto", size)[0]].band if symmetric else MOST_UNSYMMETRIC
     return float(size) * (width + 1) ** 2 <= most
@@ -70,7 +70,7 @@ class Fill(NamedTuple):
     """Measured memory of SuperLU's factors for a model, and the remedy if it is too large."""
 
     per_doubling: float  # bytes per dof for each doubling of the number of dofs
-    least: int  # from this number of dofs on
+    least: int  # number of dofs from which `per_doubling` holds
     field: str
     remedy: str
 

@@ -1,6 +1,6 @@
-"""Sparse symmetric factorizations: solutions and the count of negative eigenvalues.
+"""Sparse symmetric factorizations: solutions, and the number of negative eigenvalues.
 
-The tangent of a structure is symmetric but, beyond a critical point, indefinite. A factorization
+The tangent of a structure is symmetric, but indefinite beyond a critical point. A factorization
 P A P' = L D L' has as many negative pivots as A has negative eigenvalues (Sylvester's law of
 inertia), so one factorization gives both the step and the stability.
 
@@ -37,11 +37,11 @@ class Factorization(Solution, Protocol):
     """A factorized symmetric matrix."""
 
     def pivots(self) -> NDArray | None:
-        """Pivots whose signs are those of the eigenvalues; None if only their count is known."""
+        """Pivots, which have the signs of the eigenvalues; None if only their count is known."""
         ...
 
     def negative(self) -> int:
-        """Count of negative eigenvalues."""
+        """Number of negative eigenvalues."""
         ...
 
 
@@ -49,10 +49,10 @@ Factorizer = Callable[[sparse.csc_array], Factorization]
 
 
 def factorize(matrix: sparse.csc_array, symmetric: bool = True, pivot: float = 0.0) -> Any:
-    """Factors by SciPy's SuperLU, with its own attributes.
+    """Factors by SciPy's SuperLU, with the attributes of SuperLU.
 
-    symmetric : keep pivots on the diagonal, unless one is smaller than `pivot` times the largest
-    entry of its column.
+    symmetric : keep pivots on the diagonal, except a pivot that is smaller than `pivot` times the
+    largest entry of its column.
     """
     symmetrically = {
         "permc_spec": "MMD_AT_PLUS_A",
@@ -82,7 +82,7 @@ class SuperLU:
         return self._lu.solve(b)
 
     def pivots(self) -> NDArray:
-        """Pivots, or eigenvalues if a pivot had to leave the diagonal."""
+        """Pivots; the eigenvalues instead if a pivot had to leave the diagonal."""
         if self._pivots is not None:
             return self._pivots
         straight = np.array_equal(self._lu.perm_r, self._lu.perm_c)
@@ -91,15 +91,15 @@ class SuperLU:
         return pivots
 
     def negative(self) -> int:
-        """Count of negative eigenvalues."""
+        """Number of negative eigenvalues."""
         return int((self.pivots() < 0.0).sum())
 
 
-PIVOT = 0.01  # of the largest entry in a column: least pivot on the diagonal
+PIVOT = 0.01  # least pivot on the diagonal, relative to the largest entry in the column
 
 
 class Unsymmetric:
-    """Factorization of a nearly symmetric matrix, for solutions only."""
+    """Factorization of a nearly symmetric matrix, which only gives solutions."""
 
     def __init__(self, matrix: sparse.csc_array) -> None:
         if not np.isfinite(matrix.data).all():
@@ -111,7 +111,7 @@ class Unsymmetric:
         return self._lu.solve(b)
 
 
-MOST_DENSE = 3000  # dofs up to which eigenvalues of a full matrix are affordable
+MOST_DENSE = 3000  # number of dofs up to which all eigenvalues are affordable
 
 
 def _eigenvalues(matrix: sparse.csc_array) -> NDArray:

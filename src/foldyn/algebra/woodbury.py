@@ -1,4 +1,4 @@
-"""Factors of a matrix to which a product of few rows is added (Woodbury's formula).
+"""Factors of a matrix to which a product of a few rows is added (Woodbury's formula).
 
     (A + w G'G)^-1 = A^-1 - A^-1 G' (1/w + G A^-1 G')^-1 G A^-1
 
@@ -21,11 +21,11 @@ class Updated:
     Parameters
     ----------
     factors : Solution
-        Of A.
+        Factors of A.
     rows : ndarray, shape (r, n)
-        G.
+        The rows G.
     weight : float or complex
-        w, not 0.
+        The factor w, not 0.
     """
 
     def __init__(self, factors: Solution, rows: NDArray, weight: complex) -> None:
@@ -36,27 +36,27 @@ class Updated:
         self._small = lu_factor(small, overwrite_a=True, check_finite=False)
 
     def solve(self, b: NDArray) -> NDArray:
-        """Solution x."""
+        """Solution x of (A + w G'G) x = b."""
         x = self._factors.solve(b)
         return x - self._moved @ lu_solve(self._small, self._rows @ x, check_finite=False)
 
 
 class Squared:
-    """The sum A + G'G of a sparse matrix and a product of rows, which is never formed.
+    """The sum A + G'G of a sparse matrix and a product of rows; it is never formed.
 
     Parameters
     ----------
     matrix : csc_array, shape (n, n)
-        A.
+        The matrix A.
     rows : ndarray, shape (r, n)
-        G.
+        The rows G.
     """
 
     def __init__(self, matrix: sparse.csc_array, rows: NDArray) -> None:
         self.matrix, self.rows, self.shape = matrix, rows, matrix.shape
 
     def __matmul__(self, x: NDArray) -> NDArray:
-        """Product with a vector (n,) or several (n, k)."""
+        """Product of the sum with one vector (n,) or several (n, k)."""
         return self.matrix @ x + self.rows.T @ (self.rows @ x)
 
     def toarray(self) -> NDArray:
@@ -64,15 +64,15 @@ class Squared:
         return self.matrix.toarray() + self.rows.T @ self.rows
 
     def diagonal(self) -> NDArray:
-        """Its diagonal (n,)."""
+        """Diagonal (n,) of the sum."""
         return self.matrix.diagonal() + np.einsum("ri,ri->i", self.rows, self.rows)
 
 
 class Counted(Updated):
-    """`Updated` for symmetric matrices, with the number of negative eigenvalues of the sum.
+    """`Updated` for symmetric matrices, which also counts negative eigenvalues of the sum.
 
-    Both Schur complements of the block matrix [[A, G'], [G, -1/w]] give its count (Haynsworth's
-    theorem).
+    The count follows from both Schur complements of the block matrix [[A, G'], [G, -1/w]]
+    (Haynsworth's theorem).
     """
 
     def __init__(self, factors: Factorization, rows: NDArray, weight: float) -> None:
@@ -82,9 +82,9 @@ class Counted(Updated):
         self._negative = factors.negative() + int((values > 0.0).sum()) - given
 
     def pivots(self) -> None:
-        """None: only the count is known."""
+        """None, as only the number of negative eigenvalues is known."""
         return
 
     def negative(self) -> int:
-        """Count of negative eigenvalues."""
+        """Number of negative eigenvalues."""
         return self._negative

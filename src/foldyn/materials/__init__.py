@@ -1,4 +1,4 @@
-"""Scalar laws: stress of a bar, moment of a hinge, their slopes and energies."""
+"""Scalar laws: the stress of a bar, the moment of a hinge, and their slopes and energies."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields
 from typing import Any
 
-import foldyn.jit  # noqa: F401 - asks for what Numba needs, before anything imports Numba
+import foldyn.jit  # noqa: F401 - asks for what Numba needs before anything imports Numba
 from foldyn.errors import InputError
 from foldyn.materials import switch
 from foldyn.materials.branch_switch import MEMORY_LAWS
@@ -58,7 +58,7 @@ def bar_law(spec: str | BarLaw) -> BarLaw:
 
 
 def hinge_law(spec: str | HingeLaw, field: str = "hinge law") -> HingeLaw:
-    """Law of a hinge from its name, one of `HINGE_LAWS`, or a law object."""
+    """Law of a hinge from its name in `HINGE_LAWS`, or a law object."""
     return _law(spec, HINGE_LAWS, HingeLaw, field)
 
 

@@ -1,4 +1,4 @@
-"""The one compiled switch from the code of a branch of a law with memory to its formulas."""
+"""The compiled switch from a branch code of a law with memory to the formulas of that branch."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """A branch of a law: a damper parallel to a crease that turns in balance with edge angles.
 
-Its moment is c times the rate r of the turn d. Per unit of the stiffness of the adjacent panels
-this is r / q, with q the rate at which these panels would return the crease. In a step of h the
-rate goes from r0 to r1 as a + b exp(-q t):
+The moment is c times the rate r of the turn d. Per unit stiffness of the adjacent panels it is
+r / q, with q the rate at which these panels would return the crease. In a step h the rate goes from
+r0 to r1 as a + b exp(-q t):
 
     d = h ((1 - w) r0 + w r1),    w = 1 / (1 - exp(-q h)) - 1 / (q h),
 
@@ -22,14 +22,14 @@ from foldyn.materials.formulas import BranchFormulas
 from foldyn.materials.inelastic_law import Branch
 from foldyn.materials.law import columns
 
-CODE = 3  # among branches
-FEW = 1e-3  # of q h: below it series avoid cancellation
-NO_TIME = 1e-6  # of 1 / q, in which loads that jump would turn a crease
+CODE = 3  # code of the branch
+FEW = 1e-3  # series avoid cancellation if q h is below this
+NO_TIME = 1e-6  # time in which a jump of loads turns a crease, relative to 1 / q
 
 
 @scalar
 def update(p, before, after, dt, rate, turned):
-    """Rate, turn, moment, slope, 0 and loss per k, after a turn in a time dt."""
+    """Rate, turn, moment, slope, 0 and loss, divided by k, after a turn in a time dt."""
     time, pace = p[0], p[1]
     if dt == 0.0:
         now = rate + (after - before) * pace / NO_TIME
@@ -51,7 +51,7 @@ FORMULAS = BranchFormulas(CODE, update, None)
 
 
 def damper_branch(panels: NDArray, damping: NDArray) -> Branch:
-    """Dampers (n,), N m s/rad, on creases between panels of these stiffnesses (n,), N m/rad."""
+    """Branch of dampers (n,), N m s/rad, on creases of panels with stiffnesses (n,), N m/rad."""
     there = damping > 0.0
     pace = np.divide(panels, damping, out=np.ones(len(there)), where=there)
     return Branch(CODE, columns(len(pace), there / pace, pace), 0.0, there * 1.0, pace)

@@ -1,7 +1,7 @@
-"""Laws of the user's own, given as plain scalar Python functions.
+"""Laws that the user defines by plain scalar Python functions.
 
-Built-in laws are compiled once and kept on disk. A user's law is compiled anew in every process
-(a fraction of a second) and called by its address; a result computed with it says that it cannot
+Built-in laws are compiled once and kept on disk. A user's law is compiled anew in every process (in
+a fraction of a second) and called by its address. A result computed with it records that it cannot
 be run again from its file alone.
 """
 
@@ -20,7 +20,7 @@ from foldyn.materials.law import BarLaw, HingeLaw, Law
 
 
 class _Called(Law):
-    """A law whose first three fields are its functions; each takes the numbers of a state."""
+    """A law whose first three fields are functions; each takes the numbers of a state."""
 
     @cached_property
     def _functions(self) -> list[Any]:
@@ -50,11 +50,10 @@ class CustomBarLaw(_Called, BarLaw):
 
     Parameters
     ----------
-    energy_of, stress_of, slope_of : callable
-        Scalar functions of the stretch: W / E_y, S / E_y (second Piola-Kirchhoff) and
-        (dS/dE) / E_y, with dW/dE = S and E the Green strain.
+    Scalar functions of the stretch: W / E_y, S / E_y (second Piola-Kirchhoff stress) and
+    (dS/dE) / E_y, with dW/dE = S and E the Green strain.
     name : str
-        Shown in figures and results.
+        Name of the law in figures and results.
     """
 
     energy_of: Callable[[float], float]
@@ -70,10 +69,10 @@ class CustomHingeLaw(_Called, HingeLaw):
     Parameters
     ----------
     energy_of, moment_of, slope_of : callable
-        Scalar functions of (theta, rest) in radians, per unit stiffness; the moment is the
-        derivative of the energy with respect to theta, the slope that of the moment.
+        Scalar functions of (theta, rest) in radians, per unit stiffness. The moment is the
+        derivative of the energy with respect to theta, and the slope is that of the moment.
     name : str
-        Shown in figures and results.
+        Name of the law in figures and results.
 
     Examples
     --------

@@ -1,12 +1,12 @@
-"""Enhanced linear moment law of folds: linear, but stiffening to infinity as panels meet.
+"""Enhanced linear moment law of folds: linear, but with infinite stiffness as panels meet.
 
-With p = pi/theta1 below theta1 (mirrored above theta2 with p = pi/(2 pi - theta2)),
-M/k = (theta1 - theta0) + tan(p (theta - theta1)/2) / (p/2); linear between.
+With p = pi/theta1 below theta1 (and, mirrored, p = pi/(2 pi - theta2) above theta2),
+M/k = (theta1 - theta0) + tan(p (theta - theta1)/2) / (p/2); linear in between.
 Source: Liu and Paulino, Proc. R. Soc. A 473, 2017 (MERLIN).
 
-If the rest angle theta0 lies beyond theta1 or theta2, the published law has a moment at
-rest. `rest="stress_free"` subtracts that moment (and the energy at rest), so that the pattern as
-drawn is in equilibrium; `rest="as_published"` keeps both.
+If the rest angle theta0 lies below theta1 or above theta2, the published law has a moment at rest.
+`rest="stress_free"` subtracts that moment and the energy at rest, so that the pattern as drawn is
+in equilibrium; `rest="as_published"` keeps both.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from foldyn.materials.formulas import HingeFormulas
 from foldyn.materials.law import HingeLaw, columns
 from foldyn.values import choice, number, writable
 
-STRESS_FREE, AS_PUBLISHED = 2, 3  # codes
+STRESS_FREE, AS_PUBLISHED = 2, 3  # codes of the two laws
 TWO_PI = 2.0 * math.pi
 HALF_PI = 0.5 * math.pi
 
-# How far a fold is into its locking range goes from 0 (at theta1 or theta2) to exactly 1 (closed):
-# an angle of more than pi/2, even by rounding, would turn the sign of the tangent.
+# The depth of a fold in its locking range goes from 0 (at theta1 or theta2) to exactly 1 (closed).
+# An angle above pi/2, even by rounding, would change the sign of the tangent.
 
 
 @scalar
 def energy(theta, rest, theta1, theta2):
-    """Energy / k as published; at rest it is not zero if rest lies beyond theta1 or theta2."""
+    """Energy / k as published; not zero at rest if rest lies outside theta1 to theta2."""
     if theta < theta1:
         d, r, span = rest - theta1, theta1 - theta, theta1
     elif theta > theta2:
@@ -59,7 +59,7 @@ def moment(theta, rest, theta1, theta2):
 
 @scalar
 def slope(theta, rest, theta1, theta2):
-    """Slope / k: 1 between theta1 and theta2, 1/cos^2 beyond."""
+    """Slope / k: 1 between theta1 and theta2, 1/cos^2 outside."""
     if theta < theta1:
         return 1.0 / math.cos(HALF_PI * ((theta1 - theta) / theta1)) ** 2
     if theta > theta2:
@@ -69,7 +69,7 @@ def slope(theta, rest, theta1, theta2):
 
 @scalar
 def by_limits(theta, rest, theta1, theta2):
-    """Derivatives of moment / k as published with respect to theta1 and theta2."""
+    """Derivatives of the published moment / k with respect to theta1 and theta2."""
     if theta < theta1:
         tangent = math.tan(HALF_PI * ((theta1 - theta) / theta1))
         return 1.0 - (1.0 + tangent * tangent) * theta / theta1 - tangent / HALF_PI, 0.0
@@ -83,13 +83,13 @@ def by_limits(theta, rest, theta1, theta2):
 
 @scalar
 def energy_by_rest(theta, rest):
-    """Derivative of energy / k as published with respect to rest."""
+    """Derivative of the published energy / k with respect to rest."""
     return rest - theta
 
 
 @scalar
 def moment_by_rest(theta, rest):
-    """Derivative of moment / k with respect to rest, for a fixed moment at rest."""
+    """Derivative of moment / k with respect to rest, with the moment at rest held fixed."""
     return -1.0
 
 
@@ -107,20 +107,20 @@ def relieved_moment(theta, rest, theta1, theta2, moment_at_rest):
 
 @inner_scalar
 def relieved_by_parameters(theta, rest, theta1, theta2, moment_at_rest):
-    """Derivatives of its moment / k by theta1, theta2 and the moment at rest."""
+    """Derivatives of the stress-free moment / k with respect to theta1, theta2, moment_at_rest."""
     by_first, by_second = by_limits(theta, rest, theta1, theta2)
     return by_first, by_second, -1.0
 
 
 @inner_scalar
 def relieved_energy_by_rest(theta, rest, theta1, theta2):
-    """Derivative of its energy / k by rest; moment and energy at rest change with it."""
+    """Derivative of the stress-free energy / k with respect to rest, subtracted terms included."""
     return slope(rest, rest, theta1, theta2) * (rest - theta)
 
 
 @inner_scalar
 def relieve(rest, parameters):
-    """Set the moment and the energy at rest, which the stress-free law subtracts."""
+    """Set the moment and the energy at rest that the stress-free law subtracts."""
     theta1, theta2 = parameters[0], parameters[1]
     parameters[2] = moment(rest, rest, theta1, theta2)
     parameters[3] = energy(rest, rest, theta1, theta2)
@@ -134,14 +134,14 @@ def _relieve_each(rest, table):
 
 @dataclass(frozen=True)
 class EnhancedLinear(HingeLaw):
-    """Linear fold that locks as the panels meet.
+    """Linear fold law that locks as the panels meet.
 
     Parameters
     ----------
     theta1, theta2 : float
         Dihedrals (degrees) between which the law is linear, 0 < theta1 < theta2 < 360.
     rest : {"stress_free", "as_published"}
-        Whether the law's moment at the rest angle is subtracted (see the module's text).
+        Whether the law subtracts its moment at the rest angle (see the module docstring).
 
     Examples
     --------
@@ -167,7 +167,7 @@ class EnhancedLinear(HingeLaw):
     )  # fmt: skip
 
     def agree(self) -> None:
-        """Refuse angles that are not in order."""
+        """Refuse theta1 and theta2 that are not in order."""
         if not 0.0 < self.theta1 < self.theta2 < 360.0:
             raise InputError(
                 f"theta1 = {self.theta1}, theta2 = {self.theta2}: need "
@@ -176,7 +176,7 @@ class EnhancedLinear(HingeLaw):
 
     @property
     def code(self) -> int:
-        """Code of its formulas, which depends on whether the moment at rest is subtracted."""
+        """Code of the formulas, which depends on whether the moment at rest is subtracted."""
         return AS_PUBLISHED if self.rest == "as_published" else STRESS_FREE
 
     @property
@@ -186,17 +186,17 @@ class EnhancedLinear(HingeLaw):
 
     @property
     def closed_at_rest(self) -> bool:
-        """Only with the published law; the other one would subtract an infinite moment."""
+        """Whether a hinge may be closed at rest; the stress-free law would subtract infinity."""
         return self.rest == "as_published"
 
     def parameters(self, rest: NDArray) -> NDArray:
-        """theta1, theta2 (rad), and the moment and energy at rest to subtract, per hinge."""
+        """theta1 and theta2 (rad), and the moment and energy at rest to subtract, of each hinge."""
         table = columns(len(rest), *self.linear_between)
         if self.code == STRESS_FREE:
             _relieve_each(writable(rest), table)
         return table
 
     def reach(self, theta: NDArray, rest: NDArray, parameters: NDArray) -> NDArray:
-        """Distance to theta1, theta2 or the angles at which panels meet; see `HingeLaw`."""
+        """Distance to the nearest of theta1, theta2 and the closed angles; see `HingeLaw`."""
         kinks = (0.0, *self.linear_between, TWO_PI)
         return np.min([np.abs(theta - kink) for kink in kinks], axis=0)

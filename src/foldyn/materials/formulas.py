@@ -1,6 +1,6 @@
-"""Declarations of laws for kernels: compiled formulas, selected by the code of the law.
+"""Declarations of laws for kernels: compiled formulas, selected by a law's code.
 
-A law's file declares all of it in one place, and a missing part is an error when it is imported.
+The file of a law declares all its formulas in one place; a missing one is an error on import.
 """
 
 from __future__ import annotations
@@ -10,19 +10,19 @@ from typing import Any
 
 from foldyn.jit.switches import Branch, arguments_of
 
-MOVING = 3  # parameters on which a moment may depend: gradients know no more
+MOVING = 3  # number of parameters on which a moment may depend, as gradients have no more
 
 
 @dataclass(frozen=True)
 class BarFormulas:
-    """Formulas of e = stretch - 1, per unit Young's modulus, compiled as `scalar`.
+    """Formulas of a bar law in e = stretch - 1, per unit Young's modulus, compiled as `scalar`.
 
     Parameters
     ----------
     code : int
-        One that no other bar law has.
+        A number that no other bar law has.
     energy, stress, slope : compiled functions
-        W, its derivative S by the Green strain E, and dS/dE.
+        W, its derivative S with respect to the Green strain E, and dS/dE.
     """
 
     code: int
@@ -35,24 +35,24 @@ class BarFormulas:
 class HingeFormulas:
     """Formulas of a hinge law per unit stiffness, compiled as `scalar`.
 
-    Each takes `turn`, the dihedral minus the rest angle, or `theta` and `rest`; then as many of the
-    four `HingeLaw.parameters` as it needs, under any names.
+    Each formula takes `turn`, the dihedral minus the rest angle, or `theta` and `rest`. Further
+    arguments, under any names, are as many of the four `HingeLaw.parameters` as it needs.
 
     Parameters
     ----------
     code : int
-        One that no other hinge law has.
+        A number that no other hinge law has.
     energy, moment, slope : compiled functions
-        The energy, its derivative by the dihedral, and the derivative of that.
+        Energy and its first and second derivatives with respect to the dihedral.
     by_parameters : compiled function, optional
-        Derivatives of the moment by each parameter that it takes, three at most, as a tuple;
-        needed if it takes any.
+        Derivatives of the moment with respect to each parameter that it takes, three at most, as a
+        tuple; needed if it takes any.
     energy_by_rest, moment_by_rest : compiled functions, optional
-        Derivatives by the rest angle. Not needed if all formulas take the turn: they are then
-        minus the derivatives by the dihedral.
+        Derivatives with respect to the rest angle. Not needed if all formulas take the turn, as
+        they are then minus the derivatives with respect to the dihedral.
     follow : compiled function, optional
-        Of (rest, parameters): sets the parameters of a hinge that depend on its rest angle;
-        needed if there are any.
+        Function of (rest, parameters) that sets the parameters of a hinge that depend on the rest
+        angle; needed if there are any.
     """
 
     code: int
@@ -81,15 +81,15 @@ class HingeFormulas:
             )
 
     def value(self, name: str) -> Branch:
-        """The branch of the switch that returns a formula."""
+        """Branch of the switch that returns the formula `name`."""
         return _call(0, formula := getattr(self, name)), (formula,)
 
     def energy_slope(self) -> Branch:
-        """The branch that returns the derivative of the energy by the rest angle."""
+        """Branch that returns the derivative of the energy with respect to the rest angle."""
         return _by_rest(self.energy_by_rest, self.moment)
 
     def moment_slopes(self) -> Branch:
-        """The branch for derivatives of the moment by the rest angle and by three parameters."""
+        """Branch for derivatives of the moment with respect to rest angle and three parameters."""
         by_rest, functions = _by_rest(self.moment_by_rest, self.slope)
         slopes, others = f"({by_rest},)", MOVING - parameters_of(self.moment)
         if self.by_parameters is not None:
@@ -103,19 +103,19 @@ class BranchFormulas:
     """Formulas of a branch of a law with memory, per unit stiffness, compiled as `scalar`.
 
     Both take `p, before, after, dt, one, other`: the (4,) parameters of the branch; the turn from
-    the rest angle at the last accepted step, and now, rad; the time since then, s; and the state,
-    two numbers, at that step. Without a turn and without time the state keeps its bits.
+    the rest angle at the last accepted step and now, rad; the time between, s; and the two numbers
+    of the state at that step. Without a turn and without time, the state keeps its bits.
 
     Parameters
     ----------
     code : int
-        One that no other branch has.
+        A number that no other branch has.
     update : compiled function
-        State (two numbers), moment, its derivative by `after`, energy and loss.
+        State (two numbers), moment, its derivative with respect to `after`, energy and loss.
     mean_moment : compiled function
-        Mean moment in the step, its derivative by `after`, and a deficit: the work along the turn
-        is the change of the energy plus the loss of `update` minus this deficit. None for branches
-        that only explicit motions have.
+        Mean moment in the step, its derivative with respect to `after`, and a deficit: the work
+        along the turn is the change of energy plus the loss of `update` minus this deficit. None
+        for branches that only occur in explicit motions.
     """
 
     code: int
@@ -124,7 +124,7 @@ class BranchFormulas:
 
 
 def of_turn(formula: Any) -> bool:
-    """Whether a formula of a hinge law takes the turn from rest, not both angles."""
+    """Whether a formula of a hinge law takes the turn from rest rather than both angles."""
     return arguments_of(formula)[0] == "turn"
 
 

@@ -1,10 +1,10 @@
-"""Laws with memory: a hinge law with parallel branches whose moments depend on the past.
+"""Laws with memory: a hinge law with parallel branches, whose moments depend on the past.
 
 A hinge turned by d = theta - theta0 from its rest angle has the moment M = k (m(d) + sum of b),
-with m the elastic law and b the branches per unit stiffness k. A branch is a function of d, of d at
-the last accepted step, of the state of the branch at that step, and of the time since then.
-Kernels call all branches through one switch (`branch_switch`); the elastic part has the code of its
-own law: code that ignores branches works with the elastic part.
+with m the elastic law and b the branches, both per unit stiffness k. A branch depends on d now and
+at the last accepted step, on the state of the branch at that step, and on the time since then.
+Kernels call all branches through one switch (`branch_switch`). The elastic part has the code of its
+own law, so kernels that ignore branches work with the elastic part.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from foldyn.errors import InputError
 from foldyn.materials.formulas import BranchFormulas
 from foldyn.materials.law import HingeLaw
 
-VARIABLES = 2  # of the state of a branch
+VARIABLES = 2  # number of variables in the state of a branch
 
 
 class Branch(NamedTuple):
-    """A branch of n hinges, per unit stiffness.
+    """A branch of the law of n hinges, per unit stiffness.
 
-    Small vibrations of complex angular frequency s about a state at rest see the stiffness
+    For small vibrations of complex angular frequency s about a state at rest, its stiffness is
     relaxed + share s / (s + rate).
     """
 
-    code: int  # of the switch
+    code: int  # code in the switch
     parameters: NDArray  # (n, 4)
     relaxed: float
     share: float | NDArray  # (n,)
@@ -40,33 +40,33 @@ class Branch(NamedTuple):
 
 
 class MemoryLaw(HingeLaw):
-    """A hinge law with branches: the base of data classes with a field `law`, its elastic part."""
+    """Base of hinge laws with branches: data classes whose field `law` is the elastic part."""
 
     law: str | HingeLaw
     lookup: ClassVar[Callable[..., HingeLaw]]
-    """`materials.hinge_law`, which the registry sets, as it knows these laws."""
+    """The function `materials.hinge_law`; the registry sets it, as it knows all laws."""
     formulas: ClassVar[tuple[BranchFormulas, ...]] = ()
-    """Formulas of its branches, one for each code."""
+    """Formulas of the branches, one for each code."""
     rate_dependent: ClassVar[bool]
-    """Whether its moment depends on time, not on the path alone."""
+    """Whether the moment depends on time, rather than on the path alone."""
     relaxes: ClassVar[bool] = False
-    """Whether its moment at a held angle relaxes to the moment of the elastic part."""
+    """Whether the moment at a fixed angle relaxes to the moment of the elastic part."""
 
     @cached_property
     def elastic(self) -> HingeLaw:
-        """Its elastic part."""
+        """Elastic part of the law."""
         law = self.lookup(self.law, "law")
         if isinstance(law, MemoryLaw):
             raise InputError(f" = {law.name!r}: has a memory itself; give another", "law")
         return law
 
     def agree(self) -> None:
-        """Refuse an elastic part that has a memory itself."""
+        """Refuse an elastic part that has memory."""
         _ = self.elastic
 
     @abstractmethod
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
-        """Its branches for hinges with stiffnesses (n,), N m/rad, and lengths (n,), m."""
+        """Branches of the law for hinges with stiffnesses (n,), N m/rad, and lengths (n,), m."""
 
     code: Any = property(attrgetter("elastic.code"))
     addresses: Any = property(attrgetter("elastic.addresses"))
@@ -91,5 +91,5 @@ class MemoryLaw(HingeLaw):
 
 
 def memory_of(law: Any) -> MemoryLaw | None:
-    """The law, if it has a memory."""
+    """The law itself if it has memory, otherwise None."""
     return law if isinstance(law, MemoryLaw) else None

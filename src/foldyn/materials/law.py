@@ -1,9 +1,9 @@
-"""Base classes of scalar laws, for bars and hinges.
+"""Base classes of scalar laws for bars and hinges.
 
-A law is scaled: a bar law is per unit Young's modulus, a hinge law per unit stiffness, so the
-same law object serves every element of a structure. Compiled kernels never see these objects;
-they get `code`, an integer that selects the law in one compiled switch (`switch.py`), and for
-hinges four parameters per element.
+A bar law is per unit Young's modulus and a hinge law per unit stiffness, so the same law object
+serves every element of a structure. Compiled kernels never see these objects. They get `code`, an
+integer that selects the law in one compiled switch (`switch.py`), and for hinges four parameters
+per element.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ class Law(Checked, ABC):
     name: str
     code: int = CALLED
     formulas: ClassVar[tuple[Any, ...]] = ()
-    """`BarFormulas` or `HingeFormulas` of each of its codes; its `code` is the first of these."""
+    """`BarFormulas` or `HingeFormulas` for each code of the law; `code` is that of the first."""
     rest_state: tuple[float, ...]
     compiled: ClassVar[Callable[..., NDArray]]
-    """Table of all functions of a law by its code; set by the registry."""
+    """Function that returns a table of all functions of a law for its code; set by the registry."""
     known: ClassVar[Mapping[int, Any]]
-    """Formulas by code that the switch knows; set by the registry."""
+    """Formulas that the switch knows, by code; set by the registry."""
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Let messages begin with the name of the class, and kernels find its formulas."""
+        """Begin messages with the name of the class, and take the code from its formulas."""
         super().__init_subclass__(**options)
         cls.place = f"{cls.__name__}: "
         if "formulas" in vars(cls) and isinstance(cls.code, int):
@@ -45,12 +45,12 @@ class Law(Checked, ABC):
 
     @property
     def addresses(self) -> tuple[int, int, int] | None:
-        """Addresses of the compiled (energy, response, slope) of a user's law; else None."""
+        """Addresses of a user law's compiled energy, response and slope; None for other laws."""
         return None
 
     def check(self, field: str) -> None:
-        """Refuse a law whose formulas the switch does not know under its code."""
-        if type(self).addresses is not Law.addresses:  # asking for them would compile them
+        """Refuse a law whose formulas are not in the switch under its code."""
+        if type(self).addresses is not Law.addresses:  # reading would compile functions
             return
         if self.known.get(self.code) not in self.formulas:
             raise InputError(
@@ -62,7 +62,7 @@ class Law(Checked, ABC):
 
     @abstractmethod
     def _table(self, *state: ArrayLike) -> NDArray:
-        """All functions of the law, one a row, at states (stretch, or dihedral and rest)."""
+        """All functions of the law, one per row, at states (stretch, or dihedral and rest)."""
 
 
 class BarLaw(Law):
@@ -79,7 +79,7 @@ class BarLaw(Law):
         return self._table(stretch)[1]
 
     def slope(self, stretch: ArrayLike) -> NDArray:
-        """Slope dS/dE / E_y, E = (lambda^2 - 1)/2 the Green strain, at each stretch."""
+        """Slope (dS/dE) / E_y at each stretch, with E = (lambda^2 - 1)/2 the Green strain."""
         return self._table(stretch)[2]
 
     def _table(self, stretch: ArrayLike) -> NDArray:
@@ -93,14 +93,14 @@ class HingeLaw(Law):
 
     rest_state = (math.pi, math.pi)
     linear_between: tuple[float, float] | None = None
-    """Dihedrals (rad) between which the moment is k (theta - rest), if the law is linear at all."""
+    """Dihedrals (rad) between which the moment is k (theta - rest); None if nowhere."""
     follows_rest: bool = True
-    """Whether the parameters of its compiled form depend on the rest angle."""
+    """Whether the parameters of the formulas depend on the rest angle."""
     closed_at_rest: bool = True
-    """Whether a hinge can be at rest closed, with a dihedral of 0 or 2 pi."""
+    """Whether a hinge can be closed at rest, with a dihedral of 0 or 2 pi."""
 
     def check(self, field: str) -> None:
-        """Refuse unknown laws, and parameters that would not follow the rest angle."""
+        """Refuse unknown laws, and parameters that do not follow the rest angle they depend on."""
         super().check(field)
         one, other = self.parameters(np.array([math.pi, 0.5 * math.pi]))
         if (one != other).any() and self.known[self.code].follow is None:
@@ -111,7 +111,7 @@ class HingeLaw(Law):
             )
 
     def parameters(self, rest: NDArray) -> NDArray:
-        """Parameters of the compiled form, shape (n, 4), for hinges with rest angles (n,)."""
+        """Parameters of the formulas (n, 4) for hinges with rest angles (n,)."""
         return np.zeros((len(rest), PARAMETERS))
 
     def reach(self, theta: NDArray, rest: NDArray, parameters: NDArray) -> NDArray:
@@ -123,7 +123,7 @@ class HingeLaw(Law):
         return self._table(theta, rest)[0]
 
     def moment(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
-        """Moment / k (rad), positive where it resists an opening (theta above rest)."""
+        """Moment / k (rad), positive if it resists opening (theta above rest)."""
         return self._table(theta, rest)[1]
 
     def slope(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
@@ -135,7 +135,7 @@ class HingeLaw(Law):
         return self._table(theta, rest)[3]
 
     def moment_by(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
-        """Derivatives (4, ...) of the moment / k by the rest dihedral and `parameters` a, b, c."""
+        """Derivatives (4, ...) of moment / k with respect to rest and to `parameters` a, b, c."""
         return self._table(theta, rest)[4:]
 
     def _table(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
@@ -150,7 +150,7 @@ class HingeLaw(Law):
 
 
 def columns(rows: int, *values: ArrayLike) -> NDArray:
-    """Parameters (n, 4) of hinges from leading columns; the other columns are zero."""
+    """Parameters (n, 4) of hinges from the first columns; the other columns are zero."""
     table = np.zeros((rows, PARAMETERS))
     for column, value in enumerate(values):
         table[:, column] = value

@@ -1,4 +1,4 @@
-"""Linear laws: a bar linear in Green strain (St. Venant-Kirchhoff), a hinge linear in angle."""
+"""Linear laws: for a bar linear in Green strain (St. Venant-Kirchhoff), for a hinge in angle."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def hinge_slope(turn):
 
 @dataclass(frozen=True)
 class LinearBar(BarLaw):
-    """Stress proportional to Green strain."""
+    """Bar law with stress proportional to Green strain."""
 
     formulas = (BarFormulas(CODE, bar_energy, bar_stress, bar_slope),)
     name: str = "linear"
@@ -59,7 +59,7 @@ class LinearBar(BarLaw):
 
 @dataclass(frozen=True)
 class LinearHinge(HingeLaw):
-    """Moment proportional to the change of the dihedral."""
+    """Hinge law with moment proportional to the change of the dihedral."""
 
     formulas = (HingeFormulas(CODE, hinge_energy, hinge_moment, hinge_slope),)
     linear_between = (-math.inf, math.inf)

@@ -1,8 +1,8 @@
 """Ogden law with exponents (5, 1), as in MERLIN2.
 
 S / E_y = (lambda^3 - 1/lambda) / 4,  W / E_y = [(lambda^5 - 1)/5 - (lambda - 1)] / 4
-(Liu and Paulino, Proc. R. Soc. A 473, 2017), written in e = lambda - 1 so that nothing cancels
-near e = 0: the plain formulas lose five digits of the energy of a nearly unstretched bar.
+(Liu and Paulino, Proc. R. Soc. A 473, 2017). The formulas are written in e = lambda - 1 so that
+nothing cancels near e = 0; otherwise the energy of a nearly unstretched bar would lose five digits.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def stress(e):
 
 @scalar
 def stress_of_excess(x):
-    """S / E_y at x = lambda^2 - 1, for kernels: one root and one division."""
+    """S / E_y for x = lambda^2 - 1, for kernels: one root and one division."""
     return 0.25 * x * (2.0 + x) / math.sqrt(1.0 + x)
 
 

@@ -1,16 +1,16 @@
 """Plasticity of creases: a yield moment with isotropic and kinematic hardening.
 
-With the plastic turn p and the sum a of its sizes, per length of the crease,
+Let p be the plastic turn and a the sum of the sizes of its changes. Per length of the crease,
 
     M = k (d - p),    f = |M - C p| - (M_y + H a) <= 0,    dp/dt = sgn(M - C p) da/dt,
 
-and a grows only if f = 0. With an elastic law m(d) that is not linear, M = k (m(d) - p).
+and a grows only if f = 0. With a nonlinear elastic law m(d), M = k (m(d) - p).
 
 A step is the return mapping (M. L. Wilkins, 1964; J. C. Simo and T. J. R. Hughes, Computational
-Inelasticity, 1998, box 1.5): if the trial state with the old p has f > 0, a grows by
-f / (k + H + C). For turns in one direction the moment and the dissipation, int (M_y + H a) da, are
-exact for any step. The slope of the moment within such a step is the consistent one,
-k (H + C) / (k + H + C).
+Inelasticity, 1998, box 1.5): if f > 0 in the trial state with the old p, a grows by
+f / (k + H + C). For turns in one direction, the moment and the dissipation, int (M_y + H a) da, are
+exact for any step. The slope of the moment within such a step is the consistent one, k (H + C) / (k
++ H + C).
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ CODE = 1
 
 @scalar
 def update(p, before, after, dt, plastic, grown):
-    """Plastic turn, its sum, moment, slope, energy and loss per k, after a turn.
+    """Plastic turn, sum a, moment, slope, energy and loss, divided by k, after a turn.
 
-    p : yield moment, isotropic and kinematic hardening, over k.
+    p : yield moment, isotropic and kinematic hardening, each divided by k.
     """
     limit, isotropic, kinematic = p[0], p[1], p[2]
     driven = after - plastic - kinematic * plastic
     beyond = abs(driven) - (limit + isotropic * grown)
     slope, lost = 0.0, 0.0
-    if beyond > 0.0 and after != before:  # without a turn, rounding must not cause yielding
+    if beyond > 0.0 and after != before:  # rounding alone must not cause yielding
         whole = 1.0 + isotropic + kinematic
         more = beyond / whole
         lost = more * (limit + isotropic * (grown + 0.5 * more))
@@ -54,12 +54,12 @@ def update(p, before, after, dt, plastic, grown):
 
 @scalar
 def mean_moment(p, before, after, dt, plastic, grown):
-    """Mean of the moments at both ends, its slope, and the loss that its work does not cover.
+    """Mean moment of both ends, its slope, and the loss that the work of this mean does not cover.
 
-    Some loss is not covered if the crease begins to yield within the turn. (The mean along the turn
-    would cover it, but dofs without mass would then oscillate from step to step.) The covered loss
-    is not negative: before a crease yields, it turns by at most twice the yield moment over its
-    stiffness.
+    Part of the loss is not covered if the crease begins to yield within the turn. (The mean along
+    the turn would cover all of it, but dofs without mass would then oscillate from step to step.)
+    The covered loss is not negative: before a crease yields, it turns by at most twice the yield
+    moment divided by the stiffness.
     """
     now = update(p, before, after, dt, plastic, grown)
     turn, more, whole = abs(after - before), now[1] - grown, 1.0 + p[1] + p[2]
@@ -69,15 +69,15 @@ def mean_moment(p, before, after, dt, plastic, grown):
 
 @dataclass(frozen=True)
 class Plastic(MemoryLaw):
-    """Elastic and plastic law of creases, independent of rates.
+    """Elastic and plastic law of creases that does not depend on rates.
 
     Parameters
     ----------
     yield_moment : float
-        Moment M_y per length of the crease (N m per m) at which it yields first, above 0.
+        Moment M_y per length of the crease (N m per m) at which it first yields, above 0.
     isotropic, kinematic : float
-        Hardening H and C (N m/rad per m), at least 0: the growth of the yield moment, and the shift
-        of its middle, by plastic turn.
+        Hardening H and C (N m/rad per m), at least 0: H is the growth of the yield moment per
+        plastic turn, and C the shift of the elastic range.
     law : str or HingeLaw
         The elastic law.
 
@@ -97,7 +97,7 @@ class Plastic(MemoryLaw):
     rate_dependent = False
 
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
-        """See `MemoryLaw`."""
+        """Branches of the law; see `MemoryLaw`."""
         per = length / stiffness
         values = (per * x for x in (self.yield_moment, self.isotropic, self.kinematic))
         table = columns(len(per), *values)

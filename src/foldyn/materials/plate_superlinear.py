@@ -1,9 +1,9 @@
-"""Moment law of panels: linear for small turns, as a plate, then with the exponent 4/3.
+"""Moment law of panels: linear for small turns like a plate, with exponent 4/3 for large turns.
 
-M = k d (1 + (d/d0)^2)^(1/6), d = theta - theta0. Well below the onset d0 this is the linear law,
-well above it k d0^(-1/3) |d|^(4/3), the law of the superlinear bends: a panel that has buckled
-into the shape that large turns have. It is the blend (M_1^6 + M_4/3^6)^(1/6) of the two, smooth
-everywhere; the sixth power has an energy in closed form.
+M = k d (1 + (d/d0)^2)^(1/6), d = theta - theta0. Well below the onset d0 this is the linear law.
+Well above it, this is k d0^(-1/3) |d|^(4/3), the law of superlinear bends: of a panel that has
+buckled into the shape of large turns. M = (M_1^6 + M_4/3^6)^(1/6) is a blend of the two that is
+smooth everywhere; with the sixth power, the energy has a closed form.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from foldyn.materials.law import HingeLaw, columns
 from foldyn.values import number
 
 CODE = 4
-FEW = 1e-4  # of (d/d0)^2: below it the energy is computed by a series
+FEW = 1e-4  # a series gives the energy if (d/d0)^2 is below this
 
 
 @scalar
@@ -63,15 +63,15 @@ def onset_parameters(onset: ArrayLike) -> NDArray:
 
 @dataclass(frozen=True)
 class PlateSuperlinear(HingeLaw):
-    """Bend law that is linear for small turns and has the exponent 4/3 for large ones.
+    """Bend law that is linear for small turns and has the exponent 4/3 for large turns.
 
     Parameters
     ----------
     onset : float, optional
-        Turn d0 (degrees) at which the two parts are equal. By default each bend has its own onset,
-        at which bends of the standard calibration and bends of a plate have equal moments; this
-        needs `calibration="plate"`. (Outside a structure the default is the onset of a square panel
-        with t/L = 0.01 and nu = 0.25: 1.37 degrees.)
+        Turn d0 (degrees) at which the linear and the superlinear part are equal. By default each
+        bend has its own onset, at which bends of the standard calibration and bends of a plate have
+        equal moments; this needs `calibration="plate"`. (Outside a structure the default is the
+        onset of a square panel with t/L = 0.01 and nu = 0.25: 1.37 degrees.)
 
     Examples
     --------
@@ -87,7 +87,7 @@ class PlateSuperlinear(HingeLaw):
     follows_rest = False
 
     def check(self, field: str) -> None:
-        """Refuse the law for creases without a given onset: only bends have a default."""
+        """Refuse the law for creases without a given onset, as only bends have a default onset."""
         super().check(field)
         if field == "fold_law" and self.onset is None:
             raise InputError(
@@ -97,17 +97,17 @@ class PlateSuperlinear(HingeLaw):
             )
 
     def parameters(self, rest: NDArray) -> NDArray:
-        """1/d0^2 (1/rad^2) of each hinge."""
+        """Parameter 1/d0^2 (1/rad^2) of each hinge."""
         onset = SQUARE if self.onset is None else math.radians(self.onset)
         return onset_parameters(np.full(len(rest), onset))
 
     def reach(self, theta: NDArray, rest: NDArray, parameters: NDArray) -> NDArray:
-        """Distance of the branch points, which are complex: rest +- i onset; see `HingeLaw`."""
+        """Distance to the branch points, which are complex, rest +- i onset; see `HingeLaw`."""
         return np.sqrt((theta - rest) ** 2 + 1.0 / parameters[:, 0])
 
 
 def plate_onset(plate: ArrayLike, superlinear: ArrayLike) -> NDArray:
-    """Turns (rad) at which k d of a plate and k' d^(4/3) are equal, of stiffnesses k and k'."""
+    """Turns (rad) at which k d of a plate equals k' d^(4/3), for the stiffnesses k and k'."""
     return (np.asarray(plate) / np.asarray(superlinear)) ** 3.0
 
 

@@ -1,12 +1,12 @@
 """Linear viscoelasticity: the generalized Maxwell law, whose relaxation is a Prony series.
 
-Branches act in parallel to the elastic law, each a spring g k and a dashpot in series, with the
+Branches act in parallel to the elastic law. Each is a spring g k in series with a dashpot, with the
 relaxation time tau = eta / (g k). With e the part of the turn d that the spring takes,
 
     M = k (m(d) + sum g e),    de/dt = dd/dt - e / tau,
 
-so that after a step of d the moment relaxes as k d (1 + sum g exp(-t/tau)), and small vibrations
-see the complex stiffness k (m' + sum g i w tau / (1 + i w tau)). k is the long-time stiffness.
+so that after a step of d the moment relaxes as k d (1 + sum g exp(-t/tau)). For small vibrations
+the complex stiffness is k (m' + sum g i w tau / (1 + i w tau)). k is the long-time stiffness.
 
 Over a step in which d changes by D at a constant rate, with x = dt / tau, the law is integrated
 exactly (R. L. Taylor, K. S. Pister and G. L. Goudreau, Int. J. Numer. Methods Eng. 2, 1970; J. C.
@@ -14,10 +14,10 @@ Simo and T. J. R. Hughes, Computational Inelasticity, 1998, section 10.3):
 
     e' = exp(-x) e + D (1 - exp(-x)) / x,
 
-and so is the loss in the dashpot, g int e^2 dt / tau.
+The loss in the dashpot, g int e^2 dt / tau, is exact too.
 
-A crease in series with panels (`series`), with or without a parallel damper, is again such a law:
-its rates are the poles of its stiffness (`in_series`).
+A crease in series with panels (`series`), with or without a parallel damper, is again such a law;
+the rates of this law are the poles of the stiffness (`in_series`).
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ from foldyn.materials.inelastic_law import Branch, MemoryLaw
 from foldyn.materials.law import HingeLaw, columns
 from foldyn.values import number_or_list, show
 
-CODE = 0  # among branches
-FEW = 0.02  # of a relaxation time: below it the loss is computed by a series
+CODE = 0  # code of the branch
+FEW = 0.02  # a series gives the loss in steps below this share of a relaxation time
 
 
 @scalar
 def update(p, before, after, dt, spring, other):
-    """Spring's turn, 0, moment, slope, energy and loss per k, after a turn in a time dt.
+    """Turn of the spring, 0, moment, slope, energy and loss, divided by k, after a turn in dt.
 
     p : share and rate (1/s) of the branch.
     """
@@ -62,7 +62,7 @@ def update(p, before, after, dt, spring, other):
 
 @scalar
 def mean_moment(p, before, after, dt, spring, other):
-    """Mean moment along the turn, its slope, and 0: its work is exactly stored or lost."""
+    """Mean moment along the turn, its slope, and 0, as its work is exactly stored or lost."""
     share, x = p[0], p[1] * dt
     mean = -math.expm1(-x) / x if x > 0.0 else 1.0
     if x < FEW:
@@ -73,7 +73,7 @@ def mean_moment(p, before, after, dt, spring, other):
 
 
 def _branches(name: str, value: Any) -> tuple[float, ...]:
-    """Return positive numbers, one for each branch."""
+    """Return a tuple of positive numbers, one for each branch."""
     given = number_or_list(name, value, "branch", above=0.0)
     return given if isinstance(given, tuple) else (given,)
 
@@ -85,11 +85,11 @@ class Prony(MemoryLaw):
     Parameters
     ----------
     ratios : float or sequence of float
-        Stiffness of each branch over that of the elastic law, above 0.
+        Stiffness of each branch relative to the elastic law, above 0.
     times : float or sequence of float
-        Relaxation time (s) of each, above 0.
+        Relaxation time (s) of each branch, above 0.
     law : str or HingeLaw
-        The elastic law, for slow turns and for statics.
+        The elastic law, which holds for slow turns and for statics.
 
     Examples
     --------
@@ -122,18 +122,18 @@ class Prony(MemoryLaw):
         return np.atleast_1d(self.ratios).astype(float), np.atleast_1d(self.times).astype(float)
 
     def relaxation(self, time: Sequence[float] | NDArray) -> NDArray:
-        """Stiffness over the long-time one at times (s) after a turn."""
+        """Stiffness relative to the long-time stiffness, at times (s) after a turn."""
         ratio, tau = self.series
         return 1.0 + (ratio * np.exp(-np.asarray(time, float)[..., None] / tau)).sum(axis=-1)
 
     def modulus(self, frequency: Sequence[float] | NDArray) -> NDArray:
-        """Complex stiffness over the long-time one at frequencies (Hz), for exp(+i w t)."""
+        """Complex stiffness relative to the long-time one at frequencies (Hz), for exp(+i w t)."""
         ratio, tau = self.series
         x = 2j * np.pi * np.asarray(frequency, float)[..., None] * tau
         return 1.0 + (ratio * x / (1.0 + x)).sum(axis=-1)
 
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
-        """See `MemoryLaw`."""
+        """Branches of the law; see `MemoryLaw`."""
         ratio, tau = (np.tile(each, (len(stiffness), 1)) for each in self.series)
         return maxwell(ratio, 1.0 / tau)
 
@@ -142,7 +142,7 @@ class Prony(MemoryLaw):
 class CreaseDampers(MemoryLaw):
     """Dampers of creases between compliant panels, as a law without branches of its own.
 
-    They resist the turn of the creases, which differs from the turn of the hinges.
+    The dampers resist the turn of the creases, which differs from the turn of the hinges.
     """
 
     law: str | HingeLaw = "linear"
@@ -152,12 +152,12 @@ class CreaseDampers(MemoryLaw):
     relaxes = True
 
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
-        """See `MemoryLaw`."""
+        """Branches of the law; see `MemoryLaw`."""
         return ()
 
 
 def maxwell(ratio: NDArray, rate: NDArray) -> tuple[Branch, ...]:
-    """Branches of n hinges with stiffness ratios (n, b) and rates (n, b), 1/s."""
+    """Maxwell branches of n hinges with stiffness ratios (n, b) and rates (n, b), 1/s."""
     return tuple(
         Branch(CODE, columns(len(g), g, each), 0.0, g, each)
         for g, each in zip(ratio.T, rate.T, strict=True)
@@ -180,16 +180,16 @@ def in_series(
     Parameters
     ----------
     share : (n,)
-        Share of the crease in a small turn, at most 1.
+        Share of the crease in the turn of a hinge for small turns, at most 1.
     ratio, rate : (n, b)
-        Ratios of the crease's own branches, per unit of its stiffness, and their rates, 1/s.
+        Ratios of the crease's own branches, per unit stiffness of the crease, and rates, 1/s.
     time : (n,)
-        Damping of the crease over its stiffness, s.
+        Damping of the crease divided by its stiffness, s.
 
     Returns
     -------
     ratio, rate : (n, b + 1)
-        Per unit of the stiffness of the hinge; missing branches have the ratio 0.
+        Ratios per unit stiffness of the hinge, and rates, 1/s; missing branches have the ratio 0.
     """
     n, b = ratio.shape
     ratios, rates = np.zeros((n, b + 1)), np.ones((n, b + 1))
@@ -206,7 +206,7 @@ def in_series(
         weight = np.column_stack([time[rows], g / rate[rows]])
         push = np.zeros((len(rows), b + 1))
         push[:, 0] = panels
-        if not damped:  # the crease is in balance with its branches
+        if not damped:  # the crease is always in balance with its branches
             first, across = matrix[:, :1, 0], matrix[:, 1:, 0]
             push, weight = -across * (panels[:, None] / first), weight[:, 1:]
             matrix = matrix[:, 1:, 1:] - across[:, :, None] * (across / first)[:, None, :]

@@ -1,15 +1,15 @@
-"""Creases in series with compliant panels: a hinge turns by more than its crease.
+"""Creases in series with compliant panels, where a hinge turns by more than its crease.
 
-Panels that bend as plates give way at their creases. The dihedral theta of such a hinge is the
-dihedral phi of the crease plus the turn of the panels, a linear spring of compliance c. The law m
-of the crease (per unit of its stiffness K) and the spring transmit one moment,
+Panels that bend like plates also give way at their creases. The dihedral theta of such a hinge is
+the dihedral phi of the crease plus the turn of the panels, a linear spring of compliance c. The law
+m of the crease (per unit of its stiffness K) and the spring transmit the same moment,
 
     M = K m(phi) = (theta - phi) / c.
 
-Per unit of the stiffness k = K s of the whole hinge, s = 1/(1 + c K) the share of the crease in
-small turns, M / k = m(phi) / s = (theta - phi) / (1 - s). If m is linear, this is the law itself
-at theta; otherwise Newton's method finds phi. A moment Q of the crease alone, which turns phi
-but not the panels, acts as Q on the whole hinge whose law sees theta + c Q.
+Let s = 1/(1 + c K) be the share of the crease in small turns. Per unit of the stiffness k = K s of
+the whole hinge, M / k = m(phi) / s = (theta - phi) / (1 - s). If m is linear, this equals m(theta);
+otherwise Newton's method finds phi. A moment Q on the crease alone, which turns phi but not the
+panels, acts like Q on the whole hinge with a law that sees theta + c Q.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ TWO_PI = 2.0 * math.pi
 def crease_angle(code, theta, rest, a, b, c, d, share, address):
     """Dihedral phi (rad) of the crease of a hinge at theta; nan if Newton's method fails.
 
-    address : (3,) of the law's energy, moment and slope.
+    address : (3,) addresses of the law's energy, moment and slope.
     """
     if share == 1.0:
         return theta
     if code == LINEAR:
         return rest + share * (theta - rest)
-    locks = (code == STRESS_FREE) | (code == AS_PUBLISHED)  # between 0 and 2 pi
+    locks = (code == STRESS_FREE) | (code == AS_PUBLISHED)  # phi stays between 0 and 2 pi
     soft = (1.0 - share) / share
     phi = share * theta + (1.0 - share) * (rest + c * locks)
     if locks:
@@ -65,7 +65,7 @@ def crease_angle(code, theta, rest, a, b, c, d, share, address):
 
 @inner_scalar
 def straight(code, share):
-    """Whether the law of the crease holds for the whole hinge: stiff panels, or a linear law."""
+    """Whether the crease's law holds for the whole hinge, as panels are stiff or it is linear."""
     return (share == 1.0) | (code == LINEAR)
 
 
@@ -109,9 +109,10 @@ def series_rest_slope(code, theta, rest, a, b, c, d, share, address):
 
 @inner
 def series_derivatives(code, theta, rest, a, b, c, d, share, address):
-    """Moment / k of a hinge at theta, its slope, and its derivatives by other numbers.
+    """Moment / k of a hinge at theta, its slope, and further derivatives.
 
-    By the rest angle, by the parameters a, b and c, and by the share.
+    These are the derivatives with respect to the rest angle, the parameters a, b and c, and the
+    share.
     """
     phi = theta
     if not straight(code, share):
@@ -144,7 +145,7 @@ def in_series(
 ) -> tuple[NDArray, NDArray]:
     """Energy / k (rad^2) and moment / k (rad) of hinges whose crease has a share in small turns.
 
-    theta, rest : dihedrals (rad); arrays that go together with the shares.
+    theta, rest : dihedrals (rad); arrays that broadcast with the shares.
     """
     arrays = np.broadcast_arrays(*(np.asarray(each, float) for each in (theta, rest, share)))
     flat, at_rest, part = (np.ascontiguousarray(each.ravel()) for each in arrays)

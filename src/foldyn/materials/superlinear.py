@@ -1,6 +1,6 @@
 """Superlinear moment law of MERLIN2's bends: M = k sgn(d) |d|^(4/3), d = theta - theta0.
 
-Its slope is zero at rest: the tangent stiffness of a flat panel is singular there.
+The slope is zero at rest, so the tangent stiffness of a flat panel is singular there.
 Source: Filipov et al., Int. J. Solids Struct. 124, 2017; Liu and Paulino (MERLIN2).
 """
 
@@ -30,12 +30,12 @@ def energy(turn):
 def moment(turn):
     """Moment / k.
 
-    Without branches, so that loops over it vectorize: (d y)(|d| y) with y = |d|^(-1/3) from a guess
-    (3 % off) and two steps of order 4; exact to 3 ulp.
+    Without branches, so that loops over it vectorize: (d y)(|d| y) with y = |d|^(-1/3), which comes
+    from a guess (3 % off) and two steps of order 4; exact to 3 ulp.
     """
     a = choose(
         abs(turn) > 1e-200, abs(turn), 1e-200
-    )  # below, y^3 would overflow; the moment is zero
+    )  # for smaller turns y^3 would overflow; the moment is zero
     y = per_cube_root(a)
     r = 1.0 - a * y * y * y
     y = y + y * r * (1.0 / 3.0 + r * (2.0 / 9.0 + r * (14.0 / 81.0)))
@@ -52,11 +52,11 @@ def slope(turn):
 
 @dataclass(frozen=True)
 class Superlinear(HingeLaw):
-    """Bend law with exponent 4/3: no stiffness at rest, stiffer as the panel bends."""
+    """Bend law with exponent 4/3: no stiffness at rest, and stiffer as the panel bends."""
 
     formulas = (HingeFormulas(CODE, energy, moment, slope),)
     name: str = "superlinear"
 
     def reach(self, theta: NDArray, rest: NDArray, parameters: NDArray) -> NDArray:
-        """See `HingeLaw`: the rest angle."""
+        """Distance from the rest angle; see `HingeLaw`."""
         return np.abs(theta - rest)

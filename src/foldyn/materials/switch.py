@@ -1,6 +1,6 @@
-"""The one compiled switch from a law's integer code to its formulas.
+"""The compiled switch from a law's integer code to the formulas of that law.
 
-A new built-in law is added to the list of its kind; the switch is made of the formulas that laws
+A new built-in law is added to the list of its kind; the switch consists of the formulas that laws
 declare. A user's law is called at `address`; an unknown code without an address gives nan
 (`Law.check` refuses it earlier). Hinge parameters a, b, c, d are the four columns of
 `HingeLaw.parameters`.
@@ -30,7 +30,7 @@ _HINGE = "code, theta, rest, a, b, c, d, address"
 def _by_rest(address, theta, rest):
     if address == 0:
         return np.nan
-    h = 1e-5  # error 1e-10 of the third derivative
+    h = 1e-5  # the error is 1e-10 times the third derivative
     return (call2(address, theta, rest + h) - call2(address, theta, rest - h)) / (2.0 * h)
 
 
@@ -51,19 +51,20 @@ hinge_energy, hinge_moment, hinge_slope = (
     )
     for name in ("energy", "moment", "slope")
 )  # fmt: skip
-# derivative of the energy by the rest angle; `address` is that of the energy
+# derivative of the energy with respect to the rest angle; `address` is that of the energy
 hinge_rest_slope = switch(
     __name__, "hinge_rest_slope", _HINGE,
     {code: law.energy_slope() for code, law in HINGES.items()},
     ("{0}(address, theta, rest)", (_by_rest,)),
 )  # fmt: skip
-# derivatives of the moment by the rest angle and by a, b and c; `address` is that of the moment
+# derivatives of the moment with respect to the rest angle and to a, b and c; `address` is that of
+# the moment
 hinge_moment_by = switch(
     __name__, "hinge_moment_by", _HINGE,
     {code: law.moment_slopes() for code, law in HINGES.items()},
     ("({0}(address, theta, rest), 0.0, 0.0, 0.0)", (_by_rest,)),
 )  # fmt: skip
-# sets what follows the rest angle in the four parameters of a hinge
+# sets those of a hinge's four parameters that follow its rest angle
 move_rest = switch(
     __name__, "move_rest", "code, rest, parameters",
     {
@@ -76,7 +77,7 @@ move_rest = switch(
 
 @kernel
 def bar_table(code, e, address):
-    """Energy, stress and slope rows (3, n) of one law at e (n,)."""
+    """Rows (3, n) of one law at e (n,): energy, stress and slope."""
     out = np.empty((3, e.size))
     for i in range(e.size):
         out[0, i] = bar_energy(code, e[i], address[0])
@@ -89,8 +90,8 @@ def bar_table(code, e, address):
 def hinge_table(code, theta, rest, p, address):
     """Rows (8, n) of one law at theta (n,): energy, moment, slope, and further derivatives.
 
-    These are the derivative of the energy by the rest angle, and the derivatives of the moment by
-    the rest angle and by a, b and c.
+    These are the derivative of the energy with respect to the rest angle, and the derivatives of
+    the moment with respect to the rest angle and to a, b and c.
     """
     out = np.empty((8, theta.size))
     for i in range(theta.size):
