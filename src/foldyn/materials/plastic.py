@@ -9,8 +9,8 @@ and a grows only if f = 0. With a nonlinear elastic law m(d), M = k (m(d) - p).
 A step is the return mapping (M. L. Wilkins, 1964; J. C. Simo and T. J. R. Hughes, Computational
 Inelasticity, 1998, box 1.5): if f > 0 in the trial state with the old p, a grows by
 f / (k + H + C). For turns in one direction, the moment and the dissipation, int (M_y + H a) da, are
-exact for any step. The slope of the moment within such a step is the consistent one, k (H + C) / (k
-+ H + C).
+exact for any step. The slope of the moment within such a step is the consistent one,
+k (H + C) / (k + H + C).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Results: datasets that carry their own case, in memory and in files."""
+"""Results: datasets that contain their own case, in memory and in files."""
 
 from foldyn.results.contents import case_of, check_result
 from foldyn.results.dataset import (

@@ -11,7 +11,7 @@ import numpy as np
 from foldyn import __version__
 
 FORMAT = 2
-"""Number of the layout of results. Files of another one are refused."""
+"""Version number of the layout of results. Files with another number are refused."""
 
 OWN = ("foldyn_result", "foldyn_format", "foldyn_version", "rerunnable", "not_rerunnable_because")
 
@@ -29,7 +29,7 @@ def own_attributes(kind: str, obstacles: tuple[str, ...]) -> dict[str, Any]:
 
 
 def facts(statistics: Mapping[str, Any]) -> dict[str, Any]:
-    """Convert statistics to NetCDF attributes: numbers, text and lists of numbers."""
+    """Convert statistics to NetCDF attributes, which are numbers, text and lists of numbers."""
     attributes: dict[str, Any] = {}
     for name, value in statistics.items():
         if name in OWN:

@@ -1,6 +1,6 @@
-"""Columns of numbers that grow in files, one file each, and are read only on access.
+"""Columns of numbers that grow in files, one file per column, and are read only on access.
 
-A running checksum of each column covers the rows as written, not as read back from the disk.
+A running checksum of each column covers the rows as they were written, not as read from the disk.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 PIECE = 2**23
-"""Bytes held at a time of data that may exceed the memory."""
+"""Bytes to process at a time if data may exceed the memory."""
 SUMMED = 2**18
 """Bytes read at a time for a checksum, so that they fit in the processor's cache."""
 NUMBER = np.dtype("<f8")
 
 
 class Column:
-    """Rows of numbers in a file, from its beginning.
+    """Rows of numbers at the beginning of a file.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Column:
     row : tuple of int
         Shape of a row.
     count : int
-        Rows there are.
+        Number of rows.
     """
 
     def __init__(self, path: Path, row: tuple[int, ...], count: int) -> None:
@@ -80,24 +80,24 @@ class _Lazy(BackendArray):
 
 
 class Columns:
-    """Columns of equal length, each in its own file in one folder.
+    """Columns of equal length in one folder, each in a file of its own.
 
     Parameters
     ----------
     folder : Path
         An existing folder.
     rows : mapping of str to tuple of int
-        Shape of a row of each column, by name.
+        Shape of a row of each column, by the column's name.
     count : int
         Number of rows already stored; the files may hold more.
     sums : mapping of str to int, optional
-        Checksums of these rows, by name.
+        Checksums of the stored rows, by the column's name.
 
     Attributes
     ----------
     names : tuple of str
     count : int
-        Rows there are.
+        Number of rows.
     sums : dict of str to int
         CRC-32 of the rows of each column.
     """
@@ -115,12 +115,12 @@ class Columns:
                 pass
 
     def append(self, columns: Mapping[str, NDArray]) -> None:
-        """Add rows, the same number to each column.
+        """Append the same number of rows to each column.
 
         Raises
         ------
         OSError
-            The disk is full, or fails; then there are as many rows as before.
+            The disk is full, or fails; the number of rows is then the same as before.
         """
         (added,) = {len(array) for array in columns.values()}
         sums = {}
@@ -140,11 +140,11 @@ class Columns:
                 os.fsync(file.fileno())
 
     def cut(self, count: int) -> None:
-        """Keep only the first rows. The files drop the others when rows are next added."""
+        """Keep only the first `count` rows. The next `append` drops the others from the files."""
         self.count, self.sums = count, {name: self._sum(name, count) for name in self._rows}
 
     def damaged(self) -> Path | None:
-        """Return a file that does not hold the rows as written; None if all do."""
+        """Return a file that does not hold the rows that were written; None if all do."""
         for name, wanted in self.sums.items():
             try:
                 if self._sum(name, self.count) == wanted:
@@ -155,7 +155,7 @@ class Columns:
         return None
 
     def _sum(self, name: str, count: int) -> int:
-        """Checksum of the first rows of a file; -1 if it has fewer."""
+        """Checksum of the first `count` rows of a file; -1 if it has fewer."""
         left, found = self._bytes(name) * count, 0
         with self._path(name).open("rb") as file:
             while left > 0 and (piece := file.read(min(left, SUMMED))):
@@ -167,7 +167,7 @@ class Columns:
         return Column(self._path(name), self._rows[name], self.count)
 
     def variable(self, name: str, dims: tuple[str, ...]) -> xr.Variable:
-        """A column as a lazily read variable."""
+        """A column as a variable that is read on access."""
         return xr.Variable(dims, indexing.LazilyIndexedArray(_Lazy(self[name])))
 
     def _bytes(self, name: str) -> int:

@@ -1,4 +1,4 @@
-"""Contents of a stored dataset: checks, case, pattern, selected nodes."""
+"""Contents of a stored dataset: checks, the case, the pattern, selected nodes."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from foldyn.results.stored_case import document_of
 from foldyn.values import show, whole
 
 NUMBERS, WHOLES, TEXTS = "iuf", "iu", "UOST"
-"""Kinds of data types."""
+"""Kinds of data types, as NumPy's letters."""
 _KINDS = {NUMBERS: "numbers", WHOLES: "whole numbers", TEXTS: "texts"}
 
 
 def check_variable(
     ds: xr.Dataset, name: str, dims: tuple[str, ...], kind: str = NUMBERS, place: str = ""
 ) -> xr.DataArray:
-    """Return a variable that a dataset must have, with these dimensions and this type.
+    """Return a variable that a dataset must have with given dimensions and type.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def check_variable(
 
 
 def whole_attribute(ds: xr.Dataset, name: str) -> int:
-    """Return an attribute that is a whole number; 0 if there is none."""
+    """Return an attribute that is a whole number; 0 if the dataset lacks it."""
     value = ds.attrs.get(name, 0)
     if not isinstance(value, int | np.integer):
         raise InputError(f"its attribute {name} must be a whole number: the result is damaged")
@@ -62,12 +62,12 @@ def case_of(ds: xr.Dataset) -> Case:
     Returns
     -------
     Case
-        With exactly the numbers of the original. Functions of time have become tables.
+        Case with exactly the numbers of the original. Functions of time have become tables.
 
     Raises
     ------
     InputError
-        Not a result, or one from which the case cannot be rebuilt (user's laws).
+        Not a result, or a result whose case cannot be rebuilt (because of user laws).
     """
     check_result(ds)
     if not whole_attribute(ds, "rerunnable"):
@@ -91,7 +91,7 @@ def pattern_of(ds: xr.Dataset) -> Pattern:
 
 
 def check_result(ds: xr.Dataset, place: str = "") -> None:
-    """Refuse a dataset that is not one of our results."""
+    """Refuse a dataset that is not a Foldyn result."""
     if not isinstance(ds, xr.Dataset) or "case" not in ds or "foldyn_result" not in ds.attrs:
         raise InputError(
             f"{place}is not a Foldyn result: it lacks the variable `case` or the attribute "
@@ -106,20 +106,20 @@ def check_result(ds: xr.Dataset, place: str = "") -> None:
 def nodes_of(
     result: xr.Dataset, nodes: int | str | Sequence[int], name: str = "the result"
 ) -> list[int]:
-    """Return node numbers, given directly or as a selection of the pattern's vertices ("xmax").
+    """Return node numbers, given directly or as a selection of vertices such as "xmax".
 
     Parameters
     ----------
     result : xarray.Dataset
     nodes : int, sequence of int, or str
-        In any order; repeats are allowed.
+        Nodes, in any order; repeats are allowed.
     name : str
-        What a message calls the result.
+        Name of the result in messages.
 
     Raises
     ------
     InputError
-        No node, not node numbers, a node that the result lacks, or an empty selection.
+        Nothing given, not node numbers, a node that the result lacks, or an empty selection.
     """
     stored = result["node"].values
     for node in (numbers := _numbers(result, nodes, name)):

@@ -1,7 +1,7 @@
-"""Panels that pass through each other at the samples of a result: search, message, record.
+"""Panels that pass through each other at samples of a result: search, message and record.
 
-Without contact nothing keeps panels apart. Pairs that cross in the pattern at rest are left out,
-and so are boards (thick panels), which lie off the pattern's panels.
+Without contact nothing keeps panels apart. Pairs that already cross in the pattern at rest are left
+out. Boards (thick panels) are left out too, as they lie off the pattern's panels.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class Crossings(NamedTuple):
     crossed : (k,)
         Checked samples at which panels cross.
     panels, first : (p, 2), (p,)
-        Pairs of panels that cross at any of these samples, ordered by the first such sample, and
-        that sample.
+        Pairs of panels that cross at any of these samples, and the first such sample of each pair,
+        by which the pairs are sorted.
     """
 
     looked: NDArray[np.int64]
@@ -49,8 +49,8 @@ class Crossings(NamedTuple):
     def text(self, when: str, samples: int) -> str:
         """Describe the crossings in words; empty if there are none.
 
-        when : the first sample with a crossing, "t = 0.1 s".
-        samples : how many the result has.
+        when : the first sample with a crossing, such as "t = 0.1 s".
+        samples : number of samples of the result.
         """
         if not len(self.crossed):
             return ""
@@ -64,15 +64,15 @@ class Crossings(NamedTuple):
 
 
 def crossings_of(case: Case, displacement: NDArray | Column, stride: int = 1) -> Crossings:
-    """Look for panels that pass through each other.
+    """Find panels that pass through each other.
 
     Parameters
     ----------
     case : Case
     displacement : ndarray or Column, shape (k, n, 3)
         Displacement of the nodes at each sample, m. Samples that are not finite are skipped.
-    stride : int
-        Check every `stride`-th sample, counted back from the last. If panels cross, also check the
+    Check every `stride`-th sample, counted back from the last one. If panels cross, the samples
+    between the first crossing and the checked sample before it are checked too.
         samples between the first crossing and the checked sample before it.
     """
     structure, count = case.structure, len(displacement)
@@ -82,7 +82,7 @@ def crossings_of(case: Case, displacement: NDArray | Column, stride: int = 1) ->
     many = int(panels.max()) + 1
 
     def keys(u: NDArray) -> NDArray[np.int64]:
-        """Keys of the pairs that cross, first * many + second."""
+        """Keys of the pairs that cross, first panel * many + second panel."""
         return crossing_panels(structure.nodes + u, structure.triangles, panels) @ [many, 1]
 
     at_rest = keys(np.zeros_like(structure.nodes))

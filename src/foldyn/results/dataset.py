@@ -1,4 +1,4 @@
-"""Result datasets: labeled arrays that carry their own case."""
+"""Result datasets: labeled arrays that contain their own case."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ TAKEN = frozenset(
     {*MOTION, *CROSSINGS, *CASE_VARIABLES, "time", "node", "axis", *CONTINUATIONS, *ORIGIN}
     | {"support", "support_node", "support_axis"}
 )
-"""Names that every motion has."""
+"""Variable names that are taken in every motion."""
 
 
 def trajectory_dataset(
@@ -60,33 +60,33 @@ def trajectory_dataset(
     continuations: Mapping[str, tuple[float, Continuation]] | None = None,
     origin: tuple[float, Origin] | None = None,
 ) -> xr.Dataset:
-    """Dataset of a motion, which carries its own case.
+    """Dataset of a motion, including its case.
 
     Parameters
     ----------
     case : Case
-        What moved.
+        Case that moved.
     time : array_like, shape (nt,)
         Times of the samples (s).
     displacement, velocity : array_like, shape (nt, n, 3)
         Displacement (m) and velocity (m/s) of every node.
     reaction : array_like, shape (nt, ns)
         Forces of the supports (N) on the dofs `case.reaction_dofs`, in that order.
-    energies : mapping of str to array_like, shape (nt,)
-        kinetic, dissipated, work and the strain energies of the structure's `energy_groups` (J).
+    Forces of the supports (N) on the dofs in `case.reaction_dofs`, in this order.
+        Kinetic, dissipated, work and the strain energies in the structure's `energy_groups` (J).
     statistics : mapping
         Facts about the run, each stored as an attribute. `start`, `dt` (s) and `steps` give the
         stage times t_n and t_n + dt/2 at which functions of time are sampled.
     sampled : mapping of str to (Quantity, array_like of shape (nt, ...)), optional
         Quantities that the user added.
     memory : array_like, shape (nt, b, 2), optional
-        State of the branches of laws with memory.
+        State of the branches of laws with memory, rad.
     continuations : mapping of str to (float, Continuation), optional
-        Time (s) of the last sample and the state that the method needs to continue from it,
-        `continuation`; the same for the first sample, `continued_from`.
+        `continuation`: time (s) of the last sample, and the numbers that the method needs to go on
+        from it. `continued_from`: the same for the first sample.
     origin : (float, Origin), optional
-        Time (s) of the last sample, and the state in which the motion began, if a term depends on
-        it.
+        Time (s) of the last sample, and the state in which the motion began; only needed if a term
+        depends on that state.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def trajectory_dataset(
         `displacement`, `velocity` (time, node, axis), `reaction` (time, support) with the
         coordinates `support_node` and `support_axis`, the energies (time), `rest_position`
         (node, axis), and the `case` (TOML). The attribute `rerunnable` is 1 when `case_of` can
-        rebuild the case, else 0, and `not_rerunnable_because` says why.
+        rebuild the case, else 0, and `not_rerunnable_because` holds the reason.
     """
     time = np.array(time, dtype=np.float64)
     added = sampled or {}
@@ -116,7 +116,7 @@ def trajectory_dataset(
 
 
 def origin_variables(origin: Origin, time: float = math.nan) -> dict[str, Any]:
-    """Variables of the state in which a motion began, needed to continue it at a time (s)."""
+    """Variables of the state in which a motion began, for a result that ends at `time` (s)."""
     begun = math.nan if origin.time is None else origin.time
     values: dict[str, Any] = {"origin": origin.displacement, "origin_time": begun}
     if origin.flow is not None:
@@ -134,35 +134,35 @@ def path_dataset(
     statistics: Mapping[str, Any],
     obstacles: tuple[str, ...] = (),
 ) -> xr.Dataset:
-    """Dataset of a sequence of equilibria, which carries its own case.
+    """Dataset of a sequence of equilibria, including its case.
 
     Parameters
     ----------
     case : Case
-        What was loaded.
+        Case that was loaded.
     load_factor : array_like, shape (ns,)
         Load factor of each point.
     displacement : array_like, shape (ns, n, 3)
         Displacement (m) of every node.
     reaction : array_like, shape (ns, nd)
-        Forces of the supports (N) on the dofs `case.reaction_dofs`, in that order.
+        Forces of the supports (N) on the dofs in `case.reaction_dofs`, in this order.
     energies : mapping of str to array_like, shape (ns,)
-        work and the strain energies of the structure's `energy_groups` (J).
+        Work and the strain energies in the structure's `energy_groups` (J).
     solution : mapping of str to array_like, shape (ns,)
         How each point was found: negative_eigenvalues (-1 if not counted), point ("regular",
         "limit" or "bifurcation"), iterations, residual.
     statistics : mapping
         Facts about the run, each stored as an attribute.
     obstacles : tuple of str
-        Reasons why the path cannot be rerun from the dataset, apart from those in the case.
+        Reasons why the path cannot be rerun from the dataset, in addition to those in the case.
 
     Returns
     -------
     xarray.Dataset
-        As `trajectory_dataset`, with the dimension step and the coordinate `load_factor`.
+        As from `trajectory_dataset`, with the dimension step and the coordinate `load_factor`.
     """
     factor = np.array(load_factor, dtype=np.float64)
-    kinds = np.array(solution["point"], dtype="<U11")  # the longest value, "bifurcation"
+    kinds = np.array(solution["point"], dtype="<U11")  # the longest value is "bifurcation"
     values = {"displacement": displacement, "reaction": reaction, **energies, **solution}
     data = variables({**PATH, **energies_of(case)}, "step", values | {"point": kinds})
     along = {"load_factor": ("step", factor, {"long_name": "load factor"})}
@@ -172,14 +172,14 @@ def path_dataset(
 def modes_dataset(
     case: Case, values: Mapping[str, ArrayLike], statistics: Mapping[str, Any]
 ) -> xr.Dataset:
-    """Dataset of modes about a state, which carries its own case.
+    """Dataset of modes about a state, including its case.
 
     Parameters
     ----------
     case : Case
-        What vibrates.
+        Case that vibrates.
     values : mapping of str to array_like
-        The variables of `quantities.MODES`, optionally of `quantities.INTERNAL`, and the
+        Variables of `quantities.MODES`, optionally of `quantities.INTERNAL`, and the
         `displacement` (n, 3) of the state, m.
     statistics : mapping
         Facts about the computation, each stored as an attribute.
@@ -187,7 +187,7 @@ def modes_dataset(
     Returns
     -------
     xarray.Dataset
-        The variables, with the coordinate `mode` = 1, 2, ..., and the case as in
+        The variables, with the coordinate `mode` = 1, 2, ..., and the case as from
         `trajectory_dataset`.
     """
     known = {**MODES, **{name: own for name, own in INTERNAL.items() if name in values}}
@@ -212,7 +212,7 @@ def frf_dataset(
     statistics: Mapping[str, Any],
     more: Mapping[str, ArrayLike] | None = None,
 ) -> xr.Dataset:
-    """Dataset of a frequency response, which carries its own case.
+    """Dataset of a frequency response, including its case.
 
     Parameters
     ----------
@@ -221,23 +221,23 @@ def frf_dataset(
     frequency : array_like, shape (m,)
         Frequencies (Hz).
     quantity : {"receptance", "transmissibility"}
-        What the response is.
+        Kind of the response.
     response : array_like, shape (m, n, 3), complex
-        Response of every node, for the time dependence exp(+i w t).
+        Response of every node, for motions in time as exp(+i w t).
     displacement : array_like, shape (n, 3)
-        The state (m) about which it moves.
+        Displacement (m) of the state about which the case moves.
     drive : array_like, shape (n, 3)
-        Amplitudes of the forces on the nodes (N), or of the displacements of the base (m).
+        Amplitudes of the forces on the nodes (N), or of the displacement of the base (m).
     statistics : mapping
         Facts about the run, each stored as an attribute.
     more : mapping of str to array_like, optional
-        Further variables, of `quantities.ESTIMATES`.
+        Further variables, from `quantities.ESTIMATES`.
 
     Returns
     -------
     xarray.Dataset
-        The response under its own name, complex (frequency, node, axis), `displacement`, `drive`
-        (node, axis), and what every result has.
+        The response under its own name, complex (frequency, node, axis), `displacement` and
+        `drive` (node, axis), and the variables that every result has.
     """
     values = {quantity: np.asarray(response, np.complex128), **(more or {})}
     data = variables({**RESPONSES, **ESTIMATES}, "frequency", values)
@@ -255,14 +255,14 @@ def bands_dataset(
     along: Mapping[str, Any],
     statistics: Mapping[str, Any],
 ) -> xr.Dataset:
-    """Dataset of the bands of a repeated case, which carries its own case.
+    """Dataset of the bands of a repeated case, including this case.
 
     Parameters
     ----------
     case : Case
-        A cell.
+        Case of one cell.
     values : mapping of str to array_like
-        Variables of `quantities.BANDS`; the first dimension is the state if `along` has the
+        Variables of `quantities.BANDS`; their first dimension is the state if `along` has the
         coordinate "state".
     gaps : mapping of str to array_like
         Variables of `quantities.GAPS`.
@@ -282,12 +282,12 @@ def fidelity_dataset(
     values: Mapping[str, ArrayLike],
     statistics: Mapping[str, Any],
 ) -> xr.Dataset:
-    """Dataset of a comparison of models with the shell, which carries its own case.
+    """Dataset of a comparison of models with the shell, including its case.
 
     Parameters
     ----------
     case : Case
-        What was compared, with its own model.
+        Case that was compared, with its own model.
     models : sequence of str
         Names of the models.
     values : mapping of str to array_like
@@ -310,12 +310,12 @@ def folding_dataset(
     values: Mapping[str, ArrayLike],
     statistics: Mapping[str, Any],
 ) -> xr.Dataset:
-    """Dataset of the states of a folding pattern, which carries the pattern.
+    """Dataset of the states of a folding pattern, including the pattern.
 
     Parameters
     ----------
     pattern : Pattern
-        What is folded.
+        Pattern that is folded.
     share : array_like, shape (ns,)
         Position of each state along the folding motion, from 0 to 1.
     values : mapping of str to array_like
@@ -326,8 +326,8 @@ def folding_dataset(
     Returns
     -------
     xarray.Dataset
-        The variables along the dimension step, and the pattern as in `trajectory_dataset`; without
-        a sheet there is no case to rebuild.
+        The variables along the dimension step, and the pattern as from `trajectory_dataset`;
+        without a sheet there is no case to rebuild.
     """
     document = pattern_document(pattern)
     coordinates = {
@@ -351,12 +351,12 @@ def result_dataset(
     times: NDArray[np.float64] | None = None,
     obstacles: tuple[str, ...] = (),
 ) -> xr.Dataset:
-    """Variables of a result, with its case and facts about its run.
+    """Dataset of a result: variables, the case, and facts about the run.
 
     Parameters
     ----------
     kind : str
-        Attribute `foldyn_result`.
+        Value of the attribute `foldyn_result`.
     case : Case
     data, along : mapping
         Variables, and the coordinates of the dimension along which the result runs.
@@ -365,7 +365,7 @@ def result_dataset(
     times : ndarray, optional
         Times (s) at which functions of time are sampled.
     obstacles : tuple of str
-        Reasons why the result cannot be rerun from the dataset, apart from those in the case.
+        Reasons why the result cannot be rerun from the dataset, in addition to those in the case.
     """
     support = case.reaction_dofs
     document = to_document(case, times)
@@ -398,25 +398,25 @@ def periodic_dataset(
     floquet: ArrayLike, stable: bool, periods: int, statistics: Mapping[str, Any],
     origin: Origin | None = None,
 ) -> xr.Dataset:  # fmt: skip
-    """Dataset of one periodic motion, which carries its case.
+    """Dataset of one periodic motion, including its case.
 
     Parameters
     ----------
     case : Case
     time : array_like, shape (nt,)
-        Over one period, s.
+        Times (s) over one period.
     motion : mapping of str to array_like, shape (nt, n, 3)
-        displacement (m) and velocity (m/s).
+        Displacement (m) and velocity (m/s).
     coefficient : ndarray, complex, shape (h + 1, n, 3)
         Amplitudes of exp(2 pi i j t / period), m.
     floquet : array_like, complex, shape (2k,)
     stable : bool
     periods : int
-        Drive periods per period of the motion.
+        Number of drive periods per period of the motion.
     statistics : mapping
         Facts about the computation, each stored as an attribute.
     origin : Origin, optional
-        The reference state of damping.
+        Reference state of damping.
     """
     data = variables(MOTION, "time", motion)
     data |= {} if origin is None else origin_variables(origin)
@@ -433,14 +433,14 @@ def points_dataset(
     kind: str, case: Case, values: Mapping[str, ArrayLike], statistics: Mapping[str, Any],
     units: str = "m", origin: Origin | None = None,
 ) -> xr.Dataset:  # fmt: skip
-    """Dataset of the points of a response curve or a backbone, which carries its case.
+    """Dataset of the points of a response curve or a backbone, including its case.
 
     Parameters
     ----------
     kind : {"response_curve", "backbone"}
     case : Case
     values : mapping of str to array_like, shape (points, ...)
-        Variables of `POINTS`; `frequency` is a coordinate.
+        Variables of `POINTS`, of which `frequency` is a coordinate.
     statistics : mapping
         Facts about the computation, each stored as an attribute.
     units : str

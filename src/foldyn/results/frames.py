@@ -1,4 +1,4 @@
-"""Shapes in a result: as frames of a pattern file, as a pattern, or at all nodes."""
+"""Shapes in a result: frames of a pattern file, a pattern, or the positions of all nodes."""
 
 from __future__ import annotations
 
@@ -20,30 +20,31 @@ ALONG = {
     "modes": ("mode", "frequency", "shape", "{:.6g} Hz"),
     "folding": ("step", "share", "displacement", "{:.4g} of the way"),
 }
-"""Kinds of results with shapes: their dimension, coordinate, displacement variable, and titles."""
+"""Kinds of results with shapes: dimension, coordinate, displacement variable and titles of each."""
 SWING = 0.12
-"""Largest displacement of a displayed mode, in sizes of the pattern."""
+"""Largest displacement of a displayed mode, relative to the size of the pattern."""
 
 LARGEST = 1e6
-"""Largest factor on displacements; beyond it they would exceed single precision."""
+"""Largest factor on displacements; larger ones would exceed single precision."""
 
 
 class Shapes(NamedTuple):
-    """Shapes of all nodes of a result, in order.
+    """Shapes of all nodes of a result, in the order of the samples.
 
     Attributes
     ----------
     samples : ndarray, shape (k,)
-        Their numbers in the result, from 0.
+        Numbers of the samples in the result, from 0.
     values : ndarray, shape (k,)
         Times (s), load factors, or frequencies (Hz).
     titles : list of str
-        "t = 0.1 s", "load factor 1", "mode 2: 1.05 Hz".
+        Titles, such as "t = 0.1 s", "load factor 1" or "mode 2: 1.05 Hz".
     nodes : ndarray, shape (n, 3)
-        Reference positions of the displacements, m: at rest, or for modes the state of the
-        oscillation.
+        Positions (m) to which displacements are relative: at rest or, for modes, in the state about
+        which the nodes oscillate.
     displacement : ndarray, shape (k, n, 3)
-        m, times the requested factor. For modes the largest is `SWING` times that factor.
+        Displacements (m) times the requested factor. The largest of a mode is `SWING` times the
+        pattern's size and that factor.
     """
 
     samples: NDArray[np.int64]
@@ -63,16 +64,16 @@ def shapes_of(
     result : xarray.Dataset
         A motion, an equilibrium path, modes, or `Folding.path`.
     every : int, optional
-        Take every n-th sample, and always the last.
+        Take every n-th sample, and always the last one.
     frames : int, optional
         Take this many samples, evenly spread, including the first and the last.
     scale : float
-        Factor on all displacements.
+        Factor of all displacements.
 
     Returns
     -------
     Shapes
-        Shapes of all samples, unless fewer are requested.
+        Shapes of all samples, or of fewer if requested.
 
     Raises
     ------
@@ -96,7 +97,7 @@ def _along(result: xr.Dataset) -> tuple[str, str, str, str]:
 
 
 def chosen_samples(count: int, every: int | None, frames: int | None) -> NDArray[np.int64]:
-    """Numbers of the samples to take from a count."""
+    """Numbers of the samples to take from `count` samples."""
     if count == 0:
         raise InputError(": has no samples; compute it again", "result")
     if every is not None and frames is not None:
@@ -109,7 +110,7 @@ def chosen_samples(count: int, every: int | None, frames: int | None) -> NDArray
 
 
 def _shapes(result: xr.Dataset, samples: NDArray[np.int64], scale: float) -> Shapes:
-    """Shapes at some samples; mode shapes are scaled to `SWING` times the pattern's size."""
+    """Shapes at given samples; mode shapes are scaled to `SWING` times the pattern's size."""
     dimension, name, moving, title = _along(result)
     factor = number("scale", scale, largest=LARGEST)
     moved = check_variable(result, moving, (dimension, "node", "axis")).values[samples]
@@ -148,19 +149,19 @@ def frames_of(
 
     Parameters
     ----------
-    result, every, frames, scale
+    See `shapes_of`.
         As in `shapes_of`.
 
     Returns
     -------
     States
-        The `pattern` at rest, and its `frames`: coordinates (m) of its vertices in each state,
-        titled by the time, the load factor, the mode or the share of the folding motion.
+        The `pattern` at rest, and `frames`: coordinates (m) of the vertices in each state, with the
+        time, the load factor, the mode or the share of the folding motion as the title.
 
     Raises
     ------
     InputError
-        Not such a result, or one without its pattern.
+        A result without shapes or without a pattern.
 
     Examples
     --------
@@ -186,17 +187,17 @@ def state_of(result: xr.Dataset, frame: int | None = None, *, scale: float = 1.0
     frame : int, optional
         Number of the sample, from 0; by default the last one.
     scale : float
-        Factor on all displacements.
+        Factor of all displacements.
 
     Returns
     -------
     Pattern
-        With the letters and families of the pattern at rest.
+        Pattern with the letters and families of the pattern at rest.
 
     Raises
     ------
     InputError
-        Not such a result, or no such sample.
+        A result without shapes, or a sample that it lacks.
     """
     check_result(result, "result: ")
     count = result.sizes[_along(result)[0]]

@@ -1,11 +1,11 @@
 """Results and other datasets in NetCDF files, written and read completely or not at all.
 
-A seal at the end of a file reveals damage. HDF5 ignores bytes after its own end, and cuts them off
-when another program changes the file. Such a file has no seal, like files of older programs, and is
-read without this check.
+A seal at the end of a file reveals damage. HDF5 ignores bytes after the end of its data, and cuts
+them off when another program changes the file. Such a file has no seal and is read without this
+check, like files of older programs.
 
-NetCDF has no complex numbers: a complex variable of a result is stored as two, its real and its
-imaginary part, and put together again on loading.
+NetCDF has no complex numbers. A complex variable of a result is therefore stored as two variables,
+its real and its imaginary part, which are joined again on loading.
 """
 
 from __future__ import annotations
@@ -42,38 +42,38 @@ OTHERS = (
     ".mp4", ".npy", ".npz", ".obj", ".opx", ".parquet", ".pkl", ".png", ".stl", ".svg", ".tcl",
     ".toml", ".tsv", ".txt", ".uff", ".unv", ".vtk", ".vtkhdf", ".vtu", ".xlsx", ".zarr",
 )  # fmt: skip
-"""Suffixes that promise another kind of file."""
+"""Suffixes that belong to other kinds of files."""
 _PARTS = ("real", "imag")
 _WHOLE = "part_of_complex"  # attribute of both parts: the name of the complex variable
 MOST_PACKED = 1100
-"""Bytes that one byte of a file may expand to: deflate packs at most 1032."""
+"""Largest number of bytes that one byte of a file may expand to; deflate packs at most 1032."""
 ALONG = "time"
-"""The dimension that may be long."""
+"""Dimension along which variables may be long."""
 CHUNK = 2**20
-"""Bytes of a chunk of a variable, the least that is read at once."""
+"""Bytes of a chunk of a variable, which is the least that can be read at once."""
 LEAST_MEMORY = 2**29
-"""Bytes that reading a file without a seal may take in addition to its content."""
+"""Bytes that reading a file without a seal may take, in addition to the file's content."""
 LEAST_SECONDS, PER_SECOND = 2, 50_000
-"""Computing time (s) for reading a file without a seal, and the bytes per further second."""
+"""Computing time (s) for any file without a seal, and bytes of content per further second."""
 
 
 def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """Write a result to a NetCDF file.
 
-    The file appears only when it is complete; one of the same name is replaced.
+    The file appears only when it is complete; a file of the same name is replaced.
 
     Parameters
     ----------
     ds : xarray.Dataset
         A result.
     path : path
-        The file, as ``run.nc``; its folder must exist.
+        Name of the file, such as ``run.nc``; the folder must exist.
 
     Raises
     ------
     InputError
-        Not a result, the path cannot be written, or its suffix belongs to another kind of file,
-        such as ``run.csv``.
+        Not a result, or a path that cannot be written, or whose suffix belongs to another kind of
+        file, such as ``run.csv``.
     """
     check_result(ds, "cannot save: the dataset ")
     write(_split(ds), path)
@@ -87,8 +87,8 @@ def load(path: str | os.PathLike[str], whole: bool = True) -> xr.Dataset:
     path : path
         A file that `save` wrote.
     whole : bool, default True
-        Read everything into memory. Otherwise each access reads the part it needs from the file,
-        for results larger than memory; the file must then stay in place.
+        Whether to read everything into memory. Otherwise each access reads from the file what it
+        needs, for results larger than memory; the file must then stay in place.
 
     Returns
     -------
@@ -146,7 +146,8 @@ def check_target(path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        It is a folder, its folder does not exist, or its suffix belongs to another kind of file.
+        The path is a folder, its folder does not exist, or its suffix belongs to another kind of
+        file.
     """
     path = path_of(path)
     if path.is_dir():
@@ -162,7 +163,7 @@ def check_target(path: str | os.PathLike[str]) -> Path:
 
 
 def fill(path: Path, write_to: Callable[[Sink], Any]) -> None:
-    """Write an HDF5 file; report a failure of the file rather than HDF5's error about it."""
+    """Write an HDF5 file; if writing fails, raise the disk's error rather than HDF5's."""
     with Sink(path, "w+") as sink:
         try:
             write_to(sink)
@@ -174,13 +175,13 @@ def fill(path: Path, write_to: Callable[[Sink], Any]) -> None:
 
 
 def read(path: str | os.PathLike[str], unreadable: str, into_memory: bool = True) -> xr.Dataset:
-    """Read a dataset into memory, or lazily if that is asked for and the file has a seal.
+    """Read a dataset into memory; lazily if `into_memory` is off and the file has a seal.
 
     Raises
     ------
     InputError
-        There is no such file, it is damaged, or it is not NetCDF; the message then contains
-        `unreadable`.
+        There is no such file, or it is damaged or not NetCDF; for unreadable files the message
+        contains `unreadable`.
     """
     path = check_file(path, "a NetCDF file")
     try:
@@ -192,8 +193,8 @@ def read(path: str | os.PathLike[str], unreadable: str, into_memory: bool = True
             )
         if sealed:
             return _load(path) if into_memory else _opened(path)
-        size = path.stat().st_size  # HDF5 may crash on a damaged file
-        list_engines()  # here, so that each forked process need not do it
+        size = path.stat().st_size  # as HDF5 may crash on a damaged file
+        list_engines()  # done here so that no forked process needs to
         seconds, memory = LEAST_SECONDS + size // PER_SECOND, LEAST_MEMORY + 3 * MOST_PACKED * size
         return apart(lambda: _load(path), seconds, memory)
     except InputError:
@@ -233,8 +234,8 @@ def _fitting(ds: xr.Dataset) -> xr.Dataset:
 def _check_header(path: Path) -> None:
     """Refuse a file with missing parts, or one that declares more than it can hold.
 
-    Done before anything is read: a link may lead to an endless file, and a declared size may exceed
-    the memory.
+    The check precedes any reading: a link may lead to an endless file, and a declared size may
+    exceed the memory.
     """
     declared = 0
     with h5py.File(path) as file:
@@ -254,28 +255,28 @@ def _check_header(path: Path) -> None:
 
 
 def _is_bare(item: h5py.Dataset) -> bool:
-    """Whether this is only a dimension, without values."""
+    """Whether an item is only a dimension, without values."""
     name = item.attrs.get("NAME")
     return isinstance(name, bytes) and name.startswith(b"This is a netCDF dimension but not a")
 
 
 class Sink(io.FileIO):
-    """A new file, open for reading and writing, which records failures instead of raising them.
+    """A new file, open for reading and writing, that records failures instead of raising them.
 
     When the disk is full, HDF5 cannot close its file, and the process ends in a segmentation fault.
-    So HDF5 writes through this class, which pretends that writes succeed after the first failure;
-    the failure is raised at the end. Only the dataset itself is held in memory.
+    So HDF5 writes through this class. After the first failure, writes seem to succeed, and the
+    failure is raised at the end. Only the dataset itself is held in memory.
 
     Attributes
     ----------
     failure : BaseException or None
-        What ended the writing: a full disk, or an interruption.
+        Error that ended the writing: a full disk, or an interruption.
     """
 
     failure: BaseException | None = None
 
     def write(self, data: Any, /) -> int:
-        """Write all of it, or record the failure."""
+        """Write all the data, or record the failure."""
         left = memoryview(data).cast("B")
         size, end = len(left), self.tell() + len(left)
         try:
@@ -296,7 +297,7 @@ class Sink(io.FileIO):
         return self.tell() if size is None else size
 
     def readinto(self, buffer: Any, /) -> int:
-        """Read; return zeros for bytes that could not be written."""
+        """Read; bytes that could not be written are returned as zeros."""
         room = memoryview(buffer).cast("B")
         found = 0
         if self.failure is None:
@@ -330,7 +331,7 @@ def _joined(ds: xr.Dataset) -> xr.Dataset:
         real, imag = (ds[f"{name}_{part}"] for part in _PARTS)
         if real.dims != imag.dims or {real.dtype.kind, imag.dtype.kind} != {"f"}:
             raise TypeError(name)
-        # not real + 1j * imag: an infinite part would turn the other into nan
+        # real + 1j * imag would turn the other part of an infinite number into nan
         whole = np.empty(real.shape, np.complex128)
         whole.real, whole.imag = real.values, imag.values
         own = {key: value for key, value in real.attrs.items() if key != _WHOLE}
@@ -363,34 +364,34 @@ def _write_pieces(ds: xr.Dataset, sink: Any, engine: Literal["h5netcdf"]) -> Non
 
 T = TypeVar("T")
 IDLE = 4
-"""Wall time allowed per computing time of a call, as the machine may be busy."""
+"""Ratio of allowed wall time to allowed computing time, as the machine may be busy."""
 
 
 def apart(make: Callable[[], T], seconds: int, memory: int) -> T:
-    """Return a function's result, computed in a fork of this process.
+    """Return the result of a function, computed in a fork of this process.
 
-    Except on Linux a fork is not safe; there the function is called in this process.
+    A fork is only safe on Linux; elsewhere the function is called in this process.
 
     Parameters
     ----------
     make : callable
-        Takes no arguments; its result can be pickled.
+        Function without arguments whose result can be pickled.
     seconds : int
-        CPU time after which the process is ended; wall time may be `IDLE` times that.
+        CPU time after which the fork is ended; its wall time may be `IDLE` times as long.
     memory : int
-        Bytes that it may allocate on top of this process's own.
+        Bytes that the fork may allocate in addition to those of this process.
 
     Raises
     ------
     FoldynError
-        The function raised it.
+        Raised by the function.
     OSError
-        The function failed in another way, or its process crashed or exceeded a limit.
+        The function failed in another way, or the fork crashed or exceeded a limit.
     """
     if sys.platform != "linux":
         return make()
     reading, writing = os.pipe()
-    with warnings.catch_warnings():  # about threads, which the child does not need
+    with warnings.catch_warnings():  # warnings about threads, which the child does not need
         warnings.simplefilter("ignore", DeprecationWarning)
         child = os.fork()
     if child == 0:
@@ -411,7 +412,7 @@ def apart(make: Callable[[], T], seconds: int, memory: int) -> T:
 
 
 def _answer(make: Callable[[], Any], seconds: int, memory: int, writing: int) -> None:
-    """Send the function's result and end this process in any case."""
+    """Send the function's result, and end this process whatever happens."""
     try:
         for number in (signal.SIGALRM, signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_DFL)

@@ -1,4 +1,4 @@
-"""Registry of result variables: unit, meaning and dimensions of each.
+"""Registry of result variables: unit, meaning and dimensions of each variable.
 
 Users can add a quantity that is a function of the state to a motion:
 ``simulate(..., sample={"tip": Quantity("m", "height of the tip", function=height)})``.
@@ -22,14 +22,14 @@ class Quantity(NamedTuple):
     Parameters
     ----------
     units : str
-        Unit, "m/s"; "1" or empty if dimensionless.
+        Unit, such as "m/s"; "1" or empty if dimensionless.
     text : str
-        Meaning, as labels of figures show it.
+        Meaning, as shown in labels of figures.
     dims : tuple of str
-        Dimensions in addition to the result's own, such as time: "node", "axis", or others.
+        Dimensions such as "node" or "axis", in addition to those of the result, such as time.
     function : callable, optional
-        Returns the value, a number or an array with these dimensions, from displacement (n, 3), m,
-        velocity (n, 3), m/s, and time, s. Built-in quantities need none.
+        Function of displacement (n, 3), m, velocity (n, 3), m/s, and time, s, that returns the
+        value, a number or an array with these dimensions. Built-in quantities need none.
     """
 
     units: str = ""
@@ -52,7 +52,7 @@ CONTACT = {
         "N", "force of each plane on the sheet, without friction", ("plane", "axis")
     ),
 }
-"""Variables of motions and paths with contact; the second one only with planes."""
+"""Variables of motions and paths with contact; `plane_force` only with planes."""
 MOTION: Mapping[str, Quantity] = STATE | {
     "velocity": Quantity("m/s", "velocity", PLACE),
     "kinetic": Quantity("J", "kinetic energy"),
@@ -62,16 +62,16 @@ MOTION: Mapping[str, Quantity] = STATE | {
     "memory": MEMORY,
 }
 CONTINUATIONS: Mapping[str, str] = {
-    "continuation": "what else the method needs to go on from the last sample",
-    "continued_from": "what the method took over from another motion at the first sample",
+    "continuation": "further state of the method, to continue from the last sample",
+    "continued_from": "further state of the method from another motion, at the first sample",
 }
-"""Further variables of motions by implicit methods, along the dimension continued."""
+"""Further variables of motions by implicit methods, along the dimension `continued`."""
 ORIGIN: Mapping[str, Quantity] = {
-    "origin": Quantity("m", "displacement about which damping has its start", PLACE),
-    "origin_time": Quantity("s", "when the motion was there; nan: under the constant loads alone"),
-    "flow": Quantity("m", "displacement at which the flow was found last", PLACE),
-    "flow_time": Quantity("s", "time at which the motion has that flow"),
-    "flow_looked": Quantity(text="steps until then since that flow was checked"),
+    "origin": Quantity("m", "displacement of the state that damping refers to", PLACE),
+    "origin_time": Quantity("s", "time of that state; nan: it is under the constant loads alone"),
+    "flow": Quantity("m", "displacement at which the flow was last computed", PLACE),
+    "flow_time": Quantity("s", "time at which the motion uses that flow"),
+    "flow_looked": Quantity(text="steps from the last check of that flow to that time"),
 }
 """Further variables of motions whose damping or added mass depends on the initial state."""
 SINCE = "since rest, or since the state from which a path was started"
@@ -97,17 +97,17 @@ POINTS: Mapping[str, Quantity] = {
     "stable": Quantity(text="whether the motion is stable"),
     "bifurcation": Quantity(text="bifurcation at the point"),
     "branch": Quantity(text="number of the branch"),
-    "periods": Quantity("1", "periods of the drive in one of the motion"),
+    "periods": Quantity("1", "periods of the drive per period of the motion"),
     "floquet": Quantity("1", "Floquet multiplier", ("multiplier",)),
     "coefficient": Quantity("m", "complex amplitude of a harmonic of the motion", HARMONICS),
-    "truncation": Quantity("1", "what twice as many harmonics would add, estimated"),
-    "reduction": Quantity("1", "what the dofs left out would add, estimated"),
-    "energy": Quantity("J", "energy above that at rest"),
+    "truncation": Quantity("1", "estimated effect of twice as many harmonics"),
+    "reduction": Quantity("1", "estimated effect of the dofs left out"),
+    "energy": Quantity("J", "energy above the energy at rest"),
     "energy_drift": Quantity("1", "largest change of the energy along the motion"),
 }
-"""Possible variables of points of a curve or a backbone, along the dimension point."""
+"""Possible variables of points of a response curve or a backbone, along the dimension point."""
 FOLDING: Mapping[str, Quantity] = {
-    "displacement": Quantity("m", "displacement from the pattern as it was", PLACE),
+    "displacement": Quantity("m", "displacement from the initial pattern", PLACE),
     "position": Quantity("m", "position of the vertex", PLACE),
     "fold_angle": Quantity("rad", "fold angle, valleys positive", ("crease",)),
     "strain": Quantity(text="largest strain of a bar"),
@@ -115,13 +115,13 @@ FOLDING: Mapping[str, Quantity] = {
 }
 CROSSINGS: Mapping[str, Quantity] = {
     "crossing_panels": Quantity(text="panels that pass through each other", dims=("two",)),
-    "crossing_first": Quantity(text="first sample (from 0) at which they were seen to"),
+    "crossing_first": Quantity(text="first checked sample (from 0) in which the two panels cross"),
 }
 """Further variables of motions and paths with crossing panels, along the dimension crossing."""
 MODES: Mapping[str, Quantity] = {
     "frequency": Quantity("Hz", "frequency"),
     "eigenvalue": Quantity("rad2/s2", "square of the angular frequency (negative: unstable)"),
-    "shape": Quantity("m", "mode shape, of the modal mass 1 kg m2", PLACE),
+    "shape": Quantity("m", "mode shape with the modal mass 1 kg m2", PLACE),
     "rigid": Quantity("1", "whether the mode is a rigid motion that nothing resists"),
     "rigid_share": Quantity("1", "share of the shape in the space of rigid motions"),
     "damping_ratio": Quantity("1", "modal damping ratio"),
@@ -133,21 +133,21 @@ INTERNAL: Mapping[str, Quantity] = {
     "internal_share": Quantity("1", "share of the strain energy in internal amplitudes of panels"),
     "between_shape": Quantity("m", "mode shape between nodes", ("between", "axis")),
 }
-"""Further variables of modes if panels have internal amplitudes: `between` counts the middles of
-edges and spokes, panel by panel."""
+"""Further variables of modes if panels have internal amplitudes. The dimension `between` counts the
+middles of edges and spokes, panel by panel."""
 RESPONSES: Mapping[str, Quantity] = {
     "receptance": Quantity("m/N", "displacement per force", PLACE),
     "mobility": Quantity("m/(N s)", "velocity per force", PLACE),
     "accelerance": Quantity("m/(N s2)", "acceleration per force", PLACE),
     "transmissibility": Quantity("1", "displacement per displacement of the base", PLACE),
 }
-"""Variables of a frequency response, one of these,"""
+"""Variables of a frequency response: one of these,"""
 ESTIMATES: Mapping[str, Quantity] = {
     "coherence": Quantity("1", "coherence", PLACE),
     "swing": Quantity("rad", "largest amplitude of a superlinear hinge"),
     "unsteadiness": Quantity("1", "relative error that transients leave, estimated"),
 }
-"""and those that its method adds."""
+"""and those that the method adds."""
 BANDS: Mapping[str, Quantity] = {
     "frequency": Quantity("Hz", "frequency", ("phase", "band")),
     "eigenvalue": Quantity(
@@ -158,13 +158,13 @@ BANDS: Mapping[str, Quantity] = {
         "1", "share of the direction in the kinetic energy", ("phase", "band", "axis")
     ),
     "shape": Quantity(
-        "m", "Bloch mode, of the modal mass 1 kg m2 in a cell", ("phase", "band", *PLACE)
+        "m", "Bloch mode with the modal mass 1 kg m2 in a cell", ("phase", "band", *PLACE)
     ),
     "position": Quantity("m", "position in the state", PLACE),
     "displacement": Quantity("m", "displacement of the state from the rest position", PLACE),
     "residual": Quantity("1", "residual of the state as a fraction of the forces at play"),
-    "vectors": Quantity("m", "shift from a cell to the next", ("period", "axis")),
-    "angles": Quantity("rad", "turn from a cell to the next", ("period",)),
+    "vectors": Quantity("m", "shift from one cell to the next", ("period", "axis")),
+    "angles": Quantity("rad", "turn from one cell to the next", ("period",)),
     "axes": Quantity("1", "axis of the turn", ("period", "axis")),
     "points": Quantity("m", "point on the axis of the turn", ("period", "axis")),
     "zone_frequency": Quantity("Hz", "frequency in the whole zone", ("zone", "band")),
@@ -173,15 +173,15 @@ BANDS: Mapping[str, Quantity] = {
     "attenuation": Quantity("Np", "attenuation from cell to cell", ("leg", "level")),
     "level_frequency": Quantity("Hz", "frequency of the attenuation", ("level",)),
 }
-"""Variables of bands, with the dimension `state` too if there are several states."""
+"""Variables of bands; if there are several states, also along the dimension `state`."""
 GAPS: Mapping[str, Quantity] = {
     "gap_state": Quantity(text="number of the state, from 0"),
-    "gap_direction": Quantity(text="all, or the part of the path along which no wave travels"),
+    "gap_direction": Quantity(text="part of the path along which no wave travels, or all"),
     "gap_below": Quantity(text="number of the band below (0: none)"),
     "gap_bottom": Quantity("Hz", "bottom of the gap"),
     "gap_top": Quantity("Hz", "top of the gap"),
     "gap_width": Quantity("Hz", "width of the gap"),
-    "gap_relative_width": Quantity("1", "width of the gap over its middle"),
+    "gap_relative_width": Quantity("1", "width of the gap divided by its middle frequency"),
 }
 """Further variables of bands along the dimension `gap`."""
 FIDELITY: Mapping[str, Quantity] = {
@@ -193,18 +193,18 @@ FIDELITY: Mapping[str, Quantity] = {
     "soft_hinges": Quantity(text="hinges without stiffness at rest", dims=("model",)),
     "seconds": Quantity("s", "time for the modes of the shell"),
     "model_seconds": Quantity("s", "time for the modes of a model", ("model",)),
-    "cost_ratio": Quantity("1", "time of the shell over that of a model", ("model",)),
+    "cost_ratio": Quantity("1", "time for the shell divided by time for a model", ("model",)),
     "deflection": Quantity("m", "displacement of the shell along small loads, extrapolated"),
     "deflection_mesh_error": Quantity("1", "error of the finest mesh (nan: not converged)"),
     "deflection_error": Quantity("1", "error of the displacement (infinite: soft)", ("model",)),
 }
-"""Variables of a comparison of models with the shell; the last three only with forces."""
+"""Variables of a comparison of models with the shell; the last three only if there are forces."""
 
 
 def variables(
     known: Mapping[str, Quantity], along: str | tuple[str, ...], values: Mapping[str, ArrayLike]
 ) -> dict[str, Any]:
-    """Dataset variables from values along a dimension, or several or none."""
+    """Dataset variables from values along any number of dimensions."""
     first = (along,) if isinstance(along, str) else along
     return {
         name: variable((*first, *known[name].dims), array, known[name].units, known[name].text)
@@ -213,13 +213,13 @@ def variables(
 
 
 def variable(dims: tuple[str, ...], values: ArrayLike, units: str, text: str) -> tuple:
-    """Dataset variable with its unit, if any, and a label for figures."""
+    """Dataset variable with a label for figures, and the unit if there is one."""
     attributes = {"units": units, "long_name": text}
     return dims, np.asarray(values), {key: word for key, word in attributes.items() if word}
 
 
 def energies_of(case: Any) -> dict[str, Quantity]:
-    """Strain energies of a case's structure, by part."""
+    """Strain energies of a case's structure, for each energy group."""
     return {name: Quantity("J", text) for name, text in case.energy_groups.items()}
 
 

@@ -1,4 +1,4 @@
-"""Seals: a digest of all preceding bytes at the end of a file, which reveals damage."""
+"""Seals: a digest at the end of a file, of all bytes before it, which reveals damage."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """The case of a result, in its variable `case`: a TOML text that ends with a table of arrays.
 
-A line ``faces = "<i8 36 AAAAAAAAAAAEAAAA..."`` gives the data type, the shape, and the bytes in
-base64, exact to the bit. This table is read here: tomllib would take 90 ms per MB. Rest positions
-are a variable of their own, as scripts draw with them.
+A line ``faces = "<i8 36 AAAAAAAAAAAEAAAA..."`` has the data type, the shape, and the bytes in
+base64, exact to the bit. This table is parsed here, because tomllib would take 90 ms per MB. Rest
+positions are a variable of their own, as scripts use them in plots.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _ARRAYS = "\n[arrays]\n"
 
 
 def case_variables(document: Document) -> dict[str, Any]:
-    """Variables of a case, as it was written down."""
+    """Variables of a case, from the document that describes it."""
     arrays = dict(document.arrays)
     rest = arrays.pop("rest_position")
     lines = (f'{name} = "{_written(array)}"\n' for name, array in arrays.items())
@@ -39,12 +39,12 @@ def case_variables(document: Document) -> dict[str, Any]:
 
 
 def sections_of(ds: xr.Dataset) -> str:
-    """Text of the stored case without its arrays."""
+    """Text of the stored case, without the arrays."""
     return str(ds["case"].values[()]).partition(_ARRAYS)[0]
 
 
 def document_of(ds: xr.Dataset) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Sections of the stored case, and the arrays they refer to.
+    """Sections of the stored case, and the arrays that the sections refer to.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def _read(name: str, text: str) -> NDArray:
         kind, shape, data = text.strip('"').split(" ")
         values = np.frombuffer(base64.b64decode(data, validate=True), np.dtype(kind))
         return values.reshape([int(size) for size in shape.split(",") if size]).copy()
-    except Exception as error:  # whatever damage leads to
+    except Exception as error:  # damage may lead to any error
         raise InputError(
             f"the stored case is damaged: its array {show(name)} cannot be read"
         ) from error

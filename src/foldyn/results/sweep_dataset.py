@@ -20,13 +20,13 @@ from foldyn.results.stored_case import case_variables
 from foldyn.values import choice, number, whole
 
 POINT = "point"
-"""Dimension of sampled points."""
+"""Name of the dimension of sampled points."""
 SALTELLI = "saltelli"
-"""Sampling design for Sobol indices."""
+"""Name of the sampling design for Sobol indices."""
 FEWEST = 8
-"""Least number of points of a design, of each kind, for estimating indices."""
+"""Least number of design points of each kind for estimating indices."""
 BINS = 8
-"""Number of ranges with equally many sampled points, for main effects."""
+"""Number of ranges, with equally many sampled points each, for main effects."""
 
 
 def sweep_dataset(
@@ -35,7 +35,7 @@ def sweep_dataset(
     coordinates: Mapping[str, Any],
     statistics: Mapping[str, Any],
 ) -> xr.Dataset:
-    """Dataset of a sweep, which carries the case of the original case file.
+    """Dataset of a sweep, including the case of the original case file.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def has_values(ds: xr.Dataset) -> bool:
 
 
 def is_grid(ds: xr.Dataset) -> bool:
-    """Whether a sweep covered all combinations of values."""
+    """Whether a sweep covers all combinations of values."""
     return POINT not in ds.dims
 
 
@@ -93,20 +93,20 @@ def label(one: xr.DataArray, own: str = "") -> str:
 
 
 def measured(ds: xr.Dataset, measure: str, at: Mapping[str, Any] | None = None) -> xr.DataArray:
-    """A measure over the points of a sweep.
+    """A measure at the points of a sweep.
 
     Parameters
     ----------
     ds : xarray.Dataset
     measure : str
     at : mapping, optional
-        Coordinates along the measure's own dimensions, {"mode": 2}, by default the first; and
-        values of the grid's parameters, by default all.
+        Coordinates along the measure's own dimensions, such as {"mode": 2}, by default the first,
+        and values of the grid's parameters, by default all.
 
     Raises
     ------
     InputError
-        Not a sweep, no such measure, dimension or value.
+        Not a sweep, or no such measure, dimension or value.
     """
     found = ds[choice("measure", measure, measures_of(ds))]
     keys, left = keys_of(ds), parameters_of(ds)
@@ -134,11 +134,11 @@ class MainEffect:
     Attributes
     ----------
     name : str
-        The parameter.
+        Name of the parameter.
     values : ndarray, shape (k,)
-        Its values, or for sampled points the means of its ranges.
+        Values of the parameter; for sampled points, the mean of each range.
     mean, deviation : ndarray, shape (k,)
-        Mean of the measure there, and its standard deviation.
+        Mean and standard deviation of the measure at these values.
     """
 
     name: str
@@ -157,18 +157,18 @@ def main_effects(
     ds : xarray.Dataset
         A result of `foldyn.sweep`.
     measure, at
-        As in `measured`.
+        See `measured`.
 
     Returns
     -------
     tuple of MainEffect
-        In the order of the parameters. For samples, means are over 8 ranges with equal numbers of
-        points, or over the values of a list.
+        One per parameter, in order. For sampled points, means are over 8 ranges with equal numbers
+        of points, or over the values of a list.
 
     Raises
     ------
     InputError
-        As in `measured`.
+        See `measured`.
     """
     found = measured(ds, measure, at)
     left = [name for name in parameters_of(ds) if name not in (at or {})]
@@ -203,11 +203,11 @@ class SobolIndices:
     Attributes
     ----------
     names : tuple of str
-        The parameters.
+        Names of the parameters.
     first, total : ndarray, shape (d,)
-        Share of each parameter alone, and with all its interactions.
+        Share of each parameter alone, and of each parameter with all its interactions.
     first_interval, total_interval : ndarray, shape (d, 2)
-        Percentiles of both over resampled points.
+        Confidence intervals of both, from resampled points.
     points : int
         Number of design points of each kind that were used; failed points are left out.
     """
@@ -236,7 +236,7 @@ def sobol_indices(
     ds : xarray.Dataset
         A result of `foldyn.sweep`.
     measure, at
-        As in `measured`.
+        See `measured`.
     confidence : float
         Confidence level of the intervals, which are bootstrap percentiles.
     resamples, seed : int
@@ -253,8 +253,8 @@ def sobol_indices(
 
     Notes
     -----
-    First-order indices by Saltelli et al. (Comput. Phys. Commun. 181, 2010, table 2 (b)), total
-    ones by Jansen (table 2 (f)), as in `scipy.stats.sobol_indices`; a row of the design with any
+    First-order indices follow Saltelli et al. (Comput. Phys. Commun. 181, 2010, table 2 (b)), total
+    indices Jansen (table 2 (f)), as in `scipy.stats.sobol_indices`. A row of the design with any
     failed point is left out.
     """
     found = measured(ds, measure, at)
