@@ -158,13 +158,13 @@ def doubts(
     if 0.0 < farthest < least:
         return (
             f"nothing moves farther than {farthest:.2g} m, and below {least:.2g} m rounding "
-            "hides how hinges turn, so that they do not resist: use larger loads, lighter or "
-            "softer panels, or a longer motion"
+            "errors hide the turns of hinges, so that hinges do not resist: use larger loads, "
+            "lighter or softer panels, or a longer motion"
         )
     if 0.0 < size < plan.floor:
         return (
-            f"the motion is small: {size:.2g} m at most, where errors of steps are measured "
-            f"by {plan.floor:.2g} m, a share of the longest bar; use a tolerance of "
+            f"the motion is small: {size:.2g} m at most, but errors of steps are relative "
+            f"to {plan.floor:.2g} m, a share of the longest bar; use a tolerance of "
             f"{plan.tolerance * size / plan.floor:.1g}, or a method with a fixed step"
         )
     if balance.relative <= INACCURATE:
@@ -176,6 +176,6 @@ def doubts(
     if balance.scale <= hidden:
         return (
             f"{off}, {balance.scale:.2g} J: they are below the rounding errors of forces and "
-            f"displacements of this size ({hidden:.2g} J), which may be all that moves"
+            f"displacements of this size ({hidden:.2g} J), so the motion may be mere rounding"
         )
     return f"{off}: {remedy}"

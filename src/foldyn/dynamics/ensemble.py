@@ -341,5 +341,5 @@ def _dataset(
     data["outcome"] = variable(("model",), np.array(outcome), "", "what became of the motion")
     along = {"time": variable(("time",), out.time, "s", "time")}
     along["model"] = variable(("model",), np.arange(len(outcome)), "", "model")
-    alone = ("it is of many models, whose cases it does not hold",)
+    alone = ("it contains many models, but not the case of each",)
     return result_dataset("ensemble", case, data, along, facts, None, alone)

@@ -70,7 +70,7 @@ def failure(
         if closed[hinge] < MET:
             j, k = order[hinges[hinge, :2]].tolist()
             return InstabilityError, (
-                f"{moment} the error asks for a step of {tally.wanted:.3g} s: panels meet "
+                f"{moment} the error requires a step of {tally.wanted:.3g} s: panels meet "
                 f"about nodes {j}-{k}; {_apart(motion, hinge)}"
             )
     return InstabilityError, f"{moment} {_reason(motion, code)}"
@@ -100,7 +100,7 @@ def _reason(motion: Failed, code: int) -> str:
     plan, method = motion.plan, motion.method
     if code == Outcome.STUCK:
         return (
-            f"the error asks for a step of {float(motion.state.tally.wanted):.3g} s: a load jumps "
+            f"the error requires a step of {float(motion.state.tally.wanted):.3g} s: a load jumps "
             "too often, or the motion is too violent; raise the tolerance, or use rk4"
         )
     if code == Outcome.NOT_CONVERGED:
@@ -111,8 +111,8 @@ def _reason(motion: Failed, code: int) -> str:
     case, reason = motion.case, "a load is not finite"
     if case.remembering and isinstance(case.body.sheet, CondensedPlatesTerm):
         reason += (
-            ', or panels find no balance beside creases with memory (take method = "newmark", or a '
-            "crease_stiffness nearer to that of panels)"
+            ', or panels find no balance next to creases with memory (use method = "newmark", '
+            "or a crease_stiffness closer to the stiffness of panels)"
         )
     if plan.steps and not method.implicit:
         reason = (

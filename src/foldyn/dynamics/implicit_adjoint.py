@@ -265,13 +265,13 @@ def _refuse(motion: Any) -> None:
     """Refuse motions whose steps have no adjoint, with a remedy."""
     if motion.method.name not in METHODS:
         raise InputError(
-            f" = {motion.method.name!r}: motions by it have no gradients; take rk4, "
+            f" = {motion.method.name!r}: motions by this method have no gradients; take rk4, "
             f"central_difference, {' or '.join(METHODS)}",
             "method",
         )
     if not motion.plan.steps:
         raise InputError(
-            ": there are gradients of fixed steps alone, which change with nothing; give dt, and "
+            ": gradients need fixed steps, which do not depend on the motion; give dt, and "
             "no tolerance",
             "dt",
         )

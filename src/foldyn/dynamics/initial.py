@@ -184,7 +184,7 @@ def check_steady(case: Case, start: float, end: float) -> None:
             instead = ", or added_mass = false" if section == "air" else ""
             raise InputError(
                 f"{section}: {what} with the history {history.kind} jumps at t = {times[0]:g} s, "
-                f"but nothing can move in no time: use a ramp, a half sine or a table{instead}"
+                f"but nothing can move instantly: use a ramp, a half sine or a table{instead}"
             )
 
 
@@ -227,10 +227,10 @@ def warn_of_standing_in_wind(case: Case, v: NDArray) -> None:
     wind = float(np.linalg.norm(air.velocity))
     if wind > SLOW_WIND * float(np.linalg.norm(v, axis=1).max()):
         warn(
-            f"air: in a wind of {wind:g} m/s panels that stand lack a moment of up to 0.3 times "
+            f"air: in a wind of {wind:g} m/s stationary panels lack a moment of up to 0.3 times "
             "1/2 density U^2 A a/2 (U the wind, A and a a panel's area and width): added mass "
-            'finds its flow anew only when a hinge has turned by 3 degrees; added_mass = "local", '
-            "of each panel alone, lacks none",
+            'computes its flow again only when a hinge turns by 3 degrees; added_mass = "local", '
+            "of each panel alone, includes this moment",
             "air.md#limits",
             ModelRangeWarning,
         )

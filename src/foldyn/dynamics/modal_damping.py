@@ -82,8 +82,8 @@ class ModalRows(NamedTuple):
         if self.alike:
             warn(
                 f"damping: {self.alike} modes have frequencies in common, but different ratios, or "
-                "some of them none: as any of their sums is a mode too, all of one frequency get "
-                "the mean; give them the same ratio",
+                "some have none: as any sum of such modes is a mode too, all modes of a frequency "
+                "get the mean ratio; give them the same ratio",
                 "damping.md#modal",
             )
         if self.soft:
@@ -91,7 +91,7 @@ class ModalRows(NamedTuple):
                 f"damping: {self.soft} hinges of the superlinear law stand at their rest angle, "
                 "where their slope vanishes: motions that only they resist are no modes, and modal "
                 'damping leaves them out; take preset = "plate" in place of this law, or Rayleigh '
-                "damping beside it",
+                "damping in addition",
                 "damping.md#modal",
             )
 
@@ -202,8 +202,8 @@ def _swinging(
         inner = int((free >= case.elastic_body.size).sum())
         among = f", {inner} of them internal amplitudes," if inner else ""
         raise InputError(
-            f": all modes of {pencil.finite} free dofs{among} are too many: damping of all is "
-            f"for up to {MOST_MODES}; give count, or a list of ratios",
+            f": all modes of {pencil.finite} free dofs{among} are too many: all can be "
+            f"damped up to {MOST_MODES}; give count, or a list of ratios",
             "damping.modal",
         )
     sought = pencil.finite if wanted is None else min(wanted + BEYOND, pencil.finite)

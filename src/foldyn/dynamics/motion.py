@@ -194,9 +194,9 @@ class Motion:
         assert self._other is not None
         new, ask = self._other._unlike(self)
         text = (
-            f"the motion is computed anew with {new}: with {self._unlike(self._other)[0]}, which "
-            f"auto chose, its energy balance is off by {self.output.balance.relative:.1%} of the "
-            f"energies at play; {ask} saves the first attempt"
+            f"the motion is computed anew with {new}: with {self._unlike(self._other)[0]}, the "
+            f"choice of auto, the energy balance is off by {self.output.balance.relative:.1%} of "
+            f"the energies at play; {ask} avoids the first attempt"
         )
         warn(text, "integrators.md#integrators")
         keeping = self._keeping

@@ -214,8 +214,8 @@ def warn_of_functions(case: Case) -> None:
         if history.knots() is None:
             warn(
                 f"the history of {what} is a function whose jumps and corners are unknown: each "
-                "step looks at it at eight points, and a pulse shorter than their distance may be "
-                "missed; say when they are: fd.Function(f, at=[0.2, 0.25]), at=[] if it is smooth",
+                "step evaluates it at eight points and may miss a pulse shorter than their spacing; "
+                "give their times: fd.Function(f, at=[0.2, 0.25]), or at=[] if it is smooth",
                 "integrators.md#steps",
             )
             return
@@ -234,7 +234,7 @@ def warn_of_coarse_steps(
         if share > NOTICED:
             warn(
                 f"steps of {plan.dt:.3g} s do not resolve the history {history.kind} of {what}: "
-                f"what they see of it is off by {share:.0%}; take a smaller dt, or a method that "
+                f"the values they use are off by {share:.0%}; take a smaller dt, or a method that "
                 'chooses its steps: "dormand_prince", or an implicit one without dt',
                 "integrators.md#steps",
             )

@@ -51,8 +51,8 @@ def turns_told(
     remedy = "fd.StrainDamping (strain in a case file)" if fits else "fd.CreaseDamping"
     return (
         f"damping: {' and '.join(kinds)} resist{'s' if len(kinds) == 1 else ''} rotations: panels "
-        f"turn by up to {math.degrees(farthest):.3g} degrees, from which it takes about "
-        f"{min(energy / scale, 1.0):.0%} of the energies at play, although turning strains "
+        f"turn by up to {math.degrees(farthest):.3g} degrees, which dissipates about "
+        f"{min(energy / scale, 1.0):.0%} of the energies at play, although turns strain "
         f"nothing; use {remedy}, which follows the motion"
     )
 

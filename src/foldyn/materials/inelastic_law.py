@@ -84,7 +84,7 @@ class MemoryLaw(HingeLaw):
         stiff = self.elastic.slope(np.pi, np.pi)
         if not stiff > 0.0:
             raise InputError(
-                f": {self.name} takes shares of the stiffness at rest, and {self.elastic.name!r} "
+                f": {self.name} uses shares of the stiffness at rest, and {self.elastic.name!r} "
                 'has none there; give law = "linear" or "enhanced"',
                 field,
             )

@@ -73,7 +73,7 @@ def case_of(ds: xr.Dataset) -> Case:
     if not whole_attribute(ds, "rerunnable"):
         reason = ds.attrs.get("not_rerunnable_because", "the result says so")
         raise InputError(
-            f"this result cannot be run again from itself: {reason}; make its case anew in Python"
+            f"this result cannot be run again from itself: {reason}; make the case again in Python"
         )
     return from_document(*document_of(ds))
 

@@ -90,7 +90,7 @@ def _along(result: xr.Dataset) -> tuple[str, str, str, str]:
     kind = result.attrs["foldyn_result"]
     if kind not in ALONG:
         raise InputError(
-            f": is of kind {kind!r}, which has no shapes in turn; give a motion, a path or modes",
+            f": is of kind {kind!r}, which has no series of shapes; give a motion, a path or modes",
             "result",
         )
     return ALONG[kind]

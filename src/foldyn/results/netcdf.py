@@ -203,8 +203,8 @@ def read(path: str | os.PathLike[str], unreadable: str, into_memory: bool = True
         raise InputError(f"{path}: may not be read") from None
     except Exception as error:  # libraries raise any kind of error on damaged files
         raise InputError(
-            f"{path}: {unreadable}; if it was one, it is damaged: restore it from a copy, or "
-            "compute it again"
+            f"{path}: {unreadable}; if it was one before, it is damaged: restore it from a copy, "
+            "or compute it again"
         ) from error
 
 

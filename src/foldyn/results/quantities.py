@@ -224,15 +224,15 @@ def energies_of(case: Any) -> dict[str, Quantity]:
 
 
 REASONS: Mapping[str, str] = {
-    "frequency": "an unstable mode grows instead of swinging",
-    "zone_frequency": "an unstable wave grows instead of swinging",
-    "damped_ratio": "a rigid motion does not swing",
+    "frequency": "an unstable mode grows instead of oscillating",
+    "zone_frequency": "an unstable wave grows instead of oscillating",
+    "damped_ratio": "a rigid motion does not oscillate",
     "slope": "bands have corners where the frequency is zero",
     "group_velocity": "bands have corners where the frequency is zero",
-    "damping_ratio": "a rigid or an unstable mode does not swing",
+    "damping_ratio": "a rigid or an unstable mode does not oscillate",
     "receptance": "a resonance without damping, a body free to move at 0 Hz, or no convergence",
     "transmissibility": "a resonance without damping, or no convergence",
-    "coherence": "what does not respond (held axes, nodes at rest) is coherent with nothing",
+    "coherence": "without a response (held axes, nodes at rest) coherence is undefined",
     "swing": "the harmonic balance does not converge at the frequency",
     "mesh_error": "the meshes of the shell have not converged",
     "deflection_mesh_error": "the meshes of the shell have not converged",

@@ -269,9 +269,9 @@ def sobol_indices(
     rows = rows[:, np.isfinite(rows).all(axis=0)]
     count = rows.shape[1]
     if count < FEWEST:
-        raise InputError(f"sweep: only {count} rows of the design did not fail; at least {FEWEST}")
+        raise InputError(f"sweep: only {count} rows of the design succeeded; {FEWEST} are needed")
     if np.ptp(rows) <= 1e-12 * np.abs(rows).max():
-        raise InputError(f"measure = {measure}: does not vary, so nothing explains it")
+        raise InputError(f"measure = {measure}: does not vary, so there is no variance to explain")
     first, total = _indices(rows)
     drawn = np.random.default_rng(seed).integers(0, count, (resamples, count))
     repeated = np.array([_indices(rows[:, chosen]) for chosen in drawn])

@@ -51,13 +51,13 @@ def no_card() -> str:
 
     if not cuda.is_available():
         return (
-            "no GPU of NVIDIA's with a driver is found here (what does nvidia-smi say?); "
+            "no GPU of NVIDIA's with a driver is found here (check with nvidia-smi); "
             'device = "cpu" needs none'
         )
     version = tuple(cuda.driver.driver.get_version())
     if version < OLDEST:
         return (
-            f"the driver of the GPU is too old: it knows CUDA {version[0]}.{version[1]}, and CUDA "
+            f"the driver of the GPU is too old: it has CUDA {version[0]}.{version[1]}, and CUDA "
             f"{OLDEST[0]}.{OLDEST[1]} is needed; update it"
         )
     return ""
