@@ -14,11 +14,11 @@ from foldyn.algebra.woodbury import Updated
 
 LOST = 1e-3  # relative rounding error above which a resonance lacks damping
 PIVOT = 0.01  # least pivot on the diagonal, relative to the largest entry in the column
-BESIDE = 64.0  # perturbation of A in rounding errors, for which the factors are exact
+BESIDE = 64.0  # damping that is added to A, in rounding errors
 # relative change of the solution at which refinement stops, and largest number of rounds
 REFINED, ROUNDS = 1e-12, 4
 FULL = 0.2  # share of nonzeros above which a matrix counts as full
-SPARSE = 40.0  # time to solve for one sparse entry, in products of a full matrix
+SPARSE = 40.0  # time per entry of a sparse solution, in multiplications of full matrices
 _EPS = float(np.finfo(np.float64).eps)
 
 

@@ -16,8 +16,8 @@ accelerations follow from
 which are solved by conjugate gradients; the initial guess uses the inverse of the matrix where F
 was computed.
 
-The forces f of the fluid take the power f.U from the wind. The sum of f is -P., with P, the sum
-of B'q, the momentum of the fluid: the air has received the energy U.P and the power -P.U.
+The forces f of the fluid take the power f.U from the wind. They add up to -P., where P =
+sum of B'q is the momentum of the fluid: the air has received the energy U.P and the power -P.U.
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ A step maps displacement u, velocity v and the stored acceleration a to
 
     v' = v + dt/2 a,   u1 = u + dt v',   a1 = a(u1, v' + dt/2 a),   v1 = v' + dt/2 a1.
 
-Stored states allow the steps to be recomputed, bit for bit. One segment of steps at a time, the
-points of force evaluation and the accelerations are stored.
+Stored states allow the steps to be recomputed, bit for bit. The points of force
+evaluation and the accelerations are stored for one segment of steps at a time.
 """
 
 from __future__ import annotations

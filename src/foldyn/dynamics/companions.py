@@ -51,9 +51,9 @@ class Accompanied(ImplicitEngine):
     Parameters
     ----------
     others : sequence of Companion
-        Cases with the same dofs, without contact and laws with memory.
+        Cases with the same dofs, without contact and without laws with memory.
     share : float
-        Relative change of a difference at which its iteration ends.
+        Relative change of a difference at which the iteration ends.
 
     Attributes
     ----------

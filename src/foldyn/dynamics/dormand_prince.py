@@ -61,7 +61,7 @@ P = np.array(
 )
 SMALLEST = 1e-13  # smallest step relative to the end time of the motion
 RESOLVED = 0.6  # radians of a contact's vibration per step; error control does the rest
-EASED = 0.1  # share of kinetic energy that unresolved slow contacts may have, per tolerance
+EASED = 0.1  # energy of unresolved slow contacts, relative to tolerance times kinetic energy
 ROUNDING = 1e-9  # how far a sample may lie beyond the end of a step, relative to the step
 
 
@@ -252,7 +252,8 @@ def advance(handle, state, plan, room, stretch):
             u[i], v[i] = fut[i], speeds[6, i]
             speeds[0, i] = speeds[6, i]
         jumps = stops and handle.spent != 0
-        if tally.samples > first and (handle.commit != 0 or jumps):  # back at the end
+        # samples have evaluated the terms before the step's end
+        if tally.samples > first and (handle.commit != 0 or jumps):
             advance_clock(handle, h)
             acceleration(handle, state.u, state.v, moment, a)
             tally.evaluations += 1

@@ -11,7 +11,7 @@ structure and the momenta of a free one, to the tolerance of the equations and t
 damping and loads, the energy balance closes equally well. The method has order 2 (Simo and Tarnow
 1992, Gonzalez 1996) and does not damp vibrations that a step does not resolve.
 
-On average over a step, massless dofs satisfy F = p: their residual at its end is minus the residual
+On average over a step, massless dofs satisfy F = p: the residual at its end is minus the residual
 at its start, plus a small contribution of nonlinear laws. The method conserves an energy that
 includes this residual.
 """

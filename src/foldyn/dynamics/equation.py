@@ -186,7 +186,7 @@ def _record(m, tally, q, w, a, out, k):
     if last - 2 > groups:
         energy[groups] = tally.air
     energy[last - 1] = tally.dissipated + dissipated_by(m.terms)
-    # work includes the energy that accelerated moving supports, which may do so in jolts
+    # work includes the energy for accelerating supports, whose velocity may jump
     energy[last] = tally.work + moving_energy(system.moved_mass, s.factor)
 
 

@@ -7,7 +7,7 @@ the contact forces y by conjugate gradients,
     (e + G M^-1 G') y = G (a0 + alpha w),    a = a0 - M^-1 G' y,
 
 with a0 the accelerations without this inertia, including the drag -alpha w, and g the rows of G.
-The drag acts on this inertia as on any mass; otherwise its vibrations would never decay.
+The drag acts on this inertia as on any mass; otherwise contact vibrations would never decay.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ class Inertia(NamedTuple):
     """Mass matrix (nodal, CSR), with its inverse if diagonal, otherwise with its factors."""
 
     lumped: bool  # whether it is diagonal and there are no constraints
-    diagonal: NDArray  # (n,) mass; with constraints the least that a node's free dofs feel
+    diagonal: NDArray  # (n,) mass; with constraints, the least mass that the free dofs feel
     inverse: NDArray  # (n, 3) 1/m on free dofs, 0 on fixed ones; empty if not lumped
     indptr: NDArray
     indices: NDArray

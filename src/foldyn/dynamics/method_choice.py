@@ -112,7 +112,7 @@ def _explicit_cost(case: Case, evaluations: int) -> float:
 
 
 def _implicit_cost(case: Case, conserved: bool) -> float:
-    """Seconds per implicit step with residuals, tangents and factorizations, measured likewise.
+    """Measured seconds per implicit step with residuals, tangents and factorizations.
 
     The conserving method costs more: discrete-gradient forces and unsymmetric matrices.
     """

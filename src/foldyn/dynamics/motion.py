@@ -265,7 +265,7 @@ class Motion:
         self.output.begin()
 
     def integrated_by(self, engine: BlockEngine, seconds: float) -> None:
-        """Take over the samples from an engine that integrated several motions."""
+        """Take over the samples from an engine that integrated this motion among others."""
         self._engine, self.seconds = engine, seconds
 
     @property
@@ -356,7 +356,7 @@ class Motion:
         return replace(self.origin, flow=flow, looked=looked)
 
     def _continuations(self) -> dict[str, tuple[float, Continuation]]:
-        """What an implicit method continued from, and what continues from its last sample.
+        """Data that an implicit method continued from, and data to continue from its last sample.
 
         With contact a motion always starts afresh: the state that ties nodes to planes is not
         stored.
@@ -465,7 +465,7 @@ class Motion:
             length = BETWEEN * plan.interval
             plan = plan._replace(end=plan.start + length, interval=length)
         sampler = Sampler(self.case, {}, *self.start, plan.start)
-        # with a memory of its own, as this motion may continue
+        # packed anew, with a memory of its own, as this motion may continue
         packed = pack(self.case, apart(plan, self.critical), self.origin)
         motion = Motion(
             self.case, self.method, plan, self.critical, True, self._initial, self.origin, packed,

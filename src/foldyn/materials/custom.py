@@ -50,8 +50,9 @@ class CustomBarLaw(_Called, BarLaw):
 
     Parameters
     ----------
-    Scalar functions of the stretch: W / E_y, S / E_y (second Piola-Kirchhoff stress) and
-    (dS/dE) / E_y, with dW/dE = S and E the Green strain.
+    energy_of, stress_of, slope_of : callable
+        Scalar functions of the stretch: W / E_y, S / E_y (second Piola-Kirchhoff stress) and
+        (dS/dE) / E_y, with dW/dE = S and E the Green strain.
     name : str
         Name of the law in figures and results.
     """

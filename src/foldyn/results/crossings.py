@@ -71,9 +71,9 @@ def crossings_of(case: Case, displacement: NDArray | Column, stride: int = 1) ->
     case : Case
     displacement : ndarray or Column, shape (k, n, 3)
         Displacement of the nodes at each sample, m. Samples that are not finite are skipped.
-    Check every `stride`-th sample, counted back from the last one. If panels cross, the samples
-    between the first crossing and the checked sample before it are checked too.
-        samples between the first crossing and the checked sample before it.
+    stride : int
+        Check every `stride`-th sample, counted back from the last one. If panels cross, the samples
+        between the first crossing and the checked sample before it are checked too.
     """
     structure, count = case.structure, len(displacement)
     panels = getattr(structure, "triangle_panel", np.zeros(0, int))  # net models have no triangles

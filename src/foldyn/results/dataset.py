@@ -71,8 +71,8 @@ def trajectory_dataset(
     displacement, velocity : array_like, shape (nt, n, 3)
         Displacement (m) and velocity (m/s) of every node.
     reaction : array_like, shape (nt, ns)
-        Forces of the supports (N) on the dofs `case.reaction_dofs`, in that order.
-    Forces of the supports (N) on the dofs in `case.reaction_dofs`, in this order.
+        Forces of the supports (N) on the dofs in `case.reaction_dofs`, in this order.
+    energies : mapping of str to array_like, shape (nt,)
         Kinetic, dissipated, work and the strain energies in the structure's `energy_groups` (J).
     statistics : mapping
         Facts about the run, each stored as an attribute. `start`, `dt` (s) and `steps` give the

@@ -149,8 +149,8 @@ def frames_of(
 
     Parameters
     ----------
-    See `shapes_of`.
-        As in `shapes_of`.
+    result, every, frames, scale
+        See `shapes_of`.
 
     Returns
     -------

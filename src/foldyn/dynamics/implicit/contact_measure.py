@@ -39,7 +39,7 @@ class Move(NamedTuple):
     after: NDArray  # (12,) gradient at the end
     gradient: NDArray  # (12,) discrete gradient
     weights: NDArray  # (4,) weights of a distance; see `mechanics.contact.potential`
-    moves: NDArray  # (2, 4) ways in which the weights may change
+    moves: NDArray  # (2, 4) derivatives of the weights
     apart: NDArray  # (3,) distance vector, m
 
 

@@ -47,7 +47,7 @@ MOST = 60  # largest number of iterations, many of which are shortened
 CUTS = 12  # how often the line search may shorten one iteration
 OVERSHOT = 0.5  # opposite residual allowed at an iteration's end, relative to its start
 SMALLEST, LARGEST = 0.1, 0.5  # least and largest factor that shortens an iteration
-PREDICTIONS = (1.0, 0.5, 0.25, 0.0)  # shares to try of the prediction, if obstacles move
+PREDICTIONS = (1.0, 0.5, 0.25, 0.0)  # shares of the prediction to try if obstacles move
 
 
 class TouchingNewton(Newton):

@@ -32,7 +32,7 @@ from foldyn.threads import one_thread
 LEAST_STEP = 2.0**-20  # the motion fails if Newton's method fails below this share of a step
 LEAST_TIME = 1e-13  # smallest step relative to the end time of the motion
 TURN = math.pi  # largest change of a dihedral per step, unless panels collide
-MEMORY = 0.9  # factor per step of an earlier error, which still counts
+MEMORY = 0.9  # factor per step by which an earlier error counts less
 SAME_TIME = 1e-9  # times closer than this share of a step are equal
 SAME_STATE = 1e-9  # relative difference below which states and forces are equal
 # step size control
