@@ -125,7 +125,7 @@ def _elements(
     hidden_turn, turning = hinges.hidden_turn[damped], coefficient[damped]
     if beta := case.strain_damping:
         strains = body.strains()
-        assert strains is not None  # the case would have been refused
+        assert strains is not None  # otherwise the case would have been refused
         stiff = strains.hinge_stiffness > 0.0
         none = np.full((int(stiff.sum()), 2), NO_DOF)
         alone = strains.bar_stiffness > 0.0

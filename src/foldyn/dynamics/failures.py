@@ -16,7 +16,7 @@ from foldyn.structures.bars_plates import CondensedPlatesTerm
 from foldyn.structures.beyond_range import kept_apart
 
 SWING = 0.5  # turn (rad) of a hinge per step, too large for any law
-MET = 1e-3  # rad from closed: panels this close touch
+MET = 1e-3  # panels touch if they are closer than this to closed, rad
 
 
 class Failed(Protocol):

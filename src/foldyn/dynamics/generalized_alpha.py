@@ -157,7 +157,7 @@ class Alpha(Scheme):
     def change(self, h: float) -> NDArray:
         """Estimate of the displacement error of a step; see `Scheme.change`.
 
-        As a stands for the acceleration at t + (am - af) h, the error of the displacement is
+        Since a is the acceleration at t + (am - af) h, the error of the displacement is
         (am/2 - af/2 + beta - 1/6) h^3 times the third derivative of the displacement; for the
         trapezoidal rule this factor is 1/12.
         """

@@ -53,8 +53,8 @@ ROOM = 16e6  # memory for the states of a segment, bytes
 ITERATIONS = 30
 TOLERANCE = 1e-12  # relative residual of the balance of z
 ENOUGH = 1e-7  # relative residual that is accepted if the iteration has stalled
-FAST = 0.1  # residual reduction above which an old matrix is renewed
-STALL = 0.5  # residual reduction above which the iteration has stalled
+FAST = 0.1  # an old matrix is renewed if an iteration leaves more than this share
+STALL = 0.5  # the iteration has stalled if it leaves more than this share
 
 
 class Reached(NamedTuple):

@@ -23,7 +23,7 @@ from foldyn.jit.intrinsics import flat
 
 
 class Inertia(NamedTuple):
-    """Mass matrix (nodal, CSR), with its inverse if diagonal, otherwise with its factors."""
+    """Nodal mass matrix (CSR), with its inverse if it is diagonal, otherwise with its factors."""
 
     lumped: bool  # whether it is diagonal and there are no constraints
     diagonal: NDArray  # (n,) mass; with constraints, the least mass that the free dofs feel

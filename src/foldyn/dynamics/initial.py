@@ -31,7 +31,7 @@ from foldyn.values import whole
 AXES = "xyz"
 FIRST = 0.15  # ratio of first to largest step, divided by the fifth root of the tolerance
 SLOW_WIND = 0.05  # a wind below this share of the initial speed is negligible
-LOOKS = 501  # number of times at which supports and planes are checked, besides knots
+LOOKS = 501  # number of times at which supports and planes are checked, apart from knots
 ZERO = 1e-10  # eigenvalues below this share of the largest stiffness count as zero
 
 

@@ -36,7 +36,7 @@ class LaneLoads(NamedTuple):
     value: NDArray  # (t, k WIDTH) loads, N
     inverse: NDArray  # (d WIDTH,) 1/kg, 0 on fixed dofs
     mass: NDArray  # (d WIDTH,) kg
-    alpha: NDArray  # (WIDTH,) of the drag alpha M v, 1/s
+    alpha: NDArray  # (WIDTH,) factor of the drag alpha M v, 1/s
 
 
 class LanePlaces(NamedTuple):
@@ -70,7 +70,7 @@ def write_samples(mass, state, strain, places, out, k):
 def advance_lanes(model, loads, factor, state, plan, places, out, first, last):
     """Advance WIDTH models from step first to last; step 0 is the start.
 
-    factor : (last - first + 1, t WIDTH) of the histories, at the ends of the steps.
+    factor : (last - first + 1, t WIDTH) factors of the histories, at the ends of the steps.
     """
     model, loads, state = borrowed(model), borrowed(loads), borrowed(state)
     dofs, work, groups, scratch = state.dofs, state.work, out.energy.shape[2] - 3, np.zeros(WIDTH)

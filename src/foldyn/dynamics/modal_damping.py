@@ -75,7 +75,7 @@ class ModalRows(NamedTuple):
     rows: NDArray  # (r, m), sqrt(N s/m)
     rate: float  # largest 2 zeta omega, 1/s
     soft: int  # number of hinges without slope, whose modes are left out
-    alike: int = 0  # number of modes that get a mean ratio, being equal in frequency
+    alike: int = 0  # number of modes that share a frequency and get a mean ratio
 
     def warn(self) -> None:
         """Warn if modes are left out or share a mean ratio."""

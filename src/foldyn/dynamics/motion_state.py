@@ -29,7 +29,7 @@ WORK, DISSIPATED, AIR, WRONG, HINGE, OUTCOME = range(6)  # columns of a member's
 
 
 class StepPlan(NamedTuple):
-    """Steps and samples. Fixed step n is at start + n dt; variable steps go on until `end`."""
+    """Steps and samples. Fixed step n ends at start + n dt; variable steps go on until `end`."""
 
     start: float  # s
     end: float  # s

@@ -25,7 +25,7 @@ from foldyn.values import of_kind
 
 MARGIN = 0.9  # critical step relative to the stability limit, to allow for stiffening
 _DENSE = 60  # dofs below which a dense eigensolver is faster and safer
-# a function of frequencies (n,), damping (n,) and step: growth factor of free vibrations (n,)
+# function of frequencies (n,), damping (n,) and step that returns growth factors (n,)
 Growth = Callable[[NDArray, NDArray, float], NDArray]
 _FRACTIONS = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 400)])
 _RATES = np.linspace(0.0, 1.0, 5)[:, None]

@@ -1,8 +1,8 @@
 """Steps and samples: makes duration, time step, output interval and loads fit together.
 
 A pulse between the ends of steps would be lost silently. Adaptive methods therefore end steps at
-the knots of the histories and check between knots. With a fixed step, a warning beforehand
-tells how much of a history the method misses.
+the knots of the histories and check between knots. With a fixed step, the user is warned
+beforehand of the share of a history that the method misses.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from foldyn.values import number, whole
 
 MOST_STEPS = 1e13  # largest number of steps; takes years for any structure
 DEFAULT_FRACTION = 0.5  # default step relative to the critical step
-SAME_TIME = 1e-12  # stops closer than this share of the largest time are one
+SAME_TIME = 1e-12  # stops closer than this share of the largest time count as one
 NOTICED = 0.01  # share of a load that is missed, above which to warn
 MOST_LOOKS = 20_000  # evaluations; longer motions are checked near knots and at some places
 MOST_CALLS = 500  # largest number of evaluations of a user function, which is slow

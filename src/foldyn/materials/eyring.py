@@ -49,7 +49,7 @@ def update(p, before, after, dt, spring, other):
 
 @scalar
 def mean_moment(p, before, after, dt, spring, other):
-    """Mean moment of both ends, slope, and 0, as its work is exactly stored or lost."""
+    """Mean moment of both ends, its slope, and deficit 0: the work is exactly stored or lost."""
     now, slope = _relaxed(after - before, dt, spring, p[0], p[1])
     return 0.5 * (spring + now - before - after), 0.5 * (slope - 1.0), 0.0
 

@@ -102,8 +102,8 @@ class HingeFormulas:
 class BranchFormulas:
     """Formulas of a branch of a law with memory, per unit stiffness, compiled as `scalar`.
 
-    Both take `p, before, after, dt, one, other`: the (4,) parameters of the branch; the turn from
-    the rest angle at the last accepted step and now, rad; the time between, s; and the two numbers
+    Both functions take `p, before, after, dt, one, other`: the (4,) parameters of the branch; the
+    turn from rest at the last accepted step and now, rad; the time between, s; and the two numbers
     of the state at that step. Without a turn and without time, the state keeps its bits.
 
     Parameters

@@ -62,7 +62,7 @@ def update(p, before, after, dt, spring, other):
 
 @scalar
 def mean_moment(p, before, after, dt, spring, other):
-    """Mean moment along the turn, its slope, and 0, as its work is exactly stored or lost."""
+    """Mean moment along the turn, its slope, and deficit 0: work is exactly stored or lost."""
     share, x = p[0], p[1] * dt
     mean = -math.expm1(-x) / x if x > 0.0 else 1.0
     if x < FEW:

@@ -30,8 +30,8 @@ def energy(turn):
 def moment(turn):
     """Moment / k.
 
-    Without branches, so that loops over it vectorize: (d y)(|d| y) with y = |d|^(-1/3), which comes
-    from a guess (3 % off) and two steps of order 4; exact to 3 ulp.
+    Loops over it vectorize, as it has no branches: (d y)(|d| y) with y = |d|^(-1/3), from a guess
+    (3 % off) and two steps of order 4; exact to 3 ulp.
     """
     a = choose(
         abs(turn) > 1e-200, abs(turn), 1e-200

@@ -54,7 +54,7 @@ CHUNK = 2**20
 LEAST_MEMORY = 2**29
 """Bytes that reading a file without a seal may take, in addition to the file's content."""
 LEAST_SECONDS, PER_SECOND = 2, 50_000
-"""Computing time (s) for any file without a seal, and bytes of content per further second."""
+"""Computing time (s) allowed for a file without a seal, and bytes per further second."""
 
 
 def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:

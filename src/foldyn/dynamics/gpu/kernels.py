@@ -230,7 +230,7 @@ def add_notes(state, row, columns):
 
 @lru_cache
 def kernel(method: str, wide: bool, shared: bool) -> Any:
-    """Compile the time loop of a method.
+    """Compile the time loop of a method as a CUDA kernel.
 
     wide : whether one model uses the whole grid; otherwise each block has one model.
     shared : whether the model is in shared memory.

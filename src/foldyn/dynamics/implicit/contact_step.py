@@ -75,7 +75,7 @@ class StepContact:
     def put(self, u0: NDArray, u1: NDArray, factor0: NDArray, factor1: NDArray) -> None:
         """Compute `force` for a step from displacement u0 to u1 (rows, 3).
 
-        factor0, factor1 : (h, 3) of the histories at the start and the end.
+        factor0, factor1 : (h, 3) factors of the histories at the start and the end.
         """
         kept = self._memory
         for moved, factor in zip(self._moved, (factor0, factor1), strict=True):

@@ -121,7 +121,7 @@ class StepMatrix:
     def add_following(self, u: NDArray, factor: NDArray, share: float) -> None:
         """Add `share` times the stiffness of displacement-dependent loads at u (n, 3).
 
-        factor : (h, 3) of the histories. A symmetric matrix only gets the symmetric part.
+        factor : (h, 3) factors of the histories. A symmetric matrix only gets the symmetric part.
         """
         if not self._following.acts:
             return

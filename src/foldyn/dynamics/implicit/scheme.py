@@ -75,7 +75,7 @@ class StepEnd(NamedTuple):
     w: NDArray  # m/s
     a: NDArray  # m/s2
     force: NDArray  # the bracket F_int + beta K0 v - p, N
-    factor: NDArray  # (h, 3) of the histories
+    factor: NDArray  # (h, 3) factors of the histories
     pushed: NDArray  # forces of displacement-dependent loads, N; (0, 3) if there are none
     damped: NDArray  # forces of damping, N; empty if not needed
     resisted: NDArray  # forces of the air, N; empty if not needed
@@ -341,7 +341,7 @@ def norms(system, force, inertia, factor, following):
     which pass their residual on to their masters.
 
     inertia : sum of the squared inertial forces, N2.
-    factor : (h, 3) of the histories, for the loads.
+    factor : (h, 3) factors of the histories, for the loads.
     following : displacement-dependent loads (n, 3), N; (0, 3) if there are none.
     """
     values, reactions, pushed, left = flat(force), 0.0, 0.0, 0.0
