@@ -94,7 +94,7 @@ class CaseArrays:
         self._slots += len(nodes)
 
     def _again(self, nodes: NDArray, plus: int, first: int = 0) -> None:
-        """Use the slots that were reserved last for other nodes too; negative nodes get none."""
+        """Let nodes use the slots from `first` on, also if others do; negative nodes get none."""
         slots = first + np.arange(len(nodes))
         own = np.asarray(nodes).astype(np.int64)
         some = own >= 0

@@ -85,7 +85,7 @@ class Span(NamedTuple):
     last: Any
     dt: Any
     every: Any
-    sample: Any  # (m,) number of the launch's first sample, then of the next one
+    sample: Any  # (m,) number of the launch's first sample
 
 
 @on_device

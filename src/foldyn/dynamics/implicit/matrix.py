@@ -29,7 +29,7 @@ from foldyn.mechanics.constant_damping import DampingRows
 from foldyn.mechanics.following import following_places, put_following
 from foldyn.mechanics.tangent import Sparsity, block_keys, entry_slots, joined
 
-FULL = 200  # up to this many dofs a full matrix is faster than a sparse one with added terms
+FULL = 200  # with added terms, a full matrix is faster than a sparse one up to this many dofs
 
 
 class Weights(NamedTuple):
