@@ -26,7 +26,7 @@ GROUPS: Mapping[str, str] = {
     "strain_folds": "strain energy of the folds",
     "strain_bends": "strain energy of the bends",
 }
-SMALL = 300  # nodes: smaller models fit in the cache in any order
+SMALL = 300  # nodes: smaller models fit in the cache, however their nodes are numbered
 
 
 class BarsHingesTerm(SheetTerm):
@@ -38,7 +38,7 @@ class BarsHingesTerm(SheetTerm):
     turning : ndarray, shape (nr,)
         Rows in `model.hinges`: the folds, then the bends.
     laws : tuple of (HingeLaw, int)
-        Laws of folds and bends, with the number of each.
+        Law and number of the folds, then of the bends.
     softness : ndarray, shape (nf,)
         Softness of the panels adjacent to each fold, rad/(N m).
     like : BarsHingesTerm, optional
@@ -93,7 +93,7 @@ class BarsHingesTerm(SheetTerm):
         return self._assembled(data)
 
     def _assembled(self, data: NDArray) -> sparse.csr_array:
-        """Matrix of the blocks (nnz, 3, 3) of its pattern."""
+        """Sparse matrix with the given blocks (nnz, 3, 3), in the pattern of the tangent."""
         blocks = data, self.sparsity.indices, self.sparsity.indptr
         return sparse.bsr_array(blocks, shape=(self.size, self.size)).tocsr()
 
@@ -110,16 +110,16 @@ class BarsHingesTerm(SheetTerm):
         return bars_hinges_kernels(self.model, kept, len(GROUPS))
 
     def arrays(self) -> Arrays:
-        """Arrays that its forces depend on; see `Term`."""
+        """Arrays that the term's forces depend on; see `Term`."""
         return arrays_of(self.model, "addresses")
 
     def pulled(self) -> Pulled:
-        """Pullback of its forces; see `Term`."""
+        """Pullback of the term's forces; see `Term`."""
         return bars_hinges_pulled(self.model)
 
     @property
     def hinges(self) -> NDArray:
-        """Rows (nh, 4) of its hinges; see `SheetTerm`."""
+        """Rows (nh, 4) of the sheet's hinges; see `SheetTerm`."""
         return self.model.hinges
 
     @property
@@ -129,11 +129,11 @@ class BarsHingesTerm(SheetTerm):
         return Folds(model.hinge_rest, model.hinge_parameters, model.hinge_stiffness)
 
     def angles(self, q: NDArray) -> NDArray:
-        """Dihedrals (nh,) of its hinges, rad; see `SheetTerm`."""
+        """Dihedrals (nh,) of the sheet's hinges, rad; see `SheetTerm`."""
         return mechanics.angles(self.model.rest + self._nodal(q), self.model.hinges)
 
     def turn(self, q: NDArray, other: NDArray) -> float:
-        """Largest turn of a hinge, or of a bar relative to the others; inf on penetration."""
+        """Largest turn of a hinge, or of a bar relative to the other bars; inf on penetration."""
         shift, (a, b) = self._nodal(other - q), self.model.bars.T
         apart = np.linalg.norm(shift[b] - shift[a], axis=1)
         length = np.linalg.norm(self.model.bar_vector, axis=1)
@@ -148,7 +148,7 @@ class BarsHingesTerm(SheetTerm):
         return np.repeat(nodal, 3)
 
     def turning_moments(self) -> float:
-        """Sum of its hinges' moments (N m) for a unit turn; see `SheetTerm`."""
+        """Sum of the moments (N m) of all hinges for a unit turn; see `SheetTerm`."""
         return float(self.model.hinge_stiffness.sum())
 
     def longest(self) -> float:
@@ -160,12 +160,12 @@ class BarsHingesTerm(SheetTerm):
 
     @cached_property
     def _soft(self) -> NDArray:
-        """Rows (h,) of the hinges of the superlinear law."""
+        """Rows (h,) of the hinges with the superlinear law."""
         runs = self.model.hinge_runs
         return np.flatnonzero(np.repeat(runs[:, 2], runs[:, 1] - runs[:, 0]) == Superlinear.code)
 
     def soft_hinges(self, q: NDArray) -> SoftHinges:
-        """Hinges of the superlinear law; see `SheetTerm`."""
+        """Hinges with the superlinear law; see `SheetTerm`."""
         model, rows = self.model, self._soft
         if not len(rows):
             return super().soft_hinges(q)
@@ -219,7 +219,7 @@ class BarsHingesTerm(SheetTerm):
         )  # fmt: skip
 
     def own_strains(self) -> Strains:
-        """Its bars and hinges; see `SheetTerm`."""
+        """Strains of the sheet's bars and hinges; see `SheetTerm`."""
         model, angle = self.model, self.angles(np.zeros(self.size))
         bars, hinges = model.bars.astype(np.int64), model.hinges.astype(np.int64)
         slope, turn = np.zeros(len(bars)), np.zeros(len(hinges))
@@ -270,7 +270,7 @@ class BarsHingesTerm(SheetTerm):
         return self.model.hinge_share, self.model.hinge_offset
 
     def offsets_under(self, moments: NDArray) -> NDArray:
-        """Turns of the compliant panels beside creases under moments; see `SheetTerm`."""
+        """Turns of the compliant panels at creases with the given moments; see `SheetTerm`."""
         return moments * self._softness
 
     def lowest_nodes(self, turned: NDArray) -> NDArray:
@@ -300,7 +300,7 @@ class BarsHingesTerm(SheetTerm):
         )
 
     def unstrained(self, q: NDArray) -> Unstrained:
-        """The model without strain at q; see `SheetTerm`."""
+        """The model with q as its unstrained state; see `SheetTerm`."""
         sheet = self._with(self.unstrained_model(q))
         rest = np.zeros(self.size)
         return Unstrained(
@@ -308,7 +308,7 @@ class BarsHingesTerm(SheetTerm):
         )
 
     def unstrained_model(self, q: NDArray) -> BarsHinges:
-        """Arrays of this model with linear laws and its rest state at q."""
+        """Arrays of this model with linear laws and with q as rest state."""
         linear = self.nominal(q).model
         x, runs = linear.rest + self._nodal(q), linear.bar_runs.copy()
         vector = x[linear.bars[:, 1]] - x[linear.bars[:, 0]]
@@ -320,9 +320,10 @@ class BarsHingesTerm(SheetTerm):
 
 
 def stretch(model: BarsHinges, motion: NDArray) -> float:
-    """Bar elongations in a small motion (m,), relative to the largest possible.
+    """Bar elongations in a small motion (m,), relative to the largest ones possible.
 
-    Both are weighted by the bars' stiffness; 0 without bars.
+    A bar's largest possible elongation is the sum of its end displacements. Root sums of squares,
+    weighted by the bars' stiffness; 0 without bars.
     """
     ends = motion.reshape(-1, 3)[model.bars]
     along = model.bar_vector * np.sqrt(model.bar_per_length2)[:, None]

@@ -1,6 +1,6 @@
 """Bars, folds and plates as solvers see them: the scheme n5b8e.
 
-Edge angles are dofs or, for explicit methods, in balance.
+Edge angles are dofs; for explicit methods they are kept in balance instead.
 """
 
 from __future__ import annotations
@@ -65,11 +65,11 @@ class BarsPlatesTerm(SheetTerm):
     laws : tuple of HingeLaw
         Laws of the folds and of the bends.
     like : BarsPlatesTerm, optional
-        One whose elements have the same dofs.
+        A term whose elements have the same dofs.
     """
 
     energy_groups = GROUPS
-    _groups: ClassVar = (0, 1, 2)  # of bars, folds and bends
+    _groups: ClassVar = (0, 1, 2)  # energy groups of bars, folds and bends
     _no_slope: ClassVar[str] = "such folds have no slope at rest; with the scheme n5b8e modes and"
 
     def __init__(
@@ -130,7 +130,7 @@ class BarsPlatesTerm(SheetTerm):
 
     @property
     def _floor(self) -> float:
-        """Least slope of the folds in steps; slopes of a user's law may fall on purpose."""
+        """Least slope of the folds in Newton steps; slopes of a user's law may fall on purpose."""
         return -np.inf if self.model.code < 0 else STEP_FLOOR
 
     def _assembled(
@@ -189,17 +189,17 @@ class BarsPlatesTerm(SheetTerm):
         return mechanics.angles(x, rows)
 
     def holds(self, q: NDArray) -> sparse.csr_array:
-        """See `SheetTerm`: clamped edges as they turn."""
+        """See `SheetTerm`: turns of the clamped edges."""
         model, scratch = self.model, plates_scratch(self.model)
         first = len(model.hinges) - len(model.wings)
         if len(model.wings):
             turn_hinges(model, self._split(q)[0], scratch)
         turns = scratch.gradient[first:]
-        turns[:, :3] += turns[:, 9:]  # of the wing, in whose place the first end stands
+        turns[:, :3] += turns[:, 9:]  # the first end takes the place of the wing
         return unit_rows(model.hinges[first:, :3], turns[:, :9], self.size)
 
     def turn(self, q: NDArray, other: NDArray) -> float:
-        """Largest turn of a hinge, or of a bar with the rest of it; inf on penetration."""
+        """Largest turn of a hinge, or of a bar relative to the other bars; inf on penetration."""
         bars = self._bars.turn(q[: self._nodal], other[: self._nodal])
         return largest_turn(bars, self.angles(q), self.angles(other))
 
@@ -220,7 +220,7 @@ class BarsPlatesTerm(SheetTerm):
         return np.bincount(plate, energy, len(size))
 
     def scale(self) -> NDArray:
-        """EA of the bars, summed at the nodes; for rotations the largest stiffness of a plate."""
+        """EA of the bars, summed at nodes; for rotations, the largest stiffness of any plate."""
         turning = self.model.per_reach * np.abs(self.model.stiffness).max(initial=0.0)
         return np.concatenate([self._bars.scale(), np.full(len(self.hidden), turning)])
 
@@ -233,7 +233,7 @@ class BarsPlatesTerm(SheetTerm):
         return self._bars.longest()
 
     def soft_hinges(self, q: NDArray) -> SoftHinges:
-        """No hinges, but refuse the superlinear law; see `SheetTerm`."""
+        """No hinges: the superlinear law is refused; see `SheetTerm`."""
         if self.model.code == Superlinear.code:
             raise InputError(
                 f' = "superlinear": {self._no_slope} frequency responses take "linear" or '
@@ -260,7 +260,7 @@ class BarsPlatesTerm(SheetTerm):
     # ------------------------------------------------------------------ rest angles
     @property
     def rest_angles(self) -> NDArray:
-        """See `SheetTerm`: of the folds, then of the bends."""
+        """See `SheetTerm`: rest angles of the folds, then of the bends."""
         return np.concatenate([self.model.fold_rest, self.model.bend_rest])
 
     def rest_law(self, number: int) -> HingeLaw:
@@ -268,7 +268,7 @@ class BarsPlatesTerm(SheetTerm):
         return self._laws[number >= len(self.model.fold_rest)]
 
     def fold_hinges(self) -> FoldHinges:
-        """See `SheetTerm`: one of each."""
+        """See `SheetTerm`: one hinge per fold."""
         nodes = self.model.hinges[: len(self.model.fold_rest)]
         turns = self.model.fold_rotations
         hidden = np.where(turns >= 0, self._nodal + turns, NO_DOF)
@@ -325,7 +325,7 @@ class BarsPlatesTerm(SheetTerm):
 
 
 def positions(model: BarsPlates) -> NDArray:
-    """Positions (3 rows, 3) of the dofs, m; rotations are in the middle of their edges."""
+    """Positions (3 rows, 3) of the dofs, m; a rotation is at the middle of its edge."""
     points = np.zeros((3 * model.rows, 3))
     n = model.nodes
     points[: 3 * n] = np.repeat(model.bars.rest, 3, axis=0)
@@ -336,10 +336,10 @@ def positions(model: BarsPlates) -> NDArray:
 
 
 class CondensedPlatesTerm(BarsPlatesTerm):
-    """Bars, folds and plates by their displacements alone; see `mechanics.sheet_term.SheetTerm`."""
+    """Bars, folds and plates with displacements as the only dofs; see `SheetTerm`."""
 
     undifferentiated = "creases that yield, creep, relax or, beside panels that give way, damp"
-    _held: Context  # keeps the branches of its folds alive
+    _held: Context  # keeps the branches of the folds alive
 
     def __init__(
         self, model: BarsPlates, laws: tuple[HingeLaw, HingeLaw], like: BarsPlatesTerm | None = None
@@ -366,14 +366,14 @@ class CondensedPlatesTerm(BarsPlatesTerm):
         return condensed_kernels(self.condensed, kept)
 
     def arrays(self) -> Arrays | None:
-        """Arrays that its forces depend on; see `Term`."""
+        """Arrays that the term's forces depend on; see `Term`."""
         if self.condensed.memory.any():
             return None
         found = super().arrays()
         return found._replace(numbers={**found.numbers, "push": self._push})
 
     def pulled(self) -> Pulled | None:
-        """Pullback of its forces; see `Term`."""
+        """Pullback of the term's forces; see `Term`."""
         return None if self.condensed.memory.any() else condensed_pulled(self.condensed)
 
     def scratches(self, threads: int) -> list[CondensedScratch]:
@@ -394,7 +394,7 @@ class CondensedPlatesTerm(BarsPlatesTerm):
         return SparseBlocks(full, self.rows, np.repeat(self.model.bars.rest, 3, axis=0))
 
     def fold_hinges(self) -> FoldHinges:
-        """Hinges of the folds without the edge angles, which are no dofs; see `SheetTerm`."""
+        """Hinges of the folds, without edge angles, as these are no dofs; see `SheetTerm`."""
         found = super().fold_hinges()
         plates, turns = self.condensed, self.model.fold_rotations
         side = plates.band[plates.rank, -1] / self.per_hidden**2
@@ -405,7 +405,7 @@ class CondensedPlatesTerm(BarsPlatesTerm):
         return found._replace(hidden=np.full_like(found.hidden, NO_DOF), beside=beside)
 
     def remembering(self, own: MemoryHinges) -> Self:
-        """A copy of the sheet whose balance evaluates the branches of its folds."""
+        """A copy of the sheet whose balance of edge angles includes the folds' memory branches."""
         other, folds = copy(self), len(self.model.fold_rest)
         other._held, memory = evaluation(own, self.condensed.offset, folds)
         other.condensed = self.condensed._replace(memory=memory)
@@ -455,7 +455,7 @@ class CondensedPlatesTerm(BarsPlatesTerm):
 
 
 def balanced(matrix: sparse.csr_array, hidden: NDArray) -> sparse.csr_array:
-    """The tangent (3n, 3n) of displacements with the `hidden` last dofs in balance."""
+    """Tangent (3n, 3n) for displacements; the last dofs, listed in `hidden`, are in balance."""
     if not len(hidden):
         return matrix
     first = hidden[0]

@@ -1,8 +1,9 @@
-"""Patterns beyond the range of bars and hinges, and implausible sheets: warned of, but computed.
+"""Warnings of patterns beyond the range of bars and hinges, and of implausible sheets.
 
-The limits of patterns are where frequency errors relative to the shell exceed 5 to 10 %
-(docs/fidelity.md, "Beyond the range"). Above a frequency panels vibrate as plates, independent of
-their creases. Panels that meet pass through each other unless the law of their hinge locks.
+Such patterns are computed all the same. Beyond the limits used here, frequency errors relative to
+the shell exceed 5 to 10 % (docs/fidelity.md, "Beyond the range"). Above a certain frequency panels
+vibrate as plates, independent of their creases. Panels that meet pass through each other unless the
+law of their hinge locks.
 """
 
 from __future__ import annotations
@@ -24,14 +25,14 @@ from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import ModelOptions
 
 STIFF = 3.0  # k w/G of a crease between panels of width w: the sheet bends across it like one plate
-STIFF_STRIP, SQUARE = 0.3, 1.4  # the same for creases that do not meet, of longer panels
-FEW = 16  # panels of a sheet with clamped edges
+STIFF_STRIP, SQUARE = 0.3, 1.4  # k w/G of creases that meet no others; aspect of panels
+FEW = 16  # a sheet with clamped edges and at most so many panels is off
 SKEW = 33.0  # degrees, smallest corner of a quadrilateral panel
-FOLDED = 0.05  # t/(L sin fold) of welds, above which they bow, unlike in the model
-FLAT = 0.15  # the same for creases
-LOCKING = 1.1  # times the stiffness of a crease: 5 % in frequency
-SHUT = 100.0  # the same: panels at such a crease move as one
-SMOOTH = 1e-3  # rad, below it a fold is flat
+FOLDED = 0.05  # largest t/(L sin fold) of welds: above it they bow, but not in the model
+FLAT = 0.15  # largest t/(L sin fold) of creases
+LOCKING = 1.1  # times the stiffness between the locking angles: frequencies rise by 5 %
+SHUT = 100.0  # relative stiffness above which the panels at a crease move as one
+SMOOTH = 1e-3  # rad: a fold with a smaller angle counts as flat
 DIGITS = 6  # decimals in comparisons, so that rounding does not exceed limits
 SHELL = "take the shell, fd.shell"
 GIVING = f'take preset = "n5b8e", or {SHELL[5:]}'
@@ -104,7 +105,7 @@ def _doubts(pattern: Pattern, sheet: Sheet, options: ModelOptions, folds: NDArra
             f"twist up to 40 % too stiffly or softly: {GIVING}"
         )
     thick = bent * _slenderness(pattern, sheet, pattern.creases, pattern.crease_faces)
-    if thick.max(initial=0.0) > FLAT and pattern.boards is None:  # their planes are no panels
+    if thick.max(initial=0.0) > FLAT and pattern.boards is None:  # planes of boards are no panels
         yield (
             f"crease {int(thick.argmax())} is nearly flat, or closed (t/(L sin fold) = "
             f"{thick.max():.2g}, at most {FLAT:g}): it bows, which this model does not allow, "
@@ -115,7 +116,7 @@ def _doubts(pattern: Pattern, sheet: Sheet, options: ModelOptions, folds: NDArra
 
 
 def _relative_stiffness(pattern: Pattern, sheet: Sheet, folds: NDArray) -> NDArray[np.float64]:
-    """k w/G of creases (nf,), with w and G the mean width and modulus of adjacent panels."""
+    """k w/G (nf,) of creases, with w and G the mean width and modulus of adjacent panels."""
     modulus = sheet.values("bending_modulus", len(pattern.faces))[pattern.crease_faces]
     length = lengths(pattern.vertices, pattern.creases)
     width = pattern.face_areas[pattern.crease_faces] / length[:, None]
@@ -123,7 +124,7 @@ def _relative_stiffness(pattern: Pattern, sheet: Sheet, folds: NDArray) -> NDArr
 
 
 def _strips(pattern: Pattern) -> NDArray[np.bool_]:
-    """Mask (nf,) of creases that meet no other, of non-square panels with two creases."""
+    """Mask (nf,) of creases that meet no others, at non-square panels with two or more creases."""
     count = np.bincount(pattern.creases.ravel(), minlength=len(pattern.vertices))
     alone = (count[pattern.creases] == 1).all(axis=1)
     length = lengths(pattern.vertices, pattern.creases)
@@ -150,7 +151,7 @@ def _smallest_corner(pattern: Pattern, rigid: Collection[int]) -> tuple[float, i
 def _slenderness(
     pattern: Pattern, sheet: Sheet, edges: NDArray, faces: NDArray
 ) -> NDArray[np.float64]:
-    """t/(L sin fold) of edges (k, 2) between two panels (k, 2); 0 if these are coplanar."""
+    """t/(L sin fold) of edges (k, 2) between pairs of panels (k, 2); 0 between coplanar panels."""
     thickness = sheet.values("thickness", len(pattern.faces))[faces].max(axis=1, initial=0.0)
     sine = np.linalg.norm(np.cross(*pattern.face_normals[faces].transpose(1, 0, 2)), axis=1)
     across = lengths(pattern.vertices, edges) * sine
@@ -158,11 +159,11 @@ def _slenderness(
     return share.round(DIGITS)
 
 
-THICK = 0.2  # of the shortest edge of a panel: above it a sheet is not thin
-THIN, WIDE = 5e-5, 2.0  # of the shortest edge, and its length, m: thin films of such size are sails
-SLAB = 0.1  # m: sheets that fold are thinner
+THICK = 0.2  # largest thickness of a thin sheet, relative to the shortest edge of a panel
+THIN, WIDE = 5e-5, 2.0  # thickness/shortest edge, and that edge, m: limits of sails
+SLAB = 0.1  # m: a sheet that folds is thinner than this
 SLOWEST, FASTEST = 10.0, 25e3  # m/s, sqrt(E / rho): from soft gels to diamond
-USUAL = 2000.0  # m/s
+USUAL = 2000.0  # m/s, a usual wave speed
 PRESSURES = {"kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
 DENSITIES = {"g/cm3": 1e3, "t/mm3": 1e12}
 
@@ -224,8 +225,8 @@ def _meant(modulus: float, density: float, speed: float) -> str:
     return f"if {name} is meant in {unit}, give {value * factors[unit]:g}"
 
 
-NEARLY = 1e-9  # rad from closed
-BOUND = 1e3  # moment / k that only an unbounded law has there
+NEARLY = 1e-9  # rad from the closed state
+BOUND = 1e3  # moment / k: at this angle, only an unbounded law exceeds it
 
 
 def locks(law: HingeLaw) -> bool:
@@ -237,8 +238,8 @@ def locks(law: HingeLaw) -> bool:
 def kept_apart(structure: Discretized, one: int, other: int) -> str:
     """How to keep the panels at the hinge between two nodes apart, in words.
 
-    The energies of locking laws grow slowly, EnhancedLinear's with the logarithm of the angle:
-    panels that are pushed hard pass through, however small the steps.
+    The energy of a locking law grows slowly (with EnhancedLinear, like the logarithm of the angle):
+    panels that are pushed hard pass through each other, however small the steps.
     """
     ends = {one, other}
     creases = structure.edge_nodes[: len(structure.fold_rest)].tolist()
@@ -260,16 +261,16 @@ def kept_apart(structure: Discretized, one: int, other: int) -> str:
 
 
 FIRST_OF_A_SQUARE = 13.47  # omega L^2 sqrt(rho t/G) of a free square plate, nu = 0.3 (Leissa 1973)
-BELOW = 0.6  # of the plate frequency: limit up to which bars and hinges have the sheet's modes
-N5B8E, AMPLITUDES = 0.8, 2.0  # the same for n5b8e, and for n5b8e with internal amplitudes
+BELOW = 0.6  # bars and hinges have the sheet's modes up to this fraction of plate_frequency
+N5B8E, AMPLITUDES = 0.8, 2.0  # the same for n5b8e, without and with internal amplitudes
 
 
 def plate_frequency(pattern: Pattern, sheet: Sheet, rigid: Collection[int] = ()) -> float:
     """First frequency (Hz) of a free square plate as large as a panel.
 
-    The side is the panel's longest edge, or the root of its area if that is longer, as with five or
-    more corners. Returns the lowest frequency of all panels that are not rigid; inf without any,
-    nan for a sheet without density.
+    The side is the panel's longest edge, or the square root of its area if that is longer, as in
+    panels with five or more corners. Returns the lowest frequency of all panels that are not rigid;
+    inf if all are rigid, nan for a sheet without density.
     """
     count, x = len(pattern.faces), pattern.vertices
     speed = (sheet.values("bending_modulus", count) / sheet.values("areal_density", count)) ** 0.5
@@ -281,9 +282,9 @@ def plate_frequency(pattern: Pattern, sheet: Sheet, rigid: Collection[int] = ())
 
 
 def range_of(structure: Discretized, internal: int = 0) -> tuple[float, float]:
-    """Frequency (Hz) up to which a model has the sheet's modes, and its ratio to the plates' own.
+    """Frequency (Hz) up to which a model has the sheet's modes; its ratio to `plate_frequency`.
 
-    inf for shells and for structures made by hand.
+    Both are inf for shells and for structures made by hand.
     """
     if structure.kind != "bars_and_hinges" or structure.pattern is None:
         return np.inf, np.inf

@@ -19,7 +19,7 @@ from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.topology import edge_lookup, edge_of
 from foldyn.structures.discretized import Discretized
 
-ROUNDING = 1e-9  # weights and, over squared lengths, areas that count as zero
+ROUNDING = 1e-9  # smaller weights, and areas relative to squared lengths, count as zero
 
 
 class BoundaryElements(NamedTuple):
@@ -28,19 +28,19 @@ class BoundaryElements(NamedTuple):
     Attributes
     ----------
     weights : sparse array, shape (p, n)
-        Corner positions are these weights times nodal positions.
+        Positions of the p corners of all elements are these weights times nodal positions.
     triangles : ndarray of int, shape (t, 3)
-        Their corners, counter-clockwise from the front.
+        Corners of each element, counter-clockwise from the front.
     panel : ndarray of int, shape (t,)
     unknown : ndarray of int, shape (p,)
         Index of each corner with a potential jump, -1 on open edges.
     element : ndarray of int, shape (k,)
-        Index of an element, once for each triangle of the structure that contains its center: twice
-        if the center lies between two triangles, so that numbering has no influence.
+        Index of an element, once for each triangle of the structure that contains the element's
+        center: twice if the center lies between two triangles, so that numbering has no influence.
     under : ndarray of int, shape (k,)
-        That triangle.
+        The triangle of the structure that contains the center of `element`.
     shares : ndarray, shape (k, 3)
-        Weights of the triangle's nodes at the center; they add up to 1 per element.
+        Weights of the nodes of `under` at the center; they add up to 1 per element.
     """
 
     weights: sparse.csr_array
@@ -57,12 +57,12 @@ class _Corners(NamedTuple):
 
     panel: NDArray
     vertex: NDArray  # number of the point
-    ahead: NDArray  # index of the edge to the next corner, and of the edge from the previous one
+    ahead: NDArray  # index of the edge to the next corner; `behind`: from the previous one
     behind: NDArray
     before: NDArray  # index of the previous corner
-    starts: tuple[NDArray, NDArray]  # whether each of these edges is numbered from this corner
-    open: tuple[NDArray, NDArray]  # whether they are open edges of the sheet
-    graded: tuple[NDArray, NDArray]  # whether they end here, across an open edge of the sheet
+    starts: tuple[NDArray, NDArray]  # whether these two edges are numbered from this corner
+    open: tuple[NDArray, NDArray]  # whether `ahead` and `behind` are open edges of the sheet
+    graded: tuple[NDArray, NDArray]  # whether the grid along them is graded toward this corner
     rim: NDArray  # whether the vertex is on an open edge of the sheet
     edges: int
 
@@ -231,9 +231,9 @@ def _cut(numbers: NDArray) -> NDArray:
 
 
 def _located(structure: Discretized, points: NDArray, panel: NDArray) -> list[NDArray]:
-    """Points (k,), the triangles (k,) of their panels that contain them at rest, weights (k, 3).
+    """Points (k,), the triangles (k,) of their panels in which they lie at rest, weights (k, 3).
 
-    Triangles that share a point share its weight equally.
+    If a point lies in several triangles, each gets an equal share of its weight.
     """
     count, found = int(panel.max()) + 1, []
     for own, mine in zip(_by(panel, count), _by(structure.triangle_panel, count), strict=True):
@@ -252,6 +252,6 @@ def _located(structure: Discretized, points: NDArray, panel: NDArray) -> list[ND
 
 
 def _by(number: NDArray, count: int) -> list[NDArray]:
-    """Positions of each number from 0 to count - 1."""
+    """For each number from 0 to count - 1, its positions in the array `number`."""
     counts = np.bincount(number, minlength=count)
     return np.split(np.argsort(number, kind="stable"), np.cumsum(counts)[:-1])

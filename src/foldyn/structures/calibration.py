@@ -10,10 +10,11 @@ bars of an N5B8 quad         t |H^2 - nu W^2| / (2 H (1 - nu^2)) for edges 1 and
 bars of every other panel    2 S t / ((1 - nu) sum L) for edges and inner bars alike.
 
 Sources: Filipov et al., Int. J. Solids Struct. 124, 2017; Liu and Paulino (MERLIN2). MERLIN2
-assigns two of these in a different order than their formulas say; `calibration="merlin2"`
-reproduces that exactly (`_merlin2_corners`, `_merlin2_edges`), as published results depend on it.
+assigns bend stiffnesses and bar areas in a different order than the formulas say;
+`calibration="merlin2"` reproduces that order exactly (`_merlin2_corners`, `_merlin2_edges`), as
+published results depend on it.
 
-Stiffness and rest angles of creases can also be given for all, for each, or by name.
+Stiffness and rest angles can also be given: for all creases, for each one, or by name.
 """
 
 from __future__ import annotations
@@ -32,16 +33,16 @@ from foldyn.structures.mesh import Mesh, double_areas, hinge_angles, lengths
 from foldyn.structures.sheet import Sheet
 from foldyn.values import doubt_degrees, number, numbers, show, single
 
-STIFFEST = 1e100  # N/m or kg: beyond, or below its inverse, squares and quotients overflow
-SAME = 1e-9  # relative difference below which thicknesses are equal
-WEAK = 1e-3  # of thickness times side: bar areas below it leave a panel (almost) free to shear
+STIFFEST = 1e100  # N/m or kg: above this, or below its inverse, squares and quotients overflow
+SAME = 1e-9  # thicknesses with a smaller relative difference count as equal
+WEAK = 1e-3  # bar area/(thickness times side) below which a panel is (almost) free to shear
 
 
 def calibrated_folds(length: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
     """Stiffness of whole creases (nf,), N m/rad, of the given lengths (m).
 
-    The two sides of a crease are springs in series, each with half the compliance of a crease
-    between two panels of its own kind.
+    The two sides of a crease are springs in series. Each has half the compliance of a crease
+    between two panels like the one on that side.
     """
     count = len(pattern.faces)
     g = sheet.values("bending_modulus", count)[pattern.crease_faces]
@@ -112,8 +113,8 @@ def bar_areas(
 
     alike : whether all bars of a panel have equal areas, also in quads with a center.
 
-    Panels with their own modulus contribute areas of the transformed section, scaled by that
-    modulus over the sheet's, so that E A of an edge is the sum over its panels.
+    The area of a panel with its own modulus is scaled by the ratio of that modulus to the sheet's
+    (transformed section), so that E A of an edge is the sum over its panels.
     """
     kinds, kind = sheet.kinds(len(pattern.faces))
     x = mesh.nodes
@@ -171,7 +172,7 @@ def bar_areas(
 def _merlin2_edges(area: NDArray, ends: list, pattern: Pattern, panel: int) -> NDArray:
     """Areas of a quad with four folds as MERLIN2 assigns them.
 
-    The i-th edge in lexicographic order of its node numbers gets the area of the i-th listed one.
+    The i-th edge in lexicographic order of node numbers gets the area of the i-th listed edge.
     """
     listed = [3, 2, 1, 0] if pattern.flipped[panel] else [0, 1, 2, 3]
     out = np.empty(4)
@@ -226,7 +227,7 @@ PerCrease = float | Sequence[float] | Mapping[str, float] | None
 def per_crease(name: str, value: Any) -> Any:
     """Return values for creases as a number, a tuple, or a new dict by word; None unchanged.
 
-    Their number and words are checked later, with the pattern.
+    The number of values and the words are checked later, with the pattern.
     """
     if isinstance(value, Mapping):
         if not value:
@@ -242,7 +243,7 @@ def per_crease(name: str, value: Any) -> Any:
 
 
 def fold_stiffness(given: PerCrease, pattern: Pattern, sheet: Sheet) -> NDArray:
-    """Stiffness of whole creases (nf,), N m/rad, calibrated or from the `given` one per length."""
+    """Stiffness of whole creases (nf,), N m/rad: calibrated, or `given` per length."""
     length = lengths(pattern.vertices, pattern.creases)
     if given is None:
         return calibrated_folds(length, pattern, sheet)
@@ -263,7 +264,7 @@ def fold_rest(
 ) -> NDArray:
     """Rest dihedrals (rad) of hinge rows, none of them closed.
 
-    crease : crease of each row; the creases in order by default.
+    crease : index of each row's crease; by default, row k belongs to crease k.
     """
     crease = np.arange(len(folds)) if crease is None else crease
     degrees, chosen = _values("crease_rest", given, pattern)

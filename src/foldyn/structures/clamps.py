@@ -1,16 +1,16 @@
 """Clamped edges: boundary edges along which a panel keeps its tangent in space.
 
-In bars and hinges a clamp is a hinge between the triangle (j, k, i) at the edge and its mirror
-image in its own plane, which does not turn. With L the length of the edge and h the distance of i
-from it, its stiffness is
+In bars and hinges a clamp is a hinge between the triangle (j, k, i) at the edge and the triangle's
+mirror image beyond the edge, in the same plane. The mirror image does not turn. With L the length
+of the edge and h the distance of i from it, the stiffness of the hinge is
 
     k = 2 D L / h,    D = E t^3 / 12 (1 - nu^2).
 
-That is a plate of width L in cylindrical bending, M = D L kappa. A chain of rigid pieces of length
-h with hinges between them bends like it if each hinge gathers the curvature of the half pieces on
-both of its sides, k = D L / h. At a clamp there is one half piece only: the panel and its mirror
-image would turn by twice the angle, with the same moment. In the scheme n5b8e the same hinge is an
-angle of the panel's plate (`structures.edge_angles`).
+This follows from a plate of width L in cylindrical bending, M = D L kappa. A chain of rigid pieces
+of length h with hinges between them bends like the plate if each hinge gathers the curvature of the
+half pieces on both of its sides, k = D L / h. A clamp has a half piece on one side only, so that
+the same moment turns it by half the angle. In the scheme n5b8e the same hinge is an angle of the
+panel's plate (`structures.edge_angles`).
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def boundary_edges(
     ------
     InputError
         Not pairs of vertices, an edge that is not on the boundary or is listed twice, or a
-        selection without such an edge.
+        selection without a boundary edge.
     """
     if isinstance(given, str):
         with given_as(field):
@@ -64,9 +64,10 @@ def boundary_edges(
 
 
 def clamp_rows(edges: Sequence[Edge], triangles: NDArray) -> tuple[NDArray, NDArray]:
-    """Rows (c, 3) of boundary edges: their triangle, from the edge's first corner; its index.
+    """Rows (c, 3): the triangle at each boundary edge, from the edge's first corner; its index.
 
-    edges, triangles : (low, high) vertices of each, (nt, 3).
+    edges : (low, high) vertices of each edge.
+    triangles : (nt, 3).
     """
     if not edges:
         return np.zeros((0, 3), np.int64), np.zeros(0, np.int64)
@@ -79,9 +80,9 @@ def clamp_rows(edges: Sequence[Edge], triangles: NDArray) -> tuple[NDArray, NDAr
 
 
 def clamp_stiffness(x: NDArray, rows: NDArray, modulus: NDArray) -> NDArray:
-    """Stiffness (c,), N m/rad, of clamped edges of triangles (c, 3) of points x (n, 3).
+    """Stiffness (c,), N m/rad, of clamped edges: the first sides of triangles (c, 3) of x (n, 3).
 
-    modulus : D (c,), N m, of their panels.
+    modulus : D (c,), N m, of the panels of these triangles.
     """
     a, b, third = (x[rows[:, k]] for k in range(3))
     squared = ((b - a) ** 2).sum(axis=1)
@@ -90,7 +91,7 @@ def clamp_stiffness(x: NDArray, rows: NDArray, modulus: NDArray) -> NDArray:
 
 
 def clamps(x: NDArray, rows: NDArray, stiffness: NDArray, group: int) -> Clamps:
-    """Clamps of triangles (c, 3) of points x (n, 3), without moment in this state.
+    """Clamps of triangles (c, 3) of points x (n, 3), without moment at x.
 
     group : their energy group.
     """
@@ -106,9 +107,10 @@ def clamps(x: NDArray, rows: NDArray, stiffness: NDArray, group: int) -> Clamps:
 
 
 def opposite(corners: NDArray) -> NDArray:
-    """Mirror image of a triangle's (3, 3) third corner beyond the middle of its first side.
+    """Mirror image of a triangle's third corner (corners (3, 3)), beyond its first side.
 
-    Perpendicular to the side: a panel whose edge tilts, but whose tangent is kept, does not turn.
+    The image lies perpendicular to the middle of the side: then a panel whose edge tilts, but whose
+    tangent is kept, does not turn.
     """
     a, b, c = corners
     foot = a + (b - a) * ((c - a) @ (b - a)) / ((b - a) @ (b - a))

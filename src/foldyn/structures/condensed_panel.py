@@ -1,13 +1,13 @@
 """A panel as a thin plate, condensed to its bends and crease edge turns: scheme n5b8e.
 
-The angles of a panel of m corners are the turns of its m spokes (none in a triangle) and, for each
-crease edge, the turn beta of the sheet there relative to the adjacent facet, averaged along the
-edge. Their energy 1/2 phi^T K phi is the minimum over all plates through the corners and the center
-with straight edges kept straight and these mean turns; other edges are free. At a clamped edge beta
-is the turn at every point, not the mean. A weld, along which the sheet continues into the next
-panel, also has a bow: the mean distance of the sheet from the line between its ends, over its
-length. The plate is made of triangles of constant curvature (Morley; in `mechanics.triangle`),
-twice, and K extrapolated in their size.
+The angles phi of a panel of m corners are the turns of its m spokes (none in a triangle) and, for
+each crease edge, the turn beta of the sheet there relative to the adjacent facet, averaged along
+the edge. Their energy 1/2 phi^T K phi is the least energy of a plate through the corners and the
+center that has these mean turns and keeps straight edges straight; other edges are free. At a
+clamped edge beta is the turn at every point, not the mean. A weld, along which the sheet continues
+into the next panel, also has a bow: the mean distance of the sheet from the line between its ends,
+over its length. The plate is made of triangles of constant curvature (Morley; in
+`mechanics.triangle`), in two sizes, and K is extrapolated in the size.
 
 `PanelPlate` cuts each facet of a panel evenly: all its triangles are the same, half of them turned
 by 180 degrees. So each entry of a panel's stiffness is a sum of entries for its facets, as single
@@ -20,8 +20,8 @@ The unknowns at an edge of n pieces, for any edge condition:
     slopes    s_i = s + d_i - d_(i-1),                                          i = 1 ... n
 
 with the bow b, the mean slope s, and e and d, which are 0 at both ends of the edge. On a straight
-edge, b and all e are 0, on a clamped edge all d. Such unknowns are uncoupled in the matrix, with
-the stiffness 1.
+edge, b and all e are 0; on a clamped edge all d are 0. Unknowns that are 0 are uncoupled in the
+matrix, with the stiffness 1.
 """
 
 from __future__ import annotations
@@ -56,11 +56,12 @@ COARSE, FINE = 8, 16  # pieces per edge in the two meshes
 
 @shared(lambda panel, nu: (len(panel.corners), panel.center is None, nu))
 def panel_stiffness(kinds: Sequence[tuple[Outline, float]]) -> list[NDArray]:
-    """Stiffness (q, q) of a panel's angles over its bending stiffness E t^3/(12 (1 - nu^2)).
+    """Stiffness (q, q) of each panel's angles, for a bending stiffness E t^3/(12 (1 - nu^2)) of 1.
 
-    By its outline and Poisson's ratio. The angles: turns of the spokes, in the order of the corners
-    (none in a triangle), then of the creased edges, then the bows, in their order. A turn is the
-    increase of a dihedral, seen from the front; a bow is positive toward the front.
+    `kinds` has the outline and Poisson's ratio of each panel. The angles are the turns of the
+    spokes, in the order of the corners (none in a triangle), then the turns of the creased edges,
+    then the bows, in the order of the edges. A turn is the increase of a dihedral, seen from the
+    front; a bow is positive toward the front.
     """
     panels = [panel for panel, _ in kinds]
     coarse, fine = (condensed(panels, kinds[0][1], n) for n in (COARSE, FINE))
@@ -78,10 +79,10 @@ def panel_stiffness(kinds: Sequence[tuple[Outline, float]]) -> list[NDArray]:
 
 @lru_cache(maxsize=4096)
 def panel_moments(panel: Outline, poissons_ratio: float) -> NDArray:
-    """Moments (q,) of these angles for a panel with curvature 1 in both directions.
+    """Moments (q,) of the angles of a panel with free curvature 1 in both directions.
 
-    Over its bending stiffness. With phi the angles and kappa the curvature, the energy is 1/2 phi^T
-    K phi - kappa phi^T m, up to terms in kappa alone.
+    The moments are divided by the bending stiffness. With phi the angles and kappa the curvature,
+    the energy is 1/2 phi^T K phi - kappa phi^T m, up to terms in kappa alone.
     """
     coarse, fine = (_curled(panel, poissons_ratio, n) for n in (COARSE, FINE))
     stiffness, held_back = (
@@ -92,7 +93,7 @@ def panel_moments(panel: Outline, poissons_ratio: float) -> NDArray:
 
 
 def least_heights(panel: Outline, size: int) -> NDArray:
-    """Matrix (size, q): least heights for given spoke turns; other angles unchanged."""
+    """Matrix (size, q) from angles to the least heights with the spoke turns, and other angles."""
     points, corners = _points(panel), len(panel.corners)
     spokes = _spoke_turns(points, corners) if panel.center else np.zeros((0, len(points)))
     out = np.zeros((size, len(spokes) + size - len(points)))
@@ -158,9 +159,9 @@ def _paraboloid(panel: Outline) -> NDArray:
 
 
 def _curled(panel: Outline, poissons_ratio: float, n: int) -> tuple[NDArray, NDArray]:
-    """Stiffness of heights, slopes and bows, and forces missing to hold the paraboloid.
+    """Stiffness of heights, slopes and bows, and additional forces that hold the paraboloid.
 
-    Forces are missing at edges that stay straight.
+    Only edges that stay straight need such forces.
     """
     plate = PanelPlate(panel, poissons_ratio, n)
     held = [*plate.heights, *plate.slopes, *plate.bows]
@@ -188,7 +189,7 @@ def panel_mass(panel: Outline, poissons_ratio: float) -> NDArray:
         for plate in (coarse, fine)
     )  # fmt: skip
     out = extrapolated(less, more, FINE / COARSE)
-    # keeps linear functions over the panel exact to the last digit, as its facets have them
+    # functions that are linear over the panel stay exact to the last digit, as on its facets
     edges = np.roll(x[: len(panel.corners)], -1, axis=0) - x[: len(panel.corners)]
     across = edges[list(panel.clamped)] @ [[0.0, -1.0], [1.0, 0.0]]
     level = null_space(across) if len(across) else np.eye(2)  # SciPy before 1.15 needs this
@@ -207,13 +208,12 @@ class Cut(NamedTuple):
     Attributes
     ----------
     pairs : (k, 2)
-        Unknowns with an entry in the stiffness. The kept ones are last: heights of corners and
+        Unknowns with an entry in the stiffness. The last unknowns are kept: heights of corners and
         center, s of the edges, L b of the edges.
     factors : (k, 36 facets)
         Factors from entries of the facets' stiffness to these entries.
     edge : (size,)
-        Condition under which an unknown is 0: k if edge k is straight, m + k if it is clamped, 2 m
-        never.
+        When an unknown is 0: k, if edge k is straight; m + k, if edge k is clamped; 2 m, never.
     condensing : Condensing
     """
 
@@ -257,10 +257,10 @@ def _cut(m: int, center: bool, n: int) -> Cut:
 def _basis(
     at: NDArray, edges: Sequence[NDArray], sides: Sequence[tuple[NDArray, NDArray]], size: int
 ) -> tuple[sparse.csr_array, NDArray]:
-    """Matrix from unknowns to heights and slopes (size,); when unknowns are 0, see `Cut.edge`.
+    """Matrix from unknowns to heights and slopes, and `Cut.edge` (size,) of the unknowns.
 
-    at, edges, sides : heights of corners and center; of the points on each edge (n + 1,); slopes
-    across the sides of each edge and their signs (n,), 1 if outward.
+    at, edges : indices of the heights of corners and center; of the points (n + 1,) on each edge.
+    sides : indices (n,) of the slopes across each edge's sides, and their signs, 1 if outward.
     """
     m, n = len(edges), len(sides[0][0])
     first = size - len(at) - 2 * m  # first of the kept unknowns
@@ -290,7 +290,7 @@ def _basis(
 def condensed(panels: Sequence[Outline], poissons_ratio: float, n: int) -> list[NDArray]:
     """Stiffness of heights of corners and center, mean outward slopes of creases, and bows.
 
-    For G = 1, and up to eight panels with the same number of corners.
+    For G = 1. At most eight panels, with the same number of corners.
 
     n : pieces of each edge.
     """

@@ -35,7 +35,7 @@ from foldyn.structures.structure import Structure
 from foldyn.values import of_kind, vector
 
 PER_NODE = 12_000.0
-"""Bytes a node with its tangent: 5000 measured with single bars, 10,400 with coupled ones."""
+"""Bytes per node with its tangent: measured 5000 with single, 10,400 with coupled bars."""
 
 
 def discretize(
@@ -72,7 +72,7 @@ def discretize(
         way at their edges (see `foldyn.structures.edge_angles`); it takes calibration = "plate",
         linear bends and implicit methods of motion.
     mass : str
-        Mass rule, as "consistent"; the page on mass rules has all.
+        Mass rule, such as "consistent"; see the page on mass rules.
     bar_law : {"ogden", "linear"} or BarLaw
         Law of bars.
     fold_law, bend_law : {"linear", "superlinear", "enhanced", "plate_superlinear"} or HingeLaw
@@ -83,11 +83,12 @@ def discretize(
         small vibrations (see `foldyn.structures.plate`).
     crease_stiffness : float, sequence or mapping, optional
         Stiffness per length (N m/rad per m) of all creases, of each in the order of
-        `pattern.creases`, or by name ("mountain", "valley", "flat", or a family of the pattern), as
-        {"mountain": 0.1, "valley": 0.2}. Creases that are not named keep the calibrated stiffness.
-        With "plate" the adjacent panels remain compliant to the crease's moment.
+        `pattern.creases`, or by name ("mountain", "valley", "flat", or a family of the pattern),
+        for example {"mountain": 0.1, "valley": 0.2}. Creases that are not named keep the calibrated
+        stiffness. With "plate" the adjacent panels remain compliant to the crease's moment.
     crease_rest : float, sequence or mapping, optional
-        Rest dihedral (degrees, between 0 and 360), in the same forms, instead of the pattern's own.
+        Rest dihedral (degrees, between 0 and 360), given in the same ways, instead of the pattern's
+        own.
     centers : mapping, optional
         Center points (3,) by panel number, instead of the computed ones (N5B8).
     clamped : sequence of (vertex, vertex), or str
@@ -98,18 +99,18 @@ def discretize(
         Panels that cannot bend at all: three of their corners determine the positions of all their
         nodes. They must be flat. Their bars still stretch.
     straight : sequence of (vertex, vertex), or str
-        Boundary edges, in the same forms, that stay straight, such as along a support or a stiff
-        rim (n5b8e, and in their plane with membrane = "panel"); others may bow between their ends.
+        Boundary edges that stay straight, such as along a support or a stiff rim, given like
+        `clamped`; other boundary edges may bow between their ends. For "n5b8e", and in the plane of
+        panels for membrane = "panel".
     membrane : {"bars", "panel"}
-        In-plane stiffness of panels: independent bars, exact at best in uniform strain; or bars
-        coupled so that the corners have the panel's membrane stiffness, which is accurate for large
-        and for supported sheets (see `foldyn.structures.membranes`). "panel" needs `bar_law`
-        "linear"; another bar law, without a given membrane, implies "bars".
+        In-plane stiffness of panels: independent bars, which are exact in uniform strain at best;
+        or bars coupled so that the corners have the panel's membrane stiffness, which is accurate
+        for large and for supported sheets (see `foldyn.structures.membranes`). "panel" needs
+        `bar_law` "linear"; another bar law, without a given membrane, implies "bars".
     preset : {"plate", "n5b8e", "herkal", "merlin2"}, optional
-        Model that supplies options that are not given. The
-        default is "plate"; "n5b8e" if its scheme is given or the pattern has welds; and "herkal",
-        the paper's, if a calibration other than "plate" is given, or `bend_law="superlinear"` and
-        no calibration.
+        Model that supplies options that are not given. The default is "plate"; "n5b8e" if the
+        scheme "n5b8e" is given or the pattern has welds; and "herkal", the model of the paper, if a
+        calibration other than "plate" is given, or `bend_law="superlinear"` without a calibration.
 
     Returns
     -------
@@ -123,8 +124,8 @@ def discretize(
     Warns
     -----
     UnitsWarning
-        The sheet's values are probably not in SI units: a thickness over a fifth of an edge, or a
-        wave speed that no material has.
+        The sheet's values are probably not in SI units: a thickness of more than a fifth of an
+        edge, or a wave speed that no material has.
     ModelRangeWarning
         The model is inaccurate for such a pattern.
 
@@ -228,7 +229,7 @@ def checked_kinds(pattern: Any, sheet: Any) -> tuple[Pattern, Sheet]:
 def _given_centers(
     centers: Mapping[int, ArrayLike], pattern: Pattern, scheme: str
 ) -> dict[int, NDArray]:
-    """Center points by panel index, each of a panel with a center node."""
+    """Given center points by panel index; each panel must have a center node."""
     points = {}
     for panel, point in of_kind("centers", centers, Mapping).items():
         known = isinstance(panel, int | np.integer) and 0 <= panel < len(pattern.faces)

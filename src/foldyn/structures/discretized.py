@@ -1,4 +1,4 @@
-"""Base of all structures: a discretized pattern, as a case holds it."""
+"""Base of all structures: a discretized pattern, the form in which a case holds it."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from foldyn.structures.swelling import Swelling
 
 
 class HingeKind(NamedTuple):
-    """Hinges of one kind and law: rows (k, 2 or more) of their ends, stiffness and rest angle.
+    """Hinges of one kind and law: end nodes (k, 2 or more), stiffness and rest angle.
 
-    onset : of each hinge (k,), rad, if the law has none of its own.
-    softness : of the adjacent panels (k,), rad/(N m), if they are compliant.
+    onset : onset of each hinge (k,), rad, if the law has no onset of its own.
+    softness : softness of the adjacent panels (k,), rad/(N m), if they are compliant.
     """
 
     name: str
@@ -45,10 +45,11 @@ class HingeKind(NamedTuple):
 
     @property
     def share(self) -> NDArray:
-        """Share (k,) of the crease, or of the hinge itself, in a small turn.
+        """Share (k,) of a small turn that the crease takes, or the hinge itself.
 
-        1 for laws that lock, since the panels themselves meet, and for creases that yield or creep:
-        their turn is nearly the hinge's turn, as little moment remains for the panels.
+        The share is 1 for laws that lock, since the panels themselves meet, and for creases that
+        yield or creep: such a crease takes nearly the whole turn, as little moment remains for the
+        panels.
         """
         memory = memory_of(self.law)
         elastic, flows = self.law, False
@@ -94,7 +95,7 @@ class Discretized:
     triangles, triangle_panel : (nt, 3), (nt,)
         Counter-clockwise from the front, and the panel of each.
     centers : (np,)
-        Node number of each panel's center, -1 without one.
+        Node number of each panel's center, -1 if it has none.
     mass : (n, n)
         Nodal mass matrix, kg; one value serves the three axes.
     folds, fold_rest : (nf, 4), (nf,)
@@ -102,19 +103,19 @@ class Discretized:
     body : Assembly
         Model for solvers.
     kind : str
-        Its name in case files.
+        Name of this kind of structure in case files.
     hinge_kinds : tuple of HingeKind
-        Its folds, then other hinges, each with their law.
+        The folds, then other hinges, each kind with its law.
     membranes : sequence
-        Of its panels, where these resist as membranes.
+        Membranes of the panels, if panels resist stretching as membranes.
     energy_groups : mapping of str to str
-        Parts of its strain energy, with descriptions.
+        Parts of the strain energy, with descriptions.
     plates : tuple of Plate
-        Its rigid panels; three of their corners determine all their nodes.
+        The rigid panels; three corners of each determine all its nodes.
     massless : str
-        Description of its massless dofs, such as "the rotations of a shell"; empty if none.
+        Description of the massless dofs, such as "the rotations of a shell"; empty if none.
     fill : Fill
-        Memory of the factors of its tangent.
+        Memory needed for the factors of the tangent.
     clamped_nodes : sequence of (k,)
         Nodes along each clamped edge of a mesh, from one end to the other.
     bowed_edges : collection of (low, high)
@@ -176,7 +177,7 @@ class Discretized:
 
     @cached_property
     def plates(self) -> tuple[Plate, ...]:
-        """Its rigid panels."""
+        """The rigid panels."""
         if self.pattern is None:
             return ()
         rigid, faces = getattr(self.options, "rigid", None), self.pattern.faces
@@ -217,7 +218,7 @@ class Discretized:
 
     @property
     def divisions(self) -> int | None:
-        """Pieces per edge of its mesh; None without a mesh."""
+        """Pieces per edge of the mesh; None without a mesh."""
         return None
 
     def meshed(self, divisions: int) -> Discretized:
@@ -230,9 +231,10 @@ class Discretized:
         return None
 
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
-        """What swelling adds to it, if panels would stretch and curl when free.
+        """Additions to the structure if panels swell: if they would stretch and curl when free.
 
-        strain, curvature : (np,) of each panel; curvature 1/m, positive toward the front.
+        strain, curvature : (np,) free strain and curvature of each panel; curvature 1/m, positive
+        toward the front.
         """
         raise InputError("this structure has no panels that could swell")
 

@@ -5,15 +5,16 @@ its creased edges (`structures.condensed_panel`); a fold acts between its two ad
 the stiffness of the crease alone.
 
 A crease between panels in different planes stays straight, because bowing would stretch them: a bow
-w out of the plane of one panel is w sin(fold) in the plane of the other (w^2 against t^2). A crease
-counts as such above `STRAIGHT` t/L, with t the thickness and L its length.
+w out of the plane of one panel is w sin(fold) in the plane of the other (energies of stretching and
+bending are in the ratio w^2 : t^2). Panels count as lying in different planes if sin(fold) is above
+`STRAIGHT` t/L, with t the thickness and L the length of the crease.
 
-Along a weld the sheet is smooth: with d the change of the dihedral of the facets there, one panel
-turns by d/2 + x and the other by d/2 - x, with x a shared rotation. A weld that does not stay
-straight also has a shared bow.
+Along a weld the sheet is smooth: with d the change of the dihedral between the facets at the weld,
+one panel turns by d/2 + x and the other by d/2 - x, with x a shared rotation. A weld that does not
+stay straight also has a shared bow.
 
-A clamped edge has no rotation of its own: the sheet turns there relative to the facet by the
-dihedral of the facet with its mirror image at rest, minus pi.
+A clamped edge has no rotation of its own: relative to the facet the sheet turns there by the
+dihedral between the facet and the mirror image that the facet has at rest, minus pi.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ STRAIGHT = 3.0
 
 
 class EdgePlates(NamedTuple):
-    """Panels as plates: their data in `BarsPlates`."""
+    """Panels as plates: the fields of `BarsPlates` that describe them."""
 
     rotation_hinge: NDArray
     fold_rotations: NDArray
@@ -62,8 +63,8 @@ def edge_plates(
 
     straight_edges : boundary edges (low, high) that stay straight.
     rigid : indices of rigid panels, which have angles only at clamped edges.
-    clamped : boundary edges, whose hinges follow the hinges of bends and welds in this order, with
-        the stiffness, N m/rad, for rigid panels.
+    clamped : boundary edges that are clamped, with the stiffness, N m/rad, for rigid panels. Their
+    hinges follow the hinges of bends and welds, in this order.
     """
     kinds, kind = sheet.kinds(len(pattern.faces))
     folds, bends = len(mesh.folds), len(mesh.bends)
@@ -112,7 +113,7 @@ def edge_plates(
             elif k >= bends + len(hinges):
                 turned.append(k)
                 parts.append(np.ones((1, 1)))
-            else:  # the dihedral there, and the shared rotation
+            else:  # the dihedral at the weld, and the shared rotation
                 first_side = (k, "turn") not in shared
                 turned += [k, -1 - number(k, "turn")]
                 parts.append(np.array([[0.5, 1.0 if first_side else -1.0]]))
@@ -140,10 +141,11 @@ def curl_moments(
     plates: EdgePlates, panels: Sequence[Outline | None], curvature: NDArray, sheet: Sheet,
     area: NDArray, clamps: int,
 ) -> NDArray:  # fmt: skip
-    """Moments (nq,), N m, of the angles of plates with these free curvatures, 1/m.
+    """Moments (nq,), N m, of the angles of plates with given free curvatures.
 
     panels : see `outlines`.
-    curvature, area : (np,), 1/m and m2.
+    curvature : (np,), 1/m.
+    area : (np,), m2.
     clamps : index of the first hinge of a clamped edge.
     """
     kinds, kind = sheet.kinds(len(panels))
@@ -159,7 +161,7 @@ def curl_moments(
                 out[place] = moment
                 place += 1
                 continue
-            shared = plates.angle[place + 1]  # of a weld, see `edge_plates`
+            shared = plates.angle[place + 1]  # rotation of a weld, see `edge_plates`
             out[place : place + 2] = 0.5 * moment, -moment if shared in seen else moment
             seen.add(shared)
             place += 2
@@ -182,9 +184,9 @@ def outlines(
     straight_edges: Collection[Edge] = (), rigid: Collection[int] = (),
     clamped: Collection[Edge] = (),
 ) -> list[Outline | None]:  # fmt: skip
-    """Outline of each panel; None for a rigid one. Welds count as creases, which may bow.
+    """Outline of each panel; None for a rigid one. Welds count as creases that may bow.
 
-    Arguments: see `straight_creases` and `edge_plates`.
+    See `straight_creases` and `edge_plates` for the arguments.
     """
     bent = np.concatenate([pattern.creases, pattern.welds])
     straight = set(edge_lookup(bent[straight_creases(nodes, hinges, pattern, sheet)]))
@@ -210,7 +212,7 @@ def outlines(
 
 
 def straight_creases(nodes: NDArray, hinges: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
-    """Mask of creases and welds (nf + nw,) that stay straight, for their hinges in this order."""
+    """Mask (nf + nw,) of the creases, then welds, that stay straight, from their hinge rows."""
     edges = np.concatenate([pattern.creases, pattern.welds])
     faces = np.concatenate([pattern.crease_faces, pattern.weld_faces])
     thickness = sheet.values("thickness", len(pattern.faces))[faces].max(axis=1)
@@ -225,7 +227,7 @@ def plates_model(
 ) -> BarsPlates:  # fmt: skip
     """Model arrays: bars with the stiffness E A / L, folds, and the result of `edge_plates`.
 
-    clamps : (c, 3) triangles at clamped edges.
+    clamps : (c, 3) nodes of the triangles at clamped edges.
     """
     length, middle = lengths(nodes, bars), nodes[clamps[:, :2]].mean(axis=1)
     wings = np.array([opposite(corners) for corners in nodes[clamps]]).reshape(-1, 3) - middle

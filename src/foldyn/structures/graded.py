@@ -1,13 +1,13 @@
-"""Panels with triangles that get smaller toward the vertices, down to a radius.
+"""Meshes of panels whose triangles get smaller toward the vertices, down to a radius.
 
-A panel is cut from the midpoint of each edge to the mean of its corners, into one piece per corner.
-A piece is a fan about its corner: rays to the cuts, and arcs about the corner at distances
+A panel is cut into one piece per corner, by lines from the midpoint of each edge to the mean of the
+corners. A piece is a fan about its corner: rays to the cuts, and arcs about the corner at distances
 
     r (s / r)^(k / m),    k = 0 ... m,
 
 with r the radius, s the length of the ray and m the same for all edges of a pattern. So the size of
 triangles is proportional to their distance from the vertex, down to the first arc. Triangles within
-it form the corner, which is rigid in its plane (`shells.shell`).
+the first arc form the corner, which is rigid in its plane (`shells.shell`).
 
 In-plane forces concentrate at vertices, and each octave of distance from a vertex stores about
 equal energy: without a radius, or without grading, frequencies fall with every refinement.
@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 
-PER_LOG = 3.0  # divisions per arc in each factor e of distance: triangles as wide as long
-ROOM = 2.0  # times the radius: least length of a ray
+PER_LOG = 3.0  # a factor e of distance has divisions/3 arcs: triangles about as wide as long
+ROOM = 2.0  # least length of a ray, divided by the radius
 
 
 class Grading(NamedTuple):
@@ -33,7 +33,7 @@ class Grading(NamedTuple):
 
     radius: float  # m
     arcs: int  # m + 1
-    rays: int  # pieces of a cut: half as many as in the arcs about a corner
+    rays: int  # pieces of a cut; an arc about a corner has twice as many
 
     @property
     def edge_pieces(self) -> int:
@@ -45,7 +45,7 @@ class Grading(NamedTuple):
         return 2 * self.rays * self.arcs * sum(map(len, pattern.faces))
 
     def distances(self, reach: NDArray | float) -> NDArray[np.float64]:
-        """Distances of the arcs (arcs, ...) from a corner, relative to the lengths of rays."""
+        """Distances (arcs, ...) of the arcs from a corner, relative to the length of each ray."""
         return np.geomspace(self.radius / np.asarray(reach), 1.0, self.arcs)
 
     def places(self, length: float) -> NDArray[np.float64]:
@@ -54,7 +54,7 @@ class Grading(NamedTuple):
         return np.concatenate([half, 1.0 - half[-2::-1]])
 
     def points(self, corners: NDArray) -> NDArray[np.float64]:
-        """Points (..., arcs, 2 rays + 1, dimensions) of pieces, bilinear patches.
+        """Points (..., arcs, 2 rays + 1, dimensions) of pieces, which are bilinear patches.
 
         corners : (..., 4, dimensions) the panel's corner, the middle of the edge that leaves it,
             the mean of the panel's corners, and the middle of the edge that ends in it.
@@ -80,23 +80,23 @@ class Grading(NamedTuple):
 
     @property
     def steps(self) -> NDArray[np.float64]:
-        """Positions in (0, 1) of the points of a cut between an edge's midpoint and its end."""
+        """Positions in (0, 1) of the points inside a cut, counted from the edge's midpoint."""
         return np.arange(1, self.rays) / self.rays
 
     @property
     def ends(self) -> tuple[NDArray, NDArray]:
-        """Ends (2 rays + 1,) of the rays in a patch, as coordinates along both edges."""
+        """Ends (2 rays + 1,) of a patch's rays: coordinates along the two edges at the corner."""
         rising, full = np.append(0.0, self.steps), np.ones(self.rays + 1)
         return np.append(full, rising[::-1]), np.append(rising, full)
 
 
 def grading(pattern: Pattern, divisions: int, radius: float) -> Grading:
-    """Grading with triangles about as large as in an even mesh, away from vertices.
+    """Grading whose triangles, away from vertices, are about as large as in an even mesh.
 
     Raises
     ------
     InputError
-        The divisions are not a multiple of 4, so that rays and arcs cannot grow alike; or an edge
+        The divisions are not a multiple of 4, as equal growth of rays and arcs requires; or an edge
         is shorter than four radii.
     """
     if divisions % 4:
@@ -117,6 +117,6 @@ def grading(pattern: Pattern, divisions: int, radius: float) -> Grading:
 
 
 def graded(length: NDArray, rays: int, radius: float) -> Grading:
-    """Grading for edges of these lengths, m, and rays in half a corner."""
+    """Grading for edges of the given lengths, m, with `rays` in half a corner."""
     arcs = 1 + rays * math.ceil(4.0 / PER_LOG * math.log(0.5 * length.max() / radius))
     return Grading(radius, arcs, rays)

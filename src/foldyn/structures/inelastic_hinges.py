@@ -1,4 +1,4 @@
-"""Hinges with memory in a structure, by their laws or by dampers of their creases."""
+"""Hinges with memory in a structure: through their laws, or through dampers of creases."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from foldyn.mechanics.sheet_term import FoldHinges
 from foldyn.mechanics.viscous import WIDTH, hinge_dofs
 from foldyn.structures.discretized import Discretized
 
-LEAST = 1e-9  # stiffness of a crease over its panels': used for a crease without stiffness
+LEAST = 1e-9  # least stiffness of a crease divided by that of its panels
 
 
 class Remembering(NamedTuple):
     """Hinges of one kind whose law has memory.
 
-    damping : (k,) of their creases, N m s/rad, if adjacent panels are compliant.
+    damping : damping (k,) of the creases, N m s/rad, if adjacent panels are compliant.
     """
 
     kind: str  # "fold" or "bend"
@@ -39,7 +39,7 @@ class Remembering(NamedTuple):
 
     @property
     def stiffness(self) -> NDArray:
-        """Stiffness (k,), N m/rad, that branch parameters refer to."""
+        """Stiffness (k,), N m/rad, to which the parameters of branches are relative."""
         if self.alone:
             return np.where(np.isfinite(self.hinges.beside), self.hinges.beside, 0.0)
         stiffness, softness = self.hinges.stiffness, self.hinges.softness
@@ -48,7 +48,7 @@ class Remembering(NamedTuple):
 
     @property
     def alone(self) -> bool:
-        """Whether these are dampers between edge angles in balance, without their own stiffness."""
+        """Whether the hinges are dampers without stiffness, between edge angles in balance."""
         alone = isinstance(self.law, CreaseDampers)
         return alone and bool(np.isfinite(self.hinges.beside).any())
 
@@ -77,10 +77,10 @@ class Remembering(NamedTuple):
 def remembering(
     structure: Discretized, body: Assembly | None = None, damping: NDArray | None = None
 ) -> tuple[Remembering, ...]:
-    """Hinges with memory of a structure: its folds, its bends, both or none.
+    """Hinges of a structure that have memory: its folds, its bends, both or none.
 
-    body : the structure's body, or one with further terms.
-    damping : (nf,) of the structure's creases, N m s/rad per m; none by default.
+    body : the structure's body, or a body with further terms.
+    damping : damping (nf,) of the structure's creases, N m s/rad per m; none by default.
     """
     laws = {"fold": structure.fold_law, "bend": getattr(structure, "bend_law", None)}
     out, sheet = [], (structure.body if body is None else body).sheet
@@ -102,7 +102,7 @@ def remembering(
 
 
 def memory(parts: tuple[Remembering, ...], body: Assembly) -> HingeMemory:
-    """State of the branches of these parts of a body, starting at rest."""
+    """State of the branches of the given parts of a body, starting at rest."""
     columns: dict[str, list[NDArray]] = {name: [] for name in MemoryHinges._fields}
     settles, count = [], 0
     for part in parts:
@@ -149,7 +149,7 @@ def memory(parts: tuple[Remembering, ...], body: Assembly) -> HingeMemory:
 
 
 def _arms(corners: NDArray) -> NDArray:
-    """Distance (h,) of the farther wing from the axis, m; corners as in `MemoryHinges`."""
+    """Distance (h,) of each hinge's farther wing from the axis, m; corners as in `MemoryHinges`."""
     along = corners[:, 1] - corners[:, 0]
     off = np.cross(corners[:, 2:] - corners[:, :1], along[:, None])
     return np.linalg.norm(off, axis=2).max(axis=1) / np.linalg.norm(along, axis=1)

@@ -20,7 +20,7 @@ from foldyn.patterns.topology import around, edge_of
 from foldyn.structures.condensed_panel import panel_mass
 from foldyn.structures.panel_plate import TRIANGLE_MASS, outline
 
-LEAST = 0.25  # of the centroid rule's share; a parallelogram's corners need one half
+LEAST = 0.25  # least share of a node, in shares of the centroid rule; parallelograms need 1/2
 
 
 class Surface(NamedTuple):
@@ -54,18 +54,19 @@ class Surface(NamedTuple):
 
 
 def equi_inertial(surface: Surface) -> sparse.csr_array:
-    """Fixed shares for N5B8 quadrilaterals; the heavier corners end the shorter diagonal.
+    """Fixed shares for N5B8 quadrilaterals; the shorter diagonal connects the heavier corners.
 
-    4/9 (0.444) at the center, 1/4 at two opposite corners (tie: 0 and 2), 1/36 (0.028) at the other
-    two: for a rhombus of 60 degrees these are q^2/12p^2 and p^2/12q^2, p and q the half diagonals.
-    Despite the name the in-plane second moments of that rhombus are 1/3 (0.336 with the rounded
-    0.028) and 3 times the exact ones. Source: Herkal et al., section 3.
+    Shares are 4/9 (0.444) at the center, 1/4 at two opposite corners (if the diagonals are equal,
+    corners 0 and 2), 1/36 (0.028) at the other two. For a rhombus of 60 degrees with half diagonals
+    p and q, 1/4 and 1/36 are q^2/12p^2 and p^2/12q^2. Despite the name of the rule, the second
+    moments of that rhombus in its plane are 1/3 (0.336 with the rounded 0.028) and 3 times the
+    exact values. Source: Herkal et al., section 3.
     """
     return _distribute(surface, "equi_inertial", swapped=False)
 
 
 def equi_inertial_acute(surface: Surface) -> sparse.csr_array:
-    """Shares of `equi_inertial`, but the heavier corners end the longer diagonal."""
+    """Shares of `equi_inertial`, but the longer diagonal connects the heavier corners."""
     return _distribute(surface, "equi_inertial_acute", swapped=True)
 
 
@@ -100,7 +101,7 @@ def _quads(surface: Surface, name: str) -> NDArray:
 
 
 def panel(surface: Surface) -> sparse.csr_array:
-    """Equal shares for all nodes of a panel, its center included (Herkal et al., section 3)."""
+    """Equal shares for all nodes of a panel, with its center (Herkal et al., section 3)."""
     mass = np.zeros(len(surface.nodes))
     for number, total in enumerate(surface.panel_mass):
         nodes = surface.nodes_of(number)
@@ -119,7 +120,7 @@ def circumcenter(surface: Surface) -> sparse.csr_array:
     Raises
     ------
     InputError
-        A triangle is so obtuse that a share is negative (below -1e-9 of the triangle; right
+        A triangle is obtuse, so that a share is negative (below -1e-9 of the triangle's mass; right
         angles pass).
     """
     shares, _ = _circumcentric_shares(surface)
@@ -136,7 +137,7 @@ def circumcenter(surface: Surface) -> sparse.csr_array:
 
 
 def mixed_voronoi(surface: Surface) -> sparse.csr_array:
-    """Shares of `circumcenter`, but 1/2, 1/4 and 1/4 in an obtuse triangle (1/2 where obtuse).
+    """Shares of `circumcenter`, but in an obtuse triangle 1/2 at the obtuse corner, else 1/4.
 
     Source: Meyer et al., Discrete differential-geometry operators for triangulated
     2-manifolds, 2003, section 3.3.
@@ -147,7 +148,7 @@ def mixed_voronoi(surface: Surface) -> sparse.csr_array:
 
 
 def _circumcentric_shares(surface: Surface) -> tuple[NDArray, NDArray]:
-    """Share of each triangle closest to each corner (nt, 3), and whether corners are obtuse."""
+    """Part of each triangle that is closest to each corner (nt, 3); whether corners are obtuse."""
     x = surface.nodes[surface.triangles]
     opposite = np.roll(x, -2, axis=1) - np.roll(x, -1, axis=1)
     squared = np.einsum("tkc,tkc->tk", opposite, opposite)
@@ -161,7 +162,7 @@ def _circumcentric_shares(surface: Surface) -> tuple[NDArray, NDArray]:
 def consistent(surface: Surface) -> sparse.csr_array:
     """rho A t / 12 [2 1 1; 1 2 1; 1 1 2] of each triangle, assembled.
 
-    Its rotational inertia is exact about every axis in the plane of a panel.
+    The rotational inertia of a panel is exact about every axis in its plane.
     """
     matrices = surface.triangle_mass[:, None, None] * TRIANGLE_MASS
     return of_elements(surface.triangles, matrices, len(surface.nodes))
@@ -170,12 +171,12 @@ def consistent(surface: Surface) -> sparse.csr_array:
 def bubble(surface: Surface) -> sparse.csr_array:
     """Consistent matrix of parallelograms that also twist and bulge as plates do.
 
-    In a parallelogram with its center node in the middle the displacement is bilinear between the
-    corners, plus a bulge phi = 1 - (xi^2 + eta^2)/2 by which the center is off their mean: N_i =
-    bilinear_i - phi/4, N_0 = phi, with the mean of phi 2/3 and of its square 22/45. Exact for
-    translations, rotations, every change of shape that is linear over the panel and a twist, whose
-    inertia m w^2/9 no diagonal matrix reproduces. Other panels get the consistent matrix of their
-    triangles.
+    In a parallelogram with its center node in the middle, the displacement is bilinear between the
+    corners, plus a bulge phi = 1 - (xi^2 + eta^2)/2 times the center's distance from the mean of
+    the corners: N_i = bilinear_i - phi/4, N_0 = phi. The mean of phi is 2/3, the mean of phi^2 is
+    22/45. The matrix is exact for translations, rotations, every change of shape that is linear
+    over the panel, and a twist, whose inertia m w^2/9 no diagonal matrix reproduces. Other panels
+    get the consistent matrix of their triangles.
     """
     triangle = np.ones(len(surface.faces), bool)
     panels = []
@@ -192,11 +193,11 @@ def bubble(surface: Surface) -> sparse.csr_array:
 
 def _bubble_element() -> NDArray:
     """Mass matrix (5, 5) of a parallelogram of mass 1: its corners in order, then its center."""
-    mean, square = 2.0 / 3.0, 22.0 / 45.0  # of phi = 1 - (xi^2 + eta^2)/2
-    near = np.array([4.0, 2.0, 1.0, 2.0]) / 36.0  # of the bilinear functions
+    mean, square = 2.0 / 3.0, 22.0 / 45.0  # means of phi = 1 - (xi^2 + eta^2)/2 and of phi^2
+    near = np.array([4.0, 2.0, 1.0, 2.0]) / 36.0  # mean products of bilinear functions
     element = np.empty((5, 5))
     element[:4, :4] = [np.roll(near, k) for k in range(4)]
-    element[:4, :4] += (square - 2.0 * mean) / 16.0  # phi N_i has the mean of phi over 4
+    element[:4, :4] += (square - 2.0 * mean) / 16.0  # mean of phi bilinear_i: a fourth of phi's
     element[:4, 4] = element[4, :4] = (mean - square) / 4.0
     element[4, 4] = square
     return element
@@ -208,10 +209,10 @@ BUBBLE = _bubble_element()
 def condensed(surface: Surface) -> sparse.csr_array:
     """Mass of panels that follow their corners and center as thin plates do.
 
-    Between these a panel has the shape of a plate without moments at its edges and with straight
-    creases, while welds bow; see `foldyn.structures.condensed_panel`. Panels without a center node
-    have the consistent matrix of their triangles, except at clamped edges. The shape hardly depends
-    on Poisson's ratio, which is set to 0.3.
+    Between these points a panel has the shape of a plate without moments at its edges, whose
+    creases are straight and whose welds bow; see `foldyn.structures.condensed_panel`. Panels
+    without a center node have the consistent matrix of their triangles, except at clamped edges.
+    The shape hardly depends on Poisson's ratio, which is set to 0.3.
     """
     panels = condensed_panels(surface)
     plated = np.isin(np.arange(len(surface.faces)), list(panels))
@@ -225,9 +226,9 @@ def condensed(surface: Surface) -> sparse.csr_array:
 
 
 def condensed_panels(surface: Surface) -> dict[int, NDArray]:
-    """Matrices (k, k), kg, of the rule condensed, by index, for panels with a center node.
+    """Matrices (k, k), kg, of the rule `condensed`, by panel index; for panels with a center node.
 
-    Their nodes are the corners, then the center. Triangles with a clamped edge are included.
+    Rows are the corners, then the center. Triangles with a clamped edge are included.
     """
     edges = [edge_of(a, b) for face in surface.faces for a, b in around(face)]
     creases = {edge for edge, count in Counter(edges).items() if count == 2} - set(surface.welds)
@@ -245,7 +246,7 @@ def condensed_panels(surface: Surface) -> dict[int, NDArray]:
 
 
 def _without(surface: Surface, panels: NDArray) -> Surface:
-    """The triangles of all except some panels (np,)."""
+    """The surface without the triangles of masked panels (np,)."""
     kept = ~panels[surface.triangle_panel]
     return surface._replace(
         triangles=surface.triangles[kept],
@@ -255,14 +256,14 @@ def _without(surface: Surface, panels: NDArray) -> Surface:
 
 
 def inertia_exact(surface: Surface) -> sparse.csr_array:
-    """Masses with the panel's mass, center of mass and, as far as possible, inertia.
+    """Nodal masses with a panel's mass, center of mass and, as far as possible, inertia.
 
     On a parallelogram with a center node, 2/3 at the center and 1/12 at each corner have exactly
     the second moments of the panel about every axis. On other panels the masses start from the
     centroid rule, which has the exact total and center of mass, and move toward the closest masses
     that also have the second moments (or match them best, by least squares), as long as every node
-    keeps a quarter of its start value: a node without mass could not move. A triangle without a
-    center node keeps a third for each corner.
+    keeps a quarter of its start value: equations of motion need a mass at every node. In a triangle
+    without a center node each corner has a third.
     """
     mass = np.zeros(len(surface.nodes))
     total = surface.panel_mass
@@ -291,7 +292,7 @@ def _is_parallelogram(x: NDArray) -> bool:
 
 
 def _shares(x: NDArray, triangles: NDArray, part: NDArray) -> NDArray:
-    """Shares of nodes x (m, 3) in a panel's mass; each triangle contains the share `part`."""
+    """Shares of nodes x (m, 3) in a panel's mass; `part` is each triangle's share in it."""
     start = np.bincount(triangles.ravel(), np.repeat(part / 3.0, 3), minlength=len(x))
     x = x - start @ x
     x = x / np.abs(x).max()
@@ -352,7 +353,7 @@ def center_of_mass(nodes: NDArray, mass: sparse.csr_array) -> NDArray:
 
 
 def inertia_tensor(nodes: NDArray, mass: sparse.csr_array) -> NDArray:
-    """Inertia tensor (3, 3) about its center, kg m2."""
+    """Inertia tensor (3, 3) of nodal masses about their center, kg m2."""
     arm = nodes - center_of_mass(nodes, mass)
     second = arm.T @ (mass @ arm)
     return np.trace(second) * np.eye(3) - second

@@ -1,23 +1,24 @@
 """Panels with coupled bars, so that their corners have the panel's membrane stiffness.
 
-Bars that are exact in uniform strain are too stiff otherwise: between its corners a panel of a
-folded sheet is up to six times softer (`structures.panel_membrane`). With B the matrix of bar
-elongations for displacements in the panel's plane, and K the membrane stiffness at the corners,
+Independent bars that are exact in uniform strain are too stiff in other states: between its
+corners, a panel of a folded sheet is up to six times softer (`structures.panel_membrane`). With B
+the matrix of bar elongations for displacements in the panel's plane, and K the membrane stiffness
+at the corners,
 
     S = B+^T K B+ + N (N^T k^-1 N)^-1 N^T,
 
-B+ the pseudoinverse of B. N spans the elongations that no in-plane displacement causes, which occur
-in a panel that is no longer flat: only bars of stiffness k resist them. These bars also hold the
-center, which the membrane leaves free, at the position that the corners imply.
+with B+ the pseudoinverse of B. N spans the elongations that no in-plane displacement causes, which
+occur in a panel that is no longer flat: only bars of stiffness k resist them. These bars also hold
+the center, which the membrane leaves free, at the position that the corners imply.
 
-Corners give way along edges, by a logarithm of length over thickness: with `giving` panels,
+Corners give way along edges, like the logarithm of L/t: with `giving` panels,
 displacements near each end of an edge of length L gain
 
     g [1 - s/L - log(2 s/L) / log(2 t/L)],
 
-with s the distance from that end, between the thickness t and L/2; within t they are constant.
-Stresses around a force at a corner fall as 1/s. Panels share the amplitudes g of the edge between
-them (`mechanics.edge_gives`).
+with s the distance from that end, for s between the thickness t and L/2; within t displacements are
+constant. Stresses around a force at a corner fall as 1/s. Panels share the amplitudes g of the edge
+between them (`mechanics.edge_gives`).
 """
 
 from __future__ import annotations
@@ -40,14 +41,14 @@ from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
 
 NONE = np.zeros(0, bool)
-ROUNDING = 1e-13  # of the largest singular value: smaller ones count as 0
-STRAIGHT = 100.0  # resistance, over E t and the area, above which edges are straight
+ROUNDING = 1e-13  # singular values smaller than this, relative to the largest, count as 0
+STRAIGHT = 100.0  # resistance, divided by E t and the area, above which edges are straight
 
 
 class PanelKind(NamedTuple):
     """Panels of one kind, and their membranes."""
 
-    panels: NDArray  # (p,); of a shell, the panel of each triangle
+    panels: NDArray  # (p,) panel of each membrane; a shell has a membrane per triangle
     membranes: Membranes
 
 
@@ -56,7 +57,7 @@ class Sides(NamedTuple):
 
     outline: Outline
     resistance: tuple[float, ...]
-    convex: bool = True  # otherwise it has independent bars
+    convex: bool = True  # a panel that is not convex has independent bars
 
 
 def membranes(
@@ -131,7 +132,7 @@ def _numbers(pattern: Pattern, gives: Sequence[bool]) -> dict[tuple[Edge, int], 
 
 
 def _gives(x: NDArray, parts: list[tuple], edges: list[Edge]) -> EdgeGives:
-    """Panels with nodes (c,), bars (b, 2), give indices (k,), and columns (b + k, k), N/m."""
+    """Gives of panels: nodes (c,), bars (b, 2), give indices (k,), columns (b + k, k), N/m."""
     panel, size = np.array([p for p, *_ in parts]), len(parts)
     corners, bars, most = (max(len(part[k]) for part in parts) for k in (1, 2, 3))
     out = EdgeGives(
@@ -197,11 +198,11 @@ def coupling(
     sides: Sides, ends: tuple[tuple[int, int], ...], poissons_ratio: float,
     stiff: NDArray | None = None, shared: NDArray = NONE, free: NDArray = NONE,
 ) -> NDArray:  # fmt: skip
-    """Stiffness over E t of bar elongations (b,) between corners and center, and of gives.
+    """Stiffness, divided by E t, for bar elongations (b,) between corners and center, and gives.
 
     stiff : stiffness of a convex panel; by default without gives.
-    shared, free : (2m,) masks of the k gives that are kept, and of gives that follow; there are no
-        others. The result is (b + k, b + k).
+    shared, free : (2m,) masks of the k gives that are kept, and of the gives that follow; other
+    gives are absent. The result is (b + k, b + k).
     """
     panel = sides.outline
     bars, corners = np.array(ends), 2 * len(panel.corners)
@@ -243,7 +244,7 @@ def energies(
 ) -> NDArray:  # fmt: skip
     """Energy (samples, panels), J, of the membranes at displacements u (samples, n, 3), m.
 
-    free : (samples, k) free strains of all bars in turn, as `swelling` returns them.
+    free : (samples, k) free strains of the bars of all panels in turn, as `swelling` returns them.
     """
     x, out, first = rest + u, np.zeros((len(u), panels)), 0
     for which, own in kinds:
@@ -274,8 +275,8 @@ def swelling(
 ) -> tuple[list[Following], NDArray, NDArray]:
     """Forces of panels that would stretch by `strain` (np,) if they were free.
 
-    Gives are measured from their swollen positions. Returns free strains (k,) and their forces, J,
-    for all bars in turn.
+    Gives are measured from the swollen positions. Returns the free strains (k,) and the forces
+    conjugate to them, J, for the bars of all panels in turn.
 
     x : (n, 3) rest positions of the nodes, m.
     """

@@ -1,4 +1,4 @@
-"""A pattern's panels cut into triangles: inner bars, bends, and the wings of creases."""
+"""A pattern's panels cut into triangles, with inner bars, bends and the hinges of creases."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from foldyn.patterns.topology import Edge, around
 
 CUT = 'cut it with fd.convex(pattern) (in a case file, leave out facets = "line")'
 """Remedy for panels that are not convex."""
-PARALLEL = 1e-12  # of two vectors: squared sine of an angle at the rounding level
+PARALLEL = 1e-12  # squared sine of the angle between two vectors that count as parallel
 Triangle = tuple[int, int, int]
 
 
@@ -28,7 +28,7 @@ class Mesh:
     nodes : (n, 3)
         The pattern's vertices, then the panel centers in panel order.
     centers : (np,)
-        Node number of each panel's center, -1 without one.
+        Node number of each panel's center, -1 if it has none.
     inner, inner_panel : (nh, 2), (nh,)
         Bars inside panels, sorted by panel, and the panel of each.
     bends : (nh, 4)
@@ -53,7 +53,7 @@ class Mesh:
 def n5b8(pattern: Pattern, centers: Mapping[int, NDArray] | None = None) -> Mesh:
     """Mesh of a pattern with a center node in each panel of more than three corners.
 
-    centers : center points by panel index, instead of the computed ones.
+    centers : center points by panel index, in place of computed ones.
     """
     sizes = np.array([len(face) for face in pattern.faces])
     number = np.where(sizes > 3, len(pattern.vertices) + np.cumsum(sizes > 3) - 1, -1).tolist()
@@ -94,8 +94,8 @@ def too_narrow(pattern: Pattern) -> InputError:
 def n4b5(pattern: Pattern) -> Mesh:
     """Mesh of a pattern whose panels are cut by diagonals, without further nodes.
 
-    A quadrilateral is cut at its shorter diagonal inside the panel (tie: corners 0 and 2), a
-    larger polygon recursively at the shortest one.
+    A quadrilateral is cut at its shorter diagonal inside the panel (if both are equal, between
+    corners 0 and 2), a larger polygon recursively at its shortest diagonal.
     """
 
     def diagonals(panel: int) -> tuple[list[Triangle], list[Edge]]:
@@ -115,11 +115,12 @@ def _mesh(
 ) -> Mesh:
     """Mesh of a pattern whose panels are each `cut` into triangles with inner bars.
 
-    The axis j to k follows a crease in the direction of wing i's panel: wing i is the third corner
-    of the triangle that runs from low to high, wing l the third corner of the other triangle.
+    The axis of a hinge runs from j to k, the direction in which wing i's triangle passes the
+    crease. Wing i is the third corner of the triangle that passes it from the lower to the higher
+    vertex; wing l is the third corner of the other triangle.
     """
     triangles, triangle_panel, inner, inner_panel = [], [], [], []
-    third = {}  # corner by panel and directed side: a diagonal may be an edge of another panel
+    third = {}  # third corner by panel and directed side: a diagonal may be another panel's edge
     for panel in range(len(pattern.faces)):
         pieces, bars = cut(panel)
         for a, b, c in pieces:
@@ -205,7 +206,7 @@ def _cut(face: list[int], pattern: Pattern, number: int) -> tuple[list[Triangle]
 
 
 def _in_plane(x: NDArray, normal: NDArray) -> NDArray:
-    """Coordinates (m, 2) in the plane normal to `normal`, counter-clockwise from its tip."""
+    """Coordinates (m, 2) in the plane normal to `normal`, counter-clockwise about it."""
     first = x[1] - x[0] - ((x[1] - x[0]) @ normal) * normal
     first /= np.linalg.norm(first)
     return (x - x[0]) @ np.stack([first, np.cross(normal, first)], 1)
@@ -257,9 +258,9 @@ def _inside(flat: NDArray, i: int, j: int) -> bool:
 def quad_centers(x: NDArray) -> NDArray:
     """Crossing of the diagonals of quadrilaterals x (m, 4, 3).
 
-    If a panel is not flat, the point of the shorter diagonal closest to the other one; for equal
-    ones, of the diagonal through corners 1 and 3 (counted from 0). nan if the diagonals are
-    parallel to rounding.
+    If a panel is not flat, the center is the point of the shorter diagonal that is closest to the
+    other diagonal; if both are equally long, it lies on the diagonal through corners 1 and 3
+    (counted from 0). nan if the diagonals are parallel within rounding.
     """
     p, q = x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]
     start = x[:, 1] - x[:, 0]
@@ -279,7 +280,7 @@ def polygon_center(x: NDArray) -> NDArray:
     This sum of weighted distances to lines is convex and piecewise linear, so its minimum is at a
     crossing of two diagonals. If several crossings tie, the result is the mean of the corners if
     that is a minimizer too, else the mean of the tied crossings. A polygon that is not flat is
-    projected on its mean plane for this.
+    projected on its mean plane to find crossings.
     """
     origin = x.mean(axis=0)
     _, _, axes = np.linalg.svd(x - origin)

@@ -3,16 +3,16 @@
 The two panels at an edge of a folded sheet hold each other by shear: displacements along the edge
 are linear between its ends. Across it, in the plane of its panel, an edge is free to bow, except
 for the bending resistance of the panels: if it bows by w and the fold angle is phi, the neighbor's
-edge deflects by w / sin(phi), and its own by w / tan(phi). A panel resists a deflection sin(q s) of
-its edge, s along it, by
+edge deflects by w / sin(phi), and its own by w / tan(phi). With s the position along the edge, a
+panel resists a deflection sin(q s) of its edge by
 
     D (1 - nu)(3 + nu)/2 q^3
 
 per length, like the moment-free edge of a half plane (Kirchhoff). So edges of a nearly flat sheet
 are straight, and edges of a folded sheet bow freely.
 
-Two meshes of quadratic triangles give the stiffness at the corners, in the plane, over E t, which
-is extrapolated in the triangle size.
+The in-plane stiffness at the corners, divided by E t, is computed on two meshes of quadratic
+triangles and extrapolated in the triangle size.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from foldyn.mechanics.triangle import PRODUCTS, add_triangles, squares
 from foldyn.structures.graded import ROOM, Grading, graded
 from foldyn.structures.panel_plate import Outline, across_edges, meshed, shared, sides_of
 
-COARSE, FINE = 4, 8  # pieces per edge in the two meshes; triangles have twice as many
-RAYS = 2  # rays of a graded mesh, in half a corner
+COARSE, FINE = 4, 8  # pieces per edge in the two meshes; twice as many for triangular panels
+RAYS = 2  # rays of a graded mesh in half a corner
 STIFF = 1e3  # stiffness of rigid corners relative to the rest
-WAVES = 2.0  # in a bow of an edge, for each of its radii
+WAVES = 2.0  # number of sine waves in an edge's bow, divided by length/radius
 
 
 class Kind(NamedTuple):
@@ -45,13 +45,14 @@ class Kind(NamedTuple):
     Attributes
     ----------
     outline : Outline
-        Its straight edges do not bow.
+        Outline of the panel; edges that are `straight` in it do not bow.
     poissons_ratio : float
     resistance : tuple of float
-        Factor of q^3 above, over E t, of both panels at each bowing edge, in squared length units
-        of the outline.
+        For each bowing edge, the factor of q^3 in the module's formula, summed over both panels and
+        divided by E t, in squared length units of the outline.
     grading : Grading, optional
-        For a panel whose corners give way along its edges, rigid within the radius.
+        Given for a panel whose corners give way along its edges; corners are rigid within the
+        radius.
     """
 
     outline: Outline
@@ -69,11 +70,11 @@ class Kind(NamedTuple):
 
 @shared(lambda *given: Kind(*given).topology)
 def membrane_stiffness(given: Sequence[tuple]) -> list[NDArray]:
-    """Stiffness (2m, 2m) over E t of the in-plane displacements (x, y) of the m corners.
+    """Stiffness (2m, 2m), divided by E t, for in-plane displacements (x, y) of the m corners.
 
-    Its arguments are the fields of a `Kind`. With a grading (4m, 4m): the gives follow the
-    displacements, for each edge in turn, at its first and its last corner: the slip of nearby
-    points along the edge, away from the corner.
+    The arguments are the fields of a `Kind`. With a grading the stiffness is (4m, 4m):
+    displacements are followed by gives, for each edge in turn at its first and its last corner. A
+    give is the slip of nearby points along the edge, away from the corner.
     """
     kinds = [Kind(*each) for each in given]
     if kinds[0].grading:
@@ -93,7 +94,7 @@ def _symmetric(stiffness: NDArray) -> list[NDArray]:
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """How panels are cut into quadratic triangles: shared by many panels.
+    """How panels are cut into quadratic triangles. Many panels share one cut.
 
     Attributes
     ----------
@@ -118,7 +119,7 @@ class PanelMesh(NamedTuple):
 
     x: NDArray  # (n, 2) corners and side midpoints of the triangles
     cut: Cut
-    radius: float | None = None  # of the rigid corners, if they give way
+    radius: float | None = None  # radius of the rigid corners, if corners give way
 
 
 def _even(panel: Outline, n: int) -> PanelMesh:
@@ -129,7 +130,7 @@ def _even(panel: Outline, n: int) -> PanelMesh:
 
 @lru_cache(maxsize=64)
 def _evenly(corners: int, center: bool, n: int) -> tuple[NDArray, Cut]:
-    """Weights (points, corners) of the corners and the center in each point; the cut."""
+    """Weights (points, corners) of corners and center that give each point; the cut."""
     unit = np.eye(corners + center)
     weights, triangles, at, edges = meshed(unit[:corners], unit[-1] if center else None, n)
     return weights, _cut(len(weights), triangles, at[:corners], edges)
@@ -138,7 +139,7 @@ def _evenly(corners: int, center: bool, n: int) -> tuple[NDArray, Cut]:
 def grading_of(panel: Outline, radius: float) -> Grading:
     """Grading of a mesh toward corners, down to a radius or to what a short edge permits.
 
-    As for shells (`structures.graded`).
+    Shells use the same grading (`structures.graded`).
     """
     corners = np.array(panel.corners)
     length = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
@@ -168,7 +169,7 @@ def _graded(kinds: Sequence[Kind]) -> list[PanelMesh]:
 
 @lru_cache(maxsize=64)
 def _fans(corners: int, arcs: int) -> tuple[NDArray, Cut]:
-    """Points that a graded mesh uses, among its pieces' points and then the corners; the cut."""
+    """Points used by a graded mesh: indices in all points of pieces, then corners; the cut."""
     count = corners * arcs * (2 * RAYS + 1)
     node = np.arange(count).reshape(corners, arcs, -1)
     node[:, -1, RAYS] = node[0, -1, RAYS]  # the mean; two pieces share each cut
@@ -198,7 +199,7 @@ def _quadratic(points: NDArray, cut: Cut, radius: float | None = None) -> PanelM
 
 
 def _cut(points: int, triangles: NDArray, at: NDArray, edges: list[NDArray]) -> Cut:
-    """Sides of triangles between the given number of points; `edges` with their ends."""
+    """Cut with the given number of points, panel corners `at`, and `edges` with their ends."""
     side, _, ends = sides_of(triangles)
     middles = across_edges(edges, ends, points)
     along = [
@@ -212,24 +213,24 @@ def _cut(points: int, triangles: NDArray, at: NDArray, edges: list[NDArray]) -> 
 class Unknowns(NamedTuple):
     """Unknowns that move the points of panels with the same cut.
 
-    Unknowns are the displacements (x, y) of inner points; for bowing edges, the displacements of
-    their points across them, from the line between the ends; the displacements of the corners, and
-    their gives.
+    In order: the displacements (x, y) of inner points; the bows of edges, which are displacements
+    of their points across them, from the line between the ends; the displacements of the corners;
+    the gives.
 
     Attributes
     ----------
     starts : (n + 1,)
-        Start of each point in the next two arrays.
+        Start of each point's entries in `number` and `axes`.
     number : (k,)
         Indices of the unknowns that move each point, in turn.
     axes : (k, 2)
-        Their directions; 0 at edges.
+        Directions in which the unknowns move the points; 0 at edges.
     along : list of arrays (points, j)
         Unknowns that move the points of each edge.
     bows : list of arrays (points,)
-        Indices of the bows of each edge.
+        Indices of the unknowns that are bows, for each edge.
     free, size : int
-        Number of unknowns, without and with the corners' own.
+        Number of unknowns, without and with displacements and gives of the corners.
     """
 
     starts: NDArray
@@ -249,7 +250,7 @@ class Plan(NamedTuple):
     unknowns : Unknowns
     places : see `add_triangles`
     bows : list of arrays
-        Positions of the bow entries of each edge, the lower half by rows.
+        Positions of the entries for each edge's bows: the lower half, by rows.
     condensing : Condensing
     """
 
@@ -291,7 +292,7 @@ def _plan(cut: Cut, bowing: bool, gives: bool) -> Plan:
     """Layout for a cut; edges bow unless all are straight."""
     unknowns = _unknowns(cut, bowing, gives)
     starts, size = unknowns.starts, unknowns.size
-    # for all ordered pairs of points of a triangle; the lower half of the matrix suffices
+    # all ordered pairs of points of a triangle; the lower half of the matrix suffices
     one, other = pairs_within(cut.elements).T
     counts = np.diff(starts)
     each = counts[one] * counts[other]
@@ -345,7 +346,7 @@ def _condensed(kinds: Sequence[Kind], meshes: Sequence[PanelMesh]) -> NDArray:
 
 
 class Edge(NamedTuple):
-    """One edge of eight panels."""
+    """One edge in each of eight panels."""
 
     normal: NDArray  # (2, 8)
     tangent: NDArray
@@ -362,9 +363,11 @@ def _edge(x: NDArray, start: NDArray, end: NDArray) -> Edge:
 
 
 def _moves(edge: Edge, radius: NDArray | None) -> list[NDArray]:
-    """Motion (p, 2, 8) of edge points per corner displacement x, y, and per give at radii (8,).
+    """Motions (p, 2, 8) of edge points: one per corner displacement x, y; one per give.
 
-    Edges remain straight.
+    Edges remain straight in these motions.
+
+    radius : (8,), within which corners are rigid.
     """
     moves, gives = [], []
     within, half = 0.0 if radius is None else radius, 0.5 * edge.length
@@ -383,7 +386,7 @@ def _moves(edge: Edge, radius: NDArray | None) -> list[NDArray]:
 def _bowing(kind: Kind, k: int, points: int, length: float, radius: float | None) -> NDArray:
     """Stiffness of the bows of edge k with the given number of points: the lower half, by rows.
 
-    Bows of a straight edge, which move nothing, have the stiffness 1.
+    Bows of a straight edge have the stiffness 1; they move nothing.
     """
     if kind.outline.straight[k]:
         return np.eye(points)[np.tril_indices(points)]
@@ -397,7 +400,7 @@ def _bowing(kind: Kind, k: int, points: int, length: float, radius: float | None
 def _waves(points: int, radius: float | None) -> NDArray:
     """Bow stiffness of an edge of length and resistance 1, with sine waves as bows.
 
-    radius : of graded points, see `Grading`; without it points are equidistant.
+    radius : radius of the `Grading` that places the points; without it they are equidistant.
     """
     fade, number = 1.0, np.arange(1, points + 1)
     if radius is None:

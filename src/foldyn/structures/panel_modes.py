@@ -1,8 +1,9 @@
 """Internal amplitudes of a panel (Craig and Bampton): plate motions with fixed interface.
 
 A panel of the scheme n5b8e moves as the plate that follows the heights of its corners and center
-and the turns beta of its creased edges statically (`structures.condensed_panel`). The lowest modes
-of the plate with all these held add its other motions: heights
+and the turns beta of its creased edges statically (`structures.condensed_panel`). Other motions are
+added by the lowest modes of the plate with these heights and turns held, so that
+the heights are
 
     w = Psi_h h + Psi_beta beta + Psi_gamma gamma + Phi a,
 
@@ -11,9 +12,9 @@ fixed-interface modes are not coupled by stiffness, but by mass. (R. R. Craig an
 AIAA Journal 6, 1968.)
 
 Edges also turn unevenly, by beta_k P_k(s), with P_k the Legendre polynomials of the position s from
--1 to 1 along the edge. Without moments of that shape a panel has beta_k = T phi, with phi its
-angles (spokes and mean turns beta); the additional amplitudes gamma are deviations from that.
-Stiffness does not couple them with phi, and they are held in the modes.
+-1 to 1 along the edge. Without moments of the shape P_k a panel has beta_k = T phi, with phi its
+angles (spokes and mean turns beta); the additional amplitudes gamma are deviations from T phi.
+Stiffness does not couple gamma with phi, and gamma is held in the modes.
 """
 
 from __future__ import annotations
@@ -36,9 +37,9 @@ from foldyn.structures.condensed_panel import (
 )
 from foldyn.structures.panel_plate import Outline, PanelPlate
 
-TURNS = 3  # uneven turns of an edge, P_1 and on
+TURNS = 3  # number of uneven turns of an edge: P_1, P_2, P_3
 SPARE = 4  # additional modes, as finer meshes may change their order
-EQUAL = 1e-3  # relative distance of eigenvalues that count as equal: they are kept together
+EQUAL = 1e-3  # eigenvalues with a smaller relative difference count as equal and are kept together
 
 
 class PanelModes(NamedTuple):
@@ -47,14 +48,14 @@ class PanelModes(NamedTuple):
     Attributes
     ----------
     stiffness : (k, k)
-        Of the amplitudes: gamma of each edge that turns, then the modes, whose mass is 1.
+        Stiffness of the amplitudes: gamma of each edge that turns, then the modes, whose mass is 1.
     mass : (b + k, b + k)
-        Of all its heights w: the heights of corners and center, the turns of creased edges that
-        are not clamped, the amplitudes.
+        Mass of all coordinates: heights of corners and center, turns of creased edges that are not
+        clamped, amplitudes.
     between : (q, b + k)
-        Resulting heights at the midpoints of the edges, then of the spokes.
+        Heights at the midpoints of the edges, then of the spokes, for unit coordinates.
     turns : (t, q)
-        T: uneven turns by the angles of the panel, see `structures.condensed_panel`.
+        T: uneven turns per unit of the panel's angles, see `structures.condensed_panel`.
     """
 
     stiffness: NDArray
@@ -65,7 +66,7 @@ class PanelModes(NamedTuple):
 
 @lru_cache(maxsize=4096)
 def panel_modes(panel: Outline, poissons_ratio: float, count: int) -> PanelModes:
-    """Lowest modes of a panel with corners, center and edges held, and their masses.
+    """Lowest modes of a panel with corners, center and edges held, and the mass of all shapes.
 
     Frequencies are extrapolated in the size of the mesh; masses come from the fine mesh, so that
     they belong to actual shapes and are positive definite. Modes of equal frequency are kept
@@ -120,7 +121,7 @@ def middles(panel: Outline) -> NDArray:
 
 
 def _partners(coarse: NDArray, fine: NDArray) -> NDArray:
-    """Coarse shape (n, k) that each fine shape (n, k) corresponds to; their order may differ."""
+    """Index of the coarse shape (n, k) for each fine shape (n, k), as their order may differ."""
     from scipy.optimize import linear_sum_assignment
 
     size = np.linalg.norm(fine, axis=0)[:, None] * np.linalg.norm(coarse, axis=0)
@@ -144,8 +145,8 @@ def _held_modes(plate: PanelPlate, count: int) -> tuple[NDArray, NDArray]:
 def _basis(plate: PanelPlate) -> sparse.csc_array:
     """Basis of a plate's unknowns while corners, center and edges are held.
 
-    Held heights are zero; so are heights along straight edges, as their ends are held, and slopes
-    along clamped edges. Unknowns along other edges have no held component.
+    Held heights are zero. So are heights along straight edges, as the ends of these are held, and
+    slopes along clamped edges. Unknowns along other edges are orthogonal to the held components.
     """
     size = plate.stiffness.shape[0]
     still = {next(iter(entries)) for entries in (*plate.heights, *plate.lines)}

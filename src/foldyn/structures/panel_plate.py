@@ -1,8 +1,8 @@
 """A panel as a thin plate of small triangles: outline, mesh, stiffness, mass, constraints.
 
 The triangles have constant curvature (Morley; in `mechanics.triangle`). Their unknowns are the
-heights of the points and the slopes across the sides. Functions of panels that are expensive keep
-their values (`shared`).
+heights of the points and the slopes across the sides. Expensive functions of panels keep the values
+they computed (`shared`).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Shared(Generic[Value]):
 
 
 def shared(alike: Callable[..., Hashable]) -> Callable[[Find[Value]], Shared[Value]]:
-    """Decorator of functions from the arguments of at most `COUNT` calls to their values.
+    """Decorator of functions that compute the values of up to `COUNT` calls at once.
 
     alike : callable
         Maps the arguments of a call to a key; calls with equal keys are computed together.
@@ -61,7 +61,7 @@ def shared(alike: Callable[..., Hashable]) -> Callable[[Find[Value]], Shared[Val
     return lambda find: Shared(find, alike)
 
 
-DIGITS = 11  # digits to which panels with the same shape agree
+DIGITS = 11  # panels that agree to so many digits have the same shape
 TRIANGLE_MASS = (np.ones((3, 3)) + np.eye(3)) / 12.0  # total 1, linear between corners
 Rows = tuple[tuple[float, float], ...]
 
@@ -123,10 +123,11 @@ def facets_of(points: NDArray, corners: int) -> list[tuple[int, int, int]]:
 class PanelPlate:
     """A panel as a plate of small triangles; n pieces per edge, G = 1.
 
-    Its unknowns are heights of the points, then slopes across the sides. `heights` (of corners and
-    center), `slopes` (mean, outward, of creased edges), `bows` and `lines` (deviations of points on
-    straight edges from the line between the ends, and of slopes at clamped edges from the last
-    slope) are linear functions of them, as coefficients by index.
+    The unknowns are heights of the points, then slopes across the sides. The attributes are linear
+    functions of the unknowns, given by coefficients by index: `heights` of corners and center;
+    `slopes`, the mean outward slopes of creased edges; `bows`; and `lines`, the deviations of
+    points on straight edges from the line between the ends, and of slopes at clamped edges from the
+    last slope.
     """
 
     def __init__(self, panel: Outline, poissons_ratio: float, n: int) -> None:
@@ -154,7 +155,7 @@ class PanelPlate:
         return found
 
     def solved(self, held: list[dict[int, float]]) -> tuple[NDArray, NDArray]:
-        """Unknowns (size, k) with one of k held functions equal to 1 each; the stiffness (k, k).
+        """Unknowns (size, k) for each of k held functions equal to 1, others 0; stiffness (k, k).
 
         Heights come first among the held functions: holding them makes the rest positive definite.
         """
@@ -199,10 +200,11 @@ class PanelPlate:
 def _edge_functions(
     panel: Outline, edges: Sequence[NDArray], sides: Sequence[tuple[NDArray, NDArray]]
 ) -> tuple[list[dict[int, float]], ...]:
-    """Slopes, bows and lines of `PanelPlate`; and the slopes of unclamped edges.
+    """Slopes, bows and lines of `PanelPlate`, and the slopes of creased edges without clamps.
 
-    edges, sides : for each edge the indices of its points' heights (n + 1,), and of the slopes
-    across its sides with their signs (n,), 1 if outward.
+    edges : for each edge, the indices (n + 1,) of the heights of its points.
+    sides : for each edge, the indices (n,) of the slopes across its sides, and their signs, 1 if
+        outward.
     """
     slopes, bows, lines, turning = [], [], [], []
     x = np.array(panel.corners)
@@ -257,7 +259,7 @@ def meshed(
     facets = [(0, 1, 2)] if center is None else facets_of(points, len(x))
     i, j = (axis.ravel() for axis in np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij"))
     kept = i + j <= n
-    i, j = i[kept], j[kept]  # fractions of the way from the first corner to the others, in n-ths
+    i, j = i[kept], j[kept]  # positions between the first corner and the two others, in n-ths
     place = np.full((n + 1, n + 1), -1)
     place[i, j] = np.arange(len(i))
     up = np.argwhere(np.add.outer(np.arange(n + 1), np.arange(n + 1)) < n)
@@ -285,7 +287,7 @@ def meshed(
 
 
 def sides_of(triangles: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Number and sign (nt, 3) of the triangles' sides, positive from low to high; ends (s, 2)."""
+    """Index and sign (nt, 3) of triangles' sides, positive if from low to high; ends (s, 2)."""
     pairs = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)
     ends, side = np.unique(np.sort(pairs, axis=2).reshape(-1, 2), axis=0, return_inverse=True)
     sign = np.where(pairs[:, :, 0] < pairs[:, :, 1], 1.0, -1.0)

@@ -5,19 +5,20 @@ With G = E t^3 / (12 (1 - nu^2)) and A the area of a panel:
 quads                       bends G k and compliance c of creases such that the nodes move as the
                             corners of a plate do under forces that twist it and moments on its
                             creases (`structures.quad_plates`);
-spoke of a larger polygon   4 (1 - nu) G A p / sum (h1^2 + h2^2), h1 and h2 the angles by which its
-                            spokes turn in the two curvatures without mean, of size 1; p of
-                            `POLYGON`, because a plate that only its corners bend is softer;
-its diagonals (N4B5)        2 (1 - nu) G A / D^2, A the area of the two triangles of each;
-fold of length Lf           1/kf' = 1/kf + sum over its two panels of c/G, but for panels that are
-                            rigid; c = `COMPLIANCE` or `TRIANGLE` times A/Lf^2 where not of a quad;
-weld of length Lf           1/k = sum over its two panels of c/G, a crease that does not turn; c is
-                            `COMPLIANCE`, in quads with no other crease `WELDED_ALONE`, in
-                            triangles 2/3 times A/Lf^2, there a third of the height over the length:
-                            the sheet between the middles of two panels.
+spoke of a larger polygon   4 (1 - nu) G A p / sum (h1^2 + h2^2), h1 and h2 the turns of its spokes
+                            in the two curvatures of size 1 that have no mean; p from `POLYGON`,
+                            because a plate bent by its corners only is softer;
+its diagonals (N4B5)        2 (1 - nu) G A / D^2, A the area of the two adjacent triangles;
+fold of length Lf           1/kf' = 1/kf + sum over its two panels of c/G, with c = 0 for rigid
+                            panels, and `COMPLIANCE` or `TRIANGLE` times A/Lf^2 for panels that
+                            are not quads;
+weld of length Lf           1/k = sum over its two panels of c/G, like a crease that does not turn.
+                            c is A/Lf^2 times `COMPLIANCE`, in quads with no other crease times
+                            `WELDED_ALONE`, in triangles times 2/3: a third of height/length, the
+                            sheet between the middles of the two panels.
 
-Creases and welds between panels that are not in one plane stay straight in these plates, other
-edges may bow.
+In these plates, creases and welds between panels in different planes stay straight; other edges may
+bow.
 Derivation and errors: docs/fidelity.md.
 """
 
@@ -38,21 +39,21 @@ from foldyn.structures.rigid_plates import rigid_panels
 from foldyn.structures.sheet import Sheet
 
 COMPLIANCE = 0.12  # c Lf^2/A of panels with more than four corners, and at most welds
-TRIANGLE = (0.22, 0.6)  # of triangles without a free edge, and with one or two
+TRIANGLE = (0.22, 0.6)  # c Lf^2/A of triangles without a free edge, and with free edges
 POLYGON = (0.77, 0.87, 0.91, 0.93)  # p of regular polygons of 5, 6, 7 and more corners (the shell)
-WELDED_TRIANGLE, WELDED_ALONE = 2.0 / 3.0, 0.19  # for triangles, and for quads with no other crease
-Panel = tuple[NDArray, NDArray]  # stiffness of its bends and compliance c of its edges, for G = 1
+WELDED_TRIANGLE, WELDED_ALONE = 2.0 / 3.0, 0.19  # c Lf^2/A: triangles; quads alone
+Panel = tuple[NDArray, NDArray]  # stiffness of bends, compliance c of edges, for G = 1
 
 
 class Plates(NamedTuple):
-    """Contribution of panels that bend as plates to a structure.
+    """Stiffness and compliance that a structure gets from panels that bend as plates.
 
     Attributes
     ----------
     bends : (nh,)
         Stiffness of whole bends, N m/rad, in the mesh's order.
     creases : (nf,)
-        Compliance of both panels of a crease to its moment, rad/(N m).
+        Compliance of a crease's two panels together to the crease's moment, rad/(N m).
     """
 
     bends: NDArray
@@ -66,7 +67,7 @@ class Plates(NamedTuple):
 def panel_plates(
     mesh: Mesh, pattern: Pattern, sheet: Sheet, rigid: str | Sequence[int] | None = None
 ) -> Plates:
-    """Panels of a mesh as plates; rigid ones add no compliance."""
+    """Panels of a mesh as plates; rigid panels add no compliance."""
     count = len(pattern.faces)
     number = edge_lookup(np.concatenate([pattern.creases, pattern.welds]))
     edges = [[number.get(edge_of(a, b), -1) for a, b in around(face)] for face in pattern.faces]
@@ -136,7 +137,7 @@ def _other(mesh: Mesh, pattern: Pattern, p: int, rows: slice, nu: float, free: b
 
 
 def _wings(x: NDArray, bends: NDArray) -> NDArray:
-    """Area (nh,) of the two triangles of each bend (axis j, k, wings i, l)."""
+    """Area (nh,) of the two triangles at each bend (axis j, k, wings i, l)."""
     left, right = double_areas(x, bends[:, [0, 1, 2]]), double_areas(x, bends[:, [1, 0, 3]])
     return 0.5 * (np.linalg.norm(left, axis=1) + np.linalg.norm(right, axis=1))
 

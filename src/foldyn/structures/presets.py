@@ -19,7 +19,7 @@ from foldyn.values import choice, show
 
 PLATE, N5B8E, HERKAL, MERLIN2 = "plate", "n5b8e", "herkal", "merlin2"
 AGAINST_PLATES = ("scheme", "calibration", "bend_law")
-"""Options that say how a weld is to bend."""
+"""Options that determine how welds bend."""
 
 PRESETS: Mapping[str, ModelOptions] = {
     PLATE: ModelOptions(membrane="panel", bar_law="linear"),
@@ -34,12 +34,12 @@ PRESETS: Mapping[str, ModelOptions] = {
 }  # fmt: skip
 """Options by name of the preset.
 
-- "plate": panels that bend and twist as thin plates, and whose corners feel their membrane; right
-  about the shell's frequencies and small displacements (docs/fidelity.md);
-- "n5b8e": the same with panels that give way at their creases, twice as near to the shell;
+- "plate": panels bend and twist as thin plates, and have a thin plate's membrane stiffness at
+  their corners; for frequencies and small displacements close to the shell's (docs/fidelity.md);
+- "n5b8e": the same, but panels give way at their creases; half the distance from the shell;
 - "herkal": the model of Herkal et al., Int. J. Solids Struct. 309, 2025;
-- "merlin2": MERLIN2 as published (Liu and Paulino, 2018), in its order and with moments at rest; it
-  has no mass, and gets that of "herkal".
+- "merlin2": MERLIN2 as published (Liu and Paulino, 2018), with its order of stiffnesses and with
+  moments at rest; it has no mass rule, so that it gets the rule of "herkal".
 """
 
 
@@ -48,7 +48,7 @@ def resolved(preset: str | None = None, welds: bool = False, **given: Any) -> Mo
 
     Parameters
     ----------
-    preset : {"plate", "herkal", "merlin2"}, optional
+    preset : {"plate", "n5b8e", "herkal", "merlin2"}, optional
         The module docstring describes the default.
     welds : bool
         Whether the pattern has welds.
@@ -97,7 +97,7 @@ def implied(given: Mapping[str, Any]) -> str:
 
 
 def _check_bends(options: ModelOptions) -> None:
-    """Refuse bend laws that are incompatible with the calibration's stiffness."""
+    """Refuse bend laws that are incompatible with the stiffness from the calibration."""
     bends = hinge_law(options.bend_law, "bend_law")
     of_plates = options.calibration == "plate"
     if isinstance(bends, PlateSuperlinear) and bends.onset is None and not of_plates:

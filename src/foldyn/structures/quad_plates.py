@@ -1,19 +1,22 @@
-"""Quadrilateral panels that move like the corners of a thin plate: `calibration="plate"`.
+"""Quadrilateral panels whose corners move like those of a thin plate: `calibration="plate"`.
 
-Five nodes have two shapes apart from planes: the twist w of the corners and the height w0 of the
-center. Their spokes, kp (whole) on one diagonal and kq on the other, for G = 1, have the energy
+Apart from planes, five nodes have two shapes: the twist w of the corners and the height w0 of the
+center. With the stiffness kp of whole spokes on one diagonal and kq on the other, for G = 1, the
+spokes have the energy
 
     1/2 (w, w0) H (w, w0)^T,  H = kp P + kq Q,  P and Q from the turns of the spokes,
 
-and forces on the corners alone move the center to w0 = y w. With F the flexibility of a plate:
+and forces that act only on the corners move the center to w0 = y w. With F the flexibility of a
+plate:
 
 - forces twist both equally: kp and kq are scaled so that (1, y) H (1, y)^T = 1/F_ww;
 - in that twist the facets turn at the creases as the plate's edges do, s_k + y r_k = F_wk/F_ww, in
-  the least squares of all creases: that sets y, and by y the ratio kp/kq, which `LARGEST` bounds;
-- moments on creases turn their edges as the plate's. Of the flexibility F_kl the twist gives
-  F_ww (s_k + y r_k) (s_l + y r_l) and the center r_k r_l/H_00; with R_kl the rest, c is R_kk, and
-  R_kk - R_kl if the opposite edge l is a crease too: in a folded sheet, which does not curl,
-  opposite creases of a panel have opposite moments.
+  the sense of least squares over all creases: this sets y, and y sets the ratio kp/kq, within
+  `LARGEST`;
+- moments on creases turn edges as they turn the plate's. The twist contributes F_ww (s_k + y r_k)
+  (s_l + y r_l) to the flexibility F_kl, and the center r_k r_l/H_00; R_kl is the rest. The
+  compliance c is R_kk, or R_kk - R_kl if the opposite edge l is a crease too: in a folded sheet,
+  which does not curl, opposite creases of a panel have opposite moments.
 
 F is the flexibility of a plate with G = 1 whose corners lie in a plane except for a twist w
 (heights a_v w, a orthogonal to all planes) and whose edges carry total moments M_k, evenly
@@ -22,11 +25,11 @@ distributed: the twist and the mean outward slopes at the edges are
     (w, s_1 ... s_4) = F (T, M_1 ... M_4),  T the force on w.
 
 Edges are straight, or free to bow. Ritz method: heights are polynomials in the bilinear coordinates
-xi, eta from -1 to 1 (integrated Legendre polynomials, so that an edge without its own polynomials
-stays straight), and F is extrapolated from the two `DEGREES`. Between straight edges that meet at
-an angle alpha > pi/2 curvatures grow as r^(pi/alpha - 2), and errors fall with the power 4
-(pi/alpha - 1) of the degree (Babuska and Suri, SIAM Review 36, 1994), of the degree + 1 for low
-ones; corners of free edges converge about as slowly as the angle `OBTUSE`.
+xi, eta from -1 to 1 (integrated Legendre polynomials, so that an edge to which no polynomial
+belongs stays straight), and F is extrapolated from the two `DEGREES`. Between straight edges that
+meet at an angle alpha > pi/2, curvatures grow as r^(pi/alpha - 2), and errors fall with the power 4
+(pi/alpha - 1) of the degree (Babuska and Suri, SIAM Review 36, 1994), for low degrees of the degree
++ 1. Errors at corners of free edges fall about as slowly as at the angle `OBTUSE`.
 """
 
 from __future__ import annotations
@@ -38,7 +41,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 LARGEST = 4.0  # kp/kq or kq/kp
-SHARP = 0.1  # area of a corner over the quad's, below which the quad counts as a parallelogram
+SHARP = 0.1  # corner area/quad area, below which the quad counts as a parallelogram
 
 
 def quad_bends(
@@ -58,13 +61,15 @@ def quad_bends(
         Which edges are creases, and which stay straight.
     poissons_ratio : (q,)
     hinged : (q,)
-        The only diagonal that bends, 0 of corners 0 and 2, 1 of corners 1 and 3; -1 if both do.
+        The only diagonal that bends: 0 between corners 0 and 2, 1 between corners 1 and 3; -1 if
+        both diagonals bend.
 
     Returns
     -------
     (ndarray, ndarray)
-        Stiffness (q, 4) of whole spokes, N m/rad, and c (q, 4), rad/(N m), 0 of free edges. If only
-        one diagonal bends, its two spokes add up to its stiffness; the others have 0.
+        Stiffness (q, 4) of whole spokes, N m/rad, and c (q, 4), rad/(N m), 0 at free edges. If only
+        one diagonal bends, the stiffnesses of its two spokes add up to its own; other spokes have
+        0.
     """
     x, center = _in_plane(corners, centers)
     turns, slopes = _facets(x, center)
@@ -97,7 +102,7 @@ def _balanced(p: NDArray, q: NDArray, ratio: float) -> NDArray:
 def _height(p: NDArray, q: NDArray, wanted: NDArray, hinged: NDArray) -> NDArray:
     """Possible height (n,) closest to `wanted`; fixed if only one diagonal bends.
 
-    With a hinge on one diagonal only, the spokes on the other do not turn.
+    With a hinge on one diagonal only, the spokes of the other diagonal do not turn.
     """
     ends = _balanced(p, q, 1.0 / LARGEST), _balanced(p, q, LARGEST)
     y = np.clip(wanted, np.minimum(*ends), np.maximum(*ends))
@@ -154,7 +159,7 @@ def _in_plane(corners: NDArray, centers: NDArray) -> tuple[NDArray, NDArray]:
 def _facets(x: NDArray, center: NDArray) -> tuple[NDArray, NDArray]:
     """Turns of the spokes and outward slopes of the facets at the edges, both (n, 2, 4).
 
-    For a unit twist with the center at 0, and for the center at 1 with the corners at 0.
+    Two cases: a unit twist with the center at 0; the center at 1 with the corners at 0.
     """
     here = x - center[:, None]
     there = np.roll(here, -1, axis=1)
@@ -176,12 +181,12 @@ DEGREES = (4, 6)
 OBTUSE = 2.0 * np.pi / 3.0
 POINTS = 8  # Gauss points in each direction
 CHUNK = 256  # panels at a time
-DIGITS = 11  # digits to which equal panels agree
+DIGITS = 11  # panels that agree to so many digits count as equal
 SIGNS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])  # xi, eta of the corners
 
 
 def flexibilities(x: NDArray, straight: NDArray, poissons_ratio: NDArray) -> NDArray:
-    """Flexibilities F (p, 5, 5) of convex panels of about size 1; equal panels share them.
+    """Flexibilities F (p, 5, 5) of convex panels of size about 1, computed once for equal panels.
 
     Parameters
     ----------
@@ -203,7 +208,7 @@ def flexibilities(x: NDArray, straight: NDArray, poissons_ratio: NDArray) -> NDA
 
 
 def twists(x: NDArray) -> NDArray:
-    """Heights (p, 4) of the corners x (p, 4, 2) in a twist, orthogonal to all planes."""
+    """Heights (p, 4) of corners x (p, 4, 2) in a unit twist; they are orthogonal to all planes."""
     planes = np.concatenate([np.ones((*x.shape[:2], 1)), x - x.mean(axis=1, keepdims=True)], axis=2)
     heights = np.stack([np.linalg.det(np.delete(planes, k, axis=1)) for k in range(4)], axis=1)
     heights *= np.array([1.0, -1.0, 1.0, -1.0])
@@ -278,13 +283,13 @@ def _polynomials(derivative: int) -> tuple[list[NDArray], list[NDArray]]:
 
 
 def _shapes(heights: NDArray, at: NDArray, d: int, e: int) -> NDArray:
-    """Derivatives (p, n, k), d times by xi and e by eta, of all shapes at points (n, 2)."""
+    """Derivatives (p, n, k) of all shapes at points (n, 2): d times in xi, e times in eta."""
     (ends, bows), (sides, lifts) = _line(at[:, 0], d), _line(at[:, 1], e)
     corners = np.stack([ends[:, i] * sides[:, j] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))], 1)
     twist = (heights @ corners.T)[:, :, None]
     others = [
-        (sides[:, :, None] * bows[:, None, :]).reshape(len(at), -1),  # of edges 0 and 2
-        (ends[:, :, None] * lifts[:, None, :]).reshape(len(at), -1),  # of edges 3 and 1
+        (sides[:, :, None] * bows[:, None, :]).reshape(len(at), -1),  # bows of edges 0 and 2
+        (ends[:, :, None] * lifts[:, None, :]).reshape(len(at), -1),  # bows of edges 3 and 1
         (bows[:, :, None] * lifts[:, None, :]).reshape(len(at), -1),
     ]
     rest = np.concatenate(others, axis=1)
@@ -292,7 +297,7 @@ def _shapes(heights: NDArray, at: NDArray, d: int, e: int) -> NDArray:
 
 
 def _jacobian(x: NDArray, at: NDArray) -> NDArray:
-    """Derivatives (p, n, 2, 2) of x, y (rows) by xi, eta at points (n, 2)."""
+    """Derivatives (p, n, 2, 2) of x, y (rows) with respect to xi, eta at points (n, 2)."""
     one = 1.0 + SIGNS[None] * at[:, None]
     by_xi = 0.25 * SIGNS[:, 0] * one[:, :, 1]
     by_eta = 0.25 * SIGNS[:, 1] * one[:, :, 0]
@@ -302,12 +307,12 @@ def _jacobian(x: NDArray, at: NDArray) -> NDArray:
 
 
 def _curvatures(x: NDArray, at: NDArray) -> tuple[NDArray, NDArray]:
-    """Second derivatives (p, n, 3, k) by xx, yy and xy of all shapes, and areas (p, n)."""
+    """Second derivatives (p, n, 3, k) of all shapes, xx, yy and xy; areas (p, n) at the points."""
     heights = twists(x)
     jacobian = _jacobian(x, at)
     inverse = np.linalg.inv(jacobian)  # rows xi, eta; columns x, y
     slopes = np.stack([_shapes(heights, at, 1, 0), _shapes(heights, at, 0, 1)], axis=2)
-    by = np.swapaxes(inverse, 2, 3) @ slopes  # by x, y
+    by = np.swapaxes(inverse, 2, 3) @ slopes  # with respect to x, y
     # d2 w/d xi2 etc., minus the effect of curved coordinates: x, y are bilinear
     mixed = 0.25 * np.einsum("v,pva->pa", SIGNS[:, 0] * SIGNS[:, 1], x)
     xi, eta = _shapes(heights, at, 2, 0), _shapes(heights, at, 0, 2)

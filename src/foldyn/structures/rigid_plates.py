@@ -1,9 +1,9 @@
 """Points of a rigid plate, and the panels of a structure that are rigid plates.
 
-A point in the plane of three others is their sum with weights that add up to one. In any motion of
-a plate that stays flat, the same weights apply, for arbitrary rotations: u = w1 u1 + w2 u2 + w3 u3.
-A panel whose nodes all follow three of its corners in this way stays plane; its bars or its
-membrane may still deform in the plane.
+A point in the plane of three other points is a weighted sum of these, with weights that add up to
+one. In any motion of a plate that stays flat, the same weights apply, for arbitrary rotations: u =
+w1 u1 + w2 u2 + w3 u3. A panel whose nodes all follow three of its corners in this way stays plane;
+its bars or its membrane may still deform in the plane.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.values import indices, show
 
-OFF_PLANE = 1e-9  # of the size of three corners: largest distance of a point from their plane
-ON_LINE = 1e-9  # sine of an angle below which points are collinear
+OFF_PLANE = 1e-9  # largest distance from the plane of three corners, relative to their size
+ON_LINE = 1e-9  # sine of the angle below which points count as collinear
 
 
 class Plate(NamedTuple):
@@ -34,8 +34,8 @@ class Plate(NamedTuple):
 def on_plate(points: NDArray, corners: NDArray) -> tuple[NDArray, NDArray]:
     """Weights (k, 3) of points (k, 3) in the plane of three corners (3, 3).
 
-    Also returns the distance (k,) of each from that plane, relative to the corners' size; nan if
-    the corners are collinear.
+    Also returns the distance (k,) of each point from that plane, relative to the size of the
+    corners' triangle; nan if the corners are collinear.
     """
     a, b = corners[1] - corners[0], corners[2] - corners[0]
     size = float(max(np.linalg.norm(a), np.linalg.norm(b)))
@@ -101,7 +101,7 @@ def rigid_plates(
         Corners of the panels.
     nodes : ndarray, shape (n, 3)
     triangles, panel : ndarray, shape (nt, 3), (nt,)
-        Of the mesh, and the panel of each.
+        Triangles of the mesh, and the panel of each.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def rigid_plates(
 
 
 def _widest(nodes: NDArray, face: Sequence[int]) -> NDArray[np.int64]:
-    """The three corners of a panel that span the largest triangle; the first if equal."""
+    """The three corners of a panel that span the largest triangle; the first of equal ones."""
 
     def area(three: tuple[int, ...]) -> float:
         a, b, c = nodes[list(three)]

@@ -41,7 +41,7 @@ Ratio = Annotated[float, Check(_ratio)]
 Length = Annotated[float, Check(length, unit="m")]
 Density = Annotated[float, Check(number, above=0.0, unit="kg/m3")]
 MATERIAL = ("youngs_modulus", "poissons_ratio", "thickness", "density")
-"""What panels may have of their own."""
+"""Values that may differ from panel to panel."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +51,14 @@ class PanelSheet(Checked):
     Parameters
     ----------
     panels : int or sequence of int
-        Their indices, in the order of `pattern.faces`.
+        Indices of the panels, in the order of `pattern.faces`.
     youngs_modulus, poissons_ratio, thickness, density : float, optional
-        As in `Sheet`, at least one of them; the others are the sheet's.
+        As in `Sheet`. Give at least one; the sheet's values apply to the rest.
 
     Raises
     ------
     InputError
-        A value out of its range, or none at all.
+        A value out of range, or no value at all.
     """
 
     panels: Annotated[Sequence[int] | int, Check(_panels)]
@@ -92,16 +92,16 @@ class Sheet(Checked):
     thickness : float
         t (m), positive.
     density : float, optional
-        rho (kg/m3), positive. Needed for the mass; statics does without.
+        rho (kg/m3), positive. Needed for the mass, not for statics.
     length_scale_ratio : float, default 1
-        L*/L_F, positive: the crease's softness in fold calibration; larger is softer.
+        L*/L_F, positive: determines the stiffness of calibrated creases; larger is softer.
     panels : sequence of PanelSheet, optional
         Panels that differ from the rest.
 
     Raises
     ------
     InputError
-        A value out of its range; a panel named twice; panels with a density in a sheet without one.
+        A value out of range; a panel named twice; panels with a density in a sheet without density.
 
     Examples
     --------
@@ -125,7 +125,7 @@ class Sheet(Checked):
     place = "sheet: "
 
     def agree(self) -> None:
-        """Refuse panels that are named twice, and densities of some panels only."""
+        """Refuse panels that are named twice, and densities given for some panels only."""
         before: dict[int, int] = {}
         for i, part in enumerate(self.panels):
             if part.density is not None and self.density is None:
@@ -153,7 +153,7 @@ class Sheet(Checked):
         return math.nan if self.density is None else self.density * self.thickness
 
     def of(self, panel: int) -> Sheet:
-        """The sheet of one panel, without differing panels."""
+        """The uniform sheet that one panel is made of."""
         kinds, kind = self.kinds(panel + 1)
         return kinds[kind[panel]]
 
@@ -227,15 +227,16 @@ class Laminate(Checked):
     Parameters
     ----------
     layers : sequence of (float, float, float)
-        Thickness (m), Young's modulus (Pa) and expansion (1/K) of each, from the back of the
-        sheet to its front.
+        Thickness (m), Young's modulus (Pa) and expansion (1/K) of each layer, from the back of the
+        sheet to the front.
 
     Attributes
     ----------
     expansion : float
         Strain of the neutral surface per kelvin, 1/K.
     curvature : float
-        Curvature per kelvin, 1/(m K), positive if the sheet bends as at a valley: toward its front.
+        Curvature per kelvin, 1/(m K), positive if the sheet bends like a valley fold, toward its
+        front.
 
     Examples
     --------
@@ -281,7 +282,7 @@ class Laminate(Checked):
         Parameters
         ----------
         poissons_ratio : float
-            Of all layers.
+            Poisson's ratio of all layers.
         areal_density : float, optional
             Mass per area, kg/m2.
         **others

@@ -1,11 +1,11 @@
 """Whether a result depends on in-plane stretching of panels, where models are inaccurate.
 
-A panel's bars are exact at best in uniform strain, and too stiff otherwise. Coupled bars have the
-panel's membrane stiffness, but with straight edges: this is also too stiff if quadrilateral panels
-stretch as a whole, with the energy of their mean strains, but accurate if they bend in their plane.
-With the scheme n5b8e edges give way, which is accurate in open sheets; closed sheets, and sheets
-with welds, are off by 5 to 20 % there, in either direction (docs/models.md, "Where panels
-stretch").
+A panel's independent bars are exact in uniform strain at best, and otherwise too stiff. Coupled
+bars have the panel's membrane stiffness, but with straight edges. They are accurate if panels bend
+in their plane, but also too stiff if quadrilateral panels stretch as a whole: then the energy is
+that of the panels' mean strains. With the scheme n5b8e edges give way, which is accurate in open
+sheets. Closed sheets and sheets with welds are off by 5 to 20 %, in either direction
+(docs/models.md, "Where panels stretch").
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from foldyn.structures.discretized import Discretized
 
 BARS = "strain_bars"
 SINGLE, TRIANGLES, COUPLED, GIVING = 0.05, 0.1, 0.4, 0.5
-"""Shares of the strain energy above which it is told: with single bars; with coupled ones of
-triangles, and by mean strains of other panels; and where edges give way. Measured with the mixed
-sets of docs/fidelity.md."""
-LEAST = 1e-9  # mean strain of the bars that may be rounding error
-FELT = 1e-3  # of the kinetic energy: less strain energy does not affect a motion
+"""Shares of stretching in the strain energy above which a result is doubtful: with single bars;
+with coupled bars in triangles; by mean strains of other panels with coupled bars; with edges that give
+way. Measured with the mixed sets of docs/fidelity.md."""
+LEAST = 1e-9  # mean strain of the bars below which it may be rounding error
+FELT = 1e-3  # share of the kinetic energy: less strain energy does not affect a motion
 SHELL = "compare with the shell (foldyn fidelity, fd.fidelity) or take it (--model shell, fd.shell)"
 
 
 class Stretch(NamedTuple):
-    """State with the largest strain energy: its index, and the share of stretching in it."""
+    """Index of the state with the largest strain energy, and the share of stretching in it."""
 
     at: int
     share: float
@@ -53,7 +53,7 @@ def most(structure: Discretized) -> float:
 
 
 def remedy(structure: Discretized) -> str:
-    """Remedy if stretching exceeds that share: the end of a message."""
+    """Remedy if the share of stretching exceeds `most`: the end of a message."""
     if not getattr(structure, "membranes", ()):
         return f'where single bars are far too stiff: take membrane = "panel", or {SHELL}'
     if getattr(structure, "edge_gives", None) is None:
@@ -65,10 +65,12 @@ def remedy(structure: Discretized) -> str:
 
 
 def stretch(structure: Any, energies: Mapping[str, NDArray], displacement: Any) -> Stretch | None:
-    """Share of stretching in states with energies (k,), J, by name; None if it is small.
+    """Share of stretching in k states with given energies (k,), J, by name; None if it is small.
 
-    Also None for motions that hardly strain the structure; their energies include `kinetic`.
-    displacement : (k, n, 3) of the states, m.
+    Also None for motions that hardly strain the structure; the energies of motions include
+    `kinetic`.
+
+    displacement : (k, n, 3) displacements of the states, m.
     """
     limit = most(structure)
     if not np.isfinite(limit) or not np.size(energies[BARS]):
@@ -106,7 +108,7 @@ def stretching(structure: Discretized, displacement: NDArray, motions: NDArray) 
 
 
 def _gradients(structure: Discretized, field: NDArray) -> NDArray:
-    """Mean gradients (..., f, 3, 2) in the panels of nodal values (..., n, 3)."""
+    """Mean gradient (..., f, 3, 2) of nodal values (..., n, 3) in each panel."""
     pattern, found = structure.pattern, []
     for face, normal in zip(pattern.faces, pattern.face_normals, strict=True):
         x = pattern.vertices[list(face)]

@@ -51,8 +51,8 @@ from foldyn.structures.swelling import Chords, Swelling, chords, mean_of_neighbo
 from foldyn.values import choice
 
 FILL = Fill(2700.0, 340, "pattern", "take fewer panels, or an explicit method of motion")
-"""Measured with SuperLU as the largest memory of `modes` and `trace` on flat lattices: 13, 20 and
-26 kB a dof with 9,843, 60,603 and 241,203 dofs."""
+"""Largest memory of `modes` and `trace` on flat lattices, measured with SuperLU: 13, 20 and 26 kB
+per dof with 9,843, 60,603 and 241,203 dofs."""
 SCHEMES = ("n5b8", "n4b5", "n5b8e")
 CALIBRATIONS = ("standard", "merlin2", "plate")
 MEMBRANES = ("bars", "panel")
@@ -99,29 +99,29 @@ class Structure(Discretized):
         Hinge rows (axis j, k, wings i, l) in the order of `pattern.creases`; stiffness of the
         whole crease (N m/rad); rest dihedral (rad).
     panel_softness : (nf,)
-        Turn (rad/(N m)) of the panels at each crease per unit of its moment, a part of the turn of
-        its fold (`foldyn.materials.series`).
+        Turn (rad/(N m)) of the panels at each crease per unit of its moment; it is part of the turn
+        of the fold (`foldyn.materials.series`).
     bends, bend_stiffness, bend_rest : (nh, 4), (nh,), (nh,)
         The same for the hinges inside panels.
     bend_onset : (nh,)
-        Turn (rad) above which bends of the law `PlateSuperlinear` are nonlinear, if the law has no
-        onset of its own.
+        Turn (rad) above which bends with the law `PlateSuperlinear` are nonlinear, if the law has
+        no onset of its own.
     triangles, triangle_panel : (nt, 3), (nt,)
         Triangles, counter-clockwise from the front, and the panel of each.
     centers : (np,)
-        Node number of each panel's center, -1 without one.
+        Node number of each panel's center, -1 if it has none.
     clamps, clamp_stiffness : (c, 3), (c,)
         Triangles at clamped edges, from the edge's first end; stiffness (N m/rad).
     edge_plates : EdgePlates or None
         Panels as plates, for the scheme n5b8e.
     membranes : tuple of PanelKind
-        Coupling of the bars of panels, with `membrane = "panel"`: `bar_area` is not used then.
+        Coupling of the bars of panels, for `membrane = "panel"`, which does not use `bar_area`.
     edge_gives : EdgeGives or None
         How edges give way near their ends, in the plane of panels; for the scheme n5b8e.
     without_edge_angles : bool
         Whether edge angles and gives are kept in balance instead of being dofs.
     pattern, sheet, options
-        Its input.
+        Input from which the structure was made.
     """
 
     nodes: NDArray
@@ -212,7 +212,7 @@ class Structure(Discretized):
         )
 
     def _coupled(self, sheet: BarsHingesTerm | BarsPlatesTerm) -> Assembly:
-        """A sheet with the membranes of its panels, in place of independent bars."""
+        """A body: the sheet, with the membranes of the panels in place of independent bars."""
         if not self.membranes:
             return Assembly(sheet)
         body = Assembly(
@@ -227,13 +227,13 @@ class Structure(Discretized):
 
     @property
     def massless(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Its massless dofs, in words; empty if there are none."""
+        """Description of the massless dofs; empty if there are none."""
         there = self.edge_plates is not None and not self.without_edge_angles
         return "the edge angles of the scheme n5b8e" if there else ""
 
     @property
     def _axes(self) -> list[list[int]]:
-        """Nodes on the axes of its hinges, folds first."""
+        """Nodes on the axes of the hinges, folds first."""
         return np.concatenate([self.folds, self.bends])[:, :2].tolist()
 
     def _plates_term(self, plates: EdgePlates) -> BarsPlatesTerm:
@@ -266,7 +266,7 @@ class Structure(Discretized):
 
     @property
     def hinge_kinds(self) -> tuple[HingeKind, ...]:
-        """Its folds and bends, with their laws."""
+        """The folds and the bends, with their laws."""
         law = self.bend_law
         own = isinstance(law, PlateSuperlinear) and law.onset is None
         onset = self.bend_onset if own else None
@@ -334,8 +334,8 @@ class Structure(Discretized):
     def _curled(self, plates: EdgePlates, curvature: NDArray) -> tuple[Following, NDArray, NDArray]:
         """Moments on the hinges of plates, and forces (r,), N, on the dofs of their edge angles.
 
-        Also returns the moments (nq,), N m, of all angles of plates. The plates' energies are
-        linear in these curvatures.
+        Also returns the moments (nq,), N m, of all angles of plates. All are linear in `curvature`,
+        the free curvatures (np,), 1/m, of the panels.
         """
         area = 0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
         area = np.bincount(self.triangle_panel, area)
@@ -365,7 +365,7 @@ class Structure(Discretized):
 
     @cached_property
     def outlines(self) -> list[Outline | None]:
-        """Outlines of its panels as plates; None for rigid ones."""
+        """Outlines of the panels as plates; None for rigid panels."""
         pattern, options = self.pattern, self.options
         assert pattern is not None
         hinges = np.concatenate([self.folds, self.bends[len(self.bends) - len(pattern.welds) :]])
@@ -376,7 +376,7 @@ class Structure(Discretized):
 
     @cached_property
     def _chords(self) -> tuple[Chords, Chords]:
-        """Turns of its hinges, folds first, and its clamps per curvature."""
+        """Turns of the hinges, folds first, per curvature of panels; the same for the clamps."""
         hinges = np.concatenate([kind.nodes for kind in self.hinge_kinds])
         of_hinges, of_clamps = (
             chords(self.nodes, self.triangles, self.triangle_panel, rows)

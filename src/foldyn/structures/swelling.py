@@ -1,17 +1,17 @@
 """Panels that heat, moisture or growth would stretch and curl if they were free.
 
 A bar that would have the stretch 1 + e gets the constant second Piola-Kirchhoff stress -S(1 + e),
-with S its law: it is free of force at that stretch.
+with S the law of the bar: then the bar has no force at that stretch.
 
 A panel that would curl to a paraboloid w = kappa r^2 / 2, toward its front, has no moment if each
 hinge inside it turns as the paraboloid through its nodes does. A wing at the distance h from an
-axis of the length L, at the position s along it, then rises over the axis by kappa (h^2 + s^2 - s
+axis of length L, and at the position s along it, then rises above the axis by kappa (h^2 + s^2 - s
 L) / 2, so that the dihedral of a hinge is smaller by the sum over its wings of
 
     kappa (h - s (L - s) / h) / 2.
 
-The same applies to a fold, whose panels meet at their own tangents: its dihedral is measured
-between chords of its nodes.
+The same applies to a fold: its panels meet at an angle between their tangents, but its dihedral is
+measured between chords of nodes.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from foldyn.mechanics.following import Following
 class Swelling(NamedTuple):
     """Additions to a structure due to swollen panels.
 
-    Parts with quadratic energies have free strains, in the plane and in bending, and their forces;
-    see `mechanics.heat`.
+    Membranes and plates have quadratic energies: for these, the free strains and angles, and the
+    forces conjugate to them; see `mechanics.heat`.
     """
 
     turns: NDArray  # (nr,) changes of rest angles, rad
     forces: Following
-    free: tuple[NDArray, NDArray]  # Green strains (.,), angles (.,) rad
-    push: tuple[NDArray, NDArray]  # (.,) J, (.,) N m
-    stress: NDArray = np.zeros(0)  # (nb,) of single bars, over Young's modulus
+    free: tuple[NDArray, NDArray]  # Green strains (s,), angles (q,) rad
+    push: tuple[NDArray, NDArray]  # forces of `free`: (s,) J, (q,) N m
+    stress: NDArray = np.zeros(0)  # (nb,) stress of single bars, divided by Young's modulus
     inner: NDArray = np.zeros(0)  # (r,) forces on dofs in balance, N
 
 
@@ -50,7 +50,7 @@ def chord_turns(corners: NDArray) -> NDArray:
 
 
 def panel_of_triangle(triangles: NDArray, panel: NDArray, wanted: NDArray) -> NDArray:
-    """Panels of the triangles `wanted` (n, 3), for any order of their corners."""
+    """Panels (n,) of the triangles `wanted` (n, 3), whose corners may be in any order."""
     known, sought = np.split(_numbers(np.concatenate([triangles, wanted])), [len(triangles)])
     order = np.argsort(known, kind="stable")
     place = order[np.searchsorted(known[order], sought, "right") - 1]
@@ -67,10 +67,10 @@ def _numbers(triangles: NDArray) -> NDArray:
 
 
 class Chords(NamedTuple):
-    """Wings of n hinges, w each: the effect of panel curvature on their angles."""
+    """Wings of n hinges, w per hinge: effect of panel curvature on the hinges' angles."""
 
     panel: NDArray  # (w, n)
-    turn: NDArray  # (w, n) `chord_turns`, m
+    turn: NDArray  # (w, n) `chord_turns` of the wings, m
 
     def turns(self, curvature: NDArray) -> NDArray:
         """Changes (n,), rad, of the angles for panel curvatures (np,), 1/m."""
@@ -81,9 +81,9 @@ class Chords(NamedTuple):
 
 
 def chords(x: NDArray, triangles: NDArray, panel: NDArray, hinges: NDArray) -> Chords:
-    """Wings of hinges (n, 2 + w), axis and wings, between triangles (nt, 3) of points x.
+    """`Chords` of hinges (n, 2 + w), axis and wings, between triangles (nt, 3) of points x.
 
-    panel : (nt,) of the triangles.
+    panel : (nt,) panel of each triangle.
     """
     wings = [hinges[:, [0, 1, wing]] for wing in range(2, hinges.shape[1])]
     return Chords(
@@ -93,7 +93,7 @@ def chords(x: NDArray, triangles: NDArray, panel: NDArray, hinges: NDArray) -> C
 
 
 def mean_of_neighbors(pairs: NDArray, triangles: NDArray, value: NDArray) -> NDArray:
-    """Mean (k,) over the triangles (nt, 3) at each pair of nodes (k, 2) of their values (nt,)."""
+    """Mean (k,) of `value` (nt,) over the triangles (nt, 3) at each pair of nodes (k, 2)."""
     sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)).reshape(-1, 2)
     size = int(triangles.max(initial=0)) + 1
     key = np.sort(pairs) @ [size, 1]
