@@ -6,7 +6,7 @@ from foldyn.cases.case import Case
 from foldyn.cases.connectors import Dashpot
 from foldyn.cases.contact import Contact, Plane
 from foldyn.cases.damping import CreaseDamping, ModalDamping, Rayleigh, StrainDamping
-from foldyn.cases.histories import *  # noqa: F403 - what it lists
+from foldyn.cases.histories import *  # noqa: F403 - its __all__
 from foldyn.cases.history import Formula, Function, as_history
 from foldyn.cases.loads import *  # noqa: F403
 from foldyn.cases.masses import PointMass

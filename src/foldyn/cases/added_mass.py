@@ -18,8 +18,8 @@ from foldyn.patterns.pattern import Pattern
 from foldyn.ram_limit import check_memory
 from foldyn.structures.boundary_elements import BoundaryElements, boundary_elements
 
-MOST_COUPLED = 3000  # dofs that a matrix may couple with all others
-COPIES = 3  # of the flow's matrix, while it is made
+MOST_COUPLED = 3000  # most dofs that may be coupled with each other in a matrix
+COPIES = 3  # copies of the flow's matrix that exist while it is made
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,10 +29,10 @@ class Fluid:
     Attributes
     ----------
     triangles : ndarray of int, shape (nt, 3)
-        Nodes of the structure's triangles.
+        Corners of the structure's triangles.
     under, shares : ndarray, shape (k,) and (k, 3)
-        The triangle under the center of each boundary element, and the weights of its nodes. An
-        element on the line between two triangles appears once for each.
+        The triangle under the center of each boundary element, and the weights of the triangle's
+        nodes. An element whose center lies between two triangles appears once for each.
     catch : sparse array, shape (u, k)
         Integrals of the flow's functions over these elements, m2.
     """
@@ -42,7 +42,7 @@ class Fluid:
     shares: NDArray[np.float64]
     catch: sparse.csr_array
     _density: float
-    _surface: tuple[NDArray, ...]  # what `flow_of` takes
+    _surface: tuple[NDArray, ...]  # arguments of `flow_of`
 
     @cached_property
     def flow(self) -> Flow:
@@ -53,7 +53,7 @@ class Fluid:
         return self._density * flow_of(*self._surface)
 
     def on(self, x: NDArray) -> AddedMass:
-        """Added mass with the triangles' normals for nodes at x (n, 3), m."""
+        """Added mass with the normals of the triangles when the nodes are at x (n, 3), m."""
         normal = normal_velocities(x, self.triangles, self.under, self.shares)
         return AddedMass(sparse.csr_array(self.catch @ normal), self.flow)
 
@@ -93,7 +93,7 @@ def fluid_at(case: Any, displacement: NDArray) -> Fluid:
 
 
 def operator_at(case: Any, displacement: NDArray) -> tuple[AddedMass, bool] | None:
-    """Added mass of a case at a displacement (n, 3), and whether it fits in a matrix; None without.
+    """Added mass at a displacement (n, 3), or None; and whether it fits in a matrix.
 
     It does not fit if it couples too many dofs.
     """
@@ -109,7 +109,7 @@ def added_mass_at(case: Any, displacement: NDArray) -> sparse.csr_array | None:
     Raises
     ------
     InputError
-        Panels nearly touch; it couples too many dofs for a matrix.
+        Panels nearly touch, or the added mass couples too many dofs for a matrix.
     """
     found = operator_at(case, displacement)
     if found is None:

@@ -19,7 +19,7 @@ from foldyn.values import flag, number, show, vector, whole
 LOCAL = "local"
 SHORTER_TO_LONGER = (0.0, 0.05, 0.1, 0.2, 1.0)
 PLATE_DRAG = (2.0, 1.5, 1.3, 1.2, 1.18)
-"""Drag coefficients of flat plates normal to the flow by the ratio of their sides: White (2011),
+"""Drag coefficients of flat plates normal to the flow, by the ratio of their sides: White (2011),
 Fluid Mechanics, 7th edition, table 7.3, after Hoerner (1965), Fluid-Dynamic Drag."""
 
 
@@ -36,23 +36,23 @@ class Air(Part):
     Parameters
     ----------
     density : float, default 1.204
-        Of the fluid (kg/m3): dry air at 20 C and 1013 hPa by default; water has 998.
+        Density of the fluid (kg/m3): dry air at 20 C and 1013 hPa by default; water has 998.
     velocity : sequence of float, shape (3,)
-        Of the fluid far from the sheet (m/s); still air by default.
+        Velocity of the fluid far from the sheet (m/s); still air by default.
     added_mass : bool or "local", default True
         Whether the fluid that the sheet moves adds to its mass. "local" treats each panel as if it
         were alone in the fluid: for sheets whose full matrix is too large.
     drag : bool, default True
         Whether the pressure drag of the panels acts in motions.
     drag_coefficient : float, optional
-        C_d in the force C_d / 2 density area v|v| on a panel, v its normal velocity relative to the
-        fluid. By default the value of a flat plate with the sheet's aspect ratio at rest: from 1.18
-        for a square to 2 for a long strip (see `coefficient`).
+        C_d in the force C_d / 2 density area v|v| on a panel, with v the normal velocity of the
+        panel relative to the fluid. By default the value for a flat plate with the sheet's aspect
+        ratio at rest: from 1.18 for a square to 2 for a long strip (see `coefficient`).
     resolution : int, default 4
-        Number of boundary elements along each edge of a panel, even, for the added mass.
+        Number of boundary elements along each edge of a panel, for the added mass; must be even.
     history : History or callable, optional
-        Factor of the velocity over time, for gusts; constant by default. With added mass it may
-        not jump, because accelerating fluid pushes.
+        Factor of the velocity over time, for gusts; constant by default. With added mass it must
+        not jump, because accelerating fluid exerts pressure.
 
     Examples
     --------
@@ -98,12 +98,12 @@ class Air(Part):
 
 
 def _side_ratio(structure: Discretized) -> float:
-    """Shorter over longer side of a rectangle with the second moments of a sheet at rest."""
+    """Ratio of the shorter to the longer side of a rectangle with a sheet's moments at rest."""
     corners = structure.nodes[structure.triangles]
     area = np.linalg.norm(double_areas(structure.nodes, structure.triangles), axis=1)
     center = np.average(corners.mean(axis=1), axis=0, weights=area)
     away = np.concatenate([corners - center, 3.0 * (corners.mean(axis=1) - center)[:, None]], 1)
-    moments = np.einsum("t,tci,tcj->ij", area, away, away)  # of triangles, times 24
+    moments = np.einsum("t,tci,tcj->ij", area, away, away)  # 24 times the second moments
     _, shorter, longer = np.sqrt(np.linalg.eigvalsh(moments).clip(min=0.0))
     return float(shorter / longer)
 

@@ -68,8 +68,8 @@ class Case(Loaded, Damped):
     rayleigh, modal_damping, crease_damping, dashpots, damped
         See `Damped`.
     fixed : ndarray of bool, shape (n, 3)
-        True where a node is held along an axis, by `Fix` or by `Impose`. Points of a mesh between
-        the ends of a clamped edge are held where both ends are.
+        True where a node is held along an axis, by `Fix` or by `Impose`. Mesh points of a clamped
+        edge are held along an axis if both ends of the edge are.
     imposed : ndarray of bool, shape (n, 3)
         True where an `Impose` moves a node along an axis.
     constraints : Constraints
@@ -78,24 +78,24 @@ class Case(Loaded, Damped):
         Numbers 3 * node + axis of the free dofs, which determine all others, and of the held dofs;
         both increase.
     reaction_dofs : ndarray of int64
-        Dofs that supports hold along an axis or act on along a direction, increasing.
+        Dofs that supports hold along an axis, or on which they act along a direction; increasing.
     load_terms : tuple of (ndarray of shape (n, 3), History)
         Forces (N) on all nodes with their history; loads with equal histories are one term.
         Forces on held nodes are kept: the reactions carry them.
     force_terms : tuple of (ndarray of shape (n, 3), History)
         The same for forces on nodes only, without gravity.
     following_terms : tuple of (Following, History)
-        Forces that depend on the displacement, one term for each load that has them.
+        Forces that depend on the displacement, one term for each load with such forces.
     gravity_terms : tuple of (ndarray of shape (3,), History)
         Accelerations of gravity (m/s2) with their history.
     imposed_terms : tuple of (ndarray of shape (n, 3), History)
-        Displacements (m) at factor 1 of imposed dofs, and of dofs that constraints tie to them,
-        zero elsewhere, with their history; equal histories are one term.
+        Displacements (m) at factor 1 of imposed dofs, and of dofs that constraints tie to these;
+        zero elsewhere. Each has its history; equal histories are one term.
     base_terms : tuple of (ndarray of shape (n, 3), History)
-        The same for dofs that `Fix` holds along the axis of a `BaseMotion`, relative to the start
-        of the motion.
+        The same for dofs that `Fix` holds along the axis of a `BaseMotion`: displacements since the
+        start of the motion.
     actuation_terms : tuple of (ndarray of shape (nf,), History)
-        Changes (rad) of the rest angles of the folds at factor 1, zero elsewhere, with their
+        Changes (rad) of the rest angles of the folds at factor 1, zero for other folds, with their
         history; equal histories are one term.
     rest_terms : tuple of (ndarray of shape (nr,), History)
         The same for all rest angles (`body.sheet.rest_angles`: folds first), from all loads.
@@ -105,7 +105,7 @@ class Case(Loaded, Damped):
     InputError
         A node or crease is out of range; a dof is held and imposed, or imposed twice; a base
         motion has no support to move; a crease is actuated twice; a force acts on held axes only;
-        or gravity meets a structure whose mass is not known.
+        or gravity acts on a structure whose mass is not known.
 
     Warns
     -----
@@ -194,7 +194,7 @@ class Case(Loaded, Damped):
         return self.structure.body.with_terms(*self.terms)
 
     def elastic_body_at(self, time: float | None) -> Assembly:
-        """`elastic_body` with the rest angles at a time (s); None: under constant loads only."""
+        """`elastic_body` with the rest angles at a time (s); None: as changed by constant loads."""
         body, turns = self.elastic_body, self.rest_terms
         if not turns:
             return body
@@ -207,7 +207,7 @@ class Case(Loaded, Damped):
         return remembering(self.structure, self.body, self.crease_damping)
 
     def check_flow(self) -> None:
-        """Refuse changes of rest angles where a law measures its flow from the rest angle."""
+        """Refuse changes of rest angles for laws that yield or creep relative to the rest angle."""
         for change, _ in self.rest_terms:
             rest = len(change) - self.body.sheet.offsets
             for number in np.flatnonzero(change[:rest]).tolist():
@@ -227,7 +227,7 @@ class Case(Loaded, Damped):
             )
 
     def memory_in(self, state: State | None) -> NDArray | str | None:
-        """Memory (b, 2) of a state for the branches of laws; a word, or None for the default."""
+        """Memory (b, 2) of a state for the branches of laws; or a word; or None for the default."""
         given = None if state is None else state.memory
         if given is None or isinstance(given, str):
             return given
@@ -292,7 +292,7 @@ class Case(Loaded, Damped):
         Parameters
         ----------
         state : State, optional
-            Only its displacement matters.
+            Only the displacement of the state matters.
 
         Returns
         -------
@@ -335,7 +335,7 @@ class Case(Loaded, Damped):
 
     @cached_property
     def nodal_mass(self) -> NDArray[np.float64]:
-        """Mass (n,) that moves with each node, kg: the sums of the rows of the mass matrix."""
+        """Mass (n,) that moves with each node, kg: the row sums of the mass matrix."""
         return self.structure.nodal_mass if not self.masses else read_only(row_sums(self.mass))
 
     @property

@@ -29,7 +29,7 @@ Summands = Iterable[tuple[NDArray[np.float64], Any]]
 
 
 class Supported:
-    """Supports of a case, which has `structure` and `supports`; see `Case`."""
+    """The part of `Case` about supports; needs the fields `structure` and `supports`."""
 
     structure: Discretized
     supports: Sequence[Any]
@@ -127,7 +127,7 @@ class Supported:
 
     @cached_property
     def prescribed_terms(self) -> Terms:
-        """Displacements (n, 3), m, that each `Impose` itself prescribes, with their history."""
+        """Displacements (n, 3), m, that each `Impose` prescribes, with their history."""
         return _sum_by_history(self._prescribed()) if self.constraints else self.imposed_terms
 
     def _prescribed(self) -> Summands:
@@ -138,8 +138,9 @@ class Supported:
             yield vector, support.history
 
     def _carry_supports(self, stated: NDArray, place: str, values: Mapping[str, Any]) -> NDArray:
-        """Displacements (n, 3), m, of all dofs when supports move as stated.
+        """Displacements (n, 3), m, of all dofs when supports move as in `stated` and `values`.
 
+        stated : displacements (n, 3) along axes.
         values : displacements along directions, by the place of the support.
         """
         shape, ties = self._straight.carried(stated), self.constraints
@@ -171,7 +172,7 @@ class Supported:
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
-        """Energy terms of the supports, one for each kind that has one."""
+        """Energy terms of the supports, one for each kind of support that stores energy."""
         kinds = dict.fromkeys(type(support) for support in self.supports)
         terms = (kind.term(list(self._supports(kind)), self.structure) for kind in kinds)
         return tuple(term for term in terms if term is not None)
@@ -183,7 +184,7 @@ class Supported:
 
 
 class Loaded:
-    """Loads of a case, which has `structure`, `loads` and `nodal_mass`; see `Case`."""
+    """The part of `Case` about loads; needs `structure`, `loads` and `nodal_mass`."""
 
     structure: Discretized
     loads: Sequence[Load]
@@ -246,7 +247,7 @@ class Loaded:
 
     @cached_property
     def following_terms(self) -> tuple[tuple[Following, History], ...]:
-        """Forces that depend on the displacement, one for each load that has them, with history."""
+        """Forces that depend on the displacement: one item per load with such forces; histories."""
         found = ((load.following(self.structure, place), load) for place, load in self._loads())
         return tuple((part, load.history) for part, load in found if part is not None)
 
@@ -264,7 +265,7 @@ class Loaded:
 
     @cached_property
     def loaded_nodes(self) -> NDArray[np.int64]:
-        """Nodes on which a force acts, increasing; gravity, which acts on all, does not count."""
+        """Nodes on which a force acts, increasing; without gravity, which acts on all nodes."""
         return _union([load.loaded(self.structure, place) for place, load in self._loads()])
 
     @cached_property
@@ -284,13 +285,13 @@ class Loaded:
 
 @dataclass(frozen=True, eq=False)
 class SomeLoads(Loaded):
-    """Some of the loads of a case, which has already checked them.
+    """Some of the loads of a case, which has checked all of them.
 
     Parameters
     ----------
     case : Case
     numbers : sequence of int
-        Their indices among the loads of the case.
+        Indices of the chosen loads among the loads of the case.
     """
 
     case: Loaded
@@ -308,7 +309,7 @@ class SomeLoads(Loaded):
 
     @property
     def loads(self) -> Sequence[Load]:
-        """These loads."""
+        """The chosen loads."""
         return tuple(self.case.loads[i] for i in self.numbers)
 
     def _loads(self) -> Iterator[tuple[str, Load]]:
@@ -317,7 +318,7 @@ class SomeLoads(Loaded):
 
 
 class Damped(Supported):
-    """Damping of a case, which has `damping`, and its dashpots, which are supports.
+    """The part of `Case` about damping; needs `damping`, and `supports` for dashpots.
 
     Attributes
     ----------
@@ -341,11 +342,11 @@ class Damped(Supported):
 
     @property
     def dampings(self) -> tuple[Damping, ...]:
-        """Its kinds of damping."""
+        """All dampings of the case."""
         return tuple(self.damping) if isinstance(self.damping, Sequence) else (self.damping,)
 
     def _check_damping(self, faults: Faults) -> None:
-        """Refuse nodes and creases that are not there."""
+        """Refuse nodes and creases that do not exist."""
         for place, dashpot in self.dashpots:
             with faults.collected():
                 dashpot.ends(self.structure, place)

@@ -1,7 +1,7 @@
 """Edges that are supported along their whole length, and the mesh points on them.
 
-A support with `along` holds an edge this way. So does a clamped edge whose ends are both held: it
-stays straight, and the points between move as the line between the ends.
+A support with `along` holds an edge along its whole length. A clamped edge whose ends are both held
+is supported in the same way: it stays straight, and its points move with the line between its ends.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from foldyn.values import show
 def supported_points(
     structure: Discretized, support: Any, place: str
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Nodes (k,) of a Fix, an Impose or a Link, and the values (k,) of an Impose there, m.
+    """Nodes (k,) of a Fix, an Impose or a Link, and for an Impose the values (k,) there, m.
 
     Raises
     ------
     InputError
-        `along` names no edge, or one that may bow.
+        A support with `along` has no edge between its nodes, or an edge that may bow.
     """
     named = resolve_nodes(structure, support.nodes, f"{place}.nodes")
     value = np.broadcast_to(getattr(support, "value", 0.0), named.shape)
@@ -45,7 +45,7 @@ def supported_points(
 
 
 def _edges(structure: Discretized, support: Any, named: NDArray, place: str) -> NDArray[np.int64]:
-    """Nodes (k, p) along the edges between those that a support names."""
+    """Nodes (k, p) along the edges between nodes that a support names."""
     if structure.pattern is None:
         raise InputError(
             ": this structure has no pattern with edges; leave it out", f"{place}.along"
@@ -77,9 +77,10 @@ def _edges(structure: Discretized, support: Any, named: NDArray, place: str) -> 
 
 
 def straightened(options: Any, pattern: Pattern, supports: Iterable[Any]) -> dict[str, Any]:
-    """Further options that a structure whose edges may bow needs for supports along edges.
+    """Options that a structure whose edges may bow needs for supports along edges.
 
-    This is the option `straight` with all boundary edges held along their length; or nothing.
+    The result has the option `straight` with all boundary edges held along their length, or is
+    empty.
     """
     if not getattr(options, "bowed", False):
         return {}
@@ -108,7 +109,7 @@ class Straight:
     ----------
     structure : Structure or Shell
     stated : ndarray of bool, shape (n, 3)
-        Dofs with a support of their own, which stay unchanged.
+        Dofs with supports of their own, which remain as they are.
     """
 
     def __init__(self, structure: Discretized, stated: NDArray[np.bool_]) -> None:
@@ -122,7 +123,7 @@ class Straight:
         return held
 
     def moved(self, imposed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Moved dofs (n, 3): the imposed ones, and points between ends of which one is imposed."""
+        """Moved dofs (n, 3): imposed dofs, and points of edges with an imposed end."""
         both, moved = self.held(), imposed.copy()
         for nodes in self._structure.clamped_nodes:
             inner = nodes[1:-1]

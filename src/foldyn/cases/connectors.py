@@ -18,7 +18,7 @@ from foldyn.mechanics.springs import GROUND, Springs, SpringsTerm
 from foldyn.structures.discretized import Discretized
 from foldyn.values import number
 
-NEAR = 1e-9  # of the structure's size: nodes closer than that have no line between them
+NEAR = 1e-9  # nodes closer than this fraction of the structure's size have no line between them
 
 
 class Connector(Part):
@@ -27,7 +27,8 @@ class Connector(Part):
     Attributes
     ----------
     nodes, between, direction
-        Nodes tied to the ground, or instead pairs of nodes; the direction, if it is fixed.
+        Nodes tied to the ground, or instead pairs of nodes tied to each other; the direction, if it
+        is fixed.
     asked, no_line : str
         Messages if not exactly one of `nodes` and `between` is given, and if the nodes a and b of
         pair k coincide and no direction is given.
@@ -68,7 +69,7 @@ class Connector(Part):
 
     @property
     def directions(self) -> NDArray[np.float64] | None:
-        """Unit vectors (k, 3) along which it acts; None: along the line between its ends."""
+        """Unit vectors (k, 3) of fixed directions; None: along the lines between the ends."""
         if self.direction is not None:
             return unit_vector(self.direction)[None]
         return np.eye(3) if self.nodes is not None else None
@@ -78,22 +79,24 @@ class Connector(Part):
 class Spring(Connector):
     """Linear springs: from nodes to the ground, or between nodes.
 
-    To the ground each node is pulled back with k (u . d), u its displacement from the rest position
-    and d a direction. The foot stands still in space; no base motion moves it.
+    A spring to the ground pulls its node back with k (u . d), with u the displacement of the node
+    from its rest position and d a direction. The foot of the spring stands still in space, even if
+    a base moves.
 
-    Between two nodes a spring pulls along the current line between them with k (l - l0), l their
-    distance; with a direction, along that with k (u_b - u_a) . d, wherever they are.
+    A spring between nodes a and b pulls along the current line between them with k (l - l0), with l
+    their distance. If a direction d is given, it pulls along d with k (u_b - u_a) . d, for any
+    positions.
 
     Parameters
     ----------
     stiffness : float
         k of each spring (N/m), above 0.
     nodes : int, sequence of int, or str, optional
-        Nodes that stand on the ground: numbers, or an expression over the pattern's vertices.
+        Nodes with springs to the ground: numbers, or an expression that selects vertices.
     between : sequence of (int, int), optional
         Pairs of nodes, instead of `nodes`.
     direction : {"x", "y", "z", "-x", "-y", "-z"} or sequence of float, shape (3,), optional
-        d, of any length. Without it springs to the ground act along all three axes, and those
+        d, of any length. Without it, springs to the ground act along all three axes, and springs
         between nodes along the line between them.
     rest_length : float, optional
         l0 of springs between nodes without a direction (m); their distance at rest by default.
@@ -114,7 +117,7 @@ class Spring(Connector):
     )
 
     def agree(self) -> None:
-        """Refuse a rest length for springs that have none."""
+        """Refuse a rest length for springs to the ground or along a direction."""
         super().agree()
         rest = self.rest_length
         if rest is not None and (self.between is None or self.direction is not None):
@@ -171,10 +174,11 @@ def packed(parts: Iterable[tuple[str, Spring]], structure: Discretized) -> Sprin
 
 @dataclass(frozen=True)
 class Dashpot(Connector):
-    """Viscous dampers: a force c times a velocity, against it.
+    """Viscous dampers: the force is c times a velocity and opposes it.
 
-    It acts between a node and the ground, which stays at rest even if a base moves; or between two
-    nodes, against the rate of their distance or of its component along a fixed direction.
+    A dashpot acts between a node and the ground, which stays at rest even if a base moves; or
+    between two nodes, against the rate of their distance, or against the component of their
+    relative velocity along a fixed direction.
 
     Parameters
     ----------
@@ -183,10 +187,11 @@ class Dashpot(Connector):
     nodes : int, sequence of int, or str, optional
         Nodes that each get a dashpot to the ground.
     between : sequence of int, or of pairs of them, optional
-        Instead of `nodes`: two nodes, as (0, 5), or several pairs with a dashpot each.
+        Instead of `nodes`: two nodes, such as (0, 5), or several pairs with a dashpot each.
     direction : {"x", "y", "z", "-x", "-y", "-z"} or sequence of float, shape (3,), optional
-        The only direction in which it acts, fixed in space. Without it a dashpot to the ground acts
-        against any motion of its node, and one between nodes along the current line between them.
+        The only direction in which the dashpot acts, fixed in space. Without it, a dashpot to the
+        ground acts against any motion of its node, and a dashpot between nodes along the current
+        line between them.
     """
 
     coefficient: Annotated[float, Check(number, least=0.0, unit="N s/m"), Key("dashpot")]

@@ -1,9 +1,9 @@
 """Constraints between displacements: oblique supports, links and rigid panels.
 
-All are linear equations G u = g with constant coefficients for the displacements u (3n,); g is zero
-except for supports that move. Elimination satisfies them exactly: u = E x (`algebra.elimination`),
-and solvers solve for the free dofs of x. This adds no stiffness and no unknowns, and keeps matrices
-symmetric and positive definite.
+All constraints are linear equations G u = g with constant coefficients for the displacements u
+(3n,); g is zero except for supports that move. Elimination satisfies them exactly: u = E x
+(`algebra.elimination`), and solvers solve for the free dofs of x. This adds no stiffness and no
+unknowns, and keeps matrices symmetric and positive definite.
 """
 
 from __future__ import annotations
@@ -27,23 +27,23 @@ from foldyn.structures.discretized import Discretized
 from foldyn.structures.rigid_plates import OFF_PLANE, on_plate
 from foldyn.values import show
 
-STRUCTURE = "the rigid panels"  # owner of their equations
-AGREES = 1e-9  # of displacements or lengths: how exactly equations must be met
+STRUCTURE = "the rigid panels"  # owner of the equations of rigid panels
+AGREES = 1e-9  # largest error of an equation, relative to displacements or lengths
 
 
 class Equation(NamedTuple):
-    """Sum of coefficients times dofs, the first dof being the one to solve for."""
+    """Sum of coefficients times dofs; it is solved for the first dof."""
 
-    owner: str  # the support that asks for it, "supports[2]", or STRUCTURE
+    owner: str  # the support that needs it, such as "supports[2]", or STRUCTURE
     dofs: Sequence[int]
     coefficients: Sequence[float] | NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """Equations between the 3n nodal dofs of a case; false if there are none.
+    """Equations between the 3n nodal dofs of a case; false as a condition if there are none.
 
-    Vectors and matrices over all dofs (m) may have further dofs after the nodal ones (a model's
+    Vectors and matrices for all dofs (m) may have further dofs after the nodal dofs (a model's
     hidden dofs), which stay unchanged.
 
     Parameters
@@ -106,13 +106,13 @@ class Constraints:
 
     @cached_property
     def determined(self) -> NDArray[np.bool_]:
-        """Whether each dof (n, 3) is held or follows others."""
+        """Whether each dof (n, 3) is held or determined by other dofs."""
         mask = np.ones(len(self.held), bool)
         mask[self.free] = False
         return mask.reshape(-1, 3)
 
     def with_held(self, dofs: NDArray) -> Constraints:
-        """The same with further dofs held."""
+        """The same constraints with further dofs held."""
         held = self.held.copy()
         held[dofs] = True
         return Constraints(self.equations, held) if len(dofs) else self
@@ -125,14 +125,14 @@ class Constraints:
 
     # ------------------------------------------------------------------ vectors and matrices
     def displacement(self, x: NDArray) -> NDArray:
-        """u = E x of vectors (m,) or (m, k)."""
+        """Displacements u = E x for coordinates x (m,) or (m, k)."""
         if not self:
             return x
         count = len(self.held)
         return np.concatenate([self.basis @ x[:count], x[count:]])
 
     def coordinates(self, u: NDArray) -> NDArray:
-        """x of displacements u (m,): slaves are replaced by the values of their equations."""
+        """Coordinates x of displacements u (m,): slaves become the values of their equations."""
         if not self:
             return u
         x = u.copy()
@@ -140,7 +140,7 @@ class Constraints:
         return x
 
     def rows_on_dofs(self, rows: NDArray) -> NDArray:
-        """Rows (r, m) for x that give the same products as the given rows with u = E x."""
+        """Rows (r, m) whose products with x equal those of the given rows with u = E x."""
         if not self:
             return rows
         out, count = rows.copy(), len(self.held)
@@ -149,35 +149,35 @@ class Constraints:
         return out
 
     def force(self, force: NDArray) -> NDArray:
-        """E' f of forces (m,) or (m, k), N."""
+        """E' f for forces f (m,) or (m, k), N."""
         if not self:
             return force
         count = len(self.held)
         return np.concatenate([self.basis.T @ force[:count], force[count:]])
 
     def largest(self, force: NDArray) -> NDArray:
-        """|E|' f: upper bounds, N, of E' f for forces of the sizes f (m,)."""
+        """|E|' f: upper bounds, N, of E' f if forces have the absolute values f (m,)."""
         if not self:
             return force
         count = len(self.held)
         return np.concatenate([abs(self.basis).T @ force[:count], force[count:]])
 
     def matrix(self, matrix: sparse.csr_array) -> sparse.csr_array:
-        """E' K E of a matrix (m, m)."""
+        """E' K E for a matrix K (m, m)."""
         if not self:
             return matrix
         basis = self.extended(matrix.shape[0])
         return sparse.csr_array(basis.T @ matrix @ basis)
 
     def extended(self, size: int) -> sparse.csr_array:
-        """E extended to m dofs (m, m)."""
+        """E (m, m), extended to m dofs."""
         more = size - len(self.held)
         if not more:
             return self.basis
         return sparse.csr_array(sparse.block_diag([self.basis, sparse.eye_array(more)]))
 
     def values(self, u: NDArray) -> NDArray:
-        """G u of displacements u (n, 3): the values (k,) of the equations, m."""
+        """G u for displacements u (n, 3): the values (k,) of the equations, m."""
         return self.rows @ u.ravel()
 
     @cached_property
@@ -187,7 +187,7 @@ class Constraints:
 
     # ------------------------------------------------------------------ supports that move
     def moved(self, shape: NDArray, values: NDArray, place: str) -> NDArray:
-        """Displacements (n, 3) when held dofs move as in `shape` (n, 3) and free ones stay.
+        """Displacements (n, 3) when held dofs move as in `shape` and free dofs stay in place.
 
         Parameters
         ----------
@@ -218,7 +218,7 @@ class Constraints:
     # ------------------------------------------------------------------ reactions
     @cached_property
     def supported(self) -> NDArray[np.int64]:
-        """Dofs (s,) on which supports exert forces, increasing: held, or along a direction."""
+        """Dofs (s,), increasing, on which supports exert forces, along axes or directions."""
         return np.union1d(np.flatnonzero(self.held), self._along).astype(np.int64)
 
     @cached_property
@@ -230,7 +230,7 @@ class Constraints:
 
     @cached_property
     def reactions(self) -> sparse.csr_array:
-        """Matrix (s, 3n) from forces on all dofs to the supports' forces on `supported` dofs."""
+        """Matrix (s, 3n) from forces on all dofs to forces of supports on `supported` dofs."""
         size = len(self.held)
         own = sparse.diags_array(self.held.astype(float))
         if not self:
@@ -250,9 +250,10 @@ def _is_direction(equation: Equation) -> bool:
 
 
 def equations_of(structure: Discretized, supports: Iterable[tuple[str, Any]]) -> list[Equation]:
-    """Equations of a structure's rigid panels, and of supports with their places.
+    """Equations of supports, given with their places, and of a structure's rigid panels.
 
-    Supports come first, so that their equation carries the force if another one is redundant.
+    Supports come first, so that the equation of a support carries the force if an equation of a
+    panel is redundant.
     """
     directions: list[Equation] = []
     links: list[Equation] = []
@@ -266,9 +267,9 @@ def equations_of(structure: Discretized, supports: Iterable[tuple[str, Any]]) ->
 
 
 def values_of(owners: NDArray, values: Mapping[str, Any]) -> NDArray[np.float64]:
-    """Values (k,), m, of equations with these owners; zero for owners without a value.
+    """Values (k,), m, of the equations of `owners`; zero for owners without a value.
 
-    values : by owner, one for all nodes or one for each.
+    values : by owner, one value for all nodes or one for each.
     """
     out = np.zeros(len(owners))
     for owner, value in values.items():
@@ -293,7 +294,7 @@ def check_tied(case: Any, displacement: NDArray, field: str) -> None:
 
 
 def _along(support: Fix | Impose, owner: str, nodes: NDArray) -> list[Equation]:
-    """Equations for the displacement along a direction; its largest component is solved for."""
+    """Equations for the displacement along a direction, solved for its largest component."""
     unit = unit_vector(support.direction)
     axes = [int(k) for k in np.argsort(-np.abs(unit), kind="stable") if unit[k] != 0.0]
     values = unit[axes].tolist()

@@ -33,8 +33,9 @@ from foldyn.values import length, number, objects, vector
 class Plane(Part):
     """A plane that the sheet cannot pass, fixed or moving: the ground, or the plate of a press.
 
-    It acts on the nodes of the sheet, or on the corners of thick panels' middle surfaces, at half
-    the thickness, but not on nodes that are held along all three axes.
+    The plane acts on the nodes of the sheet, or on the corners of the middle surfaces of thick
+    panels, at a distance of half the thickness. It does not act on nodes that are held along all
+    three axes.
 
     Parameters
     ----------
@@ -43,12 +44,12 @@ class Plane(Part):
     normal : sequence of float, shape (3,)
         Normal of any length, pointing to the side of the sheet.
     friction : float, optional
-        Coefficient of Coulomb friction; by default the one of the `Contact`.
+        Coefficient of Coulomb friction; by default that of the `Contact`.
     motion : sequence of float, shape (3,), optional
         Displacement (m) of the plane at factor 1; none by default. In an equilibrium path it is
         multiplied by the load factor.
     history : History or callable, optional
-        Factor of time of the motion, constant by default.
+        Factor of the motion over time; constant by default.
 
     Examples
     --------
@@ -75,7 +76,7 @@ class Plane(Part):
 
 @dataclass(frozen=True)
 class Contact(Part):
-    """Contact of panels that come closer than the sheet's thickness, and with planes.
+    """Contact of panels with each other, within the sheet's thickness, and with planes.
 
     Parameters
     ----------
@@ -83,14 +84,14 @@ class Contact(Part):
         Distance (m) of middle surfaces below which panels repel each other; by default the
         thickness of the sheet, or of each panel.
     friction : float, default 0
-        Coefficient of Coulomb friction between panels, and on planes without their own.
+        Coefficient of Coulomb friction between panels, and on planes without a coefficient.
     stiffness : float, optional
         k (N/m) of the potential k d0^2 (1 - d/d0)^3 / (d/d0)^4; 0.03 times Young's modulus times
         the thickness by default.
     panels : bool, default True
         Whether panels touch each other; if not, only planes act.
     planes : sequence of Plane
-        Planes; none by default.
+        Planes that the sheet cannot pass; none by default.
 
     Examples
     --------
@@ -115,8 +116,8 @@ class Contact(Part):
             raise InputError(": without planes nothing touches; give planes, or True", "panels")
 
     def sheets(self, structure: Discretized, held: NDArray[np.bool_]) -> Sheets:
-        """Surfaces in contact; held (n,) says which nodes are held along all axes."""
-        # copies: arrays that may be written to and those that may not have kernels of their own
+        """Surfaces in contact; `held` (n,) marks nodes that are held along all axes."""
+        # copies: kernels are compiled separately for read-only and for writable arrays
         panel = np.array(structure.triangle_panel)
         count, sheet = int(panel.max(initial=-1)) + 1, structure.sheet
         own = sheet.values("thickness", count)
@@ -124,7 +125,7 @@ class Contact(Part):
         stiffness = self.stiffness
         if stiffness is None:
             stiffness = STIFFNESS * float((moduli * own).min())
-        origin = structure.nodes.mean(axis=0)  # far from the origin digits are lost
+        origin = structure.nodes.mean(axis=0)  # digits are lost far from the origin
         sheets = Sheets(
             nodes=structure.nodes - origin,
             triangles=np.array(structure.triangles),
@@ -145,7 +146,7 @@ class Contact(Part):
         return BoardSheets(**vars(sheets), middle=x - height[:, :, None] * normal[:, None])
 
     def friction_on(self, plane: Plane) -> float:
-        """Coefficient of friction on a plane: its own, or else the common one."""
+        """Coefficient of friction on a plane: the plane's own, or else that of the contact."""
         return self.friction if plane.friction is None else plane.friction
 
     @property

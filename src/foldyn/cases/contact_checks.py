@@ -14,15 +14,15 @@ from foldyn.errors import InputError, warn
 from foldyn.mechanics.contact.candidates import NORMAL, POINT
 from foldyn.mechanics.crossings import crossing_panels, pairs_text
 
-STRIDE = 5  # check every fifth state for crossing panels
-NEAREST = 0.01  # of the distance at which contact begins: no motion gets closer
+STRIDE = 5  # crossing panels are looked for in every fifth state
+NEAREST = 0.01  # least distance in a motion, relative to the distance at which contact begins
 APART = (
     "start from a state in which they are apart, as with crease_rest above 0 and below 360 degrees"
 )
 
 
 def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
-    """Refuse a start in which panels or planes have been passed; warn if panels overlap.
+    """Refuse a start in which nodes are behind planes or panels cross; warn if panels overlap.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def _check_panels(case: Case, u: NDArray) -> None:
     tables = contact.tables
     x = tables.rest + contact.points(u)
     pairs = crossing_panels(x, tables.triangles, tables.panel)
-    pairs = pairs[pairs[:, 0] != pairs[:, 1]]  # what a panel does to itself is no contact
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]  # a panel has no contact with itself
     if len(pairs):
         raise InputError(
             f": at the start panels pass through each other: {pairs_text(pairs)}; {APART}",
@@ -105,16 +105,16 @@ def check_driven(case: Case, states: Iterable[tuple[str, NDArray, NDArray]]) -> 
     Parameters
     ----------
     case : Case
-        With contact.
+        A case with contact.
     states : iterable of (str, ndarray of shape (n, 3), ndarray of shape (p, 3))
-        The moment, as "t = 0.1 s"; displacements (m) of the nodes, as far as supports determine
-        them, and of the planes. The first is the start.
+        The moment, such as "t = 0.1 s"; displacements (m) of the nodes, as far as supports
+        determine them; displacements (m) of the planes. The first state is the start.
 
     Raises
     ------
     InputError
-        A node whose distance from a plane supports determine gets behind it, or panels cross
-        whose nodes are all moved by supports.
+        A node gets behind a plane, and its distance from the plane is determined by supports; or
+        panels cross, and supports move all their nodes.
     """
     assert case.contact is not None
     contact, tables = case.contact_term, case.contact_term.tables
@@ -159,7 +159,7 @@ def check_driven(case: Case, states: Iterable[tuple[str, NDArray, NDArray]]) -> 
 
 
 def _decided(case: Case, direction: NDArray) -> NDArray:
-    """Whether supports alone determine the motion of each node (n,) along a unit vector."""
+    """Whether supports alone determine each node's motion (n,) along a unit vector."""
     ties, nodes = case.constraints, len(case.structure.nodes)
     along = sparse.csr_array(sparse.kron(sparse.eye_array(nodes), direction[None]))
     if ties:
@@ -170,7 +170,7 @@ def _decided(case: Case, direction: NDArray) -> NDArray:
 def _followers(case: Case, decided: NDArray) -> tuple[NDArray, sparse.csr_array]:
     """Centers (c,) of panels whose corners supports determine, and the matrix of their motion.
 
-    decided : (n,) whether supports determine each node.
+    decided : (n,) whether supports determine the motion of each node.
     """
     structure = case.structure
     tri, size = structure.triangles, len(structure.nodes)
@@ -178,7 +178,7 @@ def _followers(case: Case, decided: NDArray) -> tuple[NDArray, sparse.csr_array]
     ends = np.unique(np.concatenate([ends, ends[:, ::-1]]), axis=0)
     beside = sparse.csr_array((np.ones(len(ends)), ends.T), (size, size))
     centers = np.asarray(getattr(structure, "centers", ()), np.int64)
-    centers = centers[centers >= 0]  # others have none
+    centers = centers[centers >= 0]  # other panels have no center
     centers = centers[~decided[centers] & (beside[centers] @ ~decided == 0)]
     mean = sparse.csr_array(beside[centers] / beside[centers].sum(axis=1)[:, None])
     return centers, mean

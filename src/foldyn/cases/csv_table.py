@@ -34,14 +34,14 @@ UNITS: Mapping[str, Mapping[str, Fraction]] = {
     "mobility": {"m/(N s)": Fraction(1), "mm/(N s)": Fraction(1, 10**3)},
     "accelerance": {"m/(N s2)": Fraction(1), "mm/(N s2)": Fraction(1, 10**3)},
 }
-"""Units by quantity, each with its size in the SI unit."""
+"""Units by quantity; the value of each unit in the SI unit."""
 
 _NUMBER = "number without unit"
 _SPELLINGS = {
     **{"µs": "us", "μs": "us", "m/s^2": "m/s2", "m/s²": "m/s2", "mm/s^2": "mm/s2"},
     **{"m/s/N": "m/(N s)", "m/s2/N": "m/(N s2)", "m/s^2/N": "m/(N s2)", "m/s²/N": "m/(N s2)"},
 }
-_DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}  # the first in the header counts
+_DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}  # first found in the header
 MOST = 64
 """Size of a file (MiB)."""
 _MANY = 10  # names listed in a message
@@ -50,7 +50,7 @@ _HEADER = 'begin with a line that names the columns, as in "time [s],force [N]"'
 
 @dataclass(frozen=True)
 class _Column:
-    """A column: its place in a line, its heading as written, and the name and unit in it."""
+    """A column: its place in a line, its heading as written, and the heading's name and unit."""
 
     place: int
     heading: str
@@ -59,7 +59,7 @@ class _Column:
 
     @property
     def shown(self) -> str:
-        """Its heading for messages."""
+        """The heading, shortened for messages."""
         return shortened(self.heading)
 
 
@@ -114,10 +114,10 @@ def read_numbers(
     Parameters
     ----------
     path : path
-        A file as `Table.from_csv` reads it.
+        A file in the format of `Table.from_csv`.
     wanted : mapping of str to (str, str)
-        For each field, which messages and the result name: the heading of its column, with or
-        without the unit, and the unit to convert to.
+        For each field: the heading of its column, with or without the unit, and the unit to convert
+        to. Messages and the result use the names of the fields.
     gaps : collection of str
         Fields whose cells may be empty.
 
@@ -151,7 +151,7 @@ def read_headings(path: str | os.PathLike[str]) -> list[tuple[str, str | None]]:
 
 
 def some(names: Sequence[str]) -> str:
-    """Names for a message; only the first ones if there are many."""
+    """Names for a message; only the first names if there are many."""
     if len(names) <= _MANY:
         return ", ".join(names)
     return f"{', '.join(names[: _MANY - 2])}, ... ({len(names)} in all)"
@@ -277,7 +277,7 @@ def _number(
     if not _is_number(cell):
         hint = " (decimals are written with a point)" if "," in cell else ""
         raise InputError(f'{place}: "{shortened(cell)}" is not a number{hint}{remedy}')
-    # an exact ratio of whole numbers: 5 ms become the double nearest to 0.005 s
+    # an exact ratio of integers, so that 5 ms becomes the double nearest to 0.005 s
     value = float(cell) * ratio.numerator / ratio.denominator
     if not np.isfinite(value):
         raise InputError(f'{place}: "{shortened(cell)}" is not a finite number{remedy}')

@@ -27,7 +27,7 @@ STATES = ("rest", "initial")
 
 @dataclass(frozen=True)
 class Rayleigh(Part):
-    """Damping matrix C = alpha M + beta K0, K0 the tangent stiffness at a stated state.
+    """Damping matrix C = alpha M + beta K0, with K0 the tangent stiffness in a given state.
 
     A motion of angular frequency w has the damping ratio alpha / (2 w) + beta w / 2. As K0 is
     constant, beta also resists rigid rotations: take `StrainDamping` for large rotations.
@@ -39,8 +39,8 @@ class Rayleigh(Part):
     beta : float
         Stiffness-proportional coefficient (s), at least 0.
     state : {"rest", "initial"}
-        Where K0 is taken: at the structure's rest, or where a motion starts (for modes and
-        frequency responses: the state about which it vibrates).
+        State in which K0 is computed: at rest, or where a motion starts (for modes and frequency
+        responses: the state about which the structure vibrates).
     """
 
     alpha: Annotated[float, Check(number, least=0.0, unit="1/s")] = 0.0
@@ -56,15 +56,15 @@ class Rayleigh(Part):
     ) -> Rayleigh:
         """Damping that has the ratios z1 and z2 at the frequencies f1 and f2.
 
-        Solves z = alpha / (4 pi f) + beta pi f for both. Between the frequencies the ratio is
-        lower, beyond them higher.
+        Solves z = alpha / (4 pi f) + beta pi f for alpha and beta. Between the two frequencies the
+        damping ratio is lower, outside this range higher.
 
         Parameters
         ----------
         f1, f2 : float
             Frequencies (Hz), positive and different.
         z1, z2 : float
-            Damping ratios there, at least 0 (0.02 is 2 %).
+            Damping ratios at f1 and f2, at least 0 (0.02 is 2 %).
         state : {"rest", "initial"}
             See `Rayleigh`.
 
@@ -85,7 +85,7 @@ class Rayleigh(Part):
         if f1 == f2:
             raise InputError(f" = {f2:g}: must differ from f1", "f2")
         lower, upper = sorted((z1 * f1 / f2, z1 * f2 / f1))
-        slack = 1e-12 * upper  # rounding where one of the two is alone
+        slack = 1e-12 * upper  # rounding if alpha or beta is 0
         if not lower - slack <= z2 <= upper + slack:
             ends = ("alpha", "beta") if f1 < f2 else ("beta", "alpha")
             raise InputError(
@@ -112,22 +112,23 @@ class Rayleigh(Part):
 class ModalDamping(Part):
     """Damping ratios of the lowest modes, C = M Phi diag(2 zeta omega) Phi' M, phi' M phi = 1.
 
-    Small motions in the listed modes have these ratios; other modes are undamped. The matrix
-    is constant (E. L. Wilson and J. Penzien, Int. J. Numer. Methods Eng. 4, 1972; R. W. Clough and
-    J. Penzien, Dynamics of Structures, 2nd ed. 1993, section 12-3), and damps only deformation: if
-    supports move, the motion relative to the quasi-static one. Rigid motions and modes without
-    stiffness are neither counted nor damped. Modes of equal frequency get the mean of their ratios,
-    as their shapes are not unique.
+    Small motions in the listed modes have these ratios; other modes are undamped. The matrix is
+    constant (E. L. Wilson and J. Penzien, Int. J. Numer. Methods Eng. 4, 1972; R. W. Clough and J.
+    Penzien, Dynamics of Structures, 2nd ed. 1993, section 12-3). It damps only deformation: if
+    supports move, it damps the motion relative to the quasi-static motion. Rigid motions and modes
+    without stiffness are neither counted nor damped. Modes of equal frequency all get the mean of
+    their ratios, as their shapes are not unique.
 
     Parameters
     ----------
     ratios : float or sequence of float
-        Damping ratio (0.02 is 2 %, at least 0) of `count` modes, or of each from the lowest on.
+        Damping ratio (0.02 is 2 %, at least 0) of `count` modes, or one for each mode from the
+        lowest on.
     count : int, optional
-        Number of lowest modes that have the ratio, if it is a single number; all by default.
+        Number of lowest modes that have the ratio, if `ratios` is a single number; all by default.
     state : {"rest", "initial"}
-        State of these modes: rest, or the initial state of a motion (for modes and frequency
-        responses: the state of the vibration).
+        State whose modes are damped: rest, or the initial state of a motion (for modes and
+        frequency responses: the state about which the structure vibrates).
     """
 
     ratios: Annotated[float | Sequence[float], Check(number_or_list, what="mode", least=0.0)]
@@ -148,24 +149,24 @@ class ModalDamping(Part):
 
     @property
     def modes(self) -> int | None:
-        """How many modes it damps; None for all."""
+        """Number of damped modes; None for all."""
         return len(self.ratios) if isinstance(self.ratios, tuple) else self.count
 
 
 @dataclass(frozen=True)
 class CreaseDamping(Part):
-    """A moment against the folding rate of each crease: M = c L d theta / dt.
+    """A moment M = c L d theta / dt against the folding of each crease.
 
-    theta is the current dihedral, so this is exact for any motion; rigid motions dissipate nothing.
-    If several damp the same crease, their coefficients add up.
+    As theta is the current dihedral, this is exact for any motion; rigid motions dissipate nothing.
+    If several crease dampings act on one crease, their coefficients add up.
 
     Parameters
     ----------
     coefficient : float
         Damping c of a crease, N m s/rad per m of its length L at rest, at least 0.
     creases : int, sequence of int, or str
-        Numbers in the order of `pattern.creases`, or a name: "mountain", "valley", "all", which
-        are all but the flat ones, or a family of the pattern (`Pattern.families`), as "zigzag".
+        Numbers in the order of `pattern.creases`, or a name: "mountain", "valley", "all" (all
+        except flat creases), or a family of the pattern (`Pattern.families`), such as "zigzag".
     """
 
     coefficient: Annotated[float, Check(number, least=0.0, unit="N m s/rad per m")]
@@ -186,11 +187,11 @@ class StrainDamping(Part):
     """Damping of the rates at which bars stretch and hinges turn: beta times their stiffness.
 
     A Kelvin-Voigt material: the force of a bar or hinge depends on its elongation or turn plus beta
-    times its rate, along its current direction. The rates of bars in panels with membranes are
-    coupled as their strains are. So this is exact for motions of any size, and rigid rotations
-    dissipate nothing. For small motions about rest it equals beta K0 (see `Rayleigh`): a vibration
-    of angular frequency w has the damping ratio beta w / 2. Hinges have the slope of their law at
-    rest; springs are not damped, as they have dashpots for this.
+    times the rate of this, and acts along the current direction. In panels with membranes the rates
+    of bars are coupled like their strains. The damping is exact for motions of any size, and rigid
+    rotations dissipate nothing. For small motions about rest it equals beta K0 (see `Rayleigh`): a
+    vibration of angular frequency w has the damping ratio beta w / 2. For hinges the slope of their
+    law at rest is used. Springs are not damped; use dashpots for this.
 
     Parameters
     ----------
@@ -206,7 +207,7 @@ class StrainDamping(Part):
 
 Damping = Rayleigh | ModalDamping | CreaseDamping | StrainDamping
 DAMPINGS: tuple[type[Damping], ...] = get_args(Damping)
-"""All kinds. In the table of damping each has its `key`; one without a key is the table itself."""
+"""All kinds. `key` is a kind's key in the table of damping; a kind without it is the table."""
 
 
 def dampings(given: Any) -> Damping | tuple[Damping, ...]:
@@ -215,7 +216,7 @@ def dampings(given: Any) -> Damping | tuple[Damping, ...]:
     Raises
     ------
     InputError
-        Something else, or two of a kind of which there can be only one.
+        `given` is something else, or has two of a kind that may occur only once.
     """
     parts = tuple(given) if isinstance(given, list | tuple) else (given,)
     names = " or ".join(f"{kind.__name__}(...)" for kind in DAMPINGS)
@@ -244,7 +245,7 @@ def damping_table(parts: Sequence[Damping]) -> dict[str, Any]:
 
 
 class _DampingsOf(Check):
-    """Dampings of a kind, from a table, a list of tables, or just the first argument."""
+    """Dampings of one kind, from a table, a list of tables, or just the value of the first key."""
 
     def __init__(self, kind: type[Damping]) -> None:
         super().__init__(self._listed)
@@ -267,7 +268,7 @@ class _DampingsOf(Check):
             return read(self.kind, name, value)
         try:
             return read(self.kind, name, {self.first: value})
-        except InputError as error:  # the value stands in the place of its table
+        except InputError as error:  # the field is the value, not a table
             raise InputError(error.reason, error.field.replace(f".{self.first}", "", 1)) from None
 
 
@@ -288,7 +289,7 @@ class DampingSection(Rayleigh, Section):
     Parameters
     ----------
     ratios : sequence of (float, float)
-        Instead of alpha and beta: two pairs of a frequency (Hz) and the damping ratio there.
+        Instead of alpha and beta: two pairs of a frequency (Hz) and the damping ratio at it.
     modal : float, sequence of float, or table
         Damping ratios of the lowest modes; see `ModalDamping`.
     creases : float, table, or list of tables

@@ -1,7 +1,7 @@
 """Histories, laws and other parts of a case from tables of case files and stored cases.
 
-Every message begins after the table's place: ".duration = -1: must be ..."; the caller puts
-"loads[0].history" in front.
+Messages begin with the key in the table, ".duration = -1: must be ..."; the caller puts the place
+of the table, "loads[0].history", in front.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ def history_from(table: Any, folder: Path | None = None) -> History:
 def law_from(spec: Any, laws: Mapping[str, type]) -> Any:
     """Law from its name, or from its table such as ``{kind = "enhanced", theta1 = 75}``.
 
-    A name is returned unchanged. A law inside another, as ``law = {kind = "enhanced"}``, is made in
-    the same way.
+    A name is returned unchanged. A law inside another law, such as ``law = {kind = "enhanced"}``,
+    is made in the same way.
     """
     if isinstance(spec, str):
         return choice("", spec, laws)
@@ -83,7 +83,7 @@ def call_from(
             made = function(**left)
             break
         except InputError as error:
-            inside = error.field.rpartition(": ")[2]  # without the name of what was called
+            inside = error.field.rpartition(": ")[2]  # without the name of the function
             key = re.split(r"\W", inside)[0]
             if key in left:
                 faults.add(InputError(error.reason, f".{inside}"))
@@ -92,7 +92,7 @@ def call_from(
                 faults.add(InputError(f": {reason}"))
             if key not in left or known[key].default is inspect.Parameter.empty:
                 break
-            del left[key]  # what else is wrong?
+            del left[key]  # look for further faults
     faults.raise_all()
     return made
 
@@ -120,7 +120,7 @@ def _table_from_file(arguments: Mapping[str, Any], folder: Path) -> Table:
 
 
 class KindOf(Placed):
-    """A table whose `kind` names one of several data classes, or just that name."""
+    """A table whose `kind` is the name of one of several data classes, or just that name."""
 
     def __init__(
         self, read: Callable[..., Any], kinds: Mapping[str, Any], named: bool, **limits: Any
@@ -148,48 +148,49 @@ Factor = Annotated[
 class Part(Checked):
     """A load, a support, a point mass or a kind of damping: a frozen data class.
 
-    Its arguments have the keys of its table in a case file; see `foldyn.arguments`.
+    The keys of its table in a case file are its arguments; see `foldyn.arguments`.
 
     Attributes
     ----------
     apart : str
-        Message if keys of another kind are given together with its own.
+        Message if a table has keys of this kind and of another kind.
     """
 
     apart: ClassVar[str] = ""
 
     @classmethod
     def term(cls, parts: Sequence[tuple[str, Any]], structure: Discretized) -> Term | None:
-        """Energy term of all parts of this kind, each given with its place; None if none."""
+        """Energy term of all parts of this kind, each given with its place; None without a term."""
         return None
 
     @classmethod
     def by_key(cls) -> dict[str, str]:
-        """Its arguments by the keys of its table."""
+        """Names of the arguments by the keys of the table."""
         return {argument.key: name for name, argument in arguments(cls).items()}
 
     def table(self) -> dict[str, Any]:
-        """Its table of plain values, without the history and arguments that are None."""
+        """The part's table of plain values, without the history and arguments that are None."""
         given = {key: getattr(self, name) for key, name in self.by_key().items()}
         given.pop("history", None)
         return {key: plain(value) for key, value in given.items() if value is not None}
 
 
 class PartOf(Check):
-    """A table of one of several kinds of parts; its keys tell which.
+    """A table of one of several kinds of parts; its keys determine the kind.
 
-    Candidates are the kinds with a given key that no other kind has, or all if there is no such
-    key. The first candidate with all given keys is chosen, or else the last.
+    Candidates are the kinds that alone have one of the keys in the table; without such a key, all
+    kinds. The first candidate that has all keys in the table is chosen; if there is none, the last
+    candidate.
 
     Parameters
     ----------
     kinds : sequence of type
     section : str
-        Name of the list of these tables in a case file.
+        Name of the list in a case file that holds the tables.
     asked : str
         Remedy in the message if the table has no keys.
     **refused
-        Forbidden keys, each with the reason.
+        Forbidden keys, each with a reason.
     """
 
     def __init__(

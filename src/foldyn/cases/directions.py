@@ -33,7 +33,7 @@ def check_axes(name: str, axes: Any) -> str:
 
 
 def check_direction(name: str, direction: Any) -> str | tuple[float, ...]:
-    """Return a direction as it was given: a vector that is not zero, or a name as "-z"."""
+    """Return a direction as it was given: a vector that is not zero, or a name such as "-z"."""
     if isinstance(direction, str):
         return choice(name, direction, DIRECTIONS)
     return vector(name, direction, nonzero=True)

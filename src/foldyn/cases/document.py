@@ -1,8 +1,8 @@
 """Conversion of a case to a document (a table for TOML) with named arrays, and back.
 
-The document has the sections of a case file. It refers to long data in the arrays as
-``{ array = "name" }``: the pattern's vertices and faces, values per crease, tables of histories.
-Numbers are preserved exactly.
+The document has the sections of a case file. Long data are in the arrays, and the document refers
+to them by ``{ array = "name" }``: the pattern's vertices and faces, values per crease, tables of
+histories. Numbers are preserved exactly.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Document:
     arrays : dict of str to ndarray
         Arrays that the sections refer to, by name.
     obstacles : tuple of str
-        Why the case cannot be rebuilt from the document; empty if it can.
+        Reasons why the case cannot be rebuilt from the document; empty if it can be rebuilt.
     """
 
     sections: dict[str, Any]
@@ -83,7 +83,7 @@ def to_document(case: Case, stage_times: NDArray[np.float64] | None = None) -> D
 
 
 def pattern_document(pattern: Pattern) -> Document:
-    """Convert a pattern without a sheet to a document, which is no complete case."""
+    """Convert a pattern without a sheet to a document, which is not a complete case."""
     writer = _Writer(None)
     sections = {
         "pattern": writer.pattern(pattern),
@@ -124,7 +124,7 @@ def _undamaged(read: Callable[[Any], T], table: Any, arrays: Mapping[str, NDArra
         return read(_resolve(table, arrays))
     except InputError:
         raise
-    except Exception as error:  # whatever a wrong number or table leads to
+    except Exception as error:  # any error that damaged numbers or tables cause
         raise InputError(f"the stored case is damaged ({type(error).__name__}: {error})") from error
 
 
@@ -294,14 +294,14 @@ class _Writer:
         return table
 
     def _new_history(self, history: History, moves: bool) -> dict[str, Any]:
-        if HISTORIES.get(history.kind) is not type(history):  # a function of the user's own
+        if HISTORIES.get(history.kind) is not type(history):  # a user's function
             if self.stage_times is None:
                 self.obstacles.append(
                     f"a {'motion' if moves else 'load'} has a function of time as history, and "
                     "the time step of the run, at which it would be sampled, is not known"
                 )
                 return {"kind": "user"}
-            try:  # the velocity of a motion counts too, so it must not jump at every sample
+            try:  # motions have velocities, which must not jump at every sample
                 history = Table(self.stage_times, history(self.stage_times), smooth=moves)
             except InputError as error:
                 self.obstacles.append(str(error))
@@ -322,7 +322,7 @@ def _read(sections: Mapping[str, Any]) -> Case:
     contact = read(Contact, "", sections["contact"]) if "contact" in sections else None
     air = read(Air, "", sections["air"]) if "air" in sections else None
     structure = _structure(sections)
-    with warnings.catch_warnings():  # they were issued when the case was first made
+    with warnings.catch_warnings():  # warnings were issued when the case was first made
         warnings.simplefilter("ignore", FoldynWarning)
         damping = read(DampingSection, "", sections["damping"]).made()
         return Case(structure, supports, loads, damping, masses, contact, air)
@@ -346,7 +346,7 @@ def _structure(sections: Mapping[str, Any]) -> Any:
         _check_whole(nodes.shape == shape, nodes, f"the shape {shape}")
         centers = {k: nodes[c] for k, c in enumerate(structure.centers) if c >= 0}
         if centers and not np.array_equal(nodes, structure.nodes):
-            # panel centers given by hand, or computed to other last digits on another machine
+            # centers were given, or computed with other last digits on another machine
             structure = discretize(pattern, sheet, **model, centers=centers)
     return structure
 
@@ -377,7 +377,7 @@ def _stored_pattern(table: Mapping[str, Any]) -> Pattern:
 
 
 def _resolve(value: Any, arrays: Mapping[str, NDArray]) -> Any:
-    """Replace references by their arrays."""
+    """Replace references by the arrays that they name."""
     if isinstance(value, Mapping):
         if set(value) == {"array"}:
             if value["array"] not in arrays:

@@ -20,9 +20,9 @@ IN_PLANE, BENDING = ("strain_membrane", "strain_bars"), ("strain_bending", "stra
 def heat_of(
     structure: Discretized, parts: Sequence[tuple[Swelling, int]], histories: int, offset: NDArray
 ) -> Heat | None:
-    """Heat of swollen states, each with the number of its history; None if there are none.
+    """Heat of swellings, each given with the number of its history; None without swellings.
 
-    offset : (., 4) of the sheet with its dofs in balance; see `SheetTerm.series`.
+    offset : (., 4) offsets of a sheet that keeps dofs in balance; see `SheetTerm.series`.
     """
     if not parts:
         return None

@@ -1,7 +1,7 @@
 """The built-in histories, and the registry of all.
 
-To add one: its formula, a frozen dataclass with `kind`, `formulas` and `parameters`, and its line
-in `HISTORIES`.
+A new history needs a formula, a frozen dataclass with `kind`, `formulas` and `parameters`, and a
+line in `HISTORIES`.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ __all__ = [
     "Table",
 ]  # fmt: skip
 
-TABLE = 8  # code
-SHARP = 0.01  # of the range of a table: deviation from a straight line at a sharp corner
+TABLE = 8  # code of tables
+SHARP = 0.01  # deviation from a straight line at a sharp corner, relative to the table's range
 
 
 @dataclass(frozen=True)
@@ -124,8 +124,8 @@ class Ramp(_Lasting):
     duration : float
         Length of the rise (s), greater than 0.
     smooth : bool
-        Rise with continuous first and second derivatives, which starts and ends a motion without a
-        jolt: x^3 (10 - 15 x + 6 x^2) with x = t / duration.
+        Whether the rise has continuous first and second derivatives, so that a motion starts and
+        ends without a jolt: x^3 (10 - 15 x + 6 x^2) with x = t / duration.
 
     Examples
     --------
@@ -206,7 +206,7 @@ class Harmonic(Formula):
 
 @inner_scalar
 def chirp(t, start, slope, phase, duration):
-    """See `Waveform`; slope (Hz/s) of the frequency."""
+    """See `Waveform`; `slope` (Hz/s) is the rate of the frequency."""
     if not 0.0 <= t < duration:
         return 0.0, 0.0, 0.0
     angle = 2.0 * math.pi * ((start + 0.5 * slope * t) * t) + phase
@@ -280,8 +280,8 @@ class Table(Formula):
     values : array_like, shape (n,)
         Factors at these times.
     smooth : bool
-        A cubic spline through the values instead of straight lines: for measured displacements of
-        supports, whose velocity must not jump at every value.
+        Whether to use a cubic spline through the values instead of straight lines: for measured
+        displacements of supports, whose velocity must not jump at every value.
     """
 
     times: Annotated[Any, Check(numbers, unit="s")]
@@ -291,7 +291,7 @@ class Table(Formula):
     formulas = (Waveform(TABLE, None),)
 
     def agree(self) -> None:
-        """Refuse times that do not increase, and another number of values."""
+        """Refuse times that do not increase, and numbers of times and values that differ."""
         times, values = self.times, self.values
         if times.ndim != 1 or times.size < 2:
             raise InputError(f" = {show(times)}: must be a list of at least two numbers", "times")
@@ -321,9 +321,9 @@ class Table(Formula):
         """Table from two columns of a CSV file; units are checked and converted.
 
         The file is a text in UTF-8: a line with the names of the columns and their units in
-        brackets, as in ``time [ms],force [mN]``, then lines of numbers. Cells are separated by
-        tabs, semicolons or commas, whichever of these the header has first in this order. Empty
-        lines and lines that begin with # are skipped.
+        brackets, such as ``time [ms],force [mN]``, then lines of numbers. Cells are separated by
+        tabs if the header has one, else by semicolons if it has one, else by commas. Empty lines
+        and lines that begin with # are skipped.
 
         Parameters
         ----------
@@ -335,10 +335,10 @@ class Table(Formula):
         unit : str
             Unit to convert the values to. The default "-" is a factor without unit, from a column
             with [-], [1], [%] or no unit. With "N", "mN" or "kN" the column must be a force: the
-            load's vector is then a direction, (1, 0, 0) for a force along x. Likewise "m", "cm",
-            "mm" and "m/s2", "mm/s2".
+            load's vector is then a direction, (1, 0, 0) for a force along x. The same applies to
+            "m", "cm", "mm" and to "m/s2", "mm/s2".
         smooth : bool
-            As for the class.
+            See the class.
 
         Raises
         ------

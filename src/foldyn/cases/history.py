@@ -1,8 +1,8 @@
 """Histories: how a load varies in time, as a factor.
 
 A history is called with times (s), a number or an array of any shape, and returns factors of the
-same shape. Here are the constant and user-defined functions; `histories` has the other built-in
-ones.
+same shape. This module has the constant history and user-defined functions; `histories` has the
+other built-in histories.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from foldyn.errors import InputError
 from foldyn.jit.compiled import inner_scalar
 from foldyn.values import numbers, show
 
-CALLED, CONSTANT = -1, 0  # codes of the user's functions, and of the constant
+CALLED, CONSTANT = -1, 0  # codes of user's functions and of the constant history
 
 
 class History(Checked, ABC):
@@ -52,11 +52,11 @@ class History(Checked, ABC):
         return np.zeros(0), np.zeros((0, 4))
 
     def jumps(self) -> tuple[float, ...]:
-        """Times (s) at which the factor jumps, which no imposed motion can follow."""
+        """Times (s) at which the factor jumps; imposed motions cannot follow jumps."""
         return ()
 
     def knots(self) -> tuple[float, ...] | None:
-        """Times (s), in order, at which it jumps or has a corner; None if unknown."""
+        """Times (s), in order, at which the factor jumps or has a corner; None if unknown."""
         return self.jumps()
 
 
@@ -67,7 +67,7 @@ class Waveform(NamedTuple):
     value after the jump.
     """
 
-    code: int  # unique
+    code: int  # unique among histories
     formula: Any  # None if `polynomials` define the history
 
 
@@ -75,7 +75,7 @@ class Formula(History):
     """A history with a compiled formula, for loops over time."""
 
     formulas: ClassVar[tuple[Waveform, ...]] = ()
-    """One for each code of the history; the first is the default."""
+    """One waveform for each code of the history; the first is the default."""
     table: ClassVar[Callable[[History, NDArray], NDArray]]
     """Factors and derivatives at times; set by `waveforms`, which imports all histories."""
 
@@ -121,11 +121,11 @@ class Function(History):
     Parameters
     ----------
     function : callable
-        Returns the factor at a time (s), a float.
+        Takes a time (s) and returns the factor, a float.
     at : sequence of float, optional
-        Times (s) at which it jumps or has a corner; empty if there are none. Integrators with
-        adaptive steps end a step at each. Without `at` they only sample the function within a step,
-        and warn that a short pulse may be missed.
+        Times (s) at which the function jumps or has a corner; empty if there are none. Integrators
+        with adaptive steps end a step at each of these times. Without `at` they only sample the
+        function within a step, and warn that a short pulse may be missed.
 
     Notes
     -----
@@ -178,7 +178,7 @@ class Function(History):
 
 
 def factor(history: History, time: float | None) -> float:
-    """Factor at a time (s); without a time 1 for constant histories and 0 for all others."""
+    """Factor at a time (s); if time is None, 1 for constant histories and 0 for all others."""
     return float(history.code == CONSTANT) if time is None else float(history(time))
 
 

@@ -22,11 +22,11 @@ class Load(Part):
     Attributes
     ----------
     apart : str
-        Why it cannot share a table with another load, for messages.
+        For messages: why this load cannot share a table with another load.
     arrows : bool
-        Whether pictures show its forces as arrows at the nodes.
+        Whether pictures show the forces as arrows at the nodes.
     moves : bool
-        Whether its history describes a motion, so that its velocity matters.
+        Whether the history describes a motion, so that the velocity matters.
     """
 
     apart: ClassVar[str]
@@ -35,11 +35,11 @@ class Load(Part):
     history: Any
 
     def forces(self, structure: Discretized, place: str) -> NDArray[np.float64] | None:
-        """Forces (n, 3), N, on all nodes; None if it is not a force."""
+        """Forces (n, 3), N, on all nodes; None if the load is not a force."""
         return None
 
     def loaded(self, structure: Discretized, place: str) -> NDArray[np.int64]:
-        """Nodes on which it acts; empty if it acts on all nodes or on creases."""
+        """Nodes on which the load acts; empty if it acts on all nodes or on creases."""
         return np.zeros(0, np.int64)
 
     def rest_changes(
@@ -49,9 +49,9 @@ class Load(Part):
         return None
 
     def turns(self, structure: Discretized, place: str) -> NDArray[np.float64] | None:
-        """Changes, rad, of the first `SheetTerm.rest_angles`; None if there are none.
+        """Changes, rad, of `SheetTerm.rest_angles`, from the first on; None if there are none.
 
-        Changes of creases by `rest_changes` are not included.
+        Changes from `rest_changes` are not included.
         """
         return None
 
@@ -76,13 +76,13 @@ def check_held(
     Parameters
     ----------
     what : str
-        The load, in messages: "the force [0, 0, 1]".
+        The load's name in messages, such as "the force [0, 0, 1]".
     nodes, acts : ndarray of int
-        Nodes and axes on which it acts.
+        Nodes and axes on which the load acts.
     fixed : ndarray of bool, shape (n, 3)
     place : str
     told : bool
-        Whether to warn if some of the axes are held.
+        Whether to warn if the load acts on held axes in part.
     """
     held = fixed[np.ix_(nodes, acts)]
     if not held.any():

@@ -39,7 +39,7 @@ __all__ = [
     "TotalForce",
 ]
 
-FOLDED = ("angle", "fold_angle", "fraction")  # arguments of `Actuate` of which one is given
+FOLDED = ("angle", "fold_angle", "fraction")  # `Actuate` takes exactly one of these arguments
 STANDARD = 9.80665  # m/s2, standard gravity (3rd CGPM, 1901)
 
 
@@ -96,10 +96,11 @@ def dihedrals(
     letters: NDArray[np.str_],
     flat: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Dihedrals (degrees) of creases (nc,), from the one of the first three that is given.
+    """Dihedrals (degrees) of creases (nc,), from one given of angle, fold angle and fraction.
 
-    letters, flat : assignments of the creases, and their dihedrals (degrees) with flat panels.
-    assigned : whether the creases were chosen by a word. A single fold angle is then a size, and
+    letters : assignments of the creases.
+    flat : dihedrals (degrees) of the creases if the panels are flat.
+    assigned : whether the creases were chosen by a word. A single fold angle then has no sign, and
         each crease folds as it is assigned.
     """
     if angle is not None:
@@ -119,7 +120,7 @@ def dihedrals(
 
 
 def within_reach(angles: NDArray[np.float64], creases: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Dihedrals (degrees) clipped to 0 to 360 if only rounding exceeds this; else an error."""
+    """Dihedrals (degrees), clipped to 0 to 360 if only rounding exceeds it; otherwise an error."""
     beyond = creases[(angles < -ROUNDING) | (angles > 360.0 + ROUNDING)]
     if beyond.size:
         raise InputError(
@@ -149,7 +150,7 @@ class Force(Load):
     Parameters
     ----------
     nodes : int, sequence of int, or str
-        Node numbers, or an expression over the pattern's vertices ("xmin", "zmax and y>0").
+        Node numbers, or an expression that selects vertices ("xmin", "zmax and y>0").
     vector : sequence of float, shape (3,)
         Force (N) on each of these nodes.
     history : History or callable, optional
@@ -191,15 +192,15 @@ def _acceleration(name: str, value: Any) -> tuple[float, ...]:
 class Gravity(Load):
     """Gravity on the whole structure, times a history.
 
-    Each node gets the sum of its row of the mass matrix times the acceleration. So the weight is
-    exact with every mass rule, and a free structure falls with exactly this acceleration. Point
-    masses are included. The weight of held nodes adds to the reactions.
+    The force on a node is the sum of the node's row of the mass matrix, times the acceleration. So
+    the weight is exact with every mass rule, and a free structure falls with exactly this
+    acceleration. Point masses are included. The weight of held nodes adds to the reactions.
 
     Parameters
     ----------
     acceleration : sequence of float, shape (3,), or str
-        Acceleration (m/s2) of free fall, as (0, 0, -9.81), not zero; or a direction, as "-z", for
-        standard gravity, 9.80665 m/s2.
+        Acceleration (m/s2) of free fall, such as (0, 0, -9.81), not zero; or a direction, such as
+        "-z", for standard gravity, 9.80665 m/s2.
     history : History or callable, optional
         Factor of time; constant by default.
     """
@@ -226,19 +227,21 @@ class Actuate(Load):
     Parameters
     ----------
     creases : int, sequence of int, or str
-        Numbers in the order of `pattern.creases`, or a name: "mountain", "valley", "all", which
-        are all but the flat ones, or a family of the pattern (`Pattern.families`), as "zigzag".
+        Numbers in the order of `pattern.creases`, or a name: "mountain", "valley", "all" (all
+        except flat creases), or a family of the pattern (`Pattern.families`), such as "zigzag".
     angle : float or sequence of float, optional
-        Rest dihedral (degrees, 0 to 360, flat 180) at factor 1, of all these creases or of each.
+        Rest dihedral (degrees, 0 to 360, flat 180) at factor 1: one for all creases, or one for
+        each.
     history : History or callable, optional
         Factor of time; constant by default.
     fold_angle : float or sequence of float, optional
-        Instead, the fold angle of the FOLD format (degrees, -180 to 180): 180 minus the dihedral,
-        0 flat, valleys positive, mountains negative. One number for creases chosen by a word is a
-        size, at least 0: each crease folds as it is assigned.
+        Instead of `angle`, the fold angle of the FOLD format (degrees, -180 to 180): 180 minus the
+        dihedral; 0 if flat, positive for valleys, negative for mountains. A single number for
+        creases chosen by a word has no sign, at least 0: each crease folds as it is assigned.
     fraction : float or str, optional
-        Instead, the fraction of fully folded, 0 to 1 or as in "80%": valleys fold to 180 degrees
-        times the fraction, mountains to -180 degrees times it.
+        Instead of `angle`, the fraction of the way to fully folded, 0 to 1 or a text such as "80%":
+        valleys fold to 180 degrees times the fraction, mountains to -180 degrees times the
+        fraction.
     """
 
     creases: Creases
@@ -285,7 +288,7 @@ class Actuate(Load):
 
 
 def _of_creases(structure: Discretized, creases: NDArray[np.int64]) -> tuple[NDArray, NDArray]:
-    """Assignments of creases, and their dihedrals (degrees) with flat panels."""
+    """Assignments of creases, and their dihedrals (degrees) if the panels are flat."""
     pattern, count = structure.pattern, len(structure.folds)
     if pattern is None:
         return np.full(count, "U")[creases], np.full(count, 180.0)[creases]

@@ -20,13 +20,13 @@ from foldyn.values import number
 class PointMass(Part):
     """The same point mass on each of some nodes.
 
-    It moves with its node along x, y and z, and counts in motions, modes, frequency responses,
-    gravity and inertia relief.
+    A point mass moves with its node along x, y and z. It counts in motions, modes, frequency
+    responses, gravity and inertia relief.
 
     Parameters
     ----------
     nodes : int, sequence of int, or str
-        Node numbers, or an expression over the pattern's vertices ("xmin", "zmax and y>0").
+        Node numbers, or an expression that selects vertices ("xmin", "zmax and y>0").
     mass : float
         Mass (kg) on each of these nodes, above 0.
     """

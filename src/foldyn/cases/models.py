@@ -22,12 +22,12 @@ class Model:
     Attributes
     ----------
     make : callable
-        ``make(pattern, sheet, **options)`` gives the structure.
+        ``make(pattern, sheet, **options)`` returns the structure.
     options : callable
-        ``options(welds=..., **given)`` returns all its options with defaults for those not given;
-        welds says whether the pattern has welds.
+        ``options(welds=..., **given)`` returns all options of the model, with defaults for options
+        that are not given; `welds` is whether the pattern has welds.
     masses : iterable of str
-        Mass rules that it offers.
+        Mass rules that the model offers.
     name : str
         Name in messages.
     """

@@ -42,7 +42,7 @@ class Spread(Load):
     arrows = True
 
     def measure(self, structure: Discretized, place: str) -> NDArray[np.float64]:
-        """Length (m) or area (m2) of each node (n,)."""
+        """Length (m) or area (m2) that belongs to each node (n,)."""
         raise NotImplementedError
 
     def total_of(self, measure: float) -> NDArray[np.float64]:
@@ -71,14 +71,14 @@ class TotalForce(Spread):
     total : sequence of float, shape (3,)
         Sum of the forces (N).
     nodes : int, sequence of int, or str, optional
-        Vertices by number, or an expression ("xmin"). Each gets a part in proportion to its area:
-        the area of a panel is divided equally among its corners.
+        Vertices by number, or an expression ("xmin"). Each vertex gets a part in proportion to its
+        area: the area of a panel is divided equally among its corners.
     edges : sequence of (vertex, vertex), or str, optional
         Edges of the pattern; an expression selects edges by both of their ends. The force is
-        distributed evenly over their length: half of each piece of an edge for either end.
+        distributed evenly over their length: half of each piece of an edge goes to either end.
     panels : int, sequence of int, or "all", optional
         Panels by number. The force is distributed evenly over their area at rest: a third of each
-        triangle of a panel for each corner.
+        triangle of a panel goes to each corner.
     history : History or callable, optional
         Factor of time; constant by default.
 
@@ -151,7 +151,8 @@ class LineLoad(Spread):
     edges : sequence of (vertex, vertex), or str
         Edges of the pattern; an expression ("xmin") selects edges by both of their ends.
     force_per_length : sequence of float, shape (3,)
-        Force per length at rest (N/m); half of each piece of an edge for either end.
+        Force per length at rest (N/m); half of the force on each piece of an edge goes to either
+        end.
     history : History or callable, optional
         Factor of time; constant by default.
 
@@ -188,12 +189,13 @@ class Pressure(Load):
     """Pressure on panels, always normal to them, times a history.
 
     It acts along the normal of the panels' fronts: a positive pressure inflates a closed body whose
-    fronts are outside. The force on a triangle is the pressure times its current area.
+    panels have their fronts outside. The force on a triangle is the pressure times its current
+    area.
 
     Parameters
     ----------
     pressure : float
-        Pa; a negative one pushes on the fronts.
+        Pressure (Pa); if negative, it pushes on the fronts.
     panels : int, sequence of int, or "all"
         Panels by number; all by default.
     history : History or callable, optional
@@ -233,10 +235,10 @@ class CreaseMoment(Load):
     Parameters
     ----------
     creases : int, sequence of int, or str
-        Numbers in the order of `pattern.creases`, or a name: "mountain", "valley", "all", which
-        are all but the flat ones, or a family of the pattern (`Pattern.families`), as "zigzag".
+        Numbers in the order of `pattern.creases`, or a name: "mountain", "valley", "all" (all
+        except flat creases), or a family of the pattern (`Pattern.families`), such as "zigzag".
     moment : float or sequence of float
-        Moment of each whole crease (N m): one for all these creases, or one for each.
+        Moment of each whole crease (N m): one for all creases, or one for each.
     history : History or callable, optional
         Factor of time; constant by default.
     """
@@ -248,12 +250,12 @@ class CreaseMoment(Load):
     apart = "acts on creases"
 
     def of_creases(self, structure: Discretized, place: str) -> tuple[NDArray, NDArray]:
-        """Its creases (k,) and their moments (k,), N m."""
+        """The loaded creases (k,) and their moments (k,), N m."""
         creases = resolve_creases(structure, self.creases, f"{place}.creases")
         return creases, one_or_each(f"{place}.moment", self.moment, len(creases), "creases")
 
     def following(self, structure: Discretized, place: str) -> Following:
-        """See `Load`; pieces of a crease in a shell share the moment by their length."""
+        """See `Load`; in a shell, pieces of a crease share its moment in proportion to length."""
         creases, moment = self.of_creases(structure, place)
         each = np.zeros(len(structure.folds))
         each[creases] = moment
@@ -266,7 +268,7 @@ class CreaseMoment(Load):
         return joined([(turning, 0), (pushes(hidden[there], back[there]), 0)])
 
     def turns(self, structure: Discretized, place: str) -> NDArray | None:
-        """See `Load`: panels at a crease yield to its whole moment."""
+        """See `Load`: compliant panels at a crease turn under the whole moment."""
         sheet = structure.body.sheet
         if not sheet.offsets:
             return None
@@ -290,20 +292,20 @@ class CreaseMoment(Load):
             )
 
 
-MOST_STRAIN = 0.2  # free strain beyond which the laws of the sheet say nothing
+MOST_STRAIN = 0.2  # largest free strain for which the laws of the sheet hold
 
 
 @dataclass(frozen=True)
 class Temperature(Load):
     """A change of temperature of panels, times a history.
 
-    Free panels stretch by `expansion` times the change and curl towards their front by `curvature`
-    times it, without stress; constrained panels are under stress. Other causes of free strain act
-    alike: moisture, growth, swelling of a gel.
+    Free panels stretch by `expansion` times the change and curl toward their front by `curvature`
+    times the change, without stress; constrained panels are under stress. Other causes of free
+    strain act in the same way: moisture, growth, swelling of a gel.
 
-    Bars and hinges get the rest angles of a paraboloid with this curvature; both models are exact
-    for small slopes. Between the factors 0 and 1 the free strain is proportional to the factor to
-    first order in the strain.
+    Bars and hinges get the rest angles of a paraboloid with this curvature; like the shell, they
+    are exact for small slopes. Between the factors 0 and 1 the free strain is proportional to the
+    factor, to first order in the strain.
 
     Parameters
     ----------
@@ -317,8 +319,9 @@ class Temperature(Load):
         Panels by number; all by default.
     layers : sequence of (float, float, float), optional
         Instead of expansion and curvature: thickness (m), Young's modulus (Pa) and expansion (1/K)
-        of bonded layers from the back to the front, as of `Laminate`. The stiffness of the panels
-        stays that of their sheet; `Laminate.sheet` gives the one that fits the layers.
+        of bonded layers from the back to the front, as for `Laminate`. The stiffness of the panels
+        stays that of their sheet; `Laminate.sheet` returns a sheet with the stiffness of the
+        layers.
     history : History or callable, optional
         Factor of time; constant by default.
     """

@@ -26,12 +26,12 @@ _WORDS = 'one of "all", "mountain", "valley", or a family of the pattern'
 def resolve_nodes(
     structure: Discretized, nodes: int | Sequence[int] | ArrayLike | str, field: str = "nodes"
 ) -> NDArray[np.int64]:
-    """Numbers of nodes of a structure from a number, several, or an expression.
+    """Numbers of nodes of a structure, from one or several numbers or an expression.
 
     Parameters
     ----------
     structure : Structure
-        Its `nodes` (n, 3) bound the numbers; its pattern's vertices serve expressions.
+        Its `nodes` (n, 3) limit the numbers; expressions refer to the vertices of its pattern.
     nodes : int, sequence of int, or str
         Numbers are kept in the order given.
     field : str
@@ -51,7 +51,7 @@ def resolve_nodes(
 
 
 def in_range(field: str, given: Any, count: int, what: str) -> NDArray[np.int64]:
-    """Return numbers as an array if all are below `count`, the number of such items."""
+    """Return numbers as an array if all are below `count`, the number of items that exist."""
     chosen = np.atleast_1d(np.array(given, dtype=np.int64))
     bad = chosen[(chosen < 0) | (chosen >= count)]
     if bad.size:
@@ -90,9 +90,9 @@ def resolve_creases(
     Parameters
     ----------
     structure : Structure
-        Its folds bound the numbers; its pattern's assignments and families serve words.
+        Its folds limit the numbers; words refer to assignments and families of its pattern.
     creases : str or tuple of int
-        As `check_creases` returns them; numbers are kept in the order given.
+        Creases as `check_creases` returns them; numbers are kept in the order given.
     name : str
         Name of the field for messages.
 
@@ -189,7 +189,7 @@ def check_panels(name: str, panels: Any) -> str | tuple[int, ...]:
 
 
 def resolve_panels(structure: Discretized, panels: Any, name: str) -> NDArray[np.int64]:
-    """Triangles (k,) of a structure in panels, which are given as from `check_panels`."""
+    """Triangles (k,) of a structure in given panels, as `check_panels` returns them."""
     if not len(structure.triangles):
         raise InputError(f"{name} = {show(panels)}: this structure has no panels")
     if panels == "all":
@@ -203,7 +203,7 @@ Panels = Annotated[int | str | Sequence[int], Check(check_panels)]
 
 
 def length_at_nodes(structure: Discretized, along: NDArray) -> NDArray[np.float64]:
-    """Length (n,), m, of each node on edges (k, p): half of each piece for either end."""
+    """Length (n,), m, of edges (k, p) per node: half of each piece for either end."""
     x, length = structure.nodes, np.zeros(len(structure.nodes))
     pieces = np.linalg.norm(np.diff(x[along], axis=1), axis=2)
     for ends in (along[:, :-1], along[:, 1:]):
@@ -212,7 +212,7 @@ def length_at_nodes(structure: Discretized, along: NDArray) -> NDArray[np.float6
 
 
 def area_at_nodes(structure: Discretized, triangles: NDArray) -> NDArray[np.float64]:
-    """Area (n,), m2, of each node on triangles (k,): a third of each for each corner."""
+    """Area (n,), m2, of triangles (k,) per node: a third of a triangle for each corner."""
     corners = structure.triangles[triangles]
     area = 0.5 * np.linalg.norm(double_areas(structure.nodes, corners), axis=1)
     count = len(structure.nodes)
@@ -220,10 +220,10 @@ def area_at_nodes(structure: Discretized, triangles: NDArray) -> NDArray[np.floa
 
 
 def tributary_area(structure: Discretized) -> NDArray[np.float64]:
-    """Area (n,), m2, of the sheet for each vertex, independent of the model.
+    """Area (n,), m2, of the sheet that belongs to each vertex, independent of the model.
 
-    The area of a panel is divided equally among its corners. Other nodes of a structure get none.
-    Without a pattern, a third of each triangle goes to each corner.
+    The area of a panel is divided equally among its corners. Other nodes of a structure have no
+    area. Without a pattern, a third of each triangle goes to each corner.
     """
     if structure.pattern is None:
         return area_at_nodes(structure, np.arange(len(structure.triangles)))

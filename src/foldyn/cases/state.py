@@ -21,9 +21,9 @@ class Continuation:
     Parameters
     ----------
     method : str
-        The method.
+        Name of the method.
     values : ndarray, shape (k,)
-        Its own values, beginning with the displacement.
+        Values that the method keeps, beginning with the displacement.
     """
 
     method: str
@@ -40,11 +40,13 @@ class Origin:
     displacement : ndarray, shape (n, 3)
         Displacement (m) at the start, the reference of damping with `state = "initial"`.
     time : float, optional
-        Time (s) of the start, for its rest angles; without it, those under constant loads only.
+        Time (s) of the start, which determines the rest angles; without it, rest angles are those
+        under constant loads only.
     flow : ndarray, shape (n, 3), optional
-        Displacement (m) at which the flow of added mass was last computed; by default the state's.
+        Displacement (m) at which the flow of added mass was last computed; by default, the
+        displacement of the state.
     looked : int
-        Steps since that flow was last checked.
+        Number of steps since that flow was last checked.
     """
 
     displacement: NDArray
@@ -67,7 +69,7 @@ def _memory(name: str, value: Any) -> NDArray | str:
 
 
 def _known(name: str, value: Any, kind: type) -> Any:
-    """Return `value` if it is of a kind."""
+    """Return `value` if it is of the given kind."""
     if isinstance(value, kind):
         return value
     raise InputError(f": got {type(value).__name__}; it comes from fd.initial_state(result)", name)
@@ -88,8 +90,8 @@ class State(Checked):
         every hinge has just left its rest angle. By default branches of the law `prony` have
         relaxed, and all others are fresh.
     continuation : Continuation, optional
-        Data to continue exactly from the end of another motion; `initial_state` takes it from the
-        result. It is used only by the same method, and only if state and forces match that end.
+        Data to continue exactly from the end of another motion; `initial_state` takes them from the
+        result. They are used only by the same method, and only if state and forces match that end.
     origin : Origin, optional
         Start of the motion that continues here, so that damping with ``state = "initial"`` and
         added mass stay the same. `initial_state` takes it from the result; without it the motion
@@ -103,7 +105,7 @@ class State(Checked):
     origin: Annotated[Origin | None, Check(_known, kind=Origin)] = None
 
     def of_nodes(self, name: str, shape: tuple[int, ...], field: str = "initial") -> NDArray:
-        """Its displacement or velocity for the nodes of a case (n, 3); zero if not given."""
+        """Displacement or velocity of the nodes (n, 3) of a case; zero if not given."""
         value = getattr(self, name)
         array = np.zeros(shape) if value is None else np.array(value)
         if array.shape != shape:

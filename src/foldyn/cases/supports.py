@@ -25,15 +25,15 @@ class Fix(Part):
     Parameters
     ----------
     nodes : int, sequence of int, or str
-        Node numbers, or an expression over the pattern's vertices ("xmin", "zmax and y>0").
+        Node numbers, or an expression that selects vertices ("xmin", "zmax and y>0").
     axes : str
-        Held axes, letters of "xyz"; all three unless a direction is given.
+        Held axes, letters from "xyz"; all three unless a direction is given.
     direction : sequence of float, shape (3,), or str, optional
-        Instead of axes: a vector of any length, or "x" to "-z", along which nodes are held. Across
-        it they slide, like rollers on a plane with this normal.
+        Instead of axes: a vector of any length, or "x" to "-z", along which nodes are held.
+        Perpendicular to it they slide, like rollers on a plane with this normal.
     along : bool
-        Whether to hold the edges between these nodes, too, along their whole length. If edges of
-        bars and hinges may bow, these edges must be among the `straight` ones of `discretize`.
+        Whether to hold also the edges between these nodes, along their whole length. If edges of
+        bars and hinges may bow, the held edges must be among the edges `straight` of `discretize`.
     """
 
     nodes: Nodes
@@ -60,24 +60,24 @@ class Impose(Part):
     """Nodes with a prescribed displacement along one axis or direction.
 
     The displacement from the rest position is the value times the factor of the history. With a
-    direction, only the component along it is prescribed; across it the nodes are free.
+    direction, only the component along it is prescribed; perpendicular to it the nodes are free.
 
     Parameters
     ----------
     nodes : int, sequence of int, or str
-        Node numbers, or an expression over the pattern's vertices ("xmin", "zmax and y>0").
+        Node numbers, or an expression that selects vertices ("xmin", "zmax and y>0").
     axis : {"x", "y", "z"}, optional
         The axis; give one `Impose` for each.
     value : float or sequence of float
-        Displacement (m) at factor 1: one for all nodes, or one for each in the order of `nodes`,
-        which must then be numbers.
+        Displacement (m) at factor 1: one for all nodes, or one for each in the order of `nodes`.
+        These must be numbers in the second case.
     history : History or callable, optional
         Factor of time; constant by default.
     direction : sequence of float, shape (3,), or str, optional
         Instead of the axis: a vector of any length, or "x" to "-z".
     along : bool
-        Whether to move the edges between these nodes, too, each as the line between its ends; see
-        `Fix`.
+        Whether to move also the edges between these nodes, each like the straight line between its
+        ends; see `Fix`.
     """
 
     nodes: Nodes
@@ -147,18 +147,18 @@ def _corners(name: str, value: Any) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Link(Part):
-    """Nodes tied together exactly, by equal displacements or to three other nodes.
+    """Nodes tied exactly: together by equal displacements, or to three other nodes.
 
     Parameters
     ----------
     nodes : int, sequence of int, or str
-        Node numbers, or an expression over the pattern's vertices.
+        Node numbers, or an expression that selects vertices.
     axes : str, optional
         All these nodes, at least two, have equal displacements along these axes ("xyz" unless `to`
         is given). Rotations are not tied.
     to : sequence of int, shape (3,), optional
-        Instead of axes: three nodes; `nodes` move as points of the plate that these span. They must
-        lie in its plane: u = w1 u1 + w2 u2 + w3 u3, with the weights of their positions at rest.
+        Instead of axes: three nodes that span a plate. `nodes` must lie in its plane and move as
+        points of it: u = w1 u1 + w2 u2 + w3 u3, with the weights that hold for positions at rest.
         This is exact for any motion of a plate that stays flat.
     """
 

@@ -20,7 +20,7 @@ from foldyn.structures import ModelOptions, Sheet
 OTHERS: Mapping[str, str] = {
     "velocity": "m/s", "dihedral": "degrees", "panel_angle": "degrees", "twist": "degrees",
 }  # fmt: skip
-"""Units of keys that are no arguments of these data classes."""
+"""Units of keys that are not arguments of data classes."""
 
 
 @cache
@@ -33,5 +33,5 @@ def units() -> dict[str, str]:
 
 
 def unit_of(key: str, value: Any) -> str:
-    """Unit of a value of a key; "" if it has none or is a word."""
+    """Unit of the value of a key; "" if the value has no unit or is a word."""
     return "" if isinstance(value, str) else units().get(key, "")

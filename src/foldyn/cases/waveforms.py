@@ -1,4 +1,4 @@
-"""Histories inside compiled loops: the formulas of the built-in ones, and calls of users' own.
+"""Histories inside compiled loops: formulas of built-in histories, calls of users' functions.
 
 `History.factor` and the integrators both evaluate a formula here: the factor and its first and
 second derivative in time, which imposed motions need.
@@ -23,7 +23,7 @@ from foldyn.jit.switches import arguments_of, by_code, switch
 
 PARAMETERS = 4
 GAUSS_POINTS, GAUSS_WEIGHTS = (0.5 * x for x in np.polynomial.legendre.leggauss(8))
-GAUSS_POINTS += 0.5  # of an interval from 0 to 1
+GAUSS_POINTS += 0.5  # points in the interval from 0 to 1
 
 
 class Waveforms(NamedTuple):
@@ -31,18 +31,18 @@ class Waveforms(NamedTuple):
 
     code: NDArray  # (h,)
     parameters: NDArray  # (h, 4)
-    first: NDArray  # (h + 1,) first knot of each
+    first: NDArray  # (h + 1,) first knot of each history
     knot: NDArray  # (k,) times, s
     cubic: NDArray  # (k, 4) coefficients of (t - knot)^3, ^2, ^1, ^0 after each knot
-    address: NDArray  # (h,) of the user's functions
-    span: float  # distance (s) of the points from which their derivatives are taken
+    address: NDArray  # (h,) addresses of user's functions
+    span: float  # distance (s) of points for differences of user's functions
 
 
 class Callbacks:
     """User functions of time made callable from compiled code.
 
-    An exception cannot pass through compiled code: the first is kept in `error`, and the factor
-    becomes nan, which the integrators notice. The object must live as long as the addresses serve.
+    An exception cannot pass through compiled code: the first one is kept in `error`, and the factor
+    becomes nan, which integrators notice. The object must live as long as its addresses are used.
     """
 
     def __init__(self) -> None:
@@ -69,8 +69,9 @@ class Callbacks:
 def pack(histories: Sequence[Any], callbacks: Callbacks, span: float = 0.0) -> Waveforms:
     """Histories as arrays for compiled code.
 
-    A history has `code` and `parameters()`, tables also `polynomials()`; one whose code is
-    `CALLED` is called through `callbacks`. `span` (s) is short compared with its variations.
+    A history has `code` and `parameters()`, a table also `polynomials()`. A history whose code is
+    `CALLED` is called through `callbacks`. `span` (s) is short compared with the variations of
+    histories.
     """
     parameters = np.zeros((len(histories), PARAMETERS))
     knots, cubics = [np.zeros(0)], [np.zeros((0, 4))]
@@ -113,8 +114,8 @@ formula_at = switch(
 def waveform(w, row, t, derive):
     """Factor of a history at time t and its two derivatives (per s and s2).
 
-    derive : whether the derivatives are wanted; without it those of the user's functions, which
-    cost several calls, are 0.
+    derive : whether the derivatives are needed. If not, the derivatives of user's functions, which
+        cost several calls, are 0.
     """
     code, p = w.code[row], w.parameters[row]
     if code == CALLED:
@@ -126,11 +127,11 @@ def waveform(w, row, t, derive):
 
 @inner
 def _tabulated(w, row, t):
-    """Piecewise polynomial, its first and last value held outside."""
+    """Piecewise polynomial; before and after it, its first and last value."""
     low, high = w.first[row], w.first[row + 1] - 1
     if t < w.knot[low]:
         return w.cubic[low, 3], 0.0, 0.0
-    while high - low > 1:  # the last knot has a constant of its own
+    while high - low > 1:  # after the last knot the cubic is a constant
         middle = (low + high) // 2
         low, high = (middle, high) if t >= w.knot[middle] else (low, middle)
     if t >= w.knot[high]:
@@ -147,7 +148,7 @@ def _tabulated(w, row, t):
 def _called(address, t, h, derive):
     """A user's function and its derivatives by differences of the fourth order.
 
-    Before 2h the points lie ahead: a function of time need not be defined before 0.
+    For t < 2h all points are at later times, as a function need not be defined before 0.
     """
     f = call1(address, t)
     if not derive:
@@ -185,8 +186,8 @@ def waveform_table(w, row, times):
 def unseen(w, first, last, before, after, out):
     """Mean distance (h,) of histories from straight lines between their values at two times.
 
-    before, after : factors (h, 3) at the times `first` and `last`. The distance is what a step
-    misses that takes the load as the average of both ends.
+    before, after : factors (h, 3) at the times `first` and `last`. The distance is the error of a
+        step that uses the average of the load at both ends.
     """
     for row in range(out.size):
         rate = (after[row, 0] - before[row, 0]) / (last - first)

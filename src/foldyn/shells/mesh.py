@@ -13,12 +13,12 @@ Numer. Methods Eng. 35, 1992). Plane stress with E, nu, t gives energies e K_m e
 beta K_b beta / 2.
 
 On a side shared by two triangles of one panel, and along a weld of two panels, the sheet is smooth:
-with d the change of the dihedral there, one side turns by d/2 + x and the other by d/2 - x, x a
-rotation without mass. On a crease each side has a rotation of its own, and the crease turns by what
-is left of the dihedral, d - x - y. Free sides have no moment: their rotation is eliminated in the
-triangle. A clamped side keeps its rest tangent in space: its hinge has a wing that is no node and
-rides on the mean displacement of the side's ends. The sides of rigid panels, which stay flat, have
-no rotations.
+with d the change of the dihedral there, the sheet turns by d/2 + x in one triangle and by d/2 - x
+in the other, with x a rotation without mass. On a crease each triangle has its own rotation, x or
+y, and the crease turns by the rest of the dihedral, d - x - y. Free sides have no moment: their
+rotation is eliminated in the triangle. A clamped side keeps its rest tangent in space: one wing of
+its hinge is a point that is not a node and moves with the mean displacement of the side's ends. The
+sides of rigid panels, which stay flat, have no rotations.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from foldyn.structures.edge_angles import EdgePlates
 from foldyn.structures.graded import Grading
 from foldyn.structures.mesh import CUT, Triangle, check_triangles
 
-EQUAL = 1e-6  # relative difference of diagonals that counts as none
+EQUAL = 1e-6  # diagonals with a smaller relative difference count as equal
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class _Points:
         return len(self.all) - 1
 
     def line(self, a: int, b: int, places: Iterable[float]) -> list[int]:
-        """Nodes from a to b, both included, with new ones at places of (0, 1) between them."""
+        """Nodes from a to b, both included, with new nodes at `places` in (0, 1) between them."""
         x, y = self.all[a], self.all[b]
         return [a, *(self.add(x + (y - x) * place) for place in places), b]
 
@@ -134,8 +134,8 @@ def _grid(points: _Points, sides: list[list[int]]) -> list[Triangle]:
 def _halves(node: NDArray, x: NDArray) -> list[Triangle]:
     """Triangles of a grid of nodes (n + 1, n + 1) at x (n + 1, n + 1, 3).
 
-    Each cell is cut at its shorter diagonal, in a pattern that has the panel's own symmetries;
-    cells with diagonals of one length alternate.
+    Each cell is cut at its shorter diagonal, so that the mesh has the symmetries of the panel; in
+    cells with equal diagonals the cuts alternate.
     """
     a, b, c, d = node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]
     ac = np.linalg.norm(x[1:, 1:] - x[:-1, :-1], axis=2)
@@ -203,17 +203,17 @@ class Sides(NamedTuple):
     beta = weight d[hinge] + sign x[rotation], where there is a hinge or a rotation (else -1).
     """
 
-    hinges: NDArray  # (nh, 4) axis j, k, wings i, l; first of the pieces of creases, last of the
-    # clamped sides, whose nodes from n on are wings that ride
+    hinges: NDArray  # (nh, 4) axis j, k, wings i, l: hinges of pieces of creases first, of clamped
+    # sides last; wings with numbers from n on are no nodes
     hinge: NDArray  # (nt, 3)
     weight: NDArray  # (nt, 3)
     rotation: NDArray  # (nt, 3)
     sign: NDArray  # (nt, 3)
     free: NDArray  # (nt, 3) bool
     rotations: int
-    piece_rotations: NDArray  # (c, 2) -1 where there is none
+    piece_rotations: NDArray  # (c, 2) rotations of both sides, -1 for none
     piece_crease: NDArray  # (c,) number of the pattern's crease
-    wings: NDArray  # (g, 3) m
+    wings: NDArray  # (g, 3) positions of wings that are no nodes, m
 
 
 def sides(
@@ -288,7 +288,7 @@ def sides(
 def _without(
     rigid: NDArray, rotation: NDArray, pieces: NDArray, count: int
 ) -> tuple[NDArray, NDArray, int]:
-    """Renumber rotations (3 nt,), and of creases (c, 2), without the ones of rigid triangles."""
+    """Renumber rotations of sides (3 nt,) and creases (c, 2), without those of rigid triangles."""
     kept = np.ones(count + 1, bool)  # the last entry stands for none
     kept[rotation[np.repeat(rigid, 3)]] = False
     number = np.where(kept, np.cumsum(kept) - 1, -1)
@@ -302,7 +302,7 @@ def _pieces(points: list[int]) -> list[Edge]:
 
 
 def stiffness(corners: NDArray, panel: NDArray, sheet: Sheet) -> tuple[NDArray, NDArray]:
-    """Membrane and bending stiffness (nt, 3, 3) of triangles (nt, 3, 3), each in a panel (nt,)."""
+    """Membrane and bending stiffness (nt, 3, 3) of triangles (nt, 3, 3) in the panels (nt,)."""
     kinds, kind = sheet.kinds(int(panel.max()) + 1)
     membrane, bending = np.empty((2, len(corners), 3, 3))
     for number, own in enumerate(kinds):
@@ -315,10 +315,10 @@ def stiffness(corners: NDArray, panel: NDArray, sheet: Sheet) -> tuple[NDArray, 
 
 
 def triangle_plates(ends: Sides, bending: NDArray) -> tuple[EdgePlates, NDArray, NDArray]:
-    """Triangles as plates, with the stiffness `bending` (nt, 3, 3) of rotations of their sides.
+    """Triangles as plates; `bending` (nt, 3, 3) is the stiffness of rotations about their sides.
 
-    Also returns, for each angle (nq,), the side that it turns, 3 t + k for side k of triangle t,
-    and the turn of the side per unit of the angle.
+    Also returns, for each angle (nq,), the index of the side that the angle turns, 3 t + k for side
+    k of triangle t, and the turn of this side per unit of the angle.
     """
     size = (len(bending), 6)
     angle = np.stack([ends.hinge, -1 - ends.rotation], axis=2).reshape(size)

@@ -52,13 +52,13 @@ from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_pa
 from foldyn.structures.swelling import Swelling, chord_turns
 from foldyn.values import choice, length, show, whole
 
-MASSES = {"lumped": "centroid", "consistent": "consistent"}  # and the rules they are
-STIFF = 100.0  # times the stiffness in the plane: corners about vertices that count as rigid
-RANDOM = 0.05  # of its bound: sum of many random rounding errors
+MASSES = {"lumped": "centroid", "consistent": "consistent"}  # and their mass rules
+STIFF = 100.0  # in-plane stiffness factor for the rigid corners about vertices
+RANDOM = 0.05  # sum of many random rounding errors, divided by its bound
 PER_NODE = 20_000.0
-"""Bytes a node with its tangent: 14,200 and 16,000 measured with 3,721 and 14,641 nodes."""
+"""Bytes per node with its tangent: measured 14,200 with 3,721 nodes, 16,000 with 14,641."""
 PER_DOUBLING, LEAST = 5900.0, 1450
-"""Memory of its factors, see `Fill`: 23 and 35 kB a dof with 21,963 and 87,123 dofs."""
+"""Memory of the tangent's factors, see `Fill`: 23 kB per dof with 21,963 dofs, 35 with 87,123."""
 
 
 @dataclass(frozen=True)
@@ -90,15 +90,15 @@ class Shell(Discretized):
     triangles, triangle_panel : (nt, 3), (nt,)
         Counter-clockwise from the front, and the panel of each.
     sides : Sides
-        How the triangles meet.
+        Hinges and rotations at which the triangles meet.
     fold_stiffness : (nf,)
         Stiffness of the whole creases, in the order of `pattern.creases`, N m/rad.
     piece_rest : (c,)
         Rest dihedral of each piece of a crease, in the order of `sides`, rad.
     pattern, sheet, options
-        What it was made from.
+        Input from which the shell was made.
     graded : Grading or None
-        How its mesh is cut about the vertices.
+        How the mesh is refined about the vertices.
     """
 
     nodes: NDArray
@@ -134,18 +134,18 @@ class Shell(Discretized):
 
     @property
     def massless(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Its massless dofs, in words; empty if all panels are rigid."""
+        """Description of the massless dofs; empty if all panels are rigid."""
         return "the rotations of a shell" if self.rotations else ""
 
     @property
     def fill(self) -> Fill:
-        """Memory of the factors of its tangent."""
+        """Memory needed for the factors of the tangent."""
         return Fill(PER_DOUBLING, LEAST, f"divisions = {self.options.divisions}", "take fewer")
 
     @property
     def hinge_kinds(self) -> tuple[HingeKind, ...]:
-        """Its folds, with their law."""
-        ends = self.pattern.creases  # its hinges are pieces of creases
+        """The folds, with their law."""
+        ends = self.pattern.creases  # hinges are pieces of creases
         return (HingeKind("fold", self.fold_law, ends, self.fold_stiffness, self.fold_rest),)
 
     @cached_property
@@ -168,8 +168,9 @@ class Shell(Discretized):
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """Effect of swelling; see `Discretized`.
 
-        Triangles have free strains of their sides, and free rotations beta0 of the sheet there (see
-        `shells.mesh`). Their energies are linear in these, so that forces are constant.
+        Triangles have free strains of their sides, and free rotations beta0 of the sheet about the
+        sides (see `shells.mesh`). The energy changes linearly with these, so that their forces are
+        constant.
         """
         panel, hinges, (plates, side, share) = self.triangle_panel, self.sides.hinges, self._plates
         bends = ~np.isin(panel, rigid_panels(self.options.rigid, len(self.pattern.faces)))
@@ -234,12 +235,12 @@ class Shell(Discretized):
 
     @property
     def _reach(self) -> float:
-        """Length (m) of a typical side: times a rotation it is a displacement."""
+        """Length (m) of a typical side, which converts rotations to displacements."""
         return 1.0 / self.model.per_reach
 
     @cached_property
     def _stiffness(self) -> tuple[NDArray, NDArray]:
-        """Stiffness (nt, 3, 3) of triangles: for strains of their sides, J; for rotations, N m."""
+        """Stiffness (nt, 3, 3) of triangles: for side strains, J, and for rotations, N m."""
         membrane, bending = stiffness(self.nodes[self.triangles], self.triangle_panel, self.sheet)
         if self.graded:
             membrane[(self.triangles < len(self.pattern.vertices)).any(axis=1)] *= STIFF
@@ -247,7 +248,7 @@ class Shell(Discretized):
 
     @cached_property
     def membranes(self) -> tuple[PanelKind, ...]:
-        """The triangles as membranes, each of its panel."""
+        """The triangles as membranes, each with the material of its panel."""
         corners = self.nodes[self.triangles]
         side = np.roll(corners, -1, axis=1) - corners
         own = Membranes(
@@ -280,11 +281,11 @@ class Shell(Discretized):
 
     @property
     def _scale(self) -> NDArray:
-        """Stiffness of the triangles' sides in the plane times their lengths, summed at nodes.
+        """In-plane stiffness of the triangles' sides, times side length, summed at nodes.
 
-        Bending adds to it: rounding errors of positions, which grow with the distance from the
-        middle of the nodes, turn the sides of small triangles. These errors are random: their sum
-        is about a twentieth of its bound.
+        Bending adds to this: rounding errors of positions, which grow with the distance from the
+        middle of the nodes, turn the sides of small triangles. The errors are random: their sum is
+        about a twentieth of its bound.
         """
         (membrane, bending), ((_, own),) = self._stiffness, self.membranes
         per_length = np.sqrt(own.per_length2.T)
@@ -301,7 +302,7 @@ class Shell(Discretized):
 
     @cached_property
     def mass(self) -> sparse.csr_array:
-        """Nodal mass matrix (n, n), kg; one value serves the three axes. Rotations have none.
+        """Nodal mass matrix (n, n), kg; one value serves the three axes. Rotations have no mass.
 
         Raises
         ------
@@ -336,7 +337,7 @@ class Shell(Discretized):
     def tangent(
         self, u: ArrayLike, rotation: ArrayLike | None = None, *, floor: float = -np.inf
     ) -> sparse.csr_array:
-        """Second derivative (3n + r, 3n + r) of the energy: 3 node + axis, then the rotations."""
+        """Second derivative (3n + r, 3n + r) of the energy; dofs 3 node + axis, then rotations."""
         u, x = self._state(u, rotation)
         matrix = self.body.tangent(np.append(u, x * self._reach), floor)
         units = np.repeat([1.0, self._reach], [u.size, x.size])
@@ -373,32 +374,34 @@ def shell(
 ) -> Shell:
     """Discretize a pattern as a thin shell of triangles with exact creases.
 
-    Each panel bends and stretches as a sheet of its own; along a crease the sheets turn against
-    each other with the stiffness of the fold, spread evenly over its length.
+    Each panel bends and stretches as a separate sheet; along a crease the two sheets turn relative
+    to each other with the stiffness of the fold, spread evenly over its length.
 
     Parameters
     ----------
     pattern : Pattern
     sheet : Sheet
-        Its length-scale ratio enters the stiffness of the creases, as in `discretize`.
+        The sheet; its length-scale ratio determines the stiffness of the creases, as in
+        `discretize`.
     divisions : int, default 16
-        Pieces of every edge; the number of triangles grows with its square. Frequencies of the
-        case studies are right to 1 % from 16 on.
+        Pieces of every edge; the number of triangles grows with the square. With 16 or more,
+        frequencies of the case studies are right to 1 %.
     mass : {"lumped", "consistent"}, default "lumped"
-        A third of each triangle to its corners, or rho A t / 12 [2 1 1; 1 2 1; 1 1 2].
+        A third of each triangle's mass at each corner, or rho A t / 12 [2 1 1; 1 2 1; 1 1 2].
     fold_law, crease_stiffness, crease_rest
         As in `discretize`.
     clamped : sequence of (vertex, vertex), or str
-        Boundary edges along which the sheet keeps its rest tangent in space, wherever they are
-        moved; their nodes need a support of their own. A selection ("xmin") means those of which it
-        has both ends.
+        Boundary edges along which the sheet keeps its rest tangent in space, even if they are
+        moved; their nodes still need supports. A selection ("xmin") means the boundary edges with
+        both ends in it.
     rigid : "all" or sequence of int, optional
-        As in `discretize`: panels that cannot bend, exactly. Their mesh has no rotations.
+        Panels that cannot bend at all, as in `discretize`. Their mesh has no rotations.
     vertex_radius : float, optional
         Distance from every vertex (m), about the thickness of the sheet, within which panels do not
-        stretch. The mesh gets finer toward vertices, down to it; away from them it is about as fine
-        as an even one of so many `divisions`, a multiple of 4. Without it forces in the plane
-        meet at points, and frequencies of large sheets and towers fall with every mesh.
+        stretch. The mesh gets finer toward vertices, down to this radius; away from vertices it is
+        about as fine as an even mesh with the same `divisions`, a multiple of 4. Without a radius,
+        in-plane forces concentrate at points, and frequencies of large sheets and towers fall with
+        every refinement.
 
     Returns
     -------

@@ -25,14 +25,14 @@ class ShellTerm(BarsPlatesTerm):
     Parameters
     ----------
     model : BarsPlates
-        Bars are the sides of the triangles; they do not act.
+        The arrays of the shell. Bars are the sides of the triangles; they have no stiffness.
     laws : tuple of HingeLaw
     crease : ndarray, shape (c,)
         The fold that each piece of a crease belongs to.
     scale : ndarray, shape (m,)
         See `SheetTerm.scale`.
     like : ShellTerm, optional
-        One with the same mesh.
+        A term with the same mesh.
     """
 
     energy_groups = GROUPS
@@ -47,7 +47,7 @@ class ShellTerm(BarsPlatesTerm):
         self._crease, self._scale = crease, scale
 
     def _with(self, model: BarsPlates) -> ShellTerm:
-        """Another sheet of the same mesh."""
+        """Another sheet with the same mesh."""
         return ShellTerm(model, self._laws, self._crease, self._scale, self)
 
     def scale(self) -> NDArray:
@@ -55,11 +55,11 @@ class ShellTerm(BarsPlatesTerm):
         return self._scale.copy()
 
     def unstrained(self, q: NDArray) -> None:
-        """See `SheetTerm`: only rigid motions keep it so."""
+        """See `SheetTerm`: None, as only rigid motions keep a shell without strain."""
 
     @property
     def rest_angles(self) -> NDArray:
-        """See `SheetTerm`: of the folds, the mean along each crease."""
+        """See `SheetTerm`: rest angles of the folds, each the mean along its crease."""
         return np.bincount(self._crease, self.model.fold_rest) / np.bincount(self._crease)
 
     def fold_hinges(self) -> FoldHinges:

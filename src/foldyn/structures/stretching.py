@@ -21,8 +21,8 @@ from foldyn.structures.discretized import Discretized
 BARS = "strain_bars"
 SINGLE, TRIANGLES, COUPLED, GIVING = 0.05, 0.1, 0.4, 0.5
 """Shares of stretching in the strain energy above which a result is doubtful: with single bars;
-with coupled bars in triangles; by mean strains of other panels with coupled bars; with edges that give
-way. Measured with the mixed sets of docs/fidelity.md."""
+with coupled bars in triangles; by mean strains of other panels with coupled bars; with edges that
+give way. Measured with the mixed sets of docs/fidelity.md."""
 LEAST = 1e-9  # mean strain of the bars below which it may be rounding error
 FELT = 1e-3  # share of the kinetic energy: less strain energy does not affect a motion
 SHELL = "compare with the shell (foldyn fidelity, fd.fidelity) or take it (--model shell, fd.shell)"
