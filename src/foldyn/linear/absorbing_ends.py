@@ -1,11 +1,12 @@
-"""Absorbing ends of a chain: dashpots with the impedance of the chain that is cut off.
+"""Absorbing ends of a chain: dashpots with the impedance of the rest of the chain.
 
-Long waves move the sections of a chain as rigid bodies, q (k,): along it, and about its axis for a
-tube. With the mass M of a cell and its stiffness K against differences of q between cells,
-M q'' = K (q_n+1 - 2 q_n + q_n-1): waves travel at c_j = sqrt(eig(M^-1 K)) cells per second, and the
-rest of the chain pushes back with -Z q', Z the sum over waves of c_j (M q_j)(M q_j)^T, with
-q_j^T M q_j = 1. Dampers with this impedance absorb long waves exactly (J. Lysmer, R. L. Kuhlemeyer,
-Finite dynamic model for infinite media, J. Eng. Mech. Div. 95, 1969).
+Long waves move the sections of a chain as rigid bodies, with the coordinates q (k,): the
+displacement along the chain and, for a tube, the rotation about its axis. With the mass M of a cell
+and the stiffness K against differences of q between cells, M q'' = K (q_n+1 - 2 q_n + q_n-1). So
+waves travel at c_j = sqrt(eig(M^-1 K)) cells per second, and the part of the chain that is cut off
+would push back with -Z q', with Z the sum over waves of c_j (M q_j)(M q_j)^T and q_j^T M q_j = 1.
+Dampers with the impedance Z absorb long waves exactly (J. Lysmer, R. L. Kuhlemeyer, Finite dynamic
+model for infinite media, J. Eng. Mech. Div. 95, 1969).
 """
 
 from __future__ import annotations
@@ -28,11 +29,11 @@ from foldyn.linear.unit_cell import UnitCell
 from foldyn.linear.wave_solver import Waves, WaveSolver
 from foldyn.values import numbers, of_kind, vector
 
-PHASE = 1e-3  # rad per cell: a long wave
+PHASE = 1e-3  # rad per cell: phase of a long wave
 LEAST = 0.5  # least share of rigid section motions in the kinetic energy of a wave
-LOOKED_AT = 8  # lowest waves computed: bending waves lie below those along the chain
-NEGLIGIBLE = 1e-3  # of the largest coefficient: smaller dashpots are left out
-ON_AXIS = 1e-6  # of the largest distance from the axis
+LOOKED_AT = 8  # number of waves computed: bending waves are lower than waves along the chain
+NEGLIGIBLE = 1e-3  # dashpots that are smaller, relative to the largest coefficient, are left out
+ON_AXIS = 1e-6  # distance from the axis, relative to the largest one, that counts as none
 
 
 def _matrix(name: str, value: ArrayLike) -> NDArray[np.float64]:
@@ -55,10 +56,10 @@ class LongWaves(Checked):
     axis : sequence of float, shape (3,)
         Direction of the chain, of any length.
     stiffness : array_like, shape (1, 1) or (2, 2)
-        K of a cell: force along the chain (N) and torque about it (N m) for the elongation (m) and
-        the twist (rad) of a cell, from the statics of one cell.
+        K of a cell, from statics: force along the chain (N) and torque about its axis (N m) per
+        elongation (m) and twist (rad) of a cell.
     mass : array_like of the same shape
-        M of a cell: its mass (kg) and, with rotations, its moment of inertia (kg m2).
+        M of a cell: mass (kg) and, with rotations, moment of inertia (kg m2).
     point : sequence of float, shape (3,)
         Any point on the axis (m), about which sections rotate.
 
@@ -117,7 +118,7 @@ def long_waves(cell: UnitCell, state: State | None = None, *, along: int = 0) ->
     InputError
         As from `bands`.
     ComputationError
-        The cell has no such waves, for instance because it is held.
+        The cell has no long waves, for instance because it is held.
 
     Examples
     --------
@@ -163,28 +164,28 @@ def long_waves(cell: UnitCell, state: State | None = None, *, along: int = 0) ->
 
 
 def absorbing_end(case: Case, nodes: Nodes, *, waves: LongWaves) -> list[Dashpot]:
-    """Dashpots that absorb long waves at an end of a chain.
+    """Dashpots that absorb long waves at the end of a chain.
 
     Parameters
     ----------
     case : Case
-        Case of the chain, without these dashpots.
+        Case of the chain, without absorbing ends.
     nodes : int, sequence of int, or str
-        Nodes of its last section, which share the impedance equally.
+        Nodes of the last section of the chain; they share the impedance equally.
     waves : LongWaves
         Long waves of the chain: `long_waves(cell)`, or from a cell's stiffness and mass.
 
     Returns
     -------
     list of Dashpot
-        To the ground, one or two per node along fixed directions, as supports of a case. On rigid
-        motions of the section they add up to `waves.impedance`. As their directions are fixed, the
-        section must not turn far.
+        Dashpots to the ground, one or two per node along fixed directions, to be supports of the
+        case. For rigid motions of the section they add up to `waves.impedance`. As the directions
+        are fixed, the section must not turn far.
 
     Raises
     ------
     InputError
-        There are no such nodes, or one lies on the axis of rotating sections.
+        A node does not exist, or lies on the axis of rotating sections.
 
     Examples
     --------
@@ -224,14 +225,14 @@ def absorbing_end(case: Case, nodes: Nodes, *, waves: LongWaves) -> list[Dashpot
 
 
 def _rigid(points: NDArray, axis: NDArray, center: NDArray, turns: bool) -> NDArray[np.float64]:
-    """Motions (n, 3, k) of points (n, 3) of a section: along an axis, and about it."""
+    """Rigid motions (n, 3, k) of points (n, 3) of a section: along an axis, and about it."""
     along = np.broadcast_to(axis, points.shape)
     parts: list[Any] = [along, np.cross(axis, points - center)][: 1 + turns]
     return np.stack(parts, axis=2)
 
 
 def _lowest(bloch: Bloch, phase: NDArray) -> int:
-    """Number of waves to compute, long ones among them: at most as many as there are."""
+    """Number of waves to compute so that long waves are among them; at most as many as exist."""
     free = WaveSolver(bloch, 1).free
     if bloch.ties.empty:
         return min(LOOKED_AT, len(free))

@@ -1,7 +1,7 @@
-"""`bands`: frequencies of Bloch waves in a repeated case, with damping, and the gaps between them.
+"""Bands, the frequencies of Bloch waves in a repeated case: undamped, damped, and their gaps.
 
-Damped waves phi exp(s t) of a phase k solve (s^2 M(k) + s C(k) + K(k)) phi = 0. The lowest s are
-found by Arnoldi iteration about a shift on the positive real axis, where the matrix is positive
+Damped waves phi exp(s t) with the phase k solve (s^2 M(k) + s C(k) + K(k)) phi = 0. The lowest s
+are found by Arnoldi iteration about a shift on the positive real axis, where the matrix is positive
 definite.
 """
 
@@ -31,13 +31,13 @@ from foldyn.values import flag, number, of_kind, whole
 
 TURN = 2.0 * np.pi
 OF_PHASES = ("ticks", "tick_labels", "grid")
-"""Attributes of phases that bands take over."""
-SHIFT = 1e-4  # of the square root of the stiffness-to-mass scale
-NOISE = 1e-3  # of the shift: smaller s count as zero
+"""Attributes of phases that are copied to bands."""
+SHIFT = 1e-4  # shift, relative to the square root of the stiffness-to-mass scale
+NOISE = 1e-3  # values of s below this, relative to the shift, count as zero
 DENSE = 200  # dofs up to which all eigenvalues are computed
-SPARE = 4  # extra eigenvalues beyond the count
+SPARE = 4  # eigenvalues computed in addition to the count
 ALL = "all"
-"""Direction of full gaps, at every phase."""
+"""Name of the direction of full gaps, which are gaps at every phase."""
 
 
 def bands(
@@ -62,20 +62,21 @@ def bands(
     ----------
     cell : UnitCell
     phases : array_like, shape (n, d), or DataArray
-        Wave vectors as phases (rad) per period, as from `UnitCell.path` and `UnitCell.grid`.
+        Wave vectors as phases (rad) per period, for example from `UnitCell.path` or
+        `UnitCell.grid`.
     count : int
         Number of bands, the lowest ones.
     state : State, optional
-        State to linearize about: displacements of the cell's own nodes that repeat, possibly with
-        other periods, as `fd.initial_state(path)`; by default the rest state.
+        State to linearize about, such as `fd.initial_state(path)`: displacements of the nodes of
+        the cell that repeat, possibly with other periods; by default the rest state.
     group_velocity : bool
         Whether to return group velocities, by the Hellmann-Feynman theorem.
     shape : bool
         Whether to return the shapes at all nodes.
     polarization : bool
-        Whether to return the shares of the axes in the kinetic energy.
+        Whether to return the shares of motions along x, y and z in the kinetic energy.
     secant : float, optional
-        Amplitude (degrees) of hinges of the superlinear law; see `modes`.
+        Amplitude (degrees) of hinges with the superlinear law; see `modes`.
     load_factor : float
         Load factor of actuated folds in a given state.
     track : bool
@@ -93,7 +94,7 @@ def bands(
         z). Coordinate `wave_vector` (phase, period), rad, and the coordinates and attributes of
         the phases (`distance`; `ticks`, `tick_labels`, `grid`). For the state: `vectors` (period,
         axis), m, and `angles` (period), rad, from a cell to the next, `axes` and `points` (m) of
-        screws, and `displacement`. Like other results it contains its case.
+        screws, and `displacement`. Like other results, the dataset contains its case.
 
     Raises
     ------
@@ -170,7 +171,7 @@ def _dataset(
     kind: str, linear: LinearizedCell, phases: Any, given: NDArray, data: Mapping[str, Any],
     facts: Mapping[str, Any],
 ) -> xarray.Dataset:  # fmt: skip
-    """Bands at given phases (n, d), with the coordinates and attributes that describe these."""
+    """Bands at given phases (n, d), with coordinates and attributes that describe the phases."""
     along: dict[str, Any] = {
         "wave_vector": (("phase", "period"), given, {"units": "rad"}),
         "band": ("band", 1 + np.arange(facts["count"])),
@@ -183,7 +184,7 @@ def _dataset(
 
 
 def polarizations(nodes: int, waves: Waves) -> NDArray[np.float64]:
-    """Shares (k, 3) of the axes in the kinetic energy of waves of a number of nodes."""
+    """Shares (k, 3) of motions along x, y, z in the kinetic energy of waves, for `nodes` nodes."""
     energy = (waves.shapes.conj() * waves.momentum)[: 3 * nodes]
     shares = np.real(energy).reshape(nodes, 3, -1).sum(axis=0).T
     return shares / shares.sum(axis=1, keepdims=True)
@@ -244,7 +245,7 @@ def damped_bands(
 
 
 def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex128]:
-    """The lowest s (count,), 1/s, by |s|, one of each complex pair."""
+    """The values s (count,), 1/s, with the least |s|, one from each complex pair."""
     factors = bloch.factors(phase)
     free = np.flatnonzero(~bloch.held)
     basis = np.eye(len(free))
@@ -268,7 +269,7 @@ def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex
         u = -linalg.lu_solve(factor, mass @ g + damping @ f + shift * (mass @ f))
         return np.concatenate([u, f + shift * u])
 
-    # iterations over clusters of bands may not converge
+    # iterations may not converge for clusters of bands
     if size <= DENSE or wanted >= 2 * size - 1:
         inverse = linalg.eigvals(solve(np.eye(2 * size)))
         found = shift + 1.0 / inverse[np.argsort(-np.abs(inverse))[:wanted]]
@@ -276,30 +277,30 @@ def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex
         start = np.random.default_rng(0).normal(size=2 * size) + 0j
         operator = LinearOperator((2 * size, 2 * size), solve, dtype=complex)
         found = shift + 1.0 / eigs(operator, wanted, v0=start, return_eigenvectors=False)
-    noise = NOISE * shift  # a double root of zero is accurate to the square root of round-off
+    noise = NOISE * shift  # a double root at zero has the error sqrt(round-off)
     found = np.where(np.abs(found) <= noise, 0.0, found)
     upper = found[np.imag(found) >= -noise]
     return upper[np.argsort(np.abs(upper), kind="stable")][:count]
 
 
 def band_gaps(bands: Any, least: float = 1e-3) -> xarray.Dataset:
-    """Gaps between bands: full ones, and those along each leg of a path.
+    """Gaps between bands: full gaps, and gaps along each leg of a path.
 
     Parameters
     ----------
     bands : xarray.Dataset
-        From `foldyn.bands`; gaps are as reliable as the phases are dense and cover the zone
+        From `foldyn.bands`. For reliable gaps, phases must be dense and cover the zone
         (`UnitCell.grid`).
     least : float
-        Least relative width (over the middle frequency) of a listed gap.
+        Least width of a listed gap, divided by the frequency at its middle.
 
     Returns
     -------
     xarray.Dataset
-        A row `gap` for each: `direction` ("all" for full gaps, "G-X" for a gap on this leg only),
-        `below` and `above` (numbers of the bands in the order of frequency; 0 below the first one),
-        `bottom`, `top`, `middle` and `width` (Hz), and `relative_width`. Full ones come first, each
-        direction from low to high frequencies. `to_dataframe()` prints it.
+        A row along `gap` for each gap: `direction` ("all" for full gaps, "G-X" for a gap on this
+        leg only), `below` and `above` (numbers of the bands in the order of frequency; 0 below the
+        first band), `bottom`, `top`, `middle` and `width` (Hz), and `relative_width`. Full gaps
+        come first; in each direction, frequencies increase. `to_dataframe()` gives a table.
 
     Raises
     ------
@@ -341,7 +342,7 @@ def frequencies_of(bands: Any) -> NDArray[np.float64]:
 
 
 def legs(bands: Any) -> dict[str, NDArray[np.int64]]:
-    """Rows of phases by direction: all, and those on each leg of a path."""
+    """Rows of phases by direction: all rows, and the rows on each leg of a path."""
     every = np.arange(bands.sizes["phase"])
     found = {ALL: every}
     if "ticks" not in bands.attrs or "distance" not in bands.coords:
@@ -357,7 +358,7 @@ def legs(bands: Any) -> dict[str, NDArray[np.int64]]:
 
 
 def _gaps(frequency: NDArray, least: float) -> list[tuple[int, float, float]]:
-    """Number of the band below, bottom and top (Hz) of each gap over some phases."""
+    """For each gap at the given phases: number of the band below, bottom and top (Hz)."""
     tops = frequency.min(axis=0)
     bottoms = np.concatenate([[0.0], frequency.max(axis=0)[:-1]])
     wide = tops - bottoms > np.maximum(least * 0.5 * (tops + bottoms), 0.0)

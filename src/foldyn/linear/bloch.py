@@ -1,8 +1,9 @@
-"""Matrices of Bloch waves: K(k) = sum over R of K_R exp(i k . R), likewise M, C and constraints.
+"""Matrices of Bloch waves: K(k) = sum over R of K_R exp(i k . R); also M, C and constraints.
 
 K_R maps displacements of cell R to forces on the dofs of cell 0, and is taken from the patch around
-it (`cell_patch`); displacements of cell R are given in axes that turn with the cell. K_-R is the
-transpose of K_R, so that K(k) is Hermitian. A check of this also shows that all cells are alike.
+cell 0 (`cell_patch`); displacements of cell R are given in axes that turn with the cell. K_-R is
+the transpose of K_R, so that K(k) is Hermitian. A check of this also confirms that all cells are
+alike.
 """
 
 from __future__ import annotations
@@ -17,18 +18,18 @@ from scipy import sparse
 
 from foldyn.errors import InputError
 
-ALIKE = 1e-8  # of the largest entry: largest difference between K_-R and the transpose of K_R
+ALIKE = 1e-8  # largest difference of K_-R from the transpose of K_R, relative to the largest entry
 
 
 class Hops(NamedTuple):
-    """A matrix A(k) = sum over R of A_R exp(i k . R), (r, n), by its nonzero entries.
+    """A matrix A(k) = sum over R of A_R exp(i k . R), (r, n), given by its nonzero entries.
 
     Attributes
     ----------
     rows, columns : (p,)
-        Entries that are nonzero for some R.
+        Positions of the entries that are nonzero for some R.
     values : sparse (p, s)
-        Their values for each R.
+        Values of these entries for each R.
     shape : (int, int)
     """
 
@@ -38,7 +39,7 @@ class Hops(NamedTuple):
     shape: tuple[int, int]
 
     def at(self, factors: NDArray) -> NDArray:
-        """A (r, n) for the factors (s,) of the R: exp(i k . R), or derivatives of it."""
+        """A (r, n) for the factors (s,) of all R: exp(i k . R), or its derivatives."""
         out = np.zeros(self.shape, factors.dtype)
         out[self.rows, self.columns] = self.values @ factors
         return out
@@ -60,7 +61,8 @@ def hops(
     """Rows of cell 0 of a matrix (m, m) of a patch, as `Hops`.
 
     rows : (n,) rows of the dofs of cell 0, in their order.
-    unit, number : (m,) dof of cell 0 of which each is a copy, -1 for none, and number of its R.
+    unit, number : (m,) for each dof, the dof of cell 0 of which it is a copy (-1 for none), and the
+        index of its R.
     """
     own = sparse.coo_array(sparse.csr_array(matrix)[rows])
     return collected(own.row, unit[own.col], number[own.col], own.data, (len(rows), count), steps)
@@ -85,11 +87,11 @@ class Bloch:
     Attributes
     ----------
     steps : (s, d)
-        R of the cells that reach cell 0, and their opposites.
+        R of the cells that act on cell 0, and their opposites.
     stiffness, mass, damping : Hops
-        (n, n).
+        Matrices (n, n).
     ties : Hops
-        (k, n), the constraints of links and rigid panels.
+        Constraints (k, n) of links and rigid panels.
     hidden, held : (n,) bool
         Dofs without mass, and dofs held by supports.
     """
@@ -117,7 +119,7 @@ class Bloch:
 
     @cached_property
     def lumped(self) -> NDArray[np.float64] | None:
-        """Masses (n,), kg, if they are diagonal and the same for all k; else None."""
+        """Masses (n,), kg, if the mass matrix is diagonal and the same for all k; else None."""
         mass, here = self.mass, np.flatnonzero((self.steps == 0).all(axis=1))
         if (mass.rows != mass.columns).any() or mass.values.nnz != len(mass.rows):
             return None
@@ -128,7 +130,7 @@ class Bloch:
 
     @cached_property
     def nodal(self) -> Hops | None:
-        """Nodal mass (n/3, n/3), kg, if it is the same for all three axes; else None."""
+        """Nodal mass (n/3, n/3), kg, if all three axes have the same mass matrix; else None."""
         mass, nodes = self.mass, int((~self.hidden).sum()) // 3
         axis = mass.rows % 3
         if (axis != mass.columns % 3).any() or mass.rows.max(initial=0) >= 3 * nodes:
@@ -147,9 +149,9 @@ class Bloch:
 
 
 def hermitian(own: Hops, steps: NDArray, what: str) -> Hops:
-    """Hermitian part of a matrix; raises if the rest is more than round-off."""
+    """Hermitian part of a matrix; raises an error if the rest is more than round-off."""
     where = {tuple(row): k for k, row in enumerate(steps.tolist())}
-    opposite = np.array([where[tuple(-x for x in row)] for row in steps.tolist()])  # -R of each R
+    opposite = np.array([where[tuple(-x for x in row)] for row in steps.tolist()])  # index of -R
     entries = own.values.tocoo()
     row, column = own.rows[entries.row], own.columns[entries.row]
 
@@ -172,7 +174,7 @@ def hermitian(own: Hops, steps: NDArray, what: str) -> Hops:
 
 
 class NotAlikeError(InputError):
-    """The matrices of two cells differ, most at the `dofs`."""
+    """The matrices of two cells differ; the largest difference is at `dofs`."""
 
     def __init__(self, what: str, share: float, dofs: tuple[int, int]) -> None:
         self.what, self.share, self.dofs = what, share, dofs
@@ -185,7 +187,7 @@ class NotAlikeError(InputError):
         )
 
     def naming(self, first: NDArray) -> InputError:
-        """The same error with names of nodes, given the node (m,) for each node of cell 0."""
+        """The same error with names of nodes; `first` (m,) has the node for each node of cell 0."""
         names = [
             f"node {first[dof // 3]}" if dof < 3 * len(first) else "a rotation of a panel's edge"
             for dof in self.dofs
@@ -194,7 +196,7 @@ class NotAlikeError(InputError):
 
 
 def steps_of(offset: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Distinct R (s, d) among given ones (m, d) and their opposites, and the row (m,) of each."""
+    """Distinct R (s, d) among `offset` (m, d) and its opposites; the row (m,) of each given R."""
     steps, number = np.unique(np.concatenate([offset, -offset]), axis=0, return_inverse=True)
     return steps, np.ravel(number)[: len(offset)]
 

@@ -19,7 +19,7 @@ from foldyn.values import listed, number, of_kind, vector, whole
 
 ITERATIONS = 40
 HALVINGS = 12
-NULL = 1e-11  # of the largest stiffness: less counts as zero
+NULL = 1e-11  # stiffnesses below this, relative to the largest, count as zero
 
 
 def relaxed(
@@ -32,16 +32,16 @@ def relaxed(
 ) -> State:
     """Equilibrium of a repeated sheet with given periods: a state that repeats.
 
-    Copies of the cell follow the periods; everything else is free except for supports. Newton's
-    method, starting from a uniform deformation of the cell, in steps of the periods.
+    Copies of the cell follow the periods; all else is free except for supports. The periods change
+    in steps; in each, Newton's method starts from a uniform deformation of the cell.
 
     Parameters
     ----------
     cell : UnitCell
     motions : sequence of Screw or array_like of shape (3,), optional
-        Motion from a cell to the next in the final state, for each motion of the cell: a
-        translation by its vector (m), or a screw; a translation that becomes a rotation bends the
-        sheet uniformly. By default the motions at rest, or in the given state.
+        For each motion of the cell, the motion from a cell to the next in the final state: a vector
+        of translation (m), or a screw. A translation that becomes a rotation bends the sheet
+        uniformly. By default the motions at rest, or in the given state.
     state : State, optional
         Periodic state from which the search starts.
     load_factor : float
@@ -52,7 +52,7 @@ def relaxed(
     Returns
     -------
     State
-        Displacements (m) of the cell's own nodes.
+        Displacements (m) of the nodes of the cell.
 
     Raises
     ------
@@ -111,7 +111,8 @@ def _given(cell: UnitCell, motions: Any) -> tuple[Screw, ...]:
 def _carried(points: NDArray, one: Sequence[Screw], two: Sequence[Screw]) -> NDArray[np.float64]:
     """Points (m, 3) moved by the uniform deformation that takes motions `one` to `two`.
 
-    Each point moves back along `one` by its position among the cells, and forward along `two`.
+    Each point is moved back to cell 0 along motions `one`, by its position among the cells, and
+    forward again along motions `two`.
     """
     shifts = np.array([motion.vector for motion in one])
     place = (points - points.mean(axis=0)) @ np.linalg.pinv(shifts)
@@ -127,7 +128,7 @@ def _carried(points: NDArray, one: Sequence[Screw], two: Sequence[Screw]) -> NDA
 def _newton(
     reach: CellReach, patch: Any, motions: Sequence[Screw], first: NDArray
 ) -> NDArray[np.float64]:
-    """Places (m, 3) of the nodes of cell 0 in equilibrium, starting from others."""
+    """Places (m, 3) of the nodes of cell 0 in equilibrium, starting from given places."""
     rest, moves = patch.case.structure.nodes, reach.moves
     free, enough = ~reach.hidden, ROUNDING * float(reach.body.scale().max())
     ones = np.ones(len(reach.steps))
@@ -159,7 +160,7 @@ def _newton(
         values, shapes = np.linalg.eigh(0.5 * (stiffness + stiffness.T))
         kept = np.abs(values) > NULL * np.abs(values).max()
         push = shapes[:, kept].T @ left
-        # downhill; if that fails, to the next equilibrium, even an unstable one
+        # downhill; if that fails, to the nearest equilibrium, even if it is unstable
         for slopes in (np.abs(values[kept]), values[kept]):
             step = (-moves @ (shapes[:, kept] @ (push / slopes)))[free].reshape(-1, 3)
             if found := better(first, step, left):

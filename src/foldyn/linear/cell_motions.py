@@ -25,12 +25,12 @@ from foldyn.values import choice, of_kind
 FEWEST = 3  # least number of cells of a chain
 AXES = ("x", "y", "z")
 COMPONENTS = (*AXES, "rotation")
-FLOOR = 1e-8  # of the largest amplitude: below it is round-off
-ENDS = 0.2  # of the cells at each end, where waves decay away from the end
+FLOOR = 1e-8  # amplitudes below this, relative to the largest, are round-off
+ENDS = 0.2  # share of the cells at each end, where waves decay from the end
 
 
 class Cells(NamedTuple):
-    """Nodes (n, m) of n cells, in the same order, and the motion from each cell to the next."""
+    """Nodes (n, m) of n cells, in the same order in each; the motion from a cell to the next."""
 
     nodes: NDArray[np.int64]
     motion: Screw
@@ -50,7 +50,8 @@ def cells_of(positions: NDArray, cell: UnitCell, along: int = 0) -> Cells:
         Rest positions (m). Nodes without partners, and incomplete cells at the end, are left out.
     cell : UnitCell
     along : int
-        Number of the motion, from 0; the rows of a sheet along the other one count as one cell.
+        Number of the motion, from 0. In a sheet, all cells along the other motion count as one
+        cell.
 
     Raises
     ------
@@ -66,7 +67,7 @@ def cells_of(positions: NDArray, cell: UnitCell, along: int = 0) -> Cells:
     following = np.where(distance <= near, partner, -1)
     rows, left = [], np.ones(len(positions), bool)
     starts = np.setdiff1d(np.arange(len(positions)), following)
-    for node in (*starts, *range(len(positions))):  # all others lie on closed rings
+    for node in (*starts, *range(len(positions))):  # the remaining nodes lie on closed rings
         if left[node]:
             row = [int(node)]
             while (after := int(following[row[-1]])) >= 0 and after != node:
@@ -93,11 +94,11 @@ def space_time(
     Parameters
     ----------
     trajectory : xarray.Dataset
-        Motion of a chain or sheet of such cells, from `simulate`.
+        Motion of a chain or sheet made of copies of the cell, from `simulate`.
     cell : UnitCell
     component : {"x", "y", "z", "rotation"}
-        Displacement component: along an axis of cell 0, turned with each cell by a screw; or the
-        rotation about the axis of the screw, in rad.
+        Displacement component: along an axis of cell 0 (a screw turns the axis with each cell); or
+        the rotation about the axis of the screw, in rad.
     along : int
         Number of the cell's motion along the chain.
 
@@ -105,8 +106,8 @@ def space_time(
     -------
     xarray.Dataset
         Dimensions time and cell: `displacement` (m, or rad) and `velocity`, means over the nodes of
-        a cell, and `strain` (time, gap): elongation between neighboring cells along the motion over
-        their distance at rest (equal for all nodes; negative in compression). Coordinates
+        a cell. `strain` (time, gap): elongation between neighboring cells along the motion, divided
+        by their distance at rest (equal for all nodes; negative in compression). Coordinates
         `position` (cell), m, along the motion, and `between` (gap), the cell before it plus 1/2.
 
     Raises
@@ -175,7 +176,7 @@ def wave_spectrum(
     Parameters
     ----------
     trajectory : xarray.Dataset
-        Motion of a chain or sheet of such cells.
+        Motion of a chain or sheet made of copies of the cell.
     cell : UnitCell
     component : {"x", "y", "z"}, optional
         Velocity component, as in `space_time`; by default all three.
@@ -187,9 +188,10 @@ def wave_spectrum(
     Returns
     -------
     xarray.Dataset
-        `amplitude` (phase, frequency), m/s: root of the sum of squared velocity amplitudes over
-        the nodes of a cell. Coordinates `phase` (rad per cell; positive for waves that travel to
-        higher cells) and `frequency` (Hz). Attributes: their steps, `phase_step`, `frequency_step`.
+        `amplitude` (phase, frequency), m/s: square root of the sum of squared velocity amplitudes
+        of all nodes of a cell. Coordinates `phase` (rad per cell; positive for waves that travel to
+        higher cells) and `frequency` (Hz). Attributes `phase_step` and `frequency_step`: steps of
+        these coordinates.
 
     Raises
     ------
@@ -227,17 +229,17 @@ def transmission(response: xarray.Dataset, cell: UnitCell, *, along: int = 0) ->
         From `frf`: to forces, or to a moving base.
     cell : UnitCell
     along : int
-        Number of the cell's motion along the chain, away from the drive.
+        Number of the cell's motion that leads along the chain, away from the drive.
 
     Returns
     -------
     xarray.Dataset
         Dimensions frequency and cell: `amplitude`, the root mean square response over the nodes of
-        a cell (in its unit); `ratio` (frequency), the amplitude of the last cell over the first;
-        and `decay` (frequency), nepers per cell, the slope of the logarithmic amplitude over the
-        cells (median over all pairs). A fifth of the cells at each end, and amplitudes at
-        round-off, are left out. In a gap this is the imaginary phase of the slowest-decaying wave
-        that the drive excites; in a band it is near zero.
+        a cell (in its unit); `ratio` (frequency), the amplitude of the last cell divided by that of
+        the first; and `decay` (frequency), nepers per cell, the slope of the logarithmic amplitude
+        along the cells (median for all pairs of cells). A fifth of the cells at each end, and
+        amplitudes at round-off, are left out. In a gap, `decay` is the imaginary phase of the
+        slowest-decaying wave that the drive excites; in a band it is near zero.
 
     Raises
     ------

@@ -1,10 +1,11 @@
 """A cell among its neighbors: the patch of copies that yields the matrices of a cell.
 
 Creases across the boundary of a cell are folds of the repeated sheet, between panels of two cells.
-So the model is built on a patch of panels around one cell: all panels at its nodes; the panels
-across their edges, which complete the forces on these nodes; and the panels across those edges, so
-that the former are discretized as in the repeated sheet. The patch is discretized with the options
-of the cell's own structure, and has copies of its supports, masses, damping and actuated creases.
+So the model is built on a patch of panels around one cell: all panels at the nodes of the cell; a
+ring of panels across the edges of these, which completes the forces on the nodes; and a second
+ring, so that the first ring is discretized as in the repeated sheet. The patch is discretized with
+the options of the cell's own structure, and has copies of the cell's supports, masses, damping and
+actuated creases.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ class Patch:
     unit, step : (n,), (n, d)
         For each node, the node of cell 0 of which it is a copy, and R.
     hidden_unit, hidden_step : (h,), (h, d)
-        The same for the hidden dofs, -1 if the patch lacks the one in cell 0.
+        The same for the hidden dofs; -1 if the patch lacks the hidden dof of cell 0.
     own_unit, own_step : (k,), (k, d)
         The same for the nodes of the cell's own structure.
     first : (m,)
@@ -90,7 +91,7 @@ class Patch:
 
     @property
     def determined(self) -> NDArray[np.bool_]:
-        """Whether each node of cell 0 is held along each axis, or follows others, (m, 3)."""
+        """Whether each node of cell 0 is held along each axis, or follows other nodes, (m, 3)."""
         return self.case.constraints.determined[self.own_nodes]
 
     def own_pairs(self, k: int) -> NDArray[np.int64]:
@@ -142,7 +143,7 @@ def cell_patch(cell: UnitCell) -> Patch:
 def _numbered(
     sites: Sequence[Site], number: Mapping[tuple, int], dimensions: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Number (n,) of the representative of each site, and R (n, d)."""
+    """Number (n,) of the representative of each site, and R (n, d) of the site."""
     units = np.array([number.get(part, -1) for _, part in sites], np.int64)
     return units, np.array([step for step, _ in sites], np.int64).reshape(-1, dimensions)
 
@@ -210,7 +211,7 @@ def _copied(chosen: Iterable[int], panels: Sequence[Panel]) -> list[int]:
 
 
 def _sheet(sheet: Sheet, panels: Sequence[Panel]) -> Sheet:
-    """The sheet, with its panel-wise parts repeated in all cells."""
+    """The sheet, with panels that differ from it repeated in all cells."""
     parts = [
         replace(part, panels=rows)
         for part in sheet.panels
@@ -288,7 +289,7 @@ def node_sites(
 def hidden_sites(structure: Discretized, unit: NDArray, step: NDArray) -> list[Site]:
     """Sites of the hidden dofs of a structure: rotations about sides, and gives of edges.
 
-    unit, step : unit and R of its nodes, (n,), (n, d).
+    unit, step : for each node, the node of cell 0 of which it is a copy (n,), and R (n, d).
     """
     place = list(zip(map(tuple, step.tolist()), unit.tolist(), strict=True))
 
@@ -297,7 +298,7 @@ def hidden_sites(structure: Discretized, unit: NDArray, step: NDArray) -> list[S
         return edge.step, (edge.kind, *what)
 
     def turns(ends: Iterable[Iterable[int]]) -> list[Site]:
-        """Rotations about sides, in order; a side may have several."""
+        """Rotations about sides, in order; a side may have several rotations."""
         times: dict[Any, int] = {}
         found = []
         for pair in map(tuple, ends):
@@ -414,7 +415,7 @@ class Repeated:
         return sorted(node for part in parts for _, node in self._copies[part])
 
     def _groups(self, nodes: Sequence[int]) -> list[tuple[Step, list[int]]]:
-        """Complete copies of a group of nodes in the patch, each with its offset."""
+        """Complete copies of a group of nodes in the patch, each with its R."""
         sites = [self.own[v] for v in nodes]
         base = sites[0][0]
         found = []
@@ -434,7 +435,7 @@ class Repeated:
         """Copies of a support for all cells of the patch."""
         if isinstance(part, BaseMotion):  # a base at rest
             return []
-        if isinstance(part, Impose):  # holds its nodes where the state puts them
+        if isinstance(part, Impose):  # its nodes are held at their places in the state
             part = Fix(part.nodes, part.axis, part.direction, part.along)
         if isinstance(part, Link):
             return self._links(part, field)
@@ -447,7 +448,7 @@ class Repeated:
             return [replace(part, nodes=self._nodes(nodes, field))]
         if getattr(part, "axes", None) is not None:
             part = [replace(part, axes=None, direction=axis) for axis in part.axes or ""]
-        elif part.direction is None:  # same in all directions
+        elif part.direction is None:  # acts the same in all directions
             return [replace(part, nodes=self._nodes(nodes, field))]
         first: dict[Any, Step] = {}  # partners count once
         for node in nodes:
@@ -460,7 +461,7 @@ class Repeated:
         ]
 
     def _turned(self, part: Any, step: Step, **changes: Any) -> Any:
-        """A copy, its direction (if any) turned with the cell."""
+        """A copy of a support, with its direction (if any) turned with the cell."""
         if part.direction is None or not self._turns:
             return replace(part, **changes)
         way = rotation(self.lattice.cell.motions, step) @ unit_vector(part.direction)
@@ -502,7 +503,7 @@ class Repeated:
 
     # ------------------------------------------------------------------ creases
     def _on_creases(self, part: Any, field: str) -> Any:
-        """The part with all copies of its creases, by name if the patch has this name."""
+        """The part for all copies of its creases; named as before if the patch has the name."""
         creases, pattern = part.creases, self.structure.pattern
         if isinstance(creases, str) and (creases in ASSIGNED or creases in pattern.families):
             return part

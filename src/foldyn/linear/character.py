@@ -1,19 +1,19 @@
 """Character of a mode, in numbers and a name: axial, bending, torsion along a main axis.
 
-A shape is compared with the motions of a beam along the axis. At stations along it the sections
-move by t and turn by w, both linear in between (s the coordinate along the axis a, c(s) the center
-of mass of the section, b and c the other two axes):
+A shape is compared with the motions of a beam along the axis. At stations along the axis the
+sections move by t and turn by w; between stations both are linear. With s the coordinate along the
+axis a, c(s) the center of mass of the section, and b and c the other two axes:
 
     phi(x) ~ t(s) + w(s) x (x - c(s))
 
-t and w are found by least squares weighted by mass. The fitted motion is the sum of its parts:
+t and w follow from least squares, weighted by mass. The fitted motion is the sum of its parts:
 
     axial        t_a             bending along b    t_b and w_c
     torsion      w_a             bending along c    t_c and w_b
 
-and phi' M (part) / phi' M phi is the share of each; the rest is distortion of the sections. The
-shares add up to 1; a small negative one can occur if sections are not symmetric. A mode is named
-after the part with more than half of its motion; a mode without such a part is mixed.
+and phi' M (part) / phi' M phi is the share of each part; the rest is distortion of the sections.
+The shares add up to 1; a share can be slightly negative if sections are not symmetric. A mode is
+named after the part with more than half of the motion; a mode without such a part is mixed.
 """
 
 from __future__ import annotations
@@ -57,16 +57,16 @@ def character(
     stations : int, optional
         Sections along the axis, 1 for a single one; by default one per dozen nodes, from 2 to 9.
     case : Case, optional
-        The case of the modes, needed if they cannot rebuild it (`foldyn.case_of`).
+        The case of the modes; needed if it cannot be rebuilt from the modes (`foldyn.case_of`).
 
     Returns
     -------
     xarray.Dataset
         `share` (mode, kind) with the kinds axial, bending along each of the other two axes,
-        torsion, distortion; `kind_of` (mode), the one with more than half of the motion, else
-        "mixed", or "rigid"; `order` (mode), its number among the modes of that kind in this set;
-        `name` (mode) in words, such as "second bending along y", or, with the two largest shares,
-        "mixed: torsion, bending along y".
+        torsion, distortion; `kind_of` (mode), the kind with more than half of the motion, else
+        "mixed", or "rigid"; `order` (mode), the number of the mode among the modes of its kind in
+        this set; `name` (mode) in words, such as "second bending along y", or, with the two largest
+        shares, "mixed: torsion, bending along y".
 
     Raises
     ------
@@ -112,7 +112,7 @@ def character(
 
 
 def main_axis(case: Case) -> str:
-    """Axis from the supports to the rest of a structure, or else its longest axis."""
+    """Axis from the supports to the rest of a structure if distinct, else its longest axis."""
     nodes = case.structure.nodes
     extent = np.ptp(nodes, axis=0)
     held = case.fixed.sum(axis=1)
@@ -130,7 +130,7 @@ def _beam_parts(x: NDArray, weight: NDArray, a: int, stations: int) -> dict[str,
     total = loads.sum(axis=0)
     centers = (loads.T @ x) / np.where(total > 0.0, total, 1.0)[:, None]
     arm = x - hats @ centers
-    arm[:, a] = 0.0  # sections are plane: turns about b and c move them along a alone
+    arm[:, a] = 0.0  # sections are plane: turns about b and c move points along a only
     b, c = (a + 1) % 3, (a + 2) % 3
     unit = np.eye(3)
 
@@ -151,7 +151,7 @@ def _beam_parts(x: NDArray, weight: NDArray, a: int, stations: int) -> dict[str,
 
 
 def _hats(along: NDArray, stations: int) -> NDArray:
-    """Values (n, k) at coordinates (n,) of piecewise linear functions that are 1 at one station."""
+    """Piecewise linear functions, each 1 at one station, as values (n, k) at coordinates (n,)."""
     extent = float(np.ptp(along))
     if stations == 1 or extent == 0.0:
         return np.ones((len(along), 1))
@@ -160,7 +160,7 @@ def _hats(along: NDArray, stations: int) -> NDArray:
 
 
 def _shares(shapes: NDArray, weight: NDArray, parts: dict[str, NDArray]) -> NDArray:
-    """Shares (modes, kinds) of the parts, and the remainder last."""
+    """Shares (modes, kinds) of the parts, then of the remainder."""
     root = np.sqrt(weight)
     flat = shapes.reshape(len(shapes), -1).T * root[:, None]
     whole = (flat**2).sum(axis=0)

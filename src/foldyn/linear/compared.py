@@ -16,13 +16,13 @@ from foldyn.errors import InputError
 from foldyn.linear.reference import LEAST, NO_LIMIT
 from foldyn.values import choice
 
-ABREAST, WIDE = 4, 79  # models side by side in plain text, and characters of a line
+ABREAST, WIDE = 4, 79  # in plain text: models side by side, and characters per line
 
 __all__ = ["OWN", "ComparedMode", "Fidelity"]
 OWN = "own"
 """Name of the case's own model."""
-GOOD, LARGEST = 0.02, 0.10  # errors: of a model that is kept, and of one that can be used
-MESH = 0.02  # mesh error above which it is mentioned
+GOOD, LARGEST = 0.02, 0.10  # largest errors: of a model worth keeping, and of a usable model
+MESH = 0.02  # larger mesh errors are mentioned
 SHELL = " (--model shell on the command line, fd.shell)"
 SCOPE = (
     "Only small vibrations about rest and small loads were compared: motions and loads that turn "
@@ -37,9 +37,9 @@ class Reach(NamedTuple):
     ----------
     model : str
     count : int
-        Number of these modes.
+        Number of modes in the range.
     worst : float
-        Largest error among them; infinite without any.
+        Largest error among these modes; infinite if there are none.
     """
 
     model: str
@@ -194,14 +194,14 @@ class ComparedMode(NamedTuple):
     shell : float
         Frequency of the mode, Hz, extrapolated in mesh size.
     mesh_error : float
-        Relative error of the finest mesh against it.
+        Relative error of the frequency on the finest mesh, compared with `shell`.
     below : bool
-        Whether it lies below 0.6 of the plate frequency.
+        Whether the mode lies below 0.6 of the plate frequency.
     error : float
         Relative error of the partner's frequency; infinite if the mode is lost, i.e. no mode of the
         model has a MAC of 0.5 or more with it.
     mac : float
-        Modal assurance criterion of the two.
+        Modal assurance criterion of the mode and its partner.
     """
 
     mode: int
@@ -219,13 +219,13 @@ class Fidelity:
     Parameters
     ----------
     result : xarray.Dataset
-        Numbers of the comparison, from `fidelity` or from `fd.load` of such a result.
+        Numbers of the comparison, from `fidelity`, or from a file by `fd.load`.
         Dimensions mode and model; the attribute `limit` is 0.6 of the plate frequency (Hz).
 
     Raises
     ------
     InputError
-        Not a result of this kind.
+        Not a result of a comparison.
     """
 
     result: xarray.Dataset
@@ -241,7 +241,7 @@ class Fidelity:
             )
 
     def __repr__(self) -> str:
-        """One line: how many modes of which models."""
+        """One line with the models and the number of modes."""
         below = int((self.result["frequency"].values < self.limit).sum())
         return (
             f"<Fidelity of {', '.join(self.models)}: {self.result.sizes['mode']} modes, {below} "
@@ -266,7 +266,7 @@ class Fidelity:
 
     @property
     def advice(self) -> str:
-        """The model to use and up to which frequency, and the limits of the comparison."""
+        """The model to use, up to which frequency, and the limits of the comparison."""
         return advice(self.result)
 
     def table(self, model: str = OWN) -> tuple[ComparedMode, ...]:

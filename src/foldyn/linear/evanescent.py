@@ -1,7 +1,7 @@
-"""Waves of a given frequency: traveling ones, and ones that decay from cell to cell.
+"""Waves of a given frequency: waves that travel, and waves that decay from cell to cell.
 
-With the dynamic stiffness D_s = K_s + i omega C_s - omega^2 M_s of cells s periods apart along one
-direction, at given phases along the other one, a wave u lambda^s satisfies
+With the dynamic stiffness D_s = K_s + i omega C_s - omega^2 M_s between cells s periods apart along
+one direction, for a given phase along the other direction, a wave u lambda^s satisfies
 
     sum over s of lambda^s D_s u = 0,    lambda = exp(i k),
 
@@ -30,12 +30,12 @@ from foldyn.threads import in_threads
 from foldyn.values import number, numbers, whole
 
 TRAVELS = 1e-6  # Np per cell: below this attenuation a wave counts as traveling
-FASTEST = 40.0  # Np per cell beyond which a wave is lost in round-off
+FASTEST = 40.0  # Np per cell: waves that decay faster are lost in round-off
 TURN = 2.0 * np.pi
 
 
 class Reach(NamedTuple):
-    """A matrix by cell distance: steps (s,) from -r to r, and blocks (s, n, n)."""
+    """A matrix by distance of cells: `steps` (s,) from -r to r, and `blocks` (s, n, n)."""
 
     steps: NDArray[np.int64]
     blocks: NDArray
@@ -57,7 +57,7 @@ def attenuation(
     Parameters
     ----------
     cell : UnitCell
-        Its damping is included, and makes all waves decay.
+        The cell; its damping is included, and makes all waves decay.
     frequencies : float or array_like, shape (n,)
         Frequencies (Hz), above 0.
     along : int
@@ -72,11 +72,11 @@ def attenuation(
     Returns
     -------
     xarray.Dataset
-        Dimensions frequency, wave. `phase` (complex, rad per cell; the real part from -pi to pi,
-        the imaginary part not negative, for waves that decay in the direction; of traveling waves,
-        only phases from 0 to pi if `phase` is 0), nan if there are fewer waves; and `attenuation`
-        (Np per cell) of the slowest-decaying wave, 0 if one travels: motions of this frequency
-        fall by exp(-attenuation) per cell.
+        Dimensions frequency, wave. `phase`, complex, rad per cell, nan if there are fewer waves:
+        the real part is from -pi to pi, and the imaginary part is not negative, so that waves decay
+        in the direction; for traveling waves only phases from 0 to pi are listed if the argument
+        `phase` is 0. `attenuation` (Np per cell) of the slowest-decaying wave, 0 if a wave travels:
+        motions of this frequency fall by exp(-attenuation) per cell.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def attenuation(
 
 
 def _blocks(bloch: Bloch, matrix: Any, along: int, phase: float) -> Reach:
-    """Blocks of a matrix by cells along a direction, summed with a phase along the other one."""
+    """Blocks of a matrix by cells along a direction, summed with a phase along the other."""
     steps = bloch.steps[:, along]
     other = np.delete(bloch.steps, along, axis=1).sum(axis=1)
     reach = int(np.abs(steps).max(initial=0))
@@ -146,7 +146,7 @@ def _blocks(bloch: Bloch, matrix: Any, along: int, phase: float) -> Reach:
 
 
 def _bordered(dynamic: NDArray, ties: NDArray) -> NDArray[np.complex128]:
-    """Blocks bordered by constraints (s, k, n), with their forces as further unknowns."""
+    """Blocks with constraints (s, k, n) added, whose forces are further unknowns."""
     count = ties.shape[1]
     if not count:
         return dynamic.astype(complex)
@@ -203,7 +203,7 @@ def phases_of(reach: Reach, condense: bool = True) -> NDArray[np.complex128]:
 def _forward(phases: NDArray, both: bool) -> NDArray[np.complex128]:
     """Waves that decay in the direction, slowest first, and traveling waves.
 
-    both : whether k and -k are both solutions, so that only one is kept.
+    both : whether -k is a solution with every k, so that only one of the two is kept.
     """
     real, decay = np.real(phases), np.imag(phases)
     travels = np.abs(decay) <= TRAVELS

@@ -1,15 +1,17 @@
-"""The drive of a frequency response, and the response: to nodal forces, or to a moving base.
+"""Drives of frequency responses, nodal forces or a moving base, and the responses to them.
 
-The response to a moving base is the absolute displacement over the base displacement. With x = t y
-+ z, t the unit translation of all nodes along the axis of the base, y the motion of the base and z
-the motion relative to it, the equation of motion M x'' + C x' + K x = 0 on the free dofs becomes
+The response to a moving base is the absolute displacement divided by the base displacement. With x
+= t y + z, where t is the unit translation of all nodes along the axis of the base, y the motion of
+the base and z the motion relative to it, the equation of motion M x'' + C x' + K x = 0 on the free
+dofs becomes
 
     M z'' + C z' + K z = -(M t)_f (y'' + alpha y') - (C_g t)_f y',
 
-because a translation strains nothing: K t = 0, and likewise for beta K0, creases, dashpots between
-nodes and modal damping. (Springs to the ground do resist it; their -K t (y + beta y') is added.)
-Rayleigh's alpha M and the dashpots to the ground, C_g, damp the absolute motion, as air does, and
-therefore drag on the moving body; beta K0 damps the strain. For one mass m on a spring k
+because a translation strains nothing: K t = 0, and the same holds for beta K0, creases, dashpots
+between nodes and modal damping. (Springs to the ground do resist a translation; their -K t (y +
+beta y') is added.) Rayleigh's alpha M and the dashpots to the ground, C_g, damp the absolute
+motion, as air does, and therefore exert drag on the moving body; beta K0 damps the strain. For one
+mass m on a spring k
 
     x / y = (k + i w beta k) / (k - w^2 m + i w (alpha m + beta k)),
 
@@ -32,7 +34,7 @@ from foldyn.errors import FoldynWarning, InputError, warn
 from foldyn.linear.linearized import Linearized
 from foldyn.values import show
 
-NAMED = 5  # frequencies that a warning lists
+NAMED = 5  # most frequencies listed in a warning
 
 
 class Answer(NamedTuple):
@@ -41,8 +43,8 @@ class Answer(NamedTuple):
     Attributes
     ----------
     response : ndarray, complex
-        Per unit of the drive: from matrix methods on the free dofs, shape (m, nf), relative to the
-        base; from simulated motions at all nodes, shape (m, n, 3), absolute.
+        Response per unit of the drive. From matrix methods: on the free dofs, shape (m, nf),
+        relative to the base. From simulated motions: at all nodes, shape (m, n, 3), absolute.
     more : dict
         Further variables of the dataset.
     facts : dict
@@ -101,7 +103,7 @@ def drive_of(case: Case, drive: Any, amplitude: float) -> Drive:
     Warns
     -----
     FoldynWarning
-        A force acts partly on held axes: this part moves nothing and is left out.
+        A force acts partly on held axes: that part moves nothing and is left out.
     """
     parts = (drive,) if isinstance(drive, Force | BaseMotion) else drive
     if not isinstance(parts, Sequence) or isinstance(parts, str) or not len(parts):
@@ -128,7 +130,7 @@ def drive_of(case: Case, drive: Any, amplitude: float) -> Drive:
 
 
 def _forces(case: Case, parts: list[Force], amplitude: float) -> Drive:
-    """A drive by forces; their part on held axes is left out."""
+    """A drive by forces, without their components on held axes."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FoldynWarning)
         try:
@@ -173,17 +175,17 @@ def _base(case: Case, part: BaseMotion, amplitude: float) -> Drive:
 
 
 class Term(NamedTuple):
-    """Part of the load per unit of a drive: a shape times a factor of frequency."""
+    """Part of the load per unit of a drive: a shape times a factor that depends on frequency."""
 
     shape: NDArray[np.float64]  # (nf,)
-    factor: Callable[[float], complex]  # of the angular frequency (rad/s)
+    factor: Callable[[float], complex]  # function of the angular frequency (rad/s)
 
 
 def drive_terms(system: Linearized, drive: Drive) -> list[Term]:
     """Load per unit of the drive: forces per N, or the effective load of a moving base.
 
-    The base drives masses by inertia, and drags on them by dashpots; springs, planes and dashpots
-    attached to the ground, which stays at rest, hold them back.
+    A moving base drives masses by inertia. Springs, planes and dashpots attached to the ground,
+    which stays at rest, hold the masses back.
     """
     if drive.axis is None:
         return [Term(system.projected((drive.vector / drive.value).ravel()), lambda omega: 1.0)]
@@ -211,7 +213,7 @@ def absolute(system: Linearized, drive: Drive, relative: NDArray) -> NDArray[np.
 
 
 def warn_at(frequency: NDArray, text: str) -> None:
-    """Warn about frequencies (m,), if any; the text has a placeholder for them."""
+    """Warn about frequencies (m,), if any; `text` has a placeholder for the frequencies."""
     if not frequency.size:
         return
     listed = ", ".join(f"{f:.6g}" for f in frequency[:NAMED])

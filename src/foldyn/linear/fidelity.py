@@ -60,15 +60,15 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
         "membrane": "bars",
     },
 }  # fmt: skip
-"""Models compared with the case's own: arguments of `discretize` that replace its own.
+"""Models compared with the case's model: arguments of `discretize` that replace the case's own.
 
-"bars" is "n5b8e" in which only bars resist stretching."""
+"bars" is "n5b8e" with bars alone resisting stretching."""
 BESIDE = ("standard", "plate", "n5b8e")
 """Models compared by default."""
 SHOWN = ("calibration", "mass", "bend_law")
 """Options that distinguish models in tables."""
-BEYOND = 2  # extra modes of the shell that are computed, but not compared
-RUNS, SECONDS = 5, 3.0  # most timed runs of a modal analysis, and their time limit, s
+BEYOND = 2  # additional modes of the shell, computed but not compared
+RUNS, SECONDS = 5, 3.0  # limits for timing a modal analysis: number of runs, and seconds
 
 
 def fidelity(
@@ -81,13 +81,14 @@ def fidelity(
     vertex_radius: float | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Fidelity:
-    """Compare bar-and-hinge models with the shell, for one's own case.
+    """Compare bar-and-hinge models with the shell, for a given case.
 
     The shell has the pattern, sheet, creases, supports, loads and masses of the case, and a
     consistent mass. Its lowest elastic modes about rest, extrapolated from two meshes, are paired
     with the modes of each model by their MAC at shared nodes. If forces act and supports hold the
     sheet, displacements along small forces are compared too. A third mesh, half as fine, gives the
-    order of convergence of the shell, and so its error, or shows that it has not converged.
+    order of convergence of the shell, and from it the shell's error, or reveals that the shell has
+    not converged.
 
     Parameters
     ----------
@@ -97,12 +98,13 @@ def fidelity(
     count : int
         Number of elastic modes of the shell.
     divisions : (int, int), optional
-        Pieces of every edge of the two finer shells: (6, 12) by default, or fewer, with a warning,
-        if the shell would be large because of many panels.
+        Pieces of every edge in the two finer shells: (6, 12) by default, or fewer, with a warning,
+        if many panels would make the shell large.
     models : sequence of str, or mapping of str to mapping, optional
-        Models compared with the case's own: names from `foldyn.linear.fidelity.MODELS`, by default
-        "standard", "plate" and "n5b8e" as far as they accept its other options; or, by name,
-        arguments of `discretize` that replace the case's own.
+        Models compared in addition to the case's own model: names from
+        `foldyn.linear.fidelity.MODELS`, by default "standard", "plate" and "n5b8e" as far as they
+        accept the case's other options; or, by name, arguments of `discretize` that replace those
+        of the case.
     secant : float, optional
         Amplitude (degrees) of superlinear hinges, which have no stiffness at rest; as in `modes`.
     vertex_radius : float, optional
@@ -116,13 +118,13 @@ def fidelity(
     Returns
     -------
     Fidelity
-        Its `advice` names the model to use and its frequency range.
+        The attribute `advice` names the model to use and its frequency range.
 
     Raises
     ------
     InputError
         The case is a shell, its structure was changed by hand, the sheet has no density, or nodes
-        other than vertices are named; a panel cannot be meshed; an argument out of range.
+        other than vertices are named; a panel cannot be meshed; an argument is out of range.
 
     Warns
     -----
@@ -157,7 +159,7 @@ class Comparison:
     shells : (Case, Case, Case)
         The case with shells of three meshes, finest last, with forces as its only loads.
     compared : mapping of str to Case
-        The case with each model, its own first, with the same loads.
+        The case with each model, starting with its own, with the same loads.
     not_forces : tuple of int
         Numbers of the loads left out.
     secant : float or None
@@ -216,14 +218,14 @@ class Comparison:
         return Fidelity(fidelity_dataset(self.case, list(self.compared), values, facts))
 
     def _times(self, true: Reference) -> dict[str, Any]:
-        """Times (s) of modal analyses, each for the same number of modes, and their ratio."""
+        """Times (s) of modal analyses, all with the same number of modes, and ratios of times."""
         count, taken = true.found.sizes["mode"], [float(true.found.attrs["wall_seconds"])]
         shell = _seconds(true.case, count, self.secant, taken)
         own = np.array([_seconds(held, count, self.secant) for held in self.compared.values()])
         return {"seconds": shell, "model_seconds": own, "cost_ratio": shell / own}
 
     def _deflections(self, held: Sequence[str]) -> dict[str, Any]:
-        """Displacements along the forces: work over the forces on the nodes of the case.
+        """Displacements along the forces: work divided by the sum of the forces on nodes.
 
         held : names of the models without free motions.
         """
@@ -274,12 +276,12 @@ def _held(found: xarray.Dataset) -> bool:
 
 
 def _compared(case: Case, models: Any) -> dict[str, Case]:
-    """The case with its own model and with others, except one equal to its own."""
+    """The case with its own model and with other models, without a model equal to its own."""
     structure = case.structure
     compared = {OWN: with_structure(case, structure)}
-    _ = structure.mass  # its rule may refuse this pattern: fail early
+    _ = structure.mass  # the mass rule may refuse this pattern: fail early
     for name, changes in named(models, structure).items():
-        law = {"bar_law": None} if "membrane" in changes else {}  # the membrane decides
+        law = {"bar_law": None} if "membrane" in changes else {}  # follows the membrane
         options = {**vars(structure.options), **law, **changes}
         with within(f"models: {name}: "):
             options |= straightened(ModelOptions(**options), structure.pattern, case.supports)
@@ -328,7 +330,7 @@ def _written(value: Any) -> str:
 
 
 def _seconds(case: Case, count: int, secant: float | None, taken: Sequence[float] = ()) -> float:
-    """Median time (s) of a modal analysis; from fewer runs if that takes long.
+    """Median time (s) of a modal analysis, from fewer runs if these take long.
 
     taken : times already measured.
     """
@@ -354,14 +356,14 @@ def _warn_of_imbalance(residual: float) -> None:
 
 
 class SmallLoads(NamedTuple):
-    """Forces in full, with the stiffness of the sheet at rest.
+    """Response of the sheet, with its stiffness at rest, to forces in full.
 
     Attributes
     ----------
     work : float
         Forces times displacements, J.
     load : float
-        Sum of the magnitudes of the components of all forces, N.
+        Sum of the absolute values of the components of all forces, N.
     """
 
     work: float
@@ -369,12 +371,12 @@ class SmallLoads(NamedTuple):
 
     @property
     def displacement(self) -> float:
-        """Mean displacement (m) along the forces, weighted by them."""
+        """Mean displacement (m) along the forces, weighted by the forces."""
         return self.work / self.load
 
 
 def forces_alone(case: Case) -> tuple[Case, list[int]]:
-    """The case with only the loads that are forces, and the numbers of the others.
+    """The case with only the loads that are forces, and the numbers of the other loads.
 
     Nodal forces, gravity and pressure are kept; loads that turn or heat parts are not.
     """
@@ -408,7 +410,7 @@ def small_loads(case: Case, secant: float | None = None) -> SmallLoads:
     Parameters
     ----------
     case : Case
-        Its supports and hinges resist every motion.
+        Supports and hinges of the case must resist every motion.
     secant : float, optional
         As in `modes`.
     """

@@ -26,10 +26,10 @@ from foldyn.linear.modes import rigid_space, unresisted
 from foldyn.ram_limit import check_memory
 from foldyn.values import whole
 
-DIAGONAL = 1e-12  # of the modal damping: smaller couplings of modes count as round-off
-FOLLOWS = 1e-8  # of the terms of a damping force on a massless dof: less counts as zero
-COPIES = 3  # of the matrix of the amplitudes in memory
-BESIDE = 0.01  # of the lowest positive eigenvalue: shift below 0 for a free body
+DIAGONAL = 1e-12  # couplings of modes smaller than this, relative to modal damping, are round-off
+FOLLOWS = 1e-8  # damping force on a massless dof, relative to its terms, that counts as zero
+COPIES = 3  # copies of the matrix of amplitudes in memory
+BESIDE = 0.01  # shift below 0 for a free body, relative to the lowest positive eigenvalue
 RESONANCE = (
     "there is no response at {} (nan): a resonance without damping, or 0 Hz of a body that is free "
     "to move; give the case damping, as Rayleigh(alpha=...), or leave these frequencies out"
@@ -44,7 +44,7 @@ class Direct(Checked):
 def direct(
     system: Linearized, drive: Drive, frequency: NDArray, options: Direct, report: Reporter
 ) -> Answer:
-    """Solve (K - w^2 M + i w (C + G'G)) x = f at each frequency, G the rows of modal damping.
+    """Solve (K - w^2 M + i w (C + G'G)) x = f at each frequency; G: rows of modal damping.
 
     The response is nan if the matrix is singular to round-off: at a resonance without damping,
     and at 0 Hz for a body that is free to move.
@@ -52,7 +52,7 @@ def direct(
     Warns
     -----
     FoldynWarning
-        There are such frequencies.
+        The response is nan at some frequencies.
     """
     terms = drive_terms(system, drive)
     response = np.zeros((len(frequency), len(system.free)), np.complex128)
@@ -89,7 +89,7 @@ class Modal(Checked):
         Number of modes, the lowest ones; all by default.
     static_correction : bool
         Whether to add the static response of the omitted modes: errors then fall with the fourth
-        power of the highest frequency kept instead of the second.
+        power of the highest frequency kept, instead of the second power.
     """
 
     count: Annotated[int | None, Check(whole, least=1, what="modes")] = None
@@ -103,9 +103,9 @@ def modal(
 
     The modal damping matrix is kept in full: modes coupled by damping (dashpots and creases, beta
     K0 about a state where the tangent is not K0) stay coupled. Massless dofs follow the modes
-    statically; a different motion due to damping or memory is coupled to them. r = (K - s M)^-1 f -
-    Phi (Lambda - s)^-1 Phi' f is the response of all other modes at the squared frequency s: 0, or
-    slightly below for a body that is free to move (mode acceleration: Craig and Kurdila,
+    statically; their further motion due to damping or memory is coupled to the modes. r = (K - s
+    M)^-1 f - Phi (Lambda - s)^-1 Phi' f is the response of all other modes at the squared frequency
+    s: 0, or slightly below for a body that is free to move (mode acceleration: Craig and Kurdila,
     Fundamentals of Structural Dynamics, 2nd ed. 2006, chapter 11).
 
     At a resonance without damping the response is nan.
@@ -113,7 +113,7 @@ def modal(
     Warns
     -----
     FoldynWarning
-        There are such resonances.
+        There are resonances without damping.
     """
     pencil = Pencil(system.stiffness, system.mass)
     count = pencil.finite if options.count is None else int(options.count)
@@ -145,7 +145,7 @@ def modal(
 
 
 class _Basis(NamedTuple):
-    """Motions, r of them, uncoupled in stiffness and mass: modes, and massless motions.
+    """Basis of r motions, uncoupled in stiffness and mass: modes, and massless motions.
 
     values : (r,) stiffness; inertia : (r,) 1 or 0; noise : (r,) rounding errors of the values.
     """
@@ -157,10 +157,11 @@ class _Basis(NamedTuple):
 
 
 def _with_massless(system: Linearized, pencil: Pencil, modes: Spectrum) -> _Basis:
-    """Modes, and the motions by which massless dofs deviate from them due to damping or memory.
+    """Modes, and motions by which massless dofs deviate from modes due to damping or memory.
 
-    In modes, massless dofs follow the others statically. Damping forces on their rates add a motion
-    of their own; massless dofs without damping follow this motion statically.
+    In modes, massless dofs follow other dofs statically. If damping forces depend on the rates of
+    massless dofs, these dofs get an additional motion; massless dofs without damping follow it
+    statically.
     """
     shapes, light = modes.shapes, ~pencil.heavy
     pull, most = np.abs(system.damping @ shapes), abs(system.damping) @ np.abs(shapes)
@@ -191,7 +192,7 @@ def _amplitudes(
 ) -> NDArray:
     """Amplitudes (r,) of the basis at an angular frequency (rad/s).
 
-    memory : complex stiffness of memory laws between the motions at this frequency.
+    memory : complex stiffness of memory laws at this frequency, in the basis.
     """
     own, noise = damping.diagonal(), basis.noise
     detuned = basis.values - omega**2 * basis.inertia

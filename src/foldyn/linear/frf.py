@@ -32,9 +32,10 @@ from foldyn.values import choice, number, numbers, of_kind, suggest, whole
 class ResponseMethod(NamedTuple):
     """A method for frequency responses.
 
-    `compute` takes a `Linearized` and its drive if `linear`, else a `Rig`; then the frequencies,
-    an instance of `options` and a reporter, and returns an `Answer`. A method with a `secant`
-    (degrees) finds the slopes of superlinear hinges itself, starting from that amplitude.
+    The first arguments of `compute` are a `Linearized` and its drive if the method is `linear`,
+    else a `Rig`; then come the frequencies, an instance of `options` and a reporter. It returns an
+    `Answer`. A method with a `secant` (degrees) finds the slopes of superlinear hinges itself,
+    starting from that amplitude.
     """
 
     name: str
@@ -61,7 +62,7 @@ METHODS: Mapping[str, ResponseMethod] = {
     )
 }
 
-COPIES = 4  # of the response in memory, while it is computed and stored
+COPIES = 4  # copies of the response in memory, while it is computed and stored
 PER_FORCE = tuple(name for name in RESPONSES if name != "transmissibility")
 
 
@@ -84,21 +85,22 @@ def frf(
     Parameters
     ----------
     case : Case
-        Its loads and imposed displacements are preloads, in full; histories and base motions are
-        ignored.
+        Loads and imposed displacements of the case are preloads, in full; histories and base
+        motions are ignored.
     drive : sequence of Force, or a BaseMotion
         Drive without a history: forces in phase with each other, or the common motion of all nodes
         that `Fix` holds along an axis.
     frequencies : array_like
         Frequencies (Hz), increasing. For `impulse` and `burst_random` multiples of one spacing,
-        as numpy.arange(0.5, 20, 0.1).
+        such as numpy.arange(0.5, 20, 0.1).
     state : State or "equilibrium", optional
-        State to linearize about: a state, as `fd.initial_state(path)`; the equilibrium under the
-        loads, found by statics; by default the rest state, in which no load acts.
+        State to linearize about: a state, such as `fd.initial_state(path)`; or "equilibrium", the
+        equilibrium under the loads, found by statics; by default the rest state, in which no load
+        acts.
     method : {"direct", "modal", "harmonic", "impulse", "stepped_sine", "burst_random"}
         "direct" and "modal" linearize the case; "harmonic" linearizes each superlinear hinge for
-        its own swing under the drive; the others simulate motions and estimate the response from
-        them, including all nonlinearities.
+        its own swing under the drive; the other methods simulate motions and estimate the response
+        from these, including all nonlinearities.
     secant : float, optional
         For "direct" and "modal": amplitude (degrees) at which superlinear hinges take their
         equivalent slope.
@@ -109,8 +111,8 @@ def frf(
     internal : int
         For "direct" and "modal": internal amplitudes of each panel, as in `modes`.
     progress : bool or callable, optional
-        True shows a bar; a callable gets a `Progress`: of the simulated time for methods that
-        simulate, of the number of frequencies for the others.
+        True shows a bar; a callable gets a `Progress`, in simulated time for methods that simulate
+        motions, in frequencies for the others.
     **options
         Fields of `linear.Modal`, `linear.HarmonicBalance`, `linear.Impulse`,
         `linear.SteppedSine` and `linear.BurstRandom`.
@@ -118,17 +120,18 @@ def frf(
     Returns
     -------
     xarray.Dataset
-        Dimensions frequency, node, axis. `receptance` (m/N): displacement over the sum of the
-        magnitudes of the nodal forces, attribute `drive_force`; or `transmissibility`: absolute
-        displacement over base displacement. Complex, for the time dependence exp(+i w t): a lag is
-        a negative phase; nan if there is no response. `displacement` of the state and `drive`, its
-        amplitudes. `coherence` (burst_random), `unsteadiness` (stepped_sine) or `swing` (harmonic).
-        Attributes hold the method, its options and facts about the run.
+        Dimensions frequency, node, axis. `receptance` (m/N): displacement divided by the sum of the
+        magnitudes of the nodal forces, which is the attribute `drive_force`; or `transmissibility`:
+        absolute displacement divided by base displacement. Complex, for the time dependence exp(+i
+        w t): a lag is a negative phase; nan if there is no response. `displacement` of the state,
+        and `drive`, the amplitudes of the drive. `coherence` (burst_random), `unsteadiness`
+        (stepped_sine) or `swing` (harmonic). Attributes hold the method, its options and facts
+        about the run.
 
     Raises
     ------
     InputError
-        An argument out of range; a drive of held axes only; frequencies that the sampling does not
+        An argument out of range; a drive on held axes only; frequencies that the sampling does not
         resolve.
     ComputationError
         No equilibrium is found, or a simulated motion fails.
@@ -141,8 +144,8 @@ def frf(
 
     Notes
     -----
-    All damping of the case is included, linearized in the state. Peaks and their damping:
-    `linear.peaks_of`; velocities and accelerations per force: `linear.convert`.
+    All damping of the case is included, linearized in the state. `linear.peaks_of` finds peaks and
+    their damping; `linear.convert` gives velocities and accelerations per force.
 
     Examples
     --------
@@ -307,7 +310,8 @@ def convert(response: xarray.Dataset, quantity: str) -> xarray.Dataset:
     Returns
     -------
     xarray.Dataset
-        The response with this variable; nan at 0 Hz if a division by i w would be needed.
+        The response with the quantity as variable; nan at 0 Hz if a division by i w would be
+        needed.
 
     Raises
     ------

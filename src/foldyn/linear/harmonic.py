@@ -5,9 +5,10 @@ harmonic its moment equals that of a linear hinge with the slope k_eq(A_h) (`equ
 
     (K(A) - w^2 M + i w C) x = f,    A_h = |g_h x|,
 
-g_h the gradient of the hinge's dihedral, is a nonlinear equation for the slopes: single harmonic
-balance (Krylov and Bogoliubov 1947; Krack and Gross, Harmonic Balance for Nonlinear Vibration
-Problems, 2019). Displacements are small compared to the structure, except for these slopes.
+with g_h the gradient of the hinge's dihedral, is a nonlinear equation for the slopes: harmonic
+balance with a single harmonic (Krylov and Bogoliubov 1947; Krack and Gross, Harmonic Balance for
+Nonlinear Vibration Problems, 2019). Displacements are small compared to the structure, except for
+these slopes.
 """
 
 from __future__ import annotations
@@ -30,13 +31,13 @@ from foldyn.linear.linearized import Linearized, equivalent_slope
 from foldyn.materials import Superlinear
 from foldyn.values import number, whole
 
-REFERENCE = 1.0  # degrees: the swing for which slopes are included in the given system
-DEPTH = 5  # previous iterations used by the acceleration
-PATIENCE = 25  # accelerated iterations before slow ones are tried
+REFERENCE = 1.0  # degrees: swing whose slopes are part of the given system
+DEPTH = 5  # number of previous iterations used for the acceleration
+PATIENCE = 25  # accelerated iterations before slow iterations are tried
 RELAXED = 0.3  # share of the full step in a slow iteration
-FURTHEST = 1.5  # factor: limit of the extrapolation of slopes to the next frequency
-LEAST = 1e-12  # rad: least swing
-APART = 1e-4  # of a swing: half width of the difference for the derivative of slopes
+FURTHEST = 1.5  # largest factor on slopes when they are extrapolated to the next frequency
+LEAST = 1e-12  # rad: least swing of a hinge
+APART = 1e-4  # relative half width in the swing, for the numerical derivative of slopes
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class HarmonicBalance(Checked):
     Parameters
     ----------
     tolerance : float
-        Largest change of the response in an iteration, relative to its maximum.
+        Largest change of the response in the last iteration, relative to its maximum.
     iterations : int
         Most iterations at a frequency.
     """
@@ -58,9 +59,9 @@ class HarmonicBalance(Checked):
 def harmonic(
     system: Linearized, drive: Drive, frequency: NDArray, options: HarmonicBalance, report: Reporter
 ) -> Answer:
-    """Balance one harmonic at each frequency, starting from the slopes at the previous one.
+    """Balance one harmonic at each frequency, starting from the slopes at the previous frequency.
 
-    If the response has several branches, rising frequencies follow one until it ends.
+    If the response has several branches, rising frequencies follow a branch until it ends.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def harmonic(
     Warns
     -----
     FoldynWarning
-        There are such frequencies.
+        The response is nan at some frequencies.
     """
     case = system.case
     turned = [k for change, _ in case.rest_terms for k in np.flatnonzero(change).tolist()]
@@ -146,7 +147,7 @@ class Hinges:
         return equivalent_slope(self.offset, swing)
 
     def change(self, slope: NDArray) -> sparse.csr_array:
-        """Stiffness to add to the reference stiffness for these slopes."""
+        """Stiffness to add to the reference stiffness for the given slopes."""
         weight = sparse.diags_array(self.stiffness * (slope - self.reference))
         return self.gradient.T @ weight @ self.gradient
 
@@ -157,7 +158,7 @@ class Hinges:
         return stiffness @ motion + self.gradient.T @ (change * turned) - load
 
     def tangent(self, stiffness: sparse.csc_array, motion: NDArray) -> sparse.csc_array:
-        """Jacobian (2 nf, 2 nf) of `left`, by real and imaginary parts of the motion.
+        """Jacobian (2 nf, 2 nf) of `left` for real and imaginary parts of the motion.
 
         A moment k s(A) y of the turn y changes by k s dy + k s' Re(y* dy) y / A.
         """
@@ -193,11 +194,11 @@ class _Balance:
         self.options, self.iterations = options, 0
 
     def balanced(self, start: NDArray) -> tuple[NDArray | None, NDArray]:
-        """Motion (nf,), None without convergence, and its slopes.
+        """Motion (nf,), None without convergence, and slopes of the hinges in it.
 
         The accelerated iteration (Anderson) comes first; it may cycle near the end of a branch, or
-        find the unstable branch between two others. The slow iteration follows, which converges to
-        the stable ones only.
+        find the unstable branch between two stable branches. The slow iteration follows, which
+        converges only to stable branches.
         """
         for accelerated in (True, False):
             motion, slope = self._iterate(start, accelerated)
@@ -211,7 +212,7 @@ class _Balance:
         slopes: list[NDArray] = []
         misses: list[NDArray] = []
         before = None
-        # a slow step changes less than the remaining error
+        # in a slow step the change is less than the remaining error
         tolerance = self.options.tolerance * (1.0 if accelerated else RELAXED)
         while len(slopes) < most and self.iterations < self.options.iterations:
             self.iterations += 1
@@ -232,7 +233,7 @@ class _Balance:
 
 
 def _anderson(slopes: list[NDArray], misses: list[NDArray]) -> NDArray:
-    """Next slopes from the last few (Walker and Ni, SIAM J. Numer. Anal. 49, 2011)."""
+    """Next slopes, from the last few slopes (Walker and Ni, SIAM J. Numer. Anal. 49, 2011)."""
     plain = slopes[-1] + misses[-1]
     if len(slopes) == 1:
         return plain

@@ -1,7 +1,7 @@
-"""Laws with memory in small vibrations: a complex stiffness that depends on frequency.
+"""Laws with memory in small vibrations: a complex stiffness that depends on the frequency.
 
 About a state at rest a hinge resists a turn exp(s t) with k (relaxed + sum share s / (s + rate)) in
-addition to its elastic part: with s = i w the complex modulus of its branches. Modes solve
+addition to its elastic part; for s = i w this is the complex modulus of its branches. Modes solve
 
     (s^2 M + K + K_b(s)) x = 0
 
@@ -24,10 +24,10 @@ from foldyn.errors import ComputationError
 from foldyn.linear.internal_modes import Amplitudes
 from foldyn.structures.inelastic_hinges import memory, remembering
 
-MOST = 40  # iterations for a mode
-SETTLED = 1e-11  # relative change of s
+MOST = 40  # most iterations for a mode
+SETTLED = 1e-11  # relative change of s at convergence
 OSCILLATES = 1e-6  # least imaginary part of s, relative to |s|
-BESIDE = 1e-7  # of s: offset from s if the matrix at s is singular
+BESIDE = 1e-7  # relative offset from s if the matrix at s is singular
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +39,11 @@ class Branches:
     gradient : (h, nf)
         Gradients of the hinge angles, 1/m.
     relaxed : (h,)
-        Relaxed stiffness that they add to K, N m/rad.
+        Relaxed stiffness that branches add to K, N m/rad.
     share, rate : (h, b)
-        Stiffness (N m/rad) and rate (1/s) of each branch; 0 and 1 if there is none.
+        Stiffness (N m/rad) and rate (1/s) of each branch; 0 and 1 for missing branches.
     viscous : (h,)
-        Part of their damping counted elsewhere, N m s/rad.
+        Part of the branches' damping that is counted elsewhere, N m s/rad.
     """
 
     gradient: sparse.csr_array
@@ -77,8 +77,8 @@ def branches_of(
 ) -> Branches | None:
     """Branches of a case about the dofs q (m,), on the free dofs of all unknowns.
 
-    inner : internal amplitudes of the case, with which creases also turn unevenly.
-    dampers : whether to include the branches of damped creases, less the quasi-static part that
+    inner : internal amplitudes of the case, by which creases also turn unevenly.
+    dampers : whether to include the branches of damped creases, minus the quasi-static part that
         `dynamics.dampers` counts.
     """
     parts = case.remembering
@@ -119,7 +119,7 @@ def damped_mode(
     stiffness: sparse.csc_array, mass: sparse.csc_array, branches: Branches, value: float,
     shape: NDArray,
 ) -> tuple[complex, NDArray[np.complex128]]:  # fmt: skip
-    """Complex frequency s (rad/s) and shape (nf,), x' M x = 1, of the mode near an elastic one.
+    """Complex frequency s (rad/s) and shape (nf,), x' M x = 1, of the mode near an elastic mode.
 
     value, shape : eigenvalue (rad2/s2), above 0, and shape of the mode without memory.
 
@@ -146,7 +146,7 @@ def damped_mode(
 def _swinging(branches: Branches, value: float, shape: NDArray) -> float:
     """Angular frequency (rad/s) of a shape with the storage modulus at this frequency.
 
-    The frequency without memory may be so far below it that damping dominates there.
+    The frequency without memory may be so far below this that damping dominates there.
     """
     turns, omega = (branches.gradient @ shape) ** 2, float(np.sqrt(value))
     for _ in range(MOST):

@@ -1,18 +1,18 @@
 """Internal amplitudes of panels, in small vibrations about a state (scheme n5b8e).
 
-Each panel moves out of plane as in `structures.panel_modes`, with the plate's own mass in place of
+Each panel moves out of plane as in `structures.panel_modes`, with the mass of the plate in place of
 the mass rule "condensed":
 
-    M = sum over panels of (1 - n n') x R + n n' x F,    R of the rule, F of the plate,
+    M = sum over panels of (1 - n n') x R + n n' x F,    R from the rule, F from the plate,
 
-n the normal of the panel in the state; F also couples the heights of its nodes with the turns of
-its creased edges, which thereby gain mass, and with the amplitudes. Amplitudes are numbered after
-the m dofs of the body. They share stiffness with these in the creases only: a crease of length L
-that turns by theta_k P_k along it, k = 1 and on, adds
+with n the normal of the panel in the state. F also couples the heights of the panel's nodes with
+the amplitudes and with the turns of creased edges, which thereby get mass. Amplitudes are numbered
+after the m dofs of the body. Only creases couple amplitudes and dofs by stiffness: a crease of
+length L that turns by theta_k P_k along it, k = 1, 2, ..., adds
 
     1/2 (stiffness per length) L / (2 k + 1) theta_k^2,    theta_k the sum of both edges' turns,
 
-and is damped likewise. The effect of stresses in a panel on its amplitudes is neglected.
+and is damped in the same way. The effect of stresses in a panel on its amplitudes is neglected.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from foldyn.structures.panel_modes import TURNS, panel_modes
 from foldyn.structures.panel_plate import TRIANGLE_MASS
 from foldyn.values import show, whole
 
-MOST = 6  # panel meshes have more shapes, but of decreasing accuracy
+MOST = 6  # most amplitudes of a panel: higher shapes of the meshes are less accurate
 
 
 class Amplitudes(NamedTuple):
@@ -43,18 +43,18 @@ class Amplitudes(NamedTuple):
     Attributes
     ----------
     stiffness : (m + k, m + k)
-        Stiffness to add: of the amplitudes, and of creases that turn unevenly, N/m.
+        Stiffness of the amplitudes, and of creases that turn unevenly, to be added, N/m.
     mass : (m + k, m + k)
         Mass to add to the mass of the nodes, kg.
     points : (q, 3)
         Midpoints of the edges and spokes of all panels in turn, at rest, m.
     between : (3 q, m + k)
-        Their displacements, as a function of all dofs.
+        Displacements of `points` per unit of each dof.
     turns : (r, m + k)
         Amplitudes of the uneven turns P_k along the creases, 1/m.
     fold, share : (r,)
-        Fold of each uneven turn, and the mean square of its P_k: the fraction of the fold's
-        stiffness and damping that resists it.
+        Fold of each uneven turn, and the mean square of P_k, which is the fraction of the fold's
+        stiffness and damping that resists the turn.
     count : int
         Number k of amplitudes.
     """
@@ -75,23 +75,23 @@ class Amplitudes(NamedTuple):
         return np.arange(size - self.count, size)
 
     def behind(self, matrix: sparse.csr_array) -> sparse.csr_array:
-        """A matrix (m, m), padded with zero rows and columns for the amplitudes."""
+        """A matrix (m, m) with zero rows and columns added for the amplitudes."""
         if not self.count:
             return matrix
         none = sparse.csr_array((self.count, self.count))
         return sparse.csr_array(sparse.block_diag([matrix, none], format="csr"))
 
     def stiffened(self, matrix: sparse.csr_array) -> sparse.csr_array:
-        """A stiffness (m, m), N/m, with the amplitudes added."""
+        """A stiffness (m, m), N/m, extended by that of the amplitudes."""
         return sparse.csr_array(self.behind(matrix) + self.stiffness) if self.count else matrix
 
     def damped(self, matrix: sparse.csr_array, damping: NDArray) -> sparse.csr_array:
-        """A damping (m + k, m + k), N s/m, plus uneven turns by fold damping (nf,), N m s/rad."""
+        """A damping (m + k, m + k), N s/m, plus that of uneven turns by fold (nf,), N m s/rad."""
         uneven = self.turns.T @ (self.turns * (damping[self.fold] * self.share)[:, None])
         return sparse.csr_array(matrix + uneven)
 
     def massed(self, matrix: sparse.csr_array) -> sparse.csr_array:
-        """A mass (m, m), kg, with the amplitudes added."""
+        """A mass (m, m), kg, extended by that of the amplitudes."""
         return sparse.csr_array(self.behind(matrix) + self.mass) if self.count else matrix
 
 
@@ -136,10 +136,10 @@ def amplitudes(structure: Discretized, body: Assembly, q: NDArray, count: int) -
     structure : Structure
         Structure of the scheme n5b8e and the mass rule condensed.
     body : Assembly
-        The body of the structure, or one with other rest angles and more terms.
+        The body of the structure, or a body with other rest angles and more terms.
     count : int
-        Amplitudes of each panel, in addition to one for each edge without a crease; one more if
-        the last two are equal by symmetry.
+        Amplitudes of each panel, in addition to one for each edge without a crease. A panel gets
+        one more if symmetry would make the last one and the next equal.
     """
     size = body.size
     if not count:
@@ -172,7 +172,7 @@ def amplitudes(structure: Discretized, body: Assembly, q: NDArray, count: int) -
         turns = structure.nodes.size + edges
         inner = np.arange(first, first + len(modes.stiffness))
         first += len(inner)
-        # heights of nodes, turns of edges, and amplitudes, in terms of the dofs
+        # heights of nodes, turns of edges, and amplitudes, as functions of the dofs
         height = np.kron(np.eye(len(nodes)), normal)
         turned = np.sqrt(length2) * body.sheet.per_hidden * np.eye(len(turns))
         by = block_diag(height, turned, np.eye(len(inner)))
@@ -182,7 +182,7 @@ def amplitudes(structure: Discretized, body: Assembly, q: NDArray, count: int) -
         masses.append(_entries(dofs, dofs, by.T @ mass @ by))
         stiff = own.bending_modulus / length2 * modes.stiffness
         stiffness.append(_entries(inner, inner, stiff))
-        # the two panels at an edge number it from opposite ends
+        # the two panels at an edge run along it from opposite ends
         own_turns = modes.turns @ angles[rows][:, dofs[: -len(inner)]].toarray()
         more = np.eye(len(own_turns), len(inner)) / np.sqrt(length2)
         sign = np.where(side[edges, None], (-1.0) ** order, 1.0).ravel()
@@ -215,7 +215,7 @@ def _sides(rotations: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _ends(nodes: NDArray, corners: int) -> NDArray:
-    """Incidence (q, k) of nodes and the edges and spokes of a panel."""
+    """Which nodes are ends of the edges and spokes of a panel: incidence (q, k)."""
     edges = np.eye(corners) + np.roll(np.eye(corners), 1, axis=1)
     if len(nodes) == corners:
         return edges

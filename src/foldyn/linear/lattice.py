@@ -1,9 +1,9 @@
-"""Panels, edges and vertices of a cell, valid for all cells, and patches of them.
+"""Panels, edges and vertices named by cell and kind, for all cells, and patches of panels.
 
-A vertex of the repeated sheet is one of a kind in a cell: (R, kind). Vertices are ordered by cell
-first, then by kind, and so are panels. Any two of them are therefore in the same order in all
-cells. So is every choice of a discretization that depends on this order: directions of hinges,
-signs of rotations, ties.
+A vertex of the repeated sheet is named by its cell and its kind: (R, kind). Vertices are ordered by
+cell first, then by kind, and so are panels. Any two of them are therefore in the same order in all
+cells. So choices of a discretization that depend on this order are the same in all cells:
+directions of hinges, signs of rotations, ties.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from foldyn.linear.unit_cell import UnitCell
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import around, edge_lookup, edge_of
 
-RINGS = 2  # of panels around the ones at the nodes of the cell
-FLAT = 1e-6  # rad from pi: below it, a crease between cells gets no letter from its dihedral
+RINGS = 2  # rings of panels around the panels at the nodes of the cell
+FLAT = 1e-6  # rad: a crease between cells whose dihedral is closer to pi counts as flat
 
 Step = tuple[int, ...]  # R
 Vertex = tuple[Step, int]  # cell and kind
 Panel = tuple[Step, int]  # cell and number
 Site = tuple[Step, tuple[Any, ...]]  # cell, and representative of a node or hidden dof
-Kind = tuple[int, int, Step]  # of an edge: kinds of its vertices, R from the first to the second
+Kind = tuple[int, int, Step]  # kind of an edge: kinds of its vertices, R between them
 
 
 def plus(one: Step, two: Step) -> Step:
@@ -41,25 +41,25 @@ def minus(one: Step, two: Step) -> Step:
 
 
 class Edge(NamedTuple):
-    """An edge by its kind, the same in all cells, and the cell of its first vertex."""
+    """An edge: its kind, which is the same in all cells, and the cell of its first vertex."""
 
     kind: Kind
     step: Step
 
 
 def edge_between(one: Vertex, two: Vertex) -> Edge:
-    """The edge of two vertices."""
+    """The edge between two vertices."""
     low, high = sorted((one, two))
     return Edge((low[1], high[1], minus(high[0], low[0])), low[0])
 
 
 def kinds_of(pairs: NDArray, vertices: Sequence[Vertex]) -> list[Kind]:
-    """Kinds of edges (m, 2) between numbered vertices."""
+    """Kinds of edges (m, 2), given as pairs of indices in `vertices`."""
     return [edge_between(vertices[a], vertices[b]).kind for a, b in pairs.tolist()]
 
 
 class Lattice:
-    """A cell with panels, edges and vertices named so that they are valid for all cells.
+    """A cell whose panels, edges and vertices have names that are valid in all cells.
 
     Parameters
     ----------
@@ -72,9 +72,10 @@ class Lattice:
     faces : list of list of Vertex
         Corners of each panel, moved so that the lowest one is in cell 0.
     steps : list of Step
-        Cell of each panel of the pattern in this numbering.
+        R of the cell in which each panel of the pattern lies in this naming.
     beside : dict
-        Panels at each kind of edge, with the edge's cell if the panel is in cell 0.
+        For each kind of edge, the panels at it, with the cell of the edge if the panel is in cell
+        0.
 
     Raises
     ------
@@ -121,11 +122,11 @@ class Lattice:
         return (edge_between(a, b) for a, b in zip(face, [*face[1:], face[0]], strict=True))
 
     def edge(self, a: int, b: int) -> Edge:
-        """The edge of two vertices of the pattern."""
+        """The edge between two vertices of the pattern."""
         return edge_between(self.vertices[a], self.vertices[b])
 
     def seams(self) -> list[tuple[int, int]]:
-        """Boundary edges of the pattern that are creases between cells, one of each kind."""
+        """Boundary edges of the pattern that are creases between cells, one for each kind."""
         kinds: dict[Kind, tuple[int, int]] = {}
         for a, b in self.pattern.boundary.tolist():
             kind = self.edge(a, b).kind
@@ -145,7 +146,7 @@ class Lattice:
 
     # ------------------------------------------------------------------ a patch
     def around_cell(self) -> list[Panel]:
-        """Panels around cell 0, sorted: those at its nodes, and rings across their edges."""
+        """Panels around cell 0, sorted: panels at its nodes, and rings of panels around these."""
         found = {
             (minus(self.zero, step), f) for f, face in enumerate(self.faces) for step, _ in face
         }
@@ -154,7 +155,7 @@ class Lattice:
         return sorted(found)
 
     def _across(self, step: Step, f: int) -> Iterator[Panel]:
-        """Panels at the edges of a panel."""
+        """Panels across the edges of a panel."""
         for edge in self._edges(f):
             for other, at in self.beside[edge.kind]:
                 yield minus(plus(step, edge.step), at), other
@@ -184,7 +185,7 @@ class Lattice:
         shared, times = np.unique(np.array(sides), axis=0, return_counts=True)
         shared = shared[times == 2]
         welds = [kind in welded for kind in kinds_of(shared, vertices)]
-        with warnings.catch_warnings():  # the cell's own pattern has warned already
+        with warnings.catch_warnings():  # warnings came with the pattern of the cell
             warnings.simplefilter("ignore", FoldynWarning)
             bare = Pattern(points, faces, name=own.name, welds=shared[welds])
             if any(bare.flipped):

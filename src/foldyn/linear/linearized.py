@@ -54,7 +54,7 @@ from foldyn.structures.discretized import Discretized
 from foldyn.values import number
 
 Mass = sparse.csr_array | Squared
-ROUNDING = 1e-12  # of what pulls at a node when the whole moves
+ROUNDING = 1e-12  # forces below this, relative to the sum of their terms, count as zero
 POWER = 4.0 / 3.0
 AT_REST = 0.9411457706782074
 """2/sqrt(pi) Gamma(POWER/2 + 1)/Gamma(POWER/2 + 3/2)."""
@@ -71,37 +71,37 @@ class Linearized:
     displacement : (n, 3)
         The state, m.
     free : (nf,)
-        Numbers of the free dofs, increasing: 3 node + axis, then, from 3 n, massless dofs that a
-        shell has in addition to nodal displacements, and internal amplitudes. If constraints tie
-        others to them, `expanded` gives the motion of all.
+        Numbers of the free dofs, increasing: 3 node + axis; then, from 3 n on, massless dofs in
+        addition to nodal displacements, such as a shell has, and internal amplitudes. If
+        constraints tie other dofs to these, `expanded` gives the motion of all dofs.
     stiffness, mass, damping : (nf, nf)
         Sparse and symmetric: tangent (N/m), mass (kg) and damping without modal damping (N s/m):
         alpha M + beta K0, dashpots and creases in the state. The tangent includes the symmetric
         part of the load stiffness. K0 is the exact tangent of the structure at rest, or in this
         state if the damping says so.
     modal : (r, nf)
-        Rows G of modal damping, which adds G' G.
+        Rows G of modal damping, which adds G' G to the damping.
     drag : (nf, 3)
-        Forces on the free dofs per unit velocity of the whole along x, y, z, without alpha M: from
-        dashpots to the ground, N s/m.
+        Forces on the free dofs if the whole structure moves with unit velocity along x, y, z: from
+        dashpots to the ground, without alpha M, N s/m.
     ground : (nf, 3)
-        Forces on the free dofs per unit displacement of the whole along x, y, z: from springs to
-        the ground and planes in contact, N/m.
+        Forces on the free dofs if the whole structure moves by a unit displacement along x, y, z:
+        from springs to the ground and planes in contact, N/m.
     inertia : (nf, 3)
-        Forces on the free dofs per unit acceleration of the whole along x, y, z, without the
-        fluid, kg.
+        Forces on the free dofs if the whole structure has unit acceleration along x, y, z, without
+        the fluid, kg.
     added : (nf, nf) or None
         Mass of the fluid around the sheet, included in `mass`, kg. If it couples too many dofs for
-        a matrix, both are `Squared`.
+        a matrix, `added` and `mass` are `Squared`.
     pushed : (nf, 3)
-        Forces of this fluid per unit acceleration of the whole along x, y, z, kg.
+        Forces from the fluid if the whole structure has unit acceleration along x, y, z, kg.
     soft : int
-        Number of superlinear hinges at their rest angle, where their slope vanishes; they count
-        without stiffness. 0 with `secant`.
+        Number of superlinear hinges at their rest angle, where the slope of their law vanishes, so
+        that they have no stiffness. 0 with `secant`.
     secant : float or None
         Amplitude (degrees) at which superlinear hinges take their equivalent slope.
     residual : float
-        Residual of the state, as a fraction of the forces at play.
+        Residual of the state, as a fraction of the forces that act.
     unbalanced : float
         Residual of the state, N.
     internal : int
@@ -109,10 +109,11 @@ class Linearized:
     inner : Amplitudes
         All internal amplitudes.
     branches : Branches or None
-        Branches of laws with memory, which `stiffness` excludes: theirs depends on the frequency.
+        Branches of laws with memory. `stiffness` excludes them, as their stiffness depends on the
+        frequency.
     responding : Branches or None
-        `branches`, plus the part of damped creases between compliant panels that `damping` lacks:
-        used by responses at given frequencies.
+        `branches`, plus the part of damped creases between compliant panels that `damping` lacks.
+        Used for responses at given frequencies.
     """
 
     case: Case
@@ -150,7 +151,7 @@ class Linearized:
         return self.case.constraints.displacement(full)
 
     def between(self, motions: NDArray) -> NDArray:
-        """Displacements (3q, k) of the points `inner.points` in motions (nf, k)."""
+        """Displacements (3q, k) of `inner.points` in motions (nf, k)."""
         return self.inner.between @ self.whole(motions)
 
     def whole(self, motions: NDArray) -> NDArray:
@@ -180,16 +181,17 @@ def linearize(
     Parameters
     ----------
     case : Case
-        Its loads and imposed displacements are preloads, in full; histories are ignored.
+        Loads and imposed displacements of the case are preloads, in full; histories are ignored.
     state : State or "equilibrium", optional
-        State to linearize about: a state, as `fd.initial_state(path)`; the equilibrium under the
-        loads, found by statics; by default the rest state, in which no load acts.
+        State to linearize about: a state, such as `fd.initial_state(path)`; or "equilibrium", the
+        equilibrium under the loads, found by statics; by default the rest state, in which no load
+        acts.
     secant : float, optional
-        Amplitude (degrees) of the turns of the hinges: superlinear hinges get the slope equivalent
-        to an oscillation of this amplitude (see `equivalent_slope`), all others keep their tangent.
+        Amplitude (degrees) by which hinges turn: superlinear hinges get the slope equivalent to an
+        oscillation of this amplitude (see `equivalent_slope`), all other hinges keep their tangent.
     load_factor : float
-        Load factor of actuated folds in a given state, and of loads there that depend on the
-        displacement.
+        Load factor of actuated folds, and of loads that depend on the displacement, in a given
+        state.
     internal : int
         Number of internal amplitudes of each panel (scheme n5b8e; see `modes`).
 
@@ -292,7 +294,7 @@ def slope_change(
 ) -> tuple[sparse.csr_array | None, int]:
     """Correction of the tangent (m, m) for other slopes, and the number of soft hinges.
 
-    Hinges that constraints keep from turning are left unchanged.
+    Hinges that cannot turn because of constraints are left unchanged.
     """
     if amplitude is None:
         return soft_slopes(case, body, q)
@@ -303,10 +305,10 @@ def slope_change(
 
 
 def _ground(body: Assembly, q: NDArray, whole: NDArray) -> NDArray:
-    """Forces (m, 3) of parts on the ground, per unit displacement of the whole (m, 3)."""
+    """Forces (m, 3) of parts attached to the ground, for displacements (m, 3) of the whole."""
     out = np.zeros_like(whole)
     for term in body.others:
-        if not term.of_hinges:  # hinges strain nothing when the whole moves
+        if not term.of_hinges:  # hinges have no strain when the whole moves
             own, moved = term.tangent(q), whole[: body.size]
             held = own @ moved
             held[np.abs(held) <= ROUNDING * (abs(own) @ np.abs(moved))] = 0.0
@@ -315,7 +317,7 @@ def _ground(body: Assembly, q: NDArray, whole: NDArray) -> NDArray:
 
 
 def _added(case: Case, displacement: NDArray, body: Assembly, inner: Amplitudes) -> Mass | None:
-    """Mass of the fluid (m, m) at a displacement (n, 3), kg; as rows if it would be full."""
+    """Mass of the fluid (m, m) at a displacement (n, 3), kg; `Squared` if too full for a matrix."""
     found = operator_at(case, displacement)
     if found is None:
         return None
@@ -354,7 +356,7 @@ def _tied(matrix: Mass, ties: Constraints, free: NDArray) -> sparse.csc_array | 
 
 
 def _inertia(case: Case, whole: NDArray, inner: Amplitudes) -> NDArray:
-    """Forces (m, 3) on the unknowns per unit acceleration of the whole (m, 3)."""
+    """Forces (m, 3) on the unknowns, for accelerations (m, 3) of the whole."""
     load = whole.copy()
     load[: case.structure.nodes.size] *= np.repeat(case.nodal_mass, 3)[:, None]
     if len(inner.dofs):
@@ -405,7 +407,7 @@ def equivalent_slope(offset: ArrayLike, amplitude: float) -> NDArray:
     offset : array_like
         Angles (rad) of the state from the rest angle, d0.
     amplitude : float
-        Amplitude A (rad) of the oscillation about it.
+        Amplitude A (rad) of the oscillation about the state.
 
     Returns
     -------
@@ -432,7 +434,7 @@ def warn_beyond(
     ----------
     structure : Discretized
     frequency : (k,)
-        Frequencies of modes, of responses, or the highest of each band; nan is ignored.
+        Frequencies of modes or responses, or the highest frequency of each band; nan is ignored.
     name : str
         Name of the numbered items, "mode" or "band"; empty if the frequencies are the input.
     internal : int or None

@@ -1,9 +1,10 @@
 """A cell of a repeated sheet, linearized about a state that repeats.
 
-The periods may change with the state: translations into others, screws to another angle and shift.
-Displacements of all cells follow from one cell and from the motions of the deformed sheet; massless
-dofs are in balance as in the repeated sheet. Displacements of cell R are given in axes that turn
-with the cell, so that a wave differs between cells only by a factor.
+The periods may change with the state: a translation to another translation, a screw to another
+angle and shift. Displacements of all cells follow from one cell and from the motions of the
+deformed sheet; massless dofs are in balance, as they are in the repeated sheet. Displacements of
+cell R are given in axes that turn with the cell, so that a wave differs between cells only by a
+factor.
 """
 
 from __future__ import annotations
@@ -41,18 +42,18 @@ from foldyn.patterns.screw import Screw, motion_between
 from foldyn.statics.tracing import displacement_of
 from foldyn.values import number, of_kind
 
-BALANCED = 1e-6  # of the forces at play: largest residual that counts as equilibrium
-ROUNDING = 1e-12  # of the bars' EA: forces that count as zero
-SAME = 1e-12  # of the pattern's size: round-off changes of a motion
-SLACK = 10.0  # factor on the tolerance: largest distance of partners from their copies in a state
+BALANCED = 1e-6  # largest residual in equilibrium, relative to the forces that act
+ROUNDING = 1e-12  # forces below this, relative to EA of the bars, count as zero
+SAME = 1e-12  # changes of a motion below this, relative to the pattern's size, are round-off
+SLACK = 10.0  # times the tolerance: largest distance of nodes from copies of their partners
 PLACES = "None (the rest state), or a State, as fd.initial_state(path)"
 ITERATIONS = 30
-SETTLED = 1e-13  # rad, of the last Newton step for hidden dofs
-TURNED = 1e-13  # of coefficients of constraints: round-off of zeros
+SETTLED = 1e-13  # rad: last Newton step for hidden dofs
+TURNED = 1e-13  # coefficients of constraints below this count as zero
 
 
 class CellReach:
-    """The m dofs of cell 0 (3 node + axis, then hidden ones), and all dofs that act on them.
+    """The m dofs of cell 0 (3 node + axis, then hidden dofs), and all dofs that act on them.
 
     Parameters
     ----------
@@ -65,9 +66,9 @@ class CellReach:
     Attributes
     ----------
     rows : ndarray of int, shape (m,)
-        Dofs of cell 0 among those of the patch.
+        Numbers of the dofs of cell 0 among the dofs of the patch.
     steps : ndarray of int, shape (s, d)
-        R of the cells with nodes in the patch, and their opposites.
+        R of the cells that have nodes in the patch, and their opposites.
     hidden : ndarray of bool, shape (m,)
         Dofs without mass.
     held : ndarray of bool, shape (m,)
@@ -105,16 +106,16 @@ class CellReach:
 
     @cached_property
     def _known(self) -> sparse.csr_array:
-        """Map from hidden dofs of a cell to those of the patch, as far as they are known."""
+        """Matrix from hidden dofs of a cell to hidden dofs of the patch that copy them."""
         unit = self.patch.hidden_unit
         there = np.flatnonzero(unit >= 0)
         entries = (np.ones(len(there)), (there, unit[there]))
         return sparse.csr_array(entries, shape=(len(unit), self.patch.hidden))
 
     def balanced(self, displacement: NDArray) -> NDArray[np.float64]:
-        """All dofs of the patch at a displacement (n, 3), hidden ones equal in all cells.
+        """All dofs of the patch at a displacement (n, 3); hidden dofs are equal in all cells.
 
-        Newton's method balances them in cell 0.
+        Newton's method balances the hidden dofs of cell 0.
 
         Raises
         ------
@@ -140,7 +141,7 @@ class CellReach:
 
     @cached_property
     def ties(self) -> Hops:
-        """Constraints (k, m) of one cell: the ones whose first cell is cell 0."""
+        """Constraints (k, m) of one cell: constraints whose first cell is cell 0."""
         ties = self.patch.case.constraints
         rows = (
             sparse.csr_array(ties.rows) if ties else sparse.csr_array((0, 3 * len(self.patch.unit)))
@@ -183,11 +184,11 @@ class LinearizedCell:
     motions : tuple of Screw
         Motions from a cell to the next in the state.
     bloch : Bloch
-        Matrices of the dofs (3 node + axis, then hidden ones) of cell 0.
+        Matrices of the dofs (3 node + axis, then hidden dofs) of cell 0.
     displacement : (n, 3)
-        The state at the nodes of the cell's own structure, m.
+        Displacement of the nodes of the cell's own structure in the state, m.
     residual : float
-        Largest force on a free dof, as a fraction of the forces at play.
+        Largest force on a free dof, as a fraction of the forces that act.
     """
 
     cell: UnitCell
@@ -244,8 +245,8 @@ def linearize_cell(
     ----------
     cell : UnitCell
     state : State, optional
-        State of the cell's own structure, the same in all cells up to the motions from a cell to
-        the next; by default the rest state.
+        State of the cell's own structure, which is the same in all cells except for the motions
+        from a cell to the next; by default the rest state.
     secant, load_factor : float
         As in `linearize`.
 
@@ -334,7 +335,7 @@ def deformed_motions(cell: UnitCell, patch: Patch, displacement: NDArray) -> tup
     Raises
     ------
     InputError
-        There are none.
+        The state has no such motions.
     """
     rest = cell.case.structure.nodes
     place, near, pattern = rest + displacement, cell.near, cell.case.structure.pattern
@@ -351,7 +352,8 @@ def deformed_motions(cell: UnitCell, patch: Patch, displacement: NDArray) -> tup
         moved, off = motion, np.linalg.norm(change, axis=1)
         if off.max() > SAME * pattern.size:
             other, left = motion_between(place[one], place[two], SAME * pattern.size)
-            # a turn that appears or vanishes in a small change is noise, or pairs on a line hide it
+            # a turn that appears or vanishes in a small change is noise, or pairs on a line do not
+            # reveal it
             if off.max() > near or other.turns == motion.turns:
                 moved, off = other, left
         if off.max() > near:
@@ -376,7 +378,7 @@ def tiled(
     Raises
     ------
     InputError
-        Partners do not coincide with each other's copies.
+        Nodes do not coincide with the copies of their partners.
     """
     place = cell.case.structure.nodes + displacement
     first = np.array(
@@ -397,7 +399,7 @@ def tiled(
 def spread(
     motions: Sequence[Screw], first: NDArray, unit: NDArray, step: NDArray
 ) -> NDArray[np.float64]:
-    """Places (n, 3) of copies R (n, d) of points (m, 3); `unit` (n,) numbers the point of each."""
+    """Places (n, 3) of copies of points (m, 3): of point `unit` (n,), in cell R (n, d)."""
     out = np.empty((len(unit), 3))
     for each in np.unique(step, axis=0):
         rows = (step == each).all(axis=1)
@@ -421,7 +423,7 @@ def folded_body(cell: UnitCell, patch: Patch, factor: float) -> Assembly:
 
 
 def _residual(reach: CellReach, q: NDArray) -> float:
-    """Largest force on a free dof of cell 0, as a fraction of the forces at play."""
+    """Largest force on a free dof of cell 0, as a fraction of the forces that act."""
     force = reach.forces(q)
     left = float(np.abs(reach.projected(force)).max(initial=0.0))
     at_play = max(

@@ -1,11 +1,12 @@
 """Modal assurance criterion: similarity of the shapes of two sets of modes.
 
-MAC_ij = |a_i^H W b_j|^2 / ((a_i^H W a_i) (b_j^H W b_j)): 1 for the same shape, whatever its size
-and sign, 0 for orthogonal ones. W is the mass, or the identity (Allemang and Brown, Proc. 1st Int.
-Modal Analysis Conf., 1982; with weights Allemang, Sound and Vibration 37, 2003).
+MAC_ij = |a_i^H W b_j|^2 / ((a_i^H W a_i) (b_j^H W b_j)): 1 for the same shape of any size and sign,
+0 for orthogonal shapes. W is the mass, or the identity (Allemang and Brown, Proc. 1st Int. Modal
+Analysis Conf., 1982; with weights Allemang, Sound and Vibration 37, 2003).
 
 Modes of nearly equal frequency mix at the slightest disturbance, so `pairs` compares a cluster of
-them as a space: the mean squared cosine between two spaces replaces the MAC of each pair in them.
+such modes as a space: the mean squared cosine between two spaces replaces the MAC of every pair of
+modes in them.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from scipy import sparse
 from foldyn.errors import InputError
 from foldyn.values import numbers
 
-NEAR = 3e-3  # relative distance of frequencies in a cluster
-FREQUENCY_WEIGHT = 0.05  # of |log(f_b / f_a)|, added to 1 - MAC: decides between similar shapes
+NEAR = 3e-3  # largest relative distance of neighboring frequencies in a cluster
+FREQUENCY_WEIGHT = 0.05  # factor of |log(f_b / f_a)| in a pair's cost, in addition to 1 - MAC
 
 
 def mac(a: Any, b: Any, *, mass: Any = None, nodes: Any = None) -> NDArray[np.float64]:
@@ -29,15 +30,15 @@ def mac(a: Any, b: Any, *, mass: Any = None, nodes: Any = None) -> NDArray[np.fl
     Parameters
     ----------
     a, b : xarray.Dataset or array_like, shapes (ka, n, 3) and (kb, n, 3)
-        Modes from `foldyn.modes`, or shapes of any other origin, also complex ones (measured, or of
-        a damped structure). Arrays (k, n) are shapes with one component per node.
+        Modes from `foldyn.modes`, or other shapes, also complex (measured, or of a damped
+        structure). Arrays (k, n) are shapes with one component per node.
     mass : array_like or sparse matrix, optional
-        Weights: nodal masses (n,) or the nodal mass matrix (n, n), as `Case.mass`, of the compared
-        nodes. With it the modes of one structure are orthogonal: the matrix of a set with itself is
-        the identity. Without it all nodes count equally.
+        Weights: nodal masses (n,) or the nodal mass matrix (n, n) of the compared nodes, such as
+        `Case.mass`. With the mass, modes of one structure are orthogonal: the matrix of a set with
+        itself is the identity. Without it, all nodes count equally.
     nodes : array_like of int, or a pair of them, optional
-        Nodes to compare: numbers that mean the same node in both sets, or (numbers in a, numbers in
-        b) for models that share only some nodes. All by default.
+        Nodes to compare: numbers that refer to the same node in both sets, or (numbers in a,
+        numbers in b) for models that share only some nodes. All nodes by default.
 
     Returns
     -------
@@ -61,10 +62,10 @@ def mac(a: Any, b: Any, *, mass: Any = None, nodes: Any = None) -> NDArray[np.fl
 
 
 class Pairs(NamedTuple):
-    """Paired modes of two sets, numbered from 0 as the rows of the sets."""
+    """Paired modes of two sets, numbered from 0 like the rows of the sets."""
 
     first: NDArray[np.int64]  # (k,) increasing
-    second: NDArray[np.int64]  # (k,) their partners
+    second: NDArray[np.int64]  # (k,) partners of `first`
     mac: NDArray[np.float64]  # (k,)
 
 
@@ -119,7 +120,7 @@ def _shapes(name: str, given: Any) -> NDArray:
 
 
 def _chosen(first: NDArray, second: NDArray, nodes: Any) -> tuple[NDArray, NDArray]:
-    """The shapes at the compared nodes."""
+    """The shapes of both sets at the compared nodes."""
     if nodes is not None:
         pair = nodes if isinstance(nodes, tuple) and len(nodes) == 2 else (nodes, nodes)
         first, second = (_at(s, n) for s, n in zip((first, second), pair, strict=True))
@@ -163,14 +164,14 @@ def _weighted(shapes: NDArray, mass: Any) -> NDArray:
 
 
 def clusters(frequency: NDArray) -> NDArray:
-    """Number (k,) of the cluster of each of increasing frequencies (k,)."""
+    """Number (k,) of the cluster to which each frequency (k,) belongs; frequencies increase."""
     apart = np.diff(frequency) > NEAR * frequency[1:]
     return np.concatenate([[0], np.cumsum(apart)])
 
 
 def likeness(fa: NDArray, a: NDArray, fb: NDArray, b: NDArray, mass: NDArray) -> NDArray:
     """MAC (ka, kb) of shapes (ka, n, 3) and (kb, n, 3), averaged over clusters."""
-    # shapes that do not move these nodes are like none
+    # shapes that do not move these nodes have no similar shape
     values = np.nan_to_num(mac(a, b, mass=mass))
     found = values.copy()
     left, right = clusters(fa), clusters(fb)

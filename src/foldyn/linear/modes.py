@@ -1,9 +1,9 @@
 """`modes`: natural frequencies and shapes of a case about a state.
 
 Participation in base motions: with shapes of unit modal mass, the participation factor along an
-axis is phi' M r, r the unit translation of the free dofs along it, and its square is the effective
-mass. Over all modes the effective masses add up to r' M r, the mass that is free to move along the
-axis.
+axis is phi' M r, with r the unit translation of the free dofs along the axis. The square of the
+factor is the effective mass. The effective masses of all modes add up to r' M r, the mass that is
+free to move along the axis.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from foldyn.statics.stability import oriented
 from foldyn.structures.stretching import most, remedy, stretching
 from foldyn.values import of_kind, whole
 
-COPIES = 4  # of the shapes in memory, while they are found and stored
+COPIES = 4  # copies of the shapes in memory, while they are found and stored
 RIGID = 1.0 - 1e-6  # share in the space of rigid motions above which a shape counts as rigid
-ROUNDING = 1e3 * EPS  # of |K| |r|: force on a rigid motion that counts as zero
+ROUNDING = 1e3 * EPS  # forces on a rigid motion r below this, relative to |K| |r|, count as zero
 TURN = 2.0 * np.pi
-TWINS = 1e-8  # relative difference below which eigenvalues count as one
-INDEPENDENT = 1e-6  # of a motion's size: least remainder after orthogonalization
+TWINS = 1e-8  # eigenvalues with a smaller relative difference count as one
+INDEPENDENT = 1e-6  # least remainder after orthogonalization, relative to a motion's size
 
 
 def modes(
@@ -52,31 +52,31 @@ def modes(
 ) -> xarray.Dataset:
     """Natural frequencies and mode shapes of a case about an equilibrium.
 
-    Solves K phi = lambda M phi on the free dofs, K the tangent in the state, for the lowest
+    Solves K phi = lambda M phi on the free dofs, with K the tangent in the state, for the lowest
     eigenvalues lambda = (2 pi f)^2.
 
     Parameters
     ----------
     case : Case
-        Its loads and imposed displacements are preloads; histories play no part.
+        Loads and imposed displacements of the case are preloads; histories are ignored.
     count : int
-        How many modes, the lowest ones, rigid and unstable ones included.
+        Number of modes, from the lowest on, including rigid and unstable modes.
     state : State or "equilibrium", optional
-        State to linearize about: a state, as `fd.initial_state(path)`; the equilibrium under the
-        loads in full; by default the rest state, in which no load acts.
+        State to linearize about: a state, such as `fd.initial_state(path)`; or "equilibrium", the
+        equilibrium under the loads in full; by default the rest state, in which no load acts.
     secant : float, optional
-        Amplitude (degrees) by which hinges turn: superlinear ones, without slope at rest, then get
-        the slope equivalent to an oscillation of this amplitude.
+        Amplitude (degrees) by which hinges turn: superlinear hinges, which have no slope at rest,
+        then get the slope equivalent to an oscillation of this amplitude.
     load_factor : float
         Load factor of actuated folds in a given state.
     internal : int
         Number of internal amplitudes (Craig and Bampton) of each panel, 0 to 6, for the motion of
         its plate between corners, center and creased edges. Each edge without a crease adds one
-        more, and each of the other edges three, by which creases turn unevenly along their length.
+        amplitude; each other edge adds three, by which its crease turns unevenly along its length.
         Only for the scheme "n5b8e" and the mass "condensed"; see `foldyn.linear.internal_modes`.
     verify : bool
-        Whether to verify by one more factorization that no mode was missed. It costs about as much
-        as the first one; small problems are solved in full and need none.
+        Whether to verify by a second factorization that no mode was missed. It costs about as much
+        as the first; small problems are solved in full and do not need it.
     solver : {"auto", "superlu", "pardiso"}
         Backend of the sparse factorization, as in the settings of `trace`.
 
@@ -88,12 +88,12 @@ def modes(
         `shape` (phi' M phi = 1 kg m2, the largest entry positive), `rigid`, `rigid_share` (of the
         shape in the space of rigid motions), `damping_ratio` (phi' C phi / (2 omega), nan if the
         frequency is 0 or nan), `participation`, `effective_mass`, and `displacement` of the state;
-        in air also `air_share`, the fluid's share of the modal mass, which `free_mass`,
-        `participation` and `effective_mass` include; with internal amplitudes also
-        `internal_share`, their share of the strain energy, which shapes at nodes do not show.
-        Attributes: `free_mass` (kg along x, y, z), `complete` (number of lowest modes verified to
-        be complete), `soft_hinges`, `residual` of the state, `rounding` (bound on the relative
-        rounding error of the eigenvalues) and facts about the computation.
+        in air also `air_share`, the fluid's share of the modal mass (`free_mass`, `participation`
+        and `effective_mass` include the fluid); with internal amplitudes also `internal_share`,
+        their share of the strain energy, as shapes at nodes do not show them. Attributes:
+        `free_mass` (kg along x, y, z), `complete` (number of lowest modes verified to be complete),
+        `soft_hinges`, `residual` of the state, `rounding` (bound on the relative rounding error of
+        the eigenvalues) and facts about the computation.
 
     Raises
     ------
@@ -119,10 +119,10 @@ def modes(
 
 
 class Found(NamedTuple):
-    """Modes as `modes` returns them, with the system and spectrum behind them."""
+    """Modes as `modes` returns them, with the system and the spectrum they come from."""
 
     linear: Linearized
-    spectrum: Spectrum  # shapes in their own order and signs
+    spectrum: Spectrum  # its shapes may differ in order and sign
     result: xarray.Dataset
 
 
@@ -130,7 +130,7 @@ def spectrum_of(
     case: Case, count: int = 6, state: State | str | None = None, secant: float | None = None, *,
     load_factor: float = 1.0, internal: int = 0, verify: bool = True, solver: str = "auto",
 ) -> Found:  # fmt: skip
-    """Modes as from `modes`, with the linearized system and its spectrum; arguments as there."""
+    """Modes, with the linearized system and its spectrum; arguments as in `modes`."""
     of_kind("case", case, Case)
     count = whole("count", count, least=1)
     check_memory(
@@ -201,7 +201,7 @@ def _variables(
 def _remembered(
     linear: Linearized, branches: Branches, values: NDArray, shapes: NDArray
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Eigenvalues |s|^2, in-phase shapes and damping ratios of modes with memory laws."""
+    """Eigenvalues |s|^2, in-phase shapes, and damping ratios of modes with memory laws."""
     values, shapes, ratio = values.copy(), shapes.copy(), np.zeros(len(values))
     for k in np.flatnonzero(values > 0.0):
         s, x = damped_mode(linear.stiffness, linear.mass, branches, values[k], shapes[:, k])
@@ -214,7 +214,7 @@ def _remembered(
 
 
 def _warn_of_twins(linear: Linearized, values: NDArray, shapes: NDArray) -> None:
-    """Warn if two modes have merged, so that another one is missing."""
+    """Warn if two modes have converged to the same mode, so that a mode is missing."""
     for k in range(1, len(values)):
         near = abs(values[k] - values[k - 1]) <= TWINS * abs(values[k])
         if near and abs(shapes[:, k] @ (linear.mass @ shapes[:, k - 1])) > RIGID:
@@ -248,7 +248,7 @@ def _air(linear: Linearized, shapes: NDArray) -> dict[str, Any]:
 def unit_translations(linear: Linearized) -> NDArray:
     """Unit translations (nf, 3) of the free dofs along x, y, z.
 
-    If constraints allow none, the closest allowed motions, weighted by mass.
+    If constraints do not allow these, the closest allowed motions, weighted by mass.
     """
     on_nodes = linear.free < linear.displacement.size
     if not linear.case.constraints:
@@ -328,7 +328,7 @@ def rigid_space(linear: Linearized) -> NDArray:
     basis, _ = np.linalg.qr(chosen)
     motions = plain @ (basis @ basis.T)
     on_nodes = linear.free[linear.free < x.size]
-    # turns of a shell's edges are relative to its panels: they stay 0
+    # rotations of a shell are relative to its panels: they stay 0
     still = np.zeros((len(linear.free) - len(on_nodes), motions.shape[1]))
     return _orthonormal(linear, np.vstack([motions[on_nodes], still]))
 
@@ -355,8 +355,8 @@ def _size(linear: Linearized, motion: NDArray) -> float:
 def unresisted(linear: Linearized, space: NDArray) -> NDArray:
     """Part (nf, k) of the rigid motions (nf, r) without restoring force: modes of zero frequency.
 
-    Loads with a fixed direction resist rotations, as gravity does for a pendulum; without such
-    loads, no rotation is resisted in an equilibrium.
+    Loads with a fixed direction resist rotations, like gravity in a pendulum; without such loads,
+    nothing resists rotations in an equilibrium.
     """
     if not space.shape[1]:
         return space
@@ -370,7 +370,7 @@ def unresisted(linear: Linearized, space: NDArray) -> NDArray:
 def _is_null(linear: Linearized, motions: NDArray) -> NDArray:
     """Whether the stiffness force on each motion (nf, k) is round-off (k,).
 
-    If the state has a residual force r, a rotation by w turns this force: |w| r.
+    If the state has a residual force r, a rotation by w turns it, which gives a force |w| r.
     """
     force = np.linalg.norm(linear.stiffness @ motions, axis=0)
     rounding = ROUNDING * np.linalg.norm(abs(linear.stiffness) @ np.abs(motions), axis=0)

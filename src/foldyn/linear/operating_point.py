@@ -22,7 +22,7 @@ from foldyn.statics.path_memory import AT_REST, REFUSED
 from foldyn.statics.rigid import free_rigid_motions
 from foldyn.statics.tracing import displacement_of
 
-BALANCED = 1e-6  # of the forces at play: largest residual that counts as equilibrium
+BALANCED = 1e-6  # largest residual in equilibrium, relative to the forces that act
 PLACES = "None (the rest state), 'equilibrium' or a State, as fd.initial_state(path)"
 
 
@@ -31,8 +31,8 @@ class OperatingPoint(NamedTuple):
 
     displacement: NDArray  # (n, 3) m
     problem: OrigamiProblem
-    factor: float  # of actuated folds and of loads that depend on the displacement
-    body: Assembly  # with its folds actuated
+    factor: float  # factor of actuated folds and of loads that depend on the displacement
+    body: Assembly  # body with its folds actuated
     dofs: NDArray  # (m,) the state on all dofs of the body
     balance: Balance
     kind: str  # "rest", "equilibrium" or "state"
@@ -50,7 +50,7 @@ class OperatingPoint(NamedTuple):
 
     @property
     def relative(self) -> float:
-        """Residual as a fraction of the forces at play; 0 below their rounding."""
+        """Residual as a fraction of the forces that act; 0 if within their rounding."""
         if self.balance.residual <= self.problem.force_rounding:
             return 0.0
         return self.balance.residual / max(self.balance.residual, self.balance.reference)
@@ -88,8 +88,8 @@ def operating_point(
 def _equilibrium(case: Case) -> NDArray:
     """Displacement (n, 3), m, under the full loads of a case, near its rest state.
 
-    Superlinear hinges need one more Newton step: a residual at round-off leaves a hinge at 1e-6 rad
-    from rest off by 1e-4 of that turn, which its slope shows.
+    Superlinear hinges need one more Newton step: with a residual at round-off, a hinge at 1e-6 rad
+    from rest is still off by 1e-4 of that turn, which affects its slope.
     """
     factors = [0.0, 1.0] if drives(case, ()) else [0.0]
     nodes, body = case.structure.nodes, case.body
@@ -108,7 +108,7 @@ def _equilibrium(case: Case) -> NDArray:
 
 
 def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> OperatingPoint:
-    """A state with its residual.
+    """The operating point of a state, with its residual.
 
     Forces with a fixed direction do not enter the tangent, and a state does not record their
     factors: each load gets the factor that minimizes the residual. Loads that depend on the
@@ -125,7 +125,7 @@ def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> Opera
     elif kind == "state" and loads.size:
         factors = np.linalg.lstsq(loads[free], residual[free], rcond=None)[0]
         residual = residual - loads @ factors
-    residual = np.pad(residual, (0, len(reached) - len(residual)))  # planes are held
+    residual = np.pad(residual, (0, len(reached) - len(residual)))  # planes are fixed
     found = balance(problem, reached, factor, residual)
     return OperatingPoint(displacement, problem, factor, body, u, found, kind)
 

@@ -26,24 +26,24 @@ from foldyn.values import choice
 
 PROMINENT = 0.05
 HALF_POWER = math.sqrt(2.0)
-SIDES = 1.5  # most half-power widths on either side of a peak for a circle fit
+SIDES = 1.5  # samples of a circle fit: at most so many half-power widths on either side
 
 
 @dataclass(frozen=True)
 class Peak:
-    """A peak of a frequency response; nan where something cannot be found.
+    """A peak of a frequency response; values that cannot be found are nan.
 
     Attributes
     ----------
     frequency, height : float
         Frequency (Hz), interpolated between samples, and height in the unit of the response.
     half_power, textbook : float
-        Damping ratio from the half-power points: exact for a single mode, and
-        (upper - lower) / (2 peak).
+        Damping ratios from the half-power points: `half_power` is exact for a single mode,
+        `textbook` is (upper - lower) / (2 peak).
     asymmetry : float
-        Asymmetry of the half-power points; above 0.1 it is not the peak of a single mode.
+        Asymmetry of the half-power points; above 0.1, the peak is not that of a single mode.
     natural_frequency, damping_ratio : float
-        From the circle fit (Hz).
+        Natural frequency (Hz) and damping ratio from the circle fit.
     frequency_error, damping_error : float
         Standard errors of the circle fit.
     misfit : float
@@ -84,9 +84,9 @@ def peaks_of(
     axis : {"x", "y", "z", "-x", "-y", "-z"}
         The sign has no effect.
     quantity : {"receptance", "mobility", "accelerance"}, optional
-        Curve whose peaks and half-power points are taken; by default the one that is stored.
-        A strongly damped mode peaks at the lowest frequency in the receptance, at its natural
-        frequency in the mobility. The circle fit does not depend on it.
+        Quantity whose peaks and half-power points are used; by default the stored quantity. A
+        strongly damped mode peaks at its natural frequency in the mobility, and at a lower
+        frequency in the receptance. The circle fit does not depend on the quantity.
     prominence : float, optional
         Least prominence of a peak, as a fraction of the curve's maximum. By default 0.05; a lower
         peak also counts if it falls to half its power on both sides, as seen on a logarithmic axis,
@@ -97,9 +97,9 @@ def peaks_of(
     Returns
     -------
     tuple of Peak
-        Circles are fitted to all peaks together, or, if that fails, to each alone. For a response
-        estimated with an exponential window, `half_power`, `natural_frequency` and `damping_ratio`
-        exclude the damping of the window.
+        Peaks with circles, which are fitted to all peaks together, or, if this fails, to each peak
+        alone. For a response estimated with an exponential window, `half_power`,
+        `natural_frequency` and `damping_ratio` exclude the damping of the window.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def resonances(
 ) -> Peaks:  # fmt: skip
     """Peaks of a finite curve, as marked in figures and listed in tables; see `peaks_of`.
 
-    shown : quantity of the curve; a transmissibility has the peaks of a receptance.
+    shown : quantity of the curve; a transmissibility is treated like a receptance.
     scatters : whether the curve is an estimate from random records, with meaningless low peaks.
     """
     kind, size = kind_of(shown), np.abs(curve)  # an undamped response is real, of either sign
@@ -151,7 +151,7 @@ def resonances(
 
 
 def kind_of(shown: str) -> str:
-    """The quantity name that peak estimators take."""
+    """The quantity for peak estimators."""
     return shown if shown in PER_FORCE else "receptance"
 
 
@@ -160,7 +160,7 @@ def _with_half_power(
 ) -> tuple[Peak, float]:
     """The peak with its half-power damping, and the distance (Hz) of the half-power points."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)  # the asymmetry is stored
+        warnings.simplefilter("ignore", FoldynWarning)  # the asymmetry is in the result
         try:
             points = half_power(f, np.abs(curve), near=peak.frequency, quantity=kind)
         except InputError as error:
@@ -192,9 +192,9 @@ def _bands(
 def _modal(
     response: xarray.Dataset, f: NDArray, curve: NDArray, shown: str, axis: str, rate: float
 ) -> NDArray:
-    """The curve converted to one in which modes trace circles.
+    """The curve converted to a quantity in which modes trace circles.
 
-    A transmissibility is 1 - (s^2 + alpha s) H, H the receptance to the forces M t of a unit
+    A transmissibility is 1 - (s^2 + alpha s) H, with H the receptance to the forces M t of a unit
     translation t of the base, s = i w plus the rate of the window, if any.
     """
     if shown in PER_FORCE:
@@ -209,7 +209,7 @@ def _with_circles(
     peaks: list[Peak], f: NDArray, curve: NDArray, bands: list[tuple[float, float]], kind: str,
     rate: float,
 ) -> list[Peak]:  # fmt: skip
-    """The peaks with their circle fits: to all together, or else to each alone."""
+    """The peaks with circle fits: of all peaks together, or else of each alone."""
     try:
         fits = circle_fits(f, curve, bands=bands, quantity=kind)
         return [_with_circle(peak, fit, rate) for peak, fit in zip(peaks, fits, strict=True)]

@@ -1,6 +1,7 @@
 """The lowest modes of a shell, extrapolated in mesh size: the reference for models.
 
-The modes of a model are paired with them. The error of one's own mesh is estimated likewise.
+Modes of a model are paired with the modes of the shell. The error of the mesh of a case is also
+estimated here.
 """
 
 from __future__ import annotations
@@ -23,18 +24,18 @@ from foldyn.linear.modes import modes
 from foldyn.linear.shell_of import with_structure
 from foldyn.structures.discretized import Discretized
 
-SWAPPED = 3  # extra modes of each mesh, which may swap with the ones compared
-RIGID = 6  # most modes without stiffness of a sheet
-SAME_PLACE = 1e-6  # of the pattern's size: largest distance of a matching node
-FLAT = np.cos(np.radians(5.0))  # of the normals of panels nearly in one plane
+SWAPPED = 3  # additional modes of each mesh, as they may swap with the compared modes
+RIGID = 6  # most modes of a sheet without stiffness
+SAME_PLACE = 1e-6  # largest distance of a matching node, relative to the pattern's size
+FLAT = np.cos(np.radians(5.0))  # cosine between the normals of panels nearly in one plane
 NO_LIMIT = (
     "a panel touches a clamped edge at vertex {} alone, folded against it, where frequencies have "
     "no limit: meshes and programs differ by 20 %"
 )
 LEAST = 0.5  # least MAC of a partner
-SPARE = 10  # extra modes of a model among which partners are sought
+SPARE = 10  # additional modes of a model among which partners are sought
 MODES = 3
-FINE = 16  # pieces: beyond, the estimate is expensive
+FINE = 16  # pieces per edge: with more, the estimate is expensive
 
 
 class MeshModes(NamedTuple):
@@ -44,10 +45,10 @@ class MeshModes(NamedTuple):
     ----------
     structure : Discretized
     frequency : (k,)
-        Hz, increasing.
+        Frequencies, Hz, increasing.
     shape : (k, n, 3)
     found : xarray.Dataset
-        All modes computed, rigid ones included; empty if nothing can move.
+        All modes computed, rigid modes included; empty if nothing can move.
     """
 
     structure: Discretized
@@ -65,9 +66,9 @@ class MeshModes(NamedTuple):
 
 
 def mesh_modes(case: Case, count: int) -> MeshModes:
-    """The lowest elastic modes on the mesh of a case: `count`, and a few spare ones."""
+    """The lowest elastic modes on the mesh of a case: `count`, and a few in reserve."""
     structure = case.structure
-    if not len(case.free_dofs):  # in a coarse mesh
+    if not len(case.free_dofs):  # possible in a coarse mesh
         still = np.zeros((0, *structure.nodes.shape))
         return MeshModes(structure, np.zeros(0), still, xarray.Dataset())
     found = modes_at_rest(case, count + SWAPPED)
@@ -75,7 +76,7 @@ def mesh_modes(case: Case, count: int) -> MeshModes:
 
 
 def same_modes(own: MeshModes, meshes: Sequence[MeshModes], count: int) -> NDArray[np.float64]:
-    """Frequencies (meshes, k) of the lowest modes on one mesh, and of the same modes on others.
+    """Frequencies (meshes, k) of the lowest modes on one mesh, and of these modes on others.
 
     Modes are paired by their shapes at the nodes that two meshes share, since a coarse mesh may
     swap close modes. At most `count`; nan for modes that a mesh lacks.
@@ -100,16 +101,16 @@ class Reference:
     frequency : (k,)
         Frequencies extrapolated from the meshes, Hz.
     mesh_error : (k,)
-        Relative errors of the finest mesh, by the order observed with the two coarser ones; nan if
-        the meshes have not converged, or there is no limit.
+        Relative errors of the finest mesh, from the order of convergence observed with all meshes;
+        nan if the meshes have not converged, or there is no limit.
     mesh_frequency : (3, k)
-        Frequencies of these modes on each mesh, Hz; nan if a coarse mesh lacks one.
+        Frequencies of the modes on each mesh, Hz; nan if a coarse mesh lacks a mode.
     shape : (k, n, 3)
         Shapes of the fine mesh.
     case : Case
         The case with the shell of the fine mesh.
     found : xarray.Dataset
-        All modes of this mesh, rigid ones included.
+        All modes of the fine mesh, rigid modes included.
     """
 
     frequency: Annotated[NDArray, Unit("Hz")]
@@ -157,8 +158,9 @@ def reference_modes(cases: Sequence[Case], count: int) -> Reference:
     Parameters
     ----------
     cases : (Case, Case, Case)
-        Shells of increasing `divisions`. The last two give the frequencies, all three their error;
-        with a vertex radius all three give both, since such meshes have an order below 2.
+        Shells of increasing `divisions`. Frequencies follow from the last two, their errors from
+        all three; with a vertex radius both follow from all three, since such meshes have an order
+        below 2.
     count : int
         Number of modes, at most as many as the last two meshes have.
     """
@@ -181,10 +183,10 @@ def is_graded(case: Case) -> bool:
 
 
 def touched_clamp(structure: Discretized) -> int | None:
-    """A vertex at which a panel only touches the clamped edges of others, folded against them.
+    """A vertex at which a panel only touches clamped edges of other panels and is folded there.
 
-    Its membrane meets the clamp at this point, which holds it more strongly the finer the mesh is
-    there; with a vertex radius the result depends on the radius.
+    The membrane of this panel meets the clamp at a point only. The finer the mesh, the more
+    strongly the point holds it; with a vertex radius the result depends on the radius.
     """
     pattern, clamped = structure.pattern, [set(edge) for edge in structure.options.clamped]
     for vertex in sorted(set().union(*clamped)):
@@ -209,7 +211,7 @@ class Shown(Protocol):
 
     @property
     def frequency(self) -> NDArray:
-        """Increasing, Hz."""
+        """Frequencies (k,), Hz, increasing."""
         ...
 
     def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
@@ -241,12 +243,12 @@ def matched(true: Shown, count: int, case: Case, found: xarray.Dataset) -> Match
     Parameters
     ----------
     true : Shown
-        Such as a `Reference`.
+        Modes of the shell, such as a `Reference`.
     count : int
         Number of modes of the shell.
     case, found : Case, xarray.Dataset
-        The model, and its modes, `SPARE` more than `count`. Shapes are compared at its nodes, and
-        with internal amplitudes also between them, if these are nodes of the shell's mesh.
+        The model, and its modes, `SPARE` more than `count`. Shapes are compared at the model's
+        nodes, and with internal amplitudes also between these, where the shell's mesh has nodes.
     """
     points, weights = _points(case, found)
     seen, shape = true.at(points)
@@ -265,8 +267,8 @@ def matched(true: Shown, count: int, case: Case, found: xarray.Dataset) -> Match
 def _points(case: Case, found: xarray.Dataset) -> tuple[NDArray, NDArray]:
     """Points (p, 3) where modes are compared, and their weights (p,) in the MAC.
 
-    The nodes, with weights equal for all mass rules; with internal amplitudes also points between
-    them, with the same total weight.
+    The points are the nodes, with the same weights for all mass rules. With internal amplitudes,
+    points between nodes are added; the total weight stays the same.
     """
     structure = case.structure
     even = replace(structure, options=replace(structure.options, mass="mixed_voronoi"))
@@ -281,12 +283,12 @@ def _points(case: Case, found: xarray.Dataset) -> tuple[NDArray, NDArray]:
 class Refinement(NamedTuple):
     """Lowest frequencies of a structure on three meshes, and their extrapolated limits."""
 
-    divisions: int  # of the structure
+    divisions: int  # pieces of every edge of the structure
     meshes: tuple[int, ...]  # (3,) pieces of every edge, increasing, `divisions` among them
     frequencies: NDArray[np.float64]  # (3, k) Hz
     order: NDArray[np.float64]  # (k,) observed order; nan: not converged
     extrapolated: NDArray[np.float64]  # (k,) Hz; nan: not converged
-    touched: int | None  # vertex at which there is no limit; see `touched_clamp`
+    touched: int | None  # vertex because of which frequencies have no limit; see `touched_clamp`
 
     @property
     def frequency(self) -> NDArray[np.float64]:
@@ -295,7 +297,7 @@ class Refinement(NamedTuple):
 
     @property
     def error(self) -> float:
-        """The largest error of these frequencies, negative if the mesh is too soft.
+        """The largest relative error of these frequencies; negative if the mesh is too soft.
 
         nan if one of them has not converged.
         """
@@ -304,15 +306,16 @@ class Refinement(NamedTuple):
 
     @property
     def changes(self) -> NDArray[np.float64]:
-        """Relative changes (2,) between meshes of one frequency, if possible one not converged.
+        """Relative changes (2,) of one frequency between meshes, if possible of one not converged.
 
-        This is the one that changes most in the last step; nan if a mesh lacks it.
+        The frequency chosen is that with the largest change in the last step; nan if a mesh lacks
+        it.
         """
         changes = self.frequencies[1:] / self.frequencies[:-1] - 1.0
         return changes[:, (np.isnan(self.order) + np.abs(changes[1])).argmax()]
 
     def facts(self) -> dict[str, Any]:
-        """Attributes of a result that describe its mesh."""
+        """Attributes for results, which describe the mesh."""
         return {
             "mesh_error": self.error,
             "mesh_frequencies": self.frequency,
@@ -330,16 +333,17 @@ def refinement(case: Case, count: int = MODES) -> Refinement | None:
     Parameters
     ----------
     case : Case
-        Its supports matter, its loads do not. The sheet needs no density here.
+        The case; only its structure and supports matter. The sheet needs no density here.
     count : int
-        How many frequencies.
+        Number of frequencies.
 
     Returns
     -------
     Refinement or None
-        From this mesh and two with half and a quarter of its pieces per edge, or finer ones if
-        there are no such meshes. None if the structure has no mesh, if its mesh is fine (more than
-        16 pieces per edge), or if supports are given by nodes that another mesh lacks.
+        Estimate from this mesh and two meshes with half and a quarter of its pieces per edge, or
+        from finer meshes if coarser meshes do not exist. None if the structure has no mesh, if its
+        mesh is fine (more than 16 pieces per edge), or if supports are given by nodes that another
+        mesh lacks.
     """
     structure = case.structure
     divisions = structure.divisions
@@ -348,7 +352,7 @@ def refinement(case: Case, count: int = MODES) -> Refinement | None:
     meshes = _meshes(divisions)
     try:
         found = {n: _modes(case, structure.meshed(n), count) for n in meshes}
-    except InputError:  # nodes beyond the vertices
+    except InputError:  # supports name nodes other than vertices
         return None
     frequencies = same_modes(found[divisions], list(found.values()), count)
     if not frequencies.size:

@@ -15,11 +15,11 @@ from foldyn.shells import Shell, ShellOptions, shell
 from foldyn.structures.discretized import Discretized
 from foldyn.values import of_kind, show, whole
 
-DIVISIONS = (6, 12)  # of every edge in the two finer meshes; a third one is half as fine
+DIVISIONS = (6, 12)  # pieces of every edge in the two finer meshes
 MOST_TRIANGLES = 15_000
 """Most triangles of a default shell: its modes take ten to twenty seconds."""
 GRADED = (8, 12)
-"""Divisions of the two finer meshes with a vertex radius; the coarsest has 4."""
+"""Divisions of the two finer meshes with a vertex radius; the coarsest mesh has 4."""
 MESH = {"divisions", "mass", "vertex_radius"}
 """Options of a shell that bars and hinges lack."""
 
@@ -53,7 +53,7 @@ def check_reduced(case: Any) -> None:
 
 
 def _check_nodes(case: Case) -> None:
-    """Refuse nodes beyond the vertices, which a shell has elsewhere."""
+    """Refuse nodes other than vertices: in a shell their numbers refer to other places."""
     count = len(case.structure.pattern.vertices)
     for place, nodes in _numbered(case):
         beyond = [node for node in nodes if node >= count]
@@ -80,7 +80,7 @@ def _numbered(case: Case) -> Iterator[tuple[str, list[int]]]:
 def shell_of(case: Case, divisions: int, vertex_radius: float | None = None) -> Case:
     """The case with a shell of the same pattern, sheet, creases and panels, without damping.
 
-    Its first nodes are the vertices, so that supports, loads and masses apply to both.
+    The first nodes of the shell are the vertices, so that supports, loads and masses apply to both.
     """
     structure = case.structure
     own = {item.name for item in fields(structure.options)} - MESH

@@ -1,6 +1,6 @@
 """Motions of a case about a state, from which frequency responses are estimated.
 
-The stepped sine method takes steady motions under a sine, one frequency at a time.
+The stepped sine method uses steady motions under a sine, one frequency at a time.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ from foldyn.signals import stepped_sine as response_per_drive
 from foldyn.values import choice, number, whole
 
 Duration = Annotated[float, Check(number, above=0.0, unit="s")]
-PER_CYCLE = 32  # samples in a cycle
-SLOWEST = 0.99  # ratio of successive changes above which no decay is assumed
-NEGLIGIBLE = 1e-12  # change at round-off
+PER_CYCLE = 32  # samples per cycle
+SLOWEST = 0.99  # if successive changes have a larger ratio, no decay is assumed
+NEGLIGIBLE = 1e-12  # relative change that is round-off
 
 
 @dataclass(frozen=True)
@@ -50,10 +50,10 @@ class Integration(Checked):
     Parameters
     ----------
     integrator : str, optional
-        Method of `simulate`. Without it "rk4", for shells "generalized_alpha".
+        Method of `simulate`; by default "rk4", for shells "generalized_alpha".
     dt : float, optional
-        Largest time step (s), shortened to divide the sampling interval; by default the one
-        of `simulate`.
+        Largest time step (s), which is shortened to divide the sampling interval; by default the
+        time step of `simulate`.
     tolerance : float, optional
         As in `simulate`.
     """
@@ -82,7 +82,7 @@ class Rig:
         self.integrator = integration.integrator or ("generalized_alpha" if massless else "rk4")
         history = Table([0.0, 1.0], [point.factor, point.factor])
         self.case = case
-        if case.contact is not None:  # planes stay where they are in the state
+        if case.contact is not None:  # planes keep their places in the state
             planes = [
                 plane if plane.history is None else replace(plane, history=history)
                 for plane in case.contact.planes
@@ -101,7 +101,7 @@ class Rig:
         self._supports = self._held()
 
     def _held(self) -> list[Support]:
-        """Supports fixed where the state puts them; a moving base of the case stands still."""
+        """Supports that hold nodes at their places in the state; bases of the case stand still."""
         moving = (Impose, BaseMotion)
         held: list[Support] = [s for s in self.case.supports if not isinstance(s, moving)]
         for support in self.case.supports:
@@ -143,7 +143,7 @@ def _moves_along(load: Load, case: Case) -> bool:
 
 
 def forces(vectors: NDArray, history: History | None = None) -> list[Force]:
-    """Loads for forces (n, 3) on nodes, equal ones combined."""
+    """Loads for forces (n, 3) on nodes; equal forces are one load."""
     distinct, which = np.unique(vectors, axis=0, return_inverse=True)
     return [
         Force(np.flatnonzero(which.ravel() == k).tolist(), vector.tolist(), history)
@@ -174,7 +174,7 @@ class SteppedSine(Integration):
     Parameters
     ----------
     cycles : int
-        Cycles whose motion is fitted, at least 2.
+        Number of cycles to which a sine is fitted, at least 2.
     settled : float
         Relative error that the transient may leave, estimated from its decay: cycles are added
         until the error is smaller.
@@ -190,7 +190,7 @@ class SteppedSine(Integration):
     sweep: Annotated[str, Check(choice, known=("up", "down"))] = "up"
 
     def agree(self) -> None:
-        """Refuse too few cycles to tell whether a motion has settled."""
+        """Refuse too few cycles for a check that a motion has settled."""
         whole("most_cycles", self.most_cycles, least=3 * self.cycles)
 
 
@@ -261,7 +261,7 @@ class _Motion:
             self.history, self.block, interval, report, self.time, self.state
         )
         drive = self.rig.drive.value * self.history(time)
-        # the last sample is the first one of the next block
+        # the last sample is the first of the next block
         response = response_per_drive(
             time[:-1], drive[:-1], response=motion[:-1], frequency=self.frequency
         )

@@ -22,17 +22,17 @@ from foldyn.values import choice, number, whole
 
 MOST_LINES = 100  # largest number of lines of a record per spacing of the frequencies
 DECAYED = 1e-5  # share of a motion left by damping at the end of the default duration
-COPIES = 4  # of the samples in memory, while their spectra are computed
-LEFT = 1e-3  # of the largest response: most that may remain at the end of a record
-END = 0.05  # of the record: its end, where the remainder is measured
-FEWEST = 4  # least samples in a cycle of the highest frequency, and in a pulse
+COPIES = 4  # copies of the samples in memory, while spectra are computed
+LEFT = 1e-3  # largest response at the end of a record, relative to its maximum
+END = 0.05  # fraction of the record, at its end, in which the remainder is measured
+FEWEST = 4  # least number of samples in a cycle of the highest frequency, and in a pulse
 PER_PULSE = 10  # samples in the pulse
-WIDTH = 0.5  # of a cycle of the highest frequency: length of the pulse
-WEAK = 1.5  # cycles of a frequency in a pulse above which its spectrum there is too weak
-STILL = 8  # samples of rest before and after a pulse, in which its spline decays
+WIDTH = 0.5  # length of the pulse, in cycles of the highest frequency
+WEAK = 1.5  # at frequencies with more cycles per pulse, the pulse's spectrum is too weak
+STILL = 8  # samples of rest before and after a pulse, in which the spline decays
 PER_CYCLE = 20  # samples in a cycle of the highest frequency, in bursts
-BAND = (0.8, 1.2)  # of the lowest and the highest frequency: band that a burst excites
-TAPER = 0.1  # of the burst: part in which it rises and falls
+BAND = (0.8, 1.2)  # band that a burst excites, in units of the lowest and highest frequency
+TAPER = 0.1  # fraction of the burst in which it rises and falls
 
 
 @dataclass(frozen=True)
@@ -43,10 +43,10 @@ class Impulse(Integration):
     ----------
     pulse : float, optional
         Duration (s) of the pulse (1 - cos(2 pi t / pulse)) / 2, whose height is the drive. By
-        default half a cycle of the highest frequency, where its spectrum still has 0.85 of its
-        strength.
+        default half a cycle of the highest frequency, at which the spectrum of the pulse still has
+        0.85 of its strength.
     duration : float, optional
-        Time (s) to simulate. By default until damping leaves 1e-5 of a motion; without alpha, the
+        Time (s) to simulate. By default, until damping leaves 1e-5 of a motion; without alpha, the
         inverse of the spacing of the frequencies.
     interval : float, optional
         Largest sampling interval (s); a tenth of the pulse by default, at most a 20th of a cycle
@@ -221,7 +221,7 @@ def record_of(
     alpha : float
         Mass-proportional damping (1/s): a motion falls at least as fast as exp(-alpha t / 2).
     quiet : float
-        Part of the record after the drive has ended.
+        Fraction of the record after the drive has ended.
     interval : float
         Largest sampling interval (s).
     duration : float, optional
@@ -277,16 +277,16 @@ def respond(
     rig: Rig, factors: Sequence[NDArray], record: Record, rate: float, estimator: str,
     report: Reporter,
 ) -> Answer:  # fmt: skip
-    """Response estimated from motions under the drive, each from the state at rest.
+    """Response estimated from motions under the drive, each starting at rest in the state.
 
     Warns if a motion has not decayed.
 
     Parameters
     ----------
     factors : sequence of ndarray, shape (k,)
-        Samples of the factor on the drive in each motion, the first and the last of them 0, with a
-        cubic spline between them. Below a tenth of the sampling frequency its spectrum is that of
-        the samples to 3e-5: a cubic spline errs by (2 pi f dt)^4 / 720.
+        Samples of the factor on the drive in each motion; the first and the last are 0, and a cubic
+        spline connects them. Below a tenth of the sampling frequency the spectrum of the spline
+        agrees with that of the samples to 3e-5: its error is (2 pi f dt)^4 / 720.
     rate : float
         Decay rate of the exponential window, 1/s.
     """

@@ -2,8 +2,8 @@
 
 The pattern repeats under one or two commuting motions g_1, g_2. Each vertex v is a copy of a
 representative u of its kind, v = g^R u with integers R: two vertices of the same kind are one
-vertex of the repeated sheet, and likewise for edges between them. Wave vectors are phases k (rad)
-per period: a Bloch wave moves copy R of a vertex as Q^R a exp(i k . R), with Q the rotation of the
+vertex of the repeated sheet, and edges between them one edge. Wave vectors are phases k (rad) per
+period: a Bloch wave moves copy R of a vertex as Q^R a exp(i k . R), with Q the rotation of the
 motion (F. Bloch, Z. Phys. 52, 1929; with rotations, C. T. White, D. H. Robertson, J. W. Mintmire,
 Phys. Rev. B 47, 1993).
 """
@@ -30,9 +30,9 @@ from foldyn.patterns.tiling import periods as translations_of
 from foldyn.ram_limit import check_memory
 from foldyn.values import number, numbers, of_kind, show, whole
 
-NEAR_MISS = 0.05  # of the pattern's size: nearer misses of a vertex are reported
-COMMUTE = 10.0  # factor on the tolerance: largest difference between the two orders of two motions
-SHOWN = 6  # vertices named in a message
+NEAR_MISS = 0.05  # misses of a vertex below this, relative to the pattern's size, are reported
+COMMUTE = 10.0  # times the tolerance: largest effect of the order of two motions
+SHOWN = 6  # most vertices named in a message
 HEXAGONAL = 1e-6  # tolerance for lengths and angle of a hexagonal lattice
 
 
@@ -42,7 +42,7 @@ class Copies(NamedTuple):
     Attributes
     ----------
     kind : ndarray of int, shape (n,)
-        Number of its kind, in the order of the representatives.
+        Number of the kind of each vertex, in the order of the representatives.
     offset : ndarray of int, shape (n, d)
         R: powers of the motions that take the representative to the vertex.
     first : ndarray of int, shape (m,)
@@ -58,21 +58,21 @@ class Copies(NamedTuple):
 class UnitCell:
     """A case that is repeated to form a sheet, a chain or a tube.
 
-    Its supports, point masses, springs, dashpots and damping repeat with it. A support or mass at a
-    node also applies to its partners on the other side of the cell: they are one node of the
-    repeated sheet, which counts once if a support or mass names several of them. Loads only matter
-    for the state.
+    Supports, point masses, springs, dashpots and damping repeat with the cell. A support or mass at
+    a node also applies to the node's partners on other sides of the cell: together they are one
+    node of the repeated sheet, which counts once even if a support or mass names several of them.
+    Loads matter only for the state.
 
     Parameters
     ----------
     case : Case
-        Its structure is made by `discretize` or `shell`. Creases between cells have the stiffness
-        and law of the others, and letters from their dihedrals.
+        Case whose structure is made by `discretize` or `shell`. Creases between cells have the
+        stiffness and law of other creases, and letters from their dihedrals.
     vectors : sequence of sequences of float, shape (d, 3), optional
         One or two translations (m) from a cell to the next: a chain or a sheet.
     screw : Screw, optional
-        Instead of `vectors`, or in addition to one of them: a screw motion from a cell to the next,
-        for tubes and rings.
+        Screw motion from a cell to the next, for tubes and rings: instead of `vectors`, or in
+        addition to one vector.
     tolerance : float
         Distance below which vertices coincide, as a fraction of the pattern's size (below 0.05).
 
@@ -86,7 +86,7 @@ class UnitCell:
     dimensions : int
         Number d of motions.
     copies : Copies
-        Vertices as copies of others.
+        Each vertex as a copy of the representative of its kind.
 
     Raises
     ------
@@ -137,7 +137,7 @@ class UnitCell:
         )
 
     def _found(self, pattern: Pattern, near: float) -> tuple[tuple[Screw, ...], list[tuple]]:
-        """The motions, and pairs of vertices known to be copies."""
+        """The motions, and pairs of vertices that are known to be copies."""
         if self.vectors is not None or self.screw is not None:
             given = [] if self.vectors is None else list(map(translation, _steps(self.vectors)))
             if self.screw is not None:
@@ -233,7 +233,7 @@ class UnitCell:
         -------
         xarray.DataArray
             Phases (phase, period), rad, with the coordinate `distance` along the path, rad, and
-            the attributes `ticks` (its values at the points) and `tick_labels`.
+            the attributes `ticks` (values of `distance` at the points) and `tick_labels`.
 
         Raises
         ------
@@ -282,12 +282,12 @@ class UnitCell:
         Parameters
         ----------
         count : int
-            Phases along each period, at least 2; without the end at pi, which is equivalent to -pi.
+            Number of phases along each period, at least 2; without pi, which is equivalent to -pi.
 
         Returns
         -------
         xarray.DataArray
-            Phases (phase, period), rad; the attribute `grid` holds the number along each.
+            Phases (phase, period), rad; the attribute `grid` holds their number along each period.
         """
         count = whole("count", count, least=2)
         _check_memory(count**self.dimensions, self.dimensions)
@@ -302,7 +302,7 @@ class UnitCell:
 def images(
     motions: Sequence[Screw], points: ArrayLike, step: Sequence[int] | NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Points (n, 3), m, moved by each motion as often as `step` says."""
+    """Points (n, 3), m, moved by each motion as many times as `step` has."""
     out = np.asarray(points, float)
     for motion, power in zip(motions, step, strict=True):
         out = motion.images(out, int(power))
@@ -312,7 +312,7 @@ def images(
 def rotation(
     motions: Sequence[Screw], step: Sequence[int] | NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Rotation (3, 3) of the motions, each applied as often as `step` says."""
+    """Rotation (3, 3) of all motions, each applied as many times as `step` has."""
     out = np.eye(3)
     for motion, power in zip(motions, step, strict=True):
         out = motion.rotation(int(power)) @ out
@@ -351,7 +351,7 @@ def check_commuting(vertices: NDArray, motions: Sequence[Screw], near: float, fi
 def _partners(
     pattern: Pattern, motions: Sequence[Screw], near: float, known: set[int]
 ) -> list[tuple[int, int, tuple[int, ...]]]:
-    """Pairs of vertices (v, w, R), w = g^R v, of boundary edges that meet edges of other cells.
+    """Pairs of vertices (v, w, R), w = g^R v, at boundary edges that meet edges of other cells.
 
     known : vertices with known partners.
     """
@@ -376,7 +376,7 @@ def _partners(
 def _check_all(
     pattern: Pattern, motions: Sequence[Screw], pairs: Sequence[tuple], near: float, field: str
 ) -> None:
-    """Refuse motions under which nothing meets, or some vertices narrowly miss their partners."""
+    """Refuse motions under which no edges meet, or vertices narrowly miss their partners."""
     from scipy.spatial import cKDTree
 
     rim = np.unique(pattern.boundary)
@@ -458,7 +458,7 @@ def _named(vertices: Sequence[int] | NDArray) -> str:
 
 
 def _check_memory(count: int, dimensions: int) -> None:
-    """Refuse more phases than memory can hold; building them takes twice as much."""
+    """Refuse more phases than memory can hold; making them takes twice their memory."""
     check_memory(
         "count", f"a list of {count:g} phases", 16.0 * count * (dimensions + 1), "take fewer"
     )
@@ -481,7 +481,7 @@ def special_points(vectors: NDArray) -> dict[str, NDArray]:
 
 
 def checked_phases(phases: object, dimensions: int) -> NDArray[np.float64]:
-    """Phases (n, d), rad; for d = 1 also a list of numbers."""
+    """Phases (n, d), rad, checked; for d = 1 they may be a list of numbers."""
     values = phases.values if isinstance(phases, xarray.DataArray) else phases
     array = numbers("phases", values)
     if array.ndim == 1 and dimensions == 1:

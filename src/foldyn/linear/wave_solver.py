@@ -1,13 +1,13 @@
 """The lowest Bloch waves at given phases, and how they continue from one phase to the next.
 
 Small problems are solved with full matrices: hidden dofs are condensed, constraints are satisfied
-by a basis of allowed motions. If the nodal mass is the same for all three axes, its factor is a
-third as large. Large problems are solved by Lanczos iteration about a shift below zero.
+by a basis of allowed motions. If the nodal mass is the same for all three axes, only its matrix for
+one axis is factored. Large problems are solved by Lanczos iteration about a shift below zero.
 
-Slopes of the frequencies over the phases follow from the Hellmann-Feynman theorem: for waves with
-phi^H M phi = 1, d lambda = phi^H (dK - lambda dM) phi; constraints G(k) phi = 0 add the work of
-their forces in dG phi. Waves of equal frequency are combined so that this matrix is diagonal along
-a direction: these combinations continue along it.
+Derivatives of the frequencies with respect to phases follow from the Hellmann-Feynman theorem: for
+waves with phi^H M phi = 1, d lambda = phi^H (dK - lambda dM) phi; constraints G(k) phi = 0 add the
+work of their forces in dG phi. Waves of equal frequency are combined so that the matrix of d lambda
+is diagonal along a direction: these combinations continue along it.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from foldyn.linear.bloch import Bloch, null_space
 from foldyn.threads import in_threads
 
 DENSE = 500  # dofs up to which a problem is solved with full matrices
-GUARD = 3  # extra waves, so that none is missed if several coincide
+GUARD = 3  # additional waves, so that none is missed if several coincide
 EPS = float(np.finfo(float).eps)
-ROUNDING = 1e-15  # of |phi|' |K| |phi|: smaller counts as zero
-NOISE = 30.0  # factor on the rounding errors of the largest entries: smaller counts as zero, too
-SHIFT = 1e-6  # of the pencil's scale: the shift below zero
-DEGENERATE = 1e-10  # of the largest eigenvalue: closer ones count as equal
+ROUNDING = 1e-15  # eigenvalues below this, relative to |phi|' |K| |phi|, count as zero
+NOISE = 30.0  # eigenvalues below this many rounding errors of the largest entries are zero, too
+SHIFT = 1e-6  # shift below zero, relative to the scale of the matrices
+DEGENERATE = 1e-10  # eigenvalues closer than this, relative to the largest, count as equal
 
 
 class Waves(NamedTuple):
-    """Waves of one phase.
+    """Waves with one phase.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Waves(NamedTuple):
     momentum: NDArray
 
     def ordered(self, order: NDArray) -> Waves:
-        """The waves in another order."""
+        """The waves, put in the given order."""
         return Waves(self.values[order], self.shapes[:, order], self.momentum[:, order])
 
 
@@ -96,7 +96,7 @@ def eigenvalue_slopes(
 
 
 def degenerate(values: NDArray) -> list[list[int]]:
-    """Indices of eigenvalues in groups equal to round-off, increasing in each."""
+    """Groups of indices of eigenvalues that are equal to round-off; increasing in each group."""
     order = np.argsort(values, kind="stable")
     near = DEGENERATE * np.abs(values).max(initial=0.0)
     gaps = np.flatnonzero(np.diff(values[order]) > near) + 1
@@ -116,11 +116,12 @@ def separated(bloch: Bloch, phase: NDArray, waves: Waves, way: NDArray) -> Waves
 
 
 def tracked(bloch: Bloch, phases: NDArray, waves: Sequence[Waves]) -> list[Waves]:
-    """Waves of phases (n, d), sorted so that their shapes continue.
+    """Waves at phases (n, d), sorted so that their shapes continue.
 
     The waves of neighboring phases are paired so that the sum of their mass-weighted MAC is
     greatest; waves of equal frequency are first combined as they continue along the step between
-    the phases. Bands that leave the lowest ones, at a crossing with one above, end there.
+    the phases. A band that is no longer among the lowest after a crossing with a higher band ends
+    there.
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -251,7 +252,7 @@ def check_count(count: int, most: int, phase: NDArray) -> None:
 
 
 def _zero(scale: NDArray) -> float:
-    """Zero threshold of the eigenvalues, from diagonals of stiffness over mass (n,)."""
+    """Eigenvalue that counts as zero, from ratios (n,) of the diagonals of stiffness and mass."""
     return NOISE * EPS * float(scale.max())
 
 
