@@ -62,8 +62,8 @@ def _edges(structure: Discretized, support: Any, named: NDArray, place: str) -> 
     inside = sorted(set(loose) - edge_lookup(structure.pattern.boundary).keys())
     if inside:
         raise InputError(
-            f": the crease {inside[0]} would have to be straight, which bars and hinges cannot say "
-            "of creases; hold its vertices by themselves, or take a shell",
+            f": the crease {inside[0]} would have to be straight, and bars and hinges have no "
+            "such option for creases; hold its vertices without along, or take a shell",
             f"{place}.along",
         )
     if loose:

@@ -328,8 +328,8 @@ def _link(structure: Discretized, link: Link, place: str, nodes: NDArray) -> lis
     if off.max() > OFF_PLANE:
         raise InputError(
             f": node {nodes[int(off.argmax())]} lies off the plane of nodes {list(link.to)} by "
-            f"{off.max():.2g} of their size; a point off the plane would have to know how the "
-            "plate turns, which is no linear function of three displacements: take nodes in the "
+            f"{off.max():.2g} of their size; a point off the plane moves with the rotation of "
+            "the plate, which is not a linear function of three displacements: take nodes in the "
             "plane, or join it by bars",
             f"{place}.nodes",
         )

@@ -86,8 +86,8 @@ class Contact(Part):
     friction : float, default 0
         Coefficient of Coulomb friction between panels, and on planes without a coefficient.
     stiffness : float, optional
-        k (N/m) of the potential k d0^2 (1 - d/d0)^3 / (d/d0)^4; 0.03 times Young's modulus times
-        the thickness by default.
+        k (N/m) of the potential k d0^2 (1 - d/d0)^3 / (d/d0)^4, with d the distance and d0 the
+        distance at which contact begins; by default 0.03 times Young's modulus times the thickness.
     panels : bool, default True
         Whether panels touch each other; if not, only planes act.
     planes : sequence of Plane

@@ -239,7 +239,7 @@ def _ratio(column: _Column, wanted: str) -> Fraction:
         raise InputError(f"{place}: the unit [{shortened(unit)}] is not known; use one of {listed}")
     if own != quantity and quantity == _NUMBER:
         raise InputError(
-            f"{place}: is {_article(own)}, but a history is a factor without unit; say "
+            f"{place}: is {_article(own)}, but a history is a factor without unit; give "
             f'unit = "{unit}" to take the numbers in {unit}, and give the load as a direction of '
             "length 1"
         )

@@ -208,7 +208,7 @@ class _Writer:
             try:
                 table["custom"] = json.dumps(pattern.custom)
             except (TypeError, ValueError):
-                self.obstacles.append("its pattern's custom data are not what JSON can hold")
+                self.obstacles.append("its pattern has custom data that JSON cannot hold")
         return table
 
     def _boards(self, boards: Boards | None) -> dict[str, Any]:

@@ -180,7 +180,7 @@ class Comparison:
         true = reference_modes(self.shells, self.count + BEYOND)
         count = min(self.count, len(true.frequency))
         if not count:
-            raise InputError(": nothing of its shell vibrates; free some of its nodes", "case")
+            raise InputError(": its shell has no vibrations; free some of its nodes", "case")
         found = {}
         for name, held in self.compared.items():
             progress(f"model {name}")

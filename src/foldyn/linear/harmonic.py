@@ -84,8 +84,8 @@ def harmonic(
     turned = [k for change, _ in case.rest_terms for k in np.flatnonzero(change).tolist()]
     if any(isinstance(case.body.sheet.rest_law(k), Superlinear) for k in turned):
         raise InputError(
-            " = 'harmonic': cannot tell how far actuated folds (or heated bends) of the "
-            "superlinear law are from their rest angle; give another law, or take stepped_sine",
+            " = 'harmonic': does not know how far actuated folds (or heated bends) of "
+            "the superlinear law are from their rest angle; give another law, or take stepped_sine",
             "method",
         )
     hinges = Hinges(system)

@@ -131,8 +131,8 @@ def meshes(pattern: Pattern, given: Sequence[int] | None) -> tuple[int, int]:
         if half < DIVISIONS[0]:
             warn(
                 f"the shell with {DIVISIONS[1]} divisions would have {whole_size} triangles: it "
-                f"has {2 * half} divisions and {size} triangles; divisions = {DIVISIONS} takes "
-                "the time for the finer one",
+                f"has {2 * half} divisions and {size} triangles; divisions = {DIVISIONS} gives "
+                "the finer shell, which takes longer",
                 "fidelity.md#your-own-pattern",
             )
         return half, 2 * half

@@ -1,4 +1,4 @@
-"""Panels cut into small triangles that fit together along the creases, and meet by their sides.
+"""Panels cut into small triangles that share whole sides, also across creases.
 
 A triangle has constant strains, from the lengths of its sides, and constant curvatures, from
 rotations about them. With the unit tangents t_k and outward normals n_k of the sides (in the plane
@@ -6,7 +6,7 @@ of the triangle), their lengths L_k and the area A:
 
 membrane   t_k . eps t_k = e_k,  e_k = (l_k^2 / L_k^2 - 1) / 2 the Green strain along side k,
 bending    kappa = sum_k (L_k / A) beta_k n_k n_k^T,  beta_k the rotation, about side k, of the
-           sheet at the middle of that side against the plane of the triangle
+           sheet at the middle of that side relative to the plane of the triangle
 
 (Morley, Aeronaut. Quart. 19, 1968; for large rotations with hinges: Phaal and Calladine, Int. J.
 Numer. Methods Eng. 35, 1992). Plane stress with E, nu, t gives energies e K_m e / 2 and

@@ -24,7 +24,7 @@ from foldyn.structures.rigid_plates import rigid_panels
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import ModelOptions
 
-STIFF = 3.0  # k w/G of a crease between panels of width w: the sheet bends across it like one plate
+STIFF = 3.0  # largest k w/G of creases between panels of width w: beyond, both bend as one plate
 STIFF_STRIP, SQUARE = 0.3, 1.4  # k w/G of creases that meet no others; aspect of panels
 FEW = 16  # a sheet with clamped edges and at most so many panels is off
 SKEW = 33.0  # degrees, smallest corner of a quadrilateral panel
@@ -182,7 +182,7 @@ def _unit_doubts(pattern: Pattern, sheet: Sheet) -> Iterator[str]:
     if thick[worst] > THICK:
         yield (
             f"sheet: thickness = {thickness[worst]:g} m is {thick[worst]:.2g} times the shortest "
-            f"edge of panel {worst}, {shortest[worst]:.3g} m, which is no thin sheet (at most "
+            f"edge of panel {worst}, {shortest[worst]:.3g} m, and not a thin sheet (at most "
             f"{THICK:g}): lengths are in m; if the thickness is meant in mm, give "
             f"{1e-3 * thickness[worst]:g}"
         )

@@ -6,7 +6,7 @@ the edge. Their energy 1/2 phi^T K phi is the least energy of a plate through th
 center that has these mean turns and keeps straight edges straight; other edges are free. At a
 clamped edge beta is the turn at every point, not the mean. A weld, along which the sheet continues
 into the next panel, also has a bow: the mean distance of the sheet from the line between its ends,
-over its length. The plate is made of triangles of constant curvature (Morley; in
+divided by its length. The plate is made of triangles of constant curvature (Morley; in
 `mechanics.triangle`), in two sizes, and K is extrapolated in the size.
 
 `PanelPlate` cuts each facet of a panel evenly: all its triangles are the same, half of them turned

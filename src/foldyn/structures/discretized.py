@@ -234,7 +234,7 @@ class Discretized:
         """Additions to the structure if panels swell: if they would stretch and curl when free.
 
         strain, curvature : (np,) free strain and curvature of each panel; curvature 1/m, positive
-        toward the front.
+            toward the front.
         """
         raise InputError("this structure has no panels that could swell")
 

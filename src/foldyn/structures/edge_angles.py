@@ -64,7 +64,7 @@ def edge_plates(
     straight_edges : boundary edges (low, high) that stay straight.
     rigid : indices of rigid panels, which have angles only at clamped edges.
     clamped : boundary edges that are clamped, with the stiffness, N m/rad, for rigid panels. Their
-    hinges follow the hinges of bends and welds, in this order.
+        hinges follow the hinges of bends and welds, in this order.
     """
     kinds, kind = sheet.kinds(len(pattern.faces))
     folds, bends = len(mesh.folds), len(mesh.bends)

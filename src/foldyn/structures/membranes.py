@@ -202,7 +202,7 @@ def coupling(
 
     stiff : stiffness of a convex panel; by default without gives.
     shared, free : (2m,) masks of the k gives that are kept, and of the gives that follow; other
-    gives are absent. The result is (b + k, b + k).
+        gives are absent. The result is (b + k, b + k).
     """
     panel = sides.outline
     bars, corners = np.array(ends), 2 * len(panel.corners)
