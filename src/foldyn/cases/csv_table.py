@@ -41,7 +41,7 @@ _SPELLINGS = {
     **{"µs": "us", "μs": "us", "m/s^2": "m/s2", "m/s²": "m/s2", "mm/s^2": "mm/s2"},
     **{"m/s/N": "m/(N s)", "m/s2/N": "m/(N s2)", "m/s^2/N": "m/(N s2)", "m/s²/N": "m/(N s2)"},
 }
-_DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}  # first found in the header
+_DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}  # in order of precedence
 MOST = 64
 """Size of a file (MiB)."""
 _MANY = 10  # names listed in a message

@@ -2,8 +2,8 @@
 
 Creases fold to a dihedral, a fold angle, or a fraction of fully folded. The fold angle follows the
 FOLD format: 0 if the panels are flat, positive for a valley, negative for a mountain, 180 or -180
-degrees if closed. It is the dihedral of the flat panels minus the dihedral: 180 degrees minus it,
-except for thick panels (`Pattern.flat_dihedrals`).
+degrees if closed. It is the dihedral with flat panels minus the current dihedral: 180 degrees minus
+the dihedral, except for thick panels (`Pattern.flat_dihedrals`).
 """
 
 from __future__ import annotations
@@ -221,7 +221,7 @@ class Gravity(Load):
 class Actuate(Load):
     """Creases that fold or unfold by themselves.
 
-    The rest dihedral of each crease changes from `Structure.fold_rest` to the given one, in
+    The rest dihedral of each crease changes from `Structure.fold_rest` to the given dihedral, in
     proportion to the factor of the history. Give one of `angle`, `fold_angle` and `fraction`.
 
     Parameters

@@ -85,7 +85,7 @@ class LongWaves(Checked):
 
     @property
     def speeds(self) -> NDArray[np.float64]:
-        """Speeds (k,) in cells per second, slowest first: slopes of bands at the origin, rad/s."""
+        """Speeds (k,), cells per second, slowest first: slopes of bands at the origin, rad/s."""
         return np.sqrt(eigh(self.stiffness, self.mass, eigvals_only=True).clip(min=0.0))
 
     @property

@@ -65,7 +65,7 @@ def bands(
         Wave vectors as phases (rad) per period, for example from `UnitCell.path` or
         `UnitCell.grid`.
     count : int
-        Number of bands, the lowest ones.
+        Number of bands, from the lowest on.
     state : State, optional
         State to linearize about, such as `fd.initial_state(path)`: displacements of the nodes of
         the cell that repeat, possibly with other periods; by default the rest state.

@@ -137,7 +137,7 @@ def _newton(
         return reach.balanced(spread(motions, points, patch.unit, patch.step) - rest)
 
     def better(first: NDArray, step: NDArray, left: NDArray) -> tuple[NDArray, ...] | None:
-        """Places along a step closer to equilibrium, their dofs, and the remaining forces."""
+        """Places that are closer to equilibrium, along a step; their dofs; remaining forces."""
         for halving in range(HALVINGS):
             trial = first + 0.5**halving * step
             try:

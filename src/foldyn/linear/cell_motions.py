@@ -171,7 +171,7 @@ def wave_spectrum(
     along: int = 0,
     window: Window = "hann",
 ) -> xarray.Dataset:
-    """Two-dimensional spectrum of a motion; for small motions it lies on the bands.
+    """Two-dimensional spectrum of a motion; the waves of small motions lie on the bands.
 
     Parameters
     ----------

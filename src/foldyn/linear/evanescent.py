@@ -65,7 +65,7 @@ def attenuation(
     phase : float
         Phase (rad) along the other period of a sheet.
     count : int
-        Number of waves, the slowest-decaying ones.
+        Number of waves, beginning with the slowest-decaying wave.
     state, secant, load_factor
         As in `bands`.
 

@@ -97,7 +97,7 @@ def drive_of(case: Case, drive: Any, amplitude: float) -> Drive:
     Raises
     ------
     InputError
-        Neither forces nor one base motion; a drive with a history of its own; forces on held axes
+        Neither forces nor a single base motion; a drive with a history; forces on held axes
         only; or a base that cannot move as a whole.
 
     Warns

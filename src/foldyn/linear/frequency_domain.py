@@ -86,7 +86,7 @@ class Modal(Checked):
     Parameters
     ----------
     count : int, optional
-        Number of modes, the lowest ones; all by default.
+        Number of modes, from the lowest on; all by default.
     static_correction : bool
         Whether to add the static response of the omitted modes: errors then fall with the fourth
         power of the highest frequency kept, instead of the second power.

@@ -101,7 +101,7 @@ def check_internal(structure: Discretized, internal: Any) -> int:
     Raises
     ------
     InputError
-        Not a number from 0 to 6; a structure without amplitudes, such as one with welds.
+        Not a number from 0 to 6; a structure that has no amplitudes, for example because of welds.
     """
     count = whole("internal", internal, least=0, most=MOST, what="amplitudes of a panel")
     if not count:

@@ -70,7 +70,7 @@ class Lattice:
     vertices : list of Vertex
         Vertices of the cell itself.
     faces : list of list of Vertex
-        Corners of each panel, moved so that the lowest one is in cell 0.
+        Corners of each panel, moved so that the lowest corner is in cell 0.
     steps : list of Step
         R of the cell in which each panel of the pattern lies in this naming.
     beside : dict

@@ -77,8 +77,8 @@ class Linearized:
     stiffness, mass, damping : (nf, nf)
         Sparse and symmetric: tangent (N/m), mass (kg) and damping without modal damping (N s/m):
         alpha M + beta K0, dashpots and creases in the state. The tangent includes the symmetric
-        part of the load stiffness. K0 is the exact tangent of the structure at rest, or in this
-        state if the damping says so.
+        part of the load stiffness. K0 is the exact tangent of the structure at rest or in this
+        state, depending on the damping's `state`.
     modal : (r, nf)
         Rows G of modal damping, which adds G' G to the damping.
     drag : (nf, 3)

@@ -92,7 +92,7 @@ def peaks_of(
         peak also counts if it falls to half its power on both sides, as seen on a logarithmic axis,
         except in an estimate from random bursts, which scatters.
     count : int, optional
-        Number of peaks, the most prominent ones.
+        Number of peaks to keep: the most prominent peaks; all by default.
 
     Returns
     -------

@@ -238,7 +238,7 @@ class Matched(NamedTuple):
 
 
 def matched(true: Shown, count: int, case: Case, found: xarray.Dataset) -> Matched:
-    """Pair the first modes of a shell with those of a model.
+    """Pair the first modes of a shell with modes of a model.
 
     Parameters
     ----------
@@ -297,9 +297,9 @@ class Refinement(NamedTuple):
 
     @property
     def error(self) -> float:
-        """The largest relative error of these frequencies; negative if the mesh is too soft.
+        """The largest relative error of `frequency`; negative if the mesh is too soft.
 
-        nan if one of them has not converged.
+        nan if a frequency has not converged.
         """
         errors = self.frequency / self.extrapolated - 1.0
         return float(errors[np.abs(errors).argmax()])
@@ -365,7 +365,7 @@ def refinement(case: Case, count: int = MODES) -> Refinement | None:
 
 
 def _meshes(divisions: int) -> tuple[int, ...]:
-    """Pieces of every edge in three meshes: `divisions`, half and a quarter, or finer ones."""
+    """Pieces of every edge in three meshes: `divisions`, half and a quarter; or finer meshes."""
     coarser = [divisions >> halvings for halvings in range(3) if divisions >> halvings]
     return tuple(sorted([*coarser, *(divisions << k + 1 for k in range(3 - len(coarser)))]))
 

@@ -67,8 +67,8 @@ class Rig:
     """A case held in a state by its loads, ready to be driven.
 
     The loads of the case are replaced by constant forces that balance the state, so that nothing
-    moves without the drive, whatever the tolerance of the state. Actuated folds and loads that
-    depend on the displacement are kept.
+    moves without the drive, even if the state is only close to an equilibrium. Actuated folds and
+    loads that depend on the displacement are kept.
     """
 
     def __init__(
@@ -181,7 +181,7 @@ class SteppedSine(Integration):
     most_cycles : int
         Largest number of cycles at a frequency, settled or not.
     sweep : {"up", "down"}
-        Whether frequencies rise or fall; each motion starts from the end of the previous one.
+        Whether frequencies rise or fall; each motion starts where the previous motion ended.
     """
 
     cycles: Annotated[int, Check(whole, least=2)] = 4

@@ -20,7 +20,7 @@ from foldyn.ram_limit import check_memory
 from foldyn.signals import exponential_window, frequency_response
 from foldyn.values import choice, number, whole
 
-MOST_LINES = 100  # largest number of lines of a record per spacing of the frequencies
+MOST_LINES = 100  # most spectral lines of a record per spacing of the frequencies
 DECAYED = 1e-5  # share of a motion left by damping at the end of the default duration
 COPIES = 4  # copies of the samples in memory, while spectra are computed
 LEFT = 1e-3  # largest response at the end of a record, relative to its maximum

@@ -320,7 +320,7 @@ def rotation(
 
 
 def _steps(vectors: Any) -> NDArray[np.float64]:
-    """Checked translations (d, 3), one or two that are not parallel."""
+    """Checked translations (d, 3): one, or two that are not parallel."""
     array = numbers("vectors", vectors)
     array = array[None] if array.ndim == 1 else array
     if array.ndim != 2 or array.shape[1] != 3 or len(array) > 2 or not len(array):

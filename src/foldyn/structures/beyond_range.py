@@ -25,7 +25,7 @@ from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import ModelOptions
 
 STIFF = 3.0  # largest k w/G of creases between panels of width w: beyond, both bend as one plate
-STIFF_STRIP, SQUARE = 0.3, 1.4  # k w/G of creases that meet no others; aspect of panels
+STIFF_STRIP, SQUARE = 0.3, 1.4  # largest k w/G in strips; largest aspect ratio of a square panel
 FEW = 16  # a sheet with clamped edges and at most so many panels is off
 SKEW = 33.0  # degrees, smallest corner of a quadrilateral panel
 FOLDED = 0.05  # largest t/(L sin fold) of welds: above it they bow, but not in the model

@@ -93,7 +93,7 @@ def clamp_stiffness(x: NDArray, rows: NDArray, modulus: NDArray) -> NDArray:
 def clamps(x: NDArray, rows: NDArray, stiffness: NDArray, group: int) -> Clamps:
     """Clamps of triangles (c, 3) of points x (n, 3), without moment at x.
 
-    group : their energy group.
+    group : energy group of the clamps.
     """
     points = x[rows]
     wings = np.array([opposite(corners) for corners in points]).reshape(-1, 1, 3)

@@ -90,7 +90,7 @@ def discretize(
         Rest dihedral (degrees, between 0 and 360), given in the same ways, instead of the pattern's
         own.
     centers : mapping, optional
-        Center points (3,) by panel number, instead of the computed ones (N5B8).
+        Center points (3,) by panel number, in place of computed points (N5B8).
     clamped : sequence of (vertex, vertex), or str
         Boundary edges along which panels keep the direction of their rest tangent in space; their
         nodes still need supports. A selection ("xmin") means the boundary edges with both ends in

@@ -184,7 +184,7 @@ def outlines(
     straight_edges: Collection[Edge] = (), rigid: Collection[int] = (),
     clamped: Collection[Edge] = (),
 ) -> list[Outline | None]:  # fmt: skip
-    """Outline of each panel; None for a rigid one. Welds count as creases that may bow.
+    """Outline of each panel; None for rigid panels. Welds count as creases that may bow.
 
     See `straight_creases` and `edge_plates` for the arguments.
     """

@@ -53,7 +53,7 @@ class PanelKind(NamedTuple):
 
 
 class Sides(NamedTuple):
-    """A panel's edges: which are straight, and the resistance of the others against bows."""
+    """A panel's edges: which are straight, and the resistance of the other edges to bowing."""
 
     outline: Outline
     resistance: tuple[float, ...]

@@ -22,7 +22,7 @@ from foldyn.mechanics.triangle import triangle_stiffness
 
 Value = TypeVar("Value")
 Find = Callable[[Sequence[tuple]], list[Value]]
-KEPT = 4096  # cached values of each kind; older ones are dropped
+KEPT = 4096  # number of cached values of each kind; older values are dropped
 
 
 class Shared(Generic[Value]):

@@ -26,7 +26,7 @@ ON_LINE = 1e-9  # sine of the angle below which points count as collinear
 class Plate(NamedTuple):
     """A rigid panel: k nodes that follow three of its corners."""
 
-    riders: NDArray  # (k,)
+    riders: NDArray  # (k,) nodes that follow the corners
     corners: NDArray  # (3,)
     weights: NDArray  # (k, 3)
 

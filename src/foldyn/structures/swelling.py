@@ -6,7 +6,7 @@ with S the law of the bar: then the bar has no force at that stretch.
 A panel that would curl to a paraboloid w = kappa r^2 / 2, toward its front, has no moment if each
 hinge inside it turns as the paraboloid through its nodes does. A wing at the distance h from an
 axis of length L, and at the position s along it, then rises above the axis by kappa (h^2 + s^2 - s
-L) / 2, so that the dihedral of a hinge is smaller by the sum over its wings of
+L) / 2, so that the dihedral of a hinge decreases by the sum, over its wings, of
 
     kappa (h - s (L - s) / h) / 2.
 
