@@ -93,7 +93,7 @@ def fluid_at(case: Any, displacement: NDArray) -> Fluid:
 
 
 def operator_at(case: Any, displacement: NDArray) -> tuple[AddedMass, bool] | None:
-    """Added mass at a displacement (n, 3), or None; and whether it fits in a matrix.
+    """Added mass at a displacement (n, 3) and whether it fits in a matrix; None without any.
 
     It does not fit if it couples too many dofs.
     """

@@ -115,7 +115,7 @@ class State(Checked):
     def origin_of(
         self, shape: tuple[int, ...], time: float | None = None, field: str = "initial"
     ) -> Origin:
-        """Start of the motion of nodes (n, 3) that continues here at a time (s)."""
+        """Start of the motion that this state continues, for nodes (n, 3) at a time (s)."""
         if self.origin is None:
             return Origin(self.of_nodes("displacement", shape, field), time)
         if self.origin.displacement.shape != shape:

@@ -334,7 +334,7 @@ def rigid_space(linear: Linearized) -> NDArray:
 
 
 def _orthonormal(linear: Linearized, motions: NDArray) -> NDArray:
-    """M-orthonormal basis (nf, r) of motions (nf, k), in their order, without dependent ones."""
+    """M-orthonormal basis (nf, r) of motions (nf, k), in order, without dependent motions."""
     kept: list[NDArray] = []
     for motion in motions.T:
         left = motion

@@ -151,7 +151,7 @@ def resonances(
 
 
 def kind_of(shown: str) -> str:
-    """The quantity for peak estimators."""
+    """The quantity as which peak estimators treat a curve."""
     return shown if shown in PER_FORCE else "receptance"
 
 

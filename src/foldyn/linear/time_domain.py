@@ -163,7 +163,7 @@ def reported(progress: bool | Reporter | None) -> Iterator[Reporter]:
 
 
 def overall(report: Reporter, before: float, total: float) -> Callable[[Progress], Any]:
-    """Reporter for one of several motions, after `before` of `total` simulated seconds."""
+    """Reporter for one of several motions; `before` of `total` seconds were simulated earlier."""
     return lambda now: report(Progress(before + now.time, total, now.steps, now.energy_error))
 
 

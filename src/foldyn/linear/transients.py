@@ -252,7 +252,7 @@ def check_records(field: str, record: Record, count: int, nodes: int) -> None:
 
 
 def common_spacing(frequency: NDArray) -> float:
-    """Largest spacing (Hz) of lines, from 0 Hz on, that include all the frequencies.
+    """Largest spacing (Hz) of spectral lines, from 0 Hz on, that include all given frequencies.
 
     Raises
     ------

@@ -64,7 +64,7 @@ def boundary_edges(
 
 
 def clamp_rows(edges: Sequence[Edge], triangles: NDArray) -> tuple[NDArray, NDArray]:
-    """Rows (c, 3): the triangle at each boundary edge, from the edge's first corner; its index.
+    """Triangle (c, 3) at each boundary edge, from the edge's first corner; its index (c,).
 
     edges : (low, high) vertices of each edge.
     triangles : (nt, 3).

@@ -265,7 +265,7 @@ def _edge_and_degree() -> tuple[NDArray, NDArray]:
 
 
 def _line(t: NDArray, derivative: int) -> tuple[NDArray, NDArray]:
-    """Two linear functions (n, 2) of coordinates t, and d that vanish at both ends (n, d)."""
+    """Two linear functions (n, 2) of coordinates t, and d functions that are 0 at both ends."""
     linear, bows = (
         np.stack([legendre.legval(t, c) for c in group], axis=-1)
         for group in _polynomials(derivative)
