@@ -27,9 +27,9 @@ from foldyn.statics.stepping import PathStoppedError, Point, Station, Walk, arri
 from foldyn.statics.tracing import check_steps, until_of
 from foldyn.values import choice, function, of_kind, whole
 
-FIRST_TURN = np.radians(1.0)  # of the hinge that turns most in the first step onto the branch
+FIRST_TURN = np.radians(1.0)  # largest turn of a hinge in the first step onto the branch
 TRIES = 6  # amplitudes tried, each half of the previous one
-FAR = 10.0  # amplitudes: an equilibrium farther away is not on the branch
+FAR = 10.0  # an equilibrium more than this many amplitudes away is not on the branch
 
 
 def switch_branch(
@@ -58,8 +58,8 @@ def switch_branch(
     case : Case, optional
         The case of the path; needed if the path cannot rebuild it (`foldyn.case_of`).
     mode : int
-        Which mode of the tangent, counted from the eigenvalue nearest to zero: a multiple
-        bifurcation has several.
+        Number of the tangent's mode to follow, counted from the eigenvalue nearest to zero; a
+        multiple bifurcation has several modes.
     method : {"arc_length", "mgdcm"}
     steps, until, settings, progress
         As in `trace`.
@@ -101,7 +101,7 @@ def switch_branch(
         "started_from": "state",
     }
 
-    # eigenvalues that vanish at the bifurcation: the jump of the negative count there
+    # number of eigenvalues that vanish at the bifurcation: the jump in the number of negative ones
     counts = path["negative_eigenvalues"].values[max(at - 1, 0) : at + 2]
     multiplicity = max(int(np.ptp(counts)), 1)
     plan = PathPlan(way, crossing.point.factor, [], None, steps - 1, 0.0)
@@ -134,7 +134,7 @@ def _bifurcation(path: xarray.Dataset, at: int | None) -> int:
 
 
 def problem_of(path: xarray.Dataset, case: Case | None, at: int) -> OrigamiProblem:
-    """The problem that a path solved, with its supports as they stand at a step."""
+    """The problem that a path solved, with the supports where they are at a step."""
     if "adaptive load" in str(path.attrs.get("not_rerunnable_because", "")):
         raise InputError("path: was traced with an adaptive load, which a path does not keep")
     case = case_of(path) if case is None else of_kind("case", case, Case)
@@ -183,7 +183,7 @@ def _onto_branch(
 
 
 def _aside(solver: Solver, crossing: Station, shape: NDArray, turn: float) -> Attempt:
-    """Equilibrium at an amplitude of a shape at which some hinge has turned by `turn` (rad)."""
+    """Equilibrium displaced along a shape until one hinge has turned by `turn` (rad)."""
     point, probe = crossing.point, 1e-6 * solver.problem.length
     amplitude = probe * turn / solver.problem.turn(point.u, point.u + probe * shape)
     start, rule = point.u + amplitude * shape, plane(shape, amplitude)
@@ -196,7 +196,7 @@ def _aside(solver: Solver, crossing: Station, shape: NDArray, turn: float) -> At
 def _directions(shapes: NDArray, mode: int, multiplicity: int) -> list[NDArray]:
     """Shapes (m,) along which a branch may leave.
 
-    If several eigenvalues vanish together, a branch leaves along some combinations of shapes only.
+    If several eigenvalues vanish together, branches leave only along some combinations of shapes.
     """
     first = shapes[:, mode]
     others = [k for k in range(multiplicity) if k != mode and mode < multiplicity]

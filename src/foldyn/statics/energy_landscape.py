@@ -1,13 +1,13 @@
 """The energy landscape along a path of a bistable structure.
 
-A path is read as a curve of a driving force against its conjugate stroke: the load factor times the
-size of the forces against the mean displacement along them, or the force on the moved supports
-against their displacement. Where the driving force vanishes, the structure is in equilibrium
-without it: stable where the force rises with the stroke, unstable (the top of the barrier) where it
-falls. These states, and the ends of the ranges in which the force falls (negative stiffness), are
-located to round-off.
+A path is read as a curve of driving force against stroke. Under forces, the driving force is the
+load factor times the size of the forces, and the stroke is the mean displacement along them. With
+moved supports, they are the force on the supports and the displacement of the supports. Where the
+driving force vanishes, the structure is in equilibrium without it: stable where the force rises
+with the stroke, unstable (the top of the barrier) where the force falls. These states, and the ends
+of the ranges in which the force falls (negative stiffness), are located to round-off.
 
-`load_at` finds the state of a path in which a node has moved by a given displacement likewise.
+In the same way, `load_at` finds the state of a path in which a node has a given displacement.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from foldyn.statics.newton import Settings, Solver, settings_of
 from foldyn.statics.stability import LostError, Section
 from foldyn.statics.stepping import Station
 
-NO_FORCE = 1e-9  # of the largest driving force: counts as zero at the ends of a path
-SHARP = 1e-13  # share of a step to which the point is located
+NO_FORCE = 1e-9  # at the ends of a path, this fraction of the largest driving force is zero
+SHARP = 1e-13  # accuracy of a located point, as a share of the step
 
 
 @brief
@@ -65,8 +65,8 @@ class Landscape:
     Attributes
     ----------
     stroke, force, energy : ndarray, shape (steps,)
-        Stroke (m), driving force (N), and energy (J, strain less the work of constant loads)
-        above the first point.
+        Stroke (m), driving force (N), and energy (J) above the first point: strain energy less the
+        work of constant loads.
     states : tuple of Equilibrium
         States without driving force, ordered along the path.
     negative_stiffness : tuple of (float, float)
@@ -105,7 +105,7 @@ class Landscape:
         Raises
         ------
         InputError
-            A number is not that of a stable state.
+            There is no stable state with one of these numbers.
         """
         stable = self.stable
         for number in (source, target):
@@ -218,7 +218,7 @@ class _Walker:
         return strain - float(self.problem.constant @ point.u)
 
     def rigidity(self, station: Station) -> float:
-        """Slope of the driving force over the stroke, up to a positive factor."""
+        """Slope of the driving force with respect to the stroke, up to a positive factor."""
         if not self.by_motion:
             return float(self.driver @ station.response)
         return float(self.driver @ (station.stiffness.matrix @ station.response))
@@ -226,8 +226,8 @@ class _Walker:
     def compliance(self, station: Station) -> float:
         """Smooth function that vanishes where the slope changes its sign.
 
-        Under forces the slope, expressed by the response, passes through infinity; its inverse
-        passes through zero.
+        Under forces, the slope (computed from the response) passes through infinity instead of
+        zero; the inverse of the slope passes through zero.
         """
         value = self.rigidity(station)
         return value if self.by_motion else 1.0 / value
@@ -253,7 +253,7 @@ def _between(
 ) -> Station:
     """Station between two others of a path at which a function vanishes.
 
-    ends : the two others in words, for the message if none is found.
+    ends : the two outer stations in words, for the message if no station is found.
     """
     try:
         section = Section(solver, start, end)

@@ -1,9 +1,9 @@
 """A case as an equilibrium problem, for structures of any kind.
 
-Contact planes that move along a path are one more dof, held like a moving support. Its value is the
-travel (m) of the plane that moves farthest; at the load factor f each plane has moved by f times
-its motion. So a Newton step moves the planes together with the sheet, and is cut where they would
-cross it.
+All contact planes that move along a path share one extra dof, held like a moving support. The value
+of this dof is the travel (m) of the plane that moves farthest; at the load factor f each plane has
+moved by f times its full motion. So a Newton step moves the planes together with the sheet, and is
+cut where the planes would cross the sheet.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ AdaptiveLoad = Callable[[NDArray, float], NDArray]
 
 
 class Plates:
-    """The moving planes of a case as one more dof of its states, if there are any.
+    """The extra dof that moves the contact planes of a case, if any plane moves.
 
     Parameters
     ----------
@@ -61,15 +61,15 @@ class Plates:
 
     @property
     def held(self) -> NDArray[np.bool_]:
-        """One True for the dof; empty if no plane moves."""
+        """Mask that marks this dof as held: one True, or empty if no plane moves."""
         return np.ones(int(bool(self)), bool)
 
     def joined(self, values: NDArray, own: float = 0.0) -> NDArray:
-        """Values (m,) of the other dofs, with the value of this one appended."""
+        """Values (m,) of the other dofs, with the value of this dof appended."""
         return np.append(values, own) if self else values
 
     def others(self, values: NDArray) -> NDArray:
-        """Values (m, ...) of the other dofs, without this one."""
+        """Values (m, ...) of all dofs but this one."""
         return values[:-1] if self else values
 
     def moved(self, values: NDArray) -> NDArray:
@@ -77,7 +77,7 @@ class Plates:
         return float(values[-1]) * self._motion if self else np.zeros_like(self._motion)
 
     def placed(self, body: Assembly, values: NDArray) -> Assembly:
-        """A body with its planes at their places in a state."""
+        """A body with its planes placed where they are in a state."""
         return body.displaced(self.moved(values)) if self else body
 
     def force(self, contact: ContactTerm, q: NDArray) -> float:
@@ -88,7 +88,7 @@ class Plates:
     def bordered(
         self, matrix: sparse.csr_array, contact: ContactTerm, q: NDArray, project: Any
     ) -> sparse.csr_array:
-        """A tangent of the other dofs, bordered by the row and column of this one, N/m.
+        """Tangent (N/m) of the other dofs, extended by the row and column of this dof.
 
         project : maps forces on the body's dofs to forces on states.
         """
@@ -123,8 +123,9 @@ class OrigamiProblem:
     """Equilibrium of a case along the load factor; dofs as in `mechanics.assembly`.
 
     If constraints tie displacements together, states and forces are the x and E' f of
-    `Constraints`: each slave is replaced by the value of its equation, which is held. `dofs` and
-    `displacement` map a state to displacements, `state` maps displacements to a state.
+    `Constraints`: each slave dof is replaced by the value of its constraint equation, and this
+    value is held. `dofs` and `displacement` map a state to displacements, `state` maps
+    displacements to a state.
 
     Parameters
     ----------
@@ -141,8 +142,8 @@ class OrigamiProblem:
     inertia_relief : bool
         Balance the loads on a free body by its inertia.
     flow : {"refused", "followed", "at rest"}
-        How to treat friction, and creases that yield or creep: refuse them, follow them along
-        the path (if they yield), or take the state at rest, in which nothing has flowed.
+        How to treat friction, and creases that yield or creep: refuse them, follow friction and
+        yielding along the path, or take the state at rest, in which nothing has flowed.
     memory : ndarray of shape (b, 2) or "fresh", optional
         State of the creases at the start; see `cases.State`.
     timed : bool
@@ -151,7 +152,7 @@ class OrigamiProblem:
     Attributes
     ----------
     constant, growing : ndarray, shape (m,)
-        Forces (N) at every factor, and per unit of the factor.
+        Forces (N) that act in full at every factor, and forces (N) per unit of the factor.
     load : float
         Sum of the absolute components of `growing`, N.
     motion : ndarray, shape (m,)
@@ -253,7 +254,7 @@ class OrigamiProblem:
         return self.body(u, 0.0).term(ContactTerm)
 
     def prescribed(self, factor: float) -> NDArray:
-        """Displacements of held dofs: imposed ones times the factor, the others at their start."""
+        """Values of held dofs: imposed displacements times the factor; other dofs stay put."""
         return np.where(self._moves, factor * self.motion, self._rest)[self.held]
 
     def external(self, u: NDArray, factor: float) -> NDArray:
@@ -370,7 +371,7 @@ class OrigamiProblem:
         return self.actuation.body(0.0).turn(self.dofs(u), self.dofs(v))
 
     def touch(self, u: NDArray) -> dict[str, NDArray]:
-        """Forces of contact in a state (m,), as `results.quantities.CONTACT` names them, N."""
+        """Contact forces (N) in a state (m,), by the names in `results.quantities.CONTACT`."""
         if self.case.contact is None:
             return {}
         q, contact = self.dofs(u), self._contact(u)
@@ -398,7 +399,7 @@ class OrigamiProblem:
         return out
 
     def working(self, u: NDArray, factor: float) -> NDArray:
-        """External forces (m,), N, without thermal forces, which are no load."""
+        """External forces (m,), N, without thermal forces (thermal forces are not loads)."""
         force = self.external(u, factor)
         if self.heat is None:
             return force
@@ -406,7 +407,7 @@ class OrigamiProblem:
         return force - self._plates.joined(self._ties.force(pushed))
 
     def actuation_rate(self, u: NDArray, factor: float) -> float:
-        """Derivative (J) of the energy by the factor at fixed u, from actuation and heat."""
+        """Derivative (J) of the energy with respect to the factor at fixed u (actuation, heat)."""
         if not self.actuation.acts and self.heat is None:
             return 0.0
         first = 1 if self.heat is None else 0  # bars (group 0) change with heat only

@@ -1,7 +1,6 @@
 """Newton's method for one equilibrium, with line search and an optional moving load factor.
 
-A problem has flat vectors of dofs. With u (m,) all dofs and a load factor f, a path is the set of
-solutions of
+Let u (m,) be the vector of all dofs and f the load factor. A path is the set of solutions of
 
     residual(u, f) = internal force - external force = 0  on the free dofs,
     u = prescribed(f)                                     on the held ones,
@@ -10,8 +9,8 @@ so a von Mises truss, a sheet of origami and a shell all look the same to a solv
 
 Each iteration solves K a = -residual with the held dofs at their prescribed values. If a rule lets
 the load factor f move too, it also solves K b = -d residual/df (the response to the factor): the
-step is a + df b, df from the rule (Batoz and Dhatt, Int. J. Numer. Meth. Eng. 14, 1979). Without a
-rule the factor is fixed.
+step is a + df b, with df from the rule (Batoz and Dhatt, Int. J. Numer. Meth. Eng. 14, 1979).
+Without a rule the factor is fixed.
 
 Steps are cut if a part would turn by more than `MOST_TURN` or run into another. With `search`, they
 are also cut until the residual along the step is at most half its initial value, as in Crisfield's
@@ -21,13 +20,13 @@ vanishes, because bars stretch to second order as panels turn.
 A state counts as an equilibrium if both conditions hold, with the fraction `tolerance` (1e-9 by
 default):
 
-- the residual's norm over the free dofs is below tolerance times the forces at play: the largest
-  of the norms of the external forces, the support forces and the hinge forces alone (which bars
-  balance if nothing is loaded, as in a sheet that unfolds without loads);
+- the residual's norm on the free dofs is below tolerance times the forces at play. These are
+  measured by the largest of three norms: of the external forces, of the support forces, and of the
+  hinge forces (in a sheet that unfolds without loads, only the bars balance the hinge forces);
 - the last step is below tolerance times the displacements.
 
-Neither can be met below round-off. A residual below the rounding errors of the bar forces (eps
-times the bars' EA) counts as zero, and so does the step, which is then noise as well.
+Neither condition can be met below round-off. A residual below the rounding errors of the bar forces
+(eps times the bars' EA) counts as zero; the last step is then noise too, and also counts as zero.
 """
 
 from __future__ import annotations
@@ -49,15 +48,15 @@ from foldyn.errors import InputError
 from foldyn.values import choice, number, whole
 
 COLLIDES = "panel would pass through panel"
-MOST_TURN = 0.2  # rad, of any part within one iteration
-HALVINGS = 40  # of a step, to avoid collisions
-TRIALS = 10  # of a line search
+MOST_TURN = 0.2  # rad, largest turn of any part within one iteration
+HALVINGS = 40  # most halvings of a step to avoid collisions
+TRIALS = 10  # most trials of a line search
 STALL = 10  # iterations without progress of the residual after which an attempt is given up
-SLACK = 0.5  # of the residual along a step: the most that a line search leaves
-SHIFT = 1e-13  # of the mean diagonal, added to a tangent singular to round-off
+SLACK = 0.5  # a line search ends below this fraction of the initial residual along the step
+SHIFT = 1e-13  # shift of a tangent singular to round-off, as a fraction of its mean diagonal
 
 S = TypeVar("S", bound=Solution)
-# df from (motion since the start of the step, a, b); nan if the rule cannot be met
+# function of (motion since the start of the step, a, b) that returns df; nan if it cannot be met
 Rule = Callable[[NDArray, NDArray, NDArray], float]
 EPS = float(np.finfo(float).eps)
 
@@ -89,12 +88,12 @@ class Problem(Protocol):
         ...
 
     def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> Any:
-        """Sparse (m, m) derivative of the residual, with vanishing slopes floored.
+        """Sparse (m, m) derivative of the residual, with vanishing slopes raised to a floor.
 
-        Symmetric, except for loads without potential. Used only for steps and, its symmetric part,
-        for the count of negative eigenvalues; the residual has no floor. With `before`, the
-        state from which the last step came, it may be another matrix that serves the next step
-        better; without, it is the derivative.
+        Symmetric, except for loads without potential. Used only for steps, and its symmetric part
+        to count negative eigenvalues; the residual has no such floor. Given `before`, the state
+        from which the last step came, it may return another matrix that serves the next step
+        better; without `before` it returns the derivative.
         """
         ...
 
@@ -168,14 +167,14 @@ class Settings(Checked):
     target : int
         Iterations per point at which the step control aims: more shrink the step, fewer enlarge it.
     cuts : int
-        Halvings after which a path ends: of the first step of each interval of load factors, or,
-        if the factor is free, of a step since the last accepted one.
+        Halvings after which a path ends: relative to the interval between two given load factors,
+        or, if the factor is free, counted since the last accepted step.
     largest_turn : float
         Degrees by which a hinge (or, without hinges, a bar) may turn within one step of
         "mgdcm" and "arc_length".
     jump : float
-        A step more than this many times as long as its linear prediction has left the path
-        (snapped) and is cut.
+        A step longer than this number times its linear prediction has left the path (snapped) and
+        is cut.
     stability : bool
         Count the negative eigenvalues of the tangent at every point.
     locate : bool
@@ -214,7 +213,7 @@ def settings_of(given: Any) -> Settings:
 
 
 def plane(normal: NDArray, reach: float) -> Rule:
-    """Rule of a step that ends in a plane at a distance (times |normal|) from the step's origin."""
+    """Rule of a step that ends in the plane in which normal times the motion equals `reach`."""
     return lambda moved, step, response: (
         (reach - float(normal @ (moved + step))) / float(normal @ response)
     )
@@ -249,7 +248,7 @@ class Stiffness:
     factors : Solution
         Factors of the block of the free dofs.
     symmetric : callable
-        Returns factors of its symmetric part, whose eigenvalues are counted.
+        Returns factors of the block's symmetric part, in which negative eigenvalues are counted.
     """
 
     def __init__(
@@ -265,7 +264,7 @@ class Stiffness:
         return self._symmetric()
 
     def solve(self, force: NDArray, motion: NDArray) -> NDArray:
-        """Motion (m,) of all dofs under a force (m,) on free ones and a motion of held ones."""
+        """Motion (m,) of all dofs under a force (m,) on free dofs and a motion of held dofs."""
         problem = self.problem
         full = np.zeros(len(force))
         full[problem.held] = motion
@@ -283,7 +282,7 @@ class Stiffness:
 
 
 class Solver:
-    """A problem, with the settings and scratch for its equilibria."""
+    """Finds equilibria of a problem under given settings."""
 
     def __init__(self, problem: Problem, settings: Settings | None = None) -> None:
         self.problem = problem
@@ -293,10 +292,10 @@ class Solver:
         self.backend, self._factorize = factorizer(self.settings.solver, len(problem.free))
 
     def stiffness(self, u: NDArray, factor: float, before: NDArray | None = None) -> Stiffness:
-        """Factorize the tangent at a state, for a step that follows one from the state `before`.
+        """Factorize the tangent at a state; the step before came from the state `before`.
 
-        If it is singular to round-off (exactly at a critical point), a shift of its diagonal far
-        below any stiffness lets the iteration continue.
+        If the tangent is singular to round-off (exactly at a critical point), a shift of the
+        diagonal far below any stiffness lets the iteration continue.
         """
         matrix = sparse.csr_array(self.problem.tangent(u, factor, before))
         block = self.reduce(matrix)
@@ -376,7 +375,7 @@ class Solver:
         return 0.0
 
     def _search(self, u: NDArray, factor: float, step: NDArray, residual: NDArray) -> float:
-        """Share of a step at which the residual along it is small compared to its initial value."""
+        """Share of a step at which the residual along the step is well below its initial value."""
         start = float(step @ residual)
         low, high, share = 0.0, 1.0, 1.0
         for _ in range(TRIALS):

@@ -1,7 +1,7 @@
-"""What accepted steps of a path remember: creases that yield or creep, and friction.
+"""The memory that a path keeps from step to step: creases that yield or creep, and friction.
 
-Both are functions of the state within a step. Only an accepted step updates their start, so that
-iterations, cut steps and points located in between leave no trace.
+Within a step, both depend on the state and on the memory at the start of the step. Only an accepted
+step updates this memory; iterations, cut steps and points located in between leave no trace.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ REFUSED, FOLLOWED, AT_REST = "refused", "followed", "at rest"
 
 
 class Kept(NamedTuple):
-    """An accepted step that can be restored; None for a memory that a case lacks."""
+    """An accepted step that can be restored; None for a kind of memory that the case lacks."""
 
     creases: tuple[NDArray, ...] | None
     friction: tuple[NDArray, ...] | None
@@ -35,8 +35,8 @@ class Memories:
     ----------
     case : Case
     flow : {"refused", "followed", "at rest"}
-        How to treat friction, and creases that yield or creep: refuse them, follow them along
-        the path (if they yield), or take the state at rest, in which nothing has flowed.
+        How to treat friction, and creases that yield or creep: refuse them, follow friction and
+        yielding along the path, or take the state at rest, in which nothing has flowed.
     timed : bool
         Whether the steps of the path take time: then all laws with memory evolve along it.
 
@@ -76,12 +76,12 @@ class Memories:
             self._creases.start(q, state)
 
     def tie(self) -> None:
-        """Begin with friction springs at rest where the body was last evaluated."""
+        """Begin with friction springs unloaded in the state where the body was last evaluated."""
         if self._friction is not None:
             self._friction.start()
 
     def slips(self) -> bool:
-        """Whether anything slips where the body was last evaluated."""
+        """Whether anything slips in the state in which the body was last evaluated."""
         return self._friction is not None and self._friction.slips()
 
     def elapse(self, seconds: float) -> None:
@@ -91,7 +91,7 @@ class Memories:
             self._creases.own.elapsed[0] = seconds
 
     def commit(self) -> Kept:
-        """Accept the step that ends where the body was last evaluated."""
+        """Accept the step that ends in the state in which the body was last evaluated."""
         self._time, self._step = self._time + self._step, 0.0
         own = (self._creases, self._friction)
         for memory in own:
@@ -110,7 +110,7 @@ class Memories:
                 memory.recall(snapshot)
 
     def branches(self, kept: Kept | None) -> NDArray:
-        """State (b, 2) of all branches of the case there, with relaxing ones relaxed."""
+        """State (b, 2) of all branches of the case at an accepted step, relaxing ones relaxed."""
         parts = self._case.remembering
         state = np.zeros((sum(part.count for part in parts), VARIABLES))
         if kept is not None and kept.creases is not None:
@@ -118,7 +118,7 @@ class Memories:
         return state
 
     def lost(self, kept: Kept | None) -> float:
-        """Energy dissipated there by creases and friction, J."""
+        """Energy (J) dissipated by creases and friction up to an accepted step."""
         own = [] if kept is None else [memory for memory in kept[:2] if memory is not None]
         return float(sum(memory[2][0] for memory in own))
 
@@ -129,7 +129,7 @@ def _rubs(case: Case, flow: str) -> bool:
     Raises
     ------
     InputError
-        It has friction that the solver cannot handle.
+        The case has friction that the solver cannot handle.
     """
     contact = case.contact
     if contact is None or not contact.rubs:
@@ -150,12 +150,12 @@ def flowing(case: Case, timed: bool) -> NDArray:
 
 
 def _flows(case: Case, flow: str, timed: bool) -> tuple[Remembering, ...]:
-    """Laws with memory that evolve along a path, checked; the others are taken as elastic.
+    """Checked laws with memory that evolve along a path; all other laws are taken as elastic.
 
     Raises
     ------
     InputError
-        The solver cannot handle one of them.
+        The solver cannot handle one of these laws.
     """
     parts = tuple(part for part in case.remembering if timed or not part.law.relaxes)
     for part in parts:

@@ -1,12 +1,12 @@
 """The methods for following a path, the course it takes, and the points that belong to it.
 
-With a free load factor a path leads through limit points and snap-backs. A step predicts along the
-tangent of the path, over a length, and corrects under the rule of its method. The length follows
-the ratio of target to actual iterations; it also shrinks where the path bends, in the plane of
-motion and load factor (the latter scaled so that the first step has a slope of 1), and where hinges
-turn far. A step is cut if it does not converge, if a hinge turns by more than 1.5 times
-`largest_turn`, or if it lies more than 60 degrees off the previous step or off the tangent at its
-own end: it may then have left the path.
+With a free load factor a path leads through limit points and snap-backs. A step is predicted along
+the tangent of the path, over a given length, and corrected under the rule of the method. The next
+length is scaled with the ratio of target to actual iterations; it also shrinks where hinges turn
+far and where the path bends in the plane of motion and load factor (with the load factor scaled so
+that the first step has a slope of 1). A step is cut if it does not converge, if a hinge turns by
+more than 1.5 times `largest_turn`, or if the step lies more than 60 degrees off the previous step
+or off the tangent at its own end: it may then have left the path.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from foldyn.values import choice, number, numbers, show
 
 STEPS_DRIVEN = 10
 STEPS_FREE = 100
-FIRST_STEP = 0.05  # of the load, or of the range to the last load factor
-# rule of one step from its length and its prediction (m,)
+FIRST_STEP = 0.05  # first change of the load factor, or fraction of the range to the last factor
+# function of the length and the prediction (m,) of a step that returns the step's rule
 ArcRule = Callable[[float, NDArray], Rule]
 
-ALIGNED = 0.5  # cosine of the largest angle to the previous step and to the tangent at the end
+ALIGNED = 0.5  # cosine of a step's largest angle to the previous step and to the tangent at the end
 BEND = np.radians(12.0)  # target for the bend of the path within a step
 REMEDY = (
     "take smaller steps (first_step, or settings with a smaller largest_turn), or start from a "
@@ -56,12 +56,12 @@ class Plane:
     step, every correction a + df b is orthogonal to b1: df = -(b1.a)/(b1.b). Predictions are as
     long as the first step of the path, |df1| = length/|b1|, which with the first response b0 is
     the square root of the generalized stiffness parameter |b0.b0/(b1.b1)| (Leon, Lages, de Araujo
-    and Paulino, Comput. Mech. 53, 2014: "modified" because the parameter and the plane use the
-    response of the present step twice, not once that of the previous step).
+    and Paulino, Comput. Mech. 53, 2014: "modified" because the parameter and the plane use only
+    the response of the present step, not also the response of the previous step).
     """
 
     def __init__(self, length: float, prediction: NDArray) -> None:
-        self.prediction = prediction  # the plane passes through its end, whatever the length
+        self.prediction = prediction  # the plane passes through its end point
 
     def __call__(self, moved: NDArray, step: NDArray, response: NDArray) -> float:
         """Change of the load factor; nan where the plane contains the response."""
@@ -72,7 +72,7 @@ class Plane:
 
 
 class Cylinder:
-    """Rule of the cylindrical arc length for one step, which fixes its length from start to end.
+    """Rule of the cylindrical arc length for one step: it fixes the distance from start to end.
 
     With c the motion since the start of the step, a the step of Newton's method at the present
     load factor and b the response to the factor, |c + a + df b| = length is a quadratic equation
@@ -108,7 +108,7 @@ def follow(
     Parameters
     ----------
     solver, start
-        Where the path begins.
+        Solver, and the station where the path begins.
     rule : ArcRule
         Rule of the method, such as `Cylinder`.
     first_step : float
@@ -154,8 +154,8 @@ class _Pace:
     def objection(self, station: Station, arrived: Station) -> str:
         """Reason to reject a converged step; empty if it is accepted.
 
-        The tangent at its end must also lie along the step: otherwise the direction in which the
-        path continues would be arbitrary.
+        The tangent at the end of the step must also lie along the step: otherwise the direction in
+        which the path continues would be arbitrary.
         """
         moved = arrived.point.u - station.point.u
         along = _cosine(moved, self.moved), abs(_cosine(moved, arrived.response))
@@ -212,7 +212,7 @@ def _advance(
 
 
 def _climb(station: Station, length: float, moved: NDArray) -> float:
-    """Change of the load factor over a length along the tangent, in the direction of a motion."""
+    """Change of the load factor for a length along the tangent, in the direction of a motion."""
     size = float(np.linalg.norm(station.response))
     return float(np.copysign(length / size, station.response @ moved))
 
@@ -247,7 +247,7 @@ class PathPlan(NamedTuple):
 
     method: PathMethod
     begin: float
-    factors: list[float]  # that drive the path; empty if the factor is free
+    factors: list[float]  # load factors that drive the path; empty if the factor is free
     end: float | None  # end of a free factor
     steps: int
     first_step: float
@@ -321,7 +321,7 @@ def _driven(
 
 
 def _durations(given: Any, steps: int) -> list[float]:
-    """Times (s) of a number of steps."""
+    """Duration (s) of each step."""
     array = numbers("duration", given)
     if array.ndim > 1 or (array.ndim and len(array) != steps) or not (array >= 0.0).all():
         raise InputError(
@@ -355,7 +355,7 @@ def _with_critical(solver: Solver, start: Station, way: Walk) -> Walk:
 
 
 def _up_to(solver: Solver, start: Station, way: Iterator[Station], end: float, steps: int) -> Walk:
-    """The way until the load factor first passes `end`; its last station lies exactly there."""
+    """Stations until the load factor first passes `end`; the last one lies exactly at `end`."""
     before = start
     for station in way:
         one, other = before.point.factor - end, station.point.factor - end
@@ -371,7 +371,7 @@ def _up_to(solver: Solver, start: Station, way: Iterator[Station], end: float, s
 
 
 def _landed(solver: Solver, before: Station, after: Station, end: float) -> Station:
-    """Station at the load factor `end` between two others; the second one if none is found."""
+    """Station at the load factor `end` between two others; `after` if none is found."""
     section = Section(solver, before, after)
     recall(solver.problem, before)
     try:

@@ -32,7 +32,7 @@ from foldyn.structures.stretching import remedy, stretch
 
 MOST_STRETCH = 2.0  # stretch of a bar: no sheet can be followed beyond it
 CLOSED = 179.0  # degrees from flat beyond which a fold counts as closed
-MOST_LISTED = 20  # changes listed in the attribute
+MOST_LISTED = 20  # most stability changes listed in the attribute
 
 
 def place_of(point: Point) -> str:
@@ -42,14 +42,14 @@ def place_of(point: Point) -> str:
 
 
 class Change(NamedTuple):
-    """Neighboring points with different counts; `before` is None at the start of the path."""
+    """Two neighboring points with different counts; `before` is None at the start of the path."""
 
     before: Point | None
     after: Point
 
     @property
     def critical(self) -> Point | None:
-        """The located critical point of the two, if any."""
+        """The point of the two that is a located critical point, if any."""
         both = sorted(filter(None, (self.before, self.after)), key=lambda point: point.negative)
         return next((point for point in both if point.kind != "regular"), None)
 
@@ -101,7 +101,7 @@ def stability_warning(
     """Warning where a path loses stability; empty if it does not.
 
     free : whether the load factor is free, so that the path passes limit points.
-    timed : whether its steps take time.
+    timed : whether the steps of the path take time.
     """
     losses = [
         change
@@ -220,7 +220,7 @@ def _dataset(
         warn(message, "loads.md#pressure")
     recorded = [_recorded(problem, point) for point in points]
     residuals, energies, reactions, touches = zip(*recorded, strict=True)
-    begun = 0.0  # J, from rest to the first point: stored there, or dissipated
+    begun = 0.0  # J, stored or dissipated from rest to the first point
     if from_rest:
         begun = float(energies[0].sum()) - problem.energy_at_rest
         begun += problem.memories.lost(points[0].memory)
@@ -233,7 +233,7 @@ def _dataset(
     if message := _stretch_warning(problem, points, energies, displacement):
         warn(message, "models.md#where-panels-stretch", StretchWarning)
     intervals = {}
-    if any(point.interval for point in points):  # some could not be located
+    if any(point.interval for point in points):  # some critical points could not be located
         intervals["interval"] = [p.interval or (p.factor, p.factor) for p in points]
     own = "an adaptive load, a function of the user's own, acted on it"
     result = path_dataset(

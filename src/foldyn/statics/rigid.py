@@ -1,9 +1,9 @@
-"""Rigid motions: the ones that supports leave free, their names, and inertia relief.
+"""Rigid motions that supports leave free, the names of these motions, and inertia relief.
 
 A free body under unbalanced loads accelerates as a rigid body. In the frame that moves with it the
-inertia forces M R a balance the loads, with R (3n, r) its free rigid motions in the current
-configuration and a = (R' M R)^-1 R' p their accelerations. The difference p - M R a deforms the
-body. Its position is fixed by holding r of its dofs, whose supports carry no force.
+inertia forces M R a balance the loads. Here R (3n, r) holds the free rigid motions in the current
+configuration and a = (R' M R)^-1 R' p the accelerations along them. The difference p - M R a
+deforms the body. The body's position is fixed by holding r dofs; their supports carry no force.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ from foldyn.cases import Case
 from foldyn.cases.constraints import Constraints
 from foldyn.errors import InputError
 
-FREE = 1e-9  # of a rigid motion's size: motion of held dofs that counts as zero
+FREE = 1e-9  # motion of held dofs that counts as zero, relative to the size of the rigid motion
 AXES = "xyz"
 TIE = 1e-6  # when pins are chosen: weight of the first dof minus that of the last
 
 
 def rigid_motions(x: NDArray) -> NDArray:
-    """Translations along and small rotations about x, y, z (3n, 6) of points x (n, 3).
+    """Rigid motions (3n, 6) of points x (n, 3): translations along, then rotations about x, y, z.
 
-    Rotations are about the mean point and per unit of size, so that all six are alike in size.
+    Rotations are small, about the mean point, and divided by the size of the body, so that all six
+    motions are of similar size.
     """
     arm = x - x.mean(axis=0)
     size = float(np.sqrt((arm**2).sum() / max(len(x), 1))) or 1.0

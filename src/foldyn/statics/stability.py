@@ -1,11 +1,11 @@
 """Critical points between the points of a path, located and classified.
 
 If the count of negative eigenvalues of the tangent changes along a step, an eigenvalue has passed
-through zero. The step is halved until one crossing remains, which is then found as the zero of the
-tangent's determinant, each point an equilibrium in the plane across the step.
+through zero. The step is halved until one crossing remains. The crossing is then located as the
+zero of the tangent's determinant, evaluated at equilibria in planes across the step.
 
-If no equilibria are found close to a crossing, it is bracketed by the load factors of the nearest
-ones on both sides; one of these stands for it.
+If no equilibria are found close to a crossing, the load factors of the nearest equilibria on both
+sides bracket it, and one of these equilibria stands for it.
 
 At a limit point the load factor turns: the response to the factor points along the step on one
 side and against it on the other. At a bifurcation it does not, and another path crosses.
@@ -26,8 +26,8 @@ from foldyn.statics.newton import Solver, plane
 from foldyn.statics.stepping import Station, arrive, elapse, kept, recall
 
 APART = 1e-6  # share of a step within which crossings count as one multiple point
-SHARP = 1e-13  # share of a step to which a crossing is located
-LOOKS = 0.5, 0.25, 0.75  # tried in turn to find an equilibrium between two others
+SHARP = 1e-13  # accuracy of a located crossing, as a share of the step
+LOOKS = 0.5, 0.25, 0.75  # shares of the way between two equilibria, tried in turn to find another
 
 
 class Mark(NamedTuple):
@@ -38,7 +38,7 @@ class Mark(NamedTuple):
 
     @property
     def negative(self) -> int:
-        """Negative eigenvalues there."""
+        """Number of negative eigenvalues at the station."""
         return self.station.point.negative
 
 
@@ -82,7 +82,7 @@ class Section:
     ) -> Mark:  # fmt: skip
         """Mark between two others at which a function of marks vanishes; raises `LostError`.
 
-        xtol : share of the step to which the mark is located.
+        xtol : accuracy of the mark, as a share of the step.
         ends : the two marks; the ends of the section by default.
         nearest : whether iterations start between the nearest known marks.
         """
@@ -108,19 +108,19 @@ class Section:
         return marks[root]
 
     def slope(self, mark: Mark) -> float:
-        """Derivative of the load factor with respect to the share there."""
+        """Derivative of the load factor with respect to the share, at a mark."""
         return self.whole / float(self.chord @ mark.station.response)
 
     def climbs(self, mark: Mark) -> bool:
-        """Whether the load factor grows along the step there."""
+        """Whether the load factor grows along the step at a mark."""
         return float(self.chord @ mark.station.response) > 0.0
 
 
 def critical_points(solver: Solver, start: Station, end: Station) -> list[Station]:
-    """Stations at the limit and bifurcation points of a step, in order, and its end.
+    """Stations at the limit and bifurcation points of a step, in order, then the end of the step.
 
-    The end itself stands for a crossing if no equilibrium is found between it and the start. All
-    other stations follow from the memory of the structure at the start of the step.
+    The end itself stands for a crossing if no equilibrium is found between start and end. All
+    other stations are computed with the structure's memory at the start of the step.
     """
     counts = start.point.negative, end.point.negative
     if counts[0] == counts[1] or min(counts) < 0:
@@ -217,7 +217,7 @@ def _bracketed(section: Section, low: Mark, high: Mark) -> tuple[Mark, Mark]:
 
 
 def _between(section: Section, low: Mark, high: Mark) -> Mark | None:
-    """A mark between two others with a count of negative eigenvalues; None if not found."""
+    """A mark between two others at which negative eigenvalues are counted; None if not found."""
     for weight in LOOKS if high.share - low.share > APART else LOOKS[:1]:
         share = low.share + weight * (high.share - low.share)
         mark = section.at(share, low, high) if low.share < share < high.share else None
@@ -242,7 +242,8 @@ def softest_modes(
 ) -> tuple[NDArray, NDArray]:
     """Eigenvalues of a symmetric matrix nearest to a shift, and their vectors.
 
-    Returns all of them for up to `dense` rows; else uses Lanczos with the factors at the shift.
+    Returns all eigenvalues for up to `dense` rows; for more rows, uses Lanczos' method with the
+    factors at the shift.
     """
     size = matrix.shape[0]
     if size <= dense or count >= size - 1:
@@ -255,7 +256,7 @@ def softest_modes(
 def oriented(shapes: NDArray) -> NDArray:
     """Shapes (m, k) with the largest entry of each positive, independent of the solver.
 
-    Among entries equal to round-off the first one decides.
+    Among entries that are equal to within round-off, the first one decides.
     """
     size = np.abs(shapes)
     first = np.argmax(size > (1.0 - 1e-6) * size.max(axis=0), axis=0)

@@ -33,7 +33,7 @@ from foldyn.statics.newton import (
     is_counted,
 )
 
-NEGLIGIBLE = 1e-6  # of the structure's size: smaller motions are never a snap
+NEGLIGIBLE = 1e-6  # motions below this fraction of the structure's size are never a snap
 SNAPS = "the structure snaps to a state off its path"
 REMEDY_LIMIT = (
     "a limit point may lie ahead: method 'arc_length' follows the path through it "
@@ -67,9 +67,9 @@ class Point:
     kind : str
         "regular", "limit" or "bifurcation".
     interval : tuple of (float, float), optional
-        Load factors between which a critical point lies that could not be located.
+        Load factors that bracket a critical point which could not be located.
     memory
-        Argument of the problem's `recall`, if parts of it yield.
+        Argument of the problem's `recall`, if parts of the structure yield.
     """
 
     u: NDArray
@@ -152,7 +152,7 @@ def _step(solver: Solver, start: Station, factor: float, seconds: float, search:
         return attempt
     change = factor - start.point.factor
     length = float(np.linalg.norm(attempt.u - u))
-    # force relaxed at the start by the end of the step, N
+    # N, out-of-balance force at the start of the step after relaxation during the step
     relaxed = problem.residual(u, start.point.factor) if seconds > 0.0 else None
 
     def snaps(stiffness: Stiffness, response: NDArray) -> bool:
@@ -165,7 +165,7 @@ def _step(solver: Solver, start: Station, factor: float, seconds: float, search:
     if not snaps(start.stiffness, start.response):
         return attempt
     if start.point.memory is not None:
-        # parts that yield or slip within the step: compare with the tangent at its end
+        # parts may yield or slip within the step: compare with the tangent at its end
         there = solver.stiffness(attempt.u, factor)
         if not snaps(there, there.response(attempt.u, factor)):
             return attempt
@@ -221,7 +221,7 @@ def stopped(station: Station, attempt: Attempt) -> PathStoppedError:
 
 
 class Released:
-    """A problem at one load factor, whose out-of-balance force fades as this factor goes to 1."""
+    """A problem at a fixed load factor; its out-of-balance force fades as `factor` goes to 1."""
 
     def __init__(self, problem: Problem, u: NDArray, factor: float) -> None:
         self.problem, self.factor = problem, factor
@@ -233,7 +233,7 @@ class Released:
         self._out[problem.held] = 0.0
 
     def prescribed(self, factor: float) -> NDArray:
-        """The held dofs, between where they stood and where they belong."""
+        """Values of the held dofs, between their initial and their prescribed values."""
         return self._from + factor * (self._to - self._from)
 
     def residual(self, u: NDArray, factor: float) -> NDArray:
@@ -245,7 +245,7 @@ class Released:
         return self.problem.tangent(u, self.factor, before)
 
     def rate(self, u: NDArray, factor: float) -> NDArray:
-        """Derivative of the residual."""
+        """Derivative of the residual with respect to `factor`."""
         return self._out
 
     def reference(self, u: NDArray, factor: float) -> float:
@@ -258,7 +258,7 @@ class Released:
         return keep(u, self.factor) if keep else None
 
     def turn(self, u: NDArray, v: NDArray) -> float:
-        """Turn in the problem."""
+        """Largest turn from u to v in the problem."""
         return self.problem.turn(u, v)
 
     def clear(self, u: NDArray, step: NDArray) -> float:
@@ -267,12 +267,12 @@ class Released:
 
 
 def settle(solver: Solver, u: NDArray, factor: float) -> Station:
-    """Station at the equilibrium, at a load factor, that belongs to a state (m,).
+    """Station at the equilibrium that belongs to a state (m,) at a load factor.
 
     Raises
     ------
     PathStoppedError
-        None was found.
+        No equilibrium was found.
     """
     problem = solver.problem
     moved = not np.array_equal(u[problem.held], problem.prescribed(factor))

@@ -1,15 +1,14 @@
 """`trace`: the equilibrium path of a case.
 
-Before a path is computed, mechanisms are found and named: motions without resistance. Hinges count
-with their stiffness k whatever their law (superlinear bends have zero slope at rest, but still
-resist), and internal forces do not count: the criterion is whether a motion stretches a bar or
-turns a hinge at all.
+Before a path is computed, mechanisms (motions without resistance) are found and named: motions that
+neither stretch a bar nor turn a hinge. Every hinge counts with its stiffness k, whatever its law
+(superlinear bends have zero slope at rest, but still resist); internal forces do not count.
 
-Rigid motions follow from the supports alone, including springs and clamped edges. For others the
-stiffness matrix is factorized; only if its smallest eigenvalue is suspicious are its softest modes
-computed, and a mode is a mechanism if its strain is round-off. Bars are judged by their
-elongations, which are accurate to round-off: soft modes of a large sheet are millions of times
-softer than its bars and still not free.
+Free rigid motions follow from the supports alone, including springs and clamped edges. To find
+other mechanisms, the stiffness matrix is factorized; only if its smallest eigenvalue is suspicious
+are its softest modes computed. A mode is a mechanism if its strain is round-off. Bars are judged by
+elongations, because these are accurate to round-off: soft modes of a large sheet are millions of
+times softer than its bars and still not free.
 """
 
 from __future__ import annotations
@@ -47,16 +46,16 @@ from foldyn.statics.stepping import Point, Walk, kept, settle, walk
 from foldyn.structures.discretized import Discretized
 from foldyn.values import choice, flag, function, indices, number, of_kind, show, single, whole
 
-SHORTEST = 1e-3  # of the rest length of a bar: least length at the start of a path
+SHORTEST = 1e-3  # least length of a bar at the start of a path, relative to its rest length
 LOOKS = 51  # load factors between two given ones at which supports and planes are checked
-COPIES = 8  # of a point's dofs in memory while forces, work and the dataset are computed
-SHIFT = 1e-13  # of the diagonal, added so that the matrix of a mechanism can be factorized
+COPIES = 8  # copies of a point's dofs in memory while forces, work and the dataset are computed
+SHIFT = 1e-13  # relative shift of the diagonal so that the matrix of a mechanism can be factorized
 SUSPICIOUS = 1e-11  # eigenvalue, of the matrix with a unit diagonal, below which modes are computed
 INVERSE_ITERATIONS = 4
 MOST_MODES = 12
-BAR_STRAIN = 1e-9  # elongations, relative to the largest that their end motions allow
-HINGE_STRAIN = 1e-6  # likewise, turns of hinges
-MOVED = 0.3  # of the largest motion: nodes beyond it are named
+BAR_STRAIN = 1e-9  # elongation that counts as zero, relative to the most that the end motions allow
+HINGE_STRAIN = 1e-6  # turn of a hinge that counts as zero, in the same measure
+MOVED = 0.3  # nodes that move more than this fraction of the largest motion are named
 MOST_NAMED = 8
 
 
@@ -85,7 +84,7 @@ class Reached(Part):
             raise InputError(" = 0: the path begins there; say where it ends", "displacement")
 
     def __call__(self, displacement: NDArray, load_factor: float) -> bool:
-        """Whether it is reached for displacements (n, 3), m."""
+        """Whether displacements (n, 3), m, reach it."""
         moved = displacement[self.node, AXES.index(self.axis)]
         return bool(moved / self.displacement >= 1.0)
 
@@ -141,9 +140,10 @@ def trace(
         Instead of load_factors: equal steps from 0 to 1 (default 10). For "mgdcm" and
         "arc_length": steps after which the path ends (default 100).
     duration : float or sequence of float, optional
-        For "newton" and "displacement" the time (s) from each load factor to the next, one for all
-        or one each: the factor changes at a constant rate, or stays constant if repeated. Creases
-        with memory relax and creep meanwhile; without a duration they are fully relaxed.
+        For "newton" and "displacement" the time (s) from each load factor to the next: one value
+        for all intervals, or one for each. The factor changes at a constant rate, or stays constant
+        if repeated. Creases with memory relax and creep meanwhile; without a duration they are
+        fully relaxed.
     constant : "gravity", int or sequence of int
         Numbers, each once, of loads in `case.loads` that act in full at every factor.
     initial : State, optional
@@ -161,8 +161,8 @@ def trace(
     inertia_relief : bool
         Balance the loads on a free body by its inertia.
     settings : Settings or mapping, optional
-        Values of `statics.Settings`, as {"largest_turn": 3.0}: tolerance, step control,
-        stability, linear solver.
+        Values of `statics.Settings`, such as {"largest_turn": 3.0}, for tolerance, step control,
+        stability and linear solver.
     progress : callable, optional
         Called with each point found.
 
@@ -218,7 +218,7 @@ def trace(
     inertia_relief = flag("inertia_relief", inertia_relief)
     check_fill(case.structure.fill, case.body.size)
     memory = case.memory_in(initial)
-    if isinstance(memory, np.ndarray):  # of all branches: select the ones that evolve
+    if isinstance(memory, np.ndarray):  # it covers all branches: select those that evolve
         memory = memory[flowing(case, timed)]
     problem = OrigamiProblem(
         case, steady, displacement, adaptive_load, inertia_relief,
@@ -320,7 +320,7 @@ def _check_case(case: Case, plan: PathPlan, constant: Sequence[int], adaptive: b
 
 
 def _check_start(problem: OrigamiProblem, factor: float) -> None:
-    """Refuse a state at a factor in which a bar has collapsed, or something has crossed."""
+    """Refuse a start of the path at which a bar has collapsed or parts have crossed."""
     structure, u = problem.structure, problem.start(factor)
     check_contact(problem.case, problem.displacement(u), problem.planes(u))
     x = structure.nodes + problem.displacement(u)
