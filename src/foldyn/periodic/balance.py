@@ -1,17 +1,19 @@
 """Harmonic balance: the equation of motion projected on a Fourier series.
 
-With X (c, k) the coefficients, w the base frequency and F the forces at the samples of a period,
+The equation for the Fourier coefficients X (c, k) is
 
-    R(X) = w^2 D^2 X M + w D X C + P F(G X) = 0,
+    R(X) = w^2 D^2 X M + w D X C + P F(G X) = 0.
 
-G the values of the series at the samples and P the projection back (alternating frequency-time:
-Cameron and Griffin, J. Appl. Mech. 56, 1989). The tangents at the samples give the exact
-derivative, P K G (Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019). The
-base frequency is the drive frequency over `multiple`, so that longer periods are included.
+Here w is the base frequency, D differentiates the series, G evaluates it at the samples of a
+period, F gives the forces at the samples, and P projects them on the series (alternating
+frequency-time: Cameron and Griffin, J. Appl. Mech. 56, 1989). With the tangents K at the samples,
+the derivative of P F(G X) is exactly P K G (Krack and Gross, Harmonic Balance for Nonlinear
+Vibration Problems, 2019). The base frequency is the drive frequency divided by `multiple`, so that
+motions with longer periods are included.
 
-The series has real coefficients, in the phase tau of the base frequency:
-x(tau) = a_0 + sum_k (a_k cos k tau + b_k sin k tau) has a_0, a_1, b_1, a_2, ...; an even series has
-only cosines.
+The series has real coefficients in the order a_0, a_1, b_1, a_2, ... of
+x(tau) = a_0 + sum_k (a_k cos k tau + b_k sin k tau), where tau is the phase of the base frequency;
+an even series has only cosines.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ class Fourier:
     ----------
     harmonics : int
     even : bool
-        Only cosines, sampled over half the period: motions that retrace their path.
+        Whether the series has only cosines, sampled over half the period, for motions that retrace
+        their path.
     samples : int, optional
         Samples in a period; `OVER` per harmonic by default.
     """
@@ -47,7 +50,7 @@ class Fourier:
         self.samples = max(OVER * harmonics, 4 * OVER) if samples is None else samples
 
     def memory(self, unknowns: int) -> float:
-        """Bytes of a balance with this number of unknowns, its derivative and their parts."""
+        """Bytes that a balance with this number of unknowns needs, with its derivative."""
         h, s = float(self.harmonics), self.samples
         c, s = (h + 1.0, s // 2 + 1) if self.even else (2.0 * h + 1.0, s)
         return 24.0 * (c * unknowns) ** 2 + 8.0 * s * (c**2 + unknowns**2)
@@ -66,7 +69,7 @@ class Fourier:
         return 2.0 * np.pi * np.arange(count) / self.samples
 
     def at(self, phase: NDArray) -> NDArray:
-        """Value (s, c) of each function at phases (s,)."""
+        """Value (s, c) of each function of the series at phases (s,)."""
         angle = np.multiply.outer(phase, self.order)
         if self.even:
             return np.cos(angle)
@@ -76,12 +79,12 @@ class Fourier:
 
     @cached_property
     def values(self) -> NDArray:
-        """Values (s, c) at the samples."""
+        """Value (s, c) of each function of the series at the samples."""
         return self.at(self.phase)
 
     @cached_property
     def fit(self) -> NDArray:
-        """Coefficients (c, s) of samples: the projection of a function on the series."""
+        """Matrix (c, s) that projects a function, given by its samples, on the series."""
         weight = np.full(len(self.phase), 2.0 / self.samples)
         if self.even:
             weight[1:-1] *= 2.0
@@ -98,11 +101,11 @@ class Fourier:
 
     @cached_property
     def curvature(self) -> NDArray:
-        """Factors (c,) of the second derivative: -k^2."""
+        """Factor (c,) of each coefficient in the second derivative: -k^2."""
         return -(self.order.astype(float) ** 2)
 
     def complex_of(self, coefficients: NDArray) -> NDArray:
-        """Amplitudes (h + 1, ...) of exp(i k tau), x = Re sum, from coefficients (c, ...)."""
+        """Complex amplitudes (h + 1, ...) of exp(i k tau) from coefficients (c, ...)."""
         if self.even:
             return coefficients.astype(complex)
         out = np.zeros((self.harmonics + 1, *coefficients.shape[1:]), complex)
@@ -111,7 +114,7 @@ class Fourier:
         return out
 
     def real_of(self, amplitudes: NDArray[np.complex128]) -> NDArray:
-        """Coefficients (c, ...) of any number of amplitudes; others are zero or dropped."""
+        """Coefficients (c, ...) from amplitudes; missing ones are zero, surplus ones dropped."""
         kept = min(len(amplitudes), self.harmonics + 1)
         out = np.zeros((len(self.order), *amplitudes.shape[1:]))
         out[0] = amplitudes[0].real
@@ -138,7 +141,7 @@ class Balance:
     equation : Equation
     fourier : Fourier
     multiple : int
-        Periods of the drive in one of the motion.
+        Periods of the drive in one period of the motion.
     """
 
     def __init__(self, equation: Equation, fourier: Fourier, multiple: int = 1) -> None:
@@ -148,12 +151,12 @@ class Balance:
 
     @property
     def threads(self) -> AbstractContextManager:
-        """Limits LAPACK to one thread for small matrices of all unknowns."""
+        """Context that limits LAPACK to one thread if the matrix of all unknowns is small."""
         return one_thread(math.prod(self.shape))
 
     @cached_property
     def _pairs(self) -> NDArray:
-        """P times G at each sample (c c, s)."""
+        """Products (c c, s) of the entries of P and G at each sample."""
         pairs = self.fourier.fit[:, None, :] * self.fourier.values.T[None, :, :]
         return np.ascontiguousarray(pairs.reshape(-1, len(self.fourier.phase)))
 
@@ -162,7 +165,7 @@ class Balance:
         return self.equation.at(self.multiple * self.fourier.phase, level)
 
     def residual(self, x: NDArray, omega: float, at: Instants) -> NDArray:
-        """R (c, k), N, of coefficients (c, k) under a drive of omega rad/s."""
+        """R (c, k), N, for coefficients (c, k) and a drive of omega rad/s."""
         w, fourier = omega / self.multiple, self.fourier
         force = at.forces(fourier.values @ x) + at.driving(omega)
         if not np.isfinite(force).all():  # passes through a contact
@@ -210,9 +213,10 @@ def newton(system, x: NDArray, tolerance: float, most: int = 25) -> Converged | 
     Parameters
     ----------
     system
-        Has `residual(x)` and `jacobian(x)` of vectors (n,), and `rounding` of the residual's norm.
+        An object with `residual(x)` and `jacobian(x)` for vectors x (n,), and `rounding`, the
+        rounding errors of the residual's norm.
     tolerance : float
-        Largest size of the last step, as a fraction of the solution.
+        Largest norm of the last step, as a fraction of the norm of the solution.
     """
     x, step, first = x.copy(), np.zeros_like(x), np.inf
     for iteration in range(most):
@@ -241,7 +245,7 @@ def newton(system, x: NDArray, tolerance: float, most: int = 25) -> Converged | 
 
 
 class AtFrequency:
-    """A balance at one frequency and level, in the form that Newton's method takes."""
+    """A balance at one frequency and level, in the form that `newton` takes."""
 
     def __init__(self, balance: Balance, omega: float, level: float = 1.0) -> None:
         self.balance, self.omega, self.level = balance, omega, level

@@ -1,9 +1,9 @@
 """Pseudo-arclength continuation of a family of motions, R(z, p) = 0.
 
-A step predicts along the unit tangent and corrects at right angles to it (Keller, in Applications
-of Bifurcation Theory, ed. Rabinowitz, 1977; Seydel, Practical Bifurcation and Stability Analysis,
-3rd ed. 2010, chapter 4). Lengths are measured as |dz| over the size of the motion there and |dp|
-over the range of the parameter.
+A step is predicted along the unit tangent and corrected at right angles to it (Keller, in
+Applications of Bifurcation Theory, ed. Rabinowitz, 1977; Seydel, Practical Bifurcation and
+Stability Analysis, 3rd ed. 2010, chapter 4). The length of a step combines |dz| divided by the size
+of the motion and |dp| divided by the range of the parameter.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
-ITERATIONS = 8  # of Newton's method per step
+ITERATIONS = 8  # most iterations of Newton's method per step
 EASY = 4  # iterations up to which the next step is longer
 GROWTH, CUT = 1.5, 0.5
-NOISE = 10.0  # times the rounding of the residual: sufficient where branches cross
+NOISE = 10.0  # a residual below this many times its rounding counts as zero
 STRAIGHT = np.cos(np.radians(25.0))  # least cosine between the tangents at the ends of a step
-SMALLEST = 1e-5  # of the longest step: below it, the branch is lost
-LOCATED = 1e-11  # of a step: accuracy of located points
-MISSES = 8  # points not found in a search for a special one, after which it ends
-NEAR = 0.2  # of a step: largest distance of a point that a step passes
+SMALLEST = 1e-5  # the branch is lost if steps become shorter than this fraction of the longest
+LOCATED = 1e-11  # accuracy of located points, as a fraction of the step
+MISSES = 8  # a search for a special point ends once more points than this were not found
+NEAR = 0.2  # a step passes points up to this distance from it, as a fraction of its length
 
 
 class Family(Protocol):
@@ -38,7 +38,7 @@ class Family(Protocol):
     rounding : float
         Norm of the residual's rounding errors.
     tolerance : float
-        Last step of Newton's method, as a fraction of the motion.
+        Largest last step of Newton's method, as a fraction of the motion.
     """
 
     span: float
@@ -73,7 +73,7 @@ class Point:
     tangent : ndarray, shape (n + 1,)
         Unit tangent of the curve, dz and dp.
     side : float
-        Sign of the determinant of the bordered matrix, which changes where branches cross.
+        Sign of the determinant of the bordered matrix; it changes where branches cross.
     iterations : int
     """
 
@@ -90,7 +90,7 @@ def _weights(family: Family, z: NDArray) -> NDArray:
 
 
 def _bordered(family: Family, z: NDArray, p: float, row: NDArray):
-    """Factors of the derivative, bordered by a further row."""
+    """LU factors of the derivative with respect to z and p, with `row` added as the last row."""
     n = len(z)
     matrix = np.empty((n + 1, n + 1))
     matrix[:n, :n] = family.jacobian(z, p)
@@ -100,7 +100,7 @@ def _bordered(family: Family, z: NDArray, p: float, row: NDArray):
 
 
 def _side(factors) -> float:
-    """Sign of a determinant, from its factors."""
+    """Sign of the determinant of a matrix, from its LU factors."""
     lu, swaps = factors
     odd = np.count_nonzero(swaps != np.arange(len(swaps))) % 2
     return float(np.prod(np.sign(np.diag(lu))) * (-1.0 if odd else 1.0))
@@ -109,7 +109,7 @@ def _side(factors) -> float:
 def corrected(
     family: Family, z: NDArray, p: float, row: NDArray, most: int = ITERATIONS
 ) -> tuple[NDArray, float, int] | None:
-    """Motion near (z, p), on the plane through it normal to a row (n + 1,); None if not found."""
+    """Motion near (z, p), in the plane through (z, p) normal to `row`; None if not found."""
     z, p, last = z.copy(), p, np.inf
     for iteration in range(most):
         residual = family.residual(z, p)
@@ -153,9 +153,10 @@ def ahead(family: Family, point: Point, length: float) -> Point | None:
 def located(
     family: Family, point: Point, other: Point, length: float, value: Callable[[Point], float]
 ) -> Point:
-    """The point between two, `length` apart, at which a function of points changes its sign.
+    """The point between two points, `length` apart, at which a function changes its sign.
 
-    Newton's method fails very close to crossing branches: the closest point found is returned.
+    Where Newton's method fails, very close to crossing branches, the closest point found is
+    returned.
     """
     from scipy.optimize import brentq
 
@@ -225,7 +226,7 @@ def steps(
             return
         step = Step(point, other, length, False)
         if taken > 1 and _passes(family, step, first):
-            return  # it is closed
+            return  # the curve is closed
         yield step
         point = other
         if other.iterations <= EASY:
@@ -264,7 +265,7 @@ def _turns(family: Family, one: Point, other: Point) -> bool:
 def branch_point(family: Family, z: NDArray, p: float, across: NDArray, far: float) -> Any:
     """First point of a branch that leaves (z, p) along a direction across (n,), or None.
 
-    far : length of the step, as a fraction of the motion (or in units of z where nothing moves).
+    far : length of the step, as a fraction of the motion (in units of z if nothing moves).
     """
     size = float(np.linalg.norm(across))
     row = np.append(across / size, 0.0)

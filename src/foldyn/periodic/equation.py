@@ -2,12 +2,14 @@
 
     M x'' + C x' + f(x, theta) + W^2 s2(theta) + W s1(theta) = 0
 
-theta = 2 pi f t is the phase of the drive, with f the lowest frequency of the `Harmonic` histories;
-the others have multiples of it. A level scales all varying terms, and leaves constant ones.
+theta = 2 pi f t is the phase of the drive, where f is the lowest frequency of the `Harmonic`
+histories; all other frequencies are multiples of f. A level scales all varying terms, but not the
+constant ones.
 
-f(x, theta) contains the internal forces minus the loads, W = 2 pi f, and s2, s1 are the effect of
-moving supports: M and C times the derivatives of their motion with respect to theta. Displacements
-of all dofs are u = u0 + B x + U(theta), forces on the unknowns B' times the forces on all dofs.
+f(x, theta) contains the internal forces minus the loads, and W = 2 pi f. s2 and s1 are the effect
+of moving supports: M and C times the second and first derivatives of the support motion with
+respect to theta. Displacements of all dofs are u = u0 + B x + U(theta); forces on the unknowns are
+B' times the forces on all dofs.
 """
 
 from __future__ import annotations
@@ -40,16 +42,16 @@ Terms = list[tuple[Any, Any]]
 
 
 class Tangents:
-    """Tangents of a body with respect to the unknowns, or along vectors of them.
+    """Tangents of a body with respect to the unknowns, or projected on vectors of unknowns.
 
-    Entries are added directly in their places; terms with unknown places, such as contact, and
-    sheets other than bars and hinges go through sparse matrices.
+    Entries are added directly at their positions in the matrix. Terms whose positions are not known
+    in advance, such as contact, and sheets other than bars and hinges go through sparse matrices.
 
     Parameters
     ----------
     body : Assembly
     basis : sparse (m, k)
-        Displacements of all dofs per unknown.
+        Displacements of all dofs per unit of each unknown.
     vectors : ndarray, shape (k, r), optional
         Vectors on which tangents are projected.
     """
@@ -58,7 +60,7 @@ class Tangents:
         self, body: Assembly, basis: sparse.csr_array, vectors: NDArray | None = None
     ) -> None:
         self._basis, self._vectors, size = basis, vectors, basis.shape[1]
-        places: dict[int, tuple[NDArray, NDArray]] = {}  # of the sheet (-1) and of terms
+        places: dict[int, tuple[NDArray, NDArray]] = {}  # by number of the term; -1 is the sheet
         if isinstance(body.sheet, BarsHingesTerm):
             places[-1] = _of_blocks(body.sheet)
         for k, term in enumerate(body.others):
@@ -125,7 +127,8 @@ def _spread(
 ) -> tuple[NDArray, NDArray, NDArray]:
     """Contributions of entries at rows and columns (e,) to a matrix of the k unknowns.
 
-    Returns their places k row + column in it, the numbers of the entries, and factors on these.
+    Returns the place k row + column of each contribution in the matrix, the number of the entry
+    that contributes, and the factor on this entry.
     """
     one, other = basis[row], basis[column]
     width = np.diff(other.indptr)
@@ -195,10 +198,11 @@ class Drive:
     frequency : float
         Lowest frequency of the harmonic histories (Hz); 0.0 without any.
     highest : int
-        Highest of their frequencies, as a multiple of the lowest.
+        Highest of the harmonic frequencies, as a multiple of the lowest.
     loads, moves, turns, planes : list of (ndarray, Constant or Harmonic)
-        Forces (n, 3), N; displacements (n, 3) of supports and of nodes tied to them, m; changes
-        (nr,) of rest angles, rad; displacements (p, 3) of contact planes, m: each at factor 1.
+        Terms at factor 1, each with its history: forces (n, 3), N; displacements (n, 3), m, of
+        supports and of nodes tied to them; changes (nr,) of rest angles, rad; displacements (p, 3),
+        m, of contact planes.
     """
 
     def __init__(self, case: Case) -> None:
@@ -219,7 +223,7 @@ class Drive:
         return self.frequency > 0.0
 
     def factors(self, terms: Terms, phase: NDArray, level: float) -> NDArray:
-        """Factors (3, s, k) of some terms, and their first two derivatives, at phases (s,)."""
+        """Factors of k terms and first two derivatives of the factors (3, s, k), at phases (s,)."""
         out = np.zeros((3, len(phase), len(terms)))
         for k, (_, history) in enumerate(terms):
             if isinstance(history, Constant):
@@ -233,7 +237,7 @@ class Drive:
         return out
 
     def sums(self, terms: Terms, phase: NDArray, level: float, size: int) -> NDArray:
-        """Sums (3, s, size) of some terms, and their first two derivatives, at phases (s,)."""
+        """Sum of terms and first two derivatives of the sum (3, s, size), at phases (s,)."""
         shapes = np.zeros((len(terms), size))
         for shape, (vector, _) in zip(shapes, terms, strict=True):
             shape[: vector.size] = vector.ravel()
@@ -241,7 +245,7 @@ class Drive:
 
 
 def _plane(case: Case, number: int, history: Any) -> tuple[NDArray, Any]:
-    """Displacements (p, 3), m, of the contact planes as one of them moves, and its history."""
+    """Displacements (p, 3), m, of all contact planes when one plane moves, and its history."""
     assert case.contact is not None
     moved = np.zeros((len(case.contact.planes), 3))
     moved[number] = case.contact.planes[number].motion
@@ -249,7 +253,7 @@ def _plane(case: Case, number: int, history: Any) -> tuple[NDArray, Any]:
 
 
 class Equation:
-    """Matrices and forces of a case.
+    """Matrices and forces in the equation of motion of a case (see the module docstring).
 
     Parameters
     ----------
@@ -259,18 +263,18 @@ class Equation:
     driven : bool
         False leaves out all varying terms, and the damping.
     origin : Origin, optional
-        State of damping with ``state = "initial"``; rest by default.
+        State about which damping with ``state = "initial"`` is taken; rest by default.
 
     Attributes
     ----------
     size : int
         Number k of unknowns.
     basis : sparse or dense (m, k)
-        B.
+        The matrix B.
     offset : (m,)
-        Displacements with zero unknowns and drive, m.
+        Displacements u0 (m) with zero unknowns and without drive.
     whole : Equation
-        The equation from which this one is reduced, or itself.
+        The equation from which this equation is reduced; the equation itself if it is not reduced.
     tangents : Tangents
         Tangents of the body with respect to the unknowns.
     mass, damping : (k, k)
@@ -303,7 +307,7 @@ class Equation:
             drag = drag + term.damping(np.zeros(total))
         self.damping = self.projected(drag)
         self._moved = sparse.csr_array(self.basis.T @ nodal), sparse.csr_array(self.basis.T @ drag)
-        self._back = np.zeros((0, 0))  # of a reduced equation: from the unknowns of the whole
+        self._back = np.zeros((0, 0))  # in a reduced equation: from the whole equation's unknowns
         parts = [(part, k) for k, (part, _) in enumerate(self.drive.following)]
         self._following = joined(parts)
 
@@ -314,7 +318,7 @@ class Equation:
 
     @cached_property
     def length(self) -> float:
-        """Size of the sheet, m, as the scale of lengths."""
+        """Size (m) of the sheet, the scale of lengths."""
         return float(np.ptp(self.case.structure.nodes, axis=0).max())
 
     def at(self, phase: NDArray, level: float = 1.0) -> Instants:
@@ -327,7 +331,7 @@ class Equation:
         return found.toarray() if sparse.issparse(found) else found
 
     def responses(self, tangent: NDArray, w: float, forces: NDArray, first: int) -> NDArray:
-        """Linear responses (h, k) of harmonics `first` and on of w rad/s to forces (h, k)."""
+        """Linear responses (h, k) to forces (h, k) of harmonics `first` and higher of w rad/s."""
         return np.array(
             [
                 np.linalg.solve(tangent - (j * w) ** 2 * self.mass + 1j * j * w * self.damping, one)
@@ -349,9 +353,9 @@ class Instants:
     Attributes
     ----------
     moved : (s, m)
-        U, m.
+        Displacement U (m) of the drive.
     inertia, drag : (s, k)
-        s2 and s1 of the module docstring.
+        The terms s2 and s1 in the module docstring.
     planes : (s, p, 3)
         Displacements of contact planes, m.
     bodies : sequence of Assembly
@@ -382,11 +386,11 @@ class Instants:
         return x @ self.equation.basis.T + self.moved + self.equation.offset
 
     def _each(self, x: NDArray):
-        """Number, displacement and body of each instant."""
+        """Yield the number, the displacement and the body of each instant."""
         return zip(range(len(x)), self.displacements(x), self.bodies, strict=True)
 
     def forces(self, x: NDArray) -> NDArray:
-        """f (s, k) at unknowns (s, k), N."""
+        """Forces f (s, k), N, at unknowns (s, k)."""
         following, force = self.equation._following, np.empty(self.moved.shape)
         for j, u, body in self._each(x):
             force[j] = body.internal(u)

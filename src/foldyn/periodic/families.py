@@ -1,14 +1,15 @@
 """Families of periodic motions that continuation follows; see `continuation.Family`.
 
-Free motions about an equilibrium are accurate for arbitrarily small amplitudes. Dihedrals are
-computed from node positions, and lose the digits by which these exceed the motion. So near the
-equilibrium x0 forces f and energies V are integrated from tangents K,
+Free motions about an equilibrium are accurate for arbitrarily small amplitudes. Dihedral angles are
+computed from node positions, so small motions lose as many digits as the positions are larger than
+the motion. Near the equilibrium x0, forces f and energies V are therefore integrated from tangents
+K,
 
     f(x) = int_0^1 K d ds,    V(x) = V(x0) + int_0^1 (1 - s) d' K d ds,
 
-with d = x - x0 and K at x0 + s d. The integrals count only if they agree with the plain values to
-within the accuracy lost, which fails where laws bend in between. About the rest position only the
-hinges are integrated: bars are accurate there for small displacements.
+with d = x - x0 and K at x0 + s d. The integrals are used only if they agree with the plain values
+to within the accuracy lost; they do not agree if a law has a kink in between. About the rest
+position only the hinges are integrated: bar forces are accurate there for small displacements.
 """
 
 from __future__ import annotations
@@ -24,11 +25,12 @@ from foldyn.periodic.equation import EPS, Equation, Instants
 from foldyn.periodic.orbit import Orbit
 
 TURN = 2.0 * np.pi
-PROBE = 1e-4  # of the level, or of the frequency: step of central differences
-LITTLE = 1e-4  # level at which forces of a drive are proportional to it
-LEAST = 1e-12  # of the sheet's length: least size of a motion
-SMALL = 1e-3  # of the sheet: largest motion that counts as small
-LOST = 100.0  # times the rounding of positions over the motion: largest loss of accuracy of forces
+PROBE = 1e-4  # step of central differences, relative to the level or the frequency
+LITTLE = 1e-4  # level of the drive that is small enough for forces to be proportional to it
+LEAST = 1e-12  # least size of a motion, relative to the sheet's length
+SMALL = 1e-3  # largest motion that counts as small, relative to the sheet's length
+# largest loss of accuracy of forces: times the rounding of positions, divided by the motion
+LOST = 100.0
 SHARES = np.array([0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)])  # Gauss's
 WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
@@ -39,7 +41,7 @@ class AboutRest(Instants):
     Parameters
     ----------
     place : ndarray, shape (k,)
-        x0.
+        Unknowns x0 of the equilibrium.
     """
 
     def __init__(self, equation: Equation, phase: NDArray, place: NDArray) -> None:
@@ -64,7 +66,7 @@ class AboutRest(Instants):
         return found[1] + others[1:] - others[0]
 
     def _summed(self, x: NDArray) -> tuple[NDArray, NDArray] | None:
-        """Correction (s, k) of the forces, and integrated energies (s,) above x0.
+        """Correction (s, k) of the plain forces, and integrated energies (s,) above x0.
 
         None if motions are not small, or the integrals do not agree with the forces.
         """
@@ -109,7 +111,7 @@ class _OfBalance:
         return z[: math.prod(self.balance.shape)].reshape(self.balance.shape)
 
     def instants(self, level: float) -> Instants:
-        """The equation at the samples; the one of the last level is kept."""
+        """The equation at the samples for a level; it is kept until the level changes."""
         if self._kept is None or self._kept[0] != level:
             self._kept = level, self.balance.instants(level)
         return self._kept[1]
@@ -120,11 +122,11 @@ class _OfBalance:
         return max(moving, LEAST * self.balance.equation.length)
 
     def own(self, z: NDArray, p: float) -> tuple[NDArray, float, float]:
-        """Coefficients (c, k), frequency of the drive (rad/s) and its level."""
+        """Coefficients (c, k), and frequency (rad/s) and level of the drive."""
         raise NotImplementedError
 
     def at(self, z: NDArray, p: float) -> tuple[NDArray, float, Instants]:
-        """Coefficients (c, k), frequency of the drive (rad/s) and the equation at its level."""
+        """Coefficients (c, k), frequency (rad/s) of the drive, and the equation at its level."""
         x, omega, level = self.own(z, p)
         return x, omega, self.instants(level)
 
@@ -133,11 +135,11 @@ class _OfBalance:
         return self.balance.residual(*self.at(z, p)).ravel()
 
     def jacobian(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n, n) of R by z; see `Family`."""
+        """Derivative (n, n) of R with respect to z; see `Family`."""
         return self.balance.jacobian(*self.at(z, p))
 
     def by_level(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (c k,) of the balance by p, which sets the level, from differences."""
+        """Derivative (c k,) of the balance with respect to p through the level, by differences."""
         up, down = (
             self.balance.residual(x, omega, self.balance.instants(level))
             for x, omega, level in (self.own(z, p + PROBE), self.own(z, p - PROBE))
@@ -145,7 +147,7 @@ class _OfBalance:
         return (up - down).ravel() / (2.0 * PROBE)
 
     def orbit(self, z: NDArray, p: float) -> Orbit:
-        """The motion."""
+        """The periodic motion at unknowns z and parameter p."""
         return Orbit.of(self.balance, *self.own(z, p))
 
 
@@ -159,7 +161,7 @@ class ByFrequency(_OfBalance):
         return self.coefficients(z), TURN * p, self.level
 
     def slope(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n,) of R by p; see `Family`."""
+        """Derivative (n,) of R with respect to p; see `Family`."""
         return TURN * self.balance.frequency_slope(*self.at(z, p)).ravel()
 
 
@@ -175,14 +177,15 @@ class ByLevel(_OfBalance):
         return self.coefficients(z), self.omega, p
 
     def slope(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n,) of R by p, from differences: exact for loads proportional to p."""
+        """Derivative (n,) of R with respect to p: differences, exact for loads linear in p."""
         return self.by_level(z, p)
 
 
 class Free(ByFrequency):
     """Free motions of an undamped sheet, along their frequency (Hz).
 
-    An even series fixes their phase: they begin at rest, and return to it.
+    An even series fixes the phase of the motions: they start at zero velocity and retrace their
+    path.
 
     Parameters
     ----------
@@ -205,15 +208,16 @@ class Free(ByFrequency):
 class InResonance(_OfBalance):
     """Forced motions in phase resonance, along the logarithm of the level of the drive.
 
-    At their frequency the drive does no reactive work: the mean over a period of its force times
-    the displacement vanishes, with the force of a small drive on the sheet in its state (Peeters,
-    Kerschen and Golinval, Mech. Syst. Signal Process. 25, 2011). The last unknown is the frequency
-    over `unit`, so that it counts as much as displacements of the sheet's size.
+    At the frequency of these motions the drive does no reactive work: the mean of force times
+    displacement over a period vanishes. The force is that of a small drive on the sheet in a given
+    state (Peeters, Kerschen and Golinval, Mech. Syst. Signal Process. 25, 2011). The last unknown
+    is the frequency divided by `unit`, so that it counts as much as displacements of the sheet's
+    size.
 
     Parameters
     ----------
     place : ndarray, shape (k,)
-        Unknowns of the state.
+        Unknowns of the given state.
     frequency : float
         Approximate frequency of the resonance, Hz.
     """
@@ -234,7 +238,7 @@ class InResonance(_OfBalance):
         return float(z[-1]) * self.unit
 
     def _reactive(self, z: NDArray) -> tuple[float, NDArray]:
-        """Reactive work over the size of the force, m, and its derivative (c, k)."""
+        """Reactive work divided by the norm of the force, m, and its derivative (c, k)."""
         omega = TURN * self.frequency(z)
         still, drag, inertia = self._force
         force = still + omega * drag + omega**2 * inertia
@@ -251,7 +255,7 @@ class InResonance(_OfBalance):
         return np.append(super().residual(z, p), self._heavy * self._reactive(z)[0])
 
     def jacobian(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n, n) of R by z; see `Family`."""
+        """Derivative (n, n) of R with respect to z; see `Family`."""
         at, n = self.at(z, p), len(z) - 1
         out = np.empty((n + 1, n + 1))
         out[:n, :n] = self.balance.jacobian(*at)
@@ -264,5 +268,5 @@ class InResonance(_OfBalance):
         return out
 
     def slope(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n,) of R by p; see `Family`."""
+        """Derivative (n,) of R with respect to p; see `Family`."""
         return np.append(self.by_level(z, p), 0.0)

@@ -31,15 +31,15 @@ from foldyn.statics.tracing import displacement_of
 from foldyn.values import choice, number, of_kind, whole
 
 METHODS = ("harmonic_balance", "shooting")
-TRUNCATED = 1e-3  # of the motion: effect of twice as many harmonics above which to warn
-REDUCED = 0.05  # of the motion: effect of the omitted dofs above which to warn
-NAMED = 5  # frequencies listed in a warning
-FEW = 3  # harmonics of the motion from which shooting starts
-ROUNDING = 1e-14  # of the motion: harmonics of a shooting result that count as zero
+TRUNCATED = 1e-3  # warn if twice as many harmonics change the motion by more than this fraction
+REDUCED = 0.05  # warn if the omitted dofs change the motion by more than this fraction
+NAMED = 5  # most frequencies listed in a warning
+FEW = 3  # number of harmonics of the motion from which shooting starts
+ROUNDING = 1e-14  # harmonics of a shooting result below this fraction of the motion are zero
 FLOOR = float(equivalent_slope(0.0, np.radians(1.0)))
 """Slope of superlinear hinges at rest in a first guess, for a swing of one degree."""
-LITTLE = 1e-4  # of the drive, whose forces are proportional to it
-SMALL = 0.05  # of the drive: level from which a motion is followed to the full drive
+LITTLE = 1e-4  # fraction of the drive that is small enough for forces to be proportional to it
+SMALL = 0.05  # fraction of the drive from which a motion is followed to the full drive
 GROWING = Stride(0.05, 0.5, 200)
 TURN = 2.0 * np.pi
 PLACES = "None, a State, or a result of periodic_motion or response_curve"
@@ -68,38 +68,40 @@ def periodic_motion(
         Case with `Harmonic` histories of forces, base motions, imposed displacements or actuated
         creases; other histories are constant.
     frequency : float, optional
-        Frequency (Hz) of the slowest of these histories; others keep their ratio to it, and all
-        keep their phases. By default the frequency of the case.
+        Frequency (Hz) of the slowest of these histories; the others keep their frequency ratio to
+        it, and all keep their phases. By default the frequency of the case.
     harmonics : int
         Number of harmonics of the motion's own frequency.
     method : {"harmonic_balance", "shooting"}
-        A Fourier series whose equation is satisfied in the mean over each harmonic, or the initial
-        state to which integration over a period (Radau's method of order 5) returns.
+        What is solved for: a Fourier series that satisfies the equation of motion projected on each
+        harmonic, or an initial state to which integration over one period (Radau's method of order
+        5) returns.
     guess : State or xarray.Dataset, optional
-        Start of the search: small motions about a state, or a result of `periodic_motion` or a
-        point of a `response_curve`. By default the equilibrium under the constant loads. Damping
-        with ``state = "initial"`` is taken about this state, or continued from a result.
+        Start of the search: a state, about which the motion is taken as small at first, or a result
+        of `periodic_motion` or a point of a `response_curve`. By default the equilibrium under the
+        constant loads. Damping with ``state = "initial"`` is taken about this state, or as in the
+        given result.
     periods : int
         Periods of the drive in one period of the motion: 2 after a period doubling.
     modes : int, optional
-        For large sheets: instead of all free dofs, use the span of this many modes about the guess
-        (about the equilibrium, if it is a motion), their derivatives and the static response to the
-        drive.
+        For large sheets: instead of all free dofs, use the span of this many modes, their modal
+        derivatives and the static response to the drive. The modes are taken about the guess, or
+        about the equilibrium if the guess is a motion.
     steps : int
         Integration steps in a period of the drive, for shooting and the multipliers.
     tolerance : float
-        Last step of Newton's method, as a fraction of the motion.
+        Largest last step of Newton's method, as a fraction of the motion.
 
     Returns
     -------
     xarray.Dataset
-        Over one period `displacement`, `velocity` (time, node, axis); `coefficient` (harmonic,
-        node, axis), complex amplitudes c_j of the motion Re sum c_j exp(2 pi i j t / T); `floquet`
-        (multiplier), the largest first, eigenvalues of the monodromy matrix that integrates the
-        variational equation; `stable`; `periods`. Attributes: `frequency`, `truncation` (effect
-        of twice as many harmonics, as a fraction of the motion, estimated from the residual
-        there), with `modes` also `reduction` (effect of the omitted dofs, likewise) and facts
-        about the run.
+        `displacement`, `velocity` (time, node, axis) in one period; `coefficient` (harmonic, node,
+        axis), complex amplitudes c_j of the motion Re sum c_j exp(2 pi i j t / T); `floquet`
+        (multiplier), the eigenvalues of the monodromy matrix of the variational equation, the
+        largest first; `stable`; `periods`. Attributes: `frequency`; `truncation`, the effect of
+        twice as many harmonics as a fraction of the motion, estimated from the residual at the
+        additional harmonics; with `modes` also `reduction`, the effect of the omitted dofs,
+        estimated in the same way; and facts about the run.
 
     Raises
     ------
@@ -116,9 +118,8 @@ def periodic_motion(
 
     Notes
     -----
-    Bases swing about their rest positions. Motions with few harmonics of stiff sheets are smooth,
-    so that multipliers of vibrations too fast for the steps show the decay by alpha M, but no
-    phase.
+    Bases swing about their rest positions. If vibrations of a stiff sheet are too fast for the
+    integration steps, their multipliers show the decay by alpha M, but not the phase.
 
     Examples
     --------
@@ -176,7 +177,7 @@ def balance_of(
     case: Case, name: str, harmonics: int, periods: int = 1, modes: int | None = None,
     guess: Any = None, steps: int = STEPS, driven: bool = True,
 ) -> Balance:  # fmt: skip
-    """Balance of a case; of free motions, with an even series, if it is not to be driven.
+    """Balance of a case; for undriven cases, of free motions with an even series.
 
     Raises
     ------
@@ -212,7 +213,7 @@ def warn_of_errors(
 ) -> None:
     """Warn of motions that need more harmonics or modes, or pass through contacts.
 
-    reduction : effects of the omitted dofs; None without `modes`.
+    reduction : effect of the omitted dofs on each motion; None without `modes`.
     """
     if truncation > TRUNCATED:
         warn(
@@ -239,7 +240,7 @@ def warn_of_errors(
 def _shot(
     balance: Balance, guess: Any, omega: float, steps: int, tolerance: float
 ) -> tuple[Orbit, int]:
-    """Motion by shooting from one of few harmonics, and the iterations spent."""
+    """Motion by shooting, started from a motion of few harmonics, and the iterations spent."""
     equation, longer = balance.equation, balance.multiple
     few = Balance(equation, Fourier(min(balance.fourier.harmonics, FEW * longer)), longer)
     near = Orbit.of(few, balanced(few, coefficients(few, guess, omega), omega, 1e-3).x, omega)
@@ -291,9 +292,9 @@ def equilibrium(case: Case) -> NDArray:
 
 
 def origin_of(case: Case, guess: Any) -> Origin | None:
-    """State of damping that is defined at the guess; None without such damping.
+    """State about which damping with ``state = "initial"`` is taken; None without such damping.
 
-    It is the state or the result from which the search begins, or the equilibrium.
+    It is the state or result from which the search begins or, without one, the equilibrium.
     """
     if not case.damped_at_start:
         return None
@@ -320,7 +321,7 @@ def coefficients(balance: Balance, guess: Any, omega: float, level: float = 1.0)
 
 
 def linear_response(balance: Balance, x: NDArray, omega: float, level: float) -> NDArray:
-    """First Newton step (c, k) of small motions about a state, with slopes for soft hinges."""
+    """Coefficients (c, k) of one Newton step from a state, with a least slope for soft hinges."""
     equation, fourier = balance.equation, balance.fourier
     still, little = (
         balance.residual(x, omega, balance.instants(share * level)) for share in (0.0, LITTLE)
@@ -365,12 +366,12 @@ def _of_result(balance: Balance, guess: xarray.Dataset, level: float) -> NDArray
 def balanced(
     balance: Balance, x: NDArray, omega: float, tolerance: float, level: float = 1.0
 ) -> Converged:
-    """The motion near coefficients (c, k), or the one that grows with the drive from rest.
+    """The motion near coefficients (c, k), or the motion that grows from rest with the drive.
 
     Raises
     ------
     ComputationError
-        Neither is found.
+        Neither motion is found.
     """
     found = newton(AtFrequency(balance, omega, level), x.ravel(), tolerance)
     return _grown(balance, x, omega, tolerance, level) if found is None else found
@@ -385,7 +386,7 @@ def _grown(balance: Balance, x: NDArray, omega: float, tolerance: float, level: 
     first, share = newton(AtFrequency(balance, omega, SMALL * level), begin, tolerance), 0.0
     if first is not None:
         spent, ahead = first.iterations, np.append(np.zeros(x.size), 1.0)
-        top = point_at(family, first.x, SMALL * level, ahead)  # point of the largest drive
+        top = point_at(family, first.x, SMALL * level, ahead)  # point with the largest drive so far
         for step in steps(family, top, GROWING, lambda point: point.p / level - 1.0):
             if not isinstance(step, Step) or step.after.p < 0.0:
                 break

@@ -36,13 +36,13 @@ from foldyn.results.dataset import points_dataset
 from foldyn.statics.tracing import displacement_of
 from foldyn.values import flag, number, numbers, of_kind, show, whole
 
-FIRST = 0.3  # of the longest step
+FIRST = 0.3  # length of the first step, relative to the longest step
 TURN = 2.0 * np.pi
-SAMPLES = 16  # of half a period, at which energies are compared
-CONSTANT = 1e-10  # largest relative change wanted of the energy along a normal mode
-RAISE, RAISES = 1.5, 3  # factor on the number of harmonics, and most increases
-WORTH = 30.0  # factor by which an increase must reduce the change to try another one
-LOOSE = 1e-2  # change of the energy above which to warn
+SAMPLES = 16  # samples of half a period at which energies are compared
+CONSTANT = 1e-10  # goal for the relative change of the energy along a normal mode
+RAISE, RAISES = 1.5, 3  # factor by which the number of harmonics grows, and most increases
+WORTH = 30.0  # an increase must reduce the energy change by this factor to try another one
+LOOSE = 1e-2  # relative change of the energy above which to warn
 
 
 def backbone(
@@ -67,20 +67,20 @@ def backbone(
     Parameters
     ----------
     case : Case
-        As for `periodic_motion`. Without `damped` its damping and harmonic histories are ignored.
+        As for `periodic_motion`. Damping and harmonic histories are ignored unless `damped`.
     mode : int
         Number of the mode, from 1, as in `modes`.
     amplitudes : (float, float)
         First and last amplitude: the largest displacement of any node from the equilibrium, m.
     harmonics : int
-        Number of harmonics; for normal modes raised as needed to keep the energy constant.
+        Number of harmonics; for normal modes it is raised as needed to keep the energy constant.
     damped : bool
-        Follow the damped case under its harmonic histories in phase resonance, where force and
-        displacement are a quarter of a period apart, instead of the undamped case: the path of the
-        peaks of response curves.
+        Instead of the undamped case, follow the damped case under its harmonic histories in phase
+        resonance, where force and displacement are a quarter of a period apart: the curve on which
+        the peaks of response curves lie.
     state : State, optional
-        State near the equilibrium about which the sheet vibrates; rest by default. Constant loads
-        act.
+        State near the equilibrium about which the sheet vibrates; rest by default. The constant
+        loads of the case act.
     modes : int, optional
         As for `periodic_motion`, about this state.
     longest_step : float
@@ -88,7 +88,7 @@ def backbone(
     most_points : int
         Largest number of points.
     tolerance : float
-        Last step of Newton's method, as a fraction of the motion.
+        Largest last step of Newton's method, as a fraction of the motion.
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress`, in which `steps` counts points.
 
@@ -97,10 +97,10 @@ def backbone(
     xarray.Dataset
         Along `point`: `frequency` (Hz, coordinate), `amplitude` (m), `coefficient` (harmonic, node,
         axis) as in `periodic_motion`, `truncation`, with `modes` also `reduction`. For the undamped
-        case `energy` (J) above the equilibrium and `energy_drift`, its largest relative change
-        along the motion; for the damped one `level`, the factor on the drive, `floquet` and
-        `stable`. Attributes: `linear_frequency` (Hz), `complete`, 1 if the last amplitude is
-        reached, and facts.
+        case `energy` (J) above the equilibrium and `energy_drift`, the largest relative change of
+        this energy along the motion; for the damped case `level`, the factor on the drive,
+        `floquet` and `stable`. Attributes: `linear_frequency` (Hz); `complete`, 1 if the last
+        amplitude is reached; and facts about the run.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def backbone(
     ComputationError
         The equilibrium is unstable, or the first motion is not found.
     MotionInterrupted
-        From the keyboard (Ctrl-C); its `partial` holds the points so far.
+        Interrupted from the keyboard (Ctrl-C); the exception's `partial` holds the points so far.
 
     Warns
     -----
@@ -119,8 +119,9 @@ def backbone(
 
     Notes
     -----
-    Normal modes are sought among motions that come to rest twice in a period, with only cosines. If
-    one resonates with another, the backbone turns back and continues as a motion of both.
+    Normal modes are sought among motions that come to rest twice in a period (series with only
+    cosines). If one mode resonates with another, the backbone turns back and continues as a motion
+    of both modes.
 
     Examples
     --------
@@ -191,7 +192,7 @@ def backbone(
 
 
 def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, NDArray]:
-    """Equilibrium (k,), frequency (Hz) and shape (k,) of a mode, its largest node moving by 1."""
+    """Equilibrium (k,), and frequency (Hz) and shape (k,) of a mode; some node moves by 1."""
     case = equation.case
     if state is None:
         displacement = equilibrium(case)
@@ -204,7 +205,7 @@ def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, ND
     if mode > equation.size:
         raise InputError(f" = {mode}: there are {equation.size} modes", "mode")
     soft = equation.body.sheet.soft_hinges(at.displacements(place[None])[0])
-    if len(soft.offset):  # the slope at rest is zero
+    if len(soft.offset):  # laws with zero slope at rest
         floored = equation.body.tangent(at.displacements(place[None])[0], FLOOR)
         stiffness = equation.projected(floored)
     value, vector = eigh(stiffness, equation.mass, subset_by_index=[mode - 1, mode - 1])
@@ -278,7 +279,7 @@ def _resonant(
 def _sharpened(family: Free, orbit: Orbit) -> Orbit:
     """A normal mode with enough harmonics to keep its energy constant.
 
-    None are added if they gain little, as where laws bend.
+    No more are added if they gain little, for example where a law has a kink.
     """
     drift = _energy(orbit, family.place)[1]
     for _ in range(RAISES):
@@ -292,7 +293,7 @@ def _sharpened(family: Free, orbit: Orbit) -> Orbit:
             break
         finer = Free(Balance(equation, fourier), family.span, family.tolerance, family.place)
         x = fourier.real_of(orbit.amplitudes)
-        row = np.append(x.ravel(), 0.0)  # fixes the size
+        row = np.append(x.ravel(), 0.0)  # fixes the size of the motion
         row[: equation.size] = 0.0
         found = corrected(finer, x.ravel(), orbit.omega / TURN, row / np.abs(row).max(), 30)
         if found is None:
@@ -317,7 +318,7 @@ def _follow(
     family: Any, kept: list[Point], stride: Stride, reached: Callable[[Point], float],
     ends: NDArray, report: Reporter,
 ) -> bool:  # fmt: skip
-    """Add points from the first to the last amplitude; returns whether it is reached."""
+    """Add points up to the last amplitude; returns whether the last amplitude is reached."""
     whole_way = math.log(ends[1] / ends[0])
     for step in steps(family, kept[0], stride, lambda point: reached(point) / ends[1] - 1.0):
         if not isinstance(step, Step):
@@ -342,7 +343,7 @@ def _largest(orbit: Orbit, place: NDArray) -> float:
 
 
 def _values(orbits: list[Orbit], place: NDArray) -> dict[str, Any]:
-    """Energies of normal modes and their drift; warns if the drift is large."""
+    """Energy and energy drift of normal modes; warns if the drift is large."""
     energies = np.array([_energy(orbit, place) for orbit in orbits])
     worst = float(energies[:, 1].max())
     if worst > LOOSE:
@@ -365,7 +366,7 @@ def _damped_values(orbits: list[Orbit]) -> dict[str, Any]:
 
 
 def _energy(orbit: Orbit, place: NDArray) -> tuple[float, float]:
-    """Energy (J) above the equilibrium, and its largest change along the motion over it."""
+    """Energy (J) above the equilibrium, and its largest relative change along the motion."""
     phase, equation = np.pi * np.arange(SAMPLES + 1) / SAMPLES, orbit.equation
     x = values_of(orbit.amplitudes, phase)
     v = orbit.omega * values_of(orbit.amplitudes, phase, 1)

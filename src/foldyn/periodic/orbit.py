@@ -7,14 +7,14 @@ stages of a step of length h solve
 
 Gauss's method, of order 6, is symplectic without damping, so that multipliers keep their pairs
 (m, 1/m): it integrates the variational equation (Hairer, Lubich and Wanner, Geometric Numerical
-Integration, 2nd ed. 2006, section II.1). Radau's IIA, of order 5, damps motions faster than the
-steps, such as vibrations of a sheet's bars: it is used for shooting (Hairer and Wanner, Solving
-Ordinary Differential Equations II, 2nd ed. 1996, section IV.5). Derivatives of a step are exact:
-they are derivatives of its own equations.
+Integration, 2nd ed. 2006, section II.1). Radau IIA, of order 5, damps motions that are too fast for
+the steps, such as vibrations of a sheet's bars: it is used for shooting (Hairer and Wanner, Solving
+Ordinary Differential Equations II, 2nd ed. 1996, section IV.5). Derivatives of a step are exact,
+because the equations of the step are differentiated.
 
 Floquet multipliers are the growth factors of small deviations from a periodic motion, per period:
 the eigenvalues of the monodromy matrix, which integrates the equation linearized about the motion,
-M y'' + C y' + K(t) y = 0, over one period. The motion is unstable if one of them exceeds 1 in
+M y'' + C y' + K(t) y = 0, over one period. The motion is unstable if a multiplier exceeds 1 in
 modulus (Nayfeh and Balachandran, Applied Nonlinear Dynamics, 1995, chapter 3).
 """
 
@@ -34,11 +34,11 @@ from foldyn.results import Quantity
 from foldyn.results.crossings import crossings_of
 from foldyn.threads import one_thread
 
-SHOWN = 128  # samples of a period in results and for extremes
-BARELY = 1e-3  # of a gap: share that remains between two samples of motions that do not cross
+SHOWN = 128  # samples of a period, in results and to find extremes
+BARELY = 1e-3  # share of a gap that remains between two samples if a motion does not cross
 STAGES = 3
 ROOT15, ROOT6 = np.sqrt(15.0), np.sqrt(6.0)
-STEPS = 64  # in a period of the drive
+STEPS = 64  # integration steps in a period of the drive
 NEUTRAL = 1e-6  # excess of a modulus over 1 that counts as round-off
 
 
@@ -72,8 +72,8 @@ RADAU = Tableau(
     ),
 )
 ITERATIONS = 30
-SETTLED = 1e-10  # of the acceleration: last Newton step within a time step
-STUCK = 0.5  # of the previous step: a larger one means that round-off is reached
+SETTLED = 1e-10  # largest last Newton step within a time step, relative to the acceleration
+STUCK = 0.5  # a Newton step above this fraction of the previous one means round-off is reached
 
 
 def stage_phases(steps: int, tableau: Tableau = GAUSS) -> NDArray:
@@ -82,7 +82,7 @@ def stage_phases(steps: int, tableau: Tableau = GAUSS) -> NDArray:
 
 
 class Stages:
-    """Matrices of steps of one length for a linear equation of k unknowns."""
+    """Matrices of steps of a fixed length, for a linear equation with k unknowns."""
 
     def __init__(self, mass: NDArray, damping: NDArray, h: float, tableau: Tableau) -> None:
         self.mass, self.damping, self.h, self.tableau, k = mass, damping, h, tableau, len(mass)
@@ -96,7 +96,7 @@ class Stages:
         return lu_factor((self._fixed + added).reshape(self._size, self._size))
 
     def tangent_step(self, factors, stiffness: NDArray, motion: NDArray) -> NDArray:
-        """Motions (2k, n), displacements over velocities, one step later."""
+        """Motions (2k, n), k displacements followed by k velocities, one step later."""
         h, k, tableau = self.h, len(self.mass), self.tableau
         x, v = motion[:k], motion[k:]
         ahead = x + h * tableau.c[:, None, None] * v
@@ -160,7 +160,7 @@ class Shooting:
         return self.period(y)[1] - np.eye(len(y))
 
     def period(self, y: NDArray) -> tuple[NDArray, NDArray]:
-        """States (steps + 1, 2k) from a start (2k,), and the derivative (2k, 2k) of the last."""
+        """States (steps + 1, 2k) from a start (2k,), and derivative (2k, 2k) of the last state."""
         key = y.tobytes()
         if self._last is None or self._last[0] != key:
             states, motion, a = [y], np.eye(len(y)), np.zeros((STAGES, self.equation.size))
@@ -216,7 +216,7 @@ class Orbit:
     amplitudes : ndarray, complex, shape (h + 1, k)
         Amplitudes of exp(i j tau) of the unknowns, m; tau is the phase in the motion's period.
     omega : float
-        Frequency of the drive, rad/s; of the motion itself without a drive.
+        Frequency of the drive (without a drive, of the motion), rad/s.
     multiple : int
         Periods of the drive in one period of the motion.
     level : float
@@ -254,7 +254,7 @@ class Orbit:
         return self.omega * (own + moved).reshape(len(phase), -1, 3)
 
     def node_amplitudes(self) -> NDArray:
-        """Amplitudes (h + 1, n, 3), m, of all nodes, including the motion of supports."""
+        """Complex amplitudes (h + 1, n, 3), m, of all nodes, including the motion of supports."""
         most = max(len(self.amplitudes) - 1, self.multiple * self.equation.drive.highest)
         count = 2 * most + 2
         values = self.displacement(2.0 * np.pi * np.arange(count) / count)
@@ -279,7 +279,7 @@ class Orbit:
         )
 
     def multipliers(self, steps: int) -> NDArray:
-        """Floquet multipliers (2k,), the largest first, from steps in a period of the drive."""
+        """Floquet multipliers (2k,), the largest first; steps : steps in a period of the drive."""
         equation, phase = self.equation, stage_phases(self.multiple * steps)
         at = equation.at(self.multiple * phase.ravel(), self.level)
         tangents = at.tangents(values_of(self.amplitudes, phase.ravel()))
@@ -292,10 +292,11 @@ class Orbit:
     def truncation(self) -> float:
         """Estimated effect of twice as many harmonics, as a fraction of the motion.
 
-        It is the residual at the additional harmonics, divided by the mean dynamic stiffness there.
+        It is the residual at the additional harmonics divided by the mean dynamic stiffness at
+        these harmonics.
         """
         kept, equation = len(self.amplitudes) - 1, self.equation
-        fourier = Fourier(2 * kept + 1)  # even ones alone may vanish by symmetry
+        fourier = Fourier(2 * kept + 1)  # 2 kept + 1 is odd: even ones may vanish by symmetry
         balance = Balance(equation, fourier, self.multiple)
         x, at = fourier.real_of(self.amplitudes), balance.instants(self.level)
         left = balance.residual(x, self.omega, at)
@@ -344,7 +345,7 @@ def along(orbits: list[Orbit]) -> dict[str, NDArray]:
 
 
 def amplitude(orbit: Orbit, measure: Quantity | None) -> float:
-    """Amplitude of a measure with a function, or of the node that swings most."""
+    """Amplitude of a measure or, without a measure, of the node that swings most."""
     phase = _phases()
     u = orbit.displacement(phase)
     if measure is None:
@@ -359,5 +360,5 @@ def amplitudes_of(coefficient: NDArray) -> NDArray[np.float64]:
 
 
 def _phases() -> NDArray[np.float64]:
-    """Phases of a period, and one beyond its end."""
+    """Phases of the samples of a period, and one phase beyond its end."""
     return 2.0 * np.pi * np.arange(SHOWN + 2) / SHOWN

@@ -1,12 +1,12 @@
 """Few unknowns for large sheets: modes, and how they change as the sheet moves along them.
 
-A folded sheet moves along curves: bars and panels that hardly stretch make nodes follow arcs, which
-no sum of modes does. Modal derivatives add the second order (Idelsohn and Cardona, Comput. Methods
+In a folded sheet, bars and panels that hardly stretch make nodes follow arcs; each mode moves nodes
+along straight lines. Modal derivatives add the second order (Idelsohn and Cardona, Comput. Methods
 Appl. Mech. Eng. 49, 1985): with K the tangent and dK/dq_i its change along mode i,
 
     theta_ij = -K^-1 (dK/dq_j) phi_i.
 
-The static responses to the drive complete them. Moving supports carry the sheet along
+The static responses to the drive complete the basis. Moving supports carry the sheet along
 quasi-statically.
 """
 
@@ -22,13 +22,13 @@ from foldyn.cases.contact_checks import check_contact
 from foldyn.errors import ComputationError, InputError
 from foldyn.periodic.equation import Equation, Instants, Tangents
 
-PROBE = 1e-3  # of the sheet's size: step of the largest node for derivatives
-LITTLE = 1e-4  # of the drive, for its static response
-DEPENDENT = 1e-6  # relative singular value below which vectors are dependent
+PROBE = 1e-3  # step for derivatives: largest motion of a node, relative to the sheet's size
+LITTLE = 1e-4  # fraction of the drive that is applied to find the static response
+DEPENDENT = 1e-6  # relative singular value below which vectors count as dependent
 
 
 def reduced(equation: Equation, modes: int, displacement: NDArray) -> Equation:
-    """The equation on the span of the lowest modes about a state and their derivatives.
+    """The equation projected on the lowest modes about a state and their modal derivatives.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def reduced(equation: Equation, modes: int, displacement: NDArray) -> Equation:
     Returns
     -------
     Equation
-        Its `whole` is the given equation.
+        The reduced equation; its attribute `whole` is the given equation.
     """
     still = equation.at(np.zeros(1), 0.0)
     check_contact(equation.case, displacement, still.planes[0])
@@ -87,7 +87,7 @@ def _static(equation: Equation, place: NDArray, factors) -> list[NDArray]:
 
 
 def _independent(mass: NDArray, vectors: NDArray) -> NDArray:
-    """M-orthonormal basis (k, r) of the span of vectors, without dependent ones."""
+    """M-orthonormal basis (k, r) of the span of vectors, without dependent vectors."""
     vectors = vectors / np.sqrt(np.einsum("ij,ik,kj->j", vectors, mass, vectors))
     value, turned = np.linalg.eigh(vectors.T @ mass @ vectors)
     kept = value > DEPENDENT**2 * value[-1]
@@ -118,7 +118,7 @@ def _projected(
 
 
 def _carried(equation: Equation, place: NDArray, shape: NDArray, factors) -> NDArray:
-    """Displacements (m,) when supports move quasi-statically by a shape (m,)."""
+    """Displacements (m,) of all dofs if supports move quasi-statically by a shape (m,)."""
     tangent = equation.body.tangent(equation.basis @ place)
     full = np.zeros(tangent.shape[0])
     full[: len(shape)] = shape

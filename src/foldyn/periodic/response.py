@@ -42,15 +42,15 @@ from foldyn.results import Quantity
 from foldyn.results.dataset import points_dataset
 from foldyn.values import number, numbers, of_kind, show, whole
 
-FIRST = 0.2  # of the longest step
-AWAY = 0.05  # of the motion: distance at which a branch is entered
-APART = 1e-2  # least distance from 1 of the multipliers at a spurious fold
-LARGEST = "largest displacement"  # of any node along an axis: shown without a measure
-MEETS = 1e-4  # of the range of the parameter: distance below which branches meet at one point
+FIRST = 0.2  # length of the first step, relative to the longest step
+AWAY = 0.05  # distance at which a branch is entered, relative to the motion
+APART = 1e-2  # at a spurious fold, all multipliers are farther than this from 1
+LARGEST = "largest displacement"  # of any node along an axis: name of the default measure
+MEETS = 1e-4  # branches meet below this distance, relative to the range of the parameter
 FOLD, PITCHFORK = "fold", "pitchfork"
 DOUBLING, TORUS = "period doubling", "Neimark-Sacker"
 SURE = {FOLD: 1e-6, PITCHFORK: 1e-3, DOUBLING: 1e-3, TORUS: 1e-3}
-"""How close to zero the test function of a bifurcation must come."""
+"""Largest absolute value of the test function at a located bifurcation of each kind."""
 REAL = 1e-9  # largest imaginary part of a real multiplier
 
 
@@ -84,24 +84,26 @@ def response_curve(
 ) -> xarray.Dataset:
     """Periodic motions of a case along the frequency or the amplitude of its harmonic histories.
 
-    Pseudo-arclength continuation from the first end to the second, through folds, with the
-    stability of each motion and the branches that fork off.
+    Pseudo-arclength continuation leads from the first end to the second, through folds. It gives
+    the stability of each motion, and follows branches that fork off.
 
     Parameters
     ----------
     case : Case
         As for `periodic_motion`.
     frequencies : (float, float)
-        Both ends (Hz); the curve begins at the first. Sizes and phases of the drive are kept.
+        Both ends of the range (Hz); the curve begins at the first. Amplitudes and phases of the
+        drive are kept.
     harmonics : int
         Number of harmonics of the drive frequency.
     measure : Quantity, optional
-        Quantity whose `function` of displacement (n, 3), m, velocity (n, 3), m/s, and time, s, the
-        curve shows: half the distance between its extremes in a period. By default the displacement
-        of the node and along the axis with the largest one.
+        Quantity of which the curve shows the amplitude: half the difference between the largest and
+        the smallest value of its `function` (of displacement (n, 3), m, velocity (n, 3), m/s, and
+        time, s) in a period. By default the displacement along an axis of the node that swings
+        most.
     amplitudes : (float, float), optional
-        Instead of frequencies: both ends of a factor on all harmonic histories, at the case's own
-        frequency.
+        Instead of frequencies: both ends of the range of a factor on all harmonic histories, at the
+        frequency of the case.
     guess : State or xarray.Dataset, optional
         Start of the search at the first end; see `periodic_motion`.
     periods : int
@@ -112,8 +114,8 @@ def response_curve(
         Depth to which branches that fork off at a pitchfork (both) or a period doubling are
         followed: 0 none, 1 branches of the curve, 2 also their branches.
     longest_step : float
-        Length of a step; a change of the whole motion by its own size counts as 1, and so does the
-        range of the frequencies.
+        Largest length of a step. A change of the motion by its own size has the length 1, and so
+        has the whole range of frequencies.
     most_points : int
         Largest number of points on one branch.
     steps, tolerance
@@ -139,14 +141,14 @@ def response_curve(
     ComputationError
         No motion is found at the first end.
     MotionInterrupted
-        From the keyboard (Ctrl-C); its `partial` holds the points so far.
+        Interrupted from the keyboard (Ctrl-C); the exception's `partial` holds the points so far.
 
     Warns
     -----
     FoldynWarning
-        A branch is lost, or has too many points (the points found are kept); too few harmonics, as
-        shown by the truncation, folds at which no multiplier is 1, or forks without branches;
-        motions that pass through contacts; too few modes.
+        A branch is lost, or has too many points (the points found are kept); motions pass through
+        contacts; there are too few modes; or too few harmonics, as shown by the truncation, by
+        folds at which no multiplier is 1, or by forks without branches.
     """
     began = time.perf_counter()
     of_kind("case", case, Case)
@@ -174,7 +176,7 @@ def response_curve(
 
 
 def _range(frequencies: Any, amplitudes: Any) -> tuple[str, tuple[float, float]]:
-    """The varied parameter, and its ends."""
+    """Name of the varied parameter, and the two ends of its range."""
     if (frequencies is None) == (amplitudes is None):
         raise InputError(": give frequencies (Hz) or amplitudes, one of the two", "frequencies")
     by, given = ("frequencies", frequencies) if amplitudes is None else ("amplitudes", amplitudes)
@@ -194,7 +196,7 @@ class _Tracer:
         self.low, self.high = min(ends), max(ends)
         self.span, self.count = self.high - self.low, count
         self.found: list[_Found] = []
-        self.forks: list[Event] = []  # at which branches cross or begin
+        self.forks: list[Event] = []  # bifurcations at which branches cross or begin
         self.met: list[Event] = []  # forks that a branch has returned to
         self.branch, self.complete = 0, True
 
@@ -206,7 +208,7 @@ class _Tracer:
         return ByLevel(balance, self.span, self.tolerance, frequency)
 
     def first(self, family: Any, guess: Any) -> Point:
-        """Point at the first end, with the tangent toward the second."""
+        """Point at the first end of the range, with the tangent toward the second."""
         balance, p = family.balance, self.ends[0]
         if self.by == "frequencies":
             omega, level = 2.0 * np.pi * p, 1.0
@@ -222,7 +224,7 @@ class _Tracer:
     ) -> None:
         """Follow a branch from its first point, then the branches that fork off, to a depth.
 
-        origin : the bifurcation, of this family, from which the branch comes.
+        origin : the bifurcation from which the branch comes, as a member of this family.
         """
         branch, forks = self.branch, []
         known: dict[int, tuple[Point, NDArray]] = {}
@@ -250,7 +252,7 @@ class _Tracer:
                 keep(event.point, "" if back else event.name)
                 if event.name in (PITCHFORK, DOUBLING) and not back:
                     forks.append(event)
-            if back:  # back on the curve from which it came
+            if back:  # the branch has returned to the curve from which it came
                 self.met.append(back)
                 break
             keep(step.after)
@@ -300,7 +302,7 @@ class _Tracer:
             point = Point(fourier.real_of(spread).ravel(), point.p, ahead, 0.0)
         jacobian, across = family.jacobian(point.z, point.p), np.zeros(len(point.z))
         mode = np.ones(len(across), bool)
-        if event.name == DOUBLING:  # odd harmonics are new, and decoupled from the even ones
+        if event.name == DOUBLING:  # odd harmonics are new, and decoupled from even harmonics
             mode = np.repeat(family.balance.fourier.order % 2 == 1, old.shape[1])
         across[mode] = np.linalg.svd(jacobian[np.ix_(mode, mode)])[2][-1] * family.size(point.z)
         # the two sides of a period doubling differ only in phase
@@ -333,7 +335,7 @@ def _warn_of_folds(found: list[_Found]) -> None:
 
 
 def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
-    """Dataset of the points found; warns about its accuracy."""
+    """Dataset of the points found; warns if they are not accurate."""
     orbits = [found.family.orbit(found.point.z, found.point.p) for found in tracer.found]
     names = np.array([found.bifurcation for found in tracer.found], dtype="<U15")
     values = {
@@ -378,7 +380,7 @@ Multipliers = Callable[[Point], Found]
 def events(family: Any, step: Step, of: Multipliers) -> list[Event]:
     """Bifurcations within a step, in order along it.
 
-    of : multipliers (2k,) of a point.
+    of : function that returns the multipliers (2k,) at a point.
     """
     one, other = step.before, step.after
     found: list[tuple[str, Callable[[Point], float]]] = []
@@ -390,13 +392,13 @@ def events(family: Any, step: Step, of: Multipliers) -> list[Event]:
         found.append((DOUBLING, lambda point: _parity(of(point)) * _nearest(of(point), -1.0)))
     moduli = _moduli(of(one)), _moduli(of(other))
     counts = [int((pairs > 1.0).sum()) for pairs in moduli]
-    # a pair that crosses has not met on the real axis: it exists at both ends
+    # a complex pair that crosses the unit circle exists at both ends of the step
     if counts[0] != counts[1] and min(map(len, moduli)) >= max(counts):
         found.append((TORUS, lambda point: _modulus(_moduli(of(point)), max(counts)) - 1.0))
     events = []
     for name, value in found:
         point = located(family, one, other, step.length, value)
-        if abs(value(point)) <= SURE[name]:  # pairs may meet on the real axis instead
+        if abs(value(point)) <= SURE[name]:  # else a pair has met on the real axis instead
             events.append((name, point))
     along = [_along(one, point) for _, point in events]
     return [Event(*events[k]) for k in np.argsort(along, kind="stable")]
@@ -424,5 +426,5 @@ def _moduli(found: Found) -> NDArray:
 
 
 def _modulus(moduli: NDArray, place: int) -> float:
-    """Modulus at a place, counted from 1; 0 if there are fewer."""
+    """Modulus at a place in the list, counted from 1; 0 if the list is shorter."""
     return float(moduli[place - 1]) if len(moduli) >= place else 0.0
