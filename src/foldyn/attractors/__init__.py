@@ -1,4 +1,4 @@
-"""Where long motions end: sweeps and their jumps, sections, exponents, basins of attraction."""
+"""Where long motions end: sweeps, jumps, Poincare sections, exponents, basins of attraction."""
 
 from foldyn.facade import lazy
 

@@ -25,7 +25,7 @@ from foldyn.values import choice, number, numbers, of_kind, whole
 SWEEPS = ("up", "down", "both")
 RESOLUTION = 1e-3  # relative width to which jumps are bracketed
 SAME = 1e-9  # relative difference below which values are equal
-REPEATS = 1e-3  # of the size of a motion: distance below which states are equal
+REPEATS = 1e-3  # states closer than this are equal, relative to the size of the motion
 FREQUENCY = Quantity("Hz", "frequency of the drive")
 LEVEL = Quantity("1", "factor on the drive")
 
@@ -48,9 +48,9 @@ def bifurcation_diagram(
 ) -> xarray.Dataset:
     """Steady motions at successive frequencies, or amplitudes, of the drive: a stepped sine.
 
-    Each motion starts at the end of the previous one, settles, and is recorded: its amplitude, and
-    the measure once per period of the drive. Jumps are bracketed by bisection, starting from the
-    motion before them.
+    Each motion starts at the end of the previous one and settles; then its amplitude is recorded,
+    and the measure once per period of the drive. Jumps are bracketed by bisection, starting from
+    the motion before the jump.
 
     Parameters
     ----------
@@ -61,21 +61,23 @@ def bifurcation_diagram(
         Quantity to show; its `function` of displacement (n, 3), m, velocity (n, 3), m/s, and time,
         s, must return a number.
     frequencies : array_like, shape (k,)
-        Increasing frequencies (Hz) of the slowest of these histories: others keep their ratio to
-        it, and all keep their phases.
+        Increasing frequencies (Hz) of the slowest of these histories; the others keep their
+        frequency ratio to it, and all keep their phases.
     amplitudes : array_like, shape (k,)
-        Alternatively, increasing factors on everything harmonic, at the case's own frequency.
+        Alternatively, increasing factors on all harmonic histories, at the case's own frequency.
     sweep : {"up", "down", "both"}
         Direction; "both" goes up first, and down from there.
     settle, record : int
-        Periods of the drive that are skipped, and recorded (at least 4), at each value.
+        At each value, periods of the drive that are skipped, and periods that are recorded then (at
+        least 4).
     resolution : float
-        Relative width to which a jump is bracketed. A large change (over 20 % of the larger
-        amplitude) between neighbors that is not reached within this width is a steep curve.
+        Relative width to which a jump is bracketed. A large change between neighbors (more than
+        20 % of the larger amplitude) counts as a steep curve, not as a jump, if it needs more than
+        this width.
     initial : State, optional
         Where the first motion starts; rest by default.
     method, dt, tolerance :
-        As in `simulate`; `dt` is the largest step (s), by default at most a 64th of the period.
+        As in `simulate`; `dt` is the largest step (s), by default at most 1/64 of the period.
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress` of the number of values.
 
@@ -83,11 +85,12 @@ def bifurcation_diagram(
     -------
     xarray.Dataset
         Along `sweep` and `frequency` (Hz) or `level` (the factor): `section` (record), the measure
-        at the start of each period of the drive; `amplitude`, half the distance between its
-        extremes while recorded; `periods`, the number of drive periods after which the motion
-        repeats to 0.1 %, 0 if it does not within half the record (quasi-periodic, chaotic or not
-        settled). Along `jump`: `jump_sweep`, `jump_between` and `jump_amplitude` (side), before and
-        after. Attribute `complete`: 1 if every sweep reached its end.
+        at the start of each period of the drive; `amplitude`, half the difference between the
+        measure's extremes in the record; `periods`, the number of drive periods after which the
+        motion repeats to within 0.1 %, or 0 if it does not repeat within half the record
+        (quasi-periodic, chaotic or not settled). Along `jump`: `jump_sweep`, the direction of the
+        sweep, and `jump_between` and `jump_amplitude` (side), values before and after the jump.
+        Attribute `complete`: 1 if every sweep reached its end.
 
     Raises
     ------
@@ -96,7 +99,7 @@ def bifurcation_diagram(
     ComputationError
         The first motion fails.
     MotionInterrupted
-        From the keyboard (Ctrl-C); its `partial` holds the points so far.
+        Interrupted from the keyboard (Ctrl-C); the exception's `partial` holds the points so far.
 
     Warns
     -----
@@ -105,9 +108,9 @@ def bifurcation_diagram(
 
     Notes
     -----
-    Close to a fold a motion lingers before it falls, and jumps come late: give `settle` a few
-    hundred periods if damping is light. Points from which a long step has dislodged the motion too
-    early are replaced by motions that arrived there slowly.
+    Close to a fold a motion takes long to leave, and jumps are found too late: settle for a few
+    hundred periods if damping is light. If a long step made the motion jump too early, the points
+    after this jump are replaced by motions that arrived in small steps.
 
     Examples
     --------
@@ -186,7 +189,7 @@ class Swept(NamedTuple):
 
 
 def _swept(case: Case, frequencies: ArrayLike | None, amplitudes: ArrayLike | None) -> Swept:
-    """The swept parameter, from frequencies or amplitudes."""
+    """The swept parameter, from the arguments `frequencies` and `amplitudes`."""
     if (frequencies is None) == (amplitudes is None):
         raise InputError(": give frequencies (Hz) or amplitudes, one of the two", "frequencies")
     own = driven_frequency(case, "fd.bifurcation_diagram")
@@ -202,7 +205,7 @@ def _swept(case: Case, frequencies: ArrayLike | None, amplitudes: ArrayLike | No
 class Point(NamedTuple):
     """A steady motion."""
 
-    value: float  # of the swept parameter
+    value: float  # value of the swept parameter
     amplitude: float
     section: NDArray[np.float64]  # (record,)
     periods: int
@@ -221,7 +224,7 @@ class Steady(NamedTuple):
     def point(self, run: Run, value: float, begun: float = 0.0) -> Point:
         """The motion at a value of the swept parameter, started from a previous motion.
 
-        begun : elapsed part of its first period (s).
+        begun : time (s) since the current period of the drive began.
         """
         case, period = self.case_at(value), 1.0 / self.frequency_at(value)
         interval, transient = period / PER_PERIOD, self.settle * period
@@ -236,14 +239,14 @@ class Steady(NamedTuple):
 
 
 def states(stretch: Stretch, period: float) -> NDArray[np.float64]:
-    """States (k, 6 n), m, of a stretch: velocities are scaled by period / (2 pi)."""
+    """States (k, 6 n), m, of a stretch; velocities are multiplied by period / (2 pi)."""
     count = len(stretch.time)
     u, v = stretch.displacement.reshape(count, -1), stretch.velocity.reshape(count, -1)
     return np.hstack([u, period / (2.0 * np.pi) * v])
 
 
 def repeats_after(section: NDArray[np.float64], near: float) -> int:
-    """Least number of periods after which a motion repeats, up to half of them; 0 if none.
+    """Least number of periods after which a motion repeats, up to half the record; 0 if none.
 
     section : states (k, m), one per period.
     near : distance below which states are equal.
@@ -257,9 +260,9 @@ def repeats_after(section: NDArray[np.float64], near: float) -> int:
 def bracketed(steady: Steady, way: str, points: list[Point], resolution: float) -> list[Jump]:
     """Jumps between points in the order of a sweep, bracketed to a relative width.
 
-    A long step may dislodge a motion before its fold. From the motion before a jump, the sweep
-    therefore continues in halved steps, past the point where it fell, until it falls again. Points
-    passed on the way are replaced.
+    A long step may make a motion jump before it reaches the fold. From the motion before a jump,
+    the sweep therefore continues in halved steps until the motion jumps again, possibly beyond the
+    first jump. Points passed on the way are replaced.
     """
     found, k = [], 0
     while k < len(points) - 1:
@@ -286,12 +289,12 @@ def bracketed(steady: Steady, way: str, points: list[Point], resolution: float) 
                     break
                 passed.append(ahead)
             else:
-                break  # in short steps it does not fall
+                break  # in short steps the motion does not jump
     return found
 
 
 def _replace(steady: Steady, points: list[Point], k: int, passed: list[Point]) -> int:
-    """Replace points from number k on by motions in small steps; returns the next number."""
+    """Replace points from k on by motions reached in small steps; returns the next number."""
     way = np.sign(passed[-1].value - passed[0].value)
     while k < len(points) and way:
         value = points[k].value

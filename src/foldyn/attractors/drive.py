@@ -29,7 +29,7 @@ SIZES: Mapping[type, str] = {
     cases.Plane: "motion",
     cases.Air: "velocity",
 }
-"""Fields with the size of a load, of the motion of a support or plane, or of the wind."""
+"""The field that holds the size of a load, of a support's or plane's motion, or of the wind."""
 
 
 def drive_frequency(case: Case) -> float:
@@ -38,7 +38,7 @@ def drive_frequency(case: Case) -> float:
     Raises
     ------
     InputError
-        The others are not multiples of it, so that the drive has no period.
+        The other frequencies are not multiples of the lowest, so that the drive has no period.
     """
     return lowest_frequency(
         [part.history.frequency for _, part in _parts(case) if _is_driven(part)]
@@ -59,7 +59,7 @@ def lowest_frequency(frequencies: Sequence[float]) -> float:
 
 
 def driven_frequency(case: Case, name: str) -> float:
-    """`drive_frequency`, refused if `case` has no drive, or one that is not harmonic."""
+    """`drive_frequency` of a case; refuses cases without drive, or with a drive not harmonic."""
     check_harmonic(case, name)
     if frequency := drive_frequency(case):
         return frequency
@@ -84,7 +84,7 @@ def with_histories(case: Case, history: Callable[[Harmonic], History]) -> Case:
 
 
 def at_frequency(case: Case, frequency: float) -> Case:
-    """The case driven at another frequency (Hz); higher ones keep their ratio to it."""
+    """The case with another lowest drive frequency (Hz); higher ones keep their ratio to it."""
     ratio = frequency / drive_frequency(case)
     return with_histories(case, lambda own: replace(own, frequency=ratio * own.frequency))
 
@@ -95,7 +95,7 @@ def at_level(case: Case, level: float) -> Case:
     Raises
     ------
     InputError
-        Swinging actuated creases, whose angles cannot be scaled.
+        The case has creases that are actuated harmonically; their angles cannot be scaled.
     """
 
     def scaled(part: Any) -> Any:
@@ -127,7 +127,7 @@ def _altered(case: Case, change: Callable[[Any], Any]) -> Case:
 
 
 def _parts(case: Case) -> Iterator[tuple[str, Any]]:
-    """Parts that may have an active history, with their fields for messages."""
+    """Parts that may have an active history, each with its field (for messages)."""
     planes = () if case.contact is None else case.contact.planes
     listed = {"loads": case.loads, "supports": case.supports, "contact.planes": planes}
     for name, parts in listed.items():

@@ -1,6 +1,6 @@
-"""`basins`: where motions from a grid of starts end.
+"""`basins`: the attractors in which motions from a grid of starts end.
 
-The ends can be stored in a folder, so that an interrupted grid can continue.
+The end states can be stored in a folder, so that an interrupted grid can continue.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ from foldyn.results.seal import seal, sound
 from foldyn.store import Store, name_of, program
 from foldyn.values import choice, number, numbers, of_kind, show, whole
 
-AT_ONCE = 256  # motions
-LOOKED_AT = 64  # starts used to choose the step
-LEAST = 1e-6  # of the longest bar: least length scale for comparing states
-BYTES = 600.0  # memory of a start and its end, per node
+AT_ONCE = 256  # motions computed together, and stored in one file
+LOOKED_AT = 64  # most starts used to choose the step
+LEAST = 1e-6  # least length scale for comparing states, relative to the longest bar
+BYTES = 600.0  # memory per node for a start and the end of its motion
 TAKEN = (
     "attractor", "record", *PLACE, "basin", "periods", "share", "displacement", "velocity",
     "support",
 )  # fmt: skip
 """Names used in the result."""
-UNDRIVEN = 0.02  # of the duration: interval between recorded states without a drive
+UNDRIVEN = 0.02  # without a drive, interval between recorded states, relative to the duration
 
 
 def basins(
@@ -68,33 +68,34 @@ def basins(
 ) -> xarray.Dataset:
     """Basins of attraction: the motion, or equilibrium, in which each start of a grid ends.
 
-    All motions are computed together (`simulate_many`). Motions that end in the same states, once
-    per period of the drive, have the same attractor.
+    All motions are computed together (`simulate_many`). Motions have the same attractor if they end
+    in the same states, sampled once per period of the drive.
 
     Parameters
     ----------
     case : Case
-        Case without hinges that yield or creep. Its `Harmonic` histories set the period; without
-        any, attractors are equilibria.
+        Case without hinges that yield or creep. Its `Harmonic` histories set the period; without a
+        `Harmonic` history, attractors are equilibria.
     initial : callable
-        Returns the `State` at a point of the grid, whose values are its keyword arguments.
+        Function that returns the `State` at a point of the grid; its keyword arguments are the
+        values of the parameters at this point.
     grid : mapping of str to array_like
         Values of each parameter of `initial`: {"height": ..., "speed": ...}.
     duration : float
         Duration (s) of each motion before it is recorded, rounded up to whole periods.
     record : int
-        States then recorded, one per period, at least 4: attractors of up to half as many periods
-        are distinguished.
+        Number of states recorded after `duration`, one per period, at least 4: attractors of up to
+        half as many periods are distinguished.
     same : float
         Distance below which states are equal, as a fraction of the range of all states.
     dt : float, optional
         Largest step (s), shortened to divide the period. By default half the least critical step of
-        64 of the starts, and with a drive at most a 64th of its period.
+        up to 64 of the starts, and with a drive at most 1/64 of the period.
     method, threads, device :
         As in `simulate_many`.
     folder : path, optional
-        Stores where motions end, 256 at a time, so that an interrupted grid, or one with more
-        starts after the same first ones, continues there.
+        Folder in which the ends of motions are stored, 256 at a time. An interrupted grid, or a
+        grid that adds starts after the same first ones, continues from the stored ends.
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress` of the number of motions.
 
@@ -103,9 +104,10 @@ def basins(
     xarray.Dataset
         Along the names of the grid: `basin`, the number of the attractor, from 0 in order of
         appearance, or -1 if the motion does not repeat: it is chaotic, has not settled yet, or has
-        failed. Along `attractor`: `periods`, the number of drive periods after which it repeats (1
-        for an equilibrium), `share` of the starts, and along `record` the states `displacement` (m)
-        and `velocity` (m/s). The attribute `device` names the device that computed them.
+        failed. Along `attractor`: `periods`, the number of drive periods after which the attractor
+        repeats (1 for an equilibrium); `share`, the share of the starts that end in it; and along
+        `record` the states `displacement` (m) and `velocity` (m/s). The attribute `device` names
+        the device that computed the motions.
 
     Raises
     ------
@@ -116,7 +118,7 @@ def basins(
     Warns
     -----
     FoldynWarning
-        Motions that do not repeat; warnings of `simulate_many`.
+        Some motions do not repeat; also the warnings of `simulate_many`.
 
     Examples
     --------
@@ -202,7 +204,7 @@ def _dataset(
 
 
 def _grid(grid: Any, nodes: int) -> tuple[tuple[str, ...], list[NDArray[np.float64]]]:
-    """Names of the parameters, and the values of each; checks the memory for the starts."""
+    """Names and values of the parameters; checks that there is memory for all starts."""
     if not isinstance(grid, Mapping) or not grid:
         raise InputError(f" = {show(grid)}: give values by name, {{'height': [0.0, 0.1]}}", "grid")
     places = []
@@ -246,7 +248,7 @@ def _starts(
 def _step(
     case: Case, starts: Sequence[State], method: str, dt: float | None, period: float, driven: bool
 ) -> float:
-    """Step (s) that divides the period."""
+    """Step (s) of the motions, which divides the period; see `dt` in `basins`."""
     if dt is None:
         longest = period / PER_PERIOD if driven else np.inf
         some = starts[:: -(-len(starts) // LOOKED_AT)]
@@ -262,7 +264,7 @@ def _ends(
 ) -> NDArray[np.float64]:  # fmt: skip
     """States (m, record, 2, n, 3) of settled motions, one per period.
 
-    used : receives the device on which they have settled.
+    used : receives the name of the device that computed the motions, as "device".
     """
     count = len(starts)
     before = simulate_many([case] * count, settled, interval=settled, initial=starts, **how)
@@ -286,7 +288,7 @@ def _size(
 ) -> float:
     """Length scale (m) for comparing states: the range of the end states.
 
-    If all end in one attractor, the starts also set the scale.
+    If there is no drive, or all motions end in one attractor, the starts also set the scale.
     """
     shape = case.structure.nodes.shape
     first = [
@@ -306,10 +308,10 @@ def _size(
 def told_apart(
     ends: NDArray[np.float64], weights: NDArray[np.float64], same: float, size: float
 ) -> tuple[NDArray[np.int64], list[int], list[int]]:
-    """Attractor of each motion (m,), one motion of each attractor, and its periods.
+    """Attractor of each motion (m,), and for each attractor one motion and the periods.
 
     ends : states (m, record, 2, n, 3), one per period.
-    weights : of displacement and velocity in a distance.
+    weights : weights of displacement and velocity in a distance.
     same : distance below which states are equal, relative to `size` (m).
     """
     states = (ends * weights[:, None, None]).reshape(*ends.shape[:2], -1)
@@ -336,7 +338,7 @@ def told_apart(
 
 
 class KeptEnds:
-    """Ends of motions, each batch stored in a file of its own.
+    """Stored end states of motions, one file per batch.
 
     Parameters
     ----------
@@ -344,12 +346,12 @@ class KeptEnds:
         Folder of the files; None stores nothing.
     case : Case
     how : mapping
-        All else that the ends depend on, as JSON data.
+        Everything else on which the ends depend, as JSON data.
 
     Raises
     ------
     InputError
-        The case cannot be written down, so that stored ends might belong to another one.
+        The case cannot be written to a file, so that stored ends could belong to another case.
     """
 
     def __init__(

@@ -22,11 +22,11 @@ class Jump(NamedTuple):
     sweep : str
         "up" or "down".
     place : float
-        Last frequency (Hz), or level, before it.
+        Last frequency (Hz), or level, before the jump.
     after : float
-        First frequency, or level, after it.
+        First frequency, or level, after the jump.
     amplitudes : tuple of float
-        Before and after.
+        Amplitudes before and after the jump.
     """
 
     sweep: str
@@ -43,10 +43,11 @@ def is_jump(before: ArrayLike, after: ArrayLike) -> NDArray[np.bool_]:
 def jumps_between(
     sweep: str, place: NDArray[np.float64], amplitude: NDArray[np.float64], width: float
 ) -> list[Jump]:
-    """Jumps of amplitudes (k,) at successive places (k,): large changes within a width.
+    """Jumps of amplitudes (k,) at successive frequencies or levels (k,).
 
-    The width is relative to the place. Among changes less than two widths apart only the largest
-    one counts: after a jump the amplitude swings until the transient has decayed.
+    A jump is a large change of the amplitude within a width, given relative to the place. Among
+    changes less than two widths apart only the largest counts: after a jump the amplitude swings
+    until the transient has decayed.
     """
     last = len(place) - 1
     ends = np.arange(last) + 1
@@ -68,9 +69,9 @@ def jumps_between(
 def jump_variables(
     jumps: Sequence[Jump], along: Quantity, measure: Quantity
 ) -> Mapping[str, tuple[Any, ...]]:
-    """Variables of a dataset along the dimension jump.
+    """Variables that hold the jumps in a dataset, along the dimension jump.
 
-    along : swept parameter.
+    along : the swept parameter.
     """
     sweeps = np.array([jump.sweep for jump in jumps], "<U4")
     places = np.reshape([(jump.place, jump.after) for jump in jumps], (-1, 2))

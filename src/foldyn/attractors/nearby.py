@@ -1,4 +1,4 @@
-"""`lyapunov_exponent`: how fast two motions with close starts separate."""
+"""`lyapunov_exponent`: how fast two motions that start close together separate."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from foldyn.results.quantities import variable
 from foldyn.values import choice, number, of_kind
 
 APART = 1e-7  # distance of the second motion, relative to the size of the first
-SMALL = 1e-4  # of the longest bar: least size, for a motion at rest
-MOST = 11.0  # largest change of the logarithm of the distance in an interval
+SMALL = 1e-4  # least size of a motion (if it is at rest), relative to the longest bar
+MOST = 11.0  # largest change of the distance's logarithm in an interval
 BLOCKS = 16  # blocks of the record, for the error estimate
 SEED = 20
 """Seed for the direction in which the second motion starts."""
@@ -58,8 +58,8 @@ def lyapunov_exponent(
     duration : float
         Time over which the rate is averaged (s).
     settle : float
-        Time before that (s), in which the motion reaches its attractor, and the separation turns to
-        its most unstable direction.
+        Time (s) before the average begins, in which the motion reaches its attractor and the
+        separation of the two motions turns to the most unstable direction.
     interval : float, optional
         Time between corrections of the distance (s); by default the period of the drive, or a
         hundredth of the duration without a drive.
@@ -68,17 +68,17 @@ def lyapunov_exponent(
     method : {"rk4", "central_difference"}
         An explicit method with fixed steps.
     dt : float, optional
-        Largest step (s), shortened to divide the interval. By default half the critical one, and
-        with a drive at most a 64th of its period.
+        Largest step (s), shortened to divide the interval. By default half the critical step, and
+        with a drive at most 1/64 of the period.
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress`.
 
     Returns
     -------
     xarray.Dataset
-        `exponent` (1/s), its standard `error` from the means of 16 blocks of the record, and, along
-        `time`, the end of each interval after `settle`, `estimate`: the running mean, which shows
-        the convergence.
+        `exponent` (1/s); `error`, the standard error of the exponent, from the means of 16 blocks
+        of the record; and `estimate`, the running mean along `time` (the ends of the intervals
+        after `settle`), to judge the convergence.
 
     Raises
     ------
@@ -88,13 +88,14 @@ def lyapunov_exponent(
     InstabilityError
         A motion grew without bound.
     MotionInterrupted
-        From the keyboard (Ctrl-C); its `partial` holds the estimate so far.
+        Interrupted from the keyboard (Ctrl-C); the exception's `partial` holds the estimate so far.
 
     Notes
     -----
-    The distance is 1e-7 of the motion's size, so that nonlinear terms are as small. It combines
-    displacements (m) and velocities times interval / (2 pi). The mean converges like one over the
-    duration for a periodic motion, and like one over its square root for a chaotic one.
+    The distance is 1e-7 of the motion's size, so that nonlinear terms have the same small relative
+    size. It combines displacements (m) and velocities times interval / (2 pi). The error of the
+    mean falls in proportion to 1 / duration for a periodic motion, and to 1 / sqrt(duration) for a
+    chaotic motion.
 
     Benettin, Galgani, Giorgilli, Strelcyn (1980), Meccanica 15, 9-30.
 
@@ -183,14 +184,14 @@ def _check(case: Case, method: str, initial: State | None) -> None:
 
 
 class Pair:
-    """Two motions with close starts.
+    """Two motions that start close together.
 
     Parameters
     ----------
     case, initial, method, dt :
         As in `lyapunov_exponent`.
     duration, interval : float
-        s.
+        As in `lyapunov_exponent`, s.
     """
 
     def __init__(
@@ -252,7 +253,7 @@ class Pair:
             raise error
 
     def _tied(self, values: NDArray) -> NDArray:
-        """Values (rows, 3), as stored, without forbidden motions, whose round-off stays."""
+        """Values (rows, 3), as stored, with motions that ties forbid set to zero."""
         x = self._numbering.outward(values)
         x[self._ties.determined] = 0.0
         return self._numbering.inward(self._ties.displacement(x.ravel()).reshape(x.shape))

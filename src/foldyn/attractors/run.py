@@ -28,7 +28,7 @@ class Stretch(NamedTuple):
     time: NDArray[np.float64]  # (k,) s
     displacement: NDArray[np.float64]  # (k, n, 3) m
     velocity: NDArray[np.float64]  # (k, n, 3) m/s
-    memory: NDArray[np.float64] | None = None  # (k, b, 2) of laws with memory
+    memory: NDArray[np.float64] | None = None  # (k, b, 2), states of laws with memory
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Run:
     Parameters
     ----------
     method, dt, tolerance :
-        As in `simulate`, `dt` the largest step (s), shortened to divide the sampling interval.
+        As in `simulate`; `dt` is the largest step (s), shortened to divide the sampling interval.
     state : State, optional
         Current state; rest by default.
     """
@@ -49,7 +49,7 @@ class Run:
     state: State | None
 
     def __post_init__(self) -> None:
-        """Check the arguments of every stretch."""
+        """Check the arguments that all stretches share."""
         choice("method", self.method, METHODS)
         if self.state is not None:
             of_kind("initial", self.state, State)
@@ -58,7 +58,7 @@ class Run:
         self, case: Case, duration: float, interval: float, longest: float, start: float = 0.0,
         report: Reporter | None = None,
     ) -> tuple[Stretch, Run]:  # fmt: skip
-        """Continue with a case for a duration (s), with a sample every `interval` (s).
+        """Continue under a case for a duration (s), with a sample every `interval` (s).
 
         longest : step (s) of methods with fixed steps if the user gives none.
         """
@@ -101,7 +101,7 @@ def check_relaxing(case: Case, why: str) -> None:
 
 
 def check_measure(measure: Any, nodes: int, name: str = "measure") -> Quantity:
-    """Refuse a measure that does not return a number, as tried on the rest state."""
+    """Refuse a measure that does not return a number in the rest state."""
     of_kind(name, measure, Quantity)
     if measure.function is None or measure.dims:
         raise InputError(
@@ -131,7 +131,8 @@ def measured(measure: Quantity, stretch: Stretch, name: str = "measure") -> NDAr
 def extremes(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Upper and lower values (k, ...) of evenly spaced samples (k, ...), refined at extremes.
 
-    At a turning point, the vertex of the parabola through three samples; else the sample.
+    The value at a turning point is the vertex of the parabola through three samples; elsewhere it
+    is the sample itself.
     """
     top = values.copy()
     before, now, after = values[:-2], values[1:-1], values[2:]
@@ -142,6 +143,6 @@ def extremes(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[
 
 
 def swing(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Half the distance (...) between the extremes of samples (k, ...)."""
+    """Half the difference (...) between the extremes of samples (k, ...)."""
     top, bottom = extremes(values)
     return 0.5 * (top.max(axis=0) - bottom.min(axis=0))

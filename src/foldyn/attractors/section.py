@@ -1,4 +1,4 @@
-"""`poincare_section`: the states of a motion once a period, or where a quantity passes a level."""
+"""`poincare_section`: states of a motion once per period, or where a quantity passes a level."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from foldyn.results.attributes import facts, own_attributes
 from foldyn.results.quantities import MOTION, variable, variables
 from foldyn.values import choice, number, show
 
-ITERATIONS = 60  # of the bisection for the time of a crossing
-ROUNDING = 1e-9  # tolerance, as a fraction of a period
+ITERATIONS = 60  # bisection steps to find the time of a crossing
+ROUNDING = 1e-9  # tolerance of times, as a fraction of a period
 
 
 def poincare_section(
@@ -36,11 +36,11 @@ def poincare_section(
     motion : xarray.Dataset
         A result of `simulate`.
     period : float, optional
-        Time between the states (s): a stroboscopic section. Without it, and without a plane, the
-        period of the drive of the motion's case.
+        Time (s) between the states, for a stroboscopic section. By default, without a plane, the
+        period of the drive in the motion's case.
     plane : Quantity, optional
-        Alternatively, a quantity whose `function` of displacement (n, 3), m, velocity (n, 3), m/s,
-        and time, s, crosses the level.
+        Alternatively, a quantity; states are taken where its `function` of displacement (n, 3), m,
+        velocity (n, 3), m/s, and time, s, crosses the level.
     level : float
         Level, in the unit of the quantity.
     direction : {"up", "down", "both"}
@@ -67,8 +67,8 @@ def poincare_section(
 
     Notes
     -----
-    Between samples a motion is interpolated by the cubic through displacements and velocities: its
-    error is of order h^4 in displacement and h^3 in velocity, h the sampling interval. With
+    Between samples a motion is interpolated by the cubic through displacements and velocities. With
+    the sampling interval h, the error is of order h^4 in displacement and h^3 in velocity. With
     ``interval = period / k`` the states are samples themselves.
 
     Examples

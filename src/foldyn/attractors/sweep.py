@@ -28,7 +28,7 @@ from foldyn.values import choice, number, numbers, of_kind, whole
 
 PER_CYCLE = 48  # samples in a cycle of the highest frequency
 FEWEST = 10  # least cycles in a sweep
-HELD, FEWEST_RECORDED = 50, 4  # cycles at a held frequency: to settle, and recorded
+HELD, FEWEST_RECORDED = 50, 4  # least cycles to settle, and cycles recorded, at a held frequency
 
 
 def swept_sine(
@@ -46,7 +46,7 @@ def swept_sine(
     tolerance: float | None = None,
     progress: bool | Reporter | None = None,
 ) -> xarray.Dataset:
-    """Motion under a slow frequency sweep of the drive, up or down, and its amplitude by cycle.
+    """Motion under a slow frequency sweep of the drive, up or down, and amplitude in each cycle.
 
     The harmonic histories of the case become chirps with linearly changing frequency.
 
@@ -57,24 +57,24 @@ def swept_sine(
     measure : Quantity
         As in `bifurcation_diagram`.
     frequencies : (float, float)
-        Lower and upper frequency (Hz) of the slowest of these histories: others keep their ratio
-        to it, and all keep their phases.
+        Lower and upper frequency (Hz) of the slowest of these histories; the others keep their
+        frequency ratio to it, and all keep their phases.
     duration : float
-        Duration of a sweep from one to the other (s).
+        Duration (s) of a sweep from one frequency to the other.
     sweep : {"up", "down", "both"}
         Direction; "both" goes up first, and down from there.
     settle : int
-        Cycles at the first frequency before each sweep, and (at least 50) at each frequency that is
-        held to tell a jump from a steep curve.
+        Number of cycles at the first frequency before each sweep. It is also the number of cycles
+        (but at least 50) at each frequency that is held to tell a jump from a steep curve.
     resolution : float
-        Relative width in frequency within which a change of the amplitude by over 20 % of the
-        larger one may be a jump. It is one if stepped motions between these frequencies, started
-        before it, also jump, as in `bifurcation_diagram`. Jumps show in a sweep slow enough for a
-        vibration to decay within this width.
+        Relative width in frequency within which a change of the amplitude, by more than 20 % of the
+        larger amplitude, may be a jump. It is a jump if motions at stepped frequencies, started
+        before the change, also jump, as in `bifurcation_diagram`. To show jumps, the sweep must be
+        slow enough for a vibration to decay within this width.
     initial : State, optional
         Where the motion starts; rest by default.
     method, dt, tolerance :
-        As in `simulate`, `dt` the largest step (s).
+        As in `simulate`; `dt` is the largest step (s).
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress`.
 
@@ -82,8 +82,9 @@ def swept_sine(
     -------
     xarray.Dataset
         Along `sweep` and `cycle`: `frequency` (Hz), the inverse duration of the cycle, and
-        `amplitude`, half the distance between the measure's extremes in it. Cycles are numbered by
-        increasing frequency. Along `jump` as in `bifurcation_diagram`.
+        `amplitude`, half the difference between the measure's extremes in the cycle. Cycles are
+        numbered by increasing frequency. Along `jump`: the same variables as in
+        `bifurcation_diagram`.
 
     Raises
     ------
@@ -94,8 +95,8 @@ def swept_sine(
 
     Notes
     -----
-    A sweep overshoots a fold before it jumps, the farther the faster it is; `bifurcation_diagram`
-    waits at each frequency.
+    A sweep passes a fold before the motion jumps; the faster the sweep, the later the jump.
+    `bifurcation_diagram` avoids this because it waits at each frequency.
 
     Examples
     --------
@@ -177,7 +178,7 @@ class Line(NamedTuple):
 
     @property
     def cycles(self) -> NDArray[np.float64]:
-        """Times (s) at which each cycle begins, and at which the last one ends."""
+        """Times (s) at which each cycle begins, and at which the last cycle ends."""
         count = int(0.5 * (self.start + self.end) * self.duration * (1.0 + 1e-12))
         turns = np.arange(count + 1)
         root = np.sqrt(self.start**2 + 2.0 * self.slope * turns)
@@ -186,7 +187,8 @@ class Line(NamedTuple):
     def chirp(self, lowest: float) -> Callable[[Harmonic], Chirp]:
         """Map harmonic histories to chirps along this line, for a `lowest` drive frequency (Hz).
 
-        They continue for a cycle beyond the end, so that nothing jumps there.
+        The chirps continue for a cycle beyond the end of the line, so that the drive does not jump
+        at the end.
         """
         more = 1.0 / max(self.start, self.end)
         length, end = self.duration + more, self.end + self.slope * more
@@ -211,10 +213,10 @@ class Glide(NamedTuple):
     run: Run
 
     def folds(self, jump: Jump, width: float) -> bool:
-        """Whether motions at steps of the frequency also jump, or the curve is merely steep.
+        """Whether motions at stepped frequencies also jump, so that the curve is not just steep.
 
-        The sweep overshoots a fold, so steps begin earlier, where the amplitude holds at a fixed
-        frequency.
+        The sweep passes a fold before it jumps, so the steps begin earlier, at a frequency at which
+        the motion keeps its amplitude if the frequency is held.
         """
         steady = Steady(
             lambda f: at_frequency(self.case, f), lambda f: f, self.measure,
@@ -232,7 +234,7 @@ class Glide(NamedTuple):
                 first = int(np.flatnonzero(apart)[-1]) if apart.any() else 0
             after = steady.point(before.run, jump.after)
             return bool(bracketed(steady, jump.sweep, [before, after], RESOLUTION))
-        except ComputationError:  # the motion fails there
+        except ComputationError:  # a motion at a held frequency fails
             return True
 
     def _at(self, cycle: int) -> tuple[Run, float, float]:
@@ -252,7 +254,7 @@ def _glide(
 ) -> tuple[Stretch, Run]:
     """Motion along a line of frequencies, after `settle` cycles at the first one.
 
-    longest : largest sampling interval (s), and step if the user gives none.
+    longest : largest sampling interval (s), and largest step (s) if the user gives none.
     """
     if settle:
         wait = settle / line.start
@@ -266,7 +268,7 @@ def _glide(
 def _amplitudes(
     times: NDArray[np.float64], values: NDArray[np.float64], cycles: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Half the distance between the extremes in each cycle."""
+    """Half the difference between the extremes of the measure in each cycle."""
     top, bottom = extremes(values)
     first = np.searchsorted(times, cycles[:-1] * (1.0 - 1e-12))
     return 0.5 * (np.maximum.reduceat(top, first) - np.minimum.reduceat(bottom, first))
