@@ -1,4 +1,4 @@
-"""From measures to parameters: derivatives with respect to the result, the case and the design."""
+"""The chain rule from measures to parameters, by way of the result and the numbers of the case."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from foldyn.gradients.parameters import SHORTER, Differentiated, Parameters
 from foldyn.mechanics.pullback import Arrays
 from foldyn.sweeps.measure import Asked
 
-SAME, ROUNDING = 1e-6, 1e-9  # of derivatives, and of the value: differences that count as zero
+SAME, ROUNDING = 1e-6, 1e-9  # derivatives are equal to this fraction of them, or of the value
 
 
 class Wanted(NamedTuple):
-    """A quantity to differentiate: an expression of measures, with their derivatives."""
+    """A quantity to differentiate: an expression of measures, and each measure's derivative."""
 
     text: str
     expression: Expression
@@ -29,7 +29,7 @@ class Wanted(NamedTuple):
 
 
 def _add(seeds: dict[Any, Any], variable: Any, seed: Any, share: float) -> None:
-    """Add a share of derivatives by a variable of a result."""
+    """Add a share of the derivatives with respect to one variable of a result to `seeds`."""
     if isinstance(seed, Mapping):  # nested: see `path.PathGradient`
         own = seeds.setdefault(variable, {})
         for key, each in seed.items():
@@ -39,7 +39,11 @@ def _add(seeds: dict[Any, Any], variable: Any, seed: Any, share: float) -> None:
 
 
 class _Changes(NamedTuple):
-    """Derivatives of a quantity by variables of a result, parameters, and numbers of the case."""
+    """Derivatives of a quantity.
+
+    They are taken with respect to variables of the result (`seeds`), parameters (`explicit`) and
+    numbers of the case (`numbers`).
+    """
 
     seeds: Seeds
     explicit: dict[str, NDArray]
@@ -63,7 +67,7 @@ class Chain(NamedTuple):
     shared: dict[Any, Any]  # intermediate results shared by measures
 
     def of(self, one: Wanted) -> tuple[float, dict[str, NDArray]]:
-        """Value of a quantity, and its derivatives by all entries of each parameter."""
+        """Value of a quantity, and derivatives with respect to all entries of each parameter."""
         values = {}
         for name, (measure, _) in one.measures.items():
             value = measure.of(self.found.result, self.case, self.shared)
@@ -80,7 +84,7 @@ class Chain(NamedTuple):
             return value, self._by_parameters(total)
 
     def _of_measure(self, measure: Asked, derivative: Derivative, value: float) -> _Changes:
-        """Derivatives of a measure, if they agree wherever its extreme is reached."""
+        """Derivatives of a measure; for an extreme, they must agree at all places that reach it."""
         if derivative.cut and self.cut:
             raise InputError(
                 "has no derivative by bar_length, the lengths to which bars are cut; leave it out "
@@ -133,7 +137,7 @@ class Chain(NamedTuple):
         return total
 
     def _by_parameters(self, changes: _Changes) -> dict[str, NDArray]:
-        """Derivatives by all entries of each parameter."""
+        """Derivatives with respect to all entries of each parameter."""
         seeds = changes.seeds
         gradient = dict(self.found.backward(seeds)) if seeds else self._nothing
         for key, by in changes.numbers.items():
@@ -145,7 +149,7 @@ class Chain(NamedTuple):
 
     @property
     def _nothing(self) -> dict[str, NDArray]:
-        """Zero gradient."""
+        """Gradient of zeros with respect to the numbers of the case."""
         numbers = self.found.numbers(self.case).numbers
         return {name: np.zeros_like(array) for name, array in numbers.items()}
 

@@ -1,6 +1,6 @@
-"""Expressions of measures, "-frequency[2] / frequency[1]", with their derivatives.
+"""Expressions of measures, such as "-frequency[2] / frequency[1]", and their derivatives.
 
-They are read by Python's parser and evaluated here, never executed as code. Derivatives are
+Expressions are read by Python's parser and evaluated here, never executed as code. Derivatives are
 propagated forward with the values.
 """
 
@@ -30,7 +30,7 @@ SMOOTH = (
 
 
 class _Number(NamedTuple):
-    """A number, and its derivatives by all measures."""
+    """A number, and its derivatives with respect to all measures."""
 
     value: float
     slope: NDArray
@@ -44,7 +44,7 @@ class Expression:
     ----------
     text : str
     measures : tuple of str
-        Measures in it, in the form "peak_frequency[8,x]".
+        Measures in the expression, in the form "peak_frequency[8,x]".
     """
 
     text: str
@@ -57,17 +57,17 @@ class Expression:
         Raises
         ------
         InputError
-            The expression has no value there.
+            The expression has no value at these values.
         """
         return self._at(values, np.zeros((len(self.measures), 0))).value
 
     def value_and_slopes(self, values: Mapping[str, float]) -> tuple[float, dict[str, float]]:
-        """Value of the expression, and its derivatives by all measures.
+        """Value of the expression, and its derivatives with respect to all measures.
 
         Raises
         ------
         InputError
-            The expression has no value or no derivative there.
+            The expression has no value or no derivative at these values.
         """
         found = self._at(values, np.eye(len(self.measures)))
         return found.value, dict(zip(self.measures, found.slope.tolist(), strict=True))
@@ -89,13 +89,13 @@ class Expression:
 def parse(text: str) -> Expression:
     """Expression from its text.
 
-    It may have numbers, measures, ``+ - * / **``, parentheses, and the functions min, max, abs,
-    sqrt, log, exp.
+    The text may contain numbers, measures, ``+ - * / **``, parentheses, and the functions min, max,
+    abs, sqrt, log, exp.
 
     Raises
     ------
     InputError
-        It cannot be read, or contains anything else; the message quotes text and place.
+        The text cannot be read, or contains anything else; the message quotes text and place.
     """
     if not isinstance(text, str) or not text.strip():
         raise InputError(f" = {show(text)}: must be an expression of measures; {EXAMPLE}")
@@ -119,7 +119,7 @@ def _expression(own: str, tree: ast.expr, text: str) -> Expression:
 
 
 def _check(node: ast.expr, text: str, found: dict[str, None]) -> None:
-    """Refuse nodes of other kinds, and collect the measures."""
+    """Refuse nodes that expressions cannot contain, and collect the measures."""
     if isinstance(node, ast.BinOp) and type(node.op) in _OPERATIONS:
         _check(node.left, text, found)
         _check(node.right, text, found)
@@ -213,7 +213,7 @@ def _power(one: _Number, other: _Number) -> _Number:
 def _chosen(
     choose: Callable[[Sequence[float]], float], arguments: Sequence[_Number], text: str
 ) -> _Number:
-    """The least or largest of several numbers; tied ones must have equal derivatives."""
+    """The least or largest of several numbers; tied numbers must have equal derivatives."""
     value = choose([one.value for one in arguments])
     tied = [one for one in arguments if abs(one.value - value) <= TIE * abs(value)]
     if any(not np.allclose(one.slope, tied[0].slope, TIE, 0.0) for one in tied):
@@ -222,7 +222,7 @@ def _chosen(
 
 
 def _rounding(node: ast.expr, known: Mapping[str, _Number]) -> float:
-    """Bound below which a part counts as 0 up to round-off, from the terms of a difference."""
+    """Bound below which a difference counts as 0 up to round-off, from the size of its terms."""
     if not (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub)):
         return 0.0
     return TIE * max(abs(_worked(one, known, 0).value) for one in (node.left, node.right))
@@ -282,7 +282,7 @@ class Constraint:
         return self.left.value(values) - self.right.value(values)
 
     def value_and_slopes(self, values: Mapping[str, float]) -> tuple[float, dict[str, float]]:
-        """`value`, and its derivatives by all measures."""
+        """`value`, and its derivatives with respect to all measures."""
         (left, slopes), (right, others) = (
             side.value_and_slopes(values) for side in (self.left, self.right)
         )
@@ -290,14 +290,14 @@ class Constraint:
         return left - right, {n: slopes.get(n, 0.0) - others.get(n, 0.0) for n in every}
 
     def size(self, values: Mapping[str, float]) -> float:
-        """Scale of a violation: a side that is a number, else the larger side."""
+        """Scale of a violation: the side that is a plain number, else the larger side."""
         sides = [abs(side.value(values)) for side in (self.left, self.right)]
         if 0.0 not in sides and not (self.left.measures and self.right.measures):
             return sides[0] if not self.left.measures else sides[1]
         return max(sides) or 1.0
 
     def violation(self, difference: float) -> float:
-        """Violation for a difference of both sides; 0 if satisfied."""
+        """Violation for a difference of the two sides; 0 if the constraint is satisfied."""
         return {"==": abs(difference), "<=": max(difference, 0.0), ">=": max(-difference, 0.0)}[
             self.sense
         ]
@@ -309,7 +309,7 @@ def constraint(text: str) -> Constraint:
     Raises
     ------
     InputError
-        It cannot be read, or is not a constraint.
+        The text cannot be read, or is not a constraint.
     """
     example = 'write for example "frequency[1] == 12" or "mass <= 0.1"'
     if not isinstance(text, str) or not text.strip():

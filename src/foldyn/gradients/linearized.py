@@ -1,9 +1,10 @@
 """Derivatives of products z' K x and z' M x with the matrices of small motions.
 
-K is the derivative of the forces, so dK needs the pullback of the forces with the weights z,
-differentiated along x: by differences over turns so small that their error is 1e-12. If hinges are
-near a kink of their law, such as superlinear ones near rest, steps are a hundredth of the distance
-to it; bars and panels, whose round-off such steps would show, keep the larger ones.
+K is the derivative of the forces. So the derivative of z' K x is the pullback of the forces with
+weights z, differentiated along x. This is done by differences with turns so small that the error is
+1e-12. If hinges are near a kink of their law, such as superlinear hinges near rest, the steps for
+hinges are a hundredth of the distance to the kink. Bars and panels keep the larger steps, because
+shorter ones would show their round-off.
 """
 
 from __future__ import annotations
@@ -27,8 +28,9 @@ from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges, SheetTerm
 from foldyn.mechanics.term import nodal
 
 TURN = 1e-3  # rad: largest turn in a difference along a motion
-SMALL = 1e-6  # of the longest bar: size of the motion used to measure turns
-NEAR, NEAREST = 1e-2, 4e-7  # of the way to a kink, and rad: closer superlinear hinges are soft
+SMALL = 1e-6  # size of the motion used to measure turns, relative to the longest bar
+# largest step, relative to the way to a kink; superlinear hinges closer than this (rad) are soft
+NEAR, NEAREST = 1e-2, 4e-7
 
 
 class Products:
@@ -38,8 +40,8 @@ class Products:
     ----------
     linear : Linearized
     equilibrium : bool
-        Whether the state is an equilibrium under the loads, and moves with the design. Otherwise
-        only massless dofs do, which are in balance for given nodes.
+        Whether the state is an equilibrium under the loads, which moves with the design. Otherwise
+        only massless dofs move with the design, as they are in balance for given nodes.
     displacement : (n, 3), optional
         State of the tangent K, m; by default the state of `linear`.
     """
@@ -63,13 +65,13 @@ class Products:
         self._rows = np.repeat(np.arange(self._mass.shape[0]), np.diff(self._mass.indptr))
 
     def nothing(self) -> dict[str, NDArray]:
-        """Zero gradient."""
+        """Gradient of zeros with respect to the numbers of the case."""
         return nothing(self._case, self._pullback)
 
     def add_stiffness(
         self, z: NDArray, x: NDArray, by: float, total: dict[str, NDArray]
     ) -> NDArray:  # fmt: skip
-        """Add the gradient of `by` z' K x, z and x (nf,); returns the part by the dofs (m,)."""
+        """Add the gradient of `by` z' K x, z and x (nf,); returns the derivatives (m,) by dofs."""
         weight, motion = (self._linear.whole(each[:, None])[:, 0] for each in (z, x))
         state = np.zeros(len(self.q))
         if by == 0.0 or not motion.any():
@@ -88,7 +90,7 @@ class Products:
         self, pullback: Pullback, weight: NDArray, motion: NDArray, step: float, by: float,
         total: dict[str, NDArray],
     ) -> NDArray:  # fmt: skip
-        """Add the fourth-order difference of a pullback along a motion; returns the part by q."""
+        """Add fourth-order differences of a pullback along a motion; returns derivatives by q."""
         state = np.zeros(len(self.q))
         for place, share in ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0)):
             factor = by * share / (12.0 * step)
@@ -108,7 +110,7 @@ class Products:
         return Pullback(Assembly(alone))
 
     def add_mass(self, z: NDArray, x: NDArray, by: float, total: dict[str, NDArray]) -> None:
-        """Add the gradient of `by` z' M x, for z (nf,) and x (nf,) or of all nodes (n, 3)."""
+        """Add the gradient of `by` z' M x, with z and x on free dofs (nf,) or all nodes (n, 3)."""
         one, other = (
             each if each.ndim > 1 else self._linear.expanded(each[:, None]).reshape(-1, 3)
             for each in (z, x)
@@ -117,7 +119,10 @@ class Products:
         total["mass"] += by * product
 
     def add_state(self, state: NDArray, total: dict[str, NDArray]) -> None:
-        """Add the effect of a state that moves with the design, given derivatives (m,) by it."""
+        """Add the effect of the state moving with the design.
+
+        state : derivatives (m,) of the quantity with respect to the state.
+        """
         if self._moves:
             self._balance.add_seen(state, self._balanced, total, self._factor)
 

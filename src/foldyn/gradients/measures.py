@@ -30,20 +30,22 @@ from foldyn.sweeps.measures import (
 from foldyn.viewer.states import bar_strain
 
 Seeds = dict[str, NDArray]
-"""Derivatives of a quantity by variables of a result, by name and in their shapes."""
+"""Derivatives of a quantity with respect to each variable of a result, in the variable's shape."""
 
 
 class Derivative(NamedTuple):
     """The derivative of a measure.
 
-    seeds : function of a result, a case and the measure's arguments.
-    frozen : for a measure that also depends on the case directly. With the result (or the measure's
-        intermediate result), the case and the arguments, it returns the measure as a function of
-        another case, with the result held fixed: a smooth one, of which differences are taken.
-    numbers : with the same arguments, derivatives of such a measure by numbers of the case.
-    places : with the same arguments, for an extreme: all places where it is reached; `seeds` and
-        `frozen` take one as `at`. The measure has a derivative if they all agree.
-    cut : whether it depends on the cut lengths of bars, in addition to the result.
+    seeds : function of a result, a case and the measure's arguments that returns the derivatives
+        with respect to variables of the result.
+    frozen : for a measure that also depends on the case directly. From the result (or the measure's
+        intermediate result), the case and the arguments, it returns the measure as a smooth
+        function of another case, with the result held fixed; differences are taken of it.
+    numbers : from the same arguments, derivatives of such a measure with respect to numbers of the
+        case.
+    places : for an extreme, from the same arguments, all places that reach it; `seeds` and `frozen`
+        take one of them as `at`. The measure has a derivative if it is the same at all places.
+    cut : whether the measure depends on the cut lengths of bars, in addition to the result.
     """
 
     seeds: Callable[..., Seeds]
@@ -54,7 +56,7 @@ class Derivative(NamedTuple):
 
 
 def _largest(numbers: NDArray) -> list[tuple[int, ...]]:
-    """Places of the largest number, followed by ties."""
+    """Index of the largest number, followed by the indices of numbers tied with it."""
     top = numbers.max()
     tied = np.argwhere(numbers >= top - TIE * abs(top))
     order = np.argsort(-numbers[tuple(tied.T)], kind="stable")
@@ -116,7 +118,7 @@ def _extreme(sign: float) -> Derivative:
 
 
 def _trapezoid(result: xr.Dataset) -> NDArray:
-    """Weights (k,), s, of samples in a time integral."""
+    """Weights (k,), s, of samples in a time integral by trapezoids."""
     step = np.diff(result["time"].values)
     weights = np.zeros(len(step) + 1)
     weights[:-1] += 0.5 * step
@@ -125,7 +127,7 @@ def _trapezoid(result: xr.Dataset) -> NDArray:
 
 
 def _mean_square(result: xr.Dataset, motion: NDArray) -> NDArray:
-    """Weights (k,) of the change of a mean square."""
+    """Derivatives (k,) of a mean square with respect to the samples."""
     weights = _trapezoid(result)
     return 2.0 * weights * motion / weights.sum()
 
@@ -133,7 +135,7 @@ def _mean_square(result: xr.Dataset, motion: NDArray) -> NDArray:
 def _moved_farthest(
     result: xr.Dataset, case: Case, node: int | None = None
 ) -> list[tuple[int, ...]]:
-    """Samples and nodes with the largest displacement, of all nodes or of one."""
+    """Sample and node with the largest displacement, among all nodes or for one node, and ties."""
     size = np.linalg.norm(_all_moved(result), axis=-1)
     if node is not None:
         size = np.where(np.arange(size.shape[1]) == node, size, -1.0)
@@ -152,19 +154,19 @@ def _largest_displacement(
 
 
 def _strained_most(result: xr.Dataset, case: Case) -> list[tuple[int, ...]]:
-    """Samples and bars with the largest strain."""
+    """Sample and bar with the largest strain, and ties."""
     return _largest(np.abs(bar_strain(case.structure, _all_moved(result))))
 
 
 class _Bar(NamedTuple):
-    """A bar, stretched (sign 1) or shortened (-1), whose ends move apart by `apart` (m)."""
+    """A bar, stretched (sign 1) or shortened (-1); `apart` (m) is the relative motion of its ends."""
 
     ends: NDArray  # (2,)
     apart: NDArray  # (3,)
     sign: float
 
     def strain(self, case: Case) -> tuple[NDArray, float]:
-        """Vector at rest, m, and absolute strain, without cancellation for small strains."""
+        """Vector at rest (m) and absolute strain, accurate also for small strains."""
         a, b = case.structure.nodes[self.ends]
         rest = b - a
         excess = float((2.0 * rest + self.apart) @ self.apart / (rest @ rest))
@@ -197,7 +199,7 @@ def _strain_of(result: xr.Dataset, case: Case, at: tuple[int, int]) -> Callable[
 
 
 class _Apart(NamedTuple):
-    """The closest points of two panels in a sample; see `Clearance`."""
+    """The closest points of two panels in a sample, from four nodes; see `Clearance`."""
 
     sample: int
     nodes: NDArray  # (4,)
@@ -304,7 +306,7 @@ def _load_at(result: xr.Dataset, case: Case, node: int, axis: str, displacement:
 
 
 def _climb(start: int, end: int) -> Derivative:
-    """Derivative of the energy from one stable state to the highest on the way to another."""
+    """Derivative of the energy barrier on the way from one stable state to another."""
 
     def places(found: Landscape, case: Case) -> list[tuple[Equilibrium, Equilibrium]]:
         stable = found.stable
@@ -326,7 +328,7 @@ def _climb(start: int, end: int) -> Derivative:
         motion = sum((vector for vector, _ in case.imposed_terms), np.zeros_like(high.displacement))
         size = np.abs(motion).max()
         found = {}
-        for k in range(len(case.imposed_terms)):  # forces of supports that move farther
+        for k in range(len(case.imposed_terms)):  # through forces at supports that move farther
             found[f"imposed.{k}"] = case.imposed * sum(
                 sign * state.stroke / size * _forces(case, state.displacement)
                 for sign, state in ((1.0, high), (-1.0, low))
@@ -343,7 +345,7 @@ def _response(result: xr.Dataset, case: Case, node: int, axis: str, frequency: f
 
 
 def _sizes(result: xr.Dataset, node: int, axes: list[int], weights: Mapping[int, float]) -> Seeds:
-    """Seeds of a weighted sum of response magnitudes of a node along some axes."""
+    """Seeds of a weighted sum of a node's response magnitudes along some axes."""
     name = quantity_of(result)
     response = result[name].transpose("frequency", "node", "axis").values
     out = np.zeros_like(response)
@@ -414,11 +416,11 @@ DERIVATIVES: Mapping[str, Derivative] = {
     "barrier": _climb(0, 1),
     "barrier_back": _climb(1, 0),
 }
-"""Derivatives by the name of the measure."""
+"""Derivative of each measure that has one, by the name of the measure."""
 
 
 def one_number(text: str, kind: Any) -> Asked:
-    """A registered measure that is a single number of results of a kind.
+    """A registered measure that gives a single number for results of a kind.
 
     Raises
     ------

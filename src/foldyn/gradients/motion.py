@@ -23,7 +23,7 @@ KNOWN = ("displacement", "velocity")
 
 
 class MotionGradient(Differentiated):
-    """A motion, with gradients of functions of it.
+    """A motion, with gradients of functions of the motion.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class MotionGradient(Differentiated):
     def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:
         """Gradient with respect to the numbers of the case.
 
-        seeds : derivatives of the quantity by variables of the result.
+        seeds : derivatives of the quantity with respect to variables of the result.
         """
         check_known(seeds, KNOWN, "motions")
         adjoint, by = self._adjoint(), self._motion.packed.numbering

@@ -1,10 +1,10 @@
-"""Results of slightly different cases, each found from the result of one case.
+"""Results of slightly different cases (neighbors), each found from the result of one case.
 
-Their differences are derivatives. A neighbor's equilibria, modes or responses follow by Newton
-steps with the factorized matrix of the one result: no path is followed and no mode is searched for,
-so each costs a few solutions. Steps are repeated until they are small: after the first one, bars
-are strained to second order in the motion, and they are far stiffer than creases. Neighbors of a
-motion are integrated along with it, step by step (`dynamics.companions`).
+Differences between these results give derivatives. A neighbor's equilibria, modes or responses
+follow by Newton steps with the factorized matrix of the one result: no path is followed and no mode
+is searched for, so a neighbor costs a few solutions. One step is not enough: it strains bars to
+second order in the motion, and bars are far stiffer than creases. So steps are repeated until they
+are small. Neighbors of a motion are integrated along with it, step by step (`dynamics.companions`).
 """
 
 from __future__ import annotations
@@ -38,15 +38,16 @@ from foldyn.linear.linearized import Linearized, linearize
 from foldyn.linear.modes import Found
 from foldyn.statics.equilibrium import OrigamiProblem
 
-GAINED = 1e-6  # of the first step: size at which steps end
-ROUNDING = 1e-14  # of the whole: size of a step that counts as zero
-ENOUGH, STALLED = 1e-4, 1e-8  # of the first step, and of the whole: most that round-off may leave
+GAINED = 1e-6  # steps end at this fraction of the first step
+ROUNDING = 1e-14  # a step below this fraction of the whole counts as zero
+# largest step that round-off may leave, relative to the first step, and to the whole
+ENOUGH, STALLED = 1e-4, 1e-8
 ROUNDS = 12
 TURN = 2.0 * np.pi
 ALONG = ("newmark", "generalized_alpha")
-"""Methods whose motions have neighbors."""
+"""Integration methods for which neighbors of a motion can be computed."""
 RESPONSES = ("direct", "harmonic")
-"""Methods whose responses have neighbors."""
+"""Methods for which neighbors of a frequency response can be computed."""
 NONE = "there is no neighbor of"
 
 
@@ -65,7 +66,7 @@ def refined(x: NDArray, step_at: Callable[[NDArray], NDArray], size: float) -> N
     x : ndarray, shape (n,) or (n, c)
         Start, for one neighbor or several.
     step_at : callable
-        The next steps from given points.
+        Returns the next step of each neighbor from given points.
     size : float
         Scale for rounding errors.
 
@@ -82,7 +83,7 @@ def refined(x: NDArray, step_at: Callable[[NDArray], NDArray], size: float) -> N
         sizes.append(np.linalg.norm(step, axis=0))
         near = sizes[-1] <= np.maximum(ENOUGH * sizes[0], STALLED * size)
         going = sizes[-1] > np.maximum(GAINED * sizes[0], ROUNDING * size)
-        if len(sizes) > 2:  # even and odd steps differ
+        if len(sizes) > 2:  # compare with the step before the last: even and odd steps differ
             stalled = sizes[-1] > 0.5 * sizes[-3]
             going &= ~(stalled & near)
             if (stalled & going).any():
@@ -152,9 +153,9 @@ def _balanced(problem: OrigamiProblem, x: NDArray, factor: float, factored: Any)
 def motions(
     motion: Motion, one: Asked, others: Sequence[Asked], share: float
 ) -> list[NDArray[np.float64]]:
-    """Displacements (k, n, 3) of other cases at the samples of a motion, integrated along with it.
+    """Displacements (k, n, 3) of other cases, integrated along with a motion, at its samples.
 
-    share : relative change of a difference between motions at which a step has converged.
+    share : a step has converged if the difference between motions changes by less than this share.
     """
     case, state, lasting = motion.case, one.arguments.get("initial"), ("initial", "sample")
     lacks = (
@@ -191,7 +192,7 @@ def motions(
 
 # ------------------------------------------------------------------ modes
 def modes(found: Found, others: Sequence[Asked], wanted: Sequence[int]) -> list[Any]:
-    """Modes of other cases, near the modes found at the places `wanted`."""
+    """Modes of other cases, near those modes of `found` that have the numbers `wanted`."""
     linear, result = found.linear, found.result
     beside = [linear if each.case is linear.case else _linear(each) for each in others]
     frequency, eigenvalue, ratio = (
@@ -352,14 +353,14 @@ def _harmonic(
 def _out_of_balance(
     beside: Sequence[tuple[Hinges, sparse.csc_array, NDArray]], own: NDArray, x: NDArray
 ) -> NDArray[np.complex128]:
-    """Out-of-balance forces (nf, c) of motions (nf, c), beyond the residual of the first case."""
+    """Out-of-balance forces (nf, c) of motions (nf, c), less the residual of the first case."""
     each = zip(beside, x.T, strict=True)
     forces = [hinges.left(matrix, motion, load) for (hinges, matrix, load), motion in each]
     return np.stack(forces, axis=1) - own[:, None]
 
 
 class _InParts:
-    """Factors of a real matrix (2n, 2n) of real and imaginary parts."""
+    """Factors of a real matrix (2n, 2n) that acts on real and imaginary parts."""
 
     def __init__(self, matrix: sparse.csc_array) -> None:
         self._factors = factorize(matrix, symmetric=False)

@@ -1,16 +1,17 @@
-"""The numbers that define a case for the solvers, and their derivatives by a design's parameters.
+"""Numbers that define a case for the solvers, and how they depend on the parameters of a design.
 
 Gradients of results are taken with respect to these numbers (`mechanics.pullback`).
 
-Building a case solves nothing, so that central differences of its numbers are cheap; they are of
-fourth order, with steps of a thousandth, and accurate to about 1e-11.
+Derivatives of the numbers with respect to parameters are central differences of fourth order, with
+steps of a thousandth, accurate to about 1e-11. They are cheap, because no equations are solved to
+build a case.
 
-All entries of an array are changed at once if each number of the case depends on one of them, as
-stiffnesses do on the stiffnesses of their creases. The entry is identified exactly: groups of
-entries are changed in turn, and each entry is in its own set of groups, all sets of one size. A
-number that depends on one entry changes with that many groups. A number that depends on several
-changes with more, and then entries are changed one by one, such as thicknesses of panels that share
-an edge.
+If each number of the case depends on only one entry of an array parameter (a hinge's stiffness
+depends on the stiffness of one crease), all entries are changed at once. To find which entry a
+number depends on, groups of entries are changed in turn. Each entry belongs to a different set of
+groups, and all sets have the same size. A number that depends on one entry changes with exactly the
+groups of this entry. A number that depends on several entries (thicknesses of panels that share an
+edge) changes with more groups; then entries are changed one by one.
 """
 
 from __future__ import annotations
@@ -32,12 +33,14 @@ from foldyn.errors import FoldynError, InputError, warn, within
 from foldyn.mechanics.pullback import Arrays, Pullback, arrays_of_body
 from foldyn.values import numbers, show
 
-STEP = 1e-3  # of the size of a parameter
-SHORTER = STEP, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8  # for measures, such as energies near a kink of a law
-SMOOTH = 1e-5  # of a change: most third-order part within a step that is short enough
-LEAST = 1e-6  # of a value: smaller changes are lost in round-off
-GOLDEN = 0.6180339887498949  # its multiples modulo 1 are all distinct
-SILENT = 1e-11, 1e-12  # of a number, and of the largest of its array: round-off of a change
+STEP = 1e-3  # step of a difference, relative to the size of the parameter
+# steps tried in turn for measures, such as energies near a kink of a law
+SHORTER = STEP, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8
+SMOOTH = 1e-5  # a step is short enough if the third-order part is below this fraction of a change
+LEAST = 1e-6  # changes below this fraction of a value are lost in round-off
+GOLDEN = 0.6180339887498949  # multiples of this number modulo 1 are all distinct
+# round-off of a change, relative to the number itself, and to the largest number of its array
+SILENT = 1e-11, 1e-12
 KINK = (
     "{}: the numbers of the case ({}) have a kink here, where their slopes jump, as where another "
     "diagonal of a panel becomes the shorter one, or a corner passes 120 degrees: the gradient is "
@@ -46,18 +49,18 @@ KINK = (
 Values = Mapping[str, Any]
 Build = Callable[..., Any]
 Gradient = Mapping[str, NDArray]
-"""Derivatives of a quantity by arrays of numbers, by the name of the array."""
+"""Derivatives of a quantity with respect to arrays of numbers, by the name of the array."""
 
 
 def numbers_of(case: Case) -> Arrays:
-    """Numbers of a case: of the terms of its body, mass, loads, supports and damping."""
+    """Numbers that define a case: its body's terms, mass, loads, supports and damping."""
     arrays = arrays_of_body(case.body)
     numbers, layout = dict(arrays.numbers), dict(arrays.layout)
     for kind in ("load", "imposed", "rest"):
         for k, (vector, _) in enumerate(getattr(case, f"{kind}_terms")):
             numbers[f"{kind}.{k}"] = np.asarray(vector, float)
     layout["held"] = case.fixed
-    if case.constraints:  # no solver differentiates ties: any change of them shows here
+    if case.constraints:  # no solver differentiates ties; included to notice if they change
         basis = case.constraints.basis
         numbers["constraints"] = basis @ np.random.default_rng(0).uniform(1.0, 2.0, basis.shape[1])
     numbers["alpha"], numbers["beta"] = np.array([[case.rayleigh.alpha], [case.rayleigh.beta]])
@@ -70,7 +73,7 @@ def numbers_of(case: Case) -> Arrays:
 
 
 def check_known(seeds: Mapping[str, Any], known: Sequence[str], what: str) -> None:
-    """Refuse derivatives of a quantity by variables of a result through which none lead back."""
+    """Refuse derivatives with respect to variables through which no gradient is computed."""
     if unknown := [name for name in seeds if name not in known]:
         raise InputError(
             f"there are no derivatives through {', '.join(unknown)} of {what}, but through "
@@ -79,12 +82,12 @@ def check_known(seeds: Mapping[str, Any], known: Sequence[str], what: str) -> No
 
 
 class Differentiated:
-    """A result of a case, with gradients of functions of it.
+    """A result of a case, with gradients of functions of the result.
 
     Attributes
     ----------
     result : xarray.Dataset
-        As from the function of the analysis.
+        The dataset that the function of the analysis returns.
     """
 
     result: xarray.Dataset
@@ -96,13 +99,13 @@ class Differentiated:
     def backward(self, seeds: Mapping[str, Any]) -> Gradient:
         """Gradient of a function of the result with respect to the numbers of the case.
 
-        seeds : derivatives of the function by variables of the result.
+        seeds : derivatives of the function with respect to variables of the result.
         """
         raise NotImplementedError
 
 
 def numbers_of_motion(packed: PackedCase, start: tuple[NDArray, NDArray]) -> Arrays:
-    """Numbers of a case as packed for motions, and its initial state."""
+    """Numbers that define a case as packed for motions, and the initial state."""
     arrays, system, mass = arrays_of_body(packed.body), packed.system, packed.mass
     numbers = {
         **arrays.numbers,
@@ -134,7 +137,7 @@ def numbers_of_motion(packed: PackedCase, start: tuple[NDArray, NDArray]) -> Arr
 
 
 def nothing(case: Case, pullback: Pullback) -> dict[str, NDArray]:
-    """Zero gradient by the numbers of a case, given the pullback of its body's forces."""
+    """Gradient of zeros with respect to the numbers of a case; pullback : of the body's forces."""
     total = {name: np.zeros_like(out) for name, out in pullback.gradient.items()}
     for kind in ("load", "imposed"):
         for k, (vector, _) in enumerate(getattr(case, f"{kind}_terms")):
@@ -145,10 +148,12 @@ def nothing(case: Case, pullback: Pullback) -> dict[str, NDArray]:
 
 
 class Slope(NamedTuple):
-    """Derivatives of a case's numbers by a parameter, if each depends on one entry.
+    """Derivatives of a case's numbers with respect to a parameter.
 
-    by : derivatives, by array of numbers.
-    entry : entry on which each number depends, by array; -1 for none.
+    Each number depends on at most one entry of the parameter.
+
+    by : for each array of numbers, the derivatives.
+    entry : for each array of numbers, the entry on which each number depends; -1 for none.
     """
 
     by: Mapping[str, NDArray]

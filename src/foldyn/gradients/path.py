@@ -7,7 +7,7 @@ defined as the parameters p change:
 - a limit point, with phi' K = 0 and so df = -phi' R_p dp / (phi' R_f);
 - a point at a given nodal displacement e' u: with K mu = e, df = -mu' R_p dp / (mu' R_f).
 
-All need -w' R_p dp, from the pullback of the forces with some weights w.
+All three need -w' R_p dp, which follows from the pullback of the forces with some weights w.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from foldyn.statics.stability import softest_modes
 
 KNOWN = ("displacement", "reaction", "load_factor", "load_at")
 GIVEN = ("newton", "displacement")
-"""Methods whose points have given load factors."""
-DENSE = 300  # dofs up to which the shape at a limit point is found from a dense matrix
-SINGULAR = 1e-13  # of the largest stiffness: a motion with less belongs to a critical point
+"""Methods that find the points of a path at given load factors."""
+DENSE = 300  # up to this many dofs, the shape at a limit point is found from a dense matrix
+SINGULAR = 1e-13  # a motion with less than this fraction of the largest stiffness is critical
 
 
 def free_block(
     case: Case, q: NDArray, free: NDArray | None = None
 ) -> tuple[NDArray, sparse.csc_array]:
-    """Free dofs (nf,), all by default, and their tangent (nf, nf)."""
+    """Free dofs (nf,), all by default, and the tangent (nf, nf) on them."""
     if free is None:
         free = np.concatenate([case.free_dofs, case.body.hidden])
     tangent = sparse.csr_array(case.constraints.matrix(case.body.tangent(q)))
@@ -49,14 +49,14 @@ def free_block(
 class Balance:
     """An equilibrium (m,) of a case, and its response to forces.
 
-    The factors of its tangent are reused for all derivatives.
+    The factors of the tangent are reused for all derivatives.
 
     Parameters
     ----------
     case : Case
     q : ndarray, shape (m,)
     free : ndarray of int, shape (nf,), optional
-        Dofs in equilibrium, all free ones by default; the others are fixed.
+        Dofs in equilibrium, by default all free dofs; all other dofs are fixed.
     """
 
     def __init__(self, case: Case, q: NDArray, free: NDArray | None = None) -> None:
@@ -77,7 +77,7 @@ class Balance:
         Raises
         ------
         InputError
-            The equilibrium is a critical point, without such a motion.
+            The equilibrium is a critical point, at which such a motion does not exist.
         """
         free, stiffness, factors = self._factors
         load, out = self.case.constraints.force(force)[free], np.zeros(len(self.q))
@@ -95,7 +95,7 @@ class Balance:
     ) -> None:
         """Add to a gradient the part due to the change of the state, with loads times a factor.
 
-        by_state : derivatives (m,) of the quantity by the dofs with the numbers fixed.
+        by_state : derivatives (m,) of the quantity with respect to the dofs at fixed numbers.
         """
         adjoint = self.under(by_state)
         seen_through(self.case, self.q, by_state, adjoint, pullback, total, factor)
@@ -105,7 +105,7 @@ def seen_through(
     case: Case, q: NDArray, by_state: NDArray, adjoint: NDArray, pullback: Pullback,
     total: dict[str, NDArray], factor: float,
 ) -> None:  # fmt: skip
-    """Add -adjoint' dR, R = F - factor p, and the effect of imposed displacements to a gradient."""
+    """Add to a gradient -adjoint' dR and the effect of imposed displacements; R = F - factor p."""
     pullback.clear()
     product = pullback.at(q, adjoint)
     for name, out in pullback.gradient.items():
@@ -120,7 +120,7 @@ def seen_through(
 
 
 class PathGradient(Differentiated):
-    """An equilibrium path, with gradients of functions of its points.
+    """An equilibrium path, with gradients of functions of the points on it.
 
     Parameters
     ----------
@@ -139,8 +139,9 @@ class PathGradient(Differentiated):
     def backward(self, seeds: Mapping[str, Any]) -> Gradient:
         """Gradient with respect to the numbers of the case.
 
-        seeds : derivatives of the quantity by variables of the result, and by load factors at given
-            nodal displacements: "load_at", a mapping from (dof, displacement) to derivatives.
+        seeds : derivatives of the quantity with respect to variables of the result and, as
+            "load_at", a mapping from (dof, displacement), with respect to load factors at given
+            nodal displacements.
         """
         check_known(seeds, KNOWN, "paths")
         total = nothing(self.case, self._pullback)
@@ -155,7 +156,7 @@ class PathGradient(Differentiated):
         return total
 
     def _add_point(self, k: int, seeds: Mapping[str, Any], total: dict[str, NDArray]) -> None:
-        """Add the part of the displacement, reactions and load factor at a point."""
+        """Add what a point contributes by its displacement, reactions and load factor."""
         case, result = self.case, self.result
         moved, pulled, climbed = (
             np.ravel(seeds[name][k]) if name in seeds else np.zeros(1) for name in KNOWN[:3]
@@ -212,7 +213,7 @@ class PathGradient(Differentiated):
         seen_through(case, q, np.zeros(len(q)), adjoint, self._pullback, total, moved.factor)
 
     def _soft(self, q: NDArray) -> NDArray:
-        """Motion (m,) without stiffness at a limit point."""
+        """Motion (m,) at a limit point that meets no stiffness."""
         free, block = free_block(self.case, q)
         scale = 1e-12 * float(np.abs(block.diagonal()).max())
         factors = splu(sparse.csc_array(block + scale * sparse.eye_array(block.shape[0])))

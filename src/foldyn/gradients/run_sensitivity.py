@@ -47,13 +47,13 @@ KINDS: Mapping[str, Callable[[Case, Mapping[str, Any]], Differentiated]] = {
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "modes": modes, "frf": frf, "dynamics": simulate, "statics": trace,
 }  # fmt: skip
-"""Functions of these analyses, which define their arguments."""
+"""Function of each analysis; its signature defines the arguments of the analysis."""
 LENGTH = "bar_length"
 ARRAYS = (
     "fold_stiffness", "fold_rest", "bend_stiffness", "bend_rest", "bar_area", LENGTH,
     "node_mass",
 )  # fmt: skip
-"""Arrays of a structure that can be parameters themselves."""
+"""Arrays of a structure that can themselves be parameters."""
 Source = Callable[..., Case] | Case | str | os.PathLike[str]
 Own = tuple[Callable[..., float], Callable[..., Seeds]]
 
@@ -72,52 +72,56 @@ def sensitivity(
     Parameters
     ----------
     build : callable, Case or path
-        ``build(**parameters)`` returns the case; or a case file, with keys as parameters, such as
-        "pattern.panel_angle"; or a case, with arrays of its structure as parameters:
+        ``build(**parameters)`` returns the case; or a case file, with parameters named by keys of
+        the file, such as "pattern.panel_angle"; or a case, with arrays of its structure as
+        parameters:
         `fold_stiffness` and `bend_stiffness` (N m/rad, of whole hinges), `fold_rest` and
         `bend_rest` (rad), `bar_area` (m2), `bar_length` (m, the cut length: bars that do not fit
         are strained at rest), `node_mass` (kg).
     parameters : mapping, or names of arrays of a case
-        Where the gradient is taken: numbers, or arrays of one dimension, each of whose entries is a
-        parameter. Names of a case's arrays take their present values.
+        Values at which the gradient is taken: numbers, or arrays of one dimension, in which each
+        entry is a parameter. Arrays of a case that are given by name alone keep their values.
     measures : str, sequence of str, or mapping
-        Measures of a sweep, as "frequency[2]", and expressions of them, as
-        "-frequency[2] / frequency[1]"; or your own by name: pairs of a function of the result and
-        the case, and a function that returns its derivatives by variables of the result, by name.
+        Measures as in a sweep, such as "frequency[2]", and expressions of measures, such as
+        "-frequency[2] / frequency[1]". Or a mapping from names to your own measures, each a pair of
+        functions of the result and the case: one returns the measure, the other its derivatives
+        with respect to variables of the result, by name.
     analysis : mapping, optional
         The analysis: its kind, "modes", "statics", "dynamics" or "frf", and arguments of
-        `fd.modes`, `fd.path`, `fd.simulate` or `fd.frf`. A case file has its own.
+        `fd.modes`, `fd.path`, `fd.simulate` or `fd.frf`. A case file contains its own analysis.
     sizes : mapping, optional
         Sizes of parameters that are 0 where the gradient is taken: differences change a parameter
         by a thousandth of its size.
     along : mapping, optional
-        A direction: rates of the parameters. The result then has one derivative, in this
-        direction, which also exists for modes of equal frequency.
+        A direction, as rates of the parameters. The result then contains one derivative, in this
+        direction; it exists also for modes of equal frequency.
 
     Returns
     -------
     xarray.Dataset
-        `value` (measure,), and for each parameter `gradient_<name>` (measure,), or
-        (measure, <name>_entry) of an array, per unit of the parameter; with `along` instead
-        `derivative` (measure,). Attributes: the kind of the analysis and the total time.
+        `value` (measure,), and for each parameter `gradient_<name>` (measure,), or for an array
+        (measure, <name>_entry), per unit of the parameter; with `along`, `derivative` (measure,)
+        instead of gradients. Attributes: the kind of the analysis and the total time.
 
     Raises
     ------
     InputError
-        A measure or a parameter has no derivative there; the message gives reason and remedy.
+        A measure or a parameter has no derivative at these values; the message gives the reason and
+        a remedy.
     ComputationError
         The analysis fails.
 
     Warns
     -----
     FoldynWarning
-        Numbers of the case have a kink there: the gradient is the mean of both sides.
+        Numbers of the case have a kink at these values: the gradient is the mean of both sides.
 
     Notes
     -----
-    Derivatives of the mechanics are analytic; derivatives of a case's numbers by its parameters are
-    central differences of fourth order, which solve nothing. Motions are differentiated as
-    computed, step by step, with fixed steps: give `dt` if it should not depend on the case.
+    Derivatives of the mechanics are analytic. Derivatives of a case's numbers with respect to the
+    parameters are central differences of fourth order, for which no equations are solved. Motions
+    are differentiated as computed, step by step, with fixed steps: give `dt` if the step should not
+    depend on the case.
 
     Examples
     --------
@@ -173,7 +177,7 @@ class Sourced(NamedTuple):
     arguments: Mapping[str, Any]
 
     def analyse(self, case: Case) -> Differentiated:
-        """The result, ready to be differentiated."""
+        """Run the analysis; the result can be differentiated."""
         try:
             return KINDS[self.kind](case, self.arguments)
         except InputError as error:
@@ -216,9 +220,10 @@ def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None
 
 
 def _by_lengths(areas: Slope, numbers: Gradient) -> Slope:
-    """Derivatives of numbers by the cut lengths of bars, from derivatives by EA / L0.
+    """Derivatives of numbers with respect to cut lengths of bars, from those by stiffness EA / L0.
 
-    x = (l^2 - L^2) / L^2 is the excess of a bar of length l cut to L, and EA / L its stiffness.
+    A bar of length l that is cut to the length L has the excess x = (l^2 - L^2) / L^2 and the
+    stiffness EA / L.
     """
     name = next(key for key in numbers if key.endswith("bar_stiffness"))
     prefix = name.removesuffix("bar_stiffness")
@@ -254,7 +259,7 @@ def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, N
 
     def build(**arrays: NDArray) -> Case:
         bars: Any = case.structure
-        if LENGTH in arrays:  # no structure has bars that do not fit: see `_by_lengths`
+        if LENGTH in arrays:  # structures cannot hold bars that do not fit: see `_by_lengths`
             share = arrays.pop(LENGTH) / bars.bar_length
             arrays["bar_area"] = arrays.get("bar_area", bars.bar_area) * share
         return replace(case, structure=replace(bars, **arrays))
@@ -263,7 +268,7 @@ def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, N
 
 
 def _check_acts(structure: Discretized, name: str) -> None:
-    """Refuse arrays that have no effect in a structure."""
+    """Refuse an array of numbers that has no effect in a structure."""
     if not isinstance(structure, Structure):
         raise InputError(": a shell has no such arrays; give a function that builds it", name)
     if name == "node_mass" and not is_lumped(structure.mass):
@@ -296,7 +301,7 @@ def case_file_at(place: Path, document: dict[str, Any], values: Mapping[str, Any
 def _of_file(
     path: str | os.PathLike[str], parameters: Any
 ) -> tuple[Callable[..., Case], dict[str, NDArray], dict[str, Any]]:
-    """A function that returns the case for other key values, these values, and the analysis."""
+    """A function that returns the case for other values of keys, the values, and the analysis."""
     place = path_of(path, "build")
     document = read_document(place)
 
@@ -342,7 +347,7 @@ def _of_registry(text: str, kind: str) -> Wanted:
 
 
 def _own(name: str, pair: Any) -> Wanted:
-    """A user's quantity: a function and its derivative."""
+    """A user's own quantity: a function and its derivative."""
     if not isinstance(pair, tuple) or len(pair) != 2 or not all(map(callable, pair)):
         raise InputError(
             f" = {show(pair)}: give a pair of a function and its derivative", f"measures.{name}"

@@ -1,24 +1,25 @@
 """Gradients of functions of modes, such as natural frequencies, and of frequency responses.
 
-With phi' M phi = 1 an eigenvalue has d lambda = phi' (dK - lambda dM) phi (Nelson, AIAA Journal 14,
-1976): products as in `gradients.linearized`.
+With phi' M phi = 1, the change of an eigenvalue is d lambda = phi' (dK - lambda dM) phi (Nelson,
+AIAA Journal 14, 1976); such products are computed in `gradients.linearized`.
 
-A shape has d phi from (K - lambda M) d phi = -(dK - lambda dM - d lambda M) phi with
-phi' M d phi = -phi' dM phi / 2. With the derivatives s of a quantity by the shape, and the solution
-of (K - lambda M) z + c M phi = s, phi' M z = 0,
+The change d phi of a shape satisfies (K - lambda M) d phi = -(dK - lambda dM - d lambda M) phi and
+phi' M d phi = -phi' dM phi / 2. Let s be the derivatives of a quantity with respect to the shape,
+and z, c the solution of (K - lambda M) z + c M phi = s, phi' M z = 0. Then
 
     s' d phi = -z' (dK - lambda dM) phi - c/2 phi' dM phi.
 
-At an angular frequency w a response x satisfies Z x = f, Z = K + i w (alpha M + beta K0) - w^2 M,
-which is symmetric. With the derivatives s of a real quantity by the response, dJ = Re(s' dx), and
-the solution of Z z = s,
+At an angular frequency w a response x satisfies Z x = f, with the symmetric matrix
+Z = K + i w (alpha M + beta K0) - w^2 M. Let s be the derivatives of a real quantity J with respect
+to the response, dJ = Re(s' dx), and z the solution of Z z = s. Then
 
-    dJ = Re(z' (df - dZ x)):
+    dJ = Re(z' (df - dZ x)),
 
-products of real and imaginary parts.
+computed from products of real and imaginary parts.
 
-K and K0 also depend on the dofs in balance: all of them in an equilibrium, massless ones about
-rest. With K mu = the derivatives of the quantity by these dofs, they add -mu' dR, R their residual.
+K and K0 also depend on the dofs that are in balance (in an equilibrium all dofs, about rest only
+massless dofs). Through these dofs, the change of the quantity has the further part -mu' dR, where R
+is the residual on these dofs and K mu equals the derivatives of the quantity with respect to them.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ Complex = NDArray[np.complex128]
 
 
 class ModesGradient(Differentiated):
-    """Modes of a case, with gradients of functions of them.
+    """Modes of a case, with gradients of functions of the modes.
 
     Parameters
     ----------
@@ -73,9 +74,10 @@ class ModesGradient(Differentiated):
         self._parted = False
 
     def along(self, rate: Callable[[Gradient], float]) -> ModesGradient:
-        """These modes for derivatives in one direction, in which modes of equal frequency separate.
+        """The modes for derivatives in one direction, where modes of equal frequency separate.
 
-        rate : derivative in this direction, from a gradient by the numbers of the case.
+        rate : function that returns the derivative in this direction, from a gradient with respect
+            to the numbers of the case.
         """
         other = copy(self)
         other._shapes, other._parted = self._shapes.copy(), True
@@ -95,7 +97,7 @@ class ModesGradient(Differentiated):
     def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:
         """Gradient with respect to the numbers of the case.
 
-        seeds : derivatives of the quantity by variables of the result.
+        seeds : derivatives of the quantity with respect to variables of the result.
         """
         check_known(seeds, KNOWN, "modes")
         total, state = self._products.nothing(), np.zeros(len(self._products.q))
@@ -116,7 +118,10 @@ class ModesGradient(Differentiated):
     def _seeds(
         self, seeds: Mapping[str, NDArray], total: dict[str, NDArray], state: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Derivatives by eigenvalues (k,) and shapes (nf, k); adds others to `total`, `state`."""
+        """Derivatives with respect to eigenvalues (k,) and shapes (nf, k).
+
+        Derivatives with respect to anything else are added to `total` and `state`.
+        """
         linear, values, shapes = self._linear, self._values, self._shapes
         zeros = np.zeros(len(values))
         with np.errstate(invalid="ignore"):
@@ -132,7 +137,7 @@ class ModesGradient(Differentiated):
         by_factor = np.array(seeds.get("participation", np.zeros((len(values), 3))), float)
         if "effective_mass" in seeds:
             by_factor += 2.0 * self.result["participation"].values * seeds["effective_mass"]
-        # allowed motions r closest to unit translations have the same phi' M r
+        # phi' M r is the same for r = the allowed motions closest to unit translations
         by_shape += linear.mass @ (unit_translations(linear) @ by_factor.T)
         moved = nodes_translated(self.case).T.reshape(3, -1, 3)
         for k, a in np.argwhere(by_factor != 0.0):
@@ -154,12 +159,12 @@ class ModesGradient(Differentiated):
         self, z: NDArray, shape: NDArray, by_stiffness: float, by_mass: float,
         total: dict[str, NDArray],
     ) -> NDArray:  # fmt: skip
-        """Add the gradient of by_stiffness z' K shape - by_mass z' M shape; returns that by q."""
+        """Add the gradient of by_stiffness z' K shape - by_mass z' M shape; returns the q part."""
         self._products.add_mass(z, shape, -by_mass, total)
         return self._products.add_stiffness(z, shape, by_stiffness, total)
 
     def _nelson(self, k: int, by_shape: NDArray) -> tuple[NDArray, float]:
-        """Solution z, c of the bordered system of the module docstring."""
+        """Solution z, c of the system for shapes in the module docstring."""
         linear = self._linear
         carried = sparse.csc_array((linear.mass @ self._shapes[:, k])[:, None])
         matrix = linear.stiffness - self._values[k] * linear.mass
@@ -169,7 +174,7 @@ class ModesGradient(Differentiated):
 
     # ------------------------------------------------------------------ refusals
     def _clusters(self) -> list[tuple[int, int]]:
-        """First and last + 1 of modes with a common eigenvalue."""
+        """First and last + 1 of each group of modes with a common eigenvalue."""
         values = self._values
         near = np.abs(np.diff(values)) <= ALONE * np.abs(values[1:])
         ends = np.flatnonzero(~near) + 1
@@ -210,7 +215,7 @@ class ModesGradient(Differentiated):
 
 
 class FrfGradient(Differentiated):
-    """A frequency response of a case, with gradients of functions of it.
+    """A frequency response of a case, with gradients of functions of the response.
 
     Parameters
     ----------
@@ -247,7 +252,8 @@ class FrfGradient(Differentiated):
     def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:
         """Gradient with respect to the numbers of the case.
 
-        seeds : complex derivatives s of the quantity by the response: it changes by Re(s' dx).
+        seeds : complex derivatives s of the quantity with respect to the response x; the quantity
+            changes by Re(s' dx).
         """
         known = quantity_of(self.result)
         check_known(seeds, [known], "this frequency response")
@@ -265,9 +271,10 @@ class FrfGradient(Differentiated):
         self, frequency: float, by: Complex, total: dict[str, NDArray], state: NDArray,
         reference: NDArray,
     ) -> None:  # fmt: skip
-        """Add the part of one frequency (Hz) to `total` and to the derivatives by the states (m,).
+        """Add what one frequency (Hz) contributes, to `total` and to derivatives by states (m,).
 
-        by : derivatives (3n,) by the response; `state` and `reference` are the states of K and K0.
+        by : derivatives (3n,) with respect to the response.
+        state, reference : derivatives with respect to the states of K and K0, to which it adds.
         """
         linear, rayleigh = self._linear, self.case.rayleigh
         omega = 2.0 * np.pi * frequency
@@ -297,20 +304,20 @@ class FrfGradient(Differentiated):
     def _add_products(
         self, products: Products, z: Complex, x: Complex, total: dict[str, NDArray]
     ) -> NDArray:
-        """Add the gradient of Re(z' K x), z and x complex; returns the part by the dofs (m,)."""
+        """Add the gradient of Re(z' K x), z and x complex; returns the derivatives (m,) by dofs."""
         real = products.add_stiffness(z.real, x.real, 1.0, total)
         return real + products.add_stiffness(z.imag, x.imag, -1.0, total)
 
     @cached_property
     def _reference(self) -> Products:
-        """Products with K0, for the stiffness-proportional damping: at rest, or in the state."""
+        """Products with K0, the matrix of stiffness-proportional damping, at rest or in a state."""
         if self.case.rayleigh.state != "rest" or not self._linear.displacement.any():
             return self._products
         return Products(self._linear, False, np.zeros_like(self._linear.displacement))
 
     @cached_property
     def _stiffness(self) -> sparse.csr_array:
-        """K0 (nf, nf)."""
+        """Stiffness matrix K0 (nf, nf)."""
         tangent = self.case.constraints.matrix(self.case.body.tangent(self._reference.q))
         free = self._linear.free
         return sparse.csr_array(sparse.csr_array(tangent)[free][:, free])
