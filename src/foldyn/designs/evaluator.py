@@ -1,4 +1,4 @@
-"""Measures of one design, and their derivatives with respect to its entries."""
+"""Measures of a design, and derivatives of the measures with respect to the design's entries."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Optimization methods for designs, with all entries scaled to 0 to 1."""
+"""Optimization methods for designs; all entries of a design are scaled to the range 0 to 1."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from foldyn.designs.search import BAD, Ended, Search, Trial
 from foldyn.errors import optional
 
 SPREAD = 0.25
-"""Standard deviation of the first generation of CMA-ES."""
+"""Standard deviation of the first generation of CMA-ES, in scaled entries."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of methods.
+    """Settings that all methods share.
 
     Attributes
     ----------
     tolerance : float
         Relative change of the objective at which a search ends.
     slack : float
-        Relative violation of constraints that counts as none.
+        Relative violation of a constraint up to which it counts as satisfied.
     most : int
-        Evaluations.
+        Most evaluations of a search.
     seed : int
         Random seed of stochastic methods.
     """
@@ -47,9 +47,9 @@ class Method:
     Attributes
     ----------
     run : callable
-        Searches from a guess; returns why it ended, and whether it is an optimum.
+        Searches from a guess; returns why the search ended, and whether at an optimum.
     gradient : bool
-        Whether it needs derivatives.
+        Whether the method needs derivatives.
     doc : str
     needs : str
         Module that must be installed.
@@ -96,7 +96,7 @@ def _trust_constr(search: Search, x: NDArray, settings: Settings) -> tuple[str, 
                 hess=BFGS(),
             )
         )  # fmt: skip
-    with warnings.catch_warnings():  # if a design fails, its slopes keep the last values
+    with warnings.catch_warnings():  # slopes of a failed design are those of the last good design
         warnings.filterwarnings("ignore", "delta_grad == 0.0", UserWarning)
         found = minimize(
             lambda x: search.at(x).objective, np.clip(x, 1e-3, 1.0 - 1e-3),
@@ -171,7 +171,7 @@ def _cma(search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
         "verb_log": 0, "tolfun": settings.tolerance, "tolx": 1e-2 * settings.tolerance,
     }  # fmt: skip
     n = len(x)
-    first = x if n > 1 else np.append(x, 0.5)  # it does not support a single variable
+    first = x if n > 1 else np.append(x, 0.5)  # cma does not support a single variable
     strategy = cma.CMAEvolutionStrategy(first, SPREAD, options)
     count = len(search.problem.constraints)
     lagrangian = handler.AugmentedLagrangian(len(first), search.problem.equal)
@@ -203,7 +203,7 @@ METHODS: Mapping[str, Method] = {
 
 
 def searched(method: str, search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
-    """Search from a guess; return why it ended, and whether it is an optimum."""
+    """Search from a guess; return why the search ended, and whether at an optimum."""
     try:
         search.at(x)
         return METHODS[method].run(search, x, settings)

@@ -1,4 +1,4 @@
-"""The page of a design: before and after, parameters and constraints, the course of the search."""
+"""The page of a design search: the design before and after, and the course of the search."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from foldyn.viewer import Stage, stage
 from foldyn.writing import whole
 
 MOST_ROWS = 200
-"""Most entries of parameters in a table."""
+"""Largest number of parameter entries in a table."""
 SHOWN = ("modes", "dynamics", "statics")
 """Kinds of analysis whose results a page shows in motion."""
 
@@ -87,7 +87,7 @@ def write_design(
 def _stages(
     plan: Plan, cases: dict[str, Case], designs: dict[str, Any], case_file: CaseFile
 ) -> Iterator[Stage]:
-    """Results of the design after and before, side by side."""
+    """Results of the best design and of the first guess, side by side."""
     if case_file.analysis.kind not in SHOWN:
         return
     results = {name: plan.evaluator.result(designs[name]) for name in cases}  # type: ignore
@@ -135,7 +135,7 @@ def _ends(found: Design) -> Table:
     ]  # fmt: skip
     header = ["search", "objective", "violation", "feasible", "evaluations", "why it ended"]
     caption = (
-        f"{found.evaluations} evaluations in all. Violations are over the size of a constraint."
+        f"{found.evaluations} evaluations in all. Violations are relative to the constraint's size."
     )
     return Table(header, rows, caption, digits=6)
 
@@ -154,7 +154,7 @@ def _failures(found: Design) -> Iterator[Section]:
 def _slopes(
     found: Design, plan: Plan, case: Case, folder: Path, figures: str | None
 ) -> Iterator[Section]:
-    """Sensitivity to each parameter, and to each array entry on the sheet."""
+    """Sensitivity to each parameter; for arrays, also drawn on the sheet for each entry."""
     text = plan.problem.objective.text
     width = plan.space.parts(plan.space.upper - plan.space.lower)
     over = {name: np.asarray(found.gradient[name]) * width[name] for name in found.gradient}
@@ -162,8 +162,8 @@ def _slopes(
         name: one if plan.space.shapes[name] else float(one.item()) for name, one in over.items()
     }
     caption = (
-        "Derivative of the objective by each parameter at the best design, times the range of the "
-        "parameter. Of arrays: the root of the sum of squares."
+        "Derivative of the objective with respect to each parameter at the best design, times the "
+        "range of the parameter. For an array: the root of the sum of squares over its entries."
     )
     if len(slopes) > 1:
         yield Charts([slope_chart(slopes, text)], caption)

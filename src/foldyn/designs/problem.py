@@ -16,7 +16,7 @@ from foldyn.values import listed, numbers, show
 
 @dataclass(frozen=True)
 class Problem:
-    """An objective and its constraints.
+    """An objective, and constraints on the design.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Problem:
 
     @property
     def signs(self) -> NDArray:
-        """For each constraint -1 if its difference must be at least 0, else 1."""
+        """For each constraint -1 if left minus right side must be at least 0, else 1."""
         return np.array([-1.0 if one.sense == ">=" else 1.0 for one in self.constraints])
 
     def numbers(self, values: Mapping[str, float]) -> NDArray:
@@ -61,7 +61,7 @@ class Problem:
     def with_slopes(
         self, values: Mapping[str, float], jacobian: Mapping[str, NDArray]
     ) -> tuple[NDArray, NDArray]:
-        """The same, and derivatives by the entries of a design, from the measures' jacobian."""
+        """`numbers`, and derivatives with respect to a design's entries, from those of measures."""
         width = len(next(iter(jacobian.values())))
         found, rows = [], []
         for one in (self.objective, *self.constraints):
@@ -71,7 +71,7 @@ class Problem:
         return np.array(found), np.array(rows)
 
     def sizes(self, values: Mapping[str, float]) -> NDArray:
-        """Scales of the objective and the violations, from one design."""
+        """Scales of the objective and of the violations, from the measures of one design."""
         return np.array(
             [
                 abs(self.objective.value(values)) or 1.0,
@@ -113,7 +113,7 @@ def _constraints(texts: Sequence[Any]) -> tuple[Constraint, ...]:
 
 
 Values = Mapping[str, float | NDArray]
-"""Values of parameters by name."""
+"""Values of parameters, by the names of the parameters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ class Space:
     Attributes
     ----------
     shapes : dict of str to tuple
-        () for a number, (count,) for an array.
+        Shape of each parameter: () for a number, (count,) for an array.
     lower, upper : ndarray, shape (n,)
         Bounds of all entries, one parameter after the other.
     """
@@ -142,7 +142,7 @@ class Space:
         return (np.asarray(point) - self.lower) / (self.upper - self.lower)
 
     def parts(self, entries: NDArray) -> dict[str, NDArray]:
-        """Split entries along the last axis by parameter."""
+        """Split an array of entries (..., n) into one part for each parameter."""
         counts = [int(np.prod(shape)) for shape in self.shapes.values()]
         split = np.split(np.asarray(entries), np.cumsum(counts)[:-1], axis=-1)
         return dict(zip(self.shapes, split, strict=True))
@@ -156,7 +156,7 @@ class Space:
 
     @property
     def entries(self) -> list[str]:
-        """Names of all entries: "panel_angle", "stiffness[3]"."""
+        """Names of all entries, such as "panel_angle" and "stiffness[3]"."""
         return [
             f"{name}[{k}]" if shape else name
             for name, shape in self.shapes.items()
@@ -165,7 +165,7 @@ class Space:
 
 
 def space_of(bounds: Any, guess: Any) -> tuple[Space, NDArray]:
-    """Design space and the entries of the first design, by default in the middle.
+    """Design space, and the entries of the first design, by default in the middle of the space.
 
     Raises
     ------

@@ -23,7 +23,7 @@ from foldyn.values import show, suggest
 from foldyn.writing import plain, write_json, write_text
 
 PARAMETER, GRADIENT = "parameter_", "gradient_"
-"""Prefixes of parameter names in datasets."""
+"""Prefixes of parameter names in datasets, for values and gradients."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,13 @@ class End:
     ----------
     search : int
     objective, violation : float
-        Values of the best design of this search; nan if none could be computed. The violation is
-        the largest of all constraints, relative to their scales.
+        Values of the best design of this search; nan if no design could be computed. The violation
+        is the largest one of all constraints, each relative to the constraint's scale.
     feasible : bool
-        Whether the violation is small enough to count as none.
+        Whether the violation is small enough to be accepted.
     evaluations : int
     message : str
-        Why it ended.
+        Why the search ended.
     converged : bool
     """
 
@@ -56,20 +56,20 @@ class End:
 @brief
 @dataclass(frozen=True, eq=False)
 class Design:
-    """The best design found, and the search. ``design["parameters"]`` is `design.parameters`.
+    """The best design found, and the searches; ``design["parameters"]`` is `design.parameters`.
 
     Attributes
     ----------
     parameters : dict
-        Values by name: numbers, or arrays.
+        Value of each parameter by name: a number, or an array.
     objective : float
         Value of the expression that was minimized or maximized.
     feasible : bool
         Whether all constraints hold, up to the slack.
     constraints : dict of str to float
-        Violation of each constraint, in the unit of its sides; 0 up to the slack.
+        Violation of each constraint, in the unit of its sides; 0 if it is within the slack.
     measures : dict of str to float
-        All measures of this design.
+        All measures of the best design.
     gradient : dict
         Derivatives of the objective with respect to the parameters; empty if not computed.
     ends : tuple of End
@@ -101,19 +101,19 @@ class Design:
         return getattr(self, name)
 
     def summary(self) -> dict[str, Any]:
-        """All numbers except the history, as JSON types (nan is null)."""
+        """All attributes except the history, as JSON types (nan becomes null)."""
         own = {name: value for name, value in vars(self).items() if name not in ("ends", "history")}
         return plain(
             {"foldyn_version": foldyn.__version__, **own, "ends": [vars(one) for one in self.ends]}
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the best design (``*.json``), or the history with it (``*.nc``, ``*.csv``).
+        """Write the best design (``*.json``), or history and best design (``*.nc``, ``*.csv``).
 
         Raises
         ------
         InputError
-            The name has another ending, or its folder does not exist.
+            The file name has another ending, or its folder does not exist.
         """
         path = Path(path)
         if not path.parent.is_dir():
@@ -136,7 +136,7 @@ class Design:
 
 
 def _columns(history: xr.Dataset) -> Iterator[tuple[str, list[Any]]]:
-    """Table columns with a number for each evaluation."""
+    """Name and values of each table column; a value for each evaluation."""
     for name, one in history.items():
         if one.dims[:1] != ("evaluation",):
             continue
@@ -161,7 +161,7 @@ def history_of(
         "objective": (along, numbers[:, 0], {"long_name": problem.objective.text}),
         "violation": (
             along, np.array([row.violation for row in rows]),
-            {"long_name": "largest violation of a constraint, over its size"},
+            {"long_name": "largest violation, relative to the size of the constraint"},
         ),
         "feasible": (along, np.array([row.feasible for row in rows])),
         "seconds": (along, np.array([row.seconds for row in rows]), {"units": "s"}),

@@ -1,4 +1,4 @@
-"""`design`: optimize parameters under bounds and constraints, also as a case file asks."""
+"""`design`: optimize parameters under bounds and constraints, in Python or from a case file."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from foldyn.values import MOST, choice, number, whole
 from foldyn.writing import write_text
 
 FLAT = 1e-12
-"""Relative change of the objective across the bounds that counts as none."""
+"""If the objective changes by less than this fraction between the bounds, it counts as constant."""
 MOST_DRAWN = 20
-"""Most designs drawn for a guess before one can be computed."""
+"""Most designs that are drawn to find a guess that can be computed."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,11 @@ class Course:
     Attributes
     ----------
     done, found : int
-        Number of evaluations, and of stored ones among them.
+        Number of evaluations, and how many of them were found in the folder.
     search : int
         Number of the search.
     objective, violation : float
-        Values of the best design so far; nan without one.
+        Values of the best design so far; nan if there is none yet.
     """
 
     done: int
@@ -103,38 +103,40 @@ def design(
     Parameters
     ----------
     build : callable or path
-        ``build(**parameters)`` returns the case; or a case file, whose parameters are keys, as
-        "pattern.panel_angle".
+        ``build(**parameters)`` returns the case; or a case file, with parameters named by keys of
+        the file, such as "pattern.panel_angle".
     bounds : mapping
-        Parameters by name, each with its lower and upper bound: numbers, or for an array lists of
-        one for each entry; numbers hold for all entries of an array that `guess` gives.
+        Parameters by name, each with a lower and an upper bound. For an array, a bound is a list
+        with a number for each entry, or one number for all entries if `guess` gives the array.
     minimize, maximize : str
-        Exactly one of the two: an expression of sweep measures, "-frequency[2] / frequency[1]",
-        with ``+ - * / **``, parentheses, min, max, abs, sqrt, log and exp.
+        Exactly one of the two: an expression of measures as in a sweep, such as
+        "-frequency[2] / frequency[1]", with ``+ - * / **``, parentheses, min, max, abs, sqrt, log
+        and exp.
     subject_to : sequence of str
-        Constraints: expressions with "==", "<=" or ">=", as "mass <= 0.1".
+        Constraints: expressions with "==", "<=" or ">=", such as "mass <= 0.1".
     analysis : mapping
         Analysis of a built case: its kind, "modes", "dynamics", "statics" or "frf", and arguments
-        of `modes`, `simulate`, `trace` or `frf`. A case file has its own.
+        of `modes`, `simulate`, `trace` or `frf`. A case file contains its own analysis.
     guess : mapping, optional
         Values to begin from, by default the middle between the bounds.
     method : {"slsqp", "trust-constr", "mma", "cma"}
         The first three use exact derivatives, see `sensitivity`; "mma" needs NLopt. "cma" (CMA-ES)
         needs no derivatives, but some hundred times as many evaluations.
     searches : int
-        Number of searches: the first from `guess`, the others from random designs within the
+        Number of searches. The first starts from `guess`, the others from random designs within the
         bounds.
     seed : int
         Random seed of the other guesses and of CMA-ES.
     tolerance : float
-        Change of the objective, relative to its size at the first design, at which a search ends.
+        A search ends when the objective changes by less than this, relative to its size at the
+        first design.
     slack : float
-        Violation of a constraint that counts as none, relative to the constraint's size: its
-        numeric side, or else the larger side at the first design.
+        A constraint holds if its violation is below this, relative to the constraint's size: the
+        side that is a number, or else the larger side at the first design.
     max_evaluations : int
         Most evaluations of each search.
     folder : path, optional
-        Keeps every evaluation, so that an interrupted search resumes.
+        Folder that keeps every evaluation, so that an interrupted search can resume.
     progress : callable, optional
         Called with a `Course` after every evaluation.
 
@@ -154,7 +156,7 @@ def design(
     Warns
     -----
     FoldynWarning
-        No design is feasible: the one with the least violation is returned.
+        No design is feasible: the design with the least violation is returned.
 
     Notes
     -----
@@ -210,14 +212,14 @@ def designed(
             message, converged = searched(plan.method, search, x, plan.settings)
             ends.append(_end(k, search, message, converged))
             if k == 0 and search.rows[0].failure and search.sizes is None:
-                plan.evaluator(plan.space.values(search.rows[0].point), gradient)  # raises it
+                plan.evaluator(plan.space.values(search.rows[0].point), gradient)  # raises
     if search.best is None:
         raise ComputationError(f"no guess can be computed: {search.rows[0].failure}")
     return _found(plan, search, search.best, ends, time.perf_counter() - began)
 
 
 def _first(plan: Plan, search: Search, number: int) -> NDArray:
-    """Guess of a search: given, or drawn until a design can be computed."""
+    """First design of a search: the given guess, or one drawn until it can be computed."""
     if number == 0:
         return plan.space.x(plan.first)
     drawn = np.random.default_rng([plan.settings.seed, number])

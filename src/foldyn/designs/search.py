@@ -1,4 +1,4 @@
-"""A search: evaluates designs once each, records them, and scales them for the method."""
+"""A search, which evaluates each design once, records it, and scales its values for the method."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from foldyn.errors import FoldynError
 from foldyn.sweeps.evaluations import Evaluations
 
 BAD = 1e6
-"""Objective of a design that cannot be computed, relative to the objective's size."""
+"""Objective assigned to a design that cannot be computed, relative to the objective's size."""
 MOST_FAILED = 20, 200
-"""Failed designs in a row after which a search is given up: for methods with gradients, and for
-stochastic ones."""
+"""Failed designs in a row after which a search is given up, for methods with gradients and for
+stochastic methods."""
 NEAR, STILL = 1e-7, 20
-"""Relative to the width of the bounds: distance of equal designs; their number in a row that ends a
-search by gradients."""
+"""Designs closer than the first number, relative to the width of the bounds, are equal; more equal
+designs in a row than the second number end a search with gradients."""
 
 
 class Ended(Exception):  # noqa: N818
@@ -37,11 +37,11 @@ class Trial:
     objective : float
         Value to minimize.
     excess : ndarray, shape (c,)
-        Excess of each constraint: at most 0 if it holds, or exactly 0 for an equality.
+        Excess of each constraint: at most 0 if the constraint holds; 0 if an equality holds.
     slope, slopes : ndarray, shapes (n,) and (c, n)
-        Derivatives of `objective` and `excess`; empty if no method asks for them.
+        Derivatives of `objective` and `excess`; empty if the method needs none.
     violation : float
-        The largest of all violations.
+        The largest violation of all constraints.
     """
 
     x: NDArray
@@ -56,7 +56,7 @@ class Trial:
 class Row:
     """A row of the history.
 
-    numbers : the objective, and left minus right sides of the constraints; nan if it failed.
+    numbers : the objective, and left minus right sides of constraints; nan for a failed design.
     """
 
     search: int
@@ -69,7 +69,7 @@ class Row:
     failure: str
     warnings: str
     values: dict[str, float] = field(default_factory=dict)
-    slopes: NDArray | None = None  # of the numbers, with respect to the entries in their units
+    slopes: NDArray | None = None  # derivatives of numbers by entries of the design, in their units
 
 
 class Search:
@@ -82,7 +82,7 @@ class Search:
     gradient : bool
         Whether evaluations include derivatives.
     slack : float
-        Relative violation of constraints that counts as none.
+        Relative violation of a constraint up to which it counts as satisfied.
     most : int
         Most evaluations of one search.
     tell : callable, optional
@@ -124,14 +124,14 @@ class Search:
     def at(self, x: NDArray) -> Trial:
         """Evaluate a design.
 
-        If it fails, the objective is very large and all other values are those of the last
-        successful design, so that methods take a shorter step.
+        If the design fails, the objective is very large, and all other values are the values of the
+        last successful design, so that methods take a shorter step.
 
         Raises
         ------
         Ended
-            The first design of a search or too many in a row cannot be computed, or the limit of
-            evaluations is reached.
+            The first design of a search, or too many designs in a row, cannot be computed, or the
+            limit of evaluations is reached.
         """
         point = self.space.point(np.asarray(x, float))
         if point not in self._known:
@@ -154,7 +154,7 @@ class Search:
         return Trial(np.asarray(x), BAD, last.excess, last.slope, last.slopes, np.inf)
 
     def _count_still(self, found: Trial) -> None:
-        """End a gradient-based search that stays at one design, as when none is feasible."""
+        """End a search with gradients that stays at one design, such as when none is feasible."""
         last = self._last
         if not self.gradient or last is None or found is last:
             return

@@ -159,7 +159,7 @@ def _strained_most(result: xr.Dataset, case: Case) -> list[tuple[int, ...]]:
 
 
 class _Bar(NamedTuple):
-    """A bar, stretched (sign 1) or shortened (-1); `apart` (m) is the relative motion of its ends."""
+    """A bar, stretched (sign 1) or shortened (-1); `apart` (m): relative motion of its ends."""
 
     ends: NDArray  # (2,)
     apart: NDArray  # (3,)

@@ -1,4 +1,4 @@
-"""Many analyses: a case file at many values of its keys, with the shared pool and evaluations."""
+"""Sweeps: a case file computed for many values of its keys; pools and stored evaluations."""
 
 from __future__ import annotations
 

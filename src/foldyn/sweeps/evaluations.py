@@ -1,4 +1,4 @@
-"""Evaluations of a model: each is computed once, and kept in its own file."""
+"""Evaluations of a model; each one is computed once, and kept in a file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from foldyn.sweeps.pool import Pool
 from foldyn.writing import made_folder, whole
 
 Point = TypeVar("Point")
-_VALUE = "value "  # prefix of the names of values, in files
+_VALUE = "value "  # prefix, in files, of the names of values
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +29,14 @@ class Evaluation:
     ----------
     values : dict of str to ndarray
     failure : str
-        Why values are missing, or "".
+        Why values are missing; "" if none are.
     warnings : str
-        Warnings, or "".
+        Text of the warnings; "" if there were none.
     seconds : float
         Computing time.
     lasting : bool
-        Whether a repetition would give the same; if not, as for a lack of memory, it is not kept.
+        Whether a repetition would give the same. If not (such as after a lack of memory), the
+        evaluation is not kept.
     """
 
     values: Mapping[str, NDArray] = field(default_factory=dict)
@@ -55,9 +56,9 @@ class Evaluations(Generic[Point]):
     stamp : callable
         Returns everything that a point's evaluation depends on, as JSON types.
     folder : path, optional
-        Keeps every evaluation; stored ones are not recomputed.
+        Folder that keeps every evaluation; stored evaluations are not recomputed.
     tell : callable, optional
-        Called with each point, its evaluation, and whether it was found in the folder.
+        Called with each point, its evaluation, and whether the evaluation was found in the folder.
     """
 
     def __init__(
@@ -87,7 +88,7 @@ class Evaluations(Generic[Point]):
         lost : callable, optional
             As in `Pool.each`.
         first : bool
-            Compute one point before the others, which then find its kernels compiled.
+            Compute one point before the others, so that the others find the kernels compiled.
         """
         new = [point for point in dict.fromkeys(points) if not self._look(point)]
         if new:
@@ -143,4 +144,4 @@ def _write(file: Path, stamp: str, found: Evaluation) -> None:
 
 
 KEPT: Store[Evaluation] = Store(_read, _write, warns=False)
-"""Files with seals; damaged ones count as missing."""
+"""Files with seals; a damaged file counts as missing."""

@@ -1,4 +1,4 @@
-"""One point of a sweep: the case file with changed values, its result, its measures."""
+"""One point of a sweep: the case file with changed values, the result, and its measures."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ class Job:
     path : Path
         The case file.
     document : dict
-        Its content.
+        Content of the case file.
     keys : tuple of str
-        Varied keys.
+        Keys that are varied.
     ties : tuple of Tie
     measures : tuple of Asked
     program : str
@@ -95,7 +95,7 @@ class Job:
 
 
 class BegunPoint:
-    """A point of a sweep from its case file to its evaluation.
+    """A point of a sweep on the way from its case file to its evaluation.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class BegunPoint:
                 if isinstance(self.compute, Moving) and self.compute.integrated:
                     self._seconds += self.compute.motion.seconds
                 result, case, shared = self._result(), self._case_file.case(), {}
-                for variable in result.variables.values():  # no measure may change it
+                for variable in result.variables.values():  # no measure may change the result
                     variable.values.setflags(write=False)
                 for each in self._job.measures:
                     with self._noted():
@@ -153,7 +153,7 @@ class BegunPoint:
 
     @contextmanager
     def _noted(self) -> Iterator[None]:
-        """Record errors of the block, and keep other values."""
+        """Record errors of the block; values of other measures are kept."""
         try:
             yield
         except (InputError, ComputationError) as error:
@@ -164,13 +164,13 @@ class BegunPoint:
 
 
 def this_program() -> str:
-    """Digest of the program."""
+    """Digest of Foldyn's source, which shows whether another process runs the same version."""
     return program(*COMPUTING)
 
 
 @cache
 def _digest(file: str) -> str:
-    """Digest of a file named in a case file; "" if there is none."""
+    """Digest of a file named in a case file; "" if the file does not exist."""
     try:
         return hashlib.sha256(Path(file).read_bytes()).hexdigest()
     except OSError:
@@ -178,14 +178,14 @@ def _digest(file: str) -> str:
 
 
 def code_of(function: Callable[..., Any]) -> str:
-    """Digest of the source of a user's function; "" for registered ones."""
+    """Digest of the source of a user's function; "" for registered measures."""
     found = function.load() if isinstance(function, Loaded) else function
     if getattr(found, "__module__", "").startswith("foldyn."):
         return ""
     try:
         file = inspect.getsourcefile(found)
         text = Path(file).read_text("utf-8") if file else inspect.getsource(found)
-    except (OSError, TypeError):  # typed into a session
+    except (OSError, TypeError):  # a function typed into an interactive session
         code = getattr(found, "__code__", None)
         text = repr(found) if code is None else f"{code.co_code!r}{code.co_consts!r}"
     return hashlib.sha256(text.encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""Measures: named functions of a result, and their arguments."""
+"""Measures: named functions of a result, and the arguments of these functions."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from foldyn.values import choice, number, show, suggest
 
 NODE, AXIS, MODE, BAND = "node", "axis", "mode", "band"
 WORDS = ("model", "point", "leg")
-"""Arguments that are names in the result,"""
+"""Arguments of measures that are names in the result."""
 REALS = {"time": "s", "displacement": "m", "frequency": "Hz"}
-"""and arguments that are numbers, with their units."""
+"""Arguments of measures that are numbers, with their units."""
 _ASKED = re.compile(r"([A-Za-z_]\w*)(?:\[([^\[\]]*)\])?\Z")
 _NAME = re.compile(r"[A-Za-z_]\w*\Z")
 _OWN = re.compile(r"(?:([A-Za-z_]\w*)=)?(.+):([A-Za-z_]\w*)\Z")
@@ -38,27 +38,27 @@ class Measure:
     ----------
     name : str
     kinds : tuple of str
-        Kinds of analysis that it applies to; empty means all.
+        Kinds of analysis to which the measure applies; empty means all kinds.
     function : callable
-        ``function(result, case)``, with the values of `takes` as named arguments; a number or an
-        array.
+        ``function(result, case)``, with the values of `takes` as further named arguments; returns a
+        number or an array.
     units : str
         "1" if dimensionless, "" if unknown.
     doc : str
-        Meaning, as labels of figures show it.
+        Meaning of the measure; also the label in figures.
     dims : tuple of str
         Dimensions of an array; their lengths may differ from point to point.
     takes : tuple of str
         Arguments, in their order: "node", "axis", "mode", "band", "model", "point", "leg",
         "time", "displacement", "frequency".
     needs : int
-        How many of them must be given.
+        How many of these arguments must be given.
     through : callable, optional
         ``through(result, case)`` runs first, once for all measures that share it; its return value
         replaces the result.
     whole : bool
-        Whether a path that stopped early has no value: true for measures of the end and for
-        extremes.
+        Whether the measure needs a whole path, and has no value for a path that stopped early: true
+        for measures of the end, and for extremes.
     """
 
     name: str
@@ -74,7 +74,7 @@ class Measure:
 
     @property
     def asked(self) -> str:
-        """Notation with its arguments: "peak_frequency[node,axis]"."""
+        """Notation of the measure with its arguments, such as "peak_frequency[node,axis]"."""
         shown = [*self.takes[: self.needs], *(f"{word}?" for word in self.takes[self.needs :])]
         return f"{self.name}[{','.join(shown)}]" if shown else self.name
 
@@ -86,11 +86,11 @@ class Asked:
     Attributes
     ----------
     name : str
-        Its name in the result of a sweep.
+        Name of the measure in the result of a sweep.
     measure : Measure
     arguments : dict
     text : str
-        Text of the request.
+        Text with which the measure was requested.
     """
 
     name: str
@@ -106,12 +106,12 @@ class Asked:
         result : xarray.Dataset
         case : Case
         shared : dict
-            Return values of `through` for this result, by function; it is extended.
+            Return values of `through` for this result, by function; new ones are added.
 
         Raises
         ------
         FoldynError
-            It does not apply to this result.
+            The measure does not apply to this result.
         """
         if self.measure.whole and result.attrs.get("status") == "stopped":
             raise InputError(f"{self.text}: is of whole paths, and this one stopped on the way")
@@ -157,12 +157,12 @@ class Asked:
 
 
 def asked(text: str, known: Mapping[str, Measure]) -> Asked:
-    """Measure of the registry from its text, "peak_frequency[8,x]".
+    """Measure of the registry from its text, such as "peak_frequency[8,x]".
 
     Raises
     ------
     InputError
-        No measure of this name, or wrong arguments.
+        There is no measure of this name, or its arguments are wrong.
     """
     found = _ASKED.match(text.strip()) if isinstance(text, str) else None
     if found is None:
@@ -225,7 +225,7 @@ def of_callable(name: str, function: Callable[..., Any]) -> Asked:
 
 @dataclass(frozen=True)
 class Loaded:
-    """A function by its location, so that it can be sent to other processes."""
+    """A function identified by its location, so that it can be sent to other processes."""
 
     place: str
     function: str

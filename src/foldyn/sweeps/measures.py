@@ -1,4 +1,4 @@
-"""Registry of measures that a sweep can take."""
+"""Registry of the measures that are available in sweeps."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ BANDS = "bands"
 PROMINENT = 0.05
 """Least prominence of a peak of a spectrum, relative to its maximum."""
 NEAR = 1e-5
-"""Relative width of an interval of load factors below which it is not reported."""
+"""Intervals of load factors with a smaller relative width are not reported."""
 CURVES, MOVED = (FRF, MOTION), (MOTION, PATH)
 MEASURES: dict[str, Measure] = {}
 """Measures by name."""
 
 
 def _measure(*kinds: str, **about: Any) -> Callable[[F], F]:
-    """Register a function as a measure under its name, for kinds of analysis; see `Measure`."""
+    """Register a function, under its name, as a measure for kinds of analysis; see `Measure`."""
 
     def registered(function: F) -> F:
         name = function.__name__.removeprefix("_")
@@ -105,7 +105,7 @@ def _rigid_modes(result: xr.Dataset, case: Case) -> int:
 def curve_of(
     result: xr.Dataset, node: int, axis: str | None
 ) -> tuple[NDArray, NDArray, Peaks, str]:
-    """Frequencies, magnitudes at a node (of the vector if no axis is named), and their peaks."""
+    """Frequencies, magnitudes at a node (along an axis, or of the vector), and their peaks."""
     along = list(AXES) if axis is None else [axis]
     if "time" in result:
         motion = result["displacement"].transpose("time", ...).sel(node=node, axis=along).values
@@ -135,7 +135,7 @@ def _highest(peaks: Peaks, name: str) -> float:
 
 
 def frequency_of(result: xr.Dataset, frequency: float) -> int:
-    """Number of the nearest frequency (Hz) of a response, at most half the spacing away."""
+    """Index of the frequency (Hz) in a response that is nearest, at most half the spacing away."""
     known = result["frequency"].values
     k = int(np.abs(known - frequency).argmin())
     if abs(known[k] - frequency) > 0.5 * np.diff(known).max(initial=0.0):
@@ -198,7 +198,7 @@ def _displacement_at(
 
 
 def time_of(result: xr.Dataset, time: float) -> int:
-    """Number of the sample at a time (s), at most half a sampling interval away."""
+    """Index of the sample nearest to a time (s), at most half a sampling interval away."""
     times = result["time"].values
     k = int(np.abs(times - time).argmin())
     if abs(times[k] - time) > 0.5 * np.diff(times).max():
@@ -241,7 +241,7 @@ def _largest_displacement(result: xr.Dataset, case: Case, node: int | None = Non
 
 
 def sampled(result: xr.Dataset, name: str) -> xr.DataArray:
-    """A variable of a motion or a path, samples first."""
+    """A variable of a motion or a path, with the samples along its first dimension."""
     along = "time" if "time" in result.dims else "step"
     return result[name].transpose(along, ...)
 
@@ -277,7 +277,7 @@ def _clearance(result: xr.Dataset, case: Case) -> float:
 
 
 def closest_panels(result: xr.Dataset, case: Case) -> list[Clearance]:
-    """Smallest distance of panels in each sample (modes: at rest, a single one), and its place."""
+    """Smallest distance of panels and its place in each sample; for modes, once, at rest."""
     made, shapes = case.structure, np.zeros((1, 1, 3))
     if "time" in result.dims or "step" in result.dims:
         shapes = sampled(result, "displacement").transpose(..., "node", "axis").values
@@ -297,7 +297,7 @@ def _largest_load(result: xr.Dataset, case: Case) -> float:
 
 
 def intervals(result: xr.Dataset, kind: str) -> NDArray:
-    """Load factors (k, 2) between which critical points lie; both are equal for located ones."""
+    """Load factors (k, 2) between which critical points lie; equal if a point was located."""
     counts, factor = result["negative_eigenvalues"].values, result["load_factor"].values
     changes = np.flatnonzero((np.diff(counts) != 0) & (np.minimum(counts[1:], counts[:-1]) >= 0))
     if len(changes) and (result.attrs["method"] == "newton" or not result.attrs["locate"]):

@@ -1,4 +1,4 @@
-"""The page of a sweep: measures over parameters, the points, and failures."""
+"""The page of a sweep: plots of measures against parameters, the points, and failures."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from foldyn.results.sweep_dataset import (
 )
 
 MOST_CURVES = 8
-"""Most curves of a chart."""
+"""Most curves in a chart."""
 MOST_ROWS = 1000
 """Most points in a table."""
 MOST_REASONS = 50
 """Most points with missing values in a table."""
 MOST_COLUMNS = 6
-"""Most values of one measure in a row."""
+"""Most values of one measure in a table row."""
 
 
 def write_sweep(
@@ -71,7 +71,7 @@ def write_sweep(
 
 
 def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]:
-    """Charts or figures of a measure, and its Sobol indices."""
+    """Charts or figures of a measure, and the measure's Sobol indices."""
     one = sweep[name]
     yield Heading(str(one.attrs["measure"]))
     if not np.isfinite(one.values).any():

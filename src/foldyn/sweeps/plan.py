@@ -39,10 +39,10 @@ class Plan:
     method : str
         "grid", or the sampling method.
     count : int
-        Number of samples, or of the base samples of a design; 0 for a grid.
+        Number of samples, or of base samples for Sobol indices; 0 for a grid.
     seed : int
     points : list of tuple
-        Values of the keys, as `varied`.
+        Values of the keys at each point, in the order of `varied`.
     job : Job
     compute : callable
         The computation of the unchanged file.
@@ -125,7 +125,7 @@ def plan_of(
 
 
 def _with_device(document: dict[str, Any], device: str | None) -> tuple[dict[str, Any], str]:
-    """A case file of motions with the requested device, and that device."""
+    """The document with the requested device (if it computes motions), and the device."""
     if device is not None:
         choice("device", device, DEVICES)
     section = document.get("analysis")
@@ -178,7 +178,7 @@ def _with_masses(
 
 
 def _measures(wanted: Sequence[Any] | Mapping[str, Any] | None) -> tuple[Asked, ...]:
-    """Measures from names, functions or a mapping; refuse none, and repeated names."""
+    """Measures from names, functions or a mapping; refuse an empty list, and repeated names."""
     if isinstance(wanted, str) or callable(wanted):
         wanted = [wanted]
     if wanted is None or not (asked_for := listed("measures", wanted, "measures")):
@@ -216,7 +216,7 @@ def _function(one: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _check_keys(job: Job, keys: Sequence[Varied], first: Point) -> None:
-    """Refuse keys and values that this kind of case file cannot have, before any computation."""
+    """Before any computation, refuse keys and values that this kind of case file cannot have."""
     names = [*job.keys, *(tie.key for tie in job.ties)]
     for name in names:
         if names.count(name) > 1:

@@ -17,7 +17,7 @@ GRID = "grid"
 MOST_POINTS = 1_000_000
 """Most points of a sweep; a larger number is a typing error."""
 MOST_SOBOL = 21201
-"""Dimensions of SciPy's Sobol sequence."""
+"""Largest number of dimensions of SciPy's Sobol sequence."""
 
 Point = tuple[Value, ...]
 
@@ -35,11 +35,12 @@ def samples(varied: Sequence[Varied], count: int, method: str, seed: int) -> lis
     Parameters
     ----------
     varied : sequence of Varied
-        Keys with one value keep it at all points and add no dimension.
+        Keys with one value keep this value at all points and add no dimension.
     count : int
-        Number of points. With "saltelli" it is the size of the base samples of a design for Sobol
-        indices: two independent samples, and for each key the first with that key from the second
-        (Saltelli et al., Comput. Phys. Commun. 181, 2010).
+        Number of points. With "saltelli" it is the number of points in each sample of a design for
+        Sobol indices. The design has two independent samples, and for each key a copy of the first
+        sample that takes this key from the second (Saltelli et al., Comput. Phys. Commun. 181,
+        2010).
     method : {"latin_hypercube", "sobol", "saltelli"}
     seed : int
 
@@ -60,7 +61,7 @@ def samples(varied: Sequence[Varied], count: int, method: str, seed: int) -> lis
 
 
 def _shares(d: int, count: int, method: str, seed: int) -> NDArray[np.float64]:
-    """Points of the unit cube, shape (points, d)."""
+    """Sample points in the unit cube, shape (points, d)."""
     from scipy.stats import qmc
 
     drawn = np.random.default_rng(seed)

@@ -14,7 +14,7 @@ Result = TypeVar("Result")
 
 
 class Pool(Protocol[Item, Result]):
-    """Computes many items; a context manager."""
+    """Context manager that computes many items."""
 
     def each(
         self,
@@ -25,9 +25,9 @@ class Pool(Protocol[Item, Result]):
     ) -> None:
         """Compute items; each result is kept, in this process, as soon as it is ready.
 
-        lost : returns a result for an item whose process died, given the item and the reason;
-        without it that is an error. first : compute one item before the others, which then find its
-        kernels compiled.
+        lost : function of an item whose process died, and the reason, that returns a result for the
+            item; without it, a dead process is an error.
+        first : whether to compute one item before the others, so that they find kernels compiled.
         """
         ...
 
@@ -39,7 +39,7 @@ class Pool(Protocol[Item, Result]):
         return self
 
     def __exit__(self, *_: Any) -> None:
-        """Leave the context, at once if something was raised."""
+        """Leave the context; abort at once if an exception was raised."""
 
 
 class Here(Pool[Item, Result]):
@@ -58,7 +58,7 @@ class Here(Pool[Item, Result]):
 
 
 PATIENCE = 30.0
-"""Seconds to wait for an answer of the scheduler."""
+"""Seconds to wait for an answer from the scheduler."""
 AT_LEAST = 16
 """Items submitted at a time while the number of workers is unknown."""
 
@@ -66,15 +66,15 @@ AT_LEAST = 16
 class Cluster(Pool[Item, Result]):
     """Workers of a Dask cluster as a pool; a context manager.
 
-    If a worker dies, another one computes its item; Dask gives up an item that has ended several
-    workers.
+    If a worker dies, another worker computes its item; Dask gives up an item on which several
+    workers have died.
 
     Parameters
     ----------
     do : callable
         Computes an item.
     address : str
-        Address of the scheduler, "tcp://10.0.0.1:8786".
+        Address of the scheduler, such as "tcp://10.0.0.1:8786".
 
     Raises
     ------
@@ -95,7 +95,7 @@ class Cluster(Pool[Item, Result]):
                 "scheduler",
             ) from None
         several = [one for one, threads in self._client.nthreads().items() if threads > 1]
-        if several:  # warnings and library settings of a process are shared by its threads
+        if several:  # all threads of a process share its warnings and library settings
             self._client.close()
             raise InputError(
                 f" = {address}: its worker {several[0]} computes on several threads; start workers "
@@ -146,7 +146,7 @@ class Cluster(Pool[Item, Result]):
             self._client.cancel(list(waiting))
 
     def _hand_out(self, left: Any, waiting: dict[Any, Item], finished: Any) -> None:
-        """Submit enough items that no worker is idle."""
+        """Submit enough items to keep all workers busy."""
         room = max(AHEAD * len(self._client.nthreads()), AT_LEAST)
         for item in islice(left, max(room - len(waiting), 0)):
             future = self._client.submit(self.do, item, pure=False)
@@ -154,7 +154,7 @@ class Cluster(Pool[Item, Result]):
             finished.add(future)
 
     def stop(self) -> None:
-        """Leave the cluster; its computations for this process are dropped."""
+        """Leave the cluster, which then drops its computations for this process."""
         self._client.close()
 
     def __exit__(self, *_: object) -> None:
@@ -169,11 +169,11 @@ def pool_of(
     Parameters
     ----------
     do : callable
-        Computes an item; for other processes it must be picklable.
+        Computes an item; it must be picklable to run in other processes.
     processes : int
         Number of parallel processes on this machine; 1 means this process.
     scheduler : str, optional
-        Address of a Dask scheduler, whose workers compute instead.
+        Address of a Dask scheduler; its workers then compute, instead of this machine.
     """
     if scheduler is not None:
         return Cluster(do, scheduler)

@@ -1,4 +1,4 @@
-"""`sweep`: a case file at many values of its keys, measured at each, and its dataset."""
+"""`sweep`: compute a case file for many values of its keys, and collect measures in a dataset."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ MOST_PROCESSES = 1024
 """Most parallel processes; a larger number is a typing error."""
 
 PREPARING = 0.05
-"""Seconds in which a core reads a point's file, checks its motion and measures it."""
+"""Seconds that a core needs to read a point's file, check its motion and measure the result."""
 
 Measures = Sequence[str | Measure | Callable[..., Any]] | Mapping[str, Callable[..., Any]]
 
@@ -50,7 +50,8 @@ class Course:
     Attributes
     ----------
     done, found, failed, total : int
-        Number of finished points, of stored ones among them, of failed ones, and of all.
+        Number of finished points, of finished points that were found in the folder, of failed
+        points, and of all points.
     seconds : float
         Time (s) since the start.
     left : float
@@ -70,11 +71,11 @@ ABOUT: Mapping[str, str] = {
     "warnings": "what was warned of",
     "seconds": "computing time",
 }
-"""Variables of every point."""
+"""Variables that the dataset has for every point, in addition to measures."""
 
 
 def names_of(keys: Sequence[str], taken: Sequence[str]) -> list[str]:
-    """Short names of keys: their last words, or all words if these are not unique."""
+    """Short names of keys: the last word of each key, or all its words if that is not unique."""
     short = [_last(key) for key in keys]
     counts = Counter([*short, *taken, *ABOUT, *CASE_VARIABLES, POINT, "case_file"])
     return [
@@ -84,7 +85,7 @@ def names_of(keys: Sequence[str], taken: Sequence[str]) -> list[str]:
 
 
 def _last(key: str) -> str:
-    """Last word of a key, with the following indices: "force_2" for "loads[0].force[2]"."""
+    """Last word of a key, with the indices after it: "force_2" for "loads[0].force[2]"."""
     words = parts(key)
     start = max(k for k, word in enumerate(words) if isinstance(word, str))
     return "_".join(map(str, words[start:]))
@@ -147,7 +148,7 @@ def dataset(plan: Plan, found: Sequence[Evaluation], facts: Mapping[str, Any]) -
 
 
 def _stacked(one: Asked, found: list[Evaluation]) -> tuple[NDArray[np.float64], list[Evaluation]]:
-    """Values at all points, padded with nan, and failures due to missing values."""
+    """Values of a measure at all points, padded with nan, and evaluations with its failures."""
     there = [point.values[one.name] for point in found if one.name in point.values]
     depth = len(one.measure.dims) or (there[0].ndim if there else 0)
     fitting = [value for value in there if value.ndim == depth]
@@ -194,68 +195,70 @@ def sweep(
     progress: Callable[[Course], None] | None = None,
     device: str | None = None,
 ) -> xr.Dataset:
-    """Compute a case file at many values of its keys, and measure each result.
+    """Compute a case file for many values of its keys, and measure each result.
 
     Parameters
     ----------
     case : path
         A case file of any kind. Arguments that are not given come from its [sweep] table.
     vary : mapping, optional
-        Keys of the case file, each with values, or with a text: ``"1:5:9"`` (9 values from 1 to 5),
-        ``"1e-3:1:7:log"``, and with `samples` ``"1:5"`` or ``"1e-3:1:log"``. Replaces the whole
-        [sweep] table except its measures.
+        Keys of the case file, each with a list of values, or with a text: ``"1:5:9"`` (9 values
+        from 1 to 5) or ``"1e-3:1:7:log"``; with `samples`, ``"1:5"`` or ``"1e-3:1:log"``. This
+        argument replaces the whole [sweep] table except the measures in it.
     measures : sequence or mapping, optional
-        Names of measures with their arguments, ``"peak_frequency[8]"``; functions
-        of a result and its case, which give a number or an array; `Measure` objects. A mapping
-        names its functions.
+        Names of measures with their arguments, such as ``"peak_frequency[8]"``; functions of a
+        result and its case that return a number or an array; or `Measure` objects. A mapping gives
+        names to functions.
     samples : int, optional
-        Draw this many points instead of all combinations; with "saltelli" (2 + keys) times as many.
+        Draw this many points instead of all combinations of values; with "saltelli" (2 + number of
+        keys) times as many.
     method : {"latin_hypercube", "sobol", "saltelli"}, optional
         Sampling method: a Latin hypercube by default, a Sobol sequence, or a design for Sobol
         indices.
     seed : int, optional
         Random seed of the samples, 0 by default.
     ties : mapping of str to str, optional
-        Keys that follow others, ``{"model.fold_law.theta2": "360 - model.fold_law.theta1"}``.
+        Keys that depend on other keys, such as
+        ``{"model.fold_law.theta2": "360 - model.fold_law.theta1"}``.
     processes : int, optional
         Number of parallel processes, by default one per processor; 1 means this process.
     scheduler : str, optional
-        Address of a Dask scheduler, whose workers compute instead.
+        Address of a Dask scheduler; its workers then compute, instead of this machine.
     folder : path, optional
-        Keeps every point, so that an interrupted sweep resumes.
+        Folder that keeps every point, so that an interrupted sweep can resume.
     progress : callable, optional
         Called with a `Course` after every point.
     device : {"auto", "cpu", "gpu"}, optional
-        Device for motions, by default the file's, else "auto": batched on a GPU if there is one, it
-        has the kernels, and it should be faster.
+        Device for motions, by default the device in the file, or else "auto": in batches on a GPU
+        if there is one, if it has the kernels, and if it should be faster.
 
     Returns
     -------
     xarray.Dataset
-        A variable for each measure. For a grid the dimensions are named by the last words of the
-        keys, for samples the dimension is ``point``; values of the keys are coordinates. `failure`
-        says why a point lacks values (they are nan), `warnings` holds its warnings, and `seconds`
-        its computing time. The attribute `device` names the device of the motions; for "auto"
-        `device_reason` explains it.
+        A variable for each measure. For a grid, dimensions are named by the last words of the keys;
+        for samples, the dimension is ``point``. Values of the keys are coordinates. For each point,
+        `failure` is the reason for missing values (nan), `warnings` holds warnings, and `seconds`
+        is the computing time. The attribute `device` names the device of the motions; for "auto",
+        `device_reason` explains the choice.
 
     Warns
     -----
     FoldynWarning
-        Each kind of warning once, at the end, with the points concerned.
+        At the end, each kind of warning is issued once, with the points at which it occurred.
 
     Raises
     ------
     InputError
         A key, range or measure cannot be used, the unchanged case file is invalid, or it cannot
-        hold one of the values. Nothing was computed then.
+        hold one of the values. It is raised before anything is computed.
     ComputationError
-        The cluster was lost. Stored points remain.
+        The connection to the cluster was lost. Stored points remain.
 
     Notes
     -----
-    Valid values may still give an invalid case or a failing computation: such points fail
-    individually, with their reasons, and the others are still computed. A measure that fails does
-    not affect other measures of its point.
+    Valid values may still give an invalid case or a failing computation. Then only these points
+    fail, each with its reason; all other points are computed. A measure that fails does not affect
+    other measures of the same point.
     """
     plan = plan_of(case, vary, measures, samples, method, seed, ties, device)
     return swept(plan, processes, scheduler, folder, progress)
@@ -291,9 +294,9 @@ def swept(
 
 
 AT_ONCE = 512
-"""Most motions in a batch, enough for a GPU's full speed."""
+"""Most motions in a batch; this many are enough for a GPU's full speed."""
 ROOM = 2.0**31
-"""Bytes for their samples."""
+"""Most bytes for the samples of a batch."""
 
 
 class SideBySide(Here[Point, Evaluation]):
@@ -305,7 +308,7 @@ class SideBySide(Here[Point, Evaluation]):
         Job whose points are motions. Points without a GPU kernel, or that fail on the GPU, run on
         the CPU.
     like : Motion
-        One of the motions, used to estimate the memory for samples.
+        One of the motions, from which the memory for samples is estimated.
     """
 
     def __init__(self, job: Job, like: Motion) -> None:
@@ -327,13 +330,13 @@ class SideBySide(Here[Point, Evaluation]):
             moving = [one.compute for _, one in begun if isinstance(one.compute, Moving)]
             for k in integrate_prepared([compute.motion for compute in moving]):
                 moving[k].integrated = True
-            while begun:  # frees the memory of its samples
+            while begun:  # frees the memory of each motion's samples
                 point, one = begun.pop(0)
                 keep(point, one.finished())
 
 
 def _tell(plan: Plan, found: Sequence[Evaluation]) -> None:
-    """Issue each kind of warning once, with the points concerned."""
+    """Issue each kind of warning once, with the points at which it occurred."""
     told, names = Told(), [one.key.rpartition(".")[2] for one in plan.varied]
     for point, one in zip(plan.points, found, strict=True):
         values = (f"{name} = {show(value)}" for name, value in zip(names, point, strict=True))
@@ -382,7 +385,7 @@ class _Follow:
         self.failed += bool(one.failure)
         computed = self.done - self.found
         if computed == 1:
-            self.first = now  # it compiles kernels while others wait
+            self.first = now  # the first point compiles kernels while others wait
         pace = (now - self.first) / (computed - 1) if computed > 1 else float("nan")
         if self.progress is not None:
             left = pace * (self.total - self.done)
