@@ -1,4 +1,4 @@
-"""Patterns: the geometry of origami structures at rest, and generators of common ones."""
+"""Patterns: the geometry of origami structures at rest, and generators of common patterns."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ GENERATORS: dict[str, Callable[..., Pattern]] = {
         flasher,
     )
 }
-"""Generators by the name that case files use (`[pattern] kind`)."""
+"""Generators, by their names in case files (`[pattern] kind`)."""
 
 __all__ = [
     "GENERATORS",

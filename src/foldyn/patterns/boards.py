@@ -18,9 +18,10 @@ class Boards:
     Parameters
     ----------
     offsets : array_like, shape (np + 1,)
-        Board p has the corners offsets[p] to offsets[p + 1], one for each corner of its panel.
+        Board p has the rows offsets[p] to offsets[p + 1] of `corners`, one for each corner of its
+        panel.
     corners : array_like, shape (m, 3)
-        Corners of the boards' middle surfaces at rest (m), in the order of the panel's face.
+        Corners of the boards' middle surfaces at rest (m), in the order of each panel's corners.
     thickness : array_like, shape (np,)
         Thickness (m) of each board.
 
@@ -31,7 +32,7 @@ class Boards:
     normals : ndarray, shape (np, 3)
         Unit normals of the boards towards the front.
     centers : ndarray, shape (np, 3)
-        Means of the corners of their middle surfaces (m).
+        Mean (m) of the corners of each board's middle surface.
     """
 
     offsets: NDArray[np.int64]
@@ -64,12 +65,12 @@ class Boards:
 
     @cached_property
     def centers(self) -> NDArray[np.float64]:
-        """Means of the corners of each board's middle surface (np, 3), m."""
+        """Mean (np, 3), m, of the corners of each board's middle surface."""
         return np.array([self.of(panel).mean(axis=0) for panel in range(len(self.thickness))])
 
     @cached_property
     def _vectors(self) -> NDArray[np.float64]:
-        """Newell's normals (np, 3), with the areas as lengths."""
+        """Newell's normals (np, 3) of the boards; the length of a normal is the area."""
         vectors = np.empty((len(self.thickness), 3))
         for panel in range(len(vectors)):
             x = self.of(panel)

@@ -1,4 +1,4 @@
-"""Optional crease data of a pattern: letters, angles to fold to, families, periods."""
+"""Optional data of a pattern's creases: letters, target fold angles, families, periods."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from foldyn.errors import InputError
 from foldyn.patterns.topology import edge_lookup, vertex_pair
 from foldyn.values import listed, show, single, suggest
 
-# Words for creases of every pattern, and the letters that each selects.
+# Words that select creases in every pattern, and the letters that each word selects.
 ASSIGNED: Mapping[str, str] = {
     "all": "MVU", "mountain": "M", "valley": "V", "flat": "F", "unassigned": "U",
 }  # fmt: skip
 
 
 class Named(NamedTuple):
-    """Letters and families of creases, by which words select creases."""
+    """Letters and families of creases, so that words can select creases."""
 
     assignments: Sequence[str]
     families: Mapping[str, NDArray[np.int64]]
 
 
 def letters_by_pair(given: Any, named: Mapping[str, Any], creases: NDArray[np.int64]) -> Any:
-    """Letters by pairs of vertices; letters of families are expanded, and pairs override them."""
+    """Letters by vertex pairs; letters of families go to their creases, and pairs override them."""
     words = [key for key in given if isinstance(key, str)] if isinstance(given, Mapping) else []
     if not words:
         return given
@@ -62,7 +62,7 @@ def fold_angles(given: Any, creases: NDArray[np.int64], named: Named) -> NDArray
             angles[rows] = _own_way(word, _angle(given[word]), np.array(named.assignments)[rows])
         for key, angle in given.items():
             if isinstance(key, str):
-                continue  # pairs last, since they refine words
+                continue  # pairs come last, since they override words
             pair = vertex_pair("fold_angles", key)
             if pair not in row:
                 raise InputError(f": {pair} is not a crease; name its two vertices", "fold_angles")
@@ -87,7 +87,7 @@ def fold_angles(given: Any, creases: NDArray[np.int64], named: Named) -> NDArray
 
 
 def _own_way(word: str, size: float, letters: NDArray[np.str_]) -> NDArray[np.float64]:
-    """Angles (rad) of selected creases from a size, with the sign of each crease's letter."""
+    """Angles (rad) of selected creases: a size, with the sign given by each crease's letter."""
     signs = np.select([letters == "V", letters == "M"], [1.0, -1.0], 0.0)
     if size < 0.0 or (size > 0.0 and not signs.all()):
         why = "is a size, as each crease folds its own way; give at least 0"
@@ -114,7 +114,7 @@ def _angle(value: Any) -> float:
 def families(
     given: Any, creases: NDArray[np.int64], field: str = "families", what: str = "a crease"
 ) -> Mapping[str, NDArray[np.int64]]:
-    """Rows of the creases (or other edges) of each family; `given` as in `Pattern`."""
+    """Row numbers of the creases (or other edges) in each family; `given` as in `Pattern`."""
     if given is None:
         return {}
     if not isinstance(given, Mapping):
@@ -138,7 +138,7 @@ def families(
 
 
 def crease_rows(field: str, word: str, pattern: Any, is_key: bool = False) -> NDArray[np.int64]:
-    """Rows of the creases that a word selects: an assignment, "all", or a family.
+    """Row numbers of the creases that a word selects: an assignment, "all", or a family.
 
     Parameters
     ----------
@@ -147,17 +147,17 @@ def crease_rows(field: str, word: str, pattern: Any, is_key: bool = False) -> ND
     word : str
     pattern : Pattern
     is_key : bool
-        Whether the word is the last part of the field rather than its value.
+        Whether the word is the last part of the field's name, rather than the value of the field.
 
     Returns
     -------
     ndarray of int, shape (k,)
-        Increasing, k >= 1.
+        Row numbers in increasing order, k >= 1.
 
     Raises
     ------
     InputError
-        The pattern has no family of that name, or no crease of that assignment.
+        The pattern has no family with this name, or no crease with this assignment.
     """
     said = ": " if is_key else f" = {show(word)}: "
     if word in pattern.families:
@@ -184,7 +184,7 @@ def crease_rows(field: str, word: str, pattern: Any, is_key: bool = False) -> ND
 
 
 def folded_rows(field: str, word: str, pattern: Any) -> NDArray[np.int64]:
-    """Rows as in `crease_rows`, with `word` a key; "all" skips unassigned creases, if it can."""
+    """Like `crease_rows` for a key; "all" skips unassigned creases if there are assigned ones."""
     rows = crease_rows(field, word, pattern, is_key=True)
     known = rows[[pattern.assignments[k] in "MV" for k in rows.tolist()]]
     return known if word == "all" and len(known) else rows
@@ -193,12 +193,12 @@ def folded_rows(field: str, word: str, pattern: Any) -> NDArray[np.int64]:
 def crease_values(
     field: str, given: Mapping[str, float], pattern: Any
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Value of each crease (nc,), given values by word, and whether it has one (nc,).
+    """Value of each crease (nc,), from values by word, and whether the crease has a value (nc,).
 
     Raises
     ------
     InputError
-        A word selects no crease, or two words select the same one.
+        A word selects no crease, or two words select the same crease.
     """
     count = len(pattern.creases)
     values, chosen = np.zeros(count), np.zeros(count, bool)

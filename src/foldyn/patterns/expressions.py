@@ -15,14 +15,14 @@ DEEPEST = 50  # most nested operations
 
 
 def parse(text: str) -> ast.expr:
-    """Syntax tree of an expression, shallow enough for recursive functions.
+    """Syntax tree of an expression, checked to be shallow enough for recursive functions.
 
     Raises
     ------
     InputError
         The text cannot be read, or is too long or too deep; the message names no field.
     """
-    if _UNDERSCORED.search(text):  # only Python reads this as a number
+    if _UNDERSCORED.search(text):  # 1_000, which only Python reads as a number
         raise InputError("cannot be read")
     if len(text) > LONGEST:
         raise InputError(f"is longer than {LONGEST} characters")

@@ -1,12 +1,12 @@
 """Facets: lines drawn inside a panel along which the sheet is not creased.
 
-Folding programs cut panels into triangles along such lines, assigned "F". `welded` removes them: it
-merges two panels if the result is convex with every vertex at a corner, as Hertel and Mehlhorn
-(Proc. FCT 1983) merge triangles of a polygon. Other facets become welds, lines across which the
-sheet is continuous.
+Folding programs cut panels into triangles along such lines, and assign them "F". `welded` removes
+facets: it merges two panels if the result is convex and has a corner at each of its vertices, as
+Hertel and Mehlhorn (Proc. FCT 1983) merge triangles of a polygon. Other facets become welds: lines
+across which the sheet is continuous.
 
-`convex` adds such welds: models mesh a panel about its center, so a panel that is not convex is
-triangulated, and triangles are merged in the same way.
+`convex` adds welds: models mesh a panel about its center, so a panel that is not convex is cut into
+triangles, and these are merged in the same way.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ from foldyn.patterns.pattern import Pattern, pattern_of
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of, vertex_pair
 from foldyn.values import flag, listed
 
-# Fates of facets: removed where panels can be joined, or else welds; welds; creases.
+# What facets become: "weld", removed if panels can be joined, else welds; "line", welds; "hinge",
+# creases.
 WELD, LINE, HINGE = FACETS = ("weld", "line", "hinge")
-COPLANAR = 1e-3  # rad: panels within this angle are coplanar, as coordinates in a file allow
-STRAIGHT = np.radians(15.0)  # smaller turns do not count as corners
+COPLANAR = 1e-3  # rad: panels within this angle are coplanar, to allow for rounded coordinates
+STRAIGHT = np.radians(15.0)  # an outline that turns by less than this has no corner
 
 
 def welded(
@@ -34,17 +35,17 @@ def welded(
 ) -> Pattern:
     """Pattern with its facets removed from the creases.
 
-    Coplanar panels (within 1e-3 rad) are joined across a facet if that makes a convex polygon with
-    a corner at each vertex, across the longest facets first. Other facets become `welds`. Vertices
-    keep their numbers; panels and creases are renumbered in order, a joined panel in place of its
-    first part.
+    Panels that are coplanar (within 1e-3 rad) are joined across a facet if that makes a convex
+    polygon with a corner at each vertex; the longest facets are tried first. Other facets become
+    `welds`. Vertices keep their numbers. Panels and creases are renumbered in order; a joined panel
+    takes the place of its first part.
 
     Parameters
     ----------
     pattern : Pattern
     facets : iterable of (vertex, vertex) or str, optional
-        Creases that are facets, or the name of their family; by default all creases assigned "F".
-        Existing welds are facets too.
+        Creases that are facets, or the name of the family of these creases; by default all creases
+        assigned "F". Existing welds are facets too.
     join : bool
         Whether to join panels; otherwise all facets become welds.
 
@@ -55,7 +56,7 @@ def welded(
     Warns
     -----
     FoldynWarning
-        No facets are named, and some of the welded creases are flat without a letter.
+        The argument `facets` is not given, and some welded creases are flat but have no letter.
 
     Raises
     ------
@@ -103,7 +104,7 @@ def _pair(edge: Sequence[int] | NDArray) -> Edge:
 
 
 def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
-    """Rows of the creases that are facets."""
+    """Row numbers of the creases that are facets."""
     letters = np.array(pattern.assignments, dtype="<U1")
     if facets is None:
         rows = np.flatnonzero(letters == "F")
@@ -148,9 +149,9 @@ def joined(
     edges: Sequence[Sequence[int]],
     beside: Sequence[Sequence[int]],
 ) -> list[tuple[int, ...]]:
-    """Join faces across edges in order, given the normals and the two faces at each edge.
+    """Join faces across edges, in the given order, from normals and the two faces at each edge.
 
-    A joined face takes the place, the first corner and the plane of its first part.
+    A joined face takes the number, the first corner and the normal of its first part.
     """
     faces, part_of = list(faces), list(range(len(faces)))
 
@@ -170,7 +171,7 @@ def joined(
 
 
 def _union(one: Sequence[int], two: Sequence[int], edge: Edge) -> tuple[int, ...] | None:
-    """Corners of the union of two faces without their shared edge; None if they share more."""
+    """Corners of two faces joined at a shared edge; None if the faces share other vertices too."""
     if len(set(one) & set(two)) > 2:
         return None
     a = edge[0] if edge in set(around(one)) else edge[1]  # where the shared edge starts along `one`
@@ -200,11 +201,11 @@ Face = tuple[int, ...]
 
 
 def convex(pattern: Pattern) -> Pattern:
-    """Pattern with convex panels that have a corner at each of their vertices.
+    """Pattern in which all panels are convex and have a corner at each of their vertices.
 
-    Other panels are cut between their vertices, by `welds`. Vertices, creases and panels keep their
-    numbers: the part at a panel's first edge keeps its number, the other parts follow after all
-    panels.
+    Panels that are not so are cut by `welds` from vertex to vertex. Vertices, creases and panels
+    keep their numbers: the part at a panel's first edge keeps the panel's number, the other parts
+    are numbered after all panels.
 
     Parameters
     ----------
@@ -213,7 +214,7 @@ def convex(pattern: Pattern) -> Pattern:
     Returns
     -------
     Pattern
-        The same one if all of its panels are convex.
+        The given pattern itself if all of its panels are convex.
 
     Raises
     ------
@@ -260,7 +261,7 @@ def what_was_cut(before: Pattern, after: Pattern) -> str:
 
 
 def triangles_of(face: Face, corners: NDArray, normal: NDArray) -> list[Face]:
-    """Triangles of a polygon with corners (k, 3), cut in the plane across `normal`."""
+    """Triangles of a polygon with corners (k, 3), cut in the plane normal to `normal`."""
     import shapely
 
     first = corners[1] - corners[0]
@@ -274,7 +275,7 @@ def triangles_of(face: Face, corners: NDArray, normal: NDArray) -> list[Face]:
 
 
 def _parts(face: Face, vertices: NDArray, normal: NDArray) -> list[Face]:
-    """Convex parts of a panel, starting with the one at its first edge."""
+    """Convex parts of a panel, starting with the part at its first edge."""
     rank = {vertex: k for k, vertex in enumerate(face)}
     pieces = triangles_of(face, vertices[list(face)], normal)
     pieces = [min((p[k:] + p[:k] for k in range(3)), key=lambda q: rank[q[0]]) for p in pieces]

@@ -1,17 +1,20 @@
-"""Local flat-foldability of a pattern's vertices, and the nearest pattern that has it.
+"""Local flat-foldability of a pattern's vertices, and the nearest pattern with this property.
 
 The conditions of Maekawa and Kawasaki are necessary at each interior vertex, but not sufficient for
-the whole pattern, whose layers may collide. Source: T. Hull, On the mathematics of flat origamis,
-Congressus Numerantium 100 (1994): Maekawa, mountains less valleys are 2 or -2; Kawasaki, the angles
-between neighboring creases, taken with alternating signs, add up to zero.
+the whole pattern, because its layers may collide. Maekawa's condition: the number of mountains
+minus the number of valleys is 2 or -2. Kawasaki's condition: the angles between neighboring
+creases, taken with alternating signs, add up to zero (T. Hull, On the mathematics of flat origamis,
+Congressus Numerantium 100, 1994).
 
-`flat_foldable` repairs slips of drawing. The alternating sum is twice that of the directions f of
-the creases. Where four creases meet, neighbors turn by angles g whose tan(g/2) have a fixed ratio,
-and panels between such vertices stay plane if the product of the ratios around them is 1 (T. Tachi,
-Generalization of rigid-foldable quadrilateral-mesh origami, J. IASS 50, 2009). Both are conditions
-on directions, which change with the ends a and b of a crease by df = (e x d(b - a)) / l, e and l
-its direction and length. Newton's method finds the vertices x that satisfy them nearest to the
-drawn ones, x0: each step solves the conditions, linear at x, for the least x - x0.
+`flat_foldable` repairs small errors of a drawing by two conditions. First, Kawasaki's alternating
+sum of angles must vanish; it is twice the alternating sum of the crease directions f. Second, where
+four creases meet, the fold angles g of neighboring creases have a fixed ratio of tan(g/2); a panel
+between such vertices stays plane if the product of the ratios at its corners is 1 (T. Tachi,
+Generalization of rigid-foldable quadrilateral-mesh origami, J. IASS 50, 2009). Both conditions
+depend on directions only. If the ends a and b of a crease move, its direction changes by
+df = (e x d(b - a)) / l, where e is the unit vector along the crease and l its length. Newton's
+method finds the vertices x that satisfy the conditions and are nearest to the drawn vertices x0:
+each step solves the conditions, linearized at x, with the least x - x0.
 """
 
 from __future__ import annotations
@@ -31,19 +34,19 @@ from foldyn.patterns.topology import Edge, around, edge_of
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FlatFoldability:
-    """Flat-foldability of the interior vertices of a pattern, one row each.
+    """Flat-foldability of a pattern, with one row for each interior vertex.
 
     Attributes
     ----------
     vertices : ndarray of int, shape (k,)
-        Numbers of the interior vertices, which panels surround completely.
+        Numbers of the interior vertices: vertices that panels surround completely.
     mountains, valleys, unassigned : ndarray of int, shape (k,)
-        Creases of each kind there; flat ones ("F") do not count.
+        Number of creases of each kind at each vertex; flat creases ("F") do not count.
     deficits : ndarray, shape (k,)
-        Angle deficit (rad): a full turn minus the sum of panel angles, 0 where developable.
+        Angle deficit (rad): a full turn minus the sum of panel angles; 0 at developable vertices.
     alternating : ndarray, shape (k,)
         Kawasaki's alternating sum (rad, not negative) of the angles between folded creases; NaN if
-        their number is odd, 0 if no crease folds.
+        the number of folded creases is odd, 0 if no crease folds.
     """
 
     vertices: NDArray[np.int64]
@@ -64,7 +67,7 @@ class FlatFoldability:
 
     @property
     def maekawa(self) -> NDArray[np.bool_]:
-        """Whether mountains minus valleys are 2 or -2, or can be with all letters (k,)."""
+        """Whether mountains minus valleys are 2 or -2 (k,), or can be once all have letters."""
         least = self.mountains - self.valleys - self.unassigned
         most = self.mountains - self.valleys + self.unassigned
         even = self.degrees % 2 == 0
@@ -86,7 +89,7 @@ def flat_foldability(pattern: Pattern) -> FlatFoldability:
     Parameters
     ----------
     pattern : Pattern
-        Flat or folded; only the angles of its panels matter, which folding preserves.
+        Flat or folded; only the corner angles of panels matter, and folding preserves them.
 
     Returns
     -------
@@ -102,7 +105,7 @@ def flat_foldability(pattern: Pattern) -> FlatFoldability:
             continue
         around = _around(corners)
         if len(around) < len(corners):
-            continue  # panels that meet here only at this point
+            continue  # panels that touch only at this vertex
         angles = np.array([corners[after][1] for after in around])
         kinds = [letter[min(vertex, after), max(vertex, after)] for after in around]
         folds = np.array([kind != "F" for kind in kinds])
@@ -121,7 +124,7 @@ def flat_foldability(pattern: Pattern) -> FlatFoldability:
 
 
 def _corners(pattern: Pattern) -> dict[int, dict[int, tuple[int, float]]]:
-    """For each vertex, the corners of faces there: next vertex to (previous vertex, angle)."""
+    """For each vertex, its face corners: a mapping from next vertex to (previous vertex, angle)."""
     faces = pattern.faces
     vertex = np.array([v for face in faces for v in face])
     following = np.array([v for face in faces for v in (*face[1:], face[0])])
@@ -161,13 +164,13 @@ def _alternating(angles: NDArray[np.float64], folds: NDArray[np.bool_]) -> float
     return abs(float(np.sum(np.where(sector % 2 == 0, angles, -angles))))
 
 
-NEARLY = np.radians(2.0)  # largest Kawasaki sum (rad) that counts as a slip of drawing
-NEARLY_PLANE = 0.1  # largest sum of logarithms around a panel meant to stay plane
+NEARLY = np.radians(2.0)  # largest Kawasaki sum (rad) that counts as a drawing error
+NEARLY_PLANE = 0.1  # largest sum of log ratios around a panel that is meant to stay plane
 EXACT = 1e-6  # Kawasaki's sum (rad) that counts as zero, before and after a repair
 FARTHEST = 0.01  # largest move of a vertex, relative to its shortest edge
 _STEPS = 20
-_CONVERGED = 1e-12  # rad
-_LEAST = 1e-13  # relative to the diagonal: smaller ones are redundant conditions
+_CONVERGED = 1e-12  # rad, largest sum at convergence
+_LEAST = 1e-13  # relative increase of the diagonal, so that redundant conditions do no harm
 _PLANE = 1e-9  # largest height of a flat pattern, relative to its size
 
 
@@ -180,12 +183,12 @@ def slips(vertices: FlatFoldability) -> NDArray[np.int64]:
 
 
 def flat_foldable(pattern: Pattern) -> Pattern:
-    """Pattern with vertices moved to the nearest ones that fold flat.
+    """Pattern with vertices moved to the nearest positions that fold flat.
 
-    Interior vertices that violate Kawasaki's condition by at most 2 degrees count as slips of
-    drawing and satisfy it to rounding afterwards; larger violations remain. Panels between assigned
-    degree-four vertices that nearly stay planar while folding then do so exactly. All vertices may
-    move, including the outline, with the least sum of squared moves.
+    Interior vertices that violate Kawasaki's condition by at most 2 degrees count as drawing
+    errors, and satisfy it to rounding afterwards; larger violations remain. Panels that nearly stay
+    plane while folding, between degree-four vertices with letters, afterwards stay exactly plane.
+    All vertices may move, including the outline, with the least sum of squared moves.
 
     Parameters
     ----------
@@ -195,7 +198,7 @@ def flat_foldable(pattern: Pattern) -> Pattern:
     Returns
     -------
     Pattern
-        The same pattern if there is nothing to repair (1e-6 rad).
+        The repaired pattern; the given pattern itself if no sum exceeds 1e-6 rad.
 
     Raises
     ------
@@ -242,7 +245,7 @@ def flat_foldable(pattern: Pattern) -> Pattern:
 
 
 def _check(pattern: Pattern, moved: NDArray, left: float) -> None:
-    """Refuse moves too large for slips, and remaining sums (rad)."""
+    """Refuse moves that are too large for drawing errors, and sums (rad) that remain."""
     ends = pattern.edges
     length = np.linalg.norm(np.diff(pattern.vertices[ends], axis=1)[:, 0], axis=1)
     shortest = np.full(len(pattern.vertices), np.inf)
@@ -258,7 +261,8 @@ def _check(pattern: Pattern, moved: NDArray, left: float) -> None:
 class _Conditions:
     """Kawasaki's sums at vertices, and sums of log ratios around the panels between them.
 
-    drawn : positions (k, 2) of the vertices of a flat pattern; place : row of each vertex.
+    drawn : positions (k, 2) of the vertices of a flat pattern.
+    place : row of each vertex in `drawn`.
     """
 
     def __init__(self, pattern: Pattern, vertices: NDArray, drawn: NDArray, place: NDArray) -> None:
@@ -291,7 +295,7 @@ class _Conditions:
         self.turns = [column[kept] for column in self.turns]
 
     def at(self, x: NDArray) -> tuple[NDArray, sparse.csr_array]:
-        """Sums (m,) and their derivatives with respect to positions x (k, 2), as (m, 2 k) per m."""
+        """Sums (m,), and derivatives (m, 2 k), per m, with respect to positions x (k, 2)."""
         along = x[self.ends[:, 1]] - x[self.ends[:, 0]]
         across = np.column_stack([-along[:, 1], along[:, 0]]) / (along**2).sum(axis=1)[:, None]
         directions = np.arctan2(along[:, 1], along[:, 0])
@@ -304,11 +308,11 @@ class _Conditions:
         return np.concatenate([sums, ratios]), sparse.vstack([self.kawasaki, slopes]) @ turned
 
     def _ratios(self, directions: NDArray) -> tuple[NDArray, sparse.csr_array]:
-        """Sums (p,) of log |tan(g2/2) / tan(g1/2)| around panels, and derivatives by directions.
+        """Sums (p,) of log |tan(g2/2) / tan(g1/2)| around panels, and derivatives by directions f.
 
-        For three neighboring creases with directions f1, f2, f3, where f2 - f1 is the panel's
-        corner, the ratio is h((f3 - f1) / 2) / h(f2 - (f1 + f3) / 2); h is the sine if 1 and 3 fold
-        opposite ways, else the cosine.
+        Let f1, f2, f3 be the directions of three neighboring creases, where the panel's corner lies
+        between f1 and f2. The ratio is h((f3 - f1) / 2) / h(f2 - (f1 + f3) / 2), where h is the
+        sine if creases 1 and 3 fold opposite ways, else the cosine.
         """
         one, two, three, opposite = self.turns
         half = 0.5 * (directions[three] - directions[one])
@@ -330,9 +334,10 @@ def _corner(
     edge: Edge, beside: Mapping[int, list[int]], spokes: Mapping[Edge, int],
     letter: Mapping[Edge, str],
 ) -> tuple[int, int, int, int] | None:  # fmt: skip
-    """Three directions at a panel's corner, from its edge on; whether 1 and 3 fold opposite ways.
+    """Rows of three directions at a panel's corner; 1 if creases 1 and 3 fold opposite ways.
 
-    None unless three mountains and a valley meet there, or the reverse.
+    The first direction is along `edge`. None unless three mountains and a valley, or three valleys
+    and a mountain, meet at the corner.
     """
     vertex, following = edge
     others = beside.get(vertex, [])

@@ -1,4 +1,4 @@
-"""`Frame`: one state of a pattern, and the fold angles in a state."""
+"""`Frame`, a state of a pattern, and the fold angles of a pattern in a state."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Frame:
     Parameters
     ----------
     title : str
-        Title of the state: "t = 0.1 s".
+        Title of the state, such as "t = 0.1 s".
     vertices : ndarray, shape (n, 3)
         Coordinates (m) of the pattern's vertices.
     """
@@ -34,7 +34,7 @@ def fold_angles(pattern: Pattern, vertices: NDArray | None = None) -> NDArray[np
     ----------
     pattern : Pattern
     vertices : ndarray, shape (n, 3), optional
-        Coordinates (m) of a state; by default at rest.
+        Coordinates (m) of the vertices in a state; by default at rest.
     """
     flat = pattern.flat_dihedrals
     if vertices is None:

@@ -1,9 +1,9 @@
 """Geometry of faces: areas, normals and planarity, dihedrals, and seams between faces.
 
-A seam is two coincident boundary edges that are not joined, where a crease was probably intended. A
-crease is an edge of two panels with the same two vertex numbers; panels that meet at coincident but
-different vertices only look joined. A cut is an intentional seam, marked by a letter. Panels that
-coincide at the edges, as in a flat-folded state, are layers and not a seam.
+A crease is an edge of two panels with the same two vertex numbers; panels that meet at coincident
+but different vertices only look joined. A seam is a pair of coincident boundary edges that are not
+joined, probably by mistake; a seam on purpose is a cut, marked by a letter. Two panels that
+coincide where their edges do, as in a flat-folded state, are layers, not a seam.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from scipy.sparse.csgraph import connected_components
 from foldyn.errors import InputError
 from foldyn.patterns.topology import Edge, Faces, around, edge_lookup, edge_of
 
-# Area over squared diameter (and edge length over diameter) below which a face is degenerate: far
-# above rounding (1e-16), far below any panel that can be made.
+# A face is degenerate if area divided by squared diameter, or edge length divided by diameter, is
+# smaller: far above rounding (1e-16), far below any panel that can be made.
 _DEGENERATE = 1e-10
-SAME_PLACE = 1e-9  # distance of equal points, relative to the pattern's size
+SAME_PLACE = 1e-9  # points closer than this are equal, relative to the pattern's size
 ASKEW = np.array([0.5377, 0.8339, 0.1244])  # a generic direction, shorter than a unit vector
-LAYERS = 1e-6  # rad: panels that leave their edges within this angle are coincident
-_ASKANCE = 10.0  # as LAYERS, for points merged within a distance and relative to it
-CLOSED = 1e-3  # rad from closed: nearer, the letter decides the side, not rounding
+LAYERS = 1e-6  # rad: panels that leave a common edge within this angle coincide
+_ASKANCE = 10.0  # the same angle, divided by the relative distance within which points are merged
+CLOSED = 1e-3  # rad: within this angle from closed, the letter decides the side
 
 
 class FaceGeometry(NamedTuple):
@@ -34,11 +34,11 @@ class FaceGeometry(NamedTuple):
     Attributes
     ----------
     face_areas : ndarray, shape (m,)
-        Area (m2); for a face that is not flat, of its projection along the normal.
+        Area (m2); for a face that is not flat, the area of its projection along the normal.
     face_normals : ndarray, shape (m, 3)
-        Unit normals towards the front (Newell's, so any polygon has one).
+        Unit normals towards the front, by Newell's method, which works for any polygon.
     face_planarity : ndarray, shape (m,)
-        Largest distance of a corner from the mean plane, over the face's diameter.
+        Largest distance of a corner from the mean plane, divided by the face's diameter.
     """
 
     face_areas: NDArray[np.float64]
@@ -74,7 +74,7 @@ def face_geometry(vertices: NDArray, faces: Faces) -> FaceGeometry:
     for size in np.unique(sizes):
         which = np.flatnonzero(sizes == size)
         corners = vertices[np.array([faces[f] for f in which])]
-        # Relative to the mean corner, so that a pattern far from the origin loses no accuracy.
+        # Positions relative to the mean corner: a pattern far from the origin loses no accuracy.
         corners = corners - corners.mean(axis=1, keepdims=True)
         newell = 0.5 * np.cross(corners, np.roll(corners, -1, axis=1)).sum(axis=1)
         areas[which] = np.linalg.norm(newell, axis=1)
@@ -135,7 +135,7 @@ def _crosses_itself(corners: NDArray, normals: NDArray, diameter: NDArray) -> ND
 def crease_dihedrals(
     vertices: NDArray, normals: NDArray, creases: NDArray, crease_faces: NDArray, letters: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Dihedral of each crease, by `atan2` of the two normals about the crease.
+    """Dihedral of each crease, from the angle (`atan2`) between the two normals.
 
     Parameters
     ----------
@@ -151,10 +151,11 @@ def crease_dihedrals(
     Returns
     -------
     dihedral : ndarray, shape (nc,)
-        Radians in [0, 2 pi]: pi when flat, below on a valley, above on a mountain. Where the panels
-        coincide to rounding, so that the geometry cannot tell 0 from 2 pi, 0 unless a mountain.
+        Dihedrals (rad) in [0, 2 pi]: pi when flat, less on a valley, more on a mountain. If the
+        panels coincide to rounding, the geometry cannot tell 0 from 2 pi: it is 2 pi for a
+        mountain, else 0.
     closed : ndarray of bool, shape (nc,)
-        True where the panels coincide within 1e-3 rad.
+        Whether the panels coincide within 1e-3 rad.
     """
     axis = vertices[creases[:, 1]] - vertices[creases[:, 0]]
     axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
@@ -182,11 +183,11 @@ def seams(
     vertices : ndarray, shape (n, 3)
         Coordinates (m).
     faces : tuple of tuple of int
-        Consistently wound.
+        Faces as vertex numbers, consistently wound.
     normals : ndarray, shape (m, 3)
         Unit normals of the faces.
     boundary : ndarray of int, shape (nb, 2)
-        Edges of one face.
+        Edges that belong to one face only.
     near : float
         Distance within which points coincide, relative to the size of the pattern.
     """
@@ -207,7 +208,7 @@ def seams(
 
 
 def _places(vertices: NDArray, boundary: NDArray, near: float) -> NDArray:
-    """Place number of each vertex (n,); coincident boundary vertices share one."""
+    """Number of each vertex's place (n,); coincident boundary vertices have the same number."""
     rim = np.unique(boundary)
     points, where = np.unique(vertices[rim], axis=0, return_inverse=True)
     pairs = _pairs_nearer(points, near * float(np.linalg.norm(np.ptp(vertices, axis=0))))
@@ -219,7 +220,7 @@ def _places(vertices: NDArray, boundary: NDArray, near: float) -> NDArray:
 
 def _pairs_nearer(points: NDArray, distance: float) -> NDArray:
     """Pairs (k, 2) of points (n, 3) within a distance."""
-    # usually there are none: along a direction parallel to no edge, no two points are that close
+    # quick test: if no two points are that close along a generic direction, there are no pairs
     along = np.sort((points - points[:1]) @ ASKEW)
     if not (np.diff(along) <= 2.0 * distance).any():
         return np.zeros((0, 2), np.int64)
@@ -231,7 +232,7 @@ def _pairs_nearer(points: NDArray, distance: float) -> NDArray:
 def _inward(
     vertices: NDArray, faces: Faces, normals: NDArray, boundary: NDArray, chosen: NDArray
 ) -> dict[int, NDArray]:
-    """Unit vectors from the chosen boundary edges into their panels, perpendicular to the edge."""
+    """Unit vectors from chosen boundary edges into their panels, perpendicular to the edges."""
     row = edge_lookup(boundary[chosen])
     unit = {}
     for number, face in enumerate(faces):

@@ -1,4 +1,4 @@
-"""Colors of all pictures and of creases in them; independent of Matplotlib."""
+"""Colors of pictures, and of the creases in pictures; independent of Matplotlib."""
 
 from __future__ import annotations
 

@@ -26,8 +26,8 @@ from foldyn.patterns.topology import (
 from foldyn.patterns.transforms import Transforms
 from foldyn.values import LONGEST, SHORTEST, single
 
-_FLAT = 1e-6  # rad from pi: an unassigned crease within this angle counts as flat
-_CONTRADICTION = 1e-3  # rad from pi on the wrong side: beyond this a given letter is doubted
+_FLAT = 1e-6  # rad: an unassigned crease within this angle from pi counts as flat
+_CONTRADICTION = 1e-3  # rad: an angle this far from pi on the wrong side contradicts the letter
 _LETTERS = ("M", "V", "F", "U")
 
 
@@ -38,72 +38,77 @@ class Pattern(Transforms):
     Parameters
     ----------
     vertices : array_like, shape (n, 3) or (n, 2)
-        Coordinates (m); two columns mean z = 0. Stored read-only with three.
+        Coordinates (m); two columns mean z = 0. They are stored read-only, with three columns.
     faces : sequence of sequences of int
-        Panels of any number of corners, each as vertex numbers in order around it,
+        Panels with any number of corners, each as a list of vertex numbers in order around it,
         counter-clockwise seen from the front. The winding is made consistent: in each
         connected part the lowest-numbered face decides where the front is.
     assignments : mapping, sequence or None
         "M" (mountain), "V" (valley), "F" (flat) or "U" (unassigned), either for each crease in the
-        order of `creases` or as a mapping from vertex pairs and families, {(a, b): "M", "zigzag":
-        "V"}, where pairs override families. A mapping may also hold "B" for boundary edges. Creases
-        without an entry, and all creases for None, get the letter of their dihedral.
+        order of `creases` or as a mapping from vertex pairs and families, such as {(a, b): "M",
+        "zigzag": "V"}, where pairs override families. A mapping may also hold "B" for boundary
+        edges. Creases without an entry get the letter that fits their dihedral; with None, all
+        creases do.
     name : str
         Name of the pattern.
     boards : Boards, optional
         The boards of thick panels; see `thicken`.
     fold_angles : mapping, sequence or None
         The state to fold to: an angle (rad) from -pi to pi for each crease in the order of
-        `creases`, positive on valleys, 0 where flat, NaN or None where free; or a mapping from
-        vertex pairs, and from "mountain", "valley", "all" and families. Angles of these words are
-        magnitudes, and each crease folds by its letter; pairs override words.
+        `creases`, positive on valleys, 0 for a flat crease, NaN or None for a free crease. Or a
+        mapping from vertex pairs, and from "mountain", "valley", "all" and families. Angles given
+        for such words are magnitudes, and the letter of each crease gives the sign; pairs override
+        words.
     families : mapping, optional
-        Names for groups of creases, each with vertex pairs: {"zigzag": [(0, 1), (1, 2)]}.
+        Names for groups of creases, given by vertex pairs: {"zigzag": [(0, 1), (1, 2)]}.
     custom : mapping, optional
         Further data of a file that Foldyn does not use, kept for writing.
     welds : sequence of (vertex, vertex)
-        Edges of two panels across which the sheet is continuous: not creases but lines in it, as
-        along the facets of a curved panel; see `welded`.
+        Edges of two panels across which the sheet is continuous: not creases, but lines in the
+        sheet, such as the facets of a curved panel; see `welded`.
     rim_families : mapping, optional
-        Boundary edges by the family that they join once another panel is attached, each with vertex
-        pairs.
+        Families that boundary edges will join once another panel is attached to them, given by
+        vertex pairs.
     periods : sequence of sequences of (vertex, vertex)
-        One or two motions that map the pattern to its neighbor, each given by pairs of a vertex and
-        the vertex onto which it moves; they hold in every folded state. See `foldyn.UnitCell`.
+        One or two motions that map the pattern to a neighboring copy. Each is given by pairs of a
+        vertex and the vertex onto which it moves; these pairs hold in every folded state. See
+        `foldyn.UnitCell`.
 
     Attributes
     ----------
     assignments : tuple of str
         The letter of each crease.
     unlettered : ndarray of bool, shape (nc,)
-        Creases without a given letter, which have the letter of their dihedral.
+        Creases without a given letter; they have the letter that fits their dihedral.
     fold_angles : ndarray, shape (nc,)
-        Angle to fold each crease to (rad, pi minus the dihedral), NaN if not given.
+        Angle (rad, pi minus the dihedral) to which each crease is to fold; NaN if not given.
     families, rim_families : mapping
-        Rows of `creases` and of `boundary`, by the name of their family.
+        Row numbers in `creases` and in `boundary`, by the name of the family.
     flipped : tuple of bool
         For each face, whether its winding was reversed. A reversed face keeps its first
         vertex: (v1, v2, v3, v4) becomes (v1, v4, v3, v2).
     edges, creases, boundary : ndarray of int, shape (m, 2)
-        All edges, edges shared by two faces except welds, and edges of one face, as (low, high)
-        vertex pairs in lexicographic order.
+        All edges; edges shared by two faces, except welds; and edges of one face only. Each is a
+        (low, high) vertex pair, in lexicographic order.
     crease_faces : ndarray of int, shape (nc, 2)
-        The face that runs along the crease from low to high, and the one from high to low.
+        The face that runs along the crease from low to high, and the face that runs from high to
+        low.
     welds, weld_faces, weld_dihedrals
         Like `creases`, `crease_faces` and `dihedrals`, for welds.
     dihedrals : ndarray, shape (nc,)
         Angle between the two panels across each crease (rad, 0 to 2 pi) seen from the front:
         pi when flat, below pi on a valley, above on a mountain. Where panels coincide within
-        1e-3 rad the letter decides the side, 0 or 2 pi; exactly closed creases without one have 0.
+        1e-3 rad the letter decides between 0 and 2 pi; exactly closed creases without a letter
+        have 0.
     flat_dihedrals : ndarray, shape (nc,)
-        Dihedral (rad) at which the two panels lie flat: pi, except for thick panels, whose boards
-        are tilted relative to the planes through their hinge lines.
+        Dihedral (rad) at which the two panels lie flat: pi for thin panels; for thick panels it may
+        differ, since boards can be tilted relative to the planes through their hinge lines.
     face_areas : ndarray, shape (m,)
         Areas (m2).
     face_normals : ndarray, shape (m, 3)
         Unit normals towards the front.
     face_planarity : ndarray, shape (m,)
-        Largest distance of a corner from the face's mean plane over the face's diameter.
+        Largest distance of a corner from the face's mean plane, divided by the face's diameter.
     size : float
         Diagonal of the bounding box of all vertices (m).
 
@@ -115,8 +120,8 @@ class Pattern(Transforms):
     Warns
     -----
     FoldynWarning
-        A given "M" or "V" contradicts the geometry by more than 1e-3 rad; two edges that
-        are not given as "B" lie in the same place and are not joined.
+        A given "M" or "V" contradicts the geometry by more than 1e-3 rad; or two boundary edges in
+        the same place are not joined, and not given as "B".
 
     Notes
     -----
@@ -231,7 +236,7 @@ class Pattern(Transforms):
 
 
 class Patterned(Protocol):
-    """An object with a pattern: a folding, a structure, a diagnosed file."""
+    """An object with a pattern, such as a folding, a structure or a diagnosed file."""
 
     @property
     def pattern(self) -> Pattern | None:
@@ -280,12 +285,12 @@ def _checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
 
 
 def _letters(dihedrals: NDArray[np.float64]) -> NDArray[np.str_]:
-    """Letter of each crease according to its dihedral."""
+    """Letter that fits the dihedral of each crease."""
     return np.select([dihedrals < np.pi - _FLAT, dihedrals > np.pi + _FLAT], ["V", "M"], "F")
 
 
 def _given_letters(assignments: Any, topology: Topology) -> tuple[NDArray[np.str_], set[Edge]]:
-    """Letter given for each crease, "" if none, and the edges given as "B"."""
+    """Letter given for each crease ("" if none is), and the edges that are given as "B"."""
     creases = topology.creases
     given = np.full(len(creases), "", dtype="<U1")
     boundary_edges: set[Edge] = set()

@@ -1,4 +1,4 @@
-"""SVG picture of a pattern, which represents it in a notebook."""
+"""SVG picture of a pattern, shown for the pattern in a notebook."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from foldyn.patterns.palette import CREASES, PAPER
 
 WIDTH, HEIGHT, MARGIN = 520.0, 300.0, 8.0  # pixels
 VIEW = (28.0, -60.0)  # elevation above the xy plane and azimuth around z (degrees) of the view
-MOST_PANELS = 600  # most panels of a picture in a notebook; larger patterns have none
-MOST_WORDS = 200  # most letters of the caption
+MOST_PANELS = 600  # patterns with more panels have no picture in a notebook
+MOST_WORDS = 200  # most characters of the caption
 FRONT, BACK = bytes.fromhex(PAPER[1:]), (217, 195, 154)
-# Color, width and dashes of edges by their letter, "B" for boundaries.
+# Color, width and dashes of edges, by the letter of the edge; "B" is for boundaries.
 LINES = {
     "M": (CREASES["M"], "1.6", ""), "V": (CREASES["V"], "1.6", "5 3"),
     "F": (CREASES["F"], "1.2", "1.5 2"),
@@ -28,7 +28,7 @@ LINES = {
 def picture(pattern: Any, words: str = "") -> str | None:
     """Picture of a `Pattern` as HTML with a caption; None if it has too many panels.
 
-    Panels are drawn from back to front; an edge is drawn with the nearest of its panels.
+    Panels are drawn from back to front; an edge is drawn together with the nearer of its panels.
     """
     if len(pattern.faces) > MOST_PANELS:
         return None

@@ -1,8 +1,8 @@
-"""Rigid motions that map a pattern to its neighbor: translations and screws.
+"""Rigid motions that map a pattern to a neighboring copy: translations and screws.
 
-By Chasles' theorem every proper motion is a screw, a rotation about an axis and a shift along it;
-without rotation it is a translation. All powers of a screw share its axis, so any number of copies
-of a pattern stay correctly spaced.
+By Chasles' theorem every rigid motion (without reflection) is a screw: a rotation about an axis and
+a shift along the axis; without rotation it is a translation. All powers of a screw share the axis,
+so any number of copies of a pattern are spaced correctly.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from foldyn.values import number, show, vector
 SPREAD = (
     1e-6  # least extent of points across a line, relative to their size, to determine a rotation
 )
-STILL = 1e-9  # rad: smaller rotations count as none
+STILL = 1e-9  # rad: a smaller rotation counts as zero
 
 
 def direction(name: str, value: ArrayLike) -> tuple[float, float, float]:
@@ -84,12 +84,12 @@ class Screw(Checked):
 
     @property
     def turns(self) -> bool:
-        """Whether it has a rotation."""
+        """Whether the motion has a rotation."""
         return self.angle != 0.0
 
     @property
     def twist(self) -> NDArray[np.float64]:
-        """Logarithm (6,): rotation vector (rad) and displacement rate of the origin (m)."""
+        """Logarithm (6,) of the motion: rotation vector (rad), then rate of the origin (m)."""
         turn = np.radians(self.angle) * self.unit
         return np.concatenate([turn, self.vector - np.cross(turn, self.point)])
 
@@ -127,18 +127,18 @@ def of_twist(twist: NDArray) -> Screw:
 
 
 def _screw(axis: NDArray, angle: float, shift: float, point: NDArray) -> Screw:
-    """A screw with a computed angle (rad), which is not checked."""
+    """A screw from computed values, which are not checked; angle in rad."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnitsWarning)
         return Screw(tuple(axis.tolist()), math.degrees(angle), shift, tuple(point.tolist()))
 
 
 def motion_between(points: NDArray, images: NDArray, tolerance: float) -> tuple[Screw, NDArray]:
-    """Motion from points (m, 3) to their images (m, 3), and the error of each (m,), m.
+    """Motion from points (m, 3) to their images (m, 3), and the error of each image (m,), m.
 
-    It is a translation if that fits within the tolerance, m, or if the points are too few or too
-    nearly collinear to determine a rotation; else the least-squares screw (Kabsch, Acta Cryst. A
-    32, 1976).
+    The motion is a translation if a translation fits within the tolerance (m), or if the points are
+    too few or too nearly collinear to determine a rotation; else it is the screw of least squares
+    (Kabsch, Acta Cryst. A 32, 1976).
     """
     step = (images - points).mean(axis=0)
     off = np.linalg.norm(points + step - images, axis=1)
@@ -159,7 +159,7 @@ def motion_between(points: NDArray, images: NDArray, tolerance: float) -> tuple[
     point = np.linalg.lstsq(np.eye(3) - rotation, move - shift * axis, rcond=None)[0]
     found = _screw(axis, angle, shift, point)
     left = np.linalg.norm(found.images(points) - images, axis=1)
-    if left.max() > tolerance:  # no motion fits: a majority may still show which points are wrong
+    if left.max() > tolerance:  # no motion fits; the majority may still tell which points are wrong
         usual = np.median(images - points, axis=0)
         off = np.linalg.norm(points + usual - images, axis=1)
         if 2 * (off <= tolerance).sum() > len(off):

@@ -1,4 +1,4 @@
-"""Expressions that select vertices by position, as "zmax and y>0".
+"""Expressions that select vertices by position, such as "zmax and y>0".
 
 An expression is made of
 
@@ -7,8 +7,8 @@ An expression is made of
 - ``and``, ``or``, ``not`` and parentheses.
 
 All comparisons use a tolerance of 1e-9 of the pattern's size, so that rounding in the coordinates
-does not matter: ``y > 0`` leaves out a vertex at y = 1e-17. Expressions select among the vertices
-of the pattern (at rest), never panel centers. They are read by a small parser, never evaluated.
+does not matter: ``y > 0`` leaves out a vertex at y = 1e-17. Expressions select vertices of the
+pattern (at rest), never panel centers. They are read by a small parser, never executed as code.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from foldyn.errors import InputError
 from foldyn.patterns.expressions import parse, written
 from foldyn.values import shortened
 
-TOLERANCE = 1e-9  # tolerance of a selection relative to the size of the pattern
+TOLERANCE = 1e-9  # tolerance of comparisons, relative to the size of the pattern
 
 _AXES = {"x": 0, "y": 1, "z": 2}
 _REMEDY = 'write for example "xmin", "zmax and y>0" or "not (x<1 or z==0)"'
@@ -41,14 +41,14 @@ _MIRRORED = {ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE}
 
 
 def select(points: Any, expression: str) -> NDArray[np.int64]:
-    """Vertices that an expression selects.
+    """Numbers of the vertices that an expression selects.
 
     Parameters
     ----------
     points : Pattern or array_like, shape (n, 3)
         A pattern, or points (m).
     expression : str
-        See the module's docstring.
+        See the docstring of the module `patterns.selection`.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def select(points: Any, expression: str) -> NDArray[np.int64]:
 
 @contextmanager
 def given_as(field: str) -> Iterator[None]:
-    """Name the field in errors about an expression."""
+    """Name the field in errors about an expression that are raised in the block."""
     try:
         yield
     except InputError as error:
@@ -88,7 +88,7 @@ def given_as(field: str) -> Iterator[None]:
 
 
 def check_expression(expression: str) -> str:
-    """Return an expression if it can be parsed, whatever it selects."""
+    """Return an expression if it can be parsed, whether or not it selects any vertex."""
     if not expression.strip():
         raise InputError(f'"{expression}": selects nothing; {_REMEDY}')
     _Selector(expression, np.zeros((1, 3)), 0.0).mask()
@@ -144,7 +144,7 @@ class _Selector:
     def _comparison(
         self, left: ast.expr, operator: ast.cmpop, right: ast.expr
     ) -> NDArray[np.bool_]:
-        """Mask (n,) of the points whose coordinate compares with a number as required."""
+        """Mask (n,) of the points whose coordinate satisfies a comparison with a number."""
         if not isinstance(left, ast.Name):
             left, right = right, left
             operator = _MIRRORED.get(type(operator), type(operator))()

@@ -1,17 +1,19 @@
 """Thick panels: boards hinged on their faces, as in thick origami.
 
-A crease is a line at some height along the front normal of the adjacent boards: by default in the
-front face at a valley, where the two front faces meet when it closes, and in the back face at a
-mountain. Each panel of the thick pattern is the plane through its hinge lines; a board moves with
-its panel. The dihedrals of flat boards, their areas and pictures follow from `Pattern.boards`.
+A crease is a line at some height along the front normal of the adjacent boards. By default a valley
+lies in the front face, because the two front faces meet when it closes, and a mountain in the back
+face. Each panel of the thick pattern lies in the plane through its hinge lines; a board moves with
+its panel. The dihedrals of flat boards, and areas and pictures of boards, follow from
+`Pattern.boards`.
 
-A board with one hinge line, or with two parallel ones at opposite heights, is a plane through
-opposite edges of its section: the mass on this plane has the center of mass of the board and its
-moment of inertia about the hinge, (w^2 + t^2) m / 3 for a board of width w hinged in its face.
+For a board with one hinge line, or with two parallel hinge lines at opposite heights, this plane
+runs through opposite edges of the board's section. The mass on the plane then has the board's
+center of mass and moment of inertia about the hinge: (w^2 + t^2) m / 3 for a board of width w that
+is hinged in its face.
 
 Sources: T. Tachi, Rigid-foldable thick origami, Origami 5, 2011 (axes at the valley sides);
-Y. Chen, R. Peng, Z. You, Origami of thick panels, Science 349, 2015 (why vertices at which hinge
-lines of different heights meet move only with thicknesses that satisfy conditions of their own).
+Y. Chen, R. Peng, Z. You, Origami of thick panels, Science 349, 2015 (a vertex at which hinge lines
+of different heights meet moves only if the thicknesses satisfy certain conditions).
 """
 
 from __future__ import annotations
@@ -30,8 +32,8 @@ from foldyn.patterns.pattern import Pattern, pattern_of
 from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.values import SHORTEST, number, number_or_list, show
 
-SAME = 1e-9  # distance of equal positions and heights, relative to the size
-SIDES = {"V": 0.5, "M": -0.5, "F": 0.0}  # height of a hinge line, in thicknesses, by assignment
+SAME = 1e-9  # positions and heights closer than this, relative to the size, are equal
+SIDES = {"V": 0.5, "M": -0.5, "F": 0.0}  # height of a hinge line divided by the thickness
 CONDITIONS = (
     "hinge lines at different heights do not meet in a point, and boards of one thickness around "
     "such a vertex cannot fold (Chen, Peng and You, Science 349, 2015); give offsets that are the "
@@ -45,31 +47,32 @@ def thicken(
     *,
     offsets: float | Sequence[float] | Mapping[str, float] | None = None,
 ) -> Pattern:
-    """Give panels a thickness, and place each crease at its own height within it.
+    """Give panels a thickness, and place each crease at a height within the thickness.
 
     Parameters
     ----------
     pattern : Pattern
         Flat or folded, with flat panels; its panels are the middle surfaces of the boards.
     thickness : float or sequence of float
-        Thickness (m), common to all panels or one for each.
+        Thickness (m), one value for all panels or one for each panel.
     offsets : float, sequence of float or mapping, optional
-        Height (m) of the hinge line of all creases, or of each, above the middle surfaces along
-        their front normals, at most half a thickness in magnitude; or heights by name ("mountain",
-        "valley", "flat", or a family of the pattern), as {"flat": 0.01}. By default valleys are
-        hinged in the front face, mountains in the back face, flat creases in the middle.
+        Height (m) of hinge lines above the middle surfaces, along the front normals, at most half a
+        thickness in magnitude. Either one height for all creases, or one for each crease, or
+        heights by name ("mountain", "valley", "flat", or a family of the pattern), such as
+        {"flat": 0.01}. By default valleys are hinged in the front face, mountains in the back face,
+        and flat creases in the middle.
 
     Returns
     -------
     Pattern
-        With the same numbering of vertices, panels and creases; its `boards` are the thick panels,
-        and its `flat_dihedrals` the angles at which they lie flat.
+        The thick pattern, with the same numbering of vertices, panels and creases. Its `boards` are
+        the thick panels, and its `flat_dihedrals` the angles at which the boards lie flat.
 
     Raises
     ------
     InputError
-        A value out of range, an unassigned crease without an offset, creases of different heights
-        that meet at a vertex, or boards that a closed ring of panels tears apart.
+        A value is out of range, an unassigned crease has no offset, creases of different heights
+        meet at a vertex, or the boards of a closed ring of panels cannot all be connected.
 
     Examples
     --------
@@ -153,7 +156,7 @@ def _heights(offsets: Any, sizes: NDArray, pattern: Pattern) -> NDArray[np.float
 
 
 def _given_heights(offsets: Any, pattern: Pattern) -> tuple[NDArray[np.float64], NDArray]:
-    """Height of each crease (nc,), and whether it is given (nc,)."""
+    """Height of each crease (nc,), and whether the height is given (nc,)."""
     count = len(pattern.creases)
     if isinstance(offsets, Mapping):
         each = {word: number(f"offsets.{word}", value) for word, value in offsets.items()}
@@ -167,7 +170,7 @@ def _given_heights(offsets: Any, pattern: Pattern) -> tuple[NDArray[np.float64],
 
 
 def _corner_heights(height: NDArray, pattern: Pattern) -> list[NDArray[np.float64]]:
-    """Height of each panel's corners (k,) above its middle, on the plane of the hinge lines."""
+    """Heights (k,) of each panel's corners above its middle, on the plane of the hinge lines."""
     row = edge_lookup(pattern.creases)
     out = []
     for panel, face in enumerate(pattern.faces):
@@ -192,10 +195,10 @@ def _corner_heights(height: NDArray, pattern: Pattern) -> list[NDArray[np.float6
 def _plane(
     panel: int, face: tuple[int, ...], known: dict[int, float], pattern: Pattern
 ) -> NDArray[np.float64]:
-    """Heights (k,) of a panel's corners on one plane through the `known` ones.
+    """Heights (k,) of a panel's corners on a plane through the corners with `known` heights.
 
-    If the known corners are collinear, the plane goes through the panel's centroid: the mass on it
-    then has the board's center of mass.
+    If these corners are collinear, the plane goes through the panel's centroid, so that the mass on
+    the plane has the board's center of mass.
     """
     if not known:
         return np.zeros(len(face))

@@ -1,4 +1,4 @@
-"""Tiling: the periods of a pattern, and gluing of copies edge to edge."""
+"""Tiling: finding the periods of a pattern, and gluing copies edge to edge."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from foldyn.errors import InputError
 from foldyn.patterns.topology import Faces, around, edge_lookup, edge_of
 
-PARALLEL = 1e-3  # rad: periods within this angle count as one direction
+PARALLEL = 1e-3  # rad: periods within this angle have the same direction
 MOST_EDGES = 600  # most boundary edges in a search for periods
 
 
@@ -26,7 +26,7 @@ class Glued(NamedTuple):
     vertices : ndarray, shape (n, 3)
         Coordinates (m).
     numbers : list of ndarray of int
-        For each sheet the new number of each of its vertices.
+        For each sheet, the new numbers of its vertices.
     joined : int
         Number of glued pairs of edges.
     """
@@ -46,7 +46,7 @@ def half_edges(faces: Faces, boundary: NDArray) -> NDArray[np.int64]:
 def glue(vertices: Sequence[NDArray], edges: Sequence[NDArray], tolerance: float) -> Glued:
     """Join sheets along coincident boundary edges.
 
-    Only the ends of such edges are merged, so that cuts within a sheet stay open.
+    Only the ends of coincident edges are merged, so that cuts within a sheet stay open.
 
     Parameters
     ----------
@@ -55,13 +55,13 @@ def glue(vertices: Sequence[NDArray], edges: Sequence[NDArray], tolerance: float
     edges : sequence of ndarray of int, shape (m, 2)
         Boundary edges of each sheet.
     tolerance : float
-        Distance (m) that counts as none.
+        Distance (m) that counts as zero.
 
     Returns
     -------
     Glued
-        With the vertices of the first sheet first; merged vertices keep the position in the
-        earliest sheet.
+        The sheet, with the vertices of the first sheet first; merged vertices keep their position
+        in the earliest sheet.
     """
     from scipy.spatial import cKDTree
 
@@ -94,8 +94,8 @@ def glue(vertices: Sequence[NDArray], edges: Sequence[NDArray], tolerance: float
 def periods(vertices: NDArray, edges: NDArray, tolerance: float) -> NDArray[np.float64]:
     """Two translations (2, 3), m, that place copies of a sheet edge to edge.
 
-    They map the longest parts of the boundary onto other parts that run the opposite way, as two
-    panels do on both sides of a crease.
+    The translations map the longest parts of the boundary onto other parts of the boundary that run
+    in the opposite direction, as the edges of two panels do at a crease.
 
     Parameters
     ----------
@@ -104,22 +104,23 @@ def periods(vertices: NDArray, edges: NDArray, tolerance: float) -> NDArray[np.f
     edges : ndarray of int, shape (m, 2)
         Boundary edges in the direction of their face's winding.
     tolerance : float
-        Distance (m) that counts as none.
+        Distance (m) that counts as zero.
 
     Returns
     -------
     ndarray, shape (2, 3)
-        The one closer to the x axis first; each towards positive coordinates.
+        Translations, first the one with the direction closer to the x axis; each towards positive
+        coordinates.
 
     Raises
     ------
     InputError
-        Fewer than two are found.
+        Fewer than two translations are found.
     """
     found: list[NDArray] = []
     if len(edges) <= MOST_EDGES:
         lengths = np.linalg.norm(np.diff(vertices[edges], axis=1)[:, 0], axis=1)
-        left = lengths.copy()  # boundary edges that no period has matched yet
+        left = lengths.copy()  # lengths of boundary edges; 0 once a period has matched the edge
         steps = _translations(vertices, edges, tolerance)
         while steps and len(found) < 2:
             step, brought = max(steps, key=lambda each: (_rounded(left[each[1]].sum(), lengths),
@@ -147,7 +148,7 @@ def _rounded(length: float, lengths: NDArray) -> float:
 def _translations(
     vertices: NDArray, edges: NDArray, tolerance: float
 ) -> list[tuple[NDArray, NDArray]]:
-    """Translations that match boundary edges, with the edges that they match."""
+    """Translations that map boundary edges onto others, each with the edges that it matches."""
     from scipy.spatial import cKDTree
 
     a, b = vertices[edges[:, 0]], vertices[edges[:, 1]]

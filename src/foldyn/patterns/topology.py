@@ -28,12 +28,12 @@ class Topology(NamedTuple):
     flipped : tuple of bool
         For each face, whether the winding given was reversed.
     edges, creases, boundary : ndarray of int, shape (m, 2)
-        Vertex pairs (low, high) in lexicographic order: all edges, edges of two faces except welds,
-        and edges of one face.
+        All edges; edges of two faces, except welds; and edges of one face only. Each is a vertex
+        pair (low, high), in lexicographic order.
     crease_faces : ndarray of int, shape (nc, 2)
         For each crease the face that runs low to high and the face that runs high to low.
     welds, weld_faces : ndarray of int, shape (nw, 2)
-        The same for edges of two faces across which the sheet is continuous.
+        Like `creases` and `crease_faces`, for edges across which the sheet is continuous.
     """
 
     faces: Faces
@@ -54,7 +54,7 @@ def checked_faces(faces: Any, n_vertices: int) -> Faces:
     faces : iterable of sequences of int
         Vertex numbers of each face, in order around it.
     n_vertices : int
-        Number of vertices the faces may refer to.
+        Number of vertices to which the faces may refer.
 
     Returns
     -------
@@ -150,7 +150,7 @@ def build_topology(faces: Faces, n_vertices: int, welds: Any = ()) -> Topology:
     end, last = np.roll(start, -1), np.cumsum(sizes) - 1
     end[last] = start[last - sizes + 1]
     low, high = np.minimum(start, end), np.maximum(start, end)
-    # Sorted by edge, equal edges side by side and the lower face first.
+    # Sorted by edge, so that equal edges are side by side, the one of the lower face first.
     order = np.argsort(low * n_vertices + high, kind="stable")
     low, high, owner, start = low[order], high[order], owner[order], start[order]
     first = np.flatnonzero(np.r_[True, (np.diff(low) != 0) | (np.diff(high) != 0)])
@@ -183,7 +183,7 @@ def build_topology(faces: Faces, n_vertices: int, welds: Any = ()) -> Topology:
 
 
 def _welded(welds: Any, shared: NDArray) -> NDArray[np.bool_]:
-    """Which edges of two faces (k, 2) are `welds`, pairs of vertices."""
+    """Whether each edge (k,) of two faces is among the vertex pairs `welds`."""
     row, chosen = edge_lookup(shared), np.zeros(len(shared), bool)
     for pair in listed("welds", welds, "pairs of vertices, as [(0, 1)]"):
         edge = vertex_pair("welds", pair)
@@ -194,7 +194,7 @@ def _welded(welds: Any, shared: NDArray) -> NDArray[np.bool_]:
 
 
 def _reversals(n_faces: int, pairs: NDArray, clash: NDArray, creases: NDArray) -> NDArray:
-    """Which faces to reverse so that no two run along a crease in the same direction."""
+    """Whether to reverse each face, so that no two faces run along a crease the same way."""
     reverse = np.zeros(n_faces, dtype=bool)
     if not clash.any():
         return reverse

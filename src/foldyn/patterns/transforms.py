@@ -1,4 +1,4 @@
-"""Patterns derived from others: scaled, moved, rotated, mirrored, repeated, joined."""
+"""Patterns derived from other patterns: scaled, moved, rotated, mirrored, repeated, joined."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from foldyn.patterns.tiling import periods as periods_of
 from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.values import number, numbers, show, vector, whole
 
-FLAT = 1e-6  # rad from pi: flatter creases between copies get no letter
+FLAT = 1e-6  # rad: a crease between copies within this angle from pi gets no letter
 TURNED = {"M": "V", "V": "M"}
-# Key of a pattern's custom data with the order of its layers, as in FOLD.
+# Key, in a pattern's custom data, of the order of its layers, as in the FOLD format.
 FACE_ORDERS = "faceOrders"
 
 
@@ -62,7 +62,7 @@ class Transforms:
         Parameters
         ----------
         factor : float
-            Greater than 0.
+            Factor on all lengths, greater than 0.
         """
         factor = number("factor", factor, above=0.0)
         return self._placed(lambda x: factor * x, factor)
@@ -86,7 +86,7 @@ class Transforms:
         Parameters
         ----------
         angle : float
-            Degrees.
+            Angle (degrees).
         axis : {"x", "y", "z"} or array_like, shape (3,)
             Direction of the axis.
         about : array_like, shape (3,)
@@ -107,8 +107,8 @@ class Transforms:
         """Return the mirror image of the pattern.
 
         The front is mirrored too: the winding of panels is reversed, so that a valley seen from the
-        front stays a valley, with its dihedral and fold angle. Mirrored in a plane perpendicular to
-        it, a flat sheet shows the same side with the same letters.
+        front stays a valley, with its dihedral and fold angle. A flat sheet that is mirrored in a
+        plane perpendicular to it shows the same side with the same letters.
 
         Parameters
         ----------
@@ -132,16 +132,17 @@ class Transforms:
         counts : sequence of two int
             Number of copies along the first and the second period, at least 1.
         periods : array_like, shape (2, 3), optional
-            Translations (m) from a copy to the next. By default they match the longest parts of the
-            boundary, the one closer to the x axis first.
+            Translations (m) from one copy to the next. By default they match the longest parts of
+            the boundary; the first is the one with the direction closer to the x axis.
         tolerance : float
             Distance, as a fraction of the pattern's size, within which edges coincide.
 
         Returns
         -------
         Pattern
-            Copies are ordered along the second period first. Creases keep letters, fold angles and
-            families; creases between copies get the letter of their dihedral, "U" if flat.
+            The glued sheet. Copies are numbered along the second period first. Creases keep
+            letters, fold angles and families; creases between copies get the letter that fits their
+            dihedral, "U" if flat.
 
         Raises
         ------
@@ -167,8 +168,8 @@ class Transforms:
     def joined(self, other: Self, tolerance: float = 1e-6) -> Self:
         """Return two patterns as one, glued along coincident boundary edges.
 
-        The front is this pattern's; if the other pattern is glued with its back to that side, its
-        mountains and valleys swap.
+        The front is the front of this pattern. If the back of the other pattern is on this side,
+        its mountains and valleys swap.
 
         Parameters
         ----------
@@ -179,8 +180,8 @@ class Transforms:
         Returns
         -------
         Pattern
-            With the vertices and panels of this pattern first. Creases between the two get the
-            letter of their dihedral, "U" if flat.
+            The glued pattern, with the vertices and panels of this pattern first. Creases between
+            the two get the letter that fits their dihedral, "U" if flat.
 
         Raises
         ------
@@ -190,7 +191,7 @@ class Transforms:
         Warns
         -----
         FoldynWarning
-            They share no edge.
+            The two patterns share no edge.
         """
         if not isinstance(other, Transforms):
             raise InputError(f" = {show(other)}: give a Pattern", "other")
@@ -210,8 +211,8 @@ class Transforms:
     def changed(self, **values: Any) -> Self:
         """Return the pattern with some arguments changed; see `Pattern`.
 
-        Warnings from its construction are not repeated. With other faces the order of layers is
-        dropped unless given.
+        Warnings from the pattern's construction are not repeated. If the faces change, the order of
+        layers is dropped unless it is given.
 
         Parameters
         ----------
@@ -235,7 +236,7 @@ class Transforms:
             own["custom"] = {k: v for k, v in self.custom.items() if k != FACE_ORDERS}
             own["rim_families"] = _still_at_the_rim(self._rim(), values["faces"])
         if len(values.get("vertices", self.vertices)) != len(self.vertices):
-            own["periods"] = ()  # which refer to vertex numbers
+            own["periods"] = ()  # they refer to vertex numbers
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
             changed = type(self)(**{**own, **values})
@@ -248,7 +249,7 @@ class Transforms:
         return {name: self.boundary[rows] for name, rows in self.rim_families.items()}
 
     def _placed(self, place: Any, factor: float = 1.0, turned: bool = False) -> Self:
-        """The pattern with its points mapped by `place`; with reversed winding if `turned`."""
+        """The pattern with all points mapped by `place`, and the winding reversed if `turned`."""
         boards = self.boards
         order = [
             np.array([0, *range(len(face) - 1, 0, -1)]) if turned else np.arange(len(face))
@@ -272,7 +273,7 @@ class Transforms:
 def _still_at_the_rim(
     families: Mapping[str, NDArray], faces: Any
 ) -> dict[str, list[list[int]]] | None:
-    """Families of boundary edges, without edges that are not on the boundary of the new faces."""
+    """Families of boundary edges, reduced to edges that are still on the boundary of `faces`."""
     if not families:
         return None
     try:
@@ -288,7 +289,7 @@ def _still_at_the_rim(
 def _joined(
     first: Transforms, sheets: Sequence[tuple[Transforms, NDArray]], near: float
 ) -> tuple[Any, int]:
-    """Join sheets, each shifted, into one pattern; also return the number of glued edges."""
+    """Join sheets, each with a shift, into one pattern; also return the number of glued edges."""
     points = [sheet.vertices + shift for sheet, shift in sheets]
     rims = [half_edges(sheet.faces, sheet.boundary) for sheet, _ in sheets]
     glued = glue(points, rims, near)

@@ -1,4 +1,4 @@
-"""Signals: arrays in, arrays out, independent of origami."""
+"""Signals: analysis of measured or computed records, given as arrays; independent of origami."""
 
 from __future__ import annotations
 

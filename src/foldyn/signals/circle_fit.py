@@ -13,32 +13,33 @@ from foldyn.signals import records
 from foldyn.signals.frequency_response import convert_response
 from foldyn.values import choice
 
-_FEWEST = 5  # points in a band: six real unknowns, ten real numbers
-_LARGEST_ERROR = 1.0 / 3.0  # largest relative error of damping; pure noise has above 0.4
+_FEWEST = 5  # least points in a band: ten real numbers for six real unknowns
+_LARGEST_ERROR = 1.0 / 3.0  # largest relative error of damping accepted; pure noise gives above 0.4
 _SWEEPS = 200
 _SETTLED = 1e-10
 
 
 @dataclass(frozen=True)
 class CircleFit:
-    """A mode from a circle fit: mobility = i w A / (w0^2 - w^2 + 2 i z w0 w) + residual.
+    """A mode from a circle fit, with mobility i w A / (w0^2 - w^2 + 2 i z w0 w) + residual.
 
     Attributes
     ----------
     natural_frequency, damping_ratio : float
-        w0 / (2 pi) (Hz), and z.
+        The natural frequency w0 / (2 pi), Hz, and the damping ratio z.
     modal_constant : complex
-        A, the product of the mass-normalized amplitudes at response and force (1/kg for a
-        receptance in m/N); real for a mode whose parts move in phase.
+        The constant A: the product of the mass-normalized amplitudes at the points of response and
+        force (1/kg for a receptance in m/N); real for a mode in which all points move in phase.
     residual : complex
-        Contribution of modes not fitted to the mobility, taken as constant in the band.
+        What all other modes contribute to the mobility, taken as constant in the band.
     center, radius : complex, float
         The circle in the plane of the mobility; it begins and ends at `residual`.
     misfit : float
         Root mean square distance between the points and the fit, as a fraction of the radius.
     frequency_error, damping_error : float
-        Standard errors of natural frequency (Hz) and damping ratio from the scatter about the fit:
-        valid for noise independent from line to line; other modes are only seen as a constant.
+        Standard errors of natural frequency (Hz) and damping ratio, from the scatter about the fit.
+        They are valid for noise that is independent from line to line, and do not include errors
+        due to other modes that vary in the band.
     points : int
         Number of points fitted.
     """
@@ -77,8 +78,8 @@ def circle_fit(
     response : array_like, shape (m,), complex
         Frequency response, for the time dependence exp(+i w t).
     band : (float, float) or None
-        Lowest and highest frequency (Hz) to fit, where this mode dominates: two to three times
-        the half-power width. None takes all.
+        Lowest and highest frequency (Hz) of the band to fit, in which this mode dominates: two to
+        three times the half-power width. None takes all frequencies.
     quantity : {"receptance", "mobility", "accelerance"}
         Quantity of the response.
 
@@ -90,7 +91,7 @@ def circle_fit(
     Raises
     ------
     InputError
-        Fewer than five points in the band, NaN there, or a curve that does not turn.
+        Fewer than five points in the band, NaN in the band, or a curve that does not turn.
     ComputationError
         A fit that does not converge (no mode in the band, or more than one), or a damping ratio
         below three times its standard error (noise).
@@ -98,12 +99,12 @@ def circle_fit(
     Notes
     -----
     Y = D / (1 + i x) + B with x = (f / f0 - f0 / f) / (2 z) and D = A / (2 z w0) is a circle
-    through B with the diameter D, and the point at x lies at the angle -2 atan(x) from the
-    resonance, seen from the center: Kennelly and Pancu, Journal of the Aeronautical Sciences 14,
-    1947; Ewins, Modal Testing, 2nd ed. 2000, chapter 4 (circle fit). The algebraic circle and the
-    angles give the start; all six parameters are then fitted by least squares of the distance in
-    the plane, which is the maximum likelihood estimate for noise of equal size at all points. The
-    mobility is used because viscous damping makes it exactly a circle.
+    through B with the diameter D. Seen from the center, the point at x lies at the angle
+    -2 atan(x) from the resonance (Kennelly and Pancu, Journal of the Aeronautical Sciences 14,
+    1947; Ewins, Modal Testing, 2nd ed. 2000, chapter 4, circle fit). An algebraic circle fit and
+    these angles give the start. Then all six parameters are fitted by least squares of the
+    distances in the plane, the maximum likelihood estimate for noise of equal size at all points.
+    The mobility is used because with viscous damping it is exactly a circle.
 
     Examples
     --------
@@ -125,11 +126,11 @@ def circle_fits(
     bands: Sequence[tuple[float, float]],
     quantity: str = "receptance",
 ) -> tuple[CircleFit, ...]:
-    """Fit several modes, one in each band, each with the others subtracted.
+    """Fit several modes, one in each band; from each band, the other modes are subtracted.
 
-    The circle fits are iterated, each on the response minus the other modes as last fitted, until
-    they converge: close modes then do not reduce accuracy, and the residuals are the contributions
-    of modes outside the bands.
+    The circle fits are iterated until they converge: each mode is fitted to the response minus the
+    last fits of the other modes. So close modes do not reduce accuracy, and the residuals are the
+    contributions of modes outside the bands.
 
     Parameters
     ----------
@@ -141,14 +142,15 @@ def circle_fits(
     Returns
     -------
     tuple of CircleFit
-        One for each band, in their order.
+        One fit for each band, in the order of the bands.
 
     Raises
     ------
     InputError
-        As in `circle_fit`, or no bands.
+        As in `circle_fit`; also if there are no bands.
     ComputationError
-        As in `circle_fit`, or fits that do not converge: modes too close for their bands.
+        As in `circle_fit`; also if the fits do not converge, because modes are too close for their
+        bands.
     """
     if len(bands) == 0:
         raise InputError("bands: empty; give one band (Hz) for each mode")
@@ -173,7 +175,7 @@ def circle_fits(
 def _mobility(
     frequency: ArrayLike, response: ArrayLike, quantity: str
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Frequencies above 0 and the mobility there; NaN is allowed outside the bands."""
+    """Frequencies above 0, and the mobility at them; NaN is allowed outside the bands."""
     choice("quantity", quantity, records.DERIVATIVES)
     f = records.checked_frequencies(frequency, fewest=_FEWEST)
     Y = np.asarray(response)
@@ -204,7 +206,7 @@ def _fit(f: NDArray[np.float64], Y: NDArray[np.complex128]) -> CircleFit:
     from scipy.optimize import least_squares  # slow to import
 
     def solved(p: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-        """Resonance curve, best diameter and residual, misfit, projection."""
+        """Resonance curve, best diameter and residual, misfit, and basis of the projection."""
         curve = 1.0 / (1.0 + 1j * _detuning(f, *np.exp(p)))
         q, r = np.linalg.qr(np.column_stack([curve, np.ones(f.size)]))
         inner = np.conj(q.T) @ Y
@@ -214,7 +216,7 @@ def _fit(f: NDArray[np.float64], Y: NDArray[np.complex128]) -> CircleFit:
         return solved(p)[2].view(np.float64)
 
     def slope(p: NDArray) -> NDArray[np.float64]:
-        # variable projection: the part of each parameter's effect that D and B cannot follow
+        # variable projection: the part of each parameter's effect that D and B cannot reproduce
         curve, linear, _, q = solved(p)
         f0, z = np.exp(p)
         x_slopes = [-(f / f0 + f0 / f) / (2.0 * z), -_detuning(f, f0, z)]
@@ -233,7 +235,7 @@ def _fit(f: NDArray[np.float64], Y: NDArray[np.complex128]) -> CircleFit:
     _, (diameter, residual), left, _ = solved(solution.x)
     J = slope(solution.x)
     variance = np.sum(np.abs(left) ** 2) / (2 * f.size - 6)
-    # by singular values: a spike of one point makes the two columns parallel
+    # by singular values, since a spike of one point makes the two columns parallel
     _, size, axes = np.linalg.svd(J, full_matrices=False)
     with np.errstate(divide="ignore", invalid="ignore"):
         errors = np.sqrt(variance * np.sum((axes / size[:, np.newaxis]) ** 2, axis=0))
@@ -253,7 +255,7 @@ def _fit(f: NDArray[np.float64], Y: NDArray[np.complex128]) -> CircleFit:
 
 
 def _certain(fit: CircleFit) -> CircleFit:
-    """The fit; raises if its points do not determine the damping."""
+    """The fit itself; raises an error if its points do not determine the damping."""
     if not fit.damping_error < _LARGEST_ERROR * fit.damping_ratio:
         raise ComputationError(
             f"circle fit: at {fit.natural_frequency:.6g} Hz the damping ratio is "
@@ -265,7 +267,7 @@ def _certain(fit: CircleFit) -> CircleFit:
 
 
 def _detuning(f: NDArray[np.float64], f0: float, z: float) -> NDArray[np.float64]:
-    """x: 0 at the natural frequency, -1 and 1 at the half-power points of the mobility."""
+    """Detuning x: 0 at the natural frequency, -1 and 1 at the mobility's half-power points."""
     return (f / f0 - f0 / f) / (2.0 * z)
 
 
@@ -279,10 +281,10 @@ def _start(f: NDArray[np.float64], Y: NDArray[np.complex128]) -> tuple[float, fl
     columns = np.column_stack([2.0 * w.real, 2.0 * w.imag, np.ones(w.size)])
     (re, im, _), *_ = np.linalg.lstsq(columns, np.abs(w) ** 2, rcond=None)
     center = complex(re, im)
-    # the band's ends lie next to the residual, the resonance opposite
+    # the ends of the band lie near the residual, the resonance lies opposite on the circle
     top = int(np.argmax(np.abs(w - 0.5 * (w[0] + w[-1]))))
     angle = np.angle((w[top] - center) / (w - center))
-    # tan(angle / 2) = f / (2 z f0) - f0 / (2 z f), weighted down where the tangent amplifies noise
+    # tan(angle / 2) = f / (2 z f0) - f0 / (2 z f), with less weight where tan amplifies noise
     weight = np.cos(0.5 * angle) ** 2
     sides = np.column_stack([f, -1.0 / f]) * weight[:, np.newaxis]
     (a, b), *_ = np.linalg.lstsq(sides, np.tan(0.5 * angle) * weight, rcond=None)

@@ -1,9 +1,9 @@
 """Frequency response from records of force and response, and its conversion to other quantities.
 
-The estimators are H1, H2 and the coherence.
+The module estimates H1, H2 and the coherence.
 
-Records that have not decayed at their end get an exponential window, whose known damping is
-subtracted again.
+Records that have not decayed at their end are multiplied by an exponential window; the damping that
+it adds is known, and is subtracted again.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from foldyn.signals.records import DERIVATIVES, beside, checked_frequencies
 from foldyn.values import choice, number, whole
 
 ESTIMATORS = ("h1", "h2")
-_FEWEST = 4  # samples of a segment
+_FEWEST = 4  # least samples of a segment
 # Lines with a force amplitude below this fraction of the largest hold only round-off.
 _SILENCE = 1e-12
 
@@ -34,16 +34,16 @@ class FrequencyResponse:
     Attributes
     ----------
     frequency : ndarray, shape (m,)
-        0 ... 1/(2 dt) (Hz), m = segment // 2 + 1.
+        Frequencies (Hz) from 0 to 1/(2 dt), m = segment // 2 + 1.
     response : ndarray, shape (m, ...), complex
-        Response per force, in the unit of the response over that of the force, for the time
-        dependence exp(+i w t): a lag is a negative phase. NaN at lines without force.
+        Response per force, in the unit of the response divided by the unit of the force, for the
+        time dependence exp(+i w t): a lag is a negative phase. NaN at lines without force.
     coherence : ndarray, shape (m, ...)
-        Fraction of the response's power that is linear in the force, 0 ... 1. NaN for a single
-        segment, for which it is 1 by construction.
+        Fraction of the response's power that is linear in the force, from 0 to 1. NaN for a single
+        segment, because the coherence would always be 1.
     force_density : ndarray, shape (m,)
-        One-sided power density of the force (unit of the force squared per Hz): where it is
-        small compared to its maximum, the response is a quotient of small numbers.
+        One-sided power density of the force (unit of the force squared per Hz). Where it is small
+        compared to its maximum, the response is inaccurate, as a quotient of small numbers.
     segments : int
         Number of segments averaged, over all records.
     """
@@ -56,10 +56,10 @@ class FrequencyResponse:
 
     @property
     def random_error(self) -> NDArray[np.float64]:
-        """Standard deviation of the relative magnitude, and of the phase in rad.
+        """Standard deviation of the relative error of the magnitude, and of the phase in rad.
 
-        sqrt((1 - c) / (2 n c)), c the coherence and n the number of segments, which must not
-        overlap (Bendat and Piersol, Random Data, chapter 9); valid where it is well below 1.
+        It is sqrt((1 - c) / (2 n c)), with the coherence c and the number n of segments, which must
+        not overlap (Bendat and Piersol, Random Data, chapter 9); valid where it is well below 1.
         """
         with np.errstate(divide="ignore"):
             return np.sqrt((1.0 - self.coherence) / (2.0 * self.segments * self.coherence))
@@ -78,30 +78,32 @@ def frequency_response(
 ) -> FrequencyResponse:
     """Estimate a frequency response from records of force and response.
 
-    With F and X the transforms of a windowed segment and averages over all segments,
-    H1 = <F* X> / <F* F> has no bias from noise in the response, and H2 = <X* X> / <X* F> none
-    from noise in the force; H1 is too small by 1 + (noise / force) with noise in the force, H2 too
-    large by 1 + (noise / response) with noise in the response, in powers. The coherence
-    ``|<F* X>|^2 / (<F* F> <X* X>)`` is H1 / H2.
+    F and X are the transforms of a windowed segment, and < > is the average over all segments.
+    H1 = <F* X> / <F* F> has no bias from noise in the response; noise in the force makes H1 too
+    small by the factor 1 + (power of noise / power of force). H2 = <X* X> / <X* F> has no bias from
+    noise in the force; noise in the response makes H2 too large by the factor 1 + (power of noise /
+    power of response). The coherence ``|<F* X>|^2 / (<F* F> <X* X>)`` is H1 / H2.
 
-    Burst random, impulse and sweep: use each record whole (`segment=None`, no window), long enough
-    for the response to decay within it, or periodic. If it does not decay, multiply by an
-    `exponential_window`. Stationary noise: segments with ``window="hann"`` and ``overlap=0.5``.
+    For burst random, impulse and sweep excitation, use each record as a whole (`segment=None`, no
+    window). The record must be periodic, or long enough for the response to decay within it; if
+    the response does not decay, multiply by an `exponential_window`. For stationary noise, use
+    segments with ``window="hann"`` and ``overlap=0.5``.
 
     Parameters
     ----------
     force : array_like, shape (n,) or (records, n)
-        Force (N), or the motion of the base: one record, or several of one length.
+        Force (N), or the motion of the base: one record, or several records of the same length.
     response : array_like, shape (n, ...) or (records, n, ...)
-        Response (m, m/s, m/s^2), with any further axes for channels.
+        Response (m, m/s or m/s^2); further axes are channels.
     dt : float
         Sampling interval (s); `foldyn.signals.sampling_interval` finds and checks it.
     estimator : {"h1", "h2"}
-        Quotient to use; both agree without noise, and for a single segment.
+        Estimator to use; the two agree without noise, and for a single segment.
     segment : int or None
-        Samples of a segment; None is the whole record. The rest at the end of a record is unused.
+        Samples of a segment; None takes the whole record. Samples at the end of a record that do
+        not fill a segment are not used.
     overlap : float
-        Fraction of a segment that the next one shares, 0 <= overlap < 1.
+        Fraction of a segment that the next segment shares, 0 <= overlap < 1.
     window : str, tuple, array_like of shape (segment,), or None
         As in `spectrum`, for both force and response.
     detrend : {None, "constant", "linear"}
@@ -110,7 +112,7 @@ def frequency_response(
     Returns
     -------
     FrequencyResponse
-        Frequency, response, coherence, density of the force and number of segments.
+        Frequency, response, coherence, power density of the force and number of segments.
 
     Raises
     ------
@@ -215,13 +217,13 @@ def _transform(
 def exponential_window(n: int, dt: float, *, rate: float) -> NDArray[np.float64]:
     """Window exp(-rate t) for records that have not decayed at their end.
 
-    Applied to both force and response, it moves every pole by -rate along the real axis, exactly:
-    the estimate is then H(i w + rate). `without_window` subtracts the added damping again.
+    Applied to both force and response, the window moves every pole by exactly -rate along the real
+    axis: the estimate is then H(i w + rate). `without_window` subtracts the added damping again.
 
     Parameters
     ----------
     n : int
-        Samples of the record or segment.
+        Number of samples of the record or segment.
     dt : float
         Sampling interval (s).
     rate : float
@@ -239,21 +241,21 @@ def exponential_window(n: int, dt: float, *, rate: float) -> NDArray[np.float64]
 def without_window(
     frequency: ArrayLike, damping_ratio: ArrayLike, *, rate: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Natural frequencies and damping ratios without the damping of an exponential window.
+    """Natural frequencies and damping ratios without the damping that an exponential window adds.
 
-    The damped frequency is unchanged, and the real part of the pole becomes -z w + rate.
+    The damped frequency stays the same, and the real part of the pole becomes -z w + rate.
 
     Parameters
     ----------
     frequency, damping_ratio : array_like
         Natural frequencies w / (2 pi) (Hz) and damping ratios z < 1, as estimated.
     rate : float
-        The window's decay rate (1/s).
+        Decay rate of the window (1/s).
 
     Returns
     -------
     frequency, damping_ratio : ndarray
-        Values of the system; a damping ratio below 0 is dominated by noise.
+        Values without the window; a damping ratio below 0 is dominated by noise.
 
     Examples
     --------
@@ -283,14 +285,14 @@ def convert_response(
     frequency : array_like, shape (m,)
         Frequencies (Hz), increasing, from 0 on.
     response : array_like, shape (m, ...), complex
-        Response per force (m/N, m/(N s) or m/(N s^2)), or any motion per any input.
+        Response per force (m/N, m/(N s) or m/(N s^2)), or another motion per another input.
     source, target : {"receptance", "mobility", "accelerance"}
-        Given and wanted quantity.
+        Quantity that is given, and quantity that is wanted.
 
     Returns
     -------
     ndarray, shape (m, ...), complex
-        The response; NaN at 0 Hz if a division by i w would be needed.
+        The converted response; NaN at 0 Hz if the conversion divides by i w.
 
     Raises
     ------
@@ -316,14 +318,14 @@ def convert_response(
 
 
 def transmissibility(response: ArrayLike, reference: ArrayLike) -> NDArray[np.complex128]:
-    """Motion at one point per motion at another, both under the same excitation.
+    """Motion at one point per motion at another point, both under the same excitation.
 
     Parameters
     ----------
     response : array_like, shape (m, ...), complex
         Frequency response of the points of interest.
     reference : array_like, shape (m,), complex
-        Response of the reference, of the same quantity and excitation.
+        Frequency response of the reference point, for the same quantity and excitation.
 
     Returns
     -------
@@ -345,9 +347,9 @@ def transmissibility(response: ArrayLike, reference: ArrayLike) -> NDArray[np.co
 def base_transmissibility(frequency: ArrayLike, relative: ArrayLike) -> NDArray[np.complex128]:
     """Absolute motion per motion of the base, from the relative motion per base acceleration.
 
-    x = y + z with z the motion relative to the base, and H = z / y'' = z / (-w^2 y) gives
-    x / y = 1 - w^2 H. A structure on a moving base obeys its equation of motion in z with the force
-    -M r y'', so that H is the relative response per base acceleration.
+    The absolute motion is x = y + z, with the motion y of the base and the motion z relative to it.
+    A structure on a moving base obeys its equation of motion in z under the force -M r y''. So the
+    relative response per base acceleration is H = z / y'' = z / (-w^2 y), and x / y = 1 - w^2 H.
 
     Parameters
     ----------

@@ -15,9 +15,9 @@ from foldyn.signals.spectrum import spectrum
 from foldyn.values import number
 
 _FEWEST = 16
-_PADDING = 8  # the period is only needed to a tenth
+_PADDING = 8  # zero padding of the spectrum; the period is needed only to within a tenth
 _FEWEST_PER_CYCLE = 8.0
-_DEGREE = 6  # of the polynomial through the samples around a maximum
+_DEGREE = 6  # degree of the polynomial through the samples around a maximum
 
 
 @brief
@@ -28,17 +28,18 @@ class LogDecrement:
     Attributes
     ----------
     decrement : float
-        Natural logarithm of the ratio of successive maxima, by least squares over all of them.
+        Natural logarithm of the ratio of successive maxima, by least squares over all maxima.
     standard_error : float
         Standard error of the decrement, from the scatter about the fit; NaN with two maxima.
     damping_ratio : float
         decrement / sqrt(4 pi^2 + decrement^2).
     damped_frequency, natural_frequency : float
-        Cycles per second between the maxima (Hz), and this over sqrt(1 - damping_ratio^2).
+        Frequency of the maxima (Hz), and this frequency divided by sqrt(1 - damping_ratio^2).
     time, height : ndarray, shape (k,)
-        The maxima (s, unit of the record), above the rest position.
+        Times (s) of the maxima, and their heights above the rest position (unit of the record).
     successive : ndarray, shape (k - 1,)
-        Logarithm of the ratio of each pair; a trend shows amplitude-dependent damping.
+        Logarithm of the ratio of each pair of successive maxima; a trend shows that damping depends
+        on amplitude.
     """
 
     decrement: float
@@ -61,23 +62,24 @@ def log_decrement(
 ) -> LogDecrement:
     """Estimate the logarithmic decrement from the successive maxima of a free vibration.
 
-    Each maximum is read from a polynomial of degree 6, fitted over two thirds of the period around
-    it; the heights are fitted by height exp(-decrement k), weighted for noise of constant size. The
-    count starts with the highest maximum; maxima within a third of a period of the record's ends
-    are unused.
+    Each maximum is read from a polynomial of degree 6, fitted over two thirds of a period around
+    it. The heights are fitted by height exp(-decrement k), with weights for noise of constant size.
+    The count k starts with the highest maximum. Maxima less than a third of a period from the ends
+    of the record are not used.
 
     Parameters
     ----------
     x : array_like, shape (n,)
-        Free vibration of one mode, at least two maxima; more modes: `matrix_pencil`.
+        Free vibration in one mode, with at least two maxima; for several modes use `matrix_pencil`.
     dt : float
         Sampling interval (s), at most an eighth of the period.
     rest : float or None
-        Rest position, in the unit of `x`. None: heights are measured from the straight line
-        between the minima before and after, which eliminates an unknown offset and a slow drift;
-        a maximum without a minimum on each side is then unused.
+        Rest position, in the unit of `x`. If None, heights are measured from the straight line
+        between the minima before and after a maximum, which eliminates an unknown offset and a
+        slow drift; a maximum without a minimum on each side is then not used.
     floor : float
-        Maxima below this fraction of the highest end the count, since noise dominates.
+        The count ends at the first maximum below this fraction of the highest, because noise
+        dominates there.
     frequency : float or None
         Approximate damped frequency (Hz); None takes the highest line of the spectrum.
 
@@ -93,13 +95,13 @@ def log_decrement(
 
     Notes
     -----
-    Successive maxima of exp(-z w t) cos(w_d t) lie at the same phase of each cycle, so that their
-    ratio is exp(2 pi z / sqrt(1 - z^2)) exactly, and so is the ratio of their distances from the
-    chords between minima (Thomson, Theory of Vibration with Applications, chapter 2). In samples,
-    only the phase within the interval changes from maximum to maximum: the polynomial leaves errors
-    up to 5e-5 of the decrement at 12 samples per period or more, and 2e-4 at 8. Noise raises low
-    maxima more than high ones: noise of 1 % at 25 samples per period lowers the decrement by 0.2 %
-    at z = 0.0255 and by 1.7 % at z = 0.135.
+    Successive maxima of exp(-z w t) cos(w_d t) lie at the same phase of each cycle. So their ratio
+    is exactly exp(2 pi z / sqrt(1 - z^2)), and their distances from the chords between minima have
+    the same ratio (Thomson, Theory of Vibration with Applications, chapter 2). In a sampled record,
+    each maximum lies at another place between two samples: the polynomial leaves errors of up to
+    5e-5 of the decrement at 12 samples per period or more, and 2e-4 at 8 samples. Noise raises low
+    maxima more than high maxima: noise of 1 % at 25 samples per period lowers the decrement by
+    0.2 % at z = 0.0255 and by 1.7 % at z = 0.135.
 
     Examples
     --------
@@ -123,7 +125,7 @@ def log_decrement(
 
     apart = np.maximum(np.rint(np.diff(place) / per_cycle), 1.0)  # 2 where noise hid a maximum
     cycle = np.concatenate([[0.0], np.cumsum(apart)])
-    # constant noise in the heights is noise / height in their logarithms
+    # noise of constant size in the heights becomes noise / height in the logarithms of the heights
     decrement, error = _slope(cycle, -np.log(height), weight=height**2)
     ratio = decrement / np.hypot(2.0 * np.pi, decrement)
     damped = cycle[-1] / ((place[-1] - place[0]) * interval)
@@ -159,7 +161,7 @@ def _samples_per_cycle(x: NDArray[np.float64], dt: float, frequency: float | Non
 def _heights(
     x: NDArray[np.float64], per_cycle: float, rest: float | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Places (in samples) of the maxima and their heights above the rest position."""
+    """Places (in samples) of the maxima, and heights of the maxima above the rest position."""
     place, value = _maxima(x, per_cycle)
     if rest is not None:
         return place, value - number("rest", rest)

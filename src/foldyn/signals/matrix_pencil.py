@@ -25,22 +25,24 @@ _ABOVE_NOISE = 4.5
 class DecayingModes:
     """A record as a sum of decaying cosines, by increasing natural frequency.
 
-    x(t) = sum over k of amplitude[k] exp(-z w t) cos(w_d t + phase[k]), w = 2 pi natural_frequency,
-    z the damping ratio and w_d = w sqrt(1 - z^2). An exponential that does not oscillate has
-    z = 1 or, growing, z = -1, and the phase 0 or pi; an offset has the natural frequency 0.
+    x(t) = sum over k of amplitude[k] exp(-z w t) cos(w_d t + phase[k]), with w = 2 pi times the
+    natural frequency, the damping ratio z and w_d = w sqrt(1 - z^2). An exponential that does not
+    oscillate has z = 1 (if it grows, z = -1) and the phase 0 or pi; an offset has the natural
+    frequency 0.
 
     Attributes
     ----------
     natural_frequency, damping_ratio, damped_frequency : ndarray, shape (k,)
         Frequencies in Hz; a negative damping ratio is a growing part, often noise.
     pole : ndarray, shape (k,), complex
-        -z w + i w_d (1/s), the pole of each pair above the real axis.
+        Poles -z w + i w_d (1/s): of each conjugate pair, the pole above the real axis.
     amplitude, phase : ndarray, shape (k, ...)
-        At t = 0, the first sample, in the unit of the record and in rad, for each channel.
+        Amplitude (unit of the record) and phase (rad) at the first sample, t = 0, in each channel.
     rest : ndarray, shape (...)
         Root mean square of the remainder, relative to the record.
     singular_values : ndarray
-        Singular values of the Hankel matrix, decreasing: `order` of them exceed the noise.
+        Singular values of the Hankel matrix, in decreasing order; the first `order` of them exceed
+        the noise.
     order : int
         Number of poles: two for each oscillating mode.
     """
@@ -56,7 +58,7 @@ class DecayingModes:
     order: int
 
     def at(self, time: ArrayLike) -> NDArray[np.float64]:
-        """The sum at times (s) from the first sample, shape (n, ...)."""
+        """Sum of the modes (n, ...) at times (s) after the first sample."""
         t = np.asarray(time, dtype=np.float64)
         parts = self.amplitude * np.exp(1j * self.phase)
         return np.real(np.tensordot(np.exp(np.outer(t, self.pole)), parts, axes=1))
@@ -72,32 +74,33 @@ def matrix_pencil(
 ) -> DecayingModes:
     """Fit a free vibration by decaying cosines: frequencies, damping ratios, amplitudes, phases.
 
-    The rows of a Hankel matrix are windows of the record. Each window is a combination of as many
-    vectors as there are poles, and a shift by one sample multiplies them by exp(s dt). All channels
+    The rows of a Hankel matrix are windows of the record. Each window is a combination of vectors,
+    one for each pole s, and a shift by one sample multiplies each vector by exp(s dt). All channels
     share the poles.
 
     Parameters
     ----------
     x : array_like, shape (n,) or (n, ...)
-        Free vibration, after all loads have ended, with any further axes for channels; scale
-        channels of different units to similar size. An offset or a slow drift appears as a pole
-        near 0: detrending is not needed; subtracting the mean of a decaying record would add one.
+        Free vibration, after all loads have ended; further axes are channels. Scale channels of
+        different units to similar size. An offset or a slow drift appears as a pole near 0, so
+        detrending is not needed; subtracting the mean of a decaying record would add an offset.
     dt : float
         Sampling interval (s).
     order : int or None
         Number of poles: two for each mode, one for an offset.
     threshold : float or None
-        Without `order`: singular values above this fraction of the largest one count. None takes
-        the lower quartile as noise and counts values above 4.5 times that: correct for white noise,
-        too many poles for colored noise. Check `singular_values`.
+        Without `order`, the number of poles is the number of singular values above this fraction of
+        the largest. None takes the lower quartile as noise and counts values above 4.5 times the
+        quartile: this is correct for white noise, and gives too many poles for colored noise. Check
+        `singular_values`.
     width : int or None
-        Length of a window less one (the pencil parameter), from the order to n - order; None takes
-        a third of the record, which is least sensitive to noise, at most 500.
+        Length of a window minus one (the pencil parameter), from the order to n - order. None takes
+        a third of the record (least sensitive to noise), but at most 500.
 
     Returns
     -------
     DecayingModes
-        The modes; ones of small amplitude or negative damping may be noise.
+        The modes; modes with small amplitude or negative damping may be noise.
 
     Raises
     ------
@@ -107,11 +110,11 @@ def matrix_pencil(
     Notes
     -----
     Hua and Sarkar, IEEE Transactions on Acoustics, Speech, and Signal Processing 38, 1990, 814-824;
-    Sarkar and Pereira, IEEE Antennas and Propagation Magazine 37(1), 1995, 48-55; for several
-    channels equivalent to the eigensystem realization algorithm without input (Juang and Pappa,
-    Journal of Guidance, Control, and Dynamics 8, 1985, 620-627). Amplitudes are fitted by least
-    squares over the whole record. Sample at 4 to 20 times the highest frequency: much finer
-    sampling crowds the poles at exp(s dt) = 1 and costs accuracy; decimate such a record.
+    Sarkar and Pereira, IEEE Antennas and Propagation Magazine 37(1), 1995, 48-55. For several
+    channels the method is equivalent to the eigensystem realization algorithm without input (Juang
+    and Pappa, Journal of Guidance, Control, and Dynamics 8, 1985, 620-627). Amplitudes are fitted
+    by least squares to the whole record. Sample at 4 to 20 times the highest frequency. In a record
+    with much finer sampling all exp(s dt) are close to 1, which costs accuracy: decimate it.
 
     Examples
     --------
@@ -196,9 +199,9 @@ def _order(values: NDArray[np.float64], n: int, threshold: float | None) -> int:
 def _amplitudes(
     x: NDArray[np.float64], exponent: NDArray[np.complex128]
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
-    """Complex amplitudes (modes, channels) of Re(C exp(exponent k)), and the remainder."""
+    """Complex amplitudes C (modes, channels) of Re(C exp(exponent k)), and the remainder."""
     n = x.shape[0]
-    # growing parts are counted from their end, to avoid overflow
+    # growing parts are scaled to 1 at their end, to avoid overflow
     origin = np.where(exponent.real > 0.0, n - 1, 0)
     waves = np.exp((np.arange(n)[:, np.newaxis] - origin) * exponent)
     turning = (exponent.imag > 0.0) & (exponent.imag < np.pi * (1.0 - 1e-12))

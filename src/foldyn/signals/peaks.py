@@ -1,4 +1,4 @@
-"""Peaks of a magnitude curve, refined between its samples, and their half-power damping."""
+"""Peaks of a magnitude curve, interpolated between samples, and damping from half-power points."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from foldyn.signals import records
 from foldyn.values import choice, number, whole
 
 _LOPSIDED = 0.1
-LOWEST = 1e-4  # least value, relative to the maximum; lower ones may be simulation errors
+LOWEST = 1e-4  # least height, relative to the maximum; lower peaks may be simulation errors
 
 
 @brief
@@ -29,10 +29,11 @@ class Peaks:
     height : ndarray, shape (p,)
         Heights in the unit of the curve, interpolated.
     prominence : ndarray, shape (p,)
-        Height above the higher of the two lowest points on the way to higher ground left and
-        right, or to the curve's ends; in the unit of the curve, from its samples.
+        Prominences, in the unit of the curve, from its samples. On each side, the curve has a
+        lowest point between the peak and the next higher value (or the end of the curve); the
+        prominence is the height above the higher of these two points.
     index : ndarray of int, shape (p,)
-        Samples of the curve at the peaks.
+        Indices of the curve's samples at the peaks.
     """
 
     frequency: Annotated[NDArray[np.float64], Unit("Hz")]
@@ -52,30 +53,30 @@ def find_peaks(
 ) -> Peaks:
     """Find the peaks of a magnitude curve: a frequency response, or an amplitude spectrum.
 
-    Between samples the curve is interpolated as one viscously damped mode, through three points:
-    its inverse square, as a receptance, is a parabola in the squared frequency. For a single mode
-    the interpolated peak is exact at any spacing.
+    Between samples the curve is interpolated through three points as a viscously damped mode: the
+    inverse square of its receptance is a parabola in the squared frequency. For a single mode the
+    interpolated peak is exact at any spacing.
 
     Parameters
     ----------
     frequency : array_like, shape (m,)
         Frequencies (Hz), increasing, m >= 3; the spacing may vary.
     magnitude : array_like, shape (m,)
-        Magnitudes; of complex values the modulus is taken.
+        Magnitudes; for complex values, the modulus is taken.
     prominence : float
         Least prominence, as a fraction of the curve's maximum.
     count : int or None
-        Number of peaks to keep, the most prominent ones.
+        Number of peaks to keep, in order of prominence.
     quantity : {"receptance", "mobility", "accelerance"}
         Quantity of the curve; "receptance" for the spectrum of a displacement.
     rise : float or None
-        Also keep lower peaks that exceed the lowest points on the way to higher ground by this
-        factor: on a logarithmic axis they are as clear as high ones.
+        Also keep lower peaks that exceed the lowest points on both sides (see `Peaks.prominence`)
+        by this factor: on a logarithmic axis they are as clear as high peaks.
 
     Returns
     -------
     Peaks
-        Arrays of length 0 if none is found. A maximum at an end of the curve does not count.
+        Arrays of length 0 if no peak is found. A maximum at an end of the curve does not count.
 
     Raises
     ------
@@ -84,8 +85,8 @@ def find_peaks(
 
     Notes
     -----
-    The peak of a receptance lies at w sqrt(1 - 2 z^2), that of a mobility at w, and that of an
-    accelerance at w / sqrt(1 - 2 z^2): `half_power` and `circle_fit` give w itself.
+    A mode with natural frequency w has its peak at w sqrt(1 - 2 z^2) in a receptance, at w in a
+    mobility, and at w / sqrt(1 - 2 z^2) in an accelerance: `half_power` and `circle_fit` give w.
 
     Examples
     --------
@@ -128,7 +129,7 @@ class Curve(NamedTuple):
     order: int
 
     def peak(self, index: int) -> tuple[float, float]:
-        """Frequency and height of the peak at a sample, from it and its two neighbors."""
+        """Frequency and height of the peak at a sample, from this sample and its two neighbors."""
         v = self._top(index)
         if v is None:
             return float(self.f[index]), float(self.size[index])
@@ -138,10 +139,10 @@ class Curve(NamedTuple):
         return float(center * np.sqrt(1.0 + v)), float(height)
 
     def _top(self, index: int) -> float | None:
-        """Place of the peak, in v; None if it is not shaped like a mode."""
+        """Place v of the peak (see `stiffness_parabola`); None if it is not shaped like a mode."""
         f, order = self.f, self.order
         a, b, c, center = self.stiffness_parabola(index)
-        # stationary p(v) / (1 + v)^order, p = a v^2 + b v + c and 1 + v the squared frequency
+        # p(v) / (1 + v)^order is stationary; p = a v^2 + b v + c, 1 + v is the squared frequency
         if order == 0:
             v = -b / (2.0 * a)
         elif order == 1:
@@ -151,14 +152,15 @@ class Curve(NamedTuple):
             v = (2.0 * c - b) / (2.0 * a - b)
         low, high = (f[[index - 1, index + 1]] / center) ** 2 - 1.0
         value = (a * v + b) * v + c
-        return v if low < v < high and value > 0.0 else None  # or it is a zero, a kink, a spike
+        return v if low < v < high and value > 0.0 else None  # else a zero, a kink or a spike
 
     def peak_slopes(self, index: int) -> PeakSlopes | None:
-        """Derivatives of the peak at a sample by it and its two neighbors.
+        """Derivatives of the peak with respect to the magnitudes at a sample and its two neighbors.
 
-        None if the peak is not shaped like a mode. With p the parabola through the squared
-        stiffnesses p_i of the three, sum p_i L_i(v), the peak is at the v with g = (1 + v) p' -
-        order p = 0; its height is stationary there, so only the change of p affects it.
+        None if the peak is not shaped like a mode. Let p = sum p_i L_i(v) be the parabola through
+        the squared stiffnesses p_i of the three samples. The peak lies at the v for which
+        g = (1 + v) p' - order p = 0. The height is stationary at this v, so the height changes only
+        with p, not with v.
         """
         v = self._top(index)
         if v is None:
@@ -169,14 +171,14 @@ class Curve(NamedTuple):
         own = (self.size[index] / self.size[near]) ** 2 * (1.0 + at) ** self.order
         shape = np.stack(
             [np.roll(at, -k) for k in range(3)]
-        )  # each row: its own place, then the others
+        )  # in each row, the place of one sample, then the places of the others
         one, other = v - shape[:, 1], v - shape[:, 2]
         scale = (shape[:, 0] - shape[:, 1]) * (shape[:, 0] - shape[:, 2])
         part, slope = one * other / scale, (one + other) / scale  # L_i and L_i'
         by_size = -2.0 * own / self.size[near]
         value, steep = (a * v + b) * v + c, 2.0 * a * v + b
         bent = 2.0 * a * (1.0 + v) + (1.0 - self.order) * steep  # g'
-        moved = ((1.0 + v) * slope - self.order * part) / bent  # -dv by p_i
+        moved = ((1.0 + v) * slope - self.order * part) / bent  # -dv / dp_i
         frequency, height = self.peak(index)
         return PeakSlopes(
             -0.5 * frequency / (1.0 + v) * moved * by_size, -0.5 * height / value * part * by_size
@@ -185,9 +187,10 @@ class Curve(NamedTuple):
     def stiffness_parabola(self, index: int) -> tuple[float, float, float, float]:
         """Parabola a v^2 + b v + c through the squared dynamic stiffness at three samples.
 
-        v = (f / center)^2 - 1 with center the frequency at `index`, and the stiffness
-        1 / |receptance| scaled to c = 1: |k - m w^2 + i c w|^2 is a parabola in w^2. Zero as a
-        magnitude, or 0 Hz where it is divided by, make it NaN or infinite.
+        Here v = (f / center)^2 - 1, where center is the frequency at `index`, and the stiffness
+        1 / |receptance| is scaled to c = 1. The squared stiffness of a damped oscillator,
+        |k - m w^2 + i c w|^2, is a parabola in w^2. A magnitude of 0, or a division by 0 Hz, makes
+        the coefficients NaN or infinite.
         """
         f, size, order = self
         center, near = f[index], slice(index - 1, index + 2)
@@ -203,7 +206,7 @@ class Curve(NamedTuple):
 
 
 class PeakSlopes(NamedTuple):
-    """Derivatives (3,) of a peak's frequency (Hz) and height by the magnitudes around it."""
+    """Derivatives (3,) of a peak's frequency (Hz) and height; see `Curve.peak_slopes`."""
 
     frequency: NDArray[np.float64]
     height: NDArray[np.float64]
@@ -230,14 +233,15 @@ class HalfPower:
     lower, upper : float
         Frequencies (Hz) left and right at which the curve has fallen to height / sqrt(2).
     textbook_damping_ratio : float
-        (upper - lower) / (2 peak), as in most publications: exact for a mobility, too large
-        by about 2 z^2 relative for a receptance (4 % at 0.135), growing with damping.
+        (upper - lower) / (2 peak), as in most publications. It is exact for a mobility; for a
+        receptance it is too large by a relative error of about 2 z^2 (4 % at z = 0.135).
     damping_ratio, natural_frequency : float
-        Values of the single viscously damped mode with these half-power points (frequency in Hz):
-        exact for it at any damping.
+        Values of the single viscously damped mode that has these half-power points (frequency in
+        Hz), exact at any damping.
     asymmetry : float
-        Distance of the peak from the middle of the half-power points, as a fraction of their
-        distance: 0 for a single viscously damped mode; raised by neighbors, noise and nonlinearity.
+        Distance of the peak from the middle of the two half-power points, divided by the distance
+        between these points. It is 0 for a single viscously damped mode; neighboring modes, noise
+        and nonlinearity increase it.
     """
 
     peak: float
@@ -260,7 +264,8 @@ def half_power(
 ) -> HalfPower:
     """Damping from the half-power points of a peak.
 
-    The points are interpolated as in `find_peaks`: exact for a single mode at any spacing.
+    The half-power points are interpolated as in `find_peaks`; this is exact for a single mode at
+    any spacing.
 
     Parameters
     ----------
@@ -269,24 +274,24 @@ def half_power(
     magnitude : array_like, shape (m,)
         Magnitudes; of complex values the modulus is taken.
     near : float or None
-        Take the peak nearest to this frequency (Hz), ignoring bumps below `ripple`; None takes the
+        Take the peak nearest to this frequency (Hz), ignoring rises below `ripple`; None takes the
         highest peak.
     quantity : {"receptance", "mobility", "accelerance"}
         Quantity of the curve.
     ripple : float
-        On its way down to the half-power points the curve may rise again by this fraction of its
-        least value so far (noise); more counts as a neighbor.
+        Between the peak and the half-power points the curve may rise again, because of noise, by
+        this fraction of its least value so far; a larger rise counts as a neighboring peak.
 
     Returns
     -------
     HalfPower
-        The points, the textbook damping ratio, and the exact one.
+        The half-power points, the textbook damping ratio, and the exact damping ratio.
 
     Raises
     ------
     InputError
-        No peak; a curve that ends before it has fallen by 3 dB, or rises again before: overlapping
-        neighbors, for which to use `circle_fit` or `matrix_pencil`.
+        There is no peak; or the curve ends, or rises again, before it has fallen by 3 dB. If it
+        rises again, peaks overlap: use `circle_fit` or `matrix_pencil`.
 
     Warns
     -----
@@ -296,12 +301,12 @@ def half_power(
     Notes
     -----
     With r = f / f0 and z the damping ratio, ``|receptance|^2 = height^2 / 2`` is a quadratic
-    equation in r^2 with the roots 1 - 2 z^2 -+ 2 z sqrt(1 - z^2). Hence, with z = sin a, the
-    quotient of difference and sum of the squared points is tan 2 a, and
-    z = sin(atan((upper^2 - lower^2) / (upper^2 + lower^2)) / 2). An accelerance has the reciprocal
-    roots and the same quotient; for a mobility upper lower = f0^2 and upper - lower = 2 z f0. A
-    receptance falls by 3 dB toward 0 Hz only if z < sin(pi / 8) = 0.383. The textbook formula:
-    Ewins, Modal Testing, 2nd ed. 2000, chapter 4 (peak amplitude method).
+    equation in r^2 with the roots 1 - 2 z^2 -+ 2 z sqrt(1 - z^2). With z = sin a, the quotient
+    (upper^2 - lower^2) / (upper^2 + lower^2) is tan 2 a, and so z is the sine of half its
+    arctangent. An accelerance has the reciprocal roots and the same quotient; a mobility has
+    upper lower = f0^2 and upper - lower = 2 z f0. A receptance falls by 3 dB toward 0 Hz only if
+    z < sin(pi / 8) = 0.383. For the textbook formula see Ewins, Modal Testing, 2nd ed. 2000,
+    chapter 4 (peak amplitude method).
 
     Examples
     --------
@@ -330,7 +335,7 @@ def half_power(
     else:
         double = np.arctan((upper**2 - lower**2) / (upper**2 + lower**2))
         damping = np.sin(0.5 * double)
-        power = 2 - 2 * curve.order  # of the frequency, in which the points are even: 2 or -2
+        power = 2 - 2 * curve.order  # 2 or -2: the points are symmetric in f^power about its peak
         middle = (0.5 * (lower**power + upper**power)) ** (1.0 / power)
         natural = middle * np.cos(double) ** (-1.0 / power)
     asymmetry = float(abs(peak - middle) / (upper - lower))
@@ -397,7 +402,7 @@ def _between(curve: Curve, inner: int, outer: int, level: float) -> float:
     f, size, order = curve
     middle = min(max(inner, 1), f.size - 2)
     a, b, c, center = curve.stiffness_parabola(middle)
-    # (height / level)^2 (1 + v)^order = a v^2 + b v + c, heights relative to `middle`
+    # (size / level)^2 (1 + v)^order = a v^2 + b v + c, with the size at the sample `middle`
     ratio = (size[middle] / level) ** 2
     a, b, c = np.array([a, b, c]) - ratio * np.array([[0, 0, 1], [0, 1, 1], [1, 2, 1]][order])
     ends = np.sort((f[[inner, outer]] / center) ** 2 - 1.0)
@@ -409,6 +414,6 @@ def _between(curve: Curve, inner: int, outer: int, level: float) -> float:
         inside = candidates[(candidates >= ends[0]) & (candidates <= ends[1])]
         if inside.size == 1:
             return float(center * np.sqrt(1.0 + inside[0]))
-    # noise or a zero: linear interpolation of the magnitude
+    # if there is noise or a zero, interpolate the magnitude linearly
     part = (size[inner] - level) / (size[inner] - size[outer])
     return float(f[inner] + part * (f[outer] - f[inner]))

@@ -1,7 +1,7 @@
-"""From a measured history to a free vibration: window, start, rest position, trend.
+"""From a measured history to a free vibration: gaps, window, start, rest position and trend.
 
-The steps of Herkal, Nagarajaiah and Paulino (Dynamic Behavior of Origami Structures: Computational
-and Experimental Study) between camera tracking and spectra, in order, as separate functions.
+The functions are the steps, in order, that Herkal, Nagarajaiah and Paulino (Dynamic Behavior of
+Origami Structures: Computational and Experimental Study) take between camera tracking and spectra.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ _FEWEST = 4
 def fill_gaps(x: ArrayLike, longest: int = 5) -> NDArray[np.float64]:
     """Fill short gaps (NaN) of a record by interpolation.
 
-    Uses a cubic spline, which follows a vibration sampled at least eight times per period. A longer
-    gap remains an error: unmeasured data must not be invented.
+    Uses a cubic spline, which reproduces a vibration with at least eight samples per period. A
+    longer gap is an error, since data that were not measured must not be invented.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def fill_gaps(x: ArrayLike, longest: int = 5) -> NDArray[np.float64]:
     Raises
     ------
     InputError
-        A longer gap, or one at an end: cut the record there.
+        A gap is longer, or lies at an end of the record: cut the record at the gap.
     """
     values = records.real_numbers("x", x)
     most = whole("longest", longest, least=1)
@@ -63,7 +63,7 @@ def fill_gaps(x: ArrayLike, longest: int = 5) -> NDArray[np.float64]:
 def choose_window(
     time: ArrayLike, x: ArrayLike, *, start: float, stop: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Samples from `start` to `stop` (s), both included.
+    """Samples of a record from the time `start` to the time `stop` (s), both included.
 
     Raises
     ------
@@ -90,7 +90,8 @@ def first_turning_point(x: ArrayLike, least: float = 0.1) -> int:
     ----------
     x : array_like, shape (n,)
     least : float
-        Fraction of the record's range by which it must rise and fall: smaller turns are noise.
+        Fraction of the record's range by which the record must rise and fall around the turn;
+        smaller turns are noise.
 
     Raises
     ------
@@ -121,7 +122,7 @@ def subtract_final(x: ArrayLike, part: float = 0.1) -> NDArray[np.float64]:
     ----------
     x : array_like, shape (n,)
     part : float
-        Fraction of the record whose mean is the final position.
+        Fraction of the record, at its end, over which the final position is averaged.
     """
     values = records.checked_record("x", x, _FEWEST)
     share = number("part", part, above=0.0, below=1.0)

@@ -1,4 +1,4 @@
-"""Checks of records, their sampling, windows and curves, shared by the estimators."""
+"""Checks of records, sampling, windows and curves that all estimators share."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from foldyn.values import number
 
 Window: TypeAlias = str | tuple | ArrayLike | None
 
-# order of time derivative of the displacement per force
+# order of the time derivative of displacement in each kind of response per force
 DERIVATIVES: dict[str, int] = {"receptance": 0, "mobility": 1, "accelerance": 2}
 DETRENDS = (None, "constant", "linear")
 
-# Times written as n*dt are rounded in proportion to their own size, so the slack of an interval is
-# a fraction of the interval plus a few units in the last place of the largest time.
+# Times computed as n*dt have rounding errors in proportion to their size. So the tolerance of an
+# interval is a fraction of the interval plus a few units in the last place of the largest time.
 _RELATIVE_SLACK = 1e-6
 _ROUNDING_UNITS = 8.0
 
@@ -34,7 +34,7 @@ def real_numbers(name: str, x: ArrayLike) -> NDArray[np.float64]:
 
 
 def finite(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return `values`, time along axis 0; raises if any is not finite."""
+    """Return `values`, with time along axis 0; raises an error if any value is not finite."""
     bad = ~np.isfinite(values)
     if bad.any():
         raise InputError(
@@ -67,7 +67,7 @@ def checked_interval(dt: float) -> float:
 
 
 def checked_window(window: Window, n: int) -> NDArray[np.float64]:
-    """Return the n samples of a window, named or given; None is a window of ones."""
+    """Return the n samples of a window, given by name or as samples; None is a window of ones."""
     if window is None:
         return np.ones(n)
     if isinstance(window, str | tuple):
@@ -98,7 +98,7 @@ def detrended(x: NDArray[np.float64], kind: str | None, axis: int = 0) -> NDArra
 
 
 def checked_frequencies(frequency: ArrayLike, fewest: int) -> NDArray[np.float64]:
-    """Return frequencies (Hz), at least `fewest`, increasing and not negative."""
+    """Return frequencies (Hz) after checks: at least `fewest`, increasing and not negative."""
     f = real_array("frequency", frequency)
     if f.ndim != 1 or f.size < fewest:
         raise InputError(f"frequency: shape {f.shape}; give at least {fewest} frequencies")
@@ -110,7 +110,7 @@ def checked_frequencies(frequency: ArrayLike, fewest: int) -> NDArray[np.float64
 def checked_curve(
     name: str, values: ArrayLike, frequency: NDArray[np.float64]
 ) -> NDArray[np.complex128]:
-    """Return a complex curve over the frequencies, finite at each of them."""
+    """Return a complex curve with a finite value at each frequency."""
     try:
         curve = np.asarray(values).astype(np.complex128)
     except (TypeError, ValueError) as error:
@@ -130,12 +130,12 @@ def checked_curve(
 
 
 def _first(bad: NDArray[np.bool_]) -> int:
-    """First index along the first axis of the first bad value."""
+    """Index of the first bad value along the first axis."""
     return int(np.argwhere(np.atleast_1d(bad))[0][0])
 
 
 def beside(row: NDArray, other: NDArray) -> NDArray:
-    """Row along the first axis, shaped to multiply an array with channels after it."""
+    """Reshape `row` to multiply `other`, an array with the same first axis and further axes."""
     return row.reshape(row.shape + (1,) * (other.ndim - 1))
 
 
@@ -147,8 +147,8 @@ def is_uniform(time: ArrayLike, rtol: float = _RELATIVE_SLACK) -> bool:
     time : array_like, shape (n,)
         Sample times (s).
     rtol : float
-        Allowed deviation of any sample from the even grid between the first and the last one,
-        as a fraction of the mean interval.
+        Allowed deviation of a sample from the even grid between the first and the last sample, as a
+        fraction of the mean interval.
 
     Returns
     -------
@@ -162,7 +162,7 @@ def is_uniform(time: ArrayLike, rtol: float = _RELATIVE_SLACK) -> bool:
     step = (t[-1] - t[0]) / (t.size - 1)
     if step <= 0.0:
         return False
-    # Compared with the grid, not step by step: rounding then does not add up, but drift shows.
+    # Times are compared with the grid, not step by step: so rounding does not add up, drift shows.
     grid = t[0] + step * np.arange(t.size)
     slack = rtol * step + _ROUNDING_UNITS * np.finfo(np.float64).eps * np.abs(t).max()
     return bool(np.abs(t - grid).max() <= min(slack, 0.5 * step))

@@ -23,10 +23,11 @@ def spectrum(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """One-sided amplitude spectrum: a sine of amplitude A on a bin gives a peak of height A.
 
-    The transform is divided by the sum of the window (its coherent gain) and doubled for the
-    negative frequencies; zero and, for an even length, the Nyquist frequency stand for themselves
-    and are not doubled. Without window and padding Parseval's identity reads
-    ``mean(x**2) == a[0]**2 + sum(a[1:]**2)/2``, the Nyquist term (even length) counted whole.
+    The transform is divided by the sum of the window (its coherent gain) and doubled to include the
+    negative frequencies; values at zero and, for an even length, at the Nyquist frequency are not
+    doubled. Without window and padding Parseval's identity is
+    ``mean(x**2) == a[0]**2 + sum(a[1:]**2)/2``, in which the Nyquist term (even length) is not
+    halved.
 
     Parameters
     ----------
@@ -35,22 +36,22 @@ def spectrum(
     dt : float
         Sampling interval (s); `foldyn.signals.sampling_interval` finds and checks it.
     axis : int
-        Axis of time.
+        Axis along which time runs.
     window : str, tuple, array_like of shape (n,), or None
-        None leaves the record as it is; a name or a (name, parameter) tuple as
-        `scipy.signal.get_window` takes it (its periodic form); or the window's own samples.
+        None leaves the record as it is. A name or a (name, parameter) tuple selects the periodic
+        window of `scipy.signal.get_window`; an array holds the samples of the window.
     detrend : {None, "constant", "linear"}
         Trend removed before windowing: nothing, the mean, or the straight line of best fit.
     pad : int
-        Zeros are appended up to `pad` times the length: a finer grid, not a finer resolution,
-        which stays 1/(n dt).
+        Zeros are appended up to `pad` times the length. This refines the grid of frequencies, but
+        not the resolution 1/(n dt).
 
     Returns
     -------
     frequencies : ndarray, shape (m,)
-        0 ... 1/(2 dt) (Hz), m = pad*n//2 + 1.
+        Frequencies (Hz) from 0 to 1/(2 dt), m = pad*n//2 + 1.
     amplitude : ndarray
-        In the unit of `x`; the shape of `x` with m in place of n along `axis`.
+        Amplitudes in the unit of `x`, with the shape of `x` but m in place of n along `axis`.
 
     Raises
     ------

@@ -24,17 +24,17 @@ class SineFit:
     Attributes
     ----------
     frequency : float
-        f (Hz), as given.
+        The given frequency f (Hz).
     amplitude : ndarray, shape (harmonics, ...), complex
         Complex amplitudes of f, 2 f, ... in the unit of the record; phases refer to a cosine at
         t = 0 of the given times.
     offset, slope : ndarray, shape (...)
-        Value at the middle of the fitted part, and trend per second.
+        Value at the middle t_mid of the fitted part, and trend per second.
     rest : ndarray, shape (...)
         Root mean square of the remainder.
     unsteadiness : ndarray, shape (...)
-        Difference of the amplitudes of f in the two halves of the part, relative to the amplitude:
-        a measure of transients, or of noise.
+        Difference between the amplitudes at f in the two halves of the fitted part, relative to the
+        amplitude: a measure of transients, or of noise.
     samples : int
         Number of samples fitted.
     """
@@ -58,22 +58,22 @@ def fit_sine(
 ) -> SineFit:
     """Fit the steady part of a record by a sine of known frequency, an offset and a trend.
 
-    Linear least squares; times need not be evenly spaced, nor cycles complete.
+    Uses linear least squares; times need not be evenly spaced, and cycles need not be complete.
 
     Parameters
     ----------
     time : array_like, shape (n,)
         Sample times (s), increasing.
     x : array_like, shape (n, ...)
-        Record, with any further axes for channels.
+        Record; further axes are channels.
     frequency : float
         Frequency of the excitation (Hz).
     cycles : int or None
-        Number of last cycles to fit, at least 2, after the transient has decayed; None fits the
-        whole record.
+        Number of cycles to fit at the end of the record, at least 2, after the transient has
+        decayed; None fits the whole record.
     harmonics : int
-        Multiples of the frequency to fit, from 1: more than 1 for the distortion of a nonlinear
-        structure, and to keep it out of `rest`.
+        Number of multiples of the frequency to fit, at least 1. More than 1 gives the distortion by
+        a nonlinear structure, and keeps it out of `rest`.
 
     Returns
     -------
@@ -83,14 +83,14 @@ def fit_sine(
     Raises
     ------
     InputError
-        A record shorter than the cycles asked for, or than two cycles, or with too few samples
+        The record is shorter than the requested cycles, or than two cycles, or has too few samples
         per cycle to tell the highest harmonic from its alias.
 
     Notes
     -----
-    The fit of IEEE Std 1057 for known frequency (three parameters), with a trend and harmonics
-    added. White noise of deviation s gives the amplitude the deviation s sqrt(2 / n) in the real
-    and in the imaginary part.
+    This is the three-parameter fit of IEEE Std 1057 for a known frequency, with a trend and
+    harmonics added. White noise with the standard deviation s gives the real and the imaginary part
+    of the amplitude the standard deviation s sqrt(2 / n).
 
     Examples
     --------
@@ -111,7 +111,8 @@ def fit_sine(
     basis = _basis(t, f, count)
     coefficients = np.linalg.lstsq(basis, samples, rcond=None)[0]
     left = samples - basis @ coefficients
-    # halves share offset and trend of the whole: short ones cannot separate them from the sine
+    # both halves use the offset and trend of the whole part: in a short half, the fit could not
+    # separate them from the sine
     waves = basis[:, 2:] @ coefficients[2:] + left
     first, second = (
         _amplitudes(np.linalg.lstsq(basis[half, 2:], waves[half], rcond=None)[0])[0]
@@ -144,8 +145,8 @@ def stepped_sine(
 ) -> NDArray[np.complex128]:
     """Response per force at the frequency of a sine excitation, from the steady part of records.
 
-    The quotient of the complex amplitudes at this frequency: for a nonlinear structure, the
-    describing function at the amplitude reached. One call per frequency (and amplitude).
+    It is the quotient of the complex amplitudes at this frequency; for a nonlinear structure, this
+    is the describing function at the amplitude reached. Use one call per frequency (and amplitude).
 
     Parameters
     ----------
@@ -154,9 +155,9 @@ def stepped_sine(
     force : array_like, shape (n,)
         Force (N), or the motion of the base.
     response : array_like, shape (n, ...)
-        Response, with any further axes for channels.
+        Response; further axes are channels.
     frequency, cycles, harmonics
-        As in `fit_sine`, which returns more about each record.
+        As in `fit_sine`, which also returns the quality of the fit to a record.
 
     Returns
     -------
@@ -192,7 +193,7 @@ def _steady_part(
         raise InputError("time: increasing sample times in one row are needed")
     if samples.ndim == 0 or samples.shape[0] != t.size:
         raise InputError(f"x: shape {samples.shape}, but there are {t.size} times")
-    # the last sample includes the interval before it: n intervals are n dt long, not (n - 1) dt
+    # each sample stands for one interval: n samples are n dt long, not (n - 1) dt
     there = (t[-1] - t[0]) * t.size / (t.size - 1) * f
     wanted = 2 if cycles is None else whole("cycles", cycles, least=2)
     if there < wanted * (1.0 - 1e-9):
@@ -200,7 +201,7 @@ def _steady_part(
             f"time: the record holds {there:.3g} cycles of {f:g} Hz, and {wanted} are needed; "
             f"record longer{'' if cycles is None else ', or fit fewer cycles'}"
         )
-    # half an interval of slack: the part does not depend on the rounding of times
+    # with half an interval of tolerance, the part does not depend on the rounding of times
     start = 0 if cycles is None else np.searchsorted(t, t[-1] - cycles / f + 0.5 * np.diff(t)[-1])
     return t[start:], samples.reshape(t.size, -1)[start:]
 

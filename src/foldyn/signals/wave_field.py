@@ -1,4 +1,4 @@
-"""Waves in a chain of cells: their spectrum over phase and frequency, and traveling pulses."""
+"""Waves in a chain of cells: spectra with respect to phase and frequency, and traveling pulses."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ class WavenumberSpectrum(NamedTuple):
     Attributes
     ----------
     phase : ndarray, shape (p,)
-        kappa, rad per cell, increasing from -pi, in steps of 2 pi/n for n cells. Waves of positive
-        phase travel to higher cells.
+        Phase kappa (rad per cell), increasing from -pi in steps of 2 pi/n for n cells. Waves with a
+        positive phase travel to higher cell numbers.
     frequency : ndarray, shape (f,)
-        Hz, from 0 in steps of 1/(m dt) for m samples.
+        Frequencies (Hz) from 0, in steps of 1/(m dt) for m samples.
     amplitude : ndarray, shape (p, f)
-        In the unit of the field; the root of the sum of squares over the components.
+        Amplitudes in the unit of the field; the root of the sum of squares over the components.
     """
 
     phase: NDArray[np.float64]
@@ -38,8 +38,8 @@ def wavenumber_spectrum(
 ) -> WavenumberSpectrum:
     """Two-dimensional spectrum of a motion of a chain of cells.
 
-    The transform over time and cells, divided by the sums of the windows and doubled for negative
-    frequencies: a traveling wave of amplitude A on a bin gives a peak of height A.
+    The transform over time and cells is divided by the sums of the windows and doubled to include
+    negative frequencies, so a traveling wave of amplitude A on a bin gives a peak of height A.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ def wavenumber_spectrum(
     dt : float
         Sampling interval (s).
     window : str, tuple, array_like, or None
-        Over time and over cells, as in `spectrum` (an array is a window over time); None applies
-        none.
+        Window along time and along cells, as in `spectrum` (an array is a window along time only);
+        None applies no window.
 
     Returns
     -------
@@ -81,7 +81,7 @@ def wavenumber_spectrum(
     over_cells = records.checked_window(window if isinstance(window, str | tuple) else None, cells)
     gain = over_time.sum() * over_cells.sum()
     flat = field.reshape(times, cells, -1) * (over_time[:, None] * over_cells)[..., None]
-    # exp(-i omega t) of the transform over time makes exp(+i kappa n) the one over cells
+    # the transform along time has exp(-i omega t), so the one along cells needs exp(+i kappa n)
     waves = scipy.fft.ifft(scipy.fft.rfft(flat, axis=0), axis=1) * (cells / gain)
     waves[1 : (times + 1) // 2] *= 2.0
     amplitude = np.linalg.norm(scipy.fft.fftshift(waves, axes=1), axis=2).T
@@ -95,14 +95,14 @@ class Pulse(NamedTuple):
     Attributes
     ----------
     arrival : ndarray, shape (n,)
-        Time of its peak in each cell; nan if it does not arrive.
+        Time of the pulse's peak in each cell; nan if the pulse does not arrive.
     peak : ndarray, shape (n,)
-        Signed value at its peak.
+        Signed value at the peak in each cell.
     width : ndarray, shape (n,)
-        Full width at half maximum, in time; nan if the record ends before.
+        Full width at half maximum, as a time; nan if the record ends before the pulse has passed.
     speed : float
-        Cells per time, from the slopes between all pairs of arrivals (their median); nan with
-        fewer than three.
+        Cells per time, from the median of the slopes between all pairs of arrivals; nan with fewer
+        than three arrivals.
     """
 
     arrival: NDArray[np.float64]
@@ -114,19 +114,19 @@ class Pulse(NamedTuple):
 def pulse(time: ArrayLike, values: ArrayLike, *, sign: int = 1, share: float = 0.5) -> Pulse:
     """Follow the first pulse of one sign along a chain of cells.
 
-    It arrives in a cell with the first maximum of at least a share of the largest value of this
-    sign in the cell.
+    The pulse arrives in a cell at the first maximum that reaches a given share of the largest value
+    with this sign in the cell.
 
     Parameters
     ----------
     time : array_like, shape (m,)
-        s, increasing.
+        Times (s), increasing.
     values : array_like, shape (m, n)
         Values in n cells, such as strains: a rarefaction has the sign 1, a compression -1.
     sign : {1, -1}
         Sign of the pulse.
     share : float
-        Least height of a maximum, from 0 to 1 of the largest value.
+        Least height of a maximum, as a share (0 to 1) of the largest value.
 
     Returns
     -------
@@ -135,7 +135,7 @@ def pulse(time: ArrayLike, values: ArrayLike, *, sign: int = 1, share: float = 0
     Raises
     ------
     InputError
-        Shapes that do not fit, values that are not finite, or another sign.
+        Shapes that do not fit, values that are not finite, or a sign other than 1 and -1.
 
     Notes
     -----
