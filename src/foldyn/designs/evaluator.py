@@ -138,7 +138,7 @@ def measured(
     elif callable(build):
         if not isinstance(analysis, Mapping) or "kind" not in analysis:
             raise InputError(
-                f' = {show(analysis)}: say what is computed, as {{"kind": "modes", "count": 4}}',
+                f' = {show(analysis)}: say what is computed, like {{"kind": "modes", "count": 4}}',
                 "analysis",
             )
         kind = choice("analysis.kind", analysis["kind"], FUNCTIONS)

@@ -147,7 +147,7 @@ def _failures(found: Design) -> Iterator[Section]:
         reasons[reason] = reasons.get(reason, 0) + 1
     if reasons:
         rows = [[count, reason] for reason, count in reasons.items()]
-        caption = "Designs that could not be computed; the search took shorter steps there."
+        caption = "Designs that could not be computed; near them the search took shorter steps."
         yield Table(["designs", "why"], rows[:MOST_ROWS], caption)
 
 

@@ -88,7 +88,7 @@ class Chain(NamedTuple):
         if derivative.cut and self.cut:
             raise InputError(
                 "has no derivative by bar_length, the lengths to which bars are cut; leave it out "
-                "of the parameters, or take another measure, as displacement"
+                "of the parameters, or take another measure, such as displacement"
             )
         places: list[dict[str, Any]] = [{}]
         if derivative.places:
@@ -107,7 +107,7 @@ class Chain(NamedTuple):
             if np.abs(left - right).max() > SAME * size + ROUNDING * abs(value):
                 raise InputError(
                     f"is reached at {len(places)} places at once, which separate as the design "
-                    "changes: it has no derivative; take a measure of one of them, or mean_square"
+                    "changes: it has no derivative; take a measure of one place, or mean_square"
                 )
         return one
 

@@ -24,8 +24,8 @@ SENSES = {ast.Eq: "==", ast.LtE: "<=", ast.GtE: ">="}
 TIE = 1e-9
 """Relative difference below which two numbers are equal up to round-off."""
 SMOOTH = (
-    "has no derivative there; write it smoothly, as (a**8 + b**8)**(1/8), or bound both: make one "
-    "of them the objective and constrain the other"
+    "has no derivative there; write it smoothly, such as (a**8 + b**8)**(1/8), or bound both: make "
+    "one of them the objective and constrain the other"
 )
 
 

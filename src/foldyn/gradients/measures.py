@@ -432,7 +432,7 @@ def one_number(text: str, kind: Any) -> Asked:
     if kinds and kind not in kinds:
         raise InputError(f": {text} is of results of kind {' or '.join(kinds)}, not {kind}")
     if one.measure.dims:
-        raise InputError(f": {text} is an array; ask for one of its numbers, as frequency[1]")
+        raise InputError(f": {text} is an array; ask for one number of it, such as frequency[1]")
     return one
 
 
@@ -448,7 +448,7 @@ def derivative_of(one: Asked) -> Derivative:
     if found is None:
         raise InputError(
             f": {one.text} has no derivative; measures with one are {', '.join(DERIVATIVES)}. "
-            'Give your own with its derivative, as {"tip": (function, derivative)}, or use '
-            'method = "cma", which needs none'
+            'Give your own measure and its derivative, as {"tip": (function, derivative)}, or use '
+            'method = "cma", which needs no derivatives'
         )
     return found

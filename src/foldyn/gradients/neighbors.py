@@ -244,7 +244,7 @@ def _linear(one: Asked) -> Linearized:
         internal=given.get("internal", 0),
     )
     if linear.responding is not None:
-        raise InputError(f"{NONE} vibrations with laws that remember")
+        raise InputError(f"{NONE} vibrations with laws that have memory")
     return linear
 
 

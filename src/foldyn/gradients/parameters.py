@@ -42,8 +42,8 @@ GOLDEN = 0.6180339887498949  # multiples of this number modulo 1 are all distinc
 # round-off of a change, relative to the number itself, and to the largest number of its array
 SILENT = 1e-11, 1e-12
 KINK = (
-    "{}: the numbers of the case ({}) have a kink here, where their slopes jump, as where another "
-    "diagonal of a panel becomes the shorter one, or a corner passes 120 degrees: the gradient is "
+    "{}: the numbers of the case ({}) have a kink here: their slopes jump, such as where another "
+    "diagonal of a panel becomes the shorter one, or a corner passes 120 degrees. The gradient is "
     "the mean of both sides; move the design a little"
 )
 Values = Mapping[str, Any]
@@ -215,7 +215,7 @@ class Parameters:
         common = own.max(initial=0.0)
         if not common:
             raise InputError(
-                f" = 0: its size, by which differences change it, is unknown; give it, as "
+                f" = 0: the size of its changes in differences is unknown; give it, such as "
                 f'sizes={{"{name}": 1.0}}',
                 name,
             )
@@ -371,7 +371,7 @@ def _known(gradient: Gradient, name: str) -> NDArray:
     """Derivative by the named array of numbers; refuses unknown ones."""
     if name not in gradient:
         raise InputError(
-            f"the design changes numbers of the case ({name}) by which there are no derivatives; "
+            f"the design changes numbers of the case ({name}) that have no derivatives; "
             "keep them fixed, or vary the parameters by fd.sweep"
         )
     return gradient[name]

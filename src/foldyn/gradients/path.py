@@ -167,7 +167,7 @@ class PathGradient(Differentiated):
             if result["point"].values[k] != "limit":
                 raise InputError(
                     f"the load factor at point {k} of the path has no derivative by the design; "
-                    "take the one at a limit point, or load_at[node,axis,displacement]"
+                    "take the factor at a limit point, or load_at[node,axis,displacement]"
                 )
             self._add_factor(Moved(u, factor), self._soft(q), float(climbed[0]), total)
         if not (moved.any() or pulled.any()):

@@ -201,7 +201,7 @@ def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None
         raise InputError(f" = {show(build)}: give a function, a case or a case file", "build")
     if analysis is None or "kind" not in analysis:
         raise InputError(
-            f' = {show(analysis)}: say what is computed, as {{"kind": "modes", "count": 4}}',
+            f' = {show(analysis)}: say what is computed, such as {{"kind": "modes", "count": 4}}',
             "analysis",
         )
     if analysis["kind"] == "bands":
@@ -332,7 +332,7 @@ def _wanted(measures: Any, kind: str) -> list[Wanted]:
         with within(f"measures[{k}]"):
             found.append(_of_registry(text, kind))
     if not found:
-        raise InputError(': none; give at least one, as "frequency[1]"', "measures")
+        raise InputError(': none; give at least one, such as "frequency[1]"', "measures")
     return found
 
 

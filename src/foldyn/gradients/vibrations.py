@@ -284,7 +284,7 @@ class FrfGradient(Differentiated):
         z = factors.solve(linear.projected(by.real) + 1j * linear.projected(by.imag))
         if not np.isfinite(x).all():
             raise InputError(
-                f"there is no response at {frequency:g} Hz: give the case damping, as "
+                f"there is no response at {frequency:g} Hz: give the case damping, such as "
                 "Rayleigh(alpha=...), or take other frequencies"
             )
         damped, mass = 1j * omega * rayleigh.beta * z, (1j * omega * rayleigh.alpha - omega**2) * z

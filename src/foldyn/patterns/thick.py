@@ -148,7 +148,7 @@ def _heights(offsets: Any, sizes: NDArray, pattern: Pattern) -> NDArray[np.float
         k = beyond[0]
         raise InputError(
             f": crease {k} has {given[k]:g} m: must be at most half the thickness of the panels "
-            f"beside it in size, {least[k]:g} m",
+            f"at the crease in size, {least[k]:g} m",
             "offsets",
         )
     own = beside * np.array([SIDES.get(letter, 0.0) for letter in letters])[:, None]

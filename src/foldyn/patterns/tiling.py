@@ -132,8 +132,8 @@ def periods(vertices: NDArray, edges: NDArray, tolerance: float) -> NDArray[np.f
             steps = [each for each in steps if _angle(each[0], step) > PARALLEL]
     if len(found) < 2:
         raise InputError(
-            f": found {len(found)} of the two translations that put the pattern beside itself; "
-            "give them, as in periods=[(0.1, 0, 0), (0, 0.1, 0)]",
+            f": found {len(found)} of the two translations from one copy of the pattern to the "
+            "next; give them, as in periods=[(0.1, 0, 0), (0, 0.1, 0)]",
             "periods",
         )
     along = [abs(step[0]) / np.linalg.norm(step) for step in found]

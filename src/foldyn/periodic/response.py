@@ -310,8 +310,8 @@ class _Tracer:
             first = branch_point(family, point.z, point.p, side * across, AWAY)
             if first is None:
                 warn(
-                    f"harmonics: no branch is found at the {event.name} at {point.p:.6g}, which a "
-                    "longer series may not have: give more harmonics",
+                    f"harmonics: no branch is found at the {event.name} at {point.p:.6g}, but a "
+                    "longer series may not have it: give more harmonics",
                     "nonlinear-vibration.md#response-curves",
                 )
             elif self.low <= first.p <= self.high:
@@ -328,8 +328,8 @@ def _warn_of_folds(found: list[_Found]) -> None:
     ]
     if at:
         warn(
-            f"harmonics: no multiplier is 1 at the folds at {', '.join(at[:NAMED])}, which a "
-            "longer series may not have: give more harmonics (or more steps)",
+            f"harmonics: no multiplier is 1 at the folds at {', '.join(at[:NAMED])}, and a longer "
+            "series may not have them: give more harmonics (or more steps)",
             "nonlinear-vibration.md#one-motion",
         )
 

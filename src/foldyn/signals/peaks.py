@@ -325,7 +325,7 @@ def half_power(
     if curve.size[index] <= level:
         raise InputError(
             f"frequency: no sample lies within the half-power points of the peak at {peak:.6g} Hz; "
-            "refine the frequencies there (spectra: record longer)"
+            "refine the frequencies near it (for spectra: record longer)"
         )
     lower, upper = (_crossing(curve, index, level, side, bumps) for side in (-1, 1))
     if curve.order == 1:

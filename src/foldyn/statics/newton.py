@@ -203,7 +203,7 @@ def settings_of(given: Any) -> Settings:
         return given
     if given is not None and not isinstance(given, Mapping):
         raise InputError(
-            f": got {type(given).__name__}, give statics.Settings(...) or a mapping, as "
+            f": got {type(given).__name__}, give statics.Settings(...) or a mapping such as "
             '{"largest_turn": 3.0}',
             "settings",
         )

@@ -109,7 +109,7 @@ class BegunPoint:
         self._failures, self._told = list[str](), Told()
         with self._timed(), self._noted():
             if job.program != this_program():
-                raise RuntimeError("this worker has another version of Foldyn than who asks it")
+                raise RuntimeError("this worker has another version of Foldyn than the sweep")
             self._case_file = job.case_file(point)
             self._computation = self._case_file.computation()
             self.compute = self._computation.compute

@@ -166,7 +166,7 @@ def asked(text: str, known: Mapping[str, Measure]) -> Asked:
     """
     found = _ASKED.match(text.strip()) if isinstance(text, str) else None
     if found is None:
-        raise InputError(f" = {show(text)}: write a name, as frequencies or peak_frequency[8]")
+        raise InputError(f" = {show(text)}: write a name like frequencies or peak_frequency[8]")
     name, inside = found[1], found[2]
     if name not in known:
         raise InputError(

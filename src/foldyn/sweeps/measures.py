@@ -266,7 +266,7 @@ def _energy_error(result: xr.Dataset, case: Case) -> float:
 @_measure(*MOVED, doc="largest strain of a bar", whole=True)
 def _strain(result: xr.Dataset, case: Case) -> float:
     if case.structure.bar_law is None:
-        raise InputError("is of bars, and a shell has none")
+        raise InputError("needs bars, and a shell has none")
     moved = sampled(result, "displacement").transpose(..., "node", "axis").values
     return float(np.abs(bar_strain(case.structure, moved)).max())
 
@@ -303,8 +303,8 @@ def intervals(result: xr.Dataset, kind: str) -> NDArray:
     if len(changes) and (result.attrs["method"] == "newton" or not result.attrs["locate"]):
         low, high = factor[changes[0] : changes[0] + 2]
         raise InputError(
-            f"the stability changes between the load factors {low:.6g} and {high:.6g}, where the "
-            'path has not looked for the point: trace it by "displacement" or "arc_length", and '
+            f"the stability changes between the load factors {low:.6g} and {high:.6g}, but the "
+            'path has not located the point: trace it by "displacement" or "arc_length", and '
             "with locate = True"
         )
     ends = np.column_stack([factor, factor])

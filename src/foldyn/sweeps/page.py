@@ -84,13 +84,13 @@ def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]
     text = f"{one.attrs['long_name']}{where}".capitalize()
     if len(names) > 1:
         if is_grid(sweep) and len(names) == 2:
-            caption = f"{text}, over both parameters."
+            caption = f"{text}, against both parameters."
             draw = partial(plots.plot_sweep_map, sweep, name, at=at)
             yield from album.figure(f"map-{name}", caption, draw)
         caption = (
             f"{text}: mean over all other parameters, at values of one."
             if is_grid(sweep)
-            else f"{text}: the points over each parameter, and their means."
+            else f"{text}: the points against each parameter, and their means."
         )
         draw = partial(plots.plot_main_effects, sweep, name, at=at)
         charts = Charts(effect_charts(sweep, name, at, not is_grid(sweep)), caption)
@@ -99,7 +99,7 @@ def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]
         by = names[1] if len(names) == 2 else (own[0] if own else None)
         kept = {dim: value for dim, value in at.items() if dim != by}
         lines = text if by not in own else str(one.attrs["long_name"]).capitalize()
-        caption = f"{lines}, over {sweep[names[0]].attrs['long_name']}."
+        caption = f"{lines}, against {sweep[names[0]].attrs['long_name']}."
         draw = partial(plots.plot_sweep_lines, sweep, name, x=names[0], by=by, at=kept)
         charts = Charts([line_chart(sweep, name, names[0], by, kept, MOST_CURVES)], caption)
         yield from album.figure(f"lines-{name}", caption, draw, charts)
