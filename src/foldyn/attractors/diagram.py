@@ -66,7 +66,7 @@ def bifurcation_diagram(
     amplitudes : array_like, shape (k,)
         Alternatively, increasing factors on all harmonic histories, at the case's own frequency.
     sweep : {"up", "down", "both"}
-        Direction; "both" goes up first, and down from there.
+        Direction; "both" sweeps up, and then down from the end of the upward sweep.
     settle, record : int
         At each value, periods of the drive that are skipped, and periods that are recorded then (at
         least 4).
@@ -144,7 +144,7 @@ def bifurcation_diagram(
         with reported(progress) as report, told_once():
             for way in ways:
                 here = values if way == "up" else values[::-1]
-                if points:  # from the end of the upward sweep
+                if points:  # start from the end of the upward sweep
                     here = here[len(values) - len(points[0]) :]
                 found: list[Point] = []
                 points.append(found)

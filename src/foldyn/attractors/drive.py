@@ -79,7 +79,7 @@ def check_harmonic(case: Case, name: str) -> None:
 
 
 def with_histories(case: Case, history: Callable[[Harmonic], History]) -> Case:
-    """The case with other histories in place of its harmonic ones."""
+    """The case with other histories in place of its harmonic histories."""
     return _altered(case, lambda part: replace(part, history=history(part.history)))
 
 

@@ -62,7 +62,7 @@ def swept_sine(
     duration : float
         Duration (s) of a sweep from one frequency to the other.
     sweep : {"up", "down", "both"}
-        Direction; "both" goes up first, and down from there.
+        Direction; "both" sweeps up, and then down from the end of the upward sweep.
     settle : int
         Number of cycles at the first frequency before each sweep. It is also the number of cycles
         (but at least 50) at each frequency that is held to tell a jump from a steep curve.

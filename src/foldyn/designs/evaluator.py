@@ -44,7 +44,7 @@ class Evaluator(Protocol):
         ...
 
     def __call__(self, values: Mapping[str, Any], gradient: bool) -> tuple[NDArray, NDArray | None]:
-        """Measures (m,) of a design, and on request their derivatives (m, n) by its entries."""
+        """Measures (m,) of a design and, on request, derivatives (m, n) with respect to entries."""
         ...
 
 
@@ -74,7 +74,7 @@ class Measured:
         return [program(*COMPUTING), self._source(), repr(self.analysis), texts]
 
     def __call__(self, values: Mapping[str, Any], gradient: bool) -> tuple[NDArray, NDArray | None]:
-        """Measures (m,) of a design, and on request their derivatives (m, n) by its entries."""
+        """Measures (m,) of a design and, on request, derivatives (m, n) with respect to entries."""
         if not gradient:
             result, case, shared = *self._computed(values), dict[Any, Any]()
             return np.array([_single(one, result, case, shared) for one in self.measures]), None

@@ -69,7 +69,7 @@ class Row:
     failure: str
     warnings: str
     values: dict[str, float] = field(default_factory=dict)
-    slopes: NDArray | None = None  # derivatives of numbers by entries of the design, in their units
+    slopes: NDArray | None = None  # derivatives of `numbers` with respect to entries of the design
 
 
 class Search:

@@ -71,7 +71,7 @@ class Products:
     def add_stiffness(
         self, z: NDArray, x: NDArray, by: float, total: dict[str, NDArray]
     ) -> NDArray:  # fmt: skip
-        """Add the gradient of `by` z' K x, z and x (nf,); returns the derivatives (m,) by dofs."""
+        """Add the gradient of `by` z' K x for z and x (nf,); returns derivatives (m,) by dofs."""
         weight, motion = (self._linear.whole(each[:, None])[:, 0] for each in (z, x))
         state = np.zeros(len(self.q))
         if by == 0.0 or not motion.any():

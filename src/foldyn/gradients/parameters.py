@@ -161,7 +161,7 @@ class Slope(NamedTuple):
     count: int
 
     def pulled(self, gradient: Gradient) -> NDArray:
-        """Derivatives (count,) of a quantity by the parameter, from its gradient by numbers."""
+        """Derivatives (count,) with respect to the parameter, from the gradient by numbers."""
         out = np.zeros(self.count)
         for name, by in self.by.items():
             here = self.entry[name] >= 0
@@ -181,7 +181,7 @@ class Parameters:
     values : mapping
         Numbers, or arrays of one dimension.
     steps : mapping
-        Sizes of parameters that are 0, or others; steps are a thousandth of the size.
+        Sizes of parameters, needed for parameters that are 0; steps are a thousandth of the size.
     """
 
     def __init__(self, build: Build, values: Values, steps: Values) -> None:
@@ -207,7 +207,7 @@ class Parameters:
             raise InputError(f": build cannot take these parameters ({error})", "build") from error
 
     def size(self, name: str) -> NDArray:
-        """Scale of a parameter, in its shape."""
+        """Size of a parameter's entries, in the parameter's shape."""
         value = self.values[name]
         if name in self.steps:
             return np.broadcast_to(np.asarray(self.steps[name], float), value.shape)
@@ -235,9 +235,9 @@ class Parameters:
     def slopes(
         self, numbers_of: Callable[[Any], Arrays], steps: Sequence[float] = (STEP,)
     ) -> dict[str, Slope]:
-        """Derivatives of the numbers of the case by each of the parameters.
+        """Derivatives of the numbers of the case with respect to each parameter.
 
-        steps : of differences; shorter ones are tried if the numbers are not smooth within them.
+        steps : steps of differences, tried in turn until the numbers are smooth within a step.
         """
         here = numbers_of(self.case())
         return {name: self._slope(name, numbers_of, here, steps) for name in self.values}
@@ -245,7 +245,7 @@ class Parameters:
     def _slope(
         self, name: str, numbers_of: Callable[[Any], Arrays], here: Arrays, steps: Sequence[float]
     ) -> Any:
-        """Derivatives of the numbers of a case by one parameter."""
+        """Derivatives of the numbers of a case with respect to one parameter."""
         value, size = self.values[name], self.size(name)
 
         def at(direction: NDArray, by: float) -> Mapping[str, NDArray]:
@@ -280,7 +280,7 @@ class Parameters:
         self, at: Callable[[NDArray, float], Mapping[str, NDArray]], size: NDArray,
         here: Mapping[str, NDArray],
     ) -> dict[str, NDArray] | None:  # fmt: skip
-        """Entry on which each number depends, -1 for none; None if one depends on several."""
+        """Entry on which each number depends, -1 for none; None if a number depends on several."""
         count = len(size)
         groups = next(m for m in range(2, 64) if math.comb(m, m // 2) >= count)
         sets = list(islice(combinations(range(groups), groups // 2), count))
@@ -304,7 +304,7 @@ class Parameters:
     def _one_by_one(
         self, change: Callable[[NDArray], dict[str, NDArray]], size: NDArray
     ) -> Columns:
-        """Derivatives of the numbers by each entry, changed one at a time."""
+        """Derivatives of the numbers with respect to each entry, changed one at a time."""
         columns = []
         for k in range(len(size)):
             alone = np.zeros_like(size)
@@ -322,7 +322,7 @@ def _difference(
 
 
 def _smooth(ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDArray) -> bool:
-    """Whether changes of numbers over two steps are nearly twice those over one."""
+    """Whether changes of numbers in two steps are nearly twice the changes in one step."""
     one, two = ahead - behind, far_ahead - far_behind
     return bool((np.abs(two - 2.0 * one) <= SMOOTH * np.abs(one).max(initial=0.0)).all())
 
@@ -330,9 +330,9 @@ def _smooth(ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDA
 def _kinked(
     here: NDArray, ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDArray
 ) -> bool:
-    """Whether slopes jump, so that the even part of a change is linear in the step.
+    """Whether slopes jump; then the even part of a change is linear in the step, not quadratic.
 
-    Arguments after `here` are changes of the numbers, one and two steps ahead and behind.
+    The arguments after `here` are changes of the numbers, one and two steps ahead and behind.
     """
     bent, far = np.abs(ahead + behind), np.abs(far_ahead + far_behind)
     least = max(
@@ -349,12 +349,12 @@ def _seen(rate: NDArray, here: NDArray) -> NDArray:
 
 
 class Columns(NamedTuple):
-    """Derivatives of a case's numbers by each entry, if numbers depend on several."""
+    """Derivatives of a case's numbers with respect to each entry; numbers depend on several."""
 
     by: list[dict[str, NDArray]]
 
     def pulled(self, gradient: Gradient) -> NDArray:
-        """Derivatives (count,) of a quantity by the parameter, from its gradient by numbers."""
+        """Derivatives (count,) with respect to the parameter, from the gradient by numbers."""
         return np.array(
             [
                 sum(
@@ -368,7 +368,7 @@ class Columns(NamedTuple):
 
 
 def _known(gradient: Gradient, name: str) -> NDArray:
-    """Derivative by the named array of numbers; refuses unknown ones."""
+    """Gradient with respect to the named array of numbers; refuses an unknown name."""
     if name not in gradient:
         raise InputError(
             f"the design changes numbers of the case ({name}) that have no derivatives; "
@@ -378,7 +378,7 @@ def _known(gradient: Gradient, name: str) -> NDArray:
 
 
 def checked(values: Values, argument: str = "parameters") -> dict[str, NDArray]:
-    """Checked values of parameters as arrays."""
+    """Check values of parameters, and return them as arrays."""
     if not isinstance(values, Mapping) or not values:
         raise InputError(f" = {show(values)}: give a mapping of names to values", argument)
     found = {}
@@ -394,7 +394,7 @@ def checked(values: Values, argument: str = "parameters") -> dict[str, NDArray]:
 
 
 def check_layout(name: str, one: Arrays, other: Arrays) -> None:
-    """Refuse a parameter that changes more than numbers."""
+    """Refuse a parameter that changes more of a case than its numbers."""
     for key, array in one.layout.items():
         if key not in other.layout or not np.array_equal(array, other.layout[key]):
             raise InputError(

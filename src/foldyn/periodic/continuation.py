@@ -200,7 +200,7 @@ LOST, LONG = "lost", "long"
 def steps(
     family: Family, first: Point, stride: Stride, outside: Callable[[Point], float]
 ) -> Iterator[Step | str]:
-    """Follow a family until a function of points exceeds 0, and stop there exactly.
+    """Follow a family up to the point at which a function of points exceeds 0.
 
     A closed curve ends before it returns to its start.
 

@@ -60,7 +60,7 @@ def periodic_motion(
     """Periodic motion of a case under its harmonic histories, and its stability.
 
     Solves M u'' + C u' + F(u, t) = p(t) with the exact internal forces F. Several motions may exist
-    at a frequency: `guess` selects one, `response_curve` finds connected ones.
+    at a frequency: `guess` selects one, and `response_curve` finds motions connected to it.
 
     Parameters
     ----------

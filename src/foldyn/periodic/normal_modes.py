@@ -84,7 +84,7 @@ def backbone(
     modes : int, optional
         As for `periodic_motion`, about this state.
     longest_step : float
-        Length of a step; a growth of the motion by its own size counts as 1.
+        Largest length of a step; a growth of the motion by its own size has the length 1.
     most_points : int
         Largest number of points.
     tolerance : float
@@ -220,7 +220,7 @@ def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, ND
 
 
 def _settled(equation: Equation, at: Any, place: NDArray) -> NDArray:
-    """Move unknowns (k,) into equilibrium, and return the stiffness (k, k) there."""
+    """Move unknowns (k,) into equilibrium, and return the stiffness (k, k) in equilibrium."""
     for _ in range(20):
         stiffness = at.tangents(place[None])[0]
         force = at.forces(place[None])[0]

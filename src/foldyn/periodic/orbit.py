@@ -43,7 +43,7 @@ NEUTRAL = 1e-6  # excess of a modulus over 1 that counts as round-off
 
 
 class Tableau:
-    """Coefficients of a collocation method, including those for displacements."""
+    """Coefficients of a collocation method, for velocities and for displacements."""
 
     def __init__(self, c: NDArray, b: NDArray, a: NDArray) -> None:
         self.c, self.b, self.a, self.aa, self.ba = c, b, a, a @ a, b @ a

@@ -79,7 +79,7 @@ def log_decrement(
         slow drift; a maximum without a minimum on each side is then not used.
     floor : float
         The count ends at the first maximum below this fraction of the highest, because noise
-        dominates there.
+        dominates lower maxima.
     frequency : float or None
         Approximate damped frequency (Hz); None takes the highest line of the spectrum.
 

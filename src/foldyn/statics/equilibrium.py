@@ -216,7 +216,7 @@ class OrigamiProblem:
         self.force_rounding = EPS * float(np.linalg.norm(scale[self.free]))
 
     def _extended(self, values: NDArray) -> NDArray:
-        """Values (n, 3) extended to all dofs (m,), zero at the hidden ones."""
+        """Values (n, 3) extended to all dofs (m,), with zeros at hidden dofs."""
         return np.concatenate([np.asarray(values, float).ravel(), np.zeros(self._hidden)])
 
     def dofs(self, u: NDArray) -> NDArray:

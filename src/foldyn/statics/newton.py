@@ -3,7 +3,7 @@
 Let u (m,) be the vector of all dofs and f the load factor. A path is the set of solutions of
 
     residual(u, f) = internal force - external force = 0  on the free dofs,
-    u = prescribed(f)                                     on the held ones,
+    u = prescribed(f)                                     on the held dofs,
 
 so a von Mises truss, a sheet of origami and a shell all look the same to a solver.
 

@@ -144,7 +144,7 @@ def _rubs(case: Case, flow: str) -> bool:
 
 
 def flowing(case: Case, timed: bool) -> NDArray:
-    """Mask (b,) of the branches that evolve along a path; without time, relaxing ones do not."""
+    """Mask (b,) of branches that evolve along a path; without time, relaxing branches do not."""
     parts = case.remembering
     return np.repeat([timed or not p.law.relaxes for p in parts], [p.count for p in parts])
 

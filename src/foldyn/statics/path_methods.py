@@ -76,7 +76,7 @@ class Cylinder:
 
     With c the motion since the start of the step, a the step of Newton's method at the present
     load factor and b the response to the factor, |c + a + df b| = length is a quadratic equation
-    for df (Crisfield, Computers and Structures 13, 1981). The root taken is the one that
+    for df (Crisfield, Computers and Structures 13, 1981). The rule takes the root that
     continues in the direction of the step.
     """
 
@@ -93,7 +93,7 @@ class Cylinder:
         if not root >= 0.0 or a == 0.0:
             return math.nan
         root = math.sqrt(root)
-        # without cancellation: one root by the sum of two terms of one sign, one by Vieta
+        # without cancellation: one root from a sum of two terms of equal sign, the other by Vieta
         far = -(b + math.copysign(root, b))
         roots = (far / a, c / far if far != 0.0 else 0.0)
         along = [float((reached + root * response) @ self.prediction) for root in roots]
@@ -112,7 +112,7 @@ def follow(
     rule : ArcRule
         Rule of the method, such as `Cylinder`.
     first_step : float
-        Change of the load factor in the first step, which sets the length of the next ones.
+        Change of the load factor in the first step; it sets the length of the following steps.
     direction : (m,) or None
         Motion that the path continues; if given, it sets the length of the first step instead.
     """

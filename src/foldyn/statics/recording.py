@@ -2,7 +2,7 @@
 
 A limit point located by a method with a free load factor is expected, and is marked in the result.
 If negative eigenvalues appear anywhere else, a warning says so: a real structure leaves the path
-there, although the points that follow are equilibria like all others.
+at this point, although the points that follow are equilibria like all others.
 """
 
 from __future__ import annotations

@@ -83,7 +83,7 @@ class Point:
 
 
 class Station(NamedTuple):
-    """A point, with the tangent and the response (m,) to the load factor there."""
+    """A point, with the tangent and the response (m,) to the load factor at this point."""
 
     point: Point
     stiffness: Stiffness

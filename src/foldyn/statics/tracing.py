@@ -50,7 +50,7 @@ SHORTEST = 1e-3  # least length of a bar at the start of a path, relative to its
 LOOKS = 51  # load factors between two given ones at which supports and planes are checked
 COPIES = 8  # copies of a point's dofs in memory while forces, work and the dataset are computed
 SHIFT = 1e-13  # relative shift of the diagonal so that the matrix of a mechanism can be factorized
-SUSPICIOUS = 1e-11  # eigenvalue, of the matrix with a unit diagonal, below which modes are computed
+SUSPICIOUS = 1e-11  # modes are computed if an eigenvalue of the scaled matrix is below this
 INVERSE_ITERATIONS = 4
 MOST_MODES = 12
 BAR_STRAIN = 1e-9  # elongation that counts as zero, relative to the most that the end motions allow
@@ -381,7 +381,7 @@ def refuse_mechanisms(problem: OrigamiProblem, factor: float = 0.0) -> None:
 
 
 def mechanisms(problem: OrigamiProblem, factor: float = 0.0) -> list[str]:
-    """Free motions in words: rigid ones, or, if there are none, internal mechanisms."""
+    """Free motions in words: rigid motions or, if there are none, internal mechanisms."""
     structure = problem.structure
     start = problem.start(factor)
     body = problem.body(start, 0.0)
