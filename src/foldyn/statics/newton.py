@@ -167,8 +167,9 @@ class Settings(Checked):
     target : int
         Iterations per point at which the step control aims: more shrink the step, fewer enlarge it.
     cuts : int
-        Halvings after which a path ends: relative to the interval between two given load factors,
-        or, if the factor is free, counted since the last accepted step.
+        A path ends if a step is shorter than the interval between two given load factors halved
+        this many times or, if the factor is free, after this many halvings since the last accepted
+        step.
     largest_turn : float
         Degrees by which a hinge (or, without hinges, a bar) may turn within one step of
         "mgdcm" and "arc_length".
