@@ -45,20 +45,20 @@ AROUND = {1: "G-X", 2: "G-X-M-Y-G"}
 MOST_ZONE = 200
 MOST_LEVELS = 10_000
 ABOVE = 1.05
-"""Upper end of an attenuation spectrum, relative to the highest frequency of the bands."""
+"""Upper end of an attenuation spectrum, as a multiple of the highest frequency of the bands."""
 COORDINATES = ("distance", "wave_vector", "zone_wave_vector", "leg")
 
 
 MOST_STATES = 200
 ASIDE = ("analysis", "output", "sweep", "design", "title")
-"""Tables and keys that do not change the state,"""
+"""Tables that do not change the state."""
 PERIODS = "periods"
 STATED = ("stretch", "turn")
-"""except for these keys of [analysis]."""
+"""Keys of [analysis] that do change the state."""
 
 
 def one_key(value: Any) -> Varied:
-    """The one key that distinguishes the states of a file."""
+    """Check that a table names one key, which distinguishes the states, and return it."""
     one, *more = varied(value, sampled=False)
     if more:
         raise InputError(
@@ -75,17 +75,17 @@ def one_key(value: Any) -> Varied:
 
 @dataclass(frozen=True, eq=False)
 class CellState:
-    """A repeated case in one of the states of a file.
+    """A repeated case in one of the states that its file describes.
 
     Attributes
     ----------
     cell : UnitCell
     start : mapping
-        Arguments of `bands` for a stored state; empty without one.
+        Arguments of `bands` for a stored state; empty if the case has none.
     given : mapping
         Table [analysis].
     varied : Varied or None
-        The varied key; `value` is its value in this state.
+        The varied key of the file; the attribute `value` is its value in this state.
     """
 
     cell: UnitCell
@@ -100,7 +100,7 @@ class CellState:
         Raises
         ------
         InputError
-            The number of factors does not match the periods.
+            The number of stretch factors differs from the number of periods.
         ComputationError
             There is no equilibrium.
         """
@@ -111,7 +111,7 @@ class CellState:
         return own | {"state": self._relaxed(stretch, turn, own.get("state"))}
 
     def _relaxed(self, stretch: Any, turn: float | None, state: State | None) -> State:
-        """Equilibrium with the requested periods."""
+        """Equilibrium of the cell with stretched or turned periods."""
         cell = self.cell
         factors = np.ones(cell.dimensions)
         if stretch is not None:
@@ -129,7 +129,7 @@ class CellState:
 
     @contextmanager
     def placed(self) -> Iterator[None]:
-        """Name the state in messages, and `initial` if a stored state is wrong."""
+        """Prefix messages with the state, and with `initial` if a stored state is wrong."""
         with _placed(self.varied, self.value):
             try:
                 yield
@@ -140,7 +140,7 @@ class CellState:
 
 
 def cell_states(case_file: CaseFile, mass: str, given: Mapping[str, Any]) -> list[CellState]:
-    """The states of a file, each with its cell."""
+    """The states that a file describes, each with its repeated cell."""
     vary: Varied | None = given["vary"]
     states = []
     for value in (None,) if vary is None else vary.values:
@@ -220,15 +220,16 @@ class BandsSection(AnalysisSection):
     zone : int, optional
         Wave vectors along each period of the whole zone, for exact full gaps.
     attenuation : int, optional
-        Number of frequencies of an attenuation spectrum, along legs of the path in one period.
+        Number of frequencies of an attenuation spectrum, along legs of the path that follow one
+        period.
     vary : mapping, optional
         Several states: one key of the file, and its values or range.
     stretch : float or sequence of float, optional
-        Factor on the periods of the equilibrium: one for all, or one for each.
+        Factor on the periods of the equilibrium: one for all periods, or one for each.
     turn : float, optional
         Turn (degrees) from cell to cell of a tube in equilibrium.
     periods : int or sequence of int, optional
-        Numbers of the pattern's periods to repeat it along; all by default.
+        Periods of the pattern, by number, along which it repeats; all by default.
     """
 
     like = (modes, UnitCell)
@@ -263,7 +264,7 @@ class BandsSchema(VibrationSchema):
     output: BandsOutput = BandsOutput()
 
     def agree(self) -> None:
-        """Refuse loads other than folding creases, unless there is a stored state."""
+        """Refuse loads other than folded creases, unless a stored state is given."""
         super().agree()
         for i, load in enumerate(self.loads):
             if self.initial is None and not isinstance(load, Actuate):
@@ -343,7 +344,7 @@ def _path(cell: UnitCell, points: str | None, count: int) -> xarray.DataArray:
     """Phases along the path of a file."""
     try:
         return cell.path(AROUND[cell.dimensions] if points is None else points, count)
-    except InputError as error:  # which has other names for the keys
+    except InputError as error:  # its message names arguments, not keys of the file
         key = {"points": "path", "count": "points"}[error.key]
         raise InputError(error.reason, key) from None
 
@@ -377,10 +378,10 @@ def _bands(state: CellState, path: xarray.DataArray, given: Mapping[str, Any]) -
 def _in_zone(
     cell: UnitCell, phases: NDArray, side: int, count: int, own: Mapping[str, Any]
 ) -> NDArray[np.float64]:
-    """Frequencies (phase, band), Hz, at the phases of a grid; reciprocity gives half of them."""
+    """Frequencies (phase, band), Hz, at the phases of a grid; half of them by reciprocity."""
     shape = [side] * cell.dimensions
     places = np.indices(shape).reshape(cell.dimensions, -1)
-    opposite = np.ravel_multi_index(tuple(-places % side), shape)  # of -k
+    opposite = np.ravel_multi_index(tuple(-places % side), shape)  # index of -k
     half = np.flatnonzero(np.arange(len(opposite)) <= opposite)
     values = np.empty((len(phases), count))
     found = bands(cell, phases[half], count=count, track=False, **own)["frequency"].values
@@ -438,7 +439,7 @@ def _joined(
 
 
 MOST_GAPS = 200
-"""Most gaps in the table of the page."""
+"""Largest number of gaps in the table of the page."""
 NUMBERS = ("gap_below", "gap_bottom", "gap_top", "gap_width", "gap_relative_width")
 
 

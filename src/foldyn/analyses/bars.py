@@ -19,8 +19,8 @@ class _Hidden:
 def bar(shown: bool, **options: Any) -> Any:
     """Progress bar of tqdm, or a stand-in.
 
-    tqdm is imported only if the bar is shown: its lock outlives killed processes, such as workers
-    of a fit.
+    tqdm is imported only if the bar is shown: the lock of tqdm outlives killed processes, such as
+    workers of a fit.
     """
     if not shown:
         return _Hidden()
@@ -30,6 +30,6 @@ def bar(shown: bool, **options: Any) -> Any:
 
 
 def share_bar(shown: bool, text: str) -> Any:
-    """Bar of a computation that reports the share that is done, from 0 to 1."""
+    """Progress bar of a computation that reports its completed share, from 0 to 1."""
     layout = "{desc}: {percentage:3.0f} %|{bar}| [{elapsed}<{remaining}]"
     return bar(shown, total=1.0, desc=text, bar_format=layout)

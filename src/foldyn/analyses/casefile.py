@@ -35,8 +35,8 @@ from foldyn.viewer import stage
 
 Begun = Callable[[], None]
 Compute = Callable[[bool, Begun], xarray.Dataset]
-"""Computes a result, with or without a progress bar. It calls its second argument, at least once,
-when all input has been accepted."""
+"""Function that computes a result, with or without a progress bar. It calls its second argument at
+least once, when all input has been accepted."""
 
 
 @runtime_checkable
@@ -46,12 +46,12 @@ class Kept(Protocol):
     kept: Keeping | None
 
     def keep(self, keeping: Keeping, shown: bool) -> None:
-        """Set how it is stored, and whether its result will be shown, which must fit in memory."""
+        """Set how it is stored, and whether its result will be shown and so must fit in memory."""
 
 
 @runtime_checkable
 class Moving(Protocol):
-    """A computation of a motion; it may be integrated together with others before the call."""
+    """A computation of a motion, which may be integrated in a batch with others beforehand."""
 
     motion: Motion
     integrated: bool
@@ -69,7 +69,7 @@ class Output:
         Whether the file names these nodes; otherwise they are the default ones.
     axis : str or None
         Component that figures show: "x", "y" or "z", for paths also "-x", "-y" or "-z". None: the
-        one with the largest motion of a node.
+        component with the largest motion of a node.
     animation : str or None
         Format of a film next to the page, "gif" or "mp4"; None: no film.
     max_frequency : float or None
@@ -102,17 +102,18 @@ class Analysis(ABC):
     schema : type
         Schema of case files of this kind.
     files : tuple of str
-        Possible files of its page: figures without suffix, animations with it.
+        Files that its page may show: figures without a suffix, animations with it.
     needs_density : str
-        Beginning of the message if the density is missing, "a motion needs"; "" if not needed.
+        Beginning of the message about a missing density, such as "a motion needs"; "" if the
+        analysis needs no density.
     takes : sequence of str
-        Names of arguments that can override those of the file.
+        Names of arguments of `CaseFile.run` that can override the file.
     moving : bool
         Whether results move, and are shown in motion at the top of the page.
     by_mass : bool
-        Whether each mass rule of a file has its own result; if not, only the first has one.
+        Whether each mass rule of a file has its own result; if not, only the first rule has one.
     arguments : dict
-        Keyword arguments of its function: of `simulate`, `trace`, `modes` or `frf`.
+        Keyword arguments of its function: `simulate`, `trace`, `modes` or `frf`.
     """
 
     kind: ClassVar[str]
@@ -128,14 +129,14 @@ class Analysis(ABC):
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
-        """The analysis that the checked sections of a case file ask for."""
+        """The analysis that the checked sections of a case file define."""
         return cls({k: value for k, value in schema.analysis.values().items() if k != "kind"})
 
     @abstractmethod
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
         """Return a computation with one mass rule, checked as far as possible.
 
-        changes : arguments that override those of the file.
+        changes : arguments that override the file.
         """
 
     @abstractmethod
@@ -240,22 +241,22 @@ class CaseFile:
 
     @property
     def heading(self) -> str:
-        """Title of its page: its own, or the name of the file."""
+        """Title of the page: the title of the case file, or its file name."""
         return self.title or self.path.stem
 
     @property
     def sweep(self) -> SweepSection | None:
-        """Its table [sweep]; None if it has none."""
+        """Table [sweep] of the file; None if it has none."""
         return self._schema.sweep
 
     @property
     def design(self) -> DesignSection | None:
-        """Its table [design]; None if it has none."""
+        """Table [design] of the file; None if it has none."""
         return self._schema.design
 
     @property
     def start_keys(self) -> dict[str, Any]:
-        """Keys of its table [initial]; empty if it has none."""
+        """Keys of the table [initial] of the file; empty if it has none."""
         section = getattr(self._schema, "initial", None)
         if section is None:
             return {}
@@ -290,7 +291,7 @@ class CaseFile:
         return self.start(mass).state
 
     def start(self, mass: str | None = None) -> Start:
-        """`initial` with the load factor of a stored state."""
+        """The state of `initial`, with the load factor if it is a stored state."""
         section = getattr(self._schema, "initial", None)
         with within("initial", self.path):
             return start_of(section, self.case(mass), self.path.parent)
@@ -307,7 +308,7 @@ class CaseFile:
         progress : bool
             Whether to show a progress bar.
         **changes
-            Arguments of `simulate`, `trace`, `modes` or `frf` that override those of the file.
+            Arguments of `simulate`, `trace`, `modes` or `frf` that override the file.
 
         Returns
         -------
@@ -351,7 +352,7 @@ class CaseFile:
         return f'mass = "{mass}": ' if mass and len(self.masses) > 1 else ""
 
     def _section(self, key: str) -> str:
-        """Table of the file that has a key, with a dot; "" if there is none."""
+        """Name of the table that has a key, followed by a dot; "" if no table has it."""
         for name in ("analysis", "output", "model"):
             if key in arguments(type(getattr(self._schema, name))):
                 return f"{name}."
@@ -382,7 +383,7 @@ class Computation:
 
     @property
     def place(self) -> str:
-        """Prefix of messages about it."""
+        """Prefix of messages about this computation."""
         return f"{self.case_file.path}: {self.case_file.named(self.mass)}"
 
     def result(self, progress: bool = False, begun: Begun = lambda: None) -> xarray.Dataset:

@@ -17,7 +17,7 @@ Document = dict[str, Any]
 
 
 def flagged(document: Document, flags: Mapping[str, Any]) -> Document:
-    """The document with keys of [analysis] from the command line."""
+    """Add keys of [analysis] from the command line to the document."""
     analysis = {**document["analysis"], **flags}
     if "state" not in flags:
         return {**document, "analysis": analysis}
@@ -36,11 +36,11 @@ STARTLESS: Mapping[str, str] = {
         "drive them"
     ),
 }
-"""Kinds in which loads and supports stay as they are, and why a start and a drive do not."""
+"""Kinds in which loads and supports stay, each with the reason why a start and a drive do not."""
 
 
 def startless(path: Path, document: Document, kind: str) -> Document:
-    """The document as one of `STARTLESS`; a start and a drive are left out with a warning."""
+    """The document as a kind of `STARTLESS`; a start and a drive are left out with a warning."""
     _tell(path, kind, _tables(document, "initial", "drive"), STARTLESS[kind])
     kept = _without(document, "initial", "drive", "output")
     return {**kept, "analysis": {"kind": kind}}
@@ -68,7 +68,7 @@ def unbounded(path: Path, document: Document, state: str) -> Document:
 
 
 def _tables(document: Document, *names: str) -> list[str]:
-    """Those of the named tables that the document has."""
+    """Names of the given tables that the document has."""
     return [f"[{name}]" for name in names if name in document]
 
 
@@ -80,7 +80,7 @@ def _tell(path: Path, command: str, left: list[str], why: str) -> None:
 
 
 def converted(path: Path, document: Document, kind: str, state: str) -> Document:
-    """The document as another kind of analysis; parts without a meaning there cause a warning."""
+    """The document as another kind of analysis; a warning names parts that are left out."""
     if kind in STARTLESS:
         return startless(path, document, kind)
     if kind == "bands":
@@ -125,7 +125,7 @@ def converted(path: Path, document: Document, kind: str, state: str) -> Document
 def _supports(
     supports: list[Document], atrest: bool, left: list[str]
 ) -> tuple[list[Document], list[tuple[int, Document]]]:
-    """Supports that hold or, except at rest, move nodes; and supports that move the base."""
+    """Supports of nodes (moving ones only if not at rest), and supports that move the base."""
     kept, bases = [], []
     for i, support in enumerate(supports):
         if "base" in support:
@@ -141,10 +141,10 @@ def _supports(
 
 def _shown(output: Document, kind: str) -> Document:
     """Keys of [output] that have the same meaning for another kind."""
-    if kind == "modes":  # axis and nodes mean something else there
+    if kind == "modes":  # modes use axis and nodes for something else
         return {key: output[key] for key in ("animation",) if key in output}
     shown = {key: output[key] for key in ("nodes", "axis") if key in output}
-    if "axis" in shown and kind != "frf":  # which reads along directions, too
+    if "axis" in shown and kind != "frf":  # frf also accepts "-x" and the like
         shown["axis"] = shown["axis"][-1]
     return shown
 
@@ -187,7 +187,7 @@ def remodeled(
 
 
 def _fold_law_of(preset: str | None) -> Document:
-    """The key for the fold law of a preset; empty if it is the default law."""
+    """Table with the fold law of a preset; empty if it is the default law."""
     law = None if preset is None else PRESETS[preset].fold_law
     if law in (None, ModelOptions().fold_law):
         return {}

@@ -72,7 +72,7 @@ class FidelityAnalysis(Analysis):
     by_mass = False
 
     masses: tuple[str, ...] = ()
-    """Further mass rules of the file, compared as models of their own."""
+    """Further mass rules of the file; each is compared as a model of its own."""
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
@@ -137,7 +137,7 @@ class _Steps:
 
 
 def _models(found: Fidelity) -> Table:
-    """A row for each model: its options, its errors, its cost."""
+    """Table with a row for each model: its options, its errors, its cost."""
     result, below = found.result, found.result["frequency"].values < found.limit
     forces = "deflection" in result
     header = ["model", "options", "median (%)", "largest (%)", "lost"]
@@ -153,7 +153,8 @@ def _models(found: Fidelity) -> Table:
         if forces:
             row.append(_told(float(one["deflection_error"]), "soft"))
         rows.append([*row, 1e3 * float(one["model_seconds"]), f"1/{float(one['cost_ratio']):.0f}"])
-    words = [line for line in legend(found) if not line.startswith("*")]  # here are no modes
+    # this table shows no modes
+    words = [line for line in legend(found) if not line.startswith("*")]
     return Table(
         [*header, "time (ms)", "of the shell's"],
         rows,
@@ -165,7 +166,7 @@ def _models(found: Fidelity) -> Table:
 
 
 def _modes(found: Fidelity) -> Table:
-    """A row for each mode of the shell."""
+    """Table with a row for each mode of the shell."""
     tables = [found.table(model) for model in found.models]
     rows: list[list[Any]] = []
     for every in zip(*tables, strict=True):

@@ -17,7 +17,7 @@ from foldyn.statics import Folding
 from foldyn.viewer import stage
 
 MOST_ROWS = 12
-"""Most states in the table."""
+"""Largest number of states in the table."""
 
 
 def write_folding_page(

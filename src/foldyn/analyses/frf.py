@@ -112,7 +112,7 @@ class FrfSection(*(method.options for method in METHODS.values()), AnalysisSecti
         method.options(**self.options())
 
     def options(self) -> dict[str, Any]:
-        """Options of its method that the file gives."""
+        """Options of the method that the file gives."""
         return {key: getattr(self, key) for key in OPTIONS & self.stated}
 
 
@@ -145,7 +145,7 @@ class FrfOutput(ShownSection):
     Parameters
     ----------
     axis : {"x", "y", "z", "-x", "-y", "-z"}, optional
-        Direction that figures show; by default the direction of the drive.
+        Direction shown in figures; by default the direction of the drive.
     quantity : {"receptance", "mobility", "accelerance"}, optional
         Shown quantity: displacement, velocity or acceleration per force.
     """
@@ -286,9 +286,9 @@ class FrfAnalysis(Analysis):
 
 
 MOST_CURVES = 8
-"""Most responses in one figure, each in its color."""
+"""Largest number of responses in one figure, each in its own color."""
 MOST_REASONS = 6
-"""Most peaks with an explanation of missing numbers on the page."""
+"""Largest number of peaks whose missing numbers the page explains."""
 
 
 def _coherence(results: ByRule, nodes: list[int], axis: str) -> list[Section]:
@@ -310,7 +310,7 @@ def _coherence(results: ByRule, nodes: list[int], axis: str) -> list[Section]:
 
 
 def driven_direction(response: xarray.Dataset) -> str:
-    """Direction in which most of the drive acts."""
+    """Axis along which the drive is largest."""
     from foldyn.plots.readings import along_drive
 
     drive = response["drive"].transpose("node", "axis").values
@@ -325,7 +325,7 @@ def _driven(case: Case, drive: list[Any]) -> Case:
 
 
 def _meaning(quantity: str, axis: str, response: xarray.Dataset) -> str:
-    """What the quantity is, in words."""
+    """Definition of the quantity in words."""
     if quantity == "transmissibility":
         base = response.attrs["base_axis"]
         return f"displacement along {axis} per displacement of the base along {base}"
@@ -405,7 +405,7 @@ def _notes(
             f"{response.attrs['secant']:g} degrees."
         )
     swing = response["swing"].values if "swing" in response else np.zeros(1)
-    if (swing > 0.0).any():  # else no hinge is superlinear
+    if (swing > 0.0).any():  # without a swing no hinge is superlinear
         at = int(np.nanargmax(swing)) if np.isfinite(swing).any() else 0
         notes.append(
             "Each superlinear hinge is linearized for its own amplitude: the largest is "
@@ -426,7 +426,7 @@ def _notes(
 
 
 def _reason(note: str) -> str:
-    """A note without its advice for Python."""
+    """A note without its advice for users of Python."""
     parts = [part for part in note.split("; ") if part.startswith(("half power", "circle fit"))]
     return "; ".join(parts or [note]).replace("magnitude: ", "")
 

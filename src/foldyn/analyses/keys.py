@@ -1,7 +1,7 @@
 """Keys of case files: paths such as "sheet.thickness" or "loads[0].force[2]".
 
-Also their values, and ties: keys that follow others. A tie, such as theta2 = 360 - theta1, is a
-sum, difference, product or quotient of numbers and keys; a small parser reads it, it is never
+Also the values of keys, and ties: keys that depend on others. A tie, such as theta2 = 360 - theta1,
+is a sum, difference, product or quotient of numbers and keys. A small parser reads it; it is never
 evaluated as Python.
 """
 
@@ -22,7 +22,7 @@ from foldyn.patterns.expressions import parse, written
 from foldyn.values import SHOWN, shortened, show, suggest
 
 LONGEST = 200
-"""Most characters of a key: no case file nests its tables that deep."""
+"""Largest number of characters of a key: no case file nests its tables deeper."""
 _KEY = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.[A-Za-z_]\w*(\[\d+\])*)*\Z")
 
 
@@ -77,7 +77,7 @@ def replaced(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[st
     """Copy of a case file with the values of some keys replaced or added.
 
     Missing tables are added, and a law given by its name becomes a table. The reader of the case
-    file checks whether it may have such a key.
+    file checks whether the file may have such a key.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def _step(here: Any, part: str | int, key: str) -> Any:
 
 
 def files_of(value: Any, *without: str) -> list[str]:
-    """Paths of all files that a case file names, except in tables under the keys `without`."""
+    """Paths of all files named in a case file, except in tables under the keys `without`."""
     if isinstance(value, Mapping):
         own = [value["file"]] if isinstance(value.get("file"), str) else []
         inner = [item for key, item in value.items() if key not in without]
@@ -143,7 +143,7 @@ _REMEDY = 'write for example "360 - model.fold_law.theta1"'
 
 @dataclass(frozen=True)
 class Tie:
-    """A key of a case file that follows parameters.
+    """A key of a case file that depends on parameters.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ class Tie:
         self.value(None)
 
     def value(self, parameters: Mapping[str, float] | None) -> float:
-        """Value for given parameters; with None it only checks the expression."""
+        """Value for given parameters; with None the expression is only checked."""
         try:
             tree = parse(self.expression.strip())
         except InputError as error:

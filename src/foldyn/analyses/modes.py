@@ -24,9 +24,9 @@ from foldyn.report.sections import Section as PageSection
 
 FRAMES, FPS = 24, 12
 MOST_FILMED = 6
-"""Most modes in the film."""
+"""Largest number of modes in the film."""
 MOST_TRIANGLES = 25_000
-"""Most triangles in each picture of the film, unless a single mode has more."""
+"""Largest number of triangles in a picture of the film, unless a single mode has more."""
 
 
 class ModesSection(AnalysisSection):
@@ -167,13 +167,13 @@ def _about(modes: xarray.Dataset) -> str:
 
 
 def _character(case_file: CaseFile, modes: xarray.Dataset, case: Case) -> xarray.Dataset:
-    """Characters of the modes along the axis of the file, or the main one."""
+    """Characters of the modes along the axis given in the file, or along the main axis."""
     chosen = case_file.output
     return character(modes, chosen.axis, nodes=chosen.nodes if chosen.named else None, case=case)
 
 
 def _judged(case_file: CaseFile, names: xarray.Dataset) -> str:
-    """How modes were named, for a caption."""
+    """Text for a caption on how modes were named."""
     nodes = case_file.output.nodes.tolist()
     of = f" of {listed('node', nodes)}" if case_file.output.named else ""
     return f"named by the largest share of their motion{of}, seen along {names.attrs['axis']}"

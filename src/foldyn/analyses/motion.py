@@ -102,7 +102,7 @@ class MotionSchema(CaseSchema):
 
 
 def check_massless(schema: Any, key: str, fit: Sequence[str] = MASSLESS_METHODS) -> None:
-    """Refuse an integrator that needs mass everywhere for a shell, unless panels are rigid."""
+    """Refuse, for a shell with flexible panels, an integrator that needs mass at every dof."""
     method = getattr(schema.analysis, key, None)
     if schema.model.rigid is None and method is not None and method not in fit:
         raise InputError(
@@ -162,7 +162,7 @@ class MotionAnalysis(Analysis):
             check_samples(*size, len(motions))
 
     def line(self, name: str, result: xarray.Dataset) -> str:
-        """Method, with the reason if chosen automatically, steps, speed and accuracy."""
+        """Method (and why, if it was chosen automatically), steps, speed and accuracy."""
         a = result.attrs
         size = f"{a['dt']:.3g} s"
         if "smallest_step" in a:
@@ -232,7 +232,7 @@ class _Prepared:
     def __init__(self, motion: Any) -> None:
         self.motion = motion
         self.kept: Keeping | None = None
-        self.shown = True  # whether its result is looked at as a whole
+        self.shown = True  # whether the whole result is loaded for figures
         self.integrated = False
 
     def keep(self, keeping: Keeping, shown: bool) -> None:

@@ -106,7 +106,7 @@ class PathOutput(ShownSection):
     Parameters
     ----------
     axis : {"x", "y", "z", "-x", "-y", "-z"}, optional
-        Direction that figures show; by default the direction of the largest motion.
+        Direction shown in figures; by default the direction of the largest motion.
     shapes : int or sequence of int
         Number of drawn shapes, or the numbers of their points.
     animation : {"gif", "mp4"}, optional
@@ -163,7 +163,7 @@ class PathAnalysis(Analysis):
         own = dict(self.arguments)
         for one, other in (("load_factors", "steps"), ("steps", "load_factors")):
             if one in changes:
-                own[other] = None  # they say the same
+                own[other] = None  # both arguments set the same thing
         given = {"initial": case_file.start(mass).state, **own, **changes}
         turned = {name: given.pop(name) for name in SETTINGS if name in given}
         given["settings"] = replace(settings_of(given["settings"]), **turned)
@@ -237,7 +237,7 @@ class PathAnalysis(Analysis):
         if path.sizes["step"] > 1:
             over: tuple[list[int], str] | tuple[None, None] = None, None
             if moved is not None and (np.diff(along(path, *moved)) > 0.0).all():
-                over = moved  # they only move forward
+                over = moved  # moved nodes only move forward
             yield from album.figure(
                 "energies",
                 f"Strain energies of {', '.join(plots.energy_shares(path))}, stacked, with the "
@@ -285,15 +285,15 @@ def _bar(shown: bool) -> Any:
 
 FRAMES, FPS = 60, 15
 MOST_CURVES = 8
-"""Most nodes in a figure of curves, each in its color."""
+"""Largest number of nodes in a figure of curves, each in its own color."""
 MOST_ROWS = 12
-"""Most regular points in the table."""
+"""Largest number of regular points in the table."""
 MOST_COLUMNS = 4
-"""Most nodes with displacements in the table."""
+"""Largest number of nodes with displacements in the table."""
 
 
 def _reaction(path: xarray.Dataset, nodes: list[int], direction: str) -> Charts:
-    """Force of moved supports over their displacement, for a page without figures."""
+    """Force of moved supports against their displacement, for a page without figures."""
     curve = Curve(
         listed("node", nodes), along(path, nodes, direction),
         plots.total_reaction(path, nodes, direction=direction),
@@ -315,13 +315,14 @@ def _landscape(
         return None
     try:
         found = landscape(path, case)
-    except (InputError, ComputationError):  # driven by both or by folds, or too coarse
+    # driven by loads and supports, or by folds; or too coarse
+    except (InputError, ComputationError):
         return None
     return found if found.negative_stiffness else None
 
 
 def _energy(found: Landscape) -> Charts:
-    """Energy over the stroke, for a page without figures."""
+    """Curve of the energy against the stroke, for a page without figures."""
     stroke, _, energy = plots.with_states(found)
     states = np.array([[state.stroke, state.energy] for state in found.states]).reshape(-1, 2)
     curves = [Curve("energy", stroke, energy), Curve("states", *states.T, dots=True)]
@@ -330,7 +331,7 @@ def _energy(found: Landscape) -> Charts:
 
 
 def _states(found: Landscape) -> Table:
-    """States without force, and the barriers between the stable ones."""
+    """Table of the states without force, and of the energy barriers between the stable ones."""
     rows, passed = [], 0
     for state in found.states:
         ahead = back = None

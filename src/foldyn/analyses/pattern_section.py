@@ -15,13 +15,13 @@ from foldyn.tables import check_keys
 from foldyn.values import choice, nearest, number_or_list, numbers, show
 
 HINGES, FACES = "hinge_offset", "faces"
-"""Key of [pattern] for thick panels, and its value for hinges in their faces."""
+"""Key of [pattern] for thick panels, and the value of that key for hinges in panel faces."""
 FACETS = "facets"
 """Key of [pattern] for the meaning of lines assigned "F"."""
 READING = ("scale", "unit", "frame", FACETS, "tolerance", "flat_foldable")
 """Keys of [pattern] in addition to `file`: arguments of `read_pattern`."""
 INLINE = ("vertices", "faces", "assignments", "fold_angles", "families")
-"""Keys of [pattern] for a pattern that the case file holds."""
+"""Keys of [pattern] for a pattern that is written out in the case file."""
 
 
 class PatternOf(Placed):
@@ -32,7 +32,7 @@ class PatternOf(Placed):
 
     def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
         """See `Check`."""
-        from foldyn.formats import read_pattern  # with all its libraries
+        from foldyn.formats import read_pattern  # imported late: it loads many libraries
 
         more = {
             FACETS: described({"enum": [*KINDS_OF_FACETS]}, 'What lines assigned "F" are.'),
@@ -83,7 +83,7 @@ def checked_pattern(value: Any) -> dict[str, Any]:
 
 
 def _check_generator(value: Mapping[str, Any]) -> None:
-    """Refuse an unknown generator, and keys unknown to it or to the nearest known one."""
+    """Refuse an unknown generator, and keys unknown to it (or to the one named most alike)."""
     faults, kind = Faults(), value["kind"]
     with faults.collected():
         choice(".kind", kind, GENERATORS)

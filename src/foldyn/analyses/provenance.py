@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from foldyn.cases import Case
 
 MOST_LISTED = 24
-"""Most numbers of a list that are written individually."""
-MOST = 200  # characters of a value
+"""Largest number of entries of a list that are written individually."""
+MOST = 200  # longest text of a value, in characters
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Call:
     command : str
         Command as typed; "" in Python.
     warnings : tuple of str
-        Warnings issued meanwhile.
+        Warnings issued while the command or call ran.
     wall, cpu : float
         Wall time and processor time (s) from reading the case file to the last result.
     """
@@ -53,7 +53,7 @@ class Call:
 
 
 def provenance(case_file: Any, results: ByRule, call: Call | None = None) -> list[Section]:
-    """Table of all inputs of the results of a `CaseFile`, and the text of the file."""
+    """Table of all inputs that led to results of a `CaseFile`, and the text of the file."""
     first = next(iter(results))
     rows = inputs(case_file, case_file.case(first), results)
     rows += computed(results, call or Call())
@@ -136,7 +136,7 @@ def damping_text(case: Case) -> str:
 
 
 def _point_masses(case: Case) -> str:
-    """Sum of the point masses, and their number of nodes."""
+    """Sum of the point masses, and the number of nodes that carry them."""
     masses = case.point_masses
     count = int((masses > 0.0).sum())
     nodes = f"{count} node{'s' if count > 1 else ''}"

@@ -20,7 +20,7 @@ from foldyn.errors import InputError, within
 from foldyn.values import number, parsed, plain, show, single, whole
 
 MOST_VALUES = 1_000_000
-"""Most values of a key; a larger number is a typing error."""
+"""Largest number of values of a key; a larger one must be a typing error."""
 LOG = "log"
 SAMPLINGS = ("latin_hypercube", "sobol", "saltelli")
 """Sampling methods."""
@@ -57,13 +57,13 @@ class Varied:
         return all(isinstance(v, int | float) and not isinstance(v, bool) for v in self.values)
 
     def at(self, share: NDArray[np.float64]) -> list[Value]:
-        """Values at positions from 0 to below 1 in its range or list."""
+        """Values at the given shares, from 0 to below 1, of the range or list."""
         if self.values:
             return [self.values[int(part * len(self.values))] for part in share]
         return _between(self.lower, self.upper, share, self.log).tolist()
 
     def tried(self) -> tuple[Value, ...]:
-        """Sample values for checking whether the case file accepts them all."""
+        """Values to try out, to check that the case file accepts the whole range or list."""
         if self.values:
             return self.values
         middle = _between(self.lower, self.upper, np.array([0.3819660112501051]), self.log)
@@ -131,7 +131,7 @@ def _range(key: str, text: str, sampled: bool) -> Varied:
 
 
 def _between(lower: float, upper: float, share: NDArray, log: bool) -> NDArray[np.float64]:
-    """Values at positions from 0 to 1 between two ends."""
+    """Values between two ends, at the given shares (0 to 1) of the way."""
     return lower * (upper / lower) ** share if log else lower + share * (upper - lower)
 
 

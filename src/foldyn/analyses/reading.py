@@ -97,7 +97,7 @@ def read_as(
     document = _parsed(path, text)
     flags = {key: value for key, value in flags.items() if value is not None}
     own = schema_of(document) is ANALYSES[kind].schema
-    if not own:  # else flags may give what is missing
+    if not own:  # otherwise flags may provide missing keys
         validated(path, document)
     with within("", path):
         document = remodeled(document, model, divisions)
@@ -125,7 +125,7 @@ def case_of_document(
 
     text : text of the file, if the document was read from one.
     pattern, structures : pattern and structures (by mass rule) made from this document before;
-        made anew if not given.
+        both are made if not given.
     """
     schema = validated(path, document)
     model = MODELS[schema.model.kind]
@@ -141,7 +141,8 @@ def case_of_document(
         faults.add(InputError(f": missing; {kind.needs_density} it (kg/m3)", "sheet.density"))
     with within("", path):
         with faults.collected(), within("model: "):
-            welds = bool(len(getattr(pattern, "welds", ())))  # no pattern where it is at fault
+            # the pattern is missing if its table is wrong
+            welds = bool(len(getattr(pattern, "welds", ())))
             resolved = model.options(welds=welds, **schema.model.options)
         faults.raise_all()
         with within("model: "):
@@ -169,7 +170,7 @@ def case_of_document(
 
     case = make(masses[0])
     cases = {masses[0]: case}
-    with warnings.catch_warnings():  # the other rules would only repeat them
+    with warnings.catch_warnings():  # further rules would only repeat warnings
         warnings.simplefilter("ignore", FoldynWarning)
         cases |= {mass: make(mass) for mass in masses[1:]}
     with within("", path):
@@ -247,7 +248,7 @@ def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
         with within("pattern"):
             return _facets(call_from(GENERATORS[table["kind"]], arguments), table)
     if "file" in table:
-        from foldyn.formats import read_pattern  # with all its libraries
+        from foldyn.formats import read_pattern  # imported late: it loads many libraries
 
         with within(f'pattern.file = "{table["file"]}": '):
             given = {key: table[key] for key in READING if key in table}

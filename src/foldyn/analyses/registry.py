@@ -62,7 +62,7 @@ def schema_of(document: Mapping[str, Any]) -> type[CaseSchema]:
 
 
 def case_schema() -> Schema:
-    """JSON Schema (draft 7) of case files: for all kinds, and stricter for the given kind."""
+    """JSON Schema (draft 7) of case files, with stricter rules for each kind of analysis."""
     definitions: dict[str, Schema] = {}
     listed: list[dict[str, Schema]] = []
     kinds: list[Schema] = []

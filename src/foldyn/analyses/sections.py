@@ -36,7 +36,7 @@ from foldyn.values import MOST, choice, indices, number, number_or_list, show, v
 
 RULES = [name for model in MODELS.values() for name in model.masses]
 MOST_SHAPES = 12
-"""Most shapes or modes in one figure."""
+"""Largest number of shapes or modes in one figure."""
 
 
 def text(name: str, value: Any) -> str:
@@ -64,8 +64,8 @@ def some_shapes(
 ) -> int | tuple[int, ...]:
     """Return the number of drawn shapes, or their numbers.
 
-    drawn : name of the shapes for messages, "modes"
-    what : name of a numbered item, "mode"
+    drawn : name of the shapes in messages, such as "modes"
+    what : name of a single shape, such as "mode"
     least : the smallest number
     """
     if isinstance(value, int) and not isinstance(value, bool):
@@ -95,7 +95,7 @@ def _masses(name: str, value: Any, beside: Mapping[str, Any]) -> list[str]:
 
 
 def known_masses(beside: Mapping[str, Any]) -> list[str]:
-    """Mass rules of the model, or of all models if its kind is invalid."""
+    """Mass rules of the model, or of all models if the kind of model is invalid."""
     kinds = [beside["kind"]] if "kind" in beside else list(MODELS)
     return [name for kind in kinds for name in MODELS[kind].masses]
 
@@ -221,14 +221,14 @@ class AnalysisSection(Section):
 
 
 class ShownSection(Section):
-    """[output]: nodes that figures show, and the axis along which they do.
+    """[output]: nodes that figures show, and the axis along which motion is shown.
 
     Parameters
     ----------
     nodes : int, sequence of int, or str
         Node numbers or a selection; by default the loaded, driven or moved ones.
     axis : {"x", "y", "z"}, optional
-        Component that figures show; by default the one with the largest motion.
+        Component that figures show; by default the component with the largest motion.
     """
 
     nodes: Nodes | None = None
@@ -252,7 +252,7 @@ class SweepSection(Section):
     ties : mapping, optional
         Dependent keys, each with its expression.
     measures : sequence of str
-        Measures of each result, as "peak_frequency[8]".
+        Measures of each result, such as "peak_frequency[8]".
     """
 
     samples: Count | None = None
@@ -271,15 +271,15 @@ class DesignSection(Section):
     bounds : mapping
         Keys of the file in quotes, each with its lower and upper bound.
     minimize, maximize : str, optional
-        Expression of measures; one of the two.
+        Expression of measures; give exactly one of `minimize` and `maximize`.
     subject_to : sequence of str
-        Constraints, as "frequency[1] >= 12".
+        Constraints, such as "frequency[1] >= 12".
     guess : mapping, optional
         Values to begin from; by default the file's.
     method : {"slsqp", "trust-constr", "mma", "cma"}
         Method of the search.
     searches : int
-        Number of searches, all but the first from random designs.
+        Number of searches; all but the first start from random designs.
     seed : int
         Random seed of these designs.
     tolerance : float
@@ -287,7 +287,7 @@ class DesignSection(Section):
     slack : float
         Relative violation of a constraint that counts as none.
     max_evaluations : int
-        Most evaluations of each search.
+        Largest number of evaluations in each search.
     """
 
     bounds: Anything

@@ -19,7 +19,7 @@ from foldyn.tables import Section
 from foldyn.values import show
 
 TOLERANCE = 1e-9
-"""Velocity of a supported node, relative to the largest, that counts as rounding error."""
+"""Velocity of a supported node, relative to the largest velocity, that counts as rounding error."""
 
 
 def _result_file(name: str, value: Any) -> str:
@@ -51,7 +51,7 @@ class MotionStart(Section):
     velocity : sequence of float, shape (3,)
         Velocity of the center of mass (m/s).
     spin : sequence of float, shape (3,)
-        Angular velocity about it (rad/s).
+        Angular velocity about the center of mass (rad/s).
     """
 
     like = (StoredStart,)
@@ -76,7 +76,7 @@ class MotionStart(Section):
 
 
 class Start(NamedTuple):
-    """A state; for a stored one also the load factor of its folded creases, if known."""
+    """A state; if it was stored, also the load factor of its folded creases, if known."""
 
     state: State | None = None  # rest
     load_factor: float | None = None

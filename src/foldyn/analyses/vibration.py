@@ -23,7 +23,7 @@ from foldyn.tables import ListOf
 from foldyn.values import number, show
 
 STATES = ("rest", "equilibrium")
-"""States of vibration in case files, in addition to a stored one."""
+"""States of vibration that case files name; a stored state is also possible."""
 About = Annotated[str, one_of(STATES)]
 Secant = Annotated[float | None, Check(number, above=0.0, most=180.0)]
 Internal = Annotated[int, Check(whole_number, least=0, most=MOST)]
@@ -88,10 +88,10 @@ def about(case_file: CaseFile, mass: str) -> dict[str, Any]:
 def bar_closed(bar: Any, keeps: bool = False) -> Iterator[Any]:
     """Close a progress bar at the end.
 
-    Partial results of an equilibrium search or a simulated motion are dropped, as they are not of
-    this kind of analysis.
+    Partial results of an equilibrium search or a simulated motion are dropped: they belong to
+    another kind of analysis.
 
-    keeps : whether the partial result of an interrupted computation is of this kind.
+    keeps : whether the partial result of an interrupted computation belongs to this kind.
     """
     try:
         yield bar

@@ -82,7 +82,7 @@ def _is_result(source: Path) -> bool:
 
 
 def _is_case(name: str) -> bool:
-    """Whether the name ends in .toml or is that of a shipped case."""
+    """Whether the name ends in .toml or belongs to a shipped case."""
     from foldyn.studies import shipped_cases
 
     return name.endswith(".toml") or (name in shipped_cases() and not Path(name).exists())
@@ -117,7 +117,7 @@ def _export(given: argparse.Namespace, what: Path | Case) -> None:
 
 
 def _listed(files: Sequence[Path]) -> str:
-    """Names of files, the first and the last of many, with their size."""
+    """Names and total size of files; of many files only the first and last name."""
     size = sum(file.stat().st_size for file in files)
     names = ", ".join(map(str, files))
     if len(files) > 3:
@@ -126,7 +126,7 @@ def _listed(files: Sequence[Path]) -> str:
 
 
 def _convert_pattern(given: argparse.Namespace, source: Path) -> None:
-    """Write a pattern file in another format; print its diagnosis or warn of it."""
+    """Write a pattern file in another format; print the diagnosis of the pattern or warn of it."""
     from foldyn.formats import diagnose, read_pattern, write_pattern
 
     for names, kind in ((RESULTS_ONLY, "results (.nc)"), (DECKS_ONLY, "input decks (.inp, .tcl)")):

@@ -1,7 +1,7 @@
 """Small computations that together compile every kernel that a run can need.
 
-Each part of a model is a term of its own, compiled once (`mechanics/term.py`), whichever other
-parts the model has. So each part needs only one use with every kind of method.
+Each part of a model is a separate term (`mechanics/term.py`), compiled once whatever other parts
+the model has. So one use of each part with every kind of method compiles everything.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ RUBBING, ON_GROUND = fd.Contact(friction=0.3), fd.Contact(planes=[GROUND])
 
 
 def sheets() -> fd.Pattern:
-    """Two flat sheets of two panels face to face, little more than their thickness apart."""
+    """Two flat sheets of two panels each, face to face, slightly more than a thickness apart."""
     grid = np.array([[0.0, i, j] for j in (0, 1) for i in (0, 1, 2)])
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.8, 0.6], [0.0, -0.6, 0.8]])
     faces = [(0, 1, 4, 3), (1, 2, 5, 4), (6, 7, 10, 9), (7, 8, 11, 10)]
@@ -148,7 +148,7 @@ def differentiated(*methods: str, **parts: Any) -> None:
 
 
 def accompanied() -> None:
-    """Run an implicit motion and a second one in step with it, as fits do."""
+    """Run two implicit motions in lockstep, as fits do."""
     made, given = case(), {"duration": STEPS * LONG, "dt": LONG, "method": IMPLICIT[0]}
     asked = Asked(made, given)
     motions(prepare(made, **given), asked, [asked], 1e-4)
@@ -236,8 +236,8 @@ STAGES: Sequence[Uses] = (
         ],
     },
 )
-"""Computations by what they compile, in stages. Within a stage they share few kernels; each stage
-needs kernels of the stages before."""
+"""Computations, named by what they compile, in stages. Computations of a stage share few kernels;
+each stage needs kernels of the stages before."""
 
 
 @contextmanager

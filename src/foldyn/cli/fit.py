@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 WRITTEN = ("fit.json", "fit.nc", "fitted.toml")
 KEPT = "evaluations"
 NOTED = 0.05
-"""Share of an interval due to the discretization, from which on it is reported."""
+"""The part of an interval that is due to discretization is reported above this share."""
 DRAWN = [
     "report.html",
     *(f"{n}.{form}" for n in ("correlation", "data-[0-9]", "data-[0-9][0-9]") for form in FIGURES),

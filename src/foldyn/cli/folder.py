@@ -1,4 +1,4 @@
-"""The results folder: checked before anything runs, locked by one run, stamped, written to."""
+"""The results folder: it is checked before a run, locked by the run, stamped and written to."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Owner:
         """Return the owner of a results folder for a file."""
         shipped = [name for name, path in shipped_cases().items() if path == file]
         digest = file_digest(file)
-        with suppress(ValueError, OSError):  # on another drive, where no relative path exists
+        with suppress(ValueError, OSError):  # no relative path leads to another drive
             file = Path(os.path.relpath(os.path.realpath(file), os.path.realpath(folder)))
         source = shipped[0] if shipped else file.as_posix()
         return cls(command, source, digest)
@@ -99,10 +99,9 @@ def write_stamp(
     folder : Path
     owner : Owner
     state : {"running", "stopped", "complete"}
-        "running" without a live process means that the run was cut off.
+        "running", if the process no longer lives, means that the run was cut off.
     results, outdated : sequence of str
-        Files of this run, and files of an earlier run, which are removed once this run saves its
-        first.
+        Files of this run; files of an earlier run, removed when this run saves its first file.
     """
     stamp = {"foldyn_version": __version__, **asdict(owner), "state": state}
     stamp |= {"results": list(results), "outdated": list(outdated)}
@@ -110,7 +109,7 @@ def write_stamp(
 
 
 def named_owner(stamp: dict[str, Any], folder: Path) -> str:
-    """Name the owner in a stamp as a user would type it."""
+    """Return the owner named in a stamp, in the words a user would type."""
     source = stamp["source"]
     if source.startswith("..") or source.endswith(".toml"):
         source = os.path.normpath(folder / source)
@@ -326,7 +325,7 @@ def held(
 
 @contextmanager
 def _naming(results: Results) -> Iterator[None]:
-    """Name what was kept when a run ends early."""
+    """Within the block: if the run ends early, name the kept files in its message."""
     try:
         yield
     except KeyboardInterrupt as stop:

@@ -1,7 +1,8 @@
 """The `foldyn` command: its arguments and exit statuses.
 
-0: done; 1: the computation failed; 2: bad input, one message, nothing written; 128 and its number:
-ended by a signal. Results computed before the end are kept, and the message names them.
+Exit status 0: done; 1: the computation failed; 2: bad input, nothing written; 128 plus the number
+of a signal: ended by that signal. Results computed before the end are kept, and the message names
+them.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ OTHERS = {
 }  # fmt: skip
 """Commands that take something other than a case file."""
 SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
-"""Environment of OpenCV, which silences its decoders: we report broken films ourselves."""
+"""Environment variables that silence the decoders of OpenCV: we report broken films ourselves."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -311,7 +312,8 @@ def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
     out.flush()
     if out.failure is None:
         return DONE
-    if isinstance(out.failure, BrokenPipeError):  # the reader has closed it, like `head`
+    # the reading program, such as `head`, has closed it
+    if isinstance(out.failure, BrokenPipeError):
         return FAILED
     return _say(f"cannot write to standard output: {reason(out.failure)}", FAILED)
 

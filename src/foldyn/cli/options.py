@@ -10,7 +10,7 @@ from foldyn.values import parsed
 
 
 def number(text: str) -> float:
-    """Parse a number; the function's name appears in argparse's message."""
+    """Parse a number; argparse uses the name of this function in its message."""
     return parsed(text)
 
 

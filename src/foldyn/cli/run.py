@@ -33,13 +33,13 @@ PARTS: Mapping[str, tuple[str, ...]] = {
     "bars_and_hinges": ("nodes", "bars", "folds", "bends"),
     "shell": ("nodes", "triangles", "folds"),
 }
-"""What to count in the structure of each model."""
+"""Parts that the introduction counts, for each model."""
 FILES = ["structure", "laws", *(name for kind in ANALYSES.values() for name in kind.files)]
 DRAWN = [
     "report.html", *(name for name in FILES if "." in name),
     *(f"{name}.{form}" for name in FILES if "." not in name for form in FIGURES),
 ]  # fmt: skip
-"""Patterns of the files of all pages."""
+"""Glob patterns of the files that pages may have."""
 
 
 def run(given: Namespace) -> Path:
@@ -192,7 +192,7 @@ def _saved(one: Computation, result: xarray.Dataset) -> xarray.Dataset:
 
 
 def _tell_missing(place: str, result: xarray.Dataset, say: Callable[[str], None]) -> None:
-    """Say which values a result lacks; raise unless a known reason explains it."""
+    """Print which values a result lacks; raise if no known reason explains their absence."""
     from foldyn.results.quantities import REASONS, missing_values
 
     for name, text in missing_values(result).items():
@@ -217,7 +217,7 @@ def _introduction(
     case_file: CaseFile, told: Told, say: Callable[[str], None]
 ) -> Callable[[], None]:
     """Return a function that announces the run once, after all checks."""
-    show = warnings.showwarning  # the original, even while warnings are being collected
+    show = warnings.showwarning  # Python's function, even while warnings are collected
 
     @cache
     def introduce() -> None:

@@ -18,7 +18,7 @@ HEEDED = [
 
 
 class Endings:
-    """Signals that were received."""
+    """The signals that were received, and how to react to further ones."""
 
     def __init__(self) -> None:
         self.first: int | None = None
@@ -68,7 +68,7 @@ class Endings:
 
     def _receive(self, number: int, _: FrameType | None) -> None:
         again, self.first = self.first is not None, self.first or number
-        if again and number != signal.SIGINT:  # some send it to the process and to its group
+        if again and number != signal.SIGINT:  # some systems signal the process and its group
             return
         if self._saving and not again:
             self._due = True

@@ -30,7 +30,8 @@ class Outlet:
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self.failure: OSError | None = None
-        with suppress(AttributeError, OSError, ValueError):  # characters that its encoding lacks
+        # for characters that the encoding lacks
+        with suppress(AttributeError, OSError, ValueError):
             stream.reconfigure(errors="backslashreplace")  # type: ignore[attr-defined]
 
     def write(self, text: str) -> int:
@@ -114,8 +115,8 @@ def progress_bar(quiet: bool, **options: Any) -> Any:
 def noted_warnings(page_of: Path | None = None) -> Iterator[Told]:
     """Collect warnings and still show them.
 
-    page_of : case file that gets a page. A shipped case chose its model on purpose, so warnings
-    about the model's accuracy appear only on the page.
+    page_of : case file that gets a page. The model of a shipped case was chosen on purpose, so
+    warnings about its accuracy appear only on the page.
     """
     from foldyn.studies import shipped_cases
 
@@ -133,7 +134,7 @@ def noted_warnings(page_of: Path | None = None) -> Iterator[Told]:
 
 
 class Clock(NamedTuple):
-    """Wall and processor time (s) at which a command began."""
+    """Wall time and processor time (s) when a command began."""
 
     wall: float
     cpu: float
@@ -144,5 +145,5 @@ class Clock(NamedTuple):
         return cls(time.perf_counter(), time.process_time())
 
     def spent(self) -> dict[str, float]:
-        """Return the time (s) since then as `wall` and `cpu`."""
+        """Return the time (s) since the command began as `wall` and `cpu`."""
         return {name: b - a for name, a, b in zip(self._fields, self, self.now(), strict=True)}

@@ -84,7 +84,7 @@ def study(given: Namespace) -> Path:
 
 
 def _data(names: Sequence[str] | None, say: Say) -> Data | None:
-    """Return the data measured on the specimen; None if it must be left out."""
+    """Return the data measured on the specimen; None if the specimen must be left out."""
     from foldyn.experiment import opencv
     from foldyn.studies.herkal.specimen.measured import data_of
 
@@ -135,7 +135,7 @@ def _waves(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence
 
 
 def _vary(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence[Done]]:
-    """Compute the sensitivity of the case studies; return its page and the tasks' outcome."""
+    """Compute the sensitivity of the case studies; return the page and the outcome of all tasks."""
     from foldyn.studies import pool
     from foldyn.studies.herkal import report, sensitivity, variations
     from foldyn.studies.herkal.runs import CASES

@@ -30,7 +30,7 @@ DRAWN = [
 OFTEN = 30.0
 """Seconds between lines of progress when output is not a terminal."""
 MOST_NAMED = 5
-"""Most reasons for missing values that are printed."""
+"""Largest number of printed reasons for missing values."""
 
 
 def add_sweep(commands: Any) -> None:
@@ -200,7 +200,7 @@ def _swept(
             if course.failed:
                 bar.set_postfix_str(f"{course.failed} failed", refresh=False)
             if course.done == course.found:
-                bar.initial = course.found  # stored points do not count
+                bar.initial = course.found  # stored points do not count for the speed
             bar.update(course.done - bar.n)
             if bar.disable and course.done < total and time.monotonic() - told > OFTEN:
                 told = time.monotonic()

@@ -121,7 +121,7 @@ def track(given: Namespace) -> Path:
     say(f"wrote {out}, {out.with_suffix('.csv')}")
     if not given.no_figures:
         with drawing(out, f"{_KEPT}{out}"):
-            # without a model only the figures show what was tracked
+            # without a model only figures can show what was tracked
             form = given.figures or (None if "displacement" in ds else "png")
             written = [] if form is None else _figures(ds, out, given.inputs, film, form)
             call = Call(given.typed, tuple(noted), **clock.spent())
@@ -283,7 +283,7 @@ def _footage(
     given: Namespace, written: Sequence[str], thing: Case | xarray.Dataset | None, film: Any,
     tracks: xarray.Dataset,
 ) -> Footage:  # fmt: skip
-    """Describe the film or photographs of the tracks, for their page."""
+    """Describe the film or photographs that were tracked, for the page."""
     from foldyn.cases import Case
     from foldyn.experiment import read_photo
     from foldyn.experiment.tracking.tracks_page import Footage, spread

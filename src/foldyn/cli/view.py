@@ -38,7 +38,7 @@ def run_view(given: Namespace) -> None:
 
     say = speech(given.quiet)
     server, title = served([find_case(name) for name in given.files], given.port)
-    with server, one_thread():  # its matrices are small
+    with server, one_thread():  # threads do not pay for small matrices
         try:
             print(server.address, flush=True)
             say(f"{title}: the page is at this address until Ctrl-C")

@@ -1,4 +1,4 @@
-"""Results in formats of other programs: one module for each, chosen from a registry."""
+"""Results in formats of other programs: one module for each format, chosen from a registry."""
 
 from foldyn.exports.registry import EXPORTS, Export, export
 

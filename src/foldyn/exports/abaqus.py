@@ -1,10 +1,10 @@
 """Abaqus: an input deck of a creased shell, for its frequencies and its statics.
 
-Triangles are ``STRI3``, flat facets of thin shells, or ``S3``. Nodes at one place have equal
-displacements by ``*EQUATION``. Another equation makes their relative rotation about the crease, in
-its position at rest, the first displacement of an extra node, which a spring ``SPRING1`` resists.
-CalculiX, whose springs have no rotations, reads this too. Keywords as in the Abaqus Keywords
-Reference Guide; numbers fit its 20 columns.
+Triangles are ``STRI3``, flat facets of thin shells, or ``S3``. ``*EQUATION`` gives coincident nodes
+equal displacements. A further equation sets the first displacement of an extra node equal to their
+relative rotation about the crease (in its position at rest); a spring ``SPRING1`` resists that
+displacement. CalculiX, whose springs have no rotations, reads this too. Keywords follow the Abaqus
+Keywords Reference Guide; numbers have at most 20 columns, as it requires.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def write(
     modes : int, optional
         How many frequencies; 6 by default.
     element : {"STRI3", "S3"}, optional
-        Kind of the triangles; STRI3 is a thin shell, like Foldyn's.
+        Kind of the triangles; STRI3 is a thin shell, as in Foldyn.
     """
     count = 6 if modes is None else whole("modes", modes, least=1)
     kind = ELEMENTS[0] if element is None else choice("element", element, ELEMENTS)

@@ -1,4 +1,4 @@
-"""Selection of the exported variables, by name, and nodes, by number."""
+"""Selection of exported variables by name, and of exported nodes by number."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ALONG = {
 
 
 def quantities_of(result: xr.Dataset) -> list[str]:
-    """Names of what was computed, and of the rest position; not the case."""
+    """Names of the computed variables and the rest position, without the variables of the case."""
     return [str(name) for name in result.data_vars if name != "case"]
 
 

@@ -1,8 +1,9 @@
-"""A creased shell in the form that finite-element programs need, to write a deck or to run it.
+"""A creased shell in the form that finite-element programs need.
 
-Shells of these programs have rotations at nodes, which panels across a crease cannot share. So each
-panel has its own nodes; coincident nodes move together, and rotate relative to each other about the
-crease against their share of its stiffness.
+Shells of these programs have rotations at nodes, and two panels that meet at a crease cannot share
+them. So each panel has its own nodes. Coincident nodes move together and may rotate relative to
+each other about the crease; a spring with their share of the crease stiffness resists that
+rotation.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from foldyn.structures import Sheet
 from foldyn.structures.discretized import Discretized
 from foldyn.values import whole
 
-DIVISIONS = 16  # enough for frequencies of the case studies within 1 %
+DIVISIONS = 16  # gives frequencies of the case studies within 1 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +58,7 @@ class CreasedShell:
     nodes : (n, 3)
         m.
     triangles, kind : (nt, 3), (nt,)
-        Counter-clockwise from the front, and the sheet of each.
+        Nodes, counter-clockwise seen from the front; index of each triangle's sheet in `sheets`.
     sheets : tuple of Sheet
     joints : tuple of Joint
     places : tuple of tuples of int
@@ -85,7 +86,7 @@ class CreasedShell:
 
     @property
     def membrane(self) -> float:
-        """Largest E t of its sheets, N/m."""
+        """Largest membrane stiffness E t among the sheets, N/m."""
         return max(sheet.youngs_modulus * sheet.thickness for sheet in self.sheets)
 
     @property
@@ -111,7 +112,7 @@ def creased_shell(case: Case, divisions: int | None = None) -> CreasedShell:
     case : Case
         A shell, or bars and hinges, whose pattern and sheet are turned into a shell.
     divisions : int, optional
-        Divisions of every edge for that; 16 by default.
+        Divisions of every edge of that shell; 16 by default.
 
     Raises
     ------
@@ -121,8 +122,7 @@ def creased_shell(case: Case, divisions: int | None = None) -> CreasedShell:
     Warns
     -----
     FoldynWarning
-        Folds that are not linear are linearized about rest; dashpots and motions of the base are
-        left out.
+        Nonlinear folds are linearized about rest; dashpots and motions of the base are left out.
     """
     held = _shell_case(case, divisions)
     _check(held)
@@ -150,14 +150,14 @@ def creased_shell(case: Case, divisions: int | None = None) -> CreasedShell:
 
 
 def shares(count: int) -> NDArray:
-    """Shares (count,) of evenly spaced points in a total: half a share at the ends."""
+    """Shares (count,) of a total for evenly spaced points; the end points get half as much."""
     share = np.full(count, 1.0 / (count - 1))
     share[[0, -1]] *= 0.5
     return share
 
 
 class _Split:
-    """Nodes of a shell (n,), duplicated for each group of panels that continue into each other.
+    """Nodes of a shell (n,), duplicated for each group of panels that are joined without a crease.
 
     Nodes keep their number in the first group that uses them; duplicates are numbered after all.
     """
@@ -210,7 +210,7 @@ def _joints(shell: Shell, split: _Split) -> tuple[Joint, ...]:
 
 
 def fold_slopes(structure: Discretized) -> NDArray:
-    """Slope (nf,) of the folds' law at rest, relative to their stiffness.
+    """Slope (nf,) of the law of each fold at rest, divided by the stiffness of the fold.
 
     Raises
     ------

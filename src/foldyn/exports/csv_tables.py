@@ -1,6 +1,6 @@
 """CSV, tidy: a row for each sample and node, a column for each component, units in the header.
 
-``pandas.read_csv`` reads it as a frame. Numbers have all their digits: with
+``pandas.read_csv`` reads it as a DataFrame. Numbers are written with all digits; with
 ``float_precision="round_trip"`` pandas reads them exactly.
 """
 
@@ -44,10 +44,10 @@ def write(
     case : None
         Not needed.
     rows : str, optional
-        Dimensions of the rows: "time,node", the default for a motion, has displacements, "time"
-        energies, "time,support" reactions, "node" constant quantities.
+        Dimensions of the rows: "time,node" (default for a motion) for displacements, "time" for
+        energies, "time,support" for reactions, "node" for constant quantities.
     fields : str or sequence of str, optional
-        Names of variables; by default all that have these rows.
+        Names of variables; by default all variables with these dimensions.
     nodes : int or sequence of int, optional
         Numbers of nodes; by default all.
     every : int, optional
@@ -133,12 +133,12 @@ def _blocks(table: list[xr.DataArray], samples: NDArray[np.int64]) -> Iterator[I
 
 
 def _over(column: xr.DataArray, rows: Rows) -> xr.DataArray:
-    """A variable over all row dimensions, of length 1 where it lacks them, and axis."""
+    """A variable with all row dimensions and the axis; dimensions it lacks get the length 1."""
     missing = [dim for dim in (*rows, "axis") if dim not in column.dims]
     return column.expand_dims(missing).transpose(*rows, "axis")
 
 
 def _parts(column: NDArray) -> list[list]:
-    """A column as lists of plain values, two of them if it is complex."""
+    """A column as lists of plain values: one list, or two if it is complex."""
     parts = (np.real(column), np.imag(column)) if np.iscomplexobj(column) else (column,)
     return [part.tolist() for part in parts]

@@ -1,7 +1,7 @@
-"""GLB: a sheet that moves, for Blender and browsers.
+"""GLB: a moving sheet, for Blender and browsers.
 
 The file holds node positions at rest and, as morph targets, displacements at each key or in each
-mode. Weights that change linearly in time blend one key into the next. There are no normals, so a
+mode. Weights that change linearly in time interpolate between keys. There are no normals, so a
 viewer shades every triangle flat. Lengths are meters; our z axis, which points up, becomes the
 format's y axis.
 """
@@ -28,7 +28,7 @@ from foldyn.viewer.sheet import KINDS, edge_pieces
 from foldyn.writing import write_bytes
 
 TRIANGLES, LINES = 4, 1
-"""Modes of primitives."""
+"""Mode numbers of primitives in glTF."""
 _COMPONENT = {"f4": 5126, "u4": 5125}
 _SHAPE = {1: "SCALAR", 3: "VEC3"}
 _VERTICES, _INDICES = 34962, 34963
@@ -105,7 +105,7 @@ SHORTEST, LONGEST = 1e-3, 1e6
 """Bounds of the length of an animation, s."""
 SWING_KEYS = 32
 UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
-"""Quaternion of the rotation that turns z up into y up."""
+"""Quaternion of the rotation that turns the upward axis z into y."""
 
 
 class Animation(NamedTuple):
@@ -141,8 +141,8 @@ def write(
     scale : float
         Factor on all displacements.
     seconds : float, optional
-        Length of the animation: by default that of the motion, `PATH_SECONDS` for a path, and
-        `SWING_SECONDS` for one period of a mode.
+        Length of the animation: by default the duration of the motion, `PATH_SECONDS` for a path,
+        and `SWING_SECONDS` for one period of a mode.
     """
     warn_of_boards(case.structure.pattern)
     kind = result.attrs["foldyn_result"]
@@ -165,7 +165,7 @@ def write(
 
 
 def _there_and_back(shapes: Shapes) -> Shapes:
-    """Each mode and its opposite, as Blender allows no negative weights."""
+    """Each mode and its opposite, because Blender allows no negative weights."""
     back = [f"{title}, back" for title in shapes.titles]
     both = np.concatenate([shapes.displacement, -shapes.displacement])
     return shapes._replace(titles=shapes.titles + back, displacement=both)

@@ -1,9 +1,9 @@
 """MAT, version 5, for MATLAB and Octave: ``run = load("run.mat")`` reads it as a struct.
 
-Arrays keep their dimensions, complex numbers stay complex. All numbers are doubles; nodes, vertices
-and supports count from 1. `faces` has a row for each panel, padded with NaN for ``patch("Vertices",
-run.vertices, "Faces", run.faces)``. Units and meanings are in the structs `units` and `labels`,
-facts about the run in `attributes`.
+Arrays keep their dimensions, complex numbers stay complex. All numbers are doubles; numbers of
+nodes, vertices and supports start at 1. `faces` has a row for each panel, padded with NaN for
+``patch("Vertices", run.vertices, "Faces", run.faces)``. Units and meanings are in the structs
+`units` and `labels`, facts about the run in `attributes`.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from foldyn.results.stored_case import sections_of
 from foldyn.writing import whole
 
 MOST = 2**31 - 1
-"""Most bytes of a variable in version 5."""
+"""Largest size of a variable in version 5, in bytes."""
 LONGEST = 63
-"""Most letters of a name in MATLAB."""
+"""Largest number of letters of a name in MATLAB."""
 KEYWORDS = frozenset({
     "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function",
     "global", "if", "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",
 })  # fmt: skip
 COUNTED = ("node", "support_node")
-"""Variables that number nodes."""
+"""Variables that hold node numbers."""
 
 
 def write(

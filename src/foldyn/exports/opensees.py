@@ -1,8 +1,8 @@
-"""OpenSees: a creased shell as a list of commands, to run directly or to write as Tcl.
+"""OpenSees: a creased shell as a list of commands, which can be run or written as Tcl.
 
 Triangles are ``ASDShellT3 -corotational``: MITC3 with drilling rotations, a third of their mass at
-each corner. Nodes at one place are tied by stiff springs of a ``zeroLength`` element, whose fourth
-direction is the rotation about the crease, in its position at rest.
+each corner. Coincident nodes are tied by stiff springs of a ``zeroLength`` element; its fourth
+direction is the rotation about the crease, in the crease's position at rest.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from foldyn.values import whole
 from foldyn.writing import write_text
 
 Command = tuple[Any, ...]
-"""Name of a command of OpenSees, and its arguments."""
+"""Name of an OpenSees command, followed by its arguments."""
 
 TIE = 100.0  # stiffness of the springs that tie nodes, relative to the membrane stiffness E t (N/m)
 TOLERANCE = 1e-7  # m and rad: norm of the last correction in a step
@@ -32,7 +32,7 @@ EIGEN = "-genBandArpack"
 
 
 def model(shell: CreasedShell, tie: float = TIE) -> Iterator[Command]:
-    """Nodes, elements, springs, supports and point masses; node k has number k + 1."""
+    """Commands for nodes, elements, springs, supports and point masses; node k has number k + 1."""
     for number, point in enumerate(shell.nodes.tolist(), 1):
         yield "node", number, *point
     for number, sheet in enumerate(shell.sheets, 1):
@@ -72,7 +72,7 @@ def _springs(shell: CreasedShell) -> Iterator[Command]:
 
 
 def first_springs(shell: CreasedShell) -> list[int]:
-    """Number of the first spring of each joint, and the one after the last."""
+    """Number of the first spring of each joint, and the number after the last spring."""
     counts = [len(joint.nodes) for joint in shell.joints]
     return np.cumsum([len(shell.triangles) + 1, *counts]).tolist()
 
@@ -84,7 +84,7 @@ def _frame(joint: Joint) -> list[float]:
 
 
 def load(number: int, force: NDArray, *series: Any) -> Iterator[Command]:
-    """Forces (n, 3), N, times a series of factors, given by its kind and arguments."""
+    """Nodal forces (n, 3), N, times a time series, which is given by its kind and arguments."""
     kind, *rest = series
     yield "timeSeries", kind, number, *rest
     yield "pattern", "Plain", number, number
@@ -93,7 +93,7 @@ def load(number: int, force: NDArray, *series: Any) -> Iterator[Command]:
 
 
 def solver(algorithm: str, tolerance: float = TOLERANCE) -> Iterator[Command]:
-    """Plain constraints and an unsymmetric solver, as the tangent is not symmetric."""
+    """Plain constraints and an unsymmetric solver, because the tangent is not symmetric."""
     yield "constraints", "Plain"
     yield "numberer", "RCM"
     yield "system", "UmfPack"

@@ -23,7 +23,7 @@ def write(
     frames: int | None = None,
     scale: float = 1.0,
 ) -> list[Path]:
-    """Write all states as frames if the format has them; otherwise the last state, or a series.
+    """Write all states as frames if the format has frames; otherwise the last state, or a series.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def write(
     frame : int, optional
         Number of the one sample to write.
     every, frames : int, optional
-        Take every n-th sample and the last one, or this many, evenly spread.
+        Take every n-th sample and the last one, or this many samples, evenly spread.
     scale : float
         Factor on all displacements.
     """

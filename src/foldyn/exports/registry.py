@@ -28,16 +28,16 @@ class Export:
     Parameters
     ----------
     name : str
-        Its name: "glb".
+        Name of the format, such as "glb".
     suffixes : tuple of str
         File suffixes, lower case with the dot.
     kinds : tuple of str
-        Kinds of results that it can hold, keys of `chosen.ALONG`.
+        Kinds of results that the format can hold, as in the keys of `chosen.ALONG`.
     write : callable
         ``write(result, path, case, **options)`` writes the file, or several, and returns their
         paths. Its keyword-only arguments are the options of the format.
     doc : str
-        Its purpose, in a few words.
+        Purpose of the format, in a few words.
     needs_case : bool
         Whether `write` needs the case of the result; otherwise it gets None, so that results
         without a rebuildable case can be exported too.
@@ -58,7 +58,7 @@ class Export:
 
     @property
     def options(self) -> tuple[str, ...]:
-        """Names of its options."""
+        """Names of the options of the format."""
         arguments = inspect.signature(self.write).parameters.values()
         return tuple(each.name for each in arguments if each.kind is each.KEYWORD_ONLY)
 
@@ -133,8 +133,8 @@ def export(
     Raises
     ------
     InputError
-        Not a result, an unknown format or option, a format that does not hold results of this
-        kind, or a file that cannot be written.
+        The input is not a result, the format or an option is unknown, the format does not hold
+        results of this kind, or the file cannot be written.
 
     Examples
     --------

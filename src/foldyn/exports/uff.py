@@ -1,9 +1,9 @@
 """Universal files (UFF, UNV) for modal software: geometry, modes, frequency responses, histories.
 
-Datasets 164 (units: SI), 2411 (nodes), 82 (lines along all edges), 2412 (panels), then 55 for each
-mode, or 58 for each node and axis of a response or a motion. Nodes count from 1. Formats after
-https://www.ceas3.uc.edu/sdrluff (I-DEAS universal file format). Abscissae have six digits there,
-displacements of modes too; ordinates of dataset 58 have thirteen.
+The file has datasets 164 (units: SI), 2411 (nodes), 82 (lines along all edges), 2412 (panels), then
+55 for each mode, or 58 for each node and axis of a response or a motion. Node numbers start at 1.
+Formats follow https://www.ceas3.uc.edu/sdrluff (I-DEAS universal file format). In them, abscissae
+and displacements of modes have six digits, ordinates of dataset 58 thirteen.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from foldyn.results.contents import pattern_of
 from foldyn.writing import whole
 
 TRIANGLE, QUADRILATERAL = 91, 94  # thin shells, linear
-TRACED = 80  # edges of one line of dataset 82, which has 250 entries at most
+TRACED = 80  # edges in one dataset 82, which has at most 250 entries
 DIGITS = 5e-6  # relative error of an abscissa of six digits
 NONE = "NONE"
 
 
 class Function(NamedTuple):
-    """Header fields of a variable's functions in dataset 58."""
+    """Header fields of dataset 58 for a variable."""
 
     kind: int  # time response 1, frequency response 4, transmissibility 5, coherence 6
     ordinate: tuple[int, str, str]  # specific data type, label, unit
@@ -69,8 +69,8 @@ def write(
     case : None
         Not needed.
     fields : str or sequence of str, optional
-        Of a motion "displacement", the default, and "velocity"; of a response itself, the default,
-        and "coherence".
+        Names of variables. A motion has "displacement" (default) and "velocity"; a response has the
+        variable of its own name (default) and "coherence".
     nodes : int or sequence of int, optional
         Nodes with functions or mode shapes, counted from 0; by default all.
 

@@ -31,15 +31,15 @@ from foldyn.viewer.states import Field, fields, folding_fields
 from foldyn.writing import whole
 
 VERSION = (2, 0)
-"""Version of the format, the first with samples in time."""
+"""Version of the format: the first version with samples in time."""
 CELLS = ("Vertices", "Lines", "Polygons", "Strips")
 """Kinds of cells, in the order of their fields."""
 BAR, PANEL = len(KINDS), len(KINDS) + 1
-"""Kinds of cells other than edges, whose kind is the index of their letter in `KINDS`."""
+"""Kinds of cells other than edges; the kind of an edge is the index of its letter in `KINDS`."""
 NAMES = {"bar_strain": "strain", "fold_moment": "moment"}
-"""Names of cell fields that differ in the file."""
+"""Cell fields that have another name in the file."""
 ROWS = 1 << 14
-"""Rows of a compressed chunk of an array, at least one sample."""
+"""Number of rows in a compressed chunk of an array; a chunk has at least one sample."""
 
 
 class Mesh(NamedTuple):
@@ -76,7 +76,8 @@ def write(
     case : Case
         Case of the result.
     every, frames : int, optional
-        Take every n-th sample and the last one, or this many, evenly spread; all by default.
+        Take every n-th sample and the last one, or this many samples, evenly spread; all by
+        default.
     """
     warn_of_boards(case.structure.pattern)
     shapes = shapes_of(result, every, frames=frames)
@@ -147,7 +148,7 @@ def _cell_fields(mesh: Mesh, known: Mapping[str, Field]) -> dict[str, NDArray]:
 
 
 def _along(result: xr.Dataset, dimension: str, *rest: str) -> dict[str, NDArray]:
-    """Scalars and vectors of a result along a dimension and, if given, further ones."""
+    """Scalars and vectors of a result along a dimension, which may have further dimensions."""
     shapes = {(dimension, *rest), (dimension, *rest, "axis")} if rest else {(dimension,)}
     return {
         str(name): each.values

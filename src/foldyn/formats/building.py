@@ -21,10 +21,10 @@ from foldyn.patterns.topology import Edge, Faces, edge_lookup, edge_of
 from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.values import LONGEST, SHORTEST, number
 
-_FARTHEST = 1e8  # from the origin, relative to the size: keeps eight digits
-_COARSEST = 0.05  # of the size: tolerance
-_SHUT = 179.0  # degrees: fold angles of closed creases
-_TURNED = 1e-3  # rad from pi: larger angles count as folded
+_FARTHEST = 1e8  # largest distance from the origin, relative to the size: keeps eight digits
+_COARSEST = 0.05  # largest tolerance, relative to the size
+_SHUT = 179.0  # degrees: larger fold angles count as closed
+_TURNED = 1e-3  # rad: larger fold angles count as folded
 
 
 class Built(NamedTuple):
@@ -43,14 +43,14 @@ def built(
     Lines without faces lie in the plane: coincident ends are joined, lines are split where they
     meet, panels are the enclosed regions, and open ends are left out. With faces, in the plane or
     in space, points that panels should share are merged. Cuts inside become two edges of the
-    boundary; joins ("J", FOLD 1.2: the panels are one) become flat creases.
+    boundary. Joins ("J" in FOLD 1.2: two parts of one panel) become flat creases.
 
     Parameters
     ----------
     drawing : Drawing
         Result of a reader, with or without faces.
     meters : float, optional
-        Length of the drawing's unit (m), instead of the file's or the assumed one
+        Length of the drawing's unit (m), instead of the length in the file or the assumed length
         (`drawing.assumed`).
     scale : float
         Factor on all lengths, in addition to the unit.
@@ -110,7 +110,7 @@ def built(
 
 
 def _facets(pattern: Pattern, panels: Panels) -> tuple[Edge, ...]:
-    """Creases drawn as flat that are to stay flat."""
+    """Creases that are drawn as flat and are to stay flat."""
     folded = edge_lookup(pattern.creases[np.nan_to_num(pattern.fold_angles) != 0.0])
     drawn = [(a, b) for a, b in pattern.creases.tolist() if panels.letters.get((a, b)) == "F"]
     return tuple(edge for edge in drawn if edge not in folded)
@@ -214,7 +214,7 @@ def _with_sides(
     bare: Pattern, given: NDArray[np.str_], faces: Faces, panels: Panels, drawing: Drawing,
     notes: Notes,
 ) -> NDArray[np.str_]:  # fmt: skip
-    """Letters of creases; for closed ones from the fold angle or from the order of layers.
+    """Letters of creases; for closed creases they follow from fold angles or the order of layers.
 
     Coincident panels have their fronts together at a valley, and their backs together at a
     mountain.
@@ -233,7 +233,7 @@ def _with_sides(
         told = "V" if side > 0 else "M"
         if given[k] in ("M", "V"):
             against += [edge] if order and told != given[k] else []
-        elif side and (not given[k] or told == "M"):  # others are closed to the front
+        elif side and (not given[k] or told == "M"):  # other creases are closed to the front
             letters[k] = told
         elif not side and turn[k] > np.pi - LAYERS:
             letters[k] = given[k] or "V"
@@ -249,7 +249,7 @@ def _with_sides(
 
 
 def _with_fronts(pattern: Pattern, faces: Faces, drawing: Drawing, notes: Notes) -> Pattern:
-    """Keep the pattern's order of layers if its panels, from `faces`, are those of the file.
+    """Keep the order of layers if the panels, built from `faces`, are the panels of the file.
 
     The order refers to fronts, so it is reversed for panels that were turned over.
     """

@@ -17,7 +17,7 @@ from foldyn.formats.lines import MOST_LINES, too_many
 CHORD = 1e-3
 """Distance of a curve from its chords, relative to the size of the drawing."""
 MOST = 1000
-"""Most chords of one piece of a curve."""
+"""Largest number of chords of one piece of a curve."""
 
 
 def bezier(control: ArrayLike, tolerance: float) -> NDArray[np.float64]:
@@ -37,7 +37,7 @@ def bezier(control: ArrayLike, tolerance: float) -> NDArray[np.float64]:
 
 
 def arc_chords(radius: float, sweep: float, tolerance: float) -> int:
-    """Number of chords of an arc (rad), each departing by radius (1 - cos of half its angle)."""
+    """Number of chords of an arc (rad); a chord departs by radius (1 - cos of its half angle)."""
     if tolerance >= radius:
         return max(1, math.ceil(abs(sweep) / (0.5 * math.pi) - 1e-9))
     return chords(abs(sweep) / (2 * math.acos(1 - tolerance / radius)))
@@ -84,7 +84,7 @@ class Chords:
     def drawing(
         self, curved: int, fold_angles: ArrayLike, repairs: Sequence[str], **more: Any
     ) -> Drawing:
-        """Drawing of all lines, of which some were curves, with further repairs and fields."""
+        """Drawing of all lines, with further repairs and fields; `curved` shapes were curves."""
         told = [f"{count(curved, 'curve')} drawn as chords, within {self.tolerance:.3g} units"]
         repairs = (*told[:curved], *without_length(self._has_length), *repairs)
         if not self.letters:

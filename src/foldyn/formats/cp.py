@@ -1,8 +1,9 @@
-"""CP, the crease patterns of ORIPA, Oriedita and Orihime: a line of text for each line.
+"""CP, the crease patterns of ORIPA, Oriedita and Orihime: a line of text for each drawn line.
 
-Each has five numbers, ``type x1 y1 x2 y2``: type 1 the outline or a cut, 2 a mountain, 3 a valley,
-4 (and 0) an auxiliary line, which is flat. y points down, as on the screen of these programs
-(Oriedita's DxfExporter.java turns it over); their paper is 400 units wide, taken as millimeters.
+Each line of text has five numbers, ``type x1 y1 x2 y2``: type 1 the outline or a cut, 2 a mountain,
+3 a valley, 4 (and 0) an auxiliary line, which is flat. y points down, as on the screen of these
+programs (Oriedita's DxfExporter.java turns it over); their paper is 400 units wide, taken as
+millimeters.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def read(text: str) -> Drawing:
     Raises
     ------
     InputError
-        A line that does not describe a crease pattern's line; the message names it.
+        A line of text does not describe a line of a crease pattern; the message names it.
     """
     kinds: list[str] = []
     points: list[tuple[float, float]] = []

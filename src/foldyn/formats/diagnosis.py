@@ -15,7 +15,7 @@ ROUNDING = np.radians(0.1)
 MOST_ROWS = 30
 MOST_MOVED = 10
 LISTED = 1e-9
-"""Least move of a vertex (m) that is reported."""
+"""Smallest move of a vertex (m) that is reported."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,11 +27,12 @@ class Diagnosis:
     size : tuple of float
         Extent of the sheet along x, y and z (m).
     assumptions : tuple of str
-        Facts missing in the file: its unit, the meaning of its colors.
+        What was assumed because the file does not say it, such as its unit or the meaning of
+        colors.
     repairs : tuple of str
         What was repaired.
     doubts : tuple of str
-        What may not be intended.
+        What may not be as intended.
     vertices : FlatFoldability
         Maekawa's and Kawasaki's conditions at interior vertices.
     facets : tuple of pairs of int

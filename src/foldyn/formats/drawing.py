@@ -39,9 +39,9 @@ class Drawing:
     edges : ndarray of int, shape (m, 2)
         Vertex numbers of each line.
     letters : tuple of str
-        For each line "B", "M", "V", "F", "U", "C" (cut) or "J" (join), as in FOLD.
+        Letter of each line: "B", "M", "V", "F", "U", "C" (cut) or "J" (join), as in FOLD.
     fold_angles : ndarray, shape (m,)
-        Angle (degrees, positive on valleys) to fold each line to; NaN if not given.
+        Angle (degrees, positive for valleys) to which each line folds; NaN if not given.
     faces : tuple of tuple of int, optional
         Panels; None if the file has only lines, from which panels are to be found.
     meters : float, optional
@@ -49,14 +49,14 @@ class Drawing:
     assumed : float
         Length (m) assumed for the unit if neither the file nor the user gives it.
     unit : str
-        Name of the format's unit, for messages: "px".
+        Name of the format's unit for messages, such as "px".
     name : str
         Title.
     places : tuple of str
-        Where each line is in the file ("line 12", "path 3"), for messages; () if its number says
-        so.
+        Where each line is in the file, for messages, such as "line 12" or "path 3"; () if messages
+        name lines by number.
     repairs, assumptions, doubts : tuple of str
-        What the reader repaired, assumed, and doubts, in words.
+        Sentences on what the reader repaired, assumed, and doubts.
     families : mapping
         Names for groups of lines, each with pairs of vertex numbers.
     welds : sequence, optional
@@ -111,7 +111,7 @@ def coordinate(text: str, place: str, given: str = "") -> float:
     Raises
     ------
     InputError
-        It is not a finite number; the message names the place and shows the text.
+        The text is not a finite number; the message names the place and shows the text.
     """
     try:
         value = parsed(text)
@@ -132,7 +132,7 @@ def count(number: int, noun: str, plural: str = "") -> str:
 
 
 def without_length(has_length: Mapping[str, bool]) -> list[str]:
-    """Sentence on elements that shrink to points, as by a scale of 0, with their places."""
+    """Sentence on elements that shrink to points, say by a scale of 0, with their places."""
     places = [place for place, has in has_length.items() if not has]
     if not places:
         return []
@@ -174,7 +174,7 @@ class Notes:
         return ", ".join(shown) + more
 
     def contradict(self, pairs: Sequence[tuple[int, int]]) -> None:
-        """Report coincident lines of which one is a mountain and the other a valley."""
+        """Report pairs of coincident lines where one is a mountain and the other a valley."""
         if pairs:
             one, other = pairs[0]
             more = f" (and {len(pairs) - 1} more such pairs)" if len(pairs) > 1 else ""

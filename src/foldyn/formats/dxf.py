@@ -1,8 +1,8 @@
-"""DXF crease patterns: layers, or else colors, tell the kinds of lines.
+"""DXF crease patterns: the kind of a line follows from its layer, or else from its color.
 
-The kind follows from a word in the layer's name: mountain, valley, cut, border (boundary, outline,
-contour), facet (flat, aux), fold (crease, hinge; without a letter); or from the name M, V, C, B, F
-or U. The library ezdxf reads the format.
+A layer defines the kind by a word in its name: mountain, valley, cut, border (boundary, outline,
+contour), facet (flat, aux), fold (crease, hinge; without a letter); or by the name M, V, C, B, F or
+U. The library ezdxf reads the format.
 """
 
 from __future__ import annotations
@@ -43,7 +43,8 @@ _MOST_INSERTED = 10_000
 _UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 12: "nm", 13: "um", 21: "ft"}
 """Units by their number in $INSUNITS (DXF reference, header section)."""
 _COLOR_NUMBERS = {"B": 7, "M": 1, "V": 5, "F": 2, "U": 6, "C": 3}
-"""AutoCAD color number of each written layer: black or white, red, blue, yellow, magenta, green."""
+"""AutoCAD color number of each layer that is written: black or white, red, blue, yellow, magenta,
+green."""
 
 
 def read(text: str) -> Drawing:
@@ -63,7 +64,7 @@ def read(text: str) -> Drawing:
     Raises
     ------
     InputError
-        Not DXF, no lines, or ezdxf is not installed.
+        The text is not DXF or has no lines, or ezdxf is not installed.
     """
     document = _document(ezdxf(), text)
     with _reading("entities"):
@@ -97,7 +98,7 @@ def read(text: str) -> Drawing:
 def _document(library: Any, text: str) -> Any:
     _check_numbers(text)
     logger, handler = logging.getLogger("ezdxf"), logging.NullHandler()
-    logger.addHandler(handler)  # otherwise its log goes to standard error
+    logger.addHandler(handler)  # otherwise ezdxf logs to standard error
     try:
         with _reading("is not a DXF file"):
             return library.read(io.StringIO(text))
@@ -122,7 +123,7 @@ def _check_numbers(text: str) -> None:
 
 @contextmanager
 def _reading(place: str) -> Iterator[None]:
-    """Refuse what the library cannot read; damaged files can raise any kind of error."""
+    """Within the block, refuse what ezdxf cannot read; damaged files can raise any error."""
     try:
         yield
     except InputError:
@@ -133,7 +134,7 @@ def _reading(place: str) -> Iterator[None]:
 
 
 def _entities(document: Any) -> tuple[list[Any], list[str]]:
-    """Line entities, including those in blocks, and remarks on the others."""
+    """Line entities, including entities in blocks, and remarks on other entities."""
     from ezdxf.disassemble import recursive_decompose
 
     layers = [layer for layer in document.layers if layer.is_off() or layer.is_frozen()]
@@ -199,7 +200,7 @@ def _along(entity: Any, path: Any, tolerance: float) -> NDArray[np.float64]:
 
 
 def _letter(entity: Any, document: Any, colors: Counter[tuple[RGB, RGB | None]]) -> str | None:
-    """Letter of a line by its layer, else by its color; None if it is white."""
+    """Letter of a line from its layer, else from its color; None for a white line."""
     name = str(entity.dxf.get("layer", "0"))
     for letter, pattern in _LAYERS:
         if pattern.search(name.lower()):
@@ -211,7 +212,7 @@ def _letter(entity: Any, document: Any, colors: Counter[tuple[RGB, RGB | None]])
 
 
 def _color(entity: Any, document: Any, layer: str) -> RGB:
-    """Color of a line, its own or its layer's; index 7 is black on white paper."""
+    """Color of a line, or else of its layer; color index 7 is black on white paper."""
     from ezdxf.colors import aci2rgb
 
     holders = [entity]

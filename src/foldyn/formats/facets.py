@@ -1,7 +1,7 @@
-"""What is done to a pattern once it is built from a file: facets, convex panels, slips.
+"""Steps after a pattern is built from a file: facets, convex panels, slips.
 
-Facets are lines assigned "F" along which a sheet is not creased. Slips of drawing keep a pattern
-from folding flat.
+Facets are lines assigned "F" along which a sheet is not creased. Slips are small errors of a
+drawing that keep a pattern from folding flat.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 def with_facets(made: Built, drawing: Drawing, facets: str | None) -> Built:
     """Weld the facets of a pattern, or keep them as creases.
 
-    facets : one of `FACETS`; None means "weld" if all facets are coplanar with their panels,
-        or the file says which of its flat creases are facets, else "hinge".
+    facets : one of `FACETS`. None means "weld" if all facets are coplanar with their panels or if
+    the file marks which of its flat creases are facets, otherwise "hinge".
     """
     drawn = _drawn(made, drawing)
     if facets is not None:
@@ -107,7 +107,7 @@ _DOUBTED = 1e-4
 
 
 def without_slips(made: Built, mend: bool, is_state: bool) -> Built:
-    """Move vertices to where they fold flat, if asked for; otherwise offer to.
+    """Move vertices to places where they fold flat if `mend` is set; otherwise suggest it.
 
     is_state : whether the pattern is one of several states, which may be strained.
     """

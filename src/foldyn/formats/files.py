@@ -44,13 +44,13 @@ class Format:
     extensions : tuple of str
         File extensions, lower case with the dot.
     read : callable or None
-        From the text of a file to a `Drawing`; raises `InputError` naming the place.
-        None: the format is written only.
+        Turns the text of a file into a `Drawing`; raises `InputError`, which names the place. None:
+        the format is written only.
     write : callable or None
-        From a `Pattern` to the text of a file. None: the format is read only.
+        Turns a `Pattern` into the text of a file. None: the format is read only.
     frames : bool
-        Whether files hold several frames: `read` then takes the number or title of one as its
-        second argument, and `write` a sequence of `Frame`.
+        Whether files hold several frames. If so, the second argument of `read` is the number or
+        title of a frame, and that of `write` a sequence of `Frame`.
     """
 
     name: str
@@ -98,15 +98,15 @@ def read_pattern(
     scale : float, optional
         Factor on all lengths.
     unit : str, optional
-        Unit of the file's coordinates, such as "mm", instead of the one in the file. A file without
-        a unit is taken to be in meters.
+        Unit of the file's coordinates, such as "mm", instead of the unit in the file. A file
+        without a unit is taken to be in meters.
     frame : int or str, optional
         Number or title of a frame, if the file has several.
     facets : {"weld", "line", "hinge"}, optional
         Meaning of lines assigned "F". "weld": facets across which the sheet is continuous; panels
         are joined, as `welded` does. "line": facets, kept as the pattern's `welds`. "hinge": flat
-        creases. By default they are facets, as with "weld", if all are coplanar with their panels,
-        which a warning says; else hinges. Files by Foldyn say which are facets. Unless it is
+        creases. By default they are facets, as with "weld", if all are coplanar with their panels
+        (a warning reports this); else hinges. Files by Foldyn mark which are facets. Except with
         "line", panels that are not convex are cut along welds, as `convex` does.
     tolerance : float, optional
         Distance (m) within which ends of lines, or points that panels should share, are merged; by
@@ -123,13 +123,13 @@ def read_pattern(
     Raises
     ------
     InputError
-        No such file, an unknown extension, or content that is not a pattern and cannot be repaired;
-        the message names the file and the place.
+        The file does not exist, has an unknown extension, or its content is not a pattern and
+        cannot be repaired; the message names the file and the place.
 
     Warns
     -----
     FoldynWarning
-        Assumptions, with the pattern's size, repairs, and doubts.
+        The reader made assumptions (shown with the pattern's size) or repairs, or has doubts.
     """
     pattern, diagnosis = diagnose(
         path,
@@ -166,8 +166,8 @@ def diagnose(
     Returns
     -------
     Built
-        The `pattern`, and the `diagnosis`: assumptions, repairs and doubts. Its text is the output
-        of ``foldyn convert --check``.
+        The `pattern`, and the `diagnosis`: assumptions, repairs and doubts. The text of the
+        diagnosis is the output of ``foldyn convert --check``.
 
     Raises
     ------
@@ -194,7 +194,7 @@ def diagnose(
 
 
 def _without_repetition(made: Built) -> Built:
-    """Drop fold angles that equal the current ones: they are no state to fold to."""
+    """Drop fold angles that equal the current angles: they define no other state to fold to."""
     wanted, there = made.pattern.fold_angles, fold_angles(made.pattern)
     given = ~np.isnan(wanted)
     if given.any() and np.abs(wanted - there)[given].max() < SAME:
@@ -235,7 +235,7 @@ def write_pattern(
     Raises
     ------
     InputError
-        An unknown extension (nothing is touched then), or the file cannot be written.
+        The extension is unknown (no file is touched then), or the file cannot be written.
     """
     file, fmt = _file_and_format(path)
     if fmt.write is None:

@@ -1,4 +1,4 @@
-"""Panels of a drawing with only lines: its planar graph, with notes on repairs."""
+"""Panels of a drawing that has only lines, found from its planar graph, with notes on repairs."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from foldyn.formats.planar import (
 )
 from foldyn.formats.regions import areas, enclosed, sheet, straightened
 
-_SAME = 1e-9  # of the size: larger distances between ends are reported
-_PLANE = 1e-9  # of the size
+_SAME = 1e-9  # relative to the size: larger distances between joined ends are reported
+_PLANE = 1e-9  # relative to the size: smaller heights count as zero
 
 
 def flat_panels(lines: Lines, notes: Notes, tolerance: float | None = None) -> Panels:
@@ -31,7 +31,7 @@ def flat_panels(lines: Lines, notes: Notes, tolerance: float | None = None) -> P
     Parameters
     ----------
     lines : Lines
-        As drawn (m), with two coordinates, or three of which one is constant.
+        Lines as drawn (m), with two coordinates, or with three coordinates if one is constant.
     notes : Notes
         Collects repairs and doubts.
     tolerance : float, optional
@@ -119,7 +119,7 @@ def _uncut(drawn: Panels, kept: Panels, openings: NDArray, cuts: int) -> int:
 
 
 def _in_plane(lines: Lines, notes: Notes) -> Lines:
-    """Lines in the xy plane, turned from another plane as seen from its positive side."""
+    """Lines in the xy plane; another plane is turned into it, seen from its positive side."""
     points = lines.points
     if not len(lines.ends):
         raise InputError(": there are none; give a file with a crease pattern", "lines")
@@ -141,7 +141,7 @@ def _in_plane(lines: Lines, notes: Notes) -> Lines:
 
 
 def _joined(lines: Lines, tolerance: float, notes: Notes) -> Lines:
-    """Lines with joined ends, without those of zero length."""
+    """Lines with joined ends; lines of zero length are left out."""
     whole = joined(lines, tolerance)
     moves = np.linalg.norm(whole.points[whole.ends] - lines.points[lines.ends], axis=2)
     moved = int(np.count_nonzero(moves > _SAME * lines.size))
@@ -175,7 +175,7 @@ def _on_lines(lines: Lines, tolerance: float, notes: Notes) -> Lines:
 
 
 def _tell_loose(loose: Lines, lines: Lines, notes: Notes) -> None:
-    """Report lines that bound no panel; long pieces of creases were meant to divide panels."""
+    """Report lines that bound no panel; among them, cuts and long pieces of creases are doubted."""
     folds = np.isin(loose.letters, ("M", "V", "U")) & (loose.lengths > 2 * GAP * lines.size)
     slits = loose.letters == "C"
     for which, told, noun, what in (

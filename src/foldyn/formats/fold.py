@@ -27,9 +27,9 @@ from foldyn.values import choice, show, single
 
 ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
 FAMILIES = "foldyn:families"
-"""Key of the families of creases, as lists of vertex pairs by name."""
+"""Key of the families of creases: lists of vertex pairs by name."""
 WELDS = "foldyn:welds"
-"""Key of flat edges that are welds, as vertex pairs; other flat edges are hinges."""
+"""Key of the flat edges that are welds: vertex pairs; other flat edges are hinges."""
 _OLD = {"edges_foldAngles": "edges_foldAngle", "edges_lengths": "edges_length"}  # spec 1.0
 _COMMA = re.compile(r'("(?:[^"\\]|\\.)*+")|,(?=\s*+[\]}])')
 _OF_ELEMENTS = re.compile(r"(?:vertices|edges|faces)_")
@@ -56,7 +56,8 @@ def read(text: str, frame: int | str | None = None) -> Drawing:
     Raises
     ------
     InputError
-        Not a FOLD file, no such frame, or inconsistent; the message names the field.
+        The text is not a FOLD file, lacks the frame, or is inconsistent; the message names the
+        field.
     """
     document, repairs = _document(text)
     fields = _frame(document, frame)
@@ -266,7 +267,7 @@ def _edges(
     give = "degrees from -180 (a closed mountain) to 180 (a closed valley), or null"
     _check("edges_foldAngle", given, _is_angle, give)
     angles = np.array([np.nan if angle is None else angle for angle in given], np.float64)
-    if "edges_assignment" not in fields:  # edges of faces get the letter of the dihedral
+    if "edges_assignment" not in fields:  # edges of faces get their letter from the dihedral
         letters = ["V" if a > 0 else "M" if a < 0 else "" if with_faces else "U" for a in angles]
     told = [e for e, letter in enumerate(letters) if letter]
     ends = np.array(pairs, dtype=np.int64).reshape(-1, 2)
@@ -288,7 +289,7 @@ def _is_angle(angle: Any) -> bool:
 
 
 def _custom(fields: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    """Data of other programs, and the keys of data that would not fit a repaired pattern."""
+    """Data of other programs, and the keys of such data that would not fit a repaired pattern."""
     keys = [key for key in fields if ":" in key and key not in (FAMILIES, WELDS)]
     dropped = [key for key in keys if _OF_ELEMENTS.match(key)]
     custom = {key: fields[key] for key in keys if key not in dropped}
@@ -332,8 +333,8 @@ def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:
     Parameters
     ----------
     pattern : Pattern
-        The key frame. Its fold angles are the ones to fold to, if given, or else the current angles
-        of a folded pattern; a flat pattern without angles has none.
+        The key frame. Written fold angles are the angles to fold to, if given, or else the current
+        angles of a folded pattern; a flat pattern without angles gets none.
     frames : sequence of Frame, optional
         Further states, which inherit all but coordinates and fold angles from the key frame.
 
@@ -389,7 +390,7 @@ def _state(pattern: Pattern, frame: Frame, rows: Sequence[int | None]) -> dict[s
 
 
 def _degrees(angles: NDArray, rows: Sequence[int | None]) -> list[float | None]:
-    """Angles of all edges from those of the creases; 0 on the boundary, None if unknown."""
+    """Angles of all edges from the angles of creases; 0 on the boundary, None if unknown."""
     found = [0.0 if k is None else float(np.degrees(angles[k])) for k in rows]
     return [None if np.isnan(angle) else angle for angle in found]
 

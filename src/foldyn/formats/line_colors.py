@@ -1,4 +1,4 @@
-"""Letters of lines by color: Origami Simulator's colors, and the nearest of them for others.
+"""Letters of lines by color: colors of Origami Simulator; other colors count as the nearest.
 
 Source: A. Ghassaei, E. Demaine, N. Gershenfeld, Fast, interactive origami simulation using GPU
 computation, Origami 7 (2018), and the notes on SVG of origamisimulator.org.
@@ -31,9 +31,9 @@ _HUES = (  # degrees within which a hue counts as a color
     (330, (255, 0, 255)),
     (360, (255, 0, 0)),
 )
-_GRAY = 0.15  # range of the components below which a color has no hue
+_GRAY = 0.15  # difference of components below which a color counts as gray
 _DARK, _WHITE = 0.4, 0.95
-_MOST_COLORS = 10  # colors reported individually
+_MOST_COLORS = 10  # largest number of colors that are reported individually
 
 
 def nearest(rgb: RGB) -> RGB | None:
@@ -52,7 +52,7 @@ def nearest(rgb: RGB) -> RGB | None:
 
 
 def color_doubts(taken: Mapping[tuple[RGB, RGB | None], int]) -> list[str]:
-    """Doubts about colors not in `COLORS`, from the number of lines matched to each."""
+    """Doubts about colors that are not in `COLORS`, with the number of lines of each."""
     doubts = []
     for (color, to), number in taken.items():
         if color != to:

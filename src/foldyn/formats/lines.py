@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 
 MOST_LINES = 50_000
-"""Most lines of a drawing, and most pieces after splitting."""
+"""Largest number of lines of a drawing, and of their pieces after splitting."""
 MOST_PAIRS = 4_000_000
-"""Most pairs of lines that are near each other."""
+"""Largest number of pairs of lines that are near each other."""
 _RANKS = {letter: rank for rank, letter in enumerate("CMVUFJB")}
 
 
@@ -31,7 +31,7 @@ class Lines:
     angles : ndarray, shape (m,)
         Fold angles (degrees), NaN if not given.
     source : ndarray of int, shape (m,)
-        Number of the drawn line that each came from.
+        Number of the drawn line from which each line comes.
     """
 
     points: NDArray[np.float64]
@@ -68,9 +68,9 @@ def single(lines: Lines) -> tuple[Lines, list[tuple[int, int]]]:
     Returns
     -------
     lines : Lines
-        No two between the same points.
+        No two lines between the same points.
     contradictions : list of (int, int)
-        Pairs of drawn lines in one place, one a mountain, the other a valley; the first drawn is
+        Pairs of coincident drawn lines, one a mountain, the other a valley; the first drawn is
         kept.
     """
     ranks = np.array([_RANKS[letter] for letter in lines.letters.tolist()], int)

@@ -1,4 +1,4 @@
-"""Panels listed in a file: joined along shared edges, without repeated or collapsed ones."""
+"""Panels listed in a file: joined along shared edges, without repeated or collapsed panels."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def listed_panels(
     Raises
     ------
     InputError
-        A corner that does not exist, or panels that form no surface.
+        A corner does not exist, or the panels form no surface.
     """
     lines, contradictions = single(without_points(lines))
     notes.contradict(contradictions)
@@ -97,7 +97,7 @@ def listed_panels(
 
 
 def _numbered(faces: Faces, n_vertices: int) -> Faces:
-    """Faces whose corners exist; other errors are repaired or found later."""
+    """Faces; a missing corner is refused, other errors are repaired or found later."""
     for f, face in enumerate(faces):
         bad = [v for v in face if not 0 <= v < n_vertices]
         if bad:
@@ -162,9 +162,9 @@ def _renumbered(panels: Panels, into: NDArray[np.int64]) -> Panels:
 
 
 ON_EDGE = 1e-5
-"""Distance of a vertex from an edge that it lies on, relative to the size: digits of a file."""
+"""Distance within which a vertex lies on an edge, relative to the size: rounding in files."""
 UPON = 1e-2
-"""Angle (rad) below which panels coincide: digits of a file too."""
+"""Angle (rad) below which panels coincide: also due to rounding in files."""
 
 
 def with_corners_on_edges(
@@ -173,22 +173,23 @@ def with_corners_on_edges(
     normals: NDArray[np.float64],
     share: float = ON_EDGE,
 ) -> tuple[Panels, int]:
-    """Add neighbors' vertices on panel edges as corners; also return how many were added.
+    """Make vertices of neighbors that lie on panel edges corners; also return how many were added.
 
     A boundary edge is divided at the ends of another panel's boundary edge that runs along its
-    other side. Edges that the file calls boundary or cut are not divided, nor edges at which more
-    than two panels would then meet. Nothing is done if too many vertices are near the edges.
+    other side. Edges that the file marks as boundary or cut are not divided, and neither are edges
+    at which more than two panels would then meet. Nothing is done if too many vertices are near the
+    edges.
 
     Parameters
     ----------
     panels : Panels
-        With winding consistent with their normals.
+        Panels whose winding is consistent with `normals`.
     points : ndarray, shape (n, 3)
         Coordinates, also for flat panels.
     normals : ndarray, shape (m, 3)
         Unit normals of the panels.
     share : float
-        Largest distance of a vertex from an edge that it lies on, relative to the size.
+        Distance within which a vertex lies on an edge, relative to the size.
     """
     sides = panels.sides()
     rim = [

@@ -1,12 +1,12 @@
 """OBJ: meshes of polygons, with the creases that origami programs put into it.
 
 Creases are comment lines ``#e a b kind angle``: two vertices counted from 1, what the edge is, and
-a fold angle in degrees. They come from Freeform Origami (T. Tachi), and other programs (MERLIN2)
-share them; its kinds, as Origami Simulator writes them for it (js/saveSTL.js), are 0 boundary, 1
-flat, 2 valley, 3 mountain. ORIPA (doc/exporter/ExporterOBJ.java) has numbers of its
-own (1 cut, 2 mountain, 3 valley) and coordinates of the screen, whose y runs down. Lines without
-faces (``l a b c``) are unassigned creases, or of the kind named by their group, object or material:
-"mountain", "valley", "boundary", "facet", "cut".
+a fold angle in degrees. They come from Freeform Origami (T. Tachi) and are shared by other programs
+(MERLIN2). The kinds of Freeform Origami, as Origami Simulator writes them (js/saveSTL.js), are 0
+boundary, 1 flat, 2 valley, 3 mountain. ORIPA (doc/exporter/ExporterOBJ.java) uses other numbers (1
+cut, 2 mountain, 3 valley) and screen coordinates with y downwards. Lines without faces (``l a b
+c``) are unassigned creases, or of the kind named by their group, object or material: "mountain",
+"valley", "boundary", "facet", "cut".
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from foldyn.patterns import Pattern
 from foldyn.values import parsed, show
 
 FREEFORM = ("B", "F", "V", "M", "U", "C")
-"""Letters of the kinds of `#e`; the last two are ours, for unassigned creases and cuts."""
+"""Letters of the kinds of `#e`; the last two kinds are Foldyn's, for unassigned creases and
+cuts."""
 ORIPA = ("U", "B", "M", "V", "F")
 GROUPS = {"mountain": "M", "valley": "V", "boundary": "B", "border": "B", "facet": "F",
           "flat": "F", "cut": "C"}  # fmt: skip
@@ -59,7 +60,7 @@ def read(text: str) -> Drawing:
     Raises
     ------
     InputError
-        A line that cannot be read, or a vertex that does not exist; the message names the line.
+        A line cannot be read, or a vertex does not exist; the message names the line.
     """
     vertices: list[list[float]] = []
     faces: list[tuple[int, ...]] = []
@@ -89,7 +90,7 @@ def read(text: str) -> Drawing:
             meters = meters or _meters(" ".join([word, *rest]))
     if not vertices:
         raise InputError("not an OBJ file of a pattern: it has no vertices (lines v x y z).")
-    if faces:  # lines without further information would override the letter of the dihedral
+    if faces:  # lines without more information would override letters that follow from dihedrals
         lines = [each for each in lines if each.letter != "U"]
     marked = {tuple(sorted(each.edge)) for each in creases}
     every = [*creases, *(each for each in lines if tuple(sorted(each.edge)) not in marked)]
@@ -178,7 +179,8 @@ def _crease(
         angle = np.inf
     if not np.isnan(angle) and abs(angle) > 180.0 + 1e-9:
         raise InputError(f": {show(words[3])}: give an angle from -180 to 180 degrees", place)
-    angle = -abs(angle) if known_kinds[kind] == "M" else angle  # some programs write only its size
+    # some programs write angles without sign
+    angle = -abs(angle) if known_kinds[kind] == "M" else angle
     return _Crease((a, b), known_kinds[kind], float(np.clip(angle, -180.0, 180.0)), place)
 
 
@@ -194,7 +196,7 @@ def _letter_of(name: str) -> str | None:
 
 
 def _meters(comment: str) -> float | None:
-    """Length of the unit that a comment names."""
+    """Length of the unit (m) that a comment names."""
     found = _UNIT.match(comment)
     word = found[1].lower() if found else ""
     return METERS.get(_NAMES.get(word, word))
@@ -206,8 +208,7 @@ def write(pattern: Pattern) -> str:
     Parameters
     ----------
     pattern : Pattern
-        The pattern to write. The angle of an edge is `Pattern.fold_angles`; it is omitted if not
-        given.
+        The pattern to write. Angles of edges are its `fold_angles`, and are omitted if not given.
 
     Returns
     -------

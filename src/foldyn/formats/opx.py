@@ -37,7 +37,7 @@ def read(text: str) -> Drawing:
     Raises
     ------
     InputError
-        Not OPX, or an invalid line; the message names it.
+        The text is not OPX, or a line is invalid; the message names it.
     """
     root = from_xml(text, "an OPX file")
     objects = [

@@ -26,9 +26,9 @@ class Panels:
     faces : tuple of tuple of int
         Panels, counter-clockwise in flat drawings.
     letters : dict
-        Letter of each edge that has one, by its (low, high) pair of points.
+        Letters of edges, by their (low, high) pairs of points; edges may lack a letter.
     angles : dict
-        Fold angle (degrees) of each edge that has one.
+        Fold angles (degrees) of edges, by the same pairs; edges may lack an angle.
     """
 
     points: NDArray[np.float64]
@@ -37,7 +37,7 @@ class Panels:
     angles: dict[Edge, float]
 
     def sides(self) -> dict[Edge, list[int]]:
-        """Numbers of the faces at each edge."""
+        """Numbers of the faces that meet at each edge."""
         sides: dict[Edge, list[int]] = {}
         for number, face in enumerate(self.faces):
             for a, b in around(face):
@@ -73,7 +73,7 @@ def components(pairs: list[tuple[int, int]], size: int) -> NDArray[np.int64]:
 
 
 def compact(panels: Panels) -> Panels:
-    """Panels with only the points that they use, in order."""
+    """Panels without unused points; the order of points stays."""
     used = sorted({point for face in panels.faces for point in face})
     number = {point: k for k, point in enumerate(used)}
     faces = tuple(tuple(number[point] for point in face) for face in panels.faces)
@@ -89,11 +89,11 @@ def compact(panels: Panels) -> Panels:
 
 
 def opened(panels: Panels) -> tuple[Panels, int]:
-    """Split cut edges (letter "C", of two panels) into two boundary edges each.
+    """Split every cut edge (letter "C", between two panels) into two boundary edges.
 
     Around each end of a cut, panels joined by folds keep a common point. So a cut that ends inside
-    the sheet stays closed there, and one that reaches the outline or another cut opens. A cut of
-    one edge with both ends inside gets a midpoint on each side.
+    the sheet stays closed at that end, and a cut that reaches the outline or another cut opens
+    there. A cut of one edge with both ends inside gets a midpoint on each side.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def opened(panels: Panels) -> tuple[Panels, int]:
 def _parted(
     panels: Panels, sides: dict[Edge, list[int]], cuts: set[Edge]
 ) -> dict[tuple[int, int], int]:
-    """Group of each corner (face, point) at a cut; folds around the point join corners."""
+    """Group number of each corner (face, point) at a cut; folds around the point join corners."""
     ends = {end for edge in cuts for end in edge}
     corners = [(f, point) for f, face in enumerate(panels.faces) for point in face if point in ends]
     row = {corner: k for k, corner in enumerate(corners)}

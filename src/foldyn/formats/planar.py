@@ -18,7 +18,7 @@ from foldyn.formats.lines import MOST_LINES, MOST_PAIRS, Lines, single, too_many
 
 FINEST, COARSEST = 1e-6, 5e-4
 """Tolerance within which two points are merged, relative to the drawing's size (its diagonal)."""
-_SHARE = 0.1  # of the lengths: a tenth of the shortest twentieth
+_SHARE = 0.1  # tolerance relative to the 5th percentile of line lengths
 _ROUNDS = 12
 _SOME = 500
 
@@ -35,7 +35,7 @@ def tolerance_of(lines: Lines) -> float:
 
 
 def merged(points: NDArray, tolerance: float, kept: int = 0) -> NDArray[np.int64]:
-    """Point that each point is merged into: the first within the tolerance.
+    """For each point, the point it is merged into: the first one within the tolerance.
 
     Remaining points are farther apart than the tolerance; the first `kept` always remain.
     """
@@ -65,7 +65,7 @@ def renumbered(lines: Lines, into: NDArray) -> Lines:
 
 
 def on_lines(lines: Lines, tolerance: float) -> Lines:
-    """Move line ends onto lines that they nearly reach, which stay straight.
+    """Move line ends onto lines that they nearly reach; those lines stay straight.
 
     Ends within rounding of the line, and ends near several lines, do not move.
     """
@@ -96,10 +96,10 @@ def split(lines: Lines, tolerance: float) -> Lines:
     Raises
     ------
     InputError
-        Too many lines are near each other or cross, or tangle within the tolerance.
+        Too many lines are near each other or cross, or lines tangle within the tolerance.
     """
     lines, _ = single(lines)
-    # With points a tolerance apart, no triangle has two corners on their opposite sides.
+    # If points are at least a tolerance apart, no triangle has two corners on opposite sides.
     near_by = 0.5 * tolerance
     for _ in range(_ROUNDS):
         if len(lines.ends) > MOST_LINES:
@@ -115,12 +115,12 @@ def split(lines: Lines, tolerance: float) -> Lines:
 
 
 def check_crowding(lines: Lines) -> None:
-    """Refuse lines of which too many are close together, judged from a sample.
+    """Refuse a drawing if too many lines are close together, judged from a sample.
 
     Raises
     ------
     InputError
-        There are so many that `split` would take long before it refuses them.
+        There are so many lines that `split` would take long before it refuses them.
     """
     geometries = segments(lines)
     some = geometries[:: -(-len(geometries) // _SOME)]
@@ -218,7 +218,7 @@ GAP = 5e-3
 def without_gaps(lines: Lines, tolerance: float) -> tuple[Lines, int, float]:
     """Extend open ends to the next point or line, if near.
 
-    A line shorter than two gaps that sticks out is left as drawn: it overshot rather than fell
+    A line that sticks out and is shorter than two gaps is left as drawn: it went too far, not too
     short.
 
     Parameters
@@ -274,7 +274,7 @@ def without_gaps(lines: Lines, tolerance: float) -> tuple[Lines, int, float]:
 
 
 def _reached(points: NDArray, root: int, end: int, target: NDArray, gap: float) -> NDArray:
-    """Where an extended line meets another; the nearest point if that is far away."""
+    """Where an extended line meets another; the nearest point if the intersection is far away."""
     a, b = points[target]
     along, onward = b - a, points[end] - points[root]
     turn = onward[0] * along[1] - onward[1] * along[0]

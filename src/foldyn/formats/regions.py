@@ -68,7 +68,7 @@ def _faces(lines: Lines) -> tuple[Faces, int]:
     corners, polygon = shapely.get_coordinates(
         shapely.get_exterior_ring(polygons), return_index=True
     )
-    used = np.unique(lines.ends)  # others may coincide
+    used = np.unique(lines.ends)  # unused points may coincide with others
     places = lines.points[used].tolist()
     number = {(x, y): k for k, (x, y) in zip(used.tolist(), places, strict=True)}
     numbers = [number[x, y] for x, y in corners.tolist()]
@@ -135,11 +135,11 @@ def sheet(panels: Panels) -> tuple[Panels, NDArray, list[tuple[float, NDArray]]]
     Returns
     -------
     panels : Panels
-        Panels of the largest part that reaches the outline.
+        The largest part that reaches the outline.
     openings : ndarray of float
-        Areas of inner regions bounded only by cuts and outlines, which fall out.
+        Areas of inner regions that fall out because only cuts and outlines bound them.
     others : list of (float, ndarray)
-        Area and a corner of each other sheet, which is left out.
+        Area and a corner of each further sheet; these sheets are left out.
     """
     part, area = parts(panels), areas(panels)
     total = np.bincount(part, area)

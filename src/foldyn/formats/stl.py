@@ -1,7 +1,7 @@
 """STL: the triangles of a flat or folded pattern, for printers and viewers; written only.
 
-The text form, in millimeters, which these programs assume as the format has no unit. Panels with
-more corners are cut into triangles between their corners; creases are lost.
+The text form, in millimeters, because the format has no unit and these programs assume millimeters.
+Panels with more than three corners are cut into triangles between their corners; creases are lost.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 """SVG crease patterns in the colors of Origami Simulator (A. Ghassaei, "Design tips").
 
 Red is a mountain, blue a valley, black the outline, yellow a flat crease, green a cut, magenta a
-hinge without a letter; the opacity of a mountain or valley is its fold angle over 180 degrees. The
-attributes data-assignment and data-foldAngle (letters and degrees) take precedence. y points down
-in an SVG and up in a pattern, which shows the sheet as it is drawn, from its front.
+hinge without a letter; the opacity of a mountain or valley is its fold angle divided by 180
+degrees. The attributes data-assignment and data-foldAngle (letters and degrees) take precedence. y
+points down in an SVG and up in a pattern, so that the drawing shows the sheet from its front.
 
-Patterns are written at true size. The legend is text, which neither cutters nor readers of crease
-patterns mistake for lines.
+Patterns are written at true size. The legend is text, so that neither cutters nor readers of crease
+patterns mistake it for lines.
 """
 
 from __future__ import annotations
@@ -49,16 +49,16 @@ _GROUPS = ("svg", "g", "a", "switch")
 _NOT_DRAWN = ("text", "image", "foreignObject")
 _STATED = ("mm", "cm", "in", "pt", "pc")
 FAINT = "opacities are fold angles over 180 degrees"
-# value of programs that write an opacity everywhere, such as Inkscape
+# programs such as Inkscape write this value everywhere
 OPAQUE = "all lines have opacity 1: creases fold to 180 degrees unless --to says otherwise"
 
 
 @dataclass(frozen=True)
 class _Frame:
-    """Extent of the drawing: its view in user units, and the size of these."""
+    """Extent of the drawing: its view in user units, and the size of a user unit."""
 
     view: tuple[float, float]
-    pixels: float = 1.0  # of a user unit
+    pixels: float = 1.0  # pixels per user unit
     physical: bool = False
     stretch: float = 1.0  # ratio of y to x
 
@@ -92,7 +92,7 @@ def read(text: str) -> Drawing:
     Raises
     ------
     InputError
-        Not SVG, unsafe to read, or without lines; the message names the place.
+        The text is not SVG, is unsafe to read, or has no lines; the message names the place.
     """
     root = from_xml(text, "an SVG file")
     if local(root) != "svg":
@@ -238,7 +238,7 @@ def placed(points: NDArray[np.float64], here: Placing) -> NDArray[np.float64]:
 def _fold_angles(letters: NDArray, opacities: NDArray) -> tuple[NDArray, tuple[str, ...]]:
     """Fold angles (degrees) from opacities, and the assumptions made.
 
-    If any mountain or valley is not opaque, those without an opacity fold completely.
+    If any mountain or valley is not opaque, creases without an opacity fold completely.
     """
     folds = np.isin(letters, ("M", "V"))
     stated = folds & np.isfinite(opacities)
@@ -269,8 +269,8 @@ NAMES = {
     "C": "cut",
 }
 FAINTEST = 1e-6
-"""Opacity of a crease with fold angle 0, as a line without opacity is invisible."""
-_DARKER = {"F": "#b8a000", "C": "#00a000"}  # of words, which must be read on white
+"""Opacity of a crease with fold angle 0: a line of opacity 0 would be invisible."""
+_DARKER = {"F": "#b8a000", "C": "#00a000"}  # colors of words, which must be readable on white
 
 
 def write(pattern: Pattern) -> str:
@@ -302,7 +302,7 @@ def write(pattern: Pattern) -> str:
     words = _legend(pattern, edges)
     line_height = 1.4 * type_size
     total = height + 2.0 * margin + (len(words) + 0.5) * line_height
-    # boundary last, over the ends of the creases
+    # boundary last, to cover the ends of creases
     edges.sort(key=lambda edge: "FUVMCB".index(edge[1]))
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',

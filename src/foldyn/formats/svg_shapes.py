@@ -31,7 +31,7 @@ _FUNCTION = re.compile(
     r"\s*(matrix|translate[XY]?|scale[XY]?|rotate|skew[XY]?)\s*\(([^()]*)\)[\s,]*"
 )
 _ANGLES = {"": 1.0, "deg": 1.0, "grad": 0.9, "rad": math.degrees(1.0), "turn": 360.0}
-_LONGEST = 2000  # letters of a transform
+_LONGEST = 2000  # largest length of a transform, in characters
 SHAPES = ("line", "polyline", "polygon", "rect", "circle", "ellipse", "path")
 Placing = NDArray[np.float64]
 """Affine map (2, 3) from an element's coordinates to those of the drawing."""
@@ -39,7 +39,7 @@ Placing = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Curve:
-    """A piece of a shape: its ends and any bends between them.
+    """A piece of a shape: its ends, and the curve between them.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Curve:
     points : callable
         Maps a tolerance to points (k, 2) along the piece, ends included.
     straight : bool
-        Whether it is a line.
+        Whether the piece is a straight line.
     """
 
     frame: NDArray[np.float64]
@@ -69,12 +69,12 @@ def length(text: str | None, whole: float, place: str, default: float = 0.0) -> 
 
 
 def numbers(text: str) -> list[float]:
-    """Numbers of a list, with any separators."""
+    """Numbers of a list, whatever separates them."""
     return [float(word) for word in _NUMBER.findall(text)]
 
 
 def _is_plain(text: str) -> bool:
-    """Whether all numbers of a text read alike outside Python."""
+    """Whether other programs read all numbers of a text as Python does."""
     return text.isascii() and "_" not in text
 
 
@@ -152,7 +152,7 @@ def curves(element: Element, whole: tuple[float, float], place: str) -> list[Cur
     Raises
     ------
     InputError
-        Attributes that describe no shape; the message names the place.
+        The attributes describe no shape; the message names the place.
     """
     from svgelements import Ellipse, Path, Rect
 
@@ -212,7 +212,7 @@ def _segments(path: Any) -> Iterator[Curve]:
     Raises
     ------
     ValueError
-        A path without a start or an end.
+        The path has no start or no end.
     """
     from svgelements import Arc, Close, CubicBezier, Move, QuadraticBezier
 

@@ -29,7 +29,7 @@ ASSIGNMENT, ANGLE = "data-assignment", "data-foldangle"
 """Attributes in which programs for FOLD files store the kind of a line."""
 _SELECTOR = re.compile(r"(\*|[A-Za-z][\w-]*)?((?:[.#][\w-]+)*)")
 _HEX = re.compile(r"#(?:[0-9a-f]{3,4}|[0-9a-f]{6}|[0-9a-f]{8})")
-_LONGEST = 200  # letters of a value
+_LONGEST = 200  # longest value, in characters
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Style:
     color : (int, int, int) or None
         Red, green and blue of the stroke, 0 to 255; None if lines are not drawn.
     opacity : float
-        Opacity of the stroke, times that of enclosing groups.
+        Opacity of the stroke, multiplied by the opacity of enclosing groups.
     stated : bool
         Whether any opacity is given.
     visible : bool
@@ -71,7 +71,7 @@ Rules = list[tuple[tuple[int, int], str, str, frozenset[str], dict[str, str]]]
 
 
 def declarations(text: str) -> dict[str, str]:
-    """Values of relevant properties, from "stroke:#f00; opacity: 0.5"."""
+    """Values of relevant properties in a text such as "stroke:#f00; opacity: 0.5"."""
     found = {}
     for declaration in text.split(";"):
         name, _, value = declaration.partition(":")
@@ -122,7 +122,7 @@ def styled(given: Mapping[str, str], inherited: Style, place: str) -> Style | No
     Raises
     ------
     InputError
-        An invalid value; the message names the place.
+        A value is invalid; the message names the place.
     """
     if given.get("display") == "none":
         return None
@@ -159,7 +159,7 @@ def declared(element: Element, rules: Rules, place: str) -> Mapping[str, str]:
     Raises
     ------
     InputError
-        CSS moves or shapes it by a property that is only supported as an attribute.
+        CSS moves or shapes the element by a property that is only supported as an attribute.
     """
     given = {name: element.get(name, "").strip() for name in PROPERTIES if element.get(name)}
     css: dict[str, str] = {}

@@ -10,11 +10,11 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.geometry import seams
 from foldyn.patterns.topology import Edge, edge_lookup
 
-PLANE = 1e-9  # of the pattern's size: smaller heights count as zero
+PLANE = 1e-9  # relative to the pattern's size: smaller heights count as zero
 
 
 def is_plane(pattern: Pattern) -> bool:
-    """Whether all vertices have z = 0, as files with two coordinates need."""
+    """Whether all vertices have z = 0, which files with two coordinates require."""
     return not np.any(pattern.vertices[:, 2])
 
 
@@ -40,7 +40,7 @@ def flat_points(pattern: Pattern, kind: str) -> NDArray[np.float64]:
 
 
 def letters(pattern: Pattern) -> list[tuple[Edge, str, float]]:
-    """Each edge with its letter ("B" on the boundary, "C" on a cut) and its angle to fold to.
+    """Each edge with its letter ("B" on the boundary, "C" on a cut) and the angle it folds to.
 
     Welds are "F", like facets in all formats.
 
@@ -62,7 +62,7 @@ def letters(pattern: Pattern) -> list[tuple[Edge, str, float]]:
 
 
 def warn_of_angles(pattern: Pattern, kind: str) -> None:
-    """Warn that a file cannot hold angles to fold to."""
+    """Warn that a file cannot hold fold angles."""
     if not np.isnan(pattern.fold_angles).all():
         warn(
             f"pattern: {kind} files have no place for fold angles, which are left out; write .fold "

@@ -12,8 +12,9 @@ if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
 DEEPEST = 100
-"""Most levels of nested elements."""
-_FIRST, _MOST, _LARGEST = 20_000, 50, 1 << 26  # letters, entities, letters
+"""Largest number of levels of nested elements."""
+# characters searched, entities, characters of the result
+_FIRST, _MOST, _LARGEST = 20_000, 50, 1 << 26
 _SUBSET = re.compile(r"<!DOCTYPE[^\[>]{0,500}\[([^\]]*)\]\s{0,9}>")
 _ENTITY = re.compile(
     r"<!ENTITY\s{1,9}([A-Za-z_][\w.-]{0,50})\s{1,9}([\"'])([^\"'<>]{0,200})\2\s{0,9}>"
@@ -33,7 +34,7 @@ def from_xml(text: str, what: str) -> Element:
     Raises
     ------
     InputError
-        Not XML, with entities or external parts, or nested too deep.
+        The text is not XML, has entities or external parts, or is nested too deep.
     """
     from xml.etree.ElementTree import ParseError
 

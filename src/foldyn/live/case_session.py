@@ -31,8 +31,8 @@ Answer = TypeVar("Answer")
 class Newest(Generic[Wish, Answer]):
     """A thread that computes the newest request.
 
-    There is no queue: a newer request replaces one that has not begun, and discards the result of
-    one being computed.
+    There is no queue: a newer request replaces a waiting one, and the result of a request that is
+    being computed is discarded.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class CaseSession:
     ----------
     title : str
     about : dict
-        Data for the page: its "controls", and the analyses that it "offers".
+        Data for the page: "controls", its sliders, and "offers", the analyses that can be chosen.
     """
 
     def __init__(self, path: Path) -> None:
@@ -163,22 +163,23 @@ KINDS: Mapping[str, str] = {
 }
 """Analyses that can be computed, with their names on the page."""
 STEPS, PERIODS, FREQUENCIES, COUNT = 10, 10.0, 200, 6
-"""Sizes of analyses that the file does not ask for: steps of a static curve, periods of the first
-mode that a motion lasts, frequencies of a response, number of modes."""
+"""Sizes of analyses that the file does not define: steps of a static curve, duration of a motion in
+periods of the first mode, frequencies of a response, number of modes."""
 SAMPLES, STEPS_A_SAMPLE = 250, 4
-"""Samples of a motion, and steps between them unless the file gives them: a hundred in a period."""
+"""Samples of a motion, and steps between samples unless the file gives them: a hundred steps in a
+period."""
 MOST_WORK = 1e7
-"""Most steps times dofs of a motion with fixed steps, about a second of computing; longer motions
-are cut."""
+"""Largest product of steps and dofs of a motion with fixed steps, about a second of computing;
+longer motions are shortened."""
 MOST_FREE, MODES = 60, 6
-"""Most free dofs of a response curve, about 0.1 s per point, and the number of modes that larger
-sheets are reduced to."""
+"""Largest number of free dofs of a response curve (about 0.1 s per point), and the number of modes
+to which larger sheets are reduced."""
 
 Document = dict[str, Any]
 
 
 def offered(document: Document) -> dict[str, str]:
-    """Kinds of analysis that a case file allows, its own first."""
+    """Kinds of analysis that a case file allows; the kind of the file comes first."""
     own = document["analysis"]["kind"]
     driven = any("force" in load for load in document.get("loads", ())) or "drive" in document
     imposed = any("displacement" in support for support in document.get("supports", ()))
@@ -189,19 +190,19 @@ def offered(document: Document) -> dict[str, str]:
         "statics": bool(document.get("loads")) or (imposed and not based),
         "dynamics": bool(document.get("loads")) or imposed or based,
         "bands": False,  # only for files of this kind: few patterns repeat
-        "response": False,  # likewise: curves take seconds or more
+        "response": False,  # only for files of this kind: curves take seconds
     }
     kinds = [kind for kind in KINDS if kind == own or possible[kind]]
     return {kind: KINDS[kind] for kind in sorted(kinds, key=lambda kind: kind != own)}
 
 
 def computed(path: Path, document: Document, kind: str) -> tuple[CaseFile, xr.Dataset]:
-    """Return the case file as one of a kind, and its result under its first mass rule.
+    """Return the case file as another kind of analysis, and the result with its first mass rule.
 
     Raises
     ------
     InputError, ComputationError
-        As in `CaseFile.run`, or the file does not allow this kind.
+        As in `CaseFile.run`; also if the file does not allow this kind.
     """
     choice("compute", kind, offered(document))
     case_file = case_of_document(path, _as_kind(path, document, kind))
@@ -223,7 +224,7 @@ def computed(path: Path, document: Document, kind: str) -> tuple[CaseFile, xr.Da
 
 
 def _curve_of_motions(case_file: CaseFile) -> xr.Dataset:
-    """Response curve; of a large sheet it is reduced to a few modes."""
+    """Response curve; for a large sheet in the span of a few modes."""
     free = len(case_file.case().free_dofs)
     if free <= MOST_FREE or case_file.analysis.arguments.get("modes"):
         return case_file.run()
@@ -236,7 +237,7 @@ def _curve_of_motions(case_file: CaseFile) -> xr.Dataset:
 
 
 def _as_kind(path: Path, document: Document, kind: str) -> Document:
-    """Convert the document to a kind; if it is not its own, with settings that compute quickly."""
+    """Convert the document to a kind; if it has another kind, use settings that compute quickly."""
     if document["analysis"]["kind"] == kind == "bands":  # a single state: sliders vary it
         analysis = {k: value for k, value in document["analysis"].items() if k != "vary"}
         return {**document, "analysis": analysis}

@@ -28,8 +28,8 @@ SPAN: Mapping[str, float] = {"pattern": 4.0, "sheet": 10.0, "damping": 10.0}
 UNDAMPED: Mapping[str, float] = {"alpha": 10.0, "beta": 0.01}
 """Upper ends of damping sliders that begin at 0."""
 MOST_COUNT, MOST_PARTS = 12, 1000
-"""Most of a small whole number on a slider, and most cells, sides or the like of a pattern in all,
-as it is recomputed for each picture."""
+"""Upper end of the slider of a small whole number, and largest total number of cells or sides of a
+pattern, which is recomputed for each picture."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Control:
         Ends of its slider; a typed number may lie outside.
     unit : str
     counts : bool
-        Whether it is a whole number.
+        Whether the number is whole.
     relative : bool
         Whether the slider is logarithmic.
     """
@@ -61,7 +61,7 @@ class Control:
 
     @property
     def name(self) -> str:
-        """The key as messages write it, "pattern.cells[0]"."""
+        """The key as messages write it, such as "pattern.cells[0]"."""
         return dotted(self.place)
 
     def described(self) -> dict[str, Any]:
@@ -93,7 +93,8 @@ def changed(
     Raises
     ------
     InputError
-        No such control, not a valid number, or a pattern too large to recompute for each picture.
+        The control does not exist, the number is invalid, or the pattern is too large to recompute
+        for each picture.
     """
     by_name = {control.name: control for control in known}
     given: dict[str, Any] = deepcopy(dict(document))
@@ -115,7 +116,7 @@ def changed(
 def _put(
     document: dict[str, Any], place: tuple[str | int, ...], value: float, known: Sequence[Control]
 ) -> None:
-    """Set a number, and create its table or list if the file leaves it at the default."""
+    """Set a number; create its table or list if the file does not contain it."""
     table: Any = document.setdefault(str(place[0]), {})
     *between, last = place[1:]
     for key in between:

@@ -46,7 +46,7 @@ class View:
     ----------
     title : str
     stage : Stage
-        What it shows.
+        The content of the page.
     height : int
         Height of the frame in a notebook (pixels).
     """
@@ -99,7 +99,7 @@ def view(what: Any, title: str = "", *, height: int = HEIGHT) -> View:
     Raises
     ------
     InputError
-        Something else, or results of several kinds.
+        `what` is of another type, or the results are of several kinds.
 
     Examples
     --------
@@ -135,7 +135,7 @@ def check_results(results: Any) -> str:
     Raises
     ------
     InputError
-        No results, or results of several kinds.
+        There are no results, or they are of several kinds.
     """
     if not isinstance(results, Mapping) or not results:
         raise InputError(
@@ -157,7 +157,7 @@ def check_results(results: Any) -> str:
 
 
 def results_stage(results: Mapping[str, xr.Dataset], title: str) -> Stage:
-    """Stage of results of one kind by name, with their cases; foldings have none."""
+    """Stage of results of one kind by name, with their cases; foldings have no cases."""
     if next(iter(results.values())).attrs["foldyn_result"] == "folding":
         return stage(results, {}, title, [])
     cases = {name: case_of(result) for name, result in results.items()}

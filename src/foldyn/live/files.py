@@ -25,7 +25,8 @@ from foldyn.viewer import Stage, rest_stage, scripts
 
 CASE, RESULT = ".toml", ".nc"
 MOST_FOLDED = 300
-"""Most panels of a pattern that is folded for viewing; larger ones are shown at rest."""
+"""Largest number of panels of a pattern that is folded for viewing; larger patterns are shown at
+rest."""
 
 
 def served(paths: Sequence[Path], port: int = 0) -> tuple[Server, str]:
@@ -41,7 +42,7 @@ def served(paths: Sequence[Path], port: int = 0) -> tuple[Server, str]:
     Raises
     ------
     InputError
-        A file that cannot be used, files of several kinds, or a port that is taken.
+        A file cannot be used, the files are of several kinds, or the port is taken.
     """
     endings = [path.suffix.lower() for path in paths]
     if len(paths) > 1 and set(endings) != {RESULT}:
@@ -67,8 +68,8 @@ def served(paths: Sequence[Path], port: int = 0) -> tuple[Server, str]:
 def live_page(title: str, about: Mapping[str, Any], key: str) -> str:
     """Text of the page.
 
-    about : data for its script: "controls" and "offers".
-    key : secret that its requests carry.
+    about : data for the script of the page: "controls" and "offers".
+    key : secret that requests of the page carry.
     """
     told = scripts.in_page({**about, "key": key})
     main = (
@@ -93,13 +94,13 @@ def _results(paths: Sequence[Path]) -> View:
 
 
 def _pattern(path: Path) -> View:
-    """A pattern as it folds to its fold angles, or at rest if it has none or does not fold."""
+    """Stage of a pattern folding to its fold angles, or at rest if it has none or does not fold."""
     pattern = read_pattern(path)
     return View(path.stem, folded_stage(pattern, path.stem))
 
 
 def folded_stage(pattern: Pattern, title: str) -> Stage:
-    """Stage of a pattern as it folds to its own fold angles if that is quick, otherwise at rest."""
+    """Stage of a pattern folding to its fold angles if that is quick, otherwise at rest."""
     wanted = pattern.fold_angles
     given = np.isfinite(wanted)
     moves = given.any() and float(np.abs(wanted - fold_angles(pattern))[given].max()) > 1e-6

@@ -1,8 +1,8 @@
 """The viewer's server: one page, and answers, for browsers on this machine only.
 
 It listens on 127.0.0.1, serves two paths, and reads no file named by a request. It answers only
-requests that name this host and carry the key of this run, which pages of other origins and other
-users of the machine do not know.
+requests that name this host and carry the key of this run. Pages of other origins and other users
+of the machine do not know the key.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from typing import Any
 
 HOST = "127.0.0.1"
 MOST_BYTES = 100_000
-"""Largest body of a request; a table of numbers needs a hundredth of it."""
+"""Largest body of a request, in bytes; a table of numbers needs a hundredth of this."""
 MOST_CONNECTIONS = 32
-"""Most simultaneous connections, each with its thread; a browser uses six for a page."""
+"""Largest number of simultaneous connections, each with a thread; a browser uses six for a page."""
 PATIENCE = 30.0
 """Seconds after which a silent connection is closed."""
 KEY_HEADER = "X-Foldyn-Key"

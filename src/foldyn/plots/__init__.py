@@ -10,8 +10,8 @@ from __future__ import annotations
 from foldyn.facade import lazy
 
 ANIMATIONS = ("gif", "mp4")
-"""Kinds of animation that can be written."""
+"""File formats of animations."""
 FIGURES = ("png", "svg", "pdf")
-"""Kinds of figures that commands can write."""
+"""File formats of figures that commands can write."""
 
 __getattr__, __dir__, __all__ = lazy(__name__, __file__, "ANIMATIONS", "FIGURES")

@@ -22,7 +22,7 @@ from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, side_by_si
 from foldyn.plots.writers import checked_file, filmed
 from foldyn.structures import Structure
 
-_TRAVELS = 0.25  # shortest path of the center of mass, in sizes of the sheet, that gets a line
+_TRAVELS = 0.25  # shorter paths of the center of mass, relative to the sheet's size, get no line
 _WIDTH, _COLUMNS = 6.0, 2  # inches; narrow, as films cannot scroll on a phone
 _PATH: dict[str, Any] = {"color": style.GREEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
 
@@ -39,20 +39,20 @@ def animate(
     view: tuple[float, float] = (28.0, -60.0),
     title: str = "",
 ) -> Path:
-    """Write a GIF or an MP4 of the moving sheet, the sheet at rest behind it in gray.
+    """Write a GIF or an MP4 of the moving sheet, with the sheet at rest behind it in gray.
 
-    The frame stands still and holds the whole motion, at equal scale along all axes; where a free
-    body travels, a line shows the path of its center of mass. Pictures of a motion show the
+    The frame stands still and has room for the whole motion, at equal scale along all axes; if a
+    free body travels, a line shows the path of its center of mass. Pictures of a motion show the
     simulated time and how much slower or faster than reality it runs; pictures of an equilibrium
     path show the load factor and whether the state is unstable.
 
     Parameters
     ----------
     case_or_structure : Case or Structure
-        What moves; by default the case of the result: ``animate(result, "motion.gif")``.
+        The structure that moves; by default from the result: ``animate(result, "motion.gif")``.
     result : xarray.Dataset
-        Its motion, ``displacement`` (time, node, axis) in m over ``time`` (s), or its equilibrium
-        path, ``displacement`` (step, node, axis) with its ``load_factor``.
+        A motion, with ``displacement`` (time, node, axis) in m and ``time`` (s), or an equilibrium
+        path, with ``displacement`` (step, node, axis) and ``load_factor``.
     path : path-like
         File to write, ending in .gif or .mp4. An MP4 needs ffmpeg: on the PATH, or through the
         package imageio-ffmpeg.
@@ -76,8 +76,9 @@ def animate(
     Raises
     ------
     InputError
-        A result of another structure or with NaN, fewer than two frames, a rate out of range,
-        a path that is no GIF or MP4 in an existing directory, or an MP4 without ffmpeg.
+        The result belongs to another structure or contains NaN, there are fewer than two frames,
+        the rate is out of range, the path is no GIF or MP4 in an existing directory, or an MP4 is
+        requested without ffmpeg.
     ComputationError
         ffmpeg could not write the file.
     """
@@ -133,13 +134,13 @@ def _factors(places: NDArray[np.float64], path: xr.Dataset) -> list[str]:
 
 
 def _digits(values: NDArray[np.float64]) -> int:
-    """Digits that make texts differ, as equal pictures would be stored as one."""
+    """Number of digits that makes texts differ, because equal pictures would be stored as one."""
     step = float(np.ptp(values)) / (len(values) - 1)
     return max(0, int(np.ceil(-np.log10(step)))) if step > 0.0 else 3
 
 
 def pace(seconds: float) -> str:
-    """Say how fast an animation plays that shows this many seconds of motion per second."""
+    """Describe the speed of an animation that shows this many seconds of motion per second."""
     times = float(f"{max(seconds, 1.0 / seconds):.2g}")
     if times == 1.0:
         return "shown at real speed"
@@ -206,13 +207,13 @@ def animate_modes(
 ) -> Path:
     """Write a GIF or an MP4 of oscillating modes, one or several side by side.
 
-    It shows one period, which repeats seamlessly. All modes swing at the same pace; their
-    frequencies stand below them.
+    The animation shows one period, which repeats seamlessly. All modes swing at the same pace;
+    their frequencies are written below them.
 
     Parameters
     ----------
     case_or_structure : Case or Structure
-        What vibrates; by default the case of the modes: ``animate_modes(modes, "x.gif")``.
+        The structure that vibrates; by default from the modes: ``animate_modes(modes, "x.gif")``.
     modes : xarray.Dataset
         Modes of `foldyn.modes`.
     path : path-like
@@ -233,8 +234,9 @@ def animate_modes(
     Raises
     ------
     InputError
-        Modes of another structure, no such mode, fewer than two frames, a rate out of range, a
-        path that is no GIF or MP4 in an existing directory, or an MP4 without ffmpeg.
+        The modes belong to another structure or lack a requested mode, there are fewer than two
+        frames, the rate is out of range, the path is no GIF or MP4 in an existing directory, or an
+        MP4 is requested without ffmpeg.
     ComputationError
         ffmpeg could not write the file.
     """

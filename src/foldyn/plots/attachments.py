@@ -16,8 +16,8 @@ from foldyn.plots import marks, style
 from foldyn.plots.marks import Mark
 from foldyn.plots.scene import Points, Sheet3D, View
 
-_TURNS = (4, 14)  # turns of a zigzag, at least and at most
-_LEAD = 0.2  # straight ends of a zigzag, as a share of its length
+_TURNS = (4, 14)  # smallest and largest number of turns of a zigzag
+_LEAD = 0.2  # length of each straight end of a zigzag, relative to its whole length
 _HATCHES = 8  # hatches of a clamped edge
 
 
@@ -27,7 +27,7 @@ def springs_and_masses(
     """Marks of springs, clamped edges and point masses of a case at node positions (n, 3).
 
     size : length of a support's mark, m.
-    supports, loads : whether springs and clamps, and whether masses are shown.
+    supports : whether springs and clamps are shown; loads : whether point masses are.
     """
     case, found = sheet.case, []
     clamped = getattr(sheet.structure.options, "clamped", ()) if supports else ()
@@ -123,7 +123,7 @@ def direction_triangles(case: Case, kind: type, points: Points, size: float, sig
         nodes, unit = resolve_nodes(case.structure, support.nodes), unit_vector(support.direction)
         values = np.broadcast_to(getattr(support, "value", 0.0), (len(nodes),))
         for node, value in zip(nodes, values, strict=True):
-            # it pushes a moving node; else it stands below the sheet, or outside
+            # the triangle pushes a moving node; otherwise it stands below or outside the sheet
             outward = unit[2] if abs(unit[2]) > 1e-9 else unit @ (middle - points[node])
             along = unit * (np.sign(value) or np.sign(outward) or 1.0)
             found.append(marks.billboard(points[node], along, size, 0.38 * size, sight))
@@ -150,15 +150,15 @@ def links(case: Case, points: Points) -> list[Mark]:
     ]  # fmt: skip
 
 
-CUP = (-0.5, 0.5)  # start and end of the cup along the line, relative to its length
-PISTON = 0.1  # position of the piston
+CUP = (-0.5, 0.5)  # start and end of the cup along the line, relative to the cup's length
+PISTON = 0.1  # position of the piston along the line, relative to the cup's length
 SHARE = 0.4  # largest part of the line that the cup takes
-HALF = 0.45  # width of the cup, relative to twice its length
+HALF = 0.45  # half of the cup's width, relative to its length
 REACH = 1.8  # length of the line from a node to the ground, in cups
 
 
 def dashpot_lines(case: Case, points: Points, size: float, view: View) -> Points:
-    """Segments (k, 2, 3) of all dashpots of a case, at node positions (n, 3).
+    """Segments (k, 2, 3) of the symbols of all dashpots of a case, at node positions (n, 3).
 
     size : length of a cup, m.
     """
@@ -178,7 +178,7 @@ def describe_dashpot(dashpot: Dashpot) -> str:
 
 
 def _grounded_end(dashpot: Dashpot, node: Points, size: float) -> Points:
-    """Position of the ground: along the direction, or below."""
+    """Position of the grounded end: along the dashpot's direction, or else below the node."""
     down = np.array([0.0, 0.0, -1.0])
     along = down if dashpot.direction is None else unit_vector(dashpot.direction)
     return node + REACH * size * along

@@ -22,12 +22,12 @@ _WAYS: dict[str, dict[str, Any]] = {
     "up": {"color": style.BLUE, "linestyle": style.DASHES[0]},
     "down": {"color": style.VERMILLION, "linestyle": style.DASHES[1]},
 }
-_MOST = 8  # attractors named in the legend
+_MOST = 8  # largest number of attractors named in the legend
 _PALE = 0.55  # share of white in the color of a basin
 
 
 def plot_amplitudes(result: xr.Dataset, title: str = "") -> Figure:
-    """Draw the amplitude over the frequency, or the level, of the drive, with its jumps.
+    """Draw the amplitude against the frequency or the level of the drive, with its jumps.
 
     Parameters
     ----------
@@ -39,8 +39,8 @@ def plot_amplitudes(result: xr.Dataset, title: str = "") -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        A curve for each sweep; a jump is a vertical line from the amplitude before to the one
-        after, with an arrow and its frequency or level.
+        A curve for each sweep. A jump is a vertical line from the amplitude before to the amplitude
+        after it, with an arrow and its frequency or level.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def plot_amplitudes(result: xr.Dataset, title: str = "") -> Figure:
 
 
 def plot_bifurcation_diagram(diagram: xr.Dataset, title: str = "") -> Figure:
-    """Draw the measure once per period over the frequency, or the level, of the drive.
+    """Draw a measure, taken once per period, against the frequency or the level of the drive.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def plot_bifurcation_diagram(diagram: xr.Dataset, title: str = "") -> Figure:
 def plot_poincare_section(
     section: xr.Dataset, node: int | str, *, axis: str, title: str = ""
 ) -> Figure:
-    """Draw velocity over displacement of a node at the points of a section.
+    """Draw the velocity of a node against its displacement at the points of a section.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def plot_poincare_section(
     Raises
     ------
     InputError
-        Another result, no such node or axis.
+        The result is of another kind, or has no such node or axis.
     """
     _check("section", section, "poincare_section")
     choice("axis", axis, AXES)
@@ -149,14 +149,14 @@ def plot_poincare_section(
 def plot_basins(
     basins: xr.Dataset, x: str | None = None, *, y: str | None = None, title: str = ""
 ) -> Figure:
-    """Draw the basins of attraction over two parameters of a grid.
+    """Draw the basins of attraction in the plane of two parameters of a grid.
 
     Parameters
     ----------
     basins : xarray.Dataset
         From `foldyn.basins` over a grid of two parameters.
     x, y : str, optional
-        Parameter along each axis, by default in their order.
+        Parameters along the two axes, by default in the order of the result.
     title : str
         Title of the figure.
 
@@ -168,7 +168,7 @@ def plot_basins(
     Raises
     ------
     InputError
-        Another result, a grid without exactly two parameters, no such parameter.
+        The result is of another kind, has not exactly two parameters, or lacks the parameter.
     """
     _check("basins", basins, "basins")
     names = [str(name) for name in basins["basin"].dims]
@@ -226,7 +226,7 @@ def plot_lyapunov_exponent(found: xr.Dataset, title: str = "") -> Figure:
 
 
 def _with_jumps(one: xr.Dataset, along: str, way: str) -> tuple[NDArray, NDArray]:
-    """Curve of amplitudes; for a stepped sine it runs up to its jumps and is broken there."""
+    """Curve of amplitudes; for a stepped sine it is broken at its jumps."""
     x = np.broadcast_to(one[along].values, one["amplitude"].shape)
     y = one["amplitude"].values
     if one.attrs["foldyn_result"] != "bifurcation_diagram":
@@ -252,7 +252,7 @@ def _along(result: xr.Dataset) -> str:
 
 
 def _named(values: xr.DataArray) -> str:
-    """Title of an axis, with the unit."""
+    """Title of the axis of a variable, with the unit."""
     text, units = values.attrs.get("long_name", str(values.name)), values.attrs.get("units", "")
     return text if units in ("", "1") else f"{text} ({units})"
 

@@ -1,4 +1,4 @@
-"""Bands of repeated sheets: along a path of the Brillouin zone, and as lines of one frequency."""
+"""Bands of repeated sheets: along a path of the Brillouin zone, and as contours of frequency."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def plot_bands(bands: xr.Dataset, gaps: bool = True, *, title: str = "") -> Figu
     Returns
     -------
     matplotlib.figure.Figure
-        Frequencies over the phase, a line for each band, colored by the share of motion along z if
-        the bands have a polarization.
+        Frequencies against the phase, a line for each band, colored by the share of motion along z
+        if the bands have a polarization.
 
     Raises
     ------
     InputError
-        Not a result of `foldyn.bands`, or phases of a grid, which lie on no path.
+        The result is not from `foldyn.bands`, or its phases form a grid instead of a path.
     """
     frequencies_of(bands)
     along, label = _along(bands)
@@ -85,13 +85,13 @@ def plot_iso_frequency(
     Returns
     -------
     matplotlib.figure.Figure
-        Contours of the frequency (Hz) over the phases along the two periods; group velocities are
-        at right angles to them where the periods are.
+        Contours of the frequency (Hz) in the plane of the phases along the two periods. If the
+        periods are at right angles, group velocities are at right angles to the contours.
 
     Raises
     ------
     InputError
-        Phases that are not a grid, or no such band.
+        The phases form no grid, or there is no such band.
     """
     frequency = frequencies_of(bands)
     shape = np.atleast_1d(bands.attrs.get("grid", ()))
@@ -116,7 +116,7 @@ def plot_iso_frequency(
 
 
 def _colored(along: np.ndarray, values: np.ndarray, shares: np.ndarray) -> LineCollection:
-    """Lines of bands (phase, band) in pieces from phase to phase, colored by shares."""
+    """Lines of bands (phase, band), cut at every phase into pieces, which shares color."""
     points = np.stack([np.broadcast_to(along[:, None], values.shape), values], axis=-1)
     pieces = np.stack([points[:-1], points[1:]], axis=2).reshape(-1, 2, 2)
     lines = LineCollection(list(pieces), cmap="viridis", linewidths=1.6, capstyle="round")
@@ -126,7 +126,7 @@ def _colored(along: np.ndarray, values: np.ndarray, shares: np.ndarray) -> LineC
 
 
 def _closed(values: np.ndarray) -> np.ndarray:
-    """Values (n, m) of a grid, closed by repeating the values at -pi at pi."""
+    """Values (n, m) of a grid, closed by repeating at pi the values at -pi."""
     values = np.concatenate([values, values[:1]])
     return np.concatenate([values, values[:, :1]], axis=1)
 

@@ -31,12 +31,12 @@ def draw_boards(
 ) -> Figure:
     """Draw thick panels as boards, with their hinge lines.
 
-    Boards move with their panels as rigid bodies, by least squares of the corners' distances.
+    Boards move as rigid bodies that fit the corners of their panels in the least-squares sense.
 
     Parameters
     ----------
     case_or_structure : Case, Structure or Pattern, or a result with its case
-        With a pattern made by `thicken`.
+        An object whose pattern was made by `thicken`.
     displacement : array_like, shape (n, 3) or (k, n, 3), optional
         Node displacements (m) of one state, or of several side by side; at rest by default.
     captions : sequence of str, optional
@@ -49,7 +49,7 @@ def draw_boards(
     Returns
     -------
     matplotlib.figure.Figure
-        The boards at rest in gray behind each state.
+        A view of each state, with the boards at rest behind it in gray.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def draw_boards(
 
 
 def _solid(pattern: Pattern) -> Sheet3D:
-    """Points of the boards at rest: the pattern's vertices, for hinge lines, then all corners."""
+    """Points of the boards at rest: the pattern's vertices (for hinge lines), then all corners."""
     boards = cast(Boards, pattern.boards)
     nodes, triangles, edges = [pattern.vertices], [], []
     first = len(pattern.vertices)

@@ -26,19 +26,19 @@ def figure_of(
     legend: int = 3,
     **grid: Any,
 ) -> Figure:
-    """Draw charts in rows of `columns`, with one legend below them.
+    """Draw charts, `columns` of them in a row, with one legend below them.
 
     Parameters
     ----------
     charts : sequence of Chart
-        Curves of one name look alike in all of them.
+        Curves of the same name look alike in all charts.
     size : tuple of float
         Width and height of the figure (inches).
     title : str
         Title of the figure.
     columns : int
     legend : int
-        Most columns of the legend; 0 draws none.
+        Largest number of columns of the legend; 0 draws no legend.
     **grid
         Arguments of `Figure.subplots`: "sharex", "sharey".
     """
@@ -61,7 +61,7 @@ def figure_of(
 
 
 def draw(axes: Axes, chart: Chart, keys: dict[str, Line2D]) -> None:
-    """Draw a chart's curves into axes; `keys` holds the lines so far by name, and is extended."""
+    """Draw a chart's curves into axes, and add their lines to `keys`, which holds lines by name."""
     alone = not any(curve.dots for curve in chart.curves)
     for curve in chart.curves:
         names = list(keys)

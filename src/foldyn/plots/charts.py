@@ -1,4 +1,4 @@
-"""Charts: curves over their axes, drawn by figures for papers and by pages."""
+"""Charts: curves with their axes, drawn both by figures for papers and by pages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from foldyn.errors import InputError
 
 DIGITS = 5  # significant digits of the numbers in a page
-MOST_POINTS = 2000  # most points of a curve in a page; of more, every k-th
+MOST_POINTS = 2000  # largest number of points of a curve in a page; of more points only every k-th
 
 
 @dataclass(frozen=True)
@@ -24,11 +24,11 @@ class Curve:
     name : str
         Name in the legend below the chart.
     x, y : array_like, shape (m,)
-        Coordinates; a curve may turn back. Points that are not finite are left out.
+        Coordinates; x need not increase. Points that are not finite are left out.
     dots : bool
         Whether to draw dots, as for measured values, instead of a line.
     spread : array_like, optional
-        Uncertainty of y: figures draw bars about dots, or a band about a line.
+        Uncertainty of y: figures draw error bars at dots, or a band around a line.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Chart:
-    """Curves over their axes.
+    """Curves with their axes.
 
     Parameters
     ----------
@@ -66,9 +66,9 @@ class Chart:
     title : str
         Written above the chart.
     note : str
-        Written below it.
+        Written below the chart.
     reach : float
-        The vertical axis spans -reach to reach; 0 fits the curves.
+        The vertical axis spans -reach to reach; with 0 it fits the curves.
     words : sequence of str
         Labels of the numbers 0, 1, 2, ... along the horizontal axis.
     zero : bool
@@ -97,5 +97,5 @@ class Chart:
 
 
 def _rounded(values: np.ndarray) -> list[float]:
-    """Round numbers to the digits that a reader can see."""
+    """Round numbers to as many digits as a reader can see."""
     return [float(f"{value:.{DIGITS}g}") for value in values.tolist()]

@@ -1,4 +1,4 @@
-"""Charts of a design search: objective and violation over the evaluations, and slopes."""
+"""Charts of a design search: objective and violation against evaluations, and slopes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from foldyn.plots.charts import Chart, Curve
 
 
 def convergence_charts(history: xr.Dataset) -> list[Chart]:
-    """Objective and largest violation over the evaluations, a curve for each search."""
+    """Objective and largest violation against evaluations, a curve for each search."""
     number = 1 + history["evaluation"].values
     search = history["search"].values
     objective, violation = history["objective"].values, history["violation"].values
@@ -39,7 +39,7 @@ def convergence_charts(history: xr.Dataset) -> list[Chart]:
 
 
 def slope_chart(slopes: Mapping[str, ArrayLike], objective: str) -> Chart:
-    """Change of an objective over the whole range of each parameter; for arrays the norm."""
+    """Change of an objective over the range of each parameter by its slope; for arrays the norm."""
     names: Sequence[str] = list(slopes)
     sizes = np.array(
         [float(np.linalg.norm(one)) if np.ndim(one) else one for one in slopes.values()]

@@ -21,12 +21,12 @@ from foldyn.plots.sheet import DrawnSheet, split_edges
 from foldyn.values import choice, of_kind
 
 COLORS = "coolwarm"
-WIDE, HIDDEN = 3.5, 0.25  # widths of colored creases, points, and their opacity behind panels
-ROWS = 4  # height of a legend: room for the color bar
+WIDE, HIDDEN = 3.5, 0.25  # width of colored creases in points, and their opacity behind panels
+ROWS = 4  # lines of a legend that take the height of the color bar
 
 
 def plot_convergence(history: xr.Dataset) -> Figure:
-    """Draw the objective and the largest violation over the evaluations.
+    """Draw the objective and the largest violation against the number of evaluations.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ def draw_sensitivity(
     ----------
     case_or_structure : Case, Structure or Pattern, or a result with its case
     values : array_like, shape (creases,) or (panels,)
-        Red is above 0, blue below.
+        Value of each crease or panel; red is above 0, blue below.
     label : str
         Title of the color bar, with its unit.
     on : {"crease", "panel"}, optional
-        What to color; by default whichever matches the number of values, creases first.
+        Parts to color; by default creases if their number matches the values, otherwise panels.
     view : tuple of float
         Elevation above the xy plane and azimuth around z (degrees).
     title : str
@@ -69,7 +69,7 @@ def draw_sensitivity(
     Raises
     ------
     InputError
-        The number of values does not match.
+        The number of values matches neither creases nor panels, or not those of `on`.
     """
     sheet, sight = Sheet3D.of(case_or_structure), View(*view)
     shown = np.asarray(values, float)

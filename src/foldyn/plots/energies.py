@@ -1,4 +1,4 @@
-"""Energies of a motion with the audit of their balance, and strain energies along a path."""
+"""Energies of a motion with the error of their balance, and strain energies along a path."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ COLORS: Mapping[str, str] = {
 
 
 def energy_error(trajectory: xr.Dataset) -> NDArray[np.float64]:
-    """Return kinetic + strain + air + dissipated - work, less its value at the start.
+    """Return kinetic + strain + air + dissipated - work, minus the same sum at the start.
 
     Parameters
     ----------
     trajectory : xarray.Dataset
-        With the energies (J) over time.
+        A motion with its energies (J) over time.
 
     Returns
     -------
@@ -52,8 +52,8 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     ----------
     trajectory : xarray.Dataset
         With ``kinetic``, the strain energies of its structure (``strain_bars``, ``strain_folds``
-        and ``strain_bends``, or of a shell ``strain_membrane``, ``strain_bending`` and
-        ``strain_folds``), ``dissipated`` and ``work`` (J), and of one in air ``air``, over
+        and ``strain_bends``; for a shell ``strain_membrane``, ``strain_bending`` and
+        ``strain_folds``), ``dissipated``, ``work`` and, for a structure in air, ``air`` (J), over
         ``time`` (s).
     title : str
         Title of the figure.
@@ -100,7 +100,7 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
 
 
 def _table(trajectory: xr.Dataset) -> NDArray[np.float64]:
-    """Return the energies (J) as in the audit, one column each."""
+    """Return the energies (J) of the balance, one column for each."""
     names = audit.audited(readings.parts_of(trajectory), audit.AIR in trajectory)
     return np.column_stack([trajectory[name].values for name in names])
 
@@ -123,20 +123,20 @@ def plot_path_energies(
         monotonically along the path. By default the axis is the load factor or, if that turns back,
         the mean distance that the nodes have traveled.
     direction : {"x", "y", "z", "-x", "-y", "-z"}, optional
-        Direction of that displacement; by default the one in which the nodes move farthest.
+        Direction of that displacement; by default the direction in which the nodes move farthest.
     title : str
         Title of the figure.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Two axes: the energies (J) and, as a line, the work done on the structure; the shares of
-        the energies.
+        Two axes: above the energies (J) and, as a line, the work done on the structure; below the
+        shares of the energies.
 
     Raises
     ------
     InputError
-        Not a path, a node that it does not have, another direction.
+        `path` is not a path, or a node or the direction does not exist.
     """
     readings.check_path(path, "path")
     x, name = _abscissa(path, nodes, direction)

@@ -1,4 +1,4 @@
-"""Models against the shell: errors of frequencies and likeness of shapes, over frequency."""
+"""Models compared with the shell: errors of frequencies and MAC of shapes, against frequency."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from foldyn.linear.reference import LEAST
 from foldyn.plots import style
 from foldyn.plots.modes import hertz
 
-NEAR = 0.05  # errors shaded as small
-MOST = 1.0  # larger errors are drawn at the edge
+NEAR = 0.05  # errors up to this share are shaded as small
+MOST = 1.0  # larger relative errors are drawn at the edge
 WIDE = 12.0  # largest ratio of frequencies on a linear axis
 MARKERS = "os^DvPX<>*"
 
 
 def plot_fidelity(fidelity: Fidelity, title: str = "") -> Figure:
-    """Draw a comparison with the shell: errors of frequencies, and MAC, over the shell's frequency.
+    """Draw errors of frequencies, and MAC, of models against the frequency of the shell.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def plot_fidelity(fidelity: Fidelity, title: str = "") -> Figure:
 
 
 def _along(upper: Axes, lower: Axes, frequency: np.ndarray, limit: float) -> None:
-    """Set the frequency axis: from zero, or logarithmic for more than a decade."""
+    """Set the frequency axis: from zero, or logarithmic for a wide range of frequencies."""
     low, high = float(frequency[0]), float(frequency[-1])
     if high > WIDE * low:
         for axes in (upper, lower):

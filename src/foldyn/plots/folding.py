@@ -1,4 +1,4 @@
-"""Pictures of a folding pattern: states side by side, and an animation."""
+"""Pictures of a pattern that folds: states side by side, and an animation."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def draw_folding(
     folding : Folding
         From `foldyn.fold`.
     states : int or sequence of int
-        How many, evenly spread over the steps including the first and the last; or their numbers,
-        negative ones from the end.
+        Number of states, evenly spread over the steps from the first to the last; or the numbers of
+        the states, where negative numbers count from the end.
     view : tuple of float
         Elevation above the xy plane and azimuth around z (degrees).
     title : str
@@ -86,7 +86,7 @@ def animate_folding(
         File to write, ending in .gif or .mp4. An MP4 needs ffmpeg: on the PATH, or through the
         package imageio-ffmpeg.
     frames : int
-        Number of pictures, evenly spread over the steps, linear between them.
+        Number of pictures, evenly spread over the steps and interpolated linearly between them.
     fps : int
         Pictures per second, 1 to 50 in a GIF and 1 to 60 in an MP4.
     view, title
@@ -100,8 +100,8 @@ def animate_folding(
     Raises
     ------
     InputError
-        Fewer than two frames, a rate out of range, a path that is no GIF or MP4 in an existing
-        directory, or an MP4 without ffmpeg.
+        There are fewer than two frames, the rate is out of range, the path is no GIF or MP4 in an
+        existing directory, or an MP4 is requested without ffmpeg.
     ComputationError
         ffmpeg could not write the file.
     """
@@ -130,7 +130,7 @@ def _checked(folding: Folding) -> Folding:
 
 
 def _sheet(folding: Folding, nodes: NDArray) -> Sheet3D:
-    """The pattern at the positions of its first state."""
+    """The pattern at the node positions of the first state."""
     pattern = folding.pattern
     return Sheet3D(pattern, None, None, nodes, n4b5(pattern).triangles)
 

@@ -22,9 +22,9 @@ from foldyn.plots.modes import hertz
 from foldyn.plots.readings import AXES, along_drive, by_label, check_nodes_of, directions, unit_of
 from foldyn.values import number
 
-_APART = 0.07  # closest labels of peaks, as a share of the frequency axis
-_FEW = 60  # up to this number of frequencies they are also drawn as dots
-_DECADES = 5.0  # least range of the magnitude axis below its highest value
+_APART = 0.07  # smallest distance between labels of peaks, relative to the frequency axis
+_FEW = 60  # up to this number of frequencies, each is also drawn as a dot
+_DECADES = 5.0  # decades, largest range of the magnitude axis
 
 
 def plot_frf(
@@ -44,13 +44,13 @@ def plot_frf(
         A response of `foldyn.frf`, or several by their labels, for example one per mass rule or
         amplitude.
     nodes : int, sequence of int, or str
-        Nodes to show, a curve each; a selection ("xmax") means vertices of the pattern.
+        Nodes to show, one curve each; a selection ("xmax") means vertices of the pattern.
     axes : str, sequence of str, or None
         Direction shown: one of "x", "y", "z", "-x", "-y", "-z" for all nodes, or one for each node.
         None means the axis along which each node responds most, in the direction of the drive.
     quantity : {"receptance", "mobility", "accelerance"}, optional
-        Quantity drawn of a response to forces; by default the receptance. A response to a moving
-        base is drawn as transmissibility.
+        Quantity to draw if forces drive; by default the receptance. If a base drives, the
+        transmissibility is drawn.
     prominence : float, optional
         Which peaks are marked; see `foldyn.linear.peaks_of`.
     title : str
@@ -59,13 +59,14 @@ def plot_frf(
     Returns
     -------
     matplotlib.figure.Figure
-        The magnitude on a logarithmic axis, its peaks marked and the higher of neighbors labelled
-        with their frequency; below it the phase in degrees, from -180 to 180, and the coherence.
+        The magnitude on a logarithmic axis, with marked peaks, labelled with their frequency (of
+        close neighbors only the higher one); below it the phase in degrees, from -180 to 180, and
+        the coherence.
 
     Raises
     ------
     InputError
-        No response or node, a node, direction or quantity that a response does not have.
+        There is no response or node, or a response lacks a node, direction or quantity.
     """
     responses = by_label("responses", responses)
     curves, shown = curves_of(responses, nodes, axes, quantity)
@@ -99,7 +100,7 @@ def plot_frf(
 
 
 class Curve(NamedTuple):
-    """The response of one node of one model at its frequencies (Hz), all of shape (m,)."""
+    """Response of one node of one model, with its frequencies (Hz); arrays have shape (m,)."""
 
     label: str
     node: int
@@ -115,12 +116,12 @@ def curves_of(
     axes: str | Sequence[str] | None,
     quantity: str | None,
 ) -> tuple[list[Curve], str]:
-    """Responses of nodes, models first, and the quantity that they show.
+    """Responses of nodes, in order of models, then nodes; and the quantity that they show.
 
     Raises
     ------
     InputError
-        No response or node, a node, direction or quantity that a response does not have.
+        There is no response or node, or a response lacks a node, direction or quantity.
     """
     held = {quantity_of(response) for response in responses.values()}
     if len(held) > 1:
@@ -154,7 +155,7 @@ def curves_of(
 def phase_line(
     frequency: NDArray[np.float64], values: NDArray[np.complex128]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Frequencies and phases (degrees, -180 to 180), broken by NaN where they jump around."""
+    """Frequencies and phases (degrees, -180 to 180), with a NaN where the phase wraps around."""
     degrees = np.degrees(np.angle(np.where(values == 0.0, np.nan, values)))
     # Without damping, rounding makes the phase -180 or 180: use one of them.
     degrees = np.where(degrees > 180.0 - 1e-6, -180.0, degrees)
@@ -163,7 +164,7 @@ def phase_line(
 
 
 def _label(curve: Curve, models: bool, nodes: bool, axes: bool) -> str:
-    """Legend entry: whatever distinguishes a curve from the others."""
+    """Legend entry of a curve: only what distinguishes it from the other curves."""
     node = f"node {curve.node}" + (f" along {curve.axis}" if axes else "")
     parts = [*([curve.label] if models else []), *([node] if nodes or axes else [])]
     return ", ".join(parts) or "response"

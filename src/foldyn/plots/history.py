@@ -16,7 +16,7 @@ from foldyn.plots.readings import AXES, by_label, check_nodes_of, directions
 from foldyn.signals import sampling_interval, spectrum
 from foldyn.values import number
 
-VISIBLE = 0.02  # share of a curve's height that is visible
+VISIBLE = 0.02  # smaller shares of a curve's height count as invisible
 ROUND = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 
@@ -41,14 +41,14 @@ def plot_history(
         ``displacement`` (time, node, axis) in m at evenly spaced times. Intervals and lengths may
         differ between them.
     nodes : int, sequence of int, or str
-        Nodes to show, one row each; a selection ("xmax") means vertices of the pattern.
+        Nodes to show, one row for each; a selection ("xmax") means vertices of the pattern.
     axes : str, sequence of str, or None
         Direction shown: one of "x", "y", "z" for all nodes, or one for each node (a sequence of
         length one serves all). None: the direction in which each node moves most.
     max_frequency : float or None
         Upper end of the frequency axis (Hz). None: a round number above the last frequency at
-        which a curve has 2 % of the height of the highest one of its node, at most half the
-        smallest sampling frequency.
+        which any curve of a node has 2 % of the height of that node's highest curve; at most half
+        the smallest sampling frequency.
     title : str
         Title of the figure.
     window, detrend : str or None
@@ -62,8 +62,8 @@ def plot_history(
     Raises
     ------
     InputError
-        No trajectory or node, a result that is no motion, a node or direction that a trajectory
-        does not have, uneven times, or NaN in a displacement.
+        There is no trajectory or no node, a result is no motion, a trajectory lacks a node or
+        direction, times are uneven, or a displacement contains NaN.
     """
     trajectories = by_label("trajectories", trajectories)
     for one in trajectories.values():

@@ -1,4 +1,4 @@
-"""The energy landscape of a path: energy and force over the stroke, and force-free states."""
+"""The energy landscape of a path: energy and force against the stroke, and force-free states."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _MARKS: dict[bool, dict[str, Any]] = {
 
 
 def plot_landscape(landscape: Landscape, title: str = "") -> Figure:
-    """Draw energy and force over the stroke of a path, with its force-free states.
+    """Draw energy and force of a path against its stroke, with the force-free states.
 
-    Stable states are dots, unstable ones (the tops of barriers) rings; ranges of the stroke in
-    which the force falls, of negative stiffness, are shaded.
+    Stable states are dots, unstable states (the tops of barriers) rings. Ranges of the stroke in
+    which the force falls (negative stiffness) are shaded.
 
     Parameters
     ----------
@@ -38,8 +38,8 @@ def plot_landscape(landscape: Landscape, title: str = "") -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Two axes: the energy (J), with the barriers between neighboring stable states; the force
-        (N).
+        Two axes: above the energy (J), with the barriers between neighboring stable states; below
+        the force (N).
 
     Raises
     ------
@@ -79,7 +79,7 @@ def plot_landscape(landscape: Landscape, title: str = "") -> Figure:
 
 
 def with_states(landscape: Landscape) -> tuple[NDArray, NDArray, NDArray]:
-    """Stroke (m), force (N) and energy (J) at points of the path, with the states in between."""
+    """Stroke (m), force (N) and energy (J) at the points of the path and at force-free states."""
     columns = np.stack([landscape.stroke, landscape.force, landscape.energy], axis=1)
     force = landscape.force
     between = np.flatnonzero(force[:-1] * force[1:] < 0.0)

@@ -16,8 +16,8 @@ from foldyn.structures.discretized import HingeKind
 
 MOST_CURVES = 4
 POINTS = 359
-# A law may grow without bound towards 0 and 360 degrees: the range between them sets the height of
-# the frame.
+# A law may grow without bound towards 0 and 360 degrees, so a narrower range of angles sets the
+# height of the frame.
 _FRAMED = (20.0, 340.0)
 
 
@@ -45,7 +45,7 @@ def _at_rest(states: list[tuple[float, float]]) -> Curve:
 
 
 def _hinges(hinges: HingeKind) -> Chart:
-    """Moment curves of one kind of hinge."""
+    """Chart of the moment curves of one kind of hinge."""
     kind, stiffness, rest = hinges.name, hinges.stiffness, hinges.rest
     degrees = np.linspace(1.0, 359.0, POINTS)
     framed = (degrees >= _FRAMED[0]) & (degrees <= _FRAMED[1])

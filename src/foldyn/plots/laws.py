@@ -23,7 +23,7 @@ def plot_laws(
     *,
     title: str = "",
 ) -> Figure:
-    """Draw moment over dihedral of folds and bends, and stress over stretch of bars.
+    """Draw moments of folds and bends against the dihedral, and stress of bars against stretch.
 
     A shell has only folds. Hinges of equal stiffness and rest angle share a curve; each kind has at
     most four curves, for the largest groups of hinges. A dot and a dotted line mark the rest angle.
@@ -31,7 +31,7 @@ def plot_laws(
     Parameters
     ----------
     structure : Structure or Shell, or a Case or result with one
-        Its laws, stiffnesses and rest angles are drawn as used, for whole creases.
+        Structure whose laws are drawn, with the stiffnesses and rest angles of whole creases.
     stretch : tuple of float
         Range of the bars' stretch.
     title : str
@@ -40,7 +40,7 @@ def plot_laws(
     Returns
     -------
     matplotlib.figure.Figure
-        One axes per kind of element that the structure has, in the order fold, bend, bar.
+        Axes for each kind of element that the structure has, in the order fold, bend, bar.
 
     Raises
     ------

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from foldyn.plots.scene import Points
 
 STEPS = 12  # radius of an arc
-NEAR, FAR = 0.15, 1.0  # rad, largest angle from a panel to the end of an arc
+NEAR, FAR = 0.15, 1.0  # rad, limits of the angle between a panel and an end of an arc
 
 
 class Share(NamedTuple):
@@ -33,7 +33,7 @@ class Share(NamedTuple):
 
 
 def on_panels(case: Case, kind: type[Pressure] | type[Temperature]) -> list[Share]:
-    """Pressure (Pa) or temperature changes (K) of panels, one for each load of a kind."""
+    """Pressures (Pa) or temperature changes (K) of panels, a `Share` for each load of a kind."""
     structure, found = case.structure, []
     for place, load in case.loads_of(kind):
         triangles = resolve_panels(structure, load.panels, f"{place}.panels")
@@ -44,7 +44,7 @@ def on_panels(case: Case, kind: type[Pressure] | type[Temperature]) -> list[Shar
 
 
 def moments(case: Case) -> list[Share]:
-    """Moments of whole creases, one for each load."""
+    """Moments of whole creases, a `Share` for each load."""
     found = []
     for place, load in case.loads_of(CreaseMoment):
         creases, moment = load.of_creases(case.structure, place)
@@ -73,10 +73,10 @@ def panel_arrows(case: Case, points: Points, share: Share) -> tuple[Points, Poin
 
 
 def crease_arcs(case: Case, points: Points, share: Share, radius: float) -> Points:
-    """Arcs (m, STEPS, 3) about the middles of creases, two for each, that end at a head.
+    """Arcs (m, STEPS, 3) about the middles of creases, two for each crease; heads go to their ends.
 
-    They lie on the front. For a positive moment, which opens the crease, they point towards the
-    panels; for a negative one, away from them.
+    Arcs lie on the front. For a positive moment, which opens the crease, they point towards the
+    panels; for a negative moment, away from the panels.
     """
     pieces, arcs = case.structure.body.sheet.fold_hinges(), []
     for crease, moment in zip(share.numbers, share.value, strict=True):
@@ -97,14 +97,14 @@ def crease_arcs(case: Case, points: Points, share: Share, radius: float) -> Poin
 
 
 K = TypeVar("K")
-POINTS = 1001  # points of a curve
+POINTS = 1001  # number of points of a curve
 _LISTED = 3
 # Most curves of one history; imposed displacements and rest angles may differ everywhere.
 _MOST_CURVES = 4
 
 
 def load_charts(case: Case, start: float, duration: float) -> list[Chart]:
-    """Curves of all loads and imposed motions over time (s), a chart for each kind.
+    """Curves of all loads and imposed motions against time (s), a chart for each kind of load.
 
     A curve shows the largest force at a node, or the largest pressure, temperature or moment among
     the panels or creases.
@@ -142,7 +142,7 @@ def _peak(vectors: np.ndarray) -> float:
 
 
 def _imposed(case: Case) -> list[tuple[float, str, Any]]:
-    """Imposed displacements, one for each history, value and axis or direction."""
+    """Curves of imposed displacements, one for each history, value and axis or direction."""
     found = []
     for _, history in case.prescribed_terms:
         moved: dict[tuple[str, float], list[int]] = {}
@@ -160,7 +160,7 @@ def _imposed(case: Case) -> list[tuple[float, str, Any]]:
 
 
 def _of_base(case: Case) -> list[tuple[float, str, Any]]:
-    """Motions of the base, one for each history and axis."""
+    """Curves of motions of the base, one for each history and axis."""
     return [
         (float(value), f"base moved {value:.4g} m along {axis}", history)
         for vectors, history in case.base_terms
@@ -172,7 +172,7 @@ def _of_base(case: Case) -> list[tuple[float, str, Any]]:
 
 
 def _rest_angles(case: Case) -> list[tuple[float, str, Any, float]]:
-    """Rest angles (degrees), one for each history and pair of first and last angle."""
+    """Curves of rest angles (degrees), one for each history and pair of first and last angle."""
     found = []
     first = np.degrees(case.structure.fold_rest).round(6)
     for change, history in case.actuation_terms:
@@ -191,7 +191,7 @@ def _rest_angles(case: Case) -> list[tuple[float, str, Any, float]]:
 
 
 def _some(groups: dict[K, list[int]]) -> Iterator[tuple[K, list[int], str]]:
-    """The first groups; the last one says how many are left out."""
+    """The first groups; the name of the last one tells how many are left out."""
     hidden = len(groups) - _MOST_CURVES
     for k, (key, numbers) in enumerate(list(groups.items())[:_MOST_CURVES], 1):
         last = hidden > 0 and k == _MOST_CURVES
@@ -205,7 +205,7 @@ def base_vectors(case: Case, vectors: np.ndarray) -> np.ndarray:
 
 
 def signed_peak(vectors: np.ndarray) -> np.ndarray:
-    """Component (3,) of the largest magnitude along each axis of vectors (n, 3)."""
+    """For each axis, the component of vectors (n, 3) with the largest magnitude, shape (3,)."""
     return vectors[np.abs(vectors).argmax(axis=0), np.arange(3)]
 
 
@@ -230,7 +230,7 @@ def describe_moment(share: Share) -> str:
 
 
 def _most(values: np.ndarray) -> float:
-    """Value of the largest magnitude."""
+    """The value with the largest magnitude."""
     return float(values[np.abs(values).argmax()])
 
 
@@ -264,7 +264,7 @@ def describe(vectors: np.ndarray, unit_name: str) -> str:
 
 
 def _listed(what: str, numbers: list[int]) -> str:
-    """List the first of some nodes or creases, "nodes 1, 2, 5 and 4 more"."""
+    """List the first of some nodes or creases, as in "nodes 1, 2, 5 and 4 more"."""
     listed = ", ".join(str(number) for number in numbers[:_LISTED])
     if len(numbers) > _LISTED:
         listed += f" and {len(numbers) - _LISTED} more"
@@ -280,8 +280,8 @@ def _direction(unit: np.ndarray) -> str:
 
 
 def history_name(history: Any) -> str:
-    """Name a history by its class and parameters, "half sine (duration 0.5)"."""
-    history = getattr(history, "function", history)  # a user's function goes by its own name
+    """Name a history by its class and parameters, such as "half sine (duration 0.5)"."""
+    history = getattr(history, "function", history)  # a function of the user keeps its own name
     kind = type(history)
     if not is_dataclass(history):
         return str(getattr(history, "__name__", kind.__name__)).strip("<>")

@@ -20,15 +20,14 @@ def plot_load_history(
 ) -> Figure:
     """Draw the loads of a case and the motions it imposes over time.
 
-    Each kind has axes of its own:
+    Each kind of load has its own axes:
 
-    - one curve per history of forces: the force at the most heavily loaded of its nodes, that is
-      the largest magnitude among the nodes times the factor of the history;
-    - pressure, changes of temperature and moments of creases: one curve per load, the largest in
-      magnitude of its panels or creases times the factor;
-    - gravity: the magnitude of its acceleration times the factor;
-    - imposed displacements and displacements of the base, one curve per value and axis;
-    - rest angles of actuated creases, one curve per pair of first and last angle.
+    - forces: one curve per history, the largest force at a node times the factor of the history;
+    - pressure, changes of temperature and moments of creases: one curve per load, the value of the
+    largest magnitude among its panels or creases times the factor; - gravity: the magnitude of its
+    acceleration times the factor; - imposed displacements and displacements of the base, one curve
+    per value and axis; - rest angles of actuated creases, one curve per pair of first and last
+    angle.
 
     The last two kinds have at most four curves per history.
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from foldyn.plots import scene
 from foldyn.plots.scene import Points, View
 
-CROWD = 20  # more arrows than this between a pattern's vertices are thinned
+CROWD = 20  # if nodes other than vertices have more arrows, these are thinned
 MANY = 100  # with more arrows in all, thinning is stronger
 _DIRECTIONS = np.radians(np.arange(90.0, 450.0, 30.0))
 
@@ -26,7 +26,7 @@ class Mark(NamedTuple):
     ----------
     color : str
     keys : list
-        Legend entries.
+        Legend entries of the mark.
     lines : sequence of ndarray, each of shape (k, p, 3)
         Polylines through p points each.
     triangles : ndarray, shape (m, 3, 3)
@@ -56,7 +56,7 @@ class Mark(NamedTuple):
         return np.concatenate([part.reshape(-1, 3) for part in parts])
 
     def draw(self, axes: Axes3D) -> None:
-        """Draw it."""
+        """Draw the mark."""
         for lines in self.lines:
             scene.add_segments(axes, lines, self.color, self.width, self.dashes, self.zorder)
         if len(self.triangles):
@@ -79,7 +79,7 @@ def billboard(tip: Points, along: Points, length: float, half: float, view: View
 def support_triangles(
     points: Points, fixed: NDArray[np.bool_], size: float, view: View, moves: Points
 ) -> tuple[Points, list[tuple[int, str]]]:
-    """Return one triangle per held direction, its tip at the node, and each node's axes.
+    """Return a triangle for each held direction, with its tip at the node, and each node's axes.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def support_triangles(
         Length of a triangle (m).
     view : View
     moves : ndarray, shape (n, 3)
-        Displacements (m) imposed by the supports: their triangles push the nodes.
+        Displacements (m) imposed by supports: triangles of such supports push the nodes.
 
     Returns
     -------
@@ -121,7 +121,8 @@ def load_arrows(
     points, vectors : ndarray, shape (n, 3)
         Node positions (m) and forces (N).
     longest : float
-        The force (N) whose arrow has the full length; smaller ones are shorter, down to a third.
+        The force (N) whose arrow has the full length; smaller forces have shorter arrows, down to a
+        third of it.
     length : float
         Full length (m).
     view : View
@@ -145,8 +146,8 @@ def load_arrows(
 def thinned(points: Points, vectors: Points, length: float, always: int | None) -> Points:
     """Set vectors (n, 3) to zero at points (n, 3) too close for arrows of a given length.
 
-    The first `always` points keep theirs. All points do if few others have a vector, or if `always`
-    is None.
+    The first `always` points keep their vectors. All points keep them if few others have a vector,
+    or if `always` is None.
     """
     where = np.flatnonzero(vectors.any(axis=1))
     if always is None or np.count_nonzero(where >= always) <= CROWD:
@@ -183,14 +184,14 @@ def add_triangles(axes: Axes3D, triangles: Points, color: str, zorder: float) ->
 
 
 class Labels:
-    """Places short texts next to points, each in the emptiest direction.
+    """Places short texts next to points, each in the direction with most room.
 
     Parameters
     ----------
     axes : Axes3D
     view : View
     distance : float
-        From the point to the middle of its text (m).
+        Distance from the point to the middle of its text (m).
     obstacles : ndarray, shape (p, 3)
         Points to avoid: samples of lines and marks.
     """

@@ -1,4 +1,4 @@
-"""Mode shapes side by side, over the equilibrium in gray, and matrices of MAC."""
+"""Mode shapes side by side, with the equilibrium behind them in gray, and matrices of MAC."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from foldyn.values import length, numbers
 _AMPLITUDE = 0.12  # largest displacement, relative to the sheet's size
 _STRETCH = 0.4  # largest relative displacement of a bar's ends, relative to its length
 _SHADES = LinearSegmentedColormap.from_list("mac", ["#FFFFFF", "#9CC7E4", style.BLUE, "#00304A"])
-_MOST_NUMBERS = 16  # most rows or columns with legible numbers
+_MOST_NUMBERS = 16  # largest number of rows or columns with legible numbers
 _CELL, _MARGIN, _BAR = 0.42, 1.1, 0.9  # inches
 
 
@@ -40,22 +40,22 @@ def draw_modes(
     view: tuple[float, float] = (28.0, -60.0),
     title: str = "",
 ) -> Figure:
-    """Draw mode shapes, each over the state of the oscillation in gray.
+    """Draw mode shapes, each with the state of the oscillation behind it in gray.
 
-    All are drawn at the same scale; below each stand its number, frequency, damping ratio and
-    character.
+    All shapes are drawn at the same scale. Below each shape are its number, frequency, damping
+    ratio and character.
 
     Parameters
     ----------
     case_or_structure : Case or Structure
-        What vibrates; by default the case of the modes: ``draw_modes(modes)``.
+        The structure that vibrates; by default from the modes: ``draw_modes(modes)``.
     modes : xarray.Dataset
         Modes of `foldyn.modes`.
     which : sequence of int, optional
-        Mode numbers, from 1; by default all that are not rigid, at most 12.
+        Mode numbers, from 1; by default all modes that are not rigid, at most 12.
     amplitude : float, optional
         Largest displacement (m) in each picture; by default 12 % of the sheet's size, or less if
-        neighboring nodes would part too far for a legible shape.
+        neighboring nodes would move too far apart for a legible shape.
     names : xarray.Dataset or mapping of int to str, optional
         Character of the modes: a result of `foldyn.linear.character`, or words by mode number; by
         default the character along the axis that leads away from the supports, or the longest axis.
@@ -72,7 +72,7 @@ def draw_modes(
     Raises
     ------
     InputError
-        Modes of another structure, or no such mode.
+        The modes belong to another structure, or a mode does not exist.
     """
     shown = ShownModes.of(case_or_structure, modes, which, amplitude, names)
     positions = shown.sheet.nodes + shown.swings
@@ -81,12 +81,12 @@ def draw_modes(
 
 @dataclass(frozen=True)
 class ShownModes:
-    """What figures and films of modes show.
+    """Mode shapes as figures and films show them, with captions and legend.
 
     Attributes
     ----------
     sheet : Sheet3D
-        The sheet in the state of the oscillation.
+        The sheet in the state about which it oscillates.
     swings : ndarray, shape (k, n, 3)
         Displacements from that state (m) at full amplitude.
     captions : list of str
@@ -127,13 +127,13 @@ class ShownModes:
 def mode_names(
     sheet: Sheet3D, modes: xr.Dataset, names: Mapping[int, str] | xr.Dataset | None
 ) -> Mapping[int, str]:
-    """Character of modes that are not rigid, with its share of the motion, by mode number."""
+    """Character of each mode that is not rigid, with the share of motion, by mode number."""
     if names is None:
         from foldyn.linear import character
 
         try:
             names = character(modes, case=sheet.case)
-        except InputError:  # a bare structure whose laws the result does not hold
+        except InputError:  # a bare structure with laws that the result does not contain
             return {}
     if not hasattr(names, "data_vars"):
         return cast("Mapping[int, str]", names)
@@ -169,7 +169,7 @@ def hertz(frequency: float) -> str:
 
 
 def _readable(sheet: Sheet3D, shape: Points, amplitude: float | None) -> Points:
-    """Scale a shape to an amplitude (m), or to a legible one."""
+    """Scale a shape to an amplitude (m), or by default to a legible amplitude."""
     largest = float(np.linalg.norm(shape, axis=1).max())
     if largest == 0.0:
         return shape
@@ -196,7 +196,7 @@ def plot_mac(
     Parameters
     ----------
     mac : array_like, shape (a, b)
-        Values from 0 to 1 of `foldyn.mac`: the rows are the modes of the first set.
+        Values from 0 to 1, as from `foldyn.mac`: rows are the modes of the first set.
     rows, columns : sequence of str, optional
         Labels of the rows and columns; by default the numbers from 1.
     row_title, column_title : str
@@ -213,7 +213,7 @@ def plot_mac(
     Raises
     ------
     InputError
-        Not a matrix, values out of range, or labels that do not match it.
+        `mac` is not a matrix, has values out of range, or labels do not match it.
     """
     values = numbers("mac", mac)
     if values.ndim != 2 or not values.size:

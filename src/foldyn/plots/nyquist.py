@@ -28,7 +28,7 @@ _RESONANT = style.ring(style.BLACK, 6.0)
 
 
 class Circle(NamedTuple):
-    """Circle of a mode in the plane of mobility: diameter / (1 + i x) + residual, x the detuning.
+    """Circle of a mode in the plane of mobility: diameter / (1 + i x) + residual, with detuning x.
 
     `natural` (Hz) and `ratio` describe the curve, including the damping of a window, if any.
     """
@@ -38,7 +38,7 @@ class Circle(NamedTuple):
     residual: complex
     natural: float
     ratio: float
-    band: NDArray[np.bool_]  # which frequencies were fitted
+    band: NDArray[np.bool_]  # marks frequencies that were fitted
 
     def __call__(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Mobility at frequencies (Hz) above 0."""
@@ -67,10 +67,11 @@ def plot_nyquist(
         A response of `foldyn.frf` to forces.
     node : int
     axis : {"x", "y", "z", "-x", "-y", "-z"}, optional
-        By default the axis along which the node responds most, in the direction of the drive.
+        Direction of the mobility; by default the axis along which the node responds most, in the
+        direction of the drive.
     peaks : sequence of Peak, optional
-        Peaks of the response, from `foldyn.linear.peaks_of`, by default all; they set the natural
-        frequency and damping ratio of the circles. The first 6 with a circle are drawn.
+        Peaks of the response, from `foldyn.linear.peaks_of`, by default all. They set the natural
+        frequency and damping ratio of the circles. The first 6 peaks that have a circle are drawn.
     title : str
         Title of the figure.
 
@@ -78,13 +79,13 @@ def plot_nyquist(
     -------
     matplotlib.figure.Figure
         Axes for each circle, at equal scale in both directions: the points within 1.5 half-power
-        widths of the resonance, the circle, and the resonance on it. If no circle fits, axes of the
-        whole curve.
+        widths of the resonance, the circle, and the resonance on it. If no circle fits, axes with
+        the whole curve.
 
     Raises
     ------
     InputError
-        A response to a moving base; no such node or direction.
+        The response is driven by a moving base, or has no such node or direction.
     """
     if quantity_of(response) not in PER_FORCE:
         raise InputError("response: a base drives it; circles need forces, drive=[fd.Force(...)]")

@@ -1,4 +1,4 @@
-"""Paths: load over displacement with stability, and deformed shapes along them."""
+"""Paths: load against displacement with stability, and deformed shapes along paths."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def plot_load_displacement(
     direction: str | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw the load factor over the displacement of chosen nodes.
+    """Draw the load factor against the displacement of chosen nodes.
 
-    Solid lines are stable, dashed ones unstable (the tangent has negative eigenvalues with the
-    supports held in place); limit points are dots, bifurcations diamonds. A point that could not be
-    located is a bar over its interval of load factors.
+    Solid lines are stable, dashed lines unstable (the tangent has negative eigenvalues with the
+    supports held in place). Limit points are dots, bifurcations diamonds. A critical point that
+    could not be located is drawn as a bar along its interval of load factors.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def plot_load_displacement(
     nodes : int, sequence of int, or str
         Nodes to show, a curve each; a selection ("xmax") means vertices of the pattern.
     direction : {"x", "y", "z", "-x", "-y", "-z"}, optional
-        Direction of the displacement; by default the one in which the nodes move farthest.
+        Direction of the displacement; by default the direction in which the nodes move farthest.
     title : str
         Title of the figure.
 
@@ -58,7 +58,7 @@ def plot_load_displacement(
     Raises
     ------
     InputError
-        No path or node, a node that a path does not have, another direction.
+        There is no path or no node, a path lacks a node, or the direction does not exist.
     """
     paths = readings.by_label("paths", paths)
     numbers, direction = readings.asked(paths, nodes, direction)
@@ -80,20 +80,21 @@ def plot_reaction(
     direction: str | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw the total force of supports over the displacement that they impose.
+    """Draw the total force of supports against the displacement that they impose.
 
-    Solid lines are stable, dashed ones unstable, with the supports held in place; limit points are
-    dots, bifurcations diamonds.
+    Solid lines are stable, dashed lines unstable, both with the supports held in place; limit
+    points are dots, bifurcations diamonds.
 
     Parameters
     ----------
     paths : xarray.Dataset, or mapping of str to xarray.Dataset
-        A path of `foldyn.trace`, or several by their labels, a curve each.
+        A path of `foldyn.trace`, or several by their labels; each is a curve.
     nodes : int, sequence of int, or str
-        Supported nodes, or a selection ("xmax"): their reactions are added up, their mean
-        displacement is shown.
+        Supported nodes, or a selection ("xmax"). The sum of their reactions is drawn against their
+        mean displacement.
     direction : {"x", "y", "z", "-x", "-y", "-z"}, optional
-        Direction of force and displacement; by default that in which the nodes move farthest.
+        Direction of force and displacement; by default the direction in which the nodes move
+        farthest.
     title : str
         Title of the figure.
 
@@ -106,8 +107,8 @@ def plot_reaction(
     Raises
     ------
     InputError
-        No path or node, a node that a path does not have or does not support along the direction,
-        another direction.
+        There is no path or no node, a path lacks a node or does not support it along the direction,
+        or the direction does not exist.
     """
     paths = readings.by_label("paths", paths)
     numbers, direction = readings.asked(paths, nodes, direction)
@@ -194,19 +195,19 @@ def draw_shapes(
     view: tuple[float, float] = (28.0, -60.0),
     title: str = "",
 ) -> Figure:
-    """Draw the deformed sheet at points of a path, over the undeformed one in gray.
+    """Draw the deformed sheet at points of a path, with the undeformed sheet behind it in gray.
 
     All shapes are drawn at the same scale.
 
     Parameters
     ----------
     case_or_structure : Case or Structure
-        What moves; by default the case of the path: ``draw_shapes(path)``.
+        The structure that moves; by default from the path: ``draw_shapes(path)``.
     path : xarray.Dataset
         A path of `foldyn.trace`.
     points : int or sequence of int
-        How many points, evenly spread over the distance that the nodes travel, including the first
-        and the last; or their numbers, negative ones from the end.
+        Number of points, evenly spread over the distance that the nodes travel, including the first
+        and the last; or the numbers of the points, where negative numbers count from the end.
     scale : float
         Factor on the displacement in the picture.
     view : tuple of float
@@ -217,12 +218,13 @@ def draw_shapes(
     Returns
     -------
     matplotlib.figure.Figure
-        One orthographic view for each point; below it the point's number, load factor and kind.
+        One orthographic view for each point, with the number, load factor and kind of the point
+        below it.
 
     Raises
     ------
     InputError
-        A path of another structure, or no such point.
+        The path belongs to another structure, or a point does not exist.
     """
     readings.check_path(path, "path")
     sheet = Sheet3D.of(case_or_structure)

@@ -1,4 +1,4 @@
-"""Pictures of patterns side by side: flat ones from above, folded ones in space."""
+"""Pictures of patterns side by side: flat patterns from above, folded patterns in space."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from foldyn.plots import scene, style
 from foldyn.plots.scene import Seen, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, edge_keys
 
-FLAT = 1e-6  # largest height, relative to the size, of a pattern drawn from above
+FLAT = 1e-6  # patterns up to this height, relative to their size, are drawn from above
 _ABOVE, _ASLANT = (90.0, -90.0), (28.0, -60.0)
 _MARGIN, _CAPTION, _LEGEND = 0.15, 0.3, 0.35  # inches
 
@@ -33,10 +33,10 @@ def draw_patterns(
     ----------
     patterns : Pattern or sequence of Pattern
     captions : sequence of str
-        Text below each.
+        Text below each pattern.
     views : sequence of tuple of float, or None
-        Elevation above the xy plane and azimuth around z (degrees) of each; None, the default, is
-        from above for a flat pattern and from the front for a folded one.
+        Elevation above the xy plane and azimuth around z (degrees) for each pattern. None, the
+        default, shows a flat pattern from above and a folded pattern from the front.
     tallest : float
         Height of the largest picture (inches).
     width : float
@@ -47,7 +47,7 @@ def draw_patterns(
     Returns
     -------
     matplotlib.figure.Figure
-        Orthographic views without axes, the legend of the creases below.
+        Orthographic views without axes, with the legend of the creases below.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What figures and pages take from their arguments, without drawing: cases, nodes, energies."""
+"""Data for figures and pages from their arguments, without drawing: cases, nodes, energies."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def alone(field: str, result: Any) -> xr.Dataset:
 
 
 class OfResult(Protocol[P, R]):
-    """A figure of a result, whose case may be omitted."""
+    """A function that draws a result, called with its case or without it."""
 
     @overload
     def __call__(
@@ -97,7 +97,7 @@ def directions(
     moved: Iterable[NDArray],
     known: Sequence[str] = AXES,
 ) -> list[str]:
-    """One direction for each node, by default the one in which it moves most.
+    """One direction for each node, by default the direction in which the node moves most.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def directions(
     count : int
         Number of nodes.
     moved : iterable of ndarray, shape (samples, count, 3)
-        Displacements shown of each result; used only if no axes are given.
+        Displacements that are shown, for each result; used only if no axes are given.
     """
     if axes is None:
         largest = np.max([np.abs(values).max(axis=0) for values in moved], axis=0)
@@ -122,7 +122,7 @@ def directions(
 
 
 def check_path(path: xr.Dataset, name: str) -> None:
-    """Refuse what is not a path, or one with NaN."""
+    """Refuse anything that is not a path, and paths with NaN."""
     alone(name, path)
     missing = [key for key in ("displacement", "load_factor", "point") if key not in path]
     if missing or "step" not in path.sizes:
@@ -132,7 +132,7 @@ def check_path(path: xr.Dataset, name: str) -> None:
 
 
 def critical_word(path: xr.Dataset, number: int) -> str:
-    """Word for a critical point; if it could not be located, with its interval of load factors."""
+    """Word for a critical point, with its interval of load factors if it could not be located."""
     word = CRITICAL.get(str(path["point"].values[number]), "")
     if is_loose(path)[number]:
         low, high = path["interval"].transpose("step", "end").values[number]
@@ -141,7 +141,7 @@ def critical_word(path: xr.Dataset, number: int) -> str:
 
 
 def is_loose(path: xr.Dataset) -> NDArray[np.bool_]:
-    """Which points of a path stand for critical points that could not be located."""
+    """Mark the points of a path that stand for critical points that could not be located."""
     if "interval" not in path:
         return np.zeros(path.sizes["step"], bool)
     return np.ptp(path["interval"].transpose("step", "end").values, axis=1) > 0.0
@@ -153,14 +153,14 @@ def displacements(result: xr.Dataset, dimension: str = "step") -> NDArray[np.flo
 
 
 def way(path: xr.Dataset) -> NDArray[np.float64]:
-    """Mean distance (m) that the nodes have traveled up to each point, never falling."""
+    """Mean distance (m) that the nodes have traveled up to each point; it never decreases."""
     motion = np.diff(displacements(path), axis=0)
     steps = np.sqrt((motion**2).sum(axis=2).mean(axis=1))
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def evenly(path: xr.Dataset, count: int) -> list[int]:
-    """Numbers of `count` points evenly spread over that distance, first and last included."""
+    """Numbers of `count` points evenly spread over the distance `way`, first and last included."""
     length = way(path)
     wanted = np.linspace(0.0, length[-1], count) if count > 1 else length[-1:]
     return np.unique(np.abs(length[:, None] - wanted).argmin(axis=0)).tolist()
@@ -177,9 +177,9 @@ class Stretch(NamedTuple):
 def stretches(path: xr.Dataset) -> list[Stretch]:
     """Stable and unstable stretches of the path.
 
-    A stretch between two points is unstable if the tangent has a negative eigenvalue at either of
-    them; critical points count as their more stable side. Without counted eigenvalues everything
-    counts as stable.
+    A stretch between two points is unstable if the tangent has a negative eigenvalue at either
+    point; a critical point counts as its more stable side. If negative eigenvalues were not
+    counted, everything counts as stable.
     """
     negative = path["negative_eigenvalues"].values
     stable = np.maximum(negative[:-1], negative[1:]) <= 0
@@ -214,12 +214,12 @@ def main_direction(paths: Mapping[str, xr.Dataset], nodes: Sequence[int]) -> str
 def asked(
     paths: Mapping[str, xr.Dataset], nodes: int | str | Sequence[int], direction: str | None
 ) -> tuple[list[int], str]:
-    """Nodes that all paths have, and the direction, by default the one in which they move farthest.
+    """Nodes that all paths have, and a direction, by default that in which they move farthest.
 
     Raises
     ------
     InputError
-        Not paths, no node, or one that a path does not have.
+        The results are not paths, there is no node, or a path lacks a node.
     """
     for label, path in paths.items():
         check_path(path, f"paths[{label!r}]" if label else "path")
@@ -227,7 +227,7 @@ def asked(
     return numbers, main_direction(paths, numbers) if direction is None else direction
 
 
-# Names of strain energies, stacked in this order from the bottom up: folds on top.
+# Names of strain energies in stacking order from the bottom up: folds are on top.
 STRAIN: Mapping[str, str] = {
     "strain_bars": "bars",
     "strain_membrane": "membrane",
@@ -240,11 +240,11 @@ STRAIN: Mapping[str, str] = {
 MOST_MODES = 12
 # Variables of modes that figures need.
 NEEDED = ("frequency", "eigenvalue", "shape", "rigid", "displacement")
-_NONE = 1e-9  # smallest energy with shares, relative to the largest
+_NONE = 1e-9  # below this energy, relative to the largest, shares are undefined
 
 
 def moved_supports(case: Case) -> tuple[list[int], str] | None:
-    """Nodes that supports move farthest and equally, and the direction; None if none moves."""
+    """Nodes that supports move farthest (all equally), and the direction; None if none moves."""
     motion = sum((vector for vector, _ in case.prescribed_terms), np.zeros(case.imposed.shape))
     if not motion.any():
         return None
@@ -288,7 +288,7 @@ def total_reaction(
 
 
 def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:
-    """Numbers of points from 0: a count of them, or given numbers, negative ones from the end."""
+    """Numbers of points, from 0: as many as asked for, or given numbers, negative from the end."""
     check_path(path, "path")
     return chosen("points", points, path.sizes["step"], partial(evenly, path))
 
@@ -296,7 +296,7 @@ def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:
 def chosen(
     field: str, wanted: int | Sequence[int], count: int, spread: Callable[[int], list[int]]
 ) -> list[int]:
-    """Numbers of states: a count of them, evenly spread, or given numbers."""
+    """Numbers of states: as many as asked for, evenly spread, or given numbers."""
     if isinstance(wanted, int | np.integer):
         if wanted < 1:
             raise InputError(f"{field}: {wanted}; give at least one")
@@ -339,8 +339,8 @@ def energy_shares(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
     Returns
     -------
     dict of str to ndarray, shape (steps,)
-        "bars", "bends" and "folds", or of a shell "membrane", "bending" and "folds", and
-        "springs" if there are any, each from 0 to 1.
+        Shares from 0 to 1 of "bars", "bends" and "folds", or for a shell "membrane", "bending" and
+        "folds", and of "springs" if the structure has any.
     """
     check_path(path, "path")
     energies = stacked(path)
@@ -350,7 +350,7 @@ def energy_shares(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
 
 
 def chosen_modes(modes: xr.Dataset, which: Sequence[int] | None) -> list[int]:
-    """Numbers of the modes to show: those asked for, or the first that are not rigid."""
+    """Numbers of the modes to show: as asked for, or the first modes that are not rigid."""
     missing = [key for key in NEEDED if key not in modes]
     if missing:
         raise InputError(f"modes: has no {missing[0]}; give a result of fd.modes")
@@ -371,7 +371,7 @@ def chosen_modes(modes: xr.Dataset, which: Sequence[int] | None) -> list[int]:
 
 
 def along_drive(response: xr.Dataset) -> list[str]:
-    """Each axis with the sign of the driving forces along it, positive without any."""
+    """Each axis with the sign of the driving forces along it; positive if there are none."""
     forces = response["drive"].transpose("node", "axis").values.sum(axis=0)
     backward = (forces < 0.0) & (quantity_of(response) in PER_FORCE)
     return ["-" + axis if back else axis for axis, back in zip(AXES, backward, strict=True)]

@@ -1,4 +1,4 @@
-"""Response curves with their stability and bifurcations, and backbones."""
+"""Figures of response curves, with stability and bifurcations, and of backbones."""
 
 from __future__ import annotations
 
@@ -26,27 +26,28 @@ def plot_response_curve(
     *,
     title: str = "",
 ) -> Figure:
-    """Draw response curves: stable motions solid, unstable ones dashed, bifurcations marked.
+    """Draw response curves: stable motions solid, unstable motions dashed, bifurcations marked.
 
     Parameters
     ----------
     curves : xarray.Dataset, or mapping of str to xarray.Dataset
         A result of `foldyn.response_curve`, or several by their labels.
     backbone : xarray.Dataset, optional
-        A result of `foldyn.backbone`, drawn behind curves without a measure. The amplitude is then
-        half the range of the largest displacement along an axis.
+        A result of `foldyn.backbone`, drawn behind the curves, which must be without a measure.
+        Their amplitude is half the range of the largest displacement along an axis.
     title : str
         Title of the figure.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Amplitude over the frequency or the factor on the drive, whichever varies.
+        Amplitude against the frequency or the factor on the drive, whichever varies.
 
     Raises
     ------
     InputError
-        Not response curves of one kind; a backbone with curves of a measure.
+        The results are not response curves of one kind, or a backbone is given with curves of a
+        measure.
     """
     labeled = by_label("curves", curves)
     kinds = {_kind("curves", one, "response_curve", "by") for one in labeled.values()}
@@ -77,7 +78,7 @@ def plot_response_curve(
 
 
 def plot_backbone(backbones: xr.Dataset | Mapping[str, xr.Dataset], title: str = "") -> Figure:
-    """Draw backbones: frequency over amplitude and, if undamped, over energy.
+    """Draw backbones: frequency against amplitude and, if undamped, against energy.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ def plot_backbone(backbones: xr.Dataset | Mapping[str, xr.Dataset], title: str =
     Returns
     -------
     matplotlib.figure.Figure
-        Both axes of amplitude and energy are logarithmic.
+        Axes for each abscissa; amplitude and energy have logarithmic axes.
 
     Raises
     ------
@@ -118,7 +119,7 @@ def plot_backbone(backbones: xr.Dataset | Mapping[str, xr.Dataset], title: str =
 
 
 def _size_along(backbone: xr.Dataset, curves: Mapping[str, xr.Dataset]) -> NDArray:
-    """Amplitudes of a backbone's motions, defined as for curves without a measure."""
+    """Amplitudes of a backbone's motions, defined as in curves without a measure."""
     from foldyn.periodic.orbit import amplitudes_of
     from foldyn.periodic.response import LARGEST
 
@@ -166,11 +167,11 @@ def _draw(axes: Axes, curve: xr.Dataset, along: str, color: str) -> set[str]:
 
 
 def _pieces(stable: NDArray[np.bool_], marked: NDArray[np.bool_]) -> list[tuple[NDArray, bool]]:
-    """Point numbers of each stretch of equal stability, which ends at bifurcations."""
+    """Point numbers of each stretch of equal stability; stretches end at bifurcations."""
     count = len(stable)
     if count == 1:
         return [(np.array([0]), bool(stable[0]))]
-    # a bifurcation is neither: the other end of the segment decides
+    # a bifurcation is neither stable nor unstable: the other end of the segment decides
     segment = np.where(marked[:-1], stable[1:], stable[:-1])
     ends = np.flatnonzero(np.diff(segment)) + 1
     edges = [0, *ends.tolist(), count - 1]

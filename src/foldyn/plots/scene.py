@@ -25,13 +25,13 @@ from foldyn.results import case_of
 from foldyn.values import show
 
 Points = NDArray[np.float64]  # points or vectors, shape (..., 3), or (..., 2) as seen on the screen
-Indices = NDArray[np.int64]  # node numbers: an edge or a triangle per row
+Indices = NDArray[np.int64]  # node numbers, a row for each edge or triangle
 # Colors of panels that differ from the sheet, in turn.
 PAPERS = ("#CFB387", "#B9CBB0", "#C9B4C6", "#A9BFCC")
 WIDTH = 7.0  # width of a figure, in inches
-# Margins around the box seen, and its largest height, in inches.
+# Margins around the visible box, and the largest height of the box, in inches.
 _LEFT, _RIGHT, _TICKS, _TALLEST = 0.8, 0.8, 0.5, 5.0
-_LABEL_PADS = 6.0, 6.0, 4.0  # points; the label of z would leave the margin with more
+_LABEL_PADS = 6.0, 6.0, 4.0  # points; with more, the label of z would leave the margin
 _CLOSE = 0.4  # inches between two ticks with overlapping numbers
 _MOST_PIECES, _MOST_DIVISIONS = 2000, 12  # pieces of all panels in a picture; pieces along an edge
 _LIGHT = np.array([0.35, -0.5, 0.8]) / np.linalg.norm([0.35, -0.5, 0.8])
@@ -39,7 +39,7 @@ _LIGHT = np.array([0.35, -0.5, 0.8]) / np.linalg.norm([0.35, -0.5, 0.8])
 
 @dataclass(frozen=True)
 class Sheet3D:
-    """What to draw of a case, a structure or a pattern.
+    """The drawable geometry of a case, a structure or a pattern.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Sheet3D:
     def edges(self) -> Indices:
         """Nodes along each edge of the pattern except welds, creases first, shape (ne, p).
 
-        p is 2, or for a shell the number of nodes along an edge, which bends.
+        p is 2, or for a shell the number of nodes along an edge, because edges of a shell bend.
         """
         count = len(self._creases) + len(self.pattern.boundary)
         if hasattr(self.structure, "edge_nodes"):
@@ -97,7 +97,7 @@ class Sheet3D:
 
     @cached_property
     def boundary(self) -> Indices:
-        """Edges of a single panel, shape (nb, p)."""
+        """Edges that belong to a single panel, shape (nb, p)."""
         return self.edges[len(self._creases) :]
 
     @cached_property
@@ -107,7 +107,7 @@ class Sheet3D:
 
     @cached_property
     def inner_bars(self) -> Indices:
-        """Bars, or sides of a shell's triangles, on no edge of the pattern, (k, 2)."""
+        """Bars, or sides of a shell's triangles, that lie on no edge of the pattern, (k, 2)."""
         if self.structure is None:
             return np.zeros((0, 2), dtype=np.int64)
         edges = {tuple(edge) for edge in np.sort(self.pieces, axis=1).tolist()}
@@ -124,7 +124,7 @@ class Sheet3D:
 
     @property
     def highlights(self) -> bool:
-        """Whether to highlight actuated creases; not if all are, which would only hide panels."""
+        """Whether to highlight actuated creases; not if all are: marks would only hide panels."""
         return len(self.actuated) < len(self.pattern.creases)
 
     @property
@@ -142,7 +142,7 @@ class Sheet3D:
         return color
 
     def check_nodes(self, result: str, moved: Points, done: str = "computed") -> None:
-        """Refuse displacements (..., n, 3) with another number of nodes."""
+        """Refuse displacements (..., n, 3) whose number of nodes differs from the structure's."""
         if moved.shape[-2:] != self.nodes.shape:
             raise InputError(
                 f"{result} {moved.shape[-2]} nodes, the structure {len(self.nodes)}; give the case "
@@ -150,7 +150,7 @@ class Sheet3D:
             )
 
     def creases(self) -> dict[str, Indices]:
-        """Creases (k, p) of each assignment that occurs."""
+        """Creases (k, p), grouped by their assignment."""
         creases = self.edges[: len(self._creases)]
         kinds = np.array(self.pattern.assignments, dtype=str)
         return {kind: creases[kinds == kind] for kind in style.CREASES if (kinds == kind).any()}
@@ -162,7 +162,7 @@ class Sheet3D:
 
 @dataclass(frozen=True)
 class View:
-    """Direction of sight, in degrees above the xy plane and around z."""
+    """Direction of view: elevation above the xy plane and azimuth around z, in degrees."""
 
     elevation: float = 28.0
     azimuth: float = -60.0
@@ -187,7 +187,7 @@ class View:
 
 
 class Seen(NamedTuple):
-    """Bounding box of all that a view shows, and its size on the screen."""
+    """Bounding box of everything in a view, and the size of the box on the screen."""
 
     view: View
     middle: Points
@@ -230,7 +230,7 @@ def view_figure(
 def add_view(figure: Figure, seen: Seen, center: tuple[float, float], scale: float) -> Axes3D:
     """Add axes for a view to a figure: the center in inches, the scale in inches per m."""
     width, height = figure.get_size_inches()
-    side = 1.1 * seen.size.max() * scale  # of the square axes, which clip their content
+    side = 1.1 * seen.size.max() * scale  # side of the square axes, which clip their content
     left, bottom = center[0] - 0.5 * side, center[1] - 0.5 * side
     place = left / width, bottom / height, side / width, side / height
     axes = Axes3D(figure, place, proj_type="ortho", computed_zorder=False)
@@ -255,7 +255,7 @@ def _span(axes: Axes3D) -> float:
 
 
 def _frame(axes: Axes3D, middle: Points, box: Points, basis: Points) -> None:
-    """Set ticks, grid, panes and labels; the basis is the view's, in inches per meter."""
+    """Set ticks, grid, panes and labels; `basis` is the basis of the view, in inches per meter."""
     ticks = _ticks(middle, box, basis)
     for axis, places in zip((axes.xaxis, axes.yaxis, axes.zaxis), ticks, strict=True):
         axis.set_major_locator(FixedLocator(places.tolist()))
@@ -293,9 +293,9 @@ def _ticks(middle: Points, box: Points, basis: Points) -> list[NDArray]:
 def shades(
     vertices: Points, triangles: Indices, color: str | NDArray[np.float64] = PAPER
 ) -> NDArray[np.float64]:
-    """Color per triangle, darker where it faces away from the light, shape (nt, 3).
+    """Color of each triangle, darker if the triangle faces away from the light, shape (nt, 3).
 
-    color : of all triangles, or one for each (nt, 3).
+    color : one color for all triangles, or one for each (nt, 3).
     """
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
@@ -343,8 +343,9 @@ def add_panels(
 ) -> Poly3DCollection:
     """Fill triangles with corners (k, 3, 3), each in its own color (k, 3).
 
-    An `alpha` below 1 mixes the color with white. Panels are neither translucent nor antialiased:
-    neighboring triangles that overlap or part by a pixel would leave seams inside every panel.
+    An `alpha` below 1 mixes the color with white. Panels are neither translucent nor antialiased,
+    because neighboring triangles may overlap or separate by a pixel, which would leave visible
+    seams inside every panel.
     """
     panels = Poly3DCollection(
         corners,

@@ -1,6 +1,6 @@
-"""Drawn sheets, alone or side by side: panels and edges, hidden where panels are in front.
+"""Drawn sheets, alone or side by side: panels, and edges that are hidden behind panels.
 
-They can move without being redrawn.
+Drawn sheets can move without being drawn anew.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ _CHUNK = 10_000  # points tested at once
 def hidden_points(
     points: Points, vertices: Points, triangles: Indices, view: View, size: float
 ) -> NDArray[np.bool_]:
-    """Which points (p, 3) lie behind a triangle as seen along the view.
+    """Mark the points (p, 3) that lie behind a triangle in the view.
 
-    A point within a thousandth of `size` (m) of a triangle is not behind it, as edges lie in their
-    own panels.
+    A point closer to a triangle than a thousandth of `size` (m) is not behind it, because edges lie
+    in their own panels.
     """
     seen = vertices @ view.basis.T
     a, b, c = (seen[triangles[:, k]] for k in range(3))
@@ -62,13 +62,13 @@ def _near_pairs(points: Points, corners: Points) -> Iterator[tuple[Indices, Indi
 def split_edges(
     edges: Indices, vertices: Points, triangles: Indices, view: View, size: float
 ) -> tuple[Points, Points]:
-    """Split edges (k, p), which are polylines through nodes, into visible and hidden parts.
+    """Split edges (k, p), polylines through nodes, into visible and hidden parts.
 
     Returns
     -------
     visible, hidden : ndarray, shape (m, q, 3)
-        Neighboring pieces of an edge with equal visibility are joined. All parts have as many
-        points as the longest: shorter ones stay at their last point.
+        Polylines; neighboring pieces of an edge with equal visibility are joined. All parts have as
+        many points as the longest; shorter parts repeat their last point.
     """
     if len(edges) == 0:
         return np.zeros((0, 2, 3)), np.zeros((0, 2, 3))
@@ -103,7 +103,7 @@ def _together(parts: list[Points]) -> Points:
 
 _HIDDEN = 0.3  # opacity of edges behind a panel
 _MARGIN = 0.15  # inches
-_CAPTION, _LINE = 0.42, 0.16  # inches; of a caption, and each further line
+_CAPTION, _LINE = 0.42, 0.16  # inches; height of a caption, and of each further line
 _TALLEST = 3.2  # inches
 
 
@@ -149,10 +149,10 @@ class EdgeKind(NamedTuple):
 
 
 def edge_kinds(sheet: Sheet3D, elements: bool, actuated: bool = True) -> list[EdgeKind]:
-    """Kinds of edges of a sheet, from the lowest to the topmost.
+    """Kinds of edges of a sheet, in drawing order: the last kind is on top.
 
-    They include inner bars, or the sides of a shell's triangles, with `elements`, and highlights of
-    actuated creases with `actuated`.
+    With `elements` they include inner bars or the sides of a shell's triangles; with `actuated`,
+    highlights of actuated creases.
     """
     kinds = []
     if actuated and len(sheet.actuated):
@@ -179,9 +179,9 @@ def edge_keys(sheet: Sheet3D, elements: bool = False, actuated: bool = True) -> 
 class DrawnSheet:
     """Panels, creases and boundary of a sheet in one position.
 
-    Panels are painted from the farthest to the nearest by their centers, which fails if large ones
-    lie close to each other, as in a nearly closed sheet. So they are cut into pieces, and pieces
-    with hidden centers are painted before all others.
+    Panels are painted from the farthest to the nearest, judged by their centers. This fails if
+    large panels lie close to each other, as in a nearly closed sheet. So panels are cut into
+    pieces, and pieces whose centers are hidden are painted before all others.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ class DrawnSheet:
             behind.set_segments(hidden)
 
     def _pieces(self, points: Points) -> list[tuple[NDArray, NDArray]]:
-        """Corners and colors of the hidden pieces of panels, and of the others."""
+        """Corners and colors of the hidden pieces of panels, and of all other pieces."""
         triangles = self._sheet.triangles
         corners = scene.pieces(points, triangles)
         colors = scene.piece_colors(points, triangles, self._sheet.paper)
@@ -255,35 +255,35 @@ def side_by_side(
     width: float = 9.0,
     most_columns: int = 3,
 ) -> tuple[Figure, list[DrawnSheet]]:
-    """Draw a sheet in several positions, over its nodes' positions in gray.
+    """Draw a sheet in several positions, with the sheet at its own `nodes` behind in gray.
 
     Parameters
     ----------
     sheet : Sheet3D
-        The sheet; its `nodes` are the gray ones.
+        The sheet; its `nodes` are the positions drawn in gray.
     shapes : ndarray, shape (k, n, 3)
-        Positions of its nodes (m).
+        Node positions of each drawn shape (m).
     captions : sequence of str
-        Text below each shape; all get as many lines as the longest.
+        Text below each shape; every caption gets as many lines as the longest.
     view : View
     notes : sequence of Line2D
-        Legend entries that come before those of the edges.
+        Legend entries that come before the entries of the edges.
     title : str
         Title of the figure.
     extent : ndarray, shape (p, 3), optional
-        Points (m) that every view has room for, in addition to the gray nodes; by default the
+        Points (m) for which every view has room, in addition to the gray nodes; by default all
         shapes.
     width : float
         Width of the figure (inches).
     most_columns : int
-        Most shapes in a row.
+        Largest number of shapes in a row.
 
     Returns
     -------
     figure : Figure
         One orthographic view for each sheet, in the order of the shapes.
     sheets : list of DrawnSheet
-        They can be moved within `extent`.
+        The drawn sheets, which can be moved within `extent`.
     """
     count = len(shapes)
     room = np.vstack([sheet.nodes, shapes.reshape(-1, 3) if extent is None else extent])

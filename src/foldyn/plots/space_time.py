@@ -1,4 +1,4 @@
-"""Waves in chains of cells: over cells and time, over phase and frequency, and transmission."""
+"""Waves in chains of cells: in space and time, by phase and frequency, and transmission."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def plot_space_time(
     limit: float | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw a motion of a chain: cells to the right, time upward, the motion as color.
+    """Draw a motion of a chain: cells along the horizontal axis, time upward, motion as color.
 
     Parameters
     ----------
@@ -50,8 +50,8 @@ def plot_space_time(
     along : int
         Which period of the cell runs along the chain.
     limit : float, optional
-        Value at the ends of the color scale; by default the largest. For strains the first quarter
-        of the gaps, which an impact strains most, does not count.
+        Value at the ends of the color scale; by default the largest. For strains, the first quarter
+        of the gaps between cells is ignored, because an impact strains them most.
     title : str
         Title of the figure.
 
@@ -63,7 +63,8 @@ def plot_space_time(
     Raises
     ------
     InputError
-        As in `foldyn.linear.space_time`; strains of cells without a translation.
+        As in `foldyn.linear.space_time`; also if strains are asked for but the cells do not advance
+        along the chain.
     """
     choice("quantity", quantity, QUANTITIES)
     found = space_time(trajectory, cell, component=component, along=along)
@@ -111,19 +112,20 @@ def plot_wave_spectrum(
         From `foldyn.bands`, at phases of the one period along the chain; negative phases may be
         left out, as bands are symmetric.
     max_frequency : float, optional
-        Upper end of the frequency axis (Hz); by default all of the spectrum.
+        Upper end of the frequency axis (Hz); by default the end of the spectrum.
     title : str
         Title of the figure.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Phases to the right, frequencies upward, three decades of amplitude as color; bands dashed.
+        Phases along the horizontal axis, frequencies upward, three decades of amplitude as color;
+        bands are dashed.
 
     Raises
     ------
     InputError
-        No such spectrum, or bands of a path or a grid of a sheet.
+        The input is no such spectrum, or the bands are along a path or on a grid of a sheet.
     """
     if "amplitude" not in alone("spectrum", spectrum) or "phase" not in spectrum.dims:
         raise InputError(": give what foldyn.linear.wave_spectrum returns", "spectrum")
@@ -162,12 +164,12 @@ def plot_transmission(
     *,
     title: str = "",
 ) -> Figure:
-    """Draw the transmission to the end of a chain, and its decay per cell with the bands' decay.
+    """Draw the transmission to the end of a chain, and the decay per cell with that of the bands.
 
     Parameters
     ----------
     transmissions : xarray.Dataset, or mapping of str to xarray.Dataset
-        From `foldyn.linear.transmission`, one or several by their labels.
+        A result of `foldyn.linear.transmission`, or several by their labels.
     attenuation : xarray.Dataset, optional
         From `foldyn.linear.attenuation`.
     title : str
@@ -176,14 +178,14 @@ def plot_transmission(
     Returns
     -------
     matplotlib.figure.Figure
-        Response of the last cell over that of the first, and below it the decay (Np per cell) as
-        dots, with the attenuation of all waves of the periodic chain as lines; a drive excites some
-        of them.
+        Above, the response of the last cell divided by that of the first. Below, the decay (Np per
+        cell) as dots, and as lines the attenuation of all waves of the periodic chain, of which a
+        drive excites only some.
 
     Raises
     ------
     InputError
-        Not results of these functions.
+        The inputs are not results of these functions.
     """
     shown = by_label("transmissions", transmissions)
     for label, one in shown.items():

@@ -43,19 +43,20 @@ def draw_structure(
     case_or_structure : Case, Structure or Pattern, or a result with its case
         Only a case has supports and loads.
     displacement : array_like, shape (n, 3), or None
-        Node displacements (m): the deformed sheet is drawn over the undeformed one in gray.
+        Node displacements (m): the deformed sheet is drawn, with the undeformed one behind in gray.
     numbers : bool or "all"
         Write the numbers of the pattern's vertices; "all" adds all other nodes.
     supports : bool
-        Mark held and moved nodes: one triangle per direction, and the names of the directions that
-        are axes. An arrow from each node with an imposed displacement, and one from the middle of
-        a moving base. Springs are zigzags, dashpots a cup and a piston, clamped edges are hatched;
-        dotted lines and rings show nodes that are linked.
+        Mark held and moved nodes by one triangle for each direction, and by the name of the
+        direction if it is an axis. Arrows show imposed displacements of nodes and, from the middle,
+        the displacement of a moving base. Springs are zigzags, dashpots a cup and a piston, clamped
+        edges are hatched; dotted lines and rings show nodes that are linked.
     loads : bool
-        Draw an arrow from each loaded node along its force, at the largest load's full length,
-        one from each panel under pressure, two about each crease with a moment, towards the panels
-        where it opens them, and one from the center of mass along gravity. Actuated creases are
-        highlighted, point masses are dots, and panels that are warmed have stars.
+        Draw arrows: from each loaded node along its force, with the full length at the largest
+        load; from each panel under pressure; two about each crease with a moment, towards the
+        panels if the moment opens the crease; and one from the center of mass along gravity.
+        Actuated creases are highlighted, point masses are dots, and panels that are warmed have
+        stars.
     elements : bool
         Draw the bars inside the panels too, or the sides of a shell's triangles.
     scale : float
@@ -68,12 +69,12 @@ def draw_structure(
     Returns
     -------
     matplotlib.figure.Figure
-        One orthographic view at equal scale, the legend below.
+        One orthographic view at equal scale, with the legend below.
 
     Raises
     ------
     InputError
-        A displacement of the wrong shape or with NaN, or an unknown `numbers`.
+        The displacement has the wrong shape or contains NaN, or `numbers` is unknown.
     """
     if numbers not in (True, False, "all"):
         raise InputError(f'numbers: {numbers!r}; use True, False or "all"')
@@ -83,7 +84,7 @@ def draw_structure(
     if sheet.case is None:
         supports = loads = False
     size = sheet.size
-    # Marks scale with the sheet, but must not cover the panels of a large one.
+    # Marks scale with the sheet, but must not cover the panels of a large sheet.
     edge = float(np.median(np.linalg.norm(np.ptp(sheet.nodes[sheet.edges], axis=1), axis=1)))
     marked = min(0.055 * size, 0.25 * edge)
     length = min(0.17 * size, 0.8 * edge)
@@ -139,7 +140,7 @@ def checked_displacement(sheet: Sheet3D, displacement: ArrayLike | None) -> Poin
 
 
 class _Supports(NamedTuple):
-    """Marks of one kind of support, and the axes of each node with the color of the labels."""
+    """Marks of one kind of support, and for labels the axes held at each node and the color."""
 
     mark: Mark
     axes: list[tuple[int, str]]
@@ -168,7 +169,7 @@ def _supports(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[
 
 
 def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[Mark]:
-    """Arrows of imposed displacements, and of the base at the mean of its nodes."""
+    """Arrows of imposed displacements, and of the base (at the mean position of its nodes)."""
     imposed = [
         (points, vectors, f"moved {load_curves.describe(vectors, 'm')}")
         for vectors, _ in sheet.case.prescribed_terms
@@ -252,9 +253,9 @@ def _arrows(
     color: str,
     vertices: int | None = None,
 ) -> list[Mark]:
-    """Arrows from points along vectors, both (k, 3) in each term, with the term's text.
+    """Arrows from points along vectors; each term has points and vectors (k, 3), and a text.
 
-    vertices : nodes from this number on get no arrow if they are many and stand too close.
+    vertices : nodes with this number or a higher one get no arrow if they are many and too close.
     """
     terms = [term for term in terms if term[1].any()]
     if not terms:
@@ -282,7 +283,7 @@ def _write_labels(
     obstacles: Points,
     sight: View,
 ) -> None:
-    """Write node numbers and support directions where they hide least."""
+    """Write node numbers and support directions at places where they hide little."""
     count = len(sheet.pattern.vertices)
     shown = len(points) if numbers == "all" else count if numbers else 0
     # Large sheets get smaller numbers, closer to the nodes.
@@ -297,7 +298,7 @@ def _write_labels(
             triangles = group.mark.triangles
             apart = np.abs(triangles[:, 0] - points[node]).max(axis=1)
             corners = triangles[apart < 1e-6 * sheet.size]
-            # Beside the foot of the lowest triangle, away from the node's own number.
+            # Next to the foot of the lowest triangle, away from the node number.
             foot = corners[:, 1:].mean(axis=1)
             lowest = foot[np.argmin(sight.flat(foot)[:, 1])]
             labels.add(lowest, names, group.ink, max(crowd, 0.75) * style.TICK)

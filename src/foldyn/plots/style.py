@@ -1,7 +1,8 @@
 """Look of all figures: colors, fonts and frames, set on each figure only.
 
-Nothing here changes matplotlib's global settings, so the caller's own figures are unaffected.
-Fonts, colors and widths are set explicitly, so the caller's settings do not affect our figures.
+This module does not change matplotlib's global settings, so the caller's own figures are
+unaffected. Fonts, colors and widths are set explicitly, so the caller's settings do not affect our
+figures.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from foldyn.patterns.palette import (  # noqa: F401  figures take all colors fro
 from foldyn.values import of_kind
 
 CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, BLACK, ORANGE, SKY, GRAY)
-# Line styles change with the color, so that curves differ in gray print too.
+# Dashes change with the color, so that curves can be told apart in gray print.
 DASHES = ("solid", (0, (6, 2)), (0, (2, 1.4)), (0, (7, 2, 1.5, 2)), (0, (4, 1.5)))
 
 CREASE_DASHES = {"M": "solid", "V": (0, (5, 2)), "F": (0, (1, 1.5)), "U": (0, (5, 2, 1, 2))}
@@ -110,7 +111,7 @@ def rows(
     ylabels: Sequence[str],
     heights: Sequence[float] | None = None,
 ) -> tuple[Figure, NDArray]:
-    """Return a figure with rows of axes that share the horizontal axis, labeled below the last.
+    """Return a figure with rows of axes; their common horizontal axis is labeled below the last.
 
     Parameters
     ----------
@@ -118,7 +119,7 @@ def rows(
         Width and height of the figure (inches).
     title, xlabel : str
     ylabels : sequence of str
-        One for each row.
+        Title of the vertical axis of each row.
     heights : sequence of float, optional
         Heights of the rows relative to each other.
     """
@@ -142,7 +143,7 @@ def single(
 
 
 def color_bar(figure: Figure, drawn: ScalarMappable, label: str, **place: Any) -> None:
-    """Add a bar with the colors of what is drawn; its place is as for `Figure.colorbar`."""
+    """Add a color bar for drawn artists; its place is given as in `Figure.colorbar`."""
     bar = figure.colorbar(drawn, **place)
     bar.set_label(label, **TEXT)
     bar.ax.tick_params(labelsize=TICK, labelcolor=BLACK, color=GRAY)
@@ -184,7 +185,7 @@ def exponents(axes: Axes, ticks: int = 6, which: Literal["x", "y"] = "y") -> Non
 
 
 def columns_that_fit(handles: Sequence, width: float, most: int) -> int:
-    """Columns of a legend, at most `most`, that fit a width (inches) given its longest text."""
+    """Number of legend columns, at most `most`, that fit a width (inches) with the longest text."""
     labels = [str(handle.get_label()) for handle in handles]
     letter, handle, gap = 0.065, 0.38, 0.22  # inches, in the legend's font
     for columns in range(most, 1, -1):
@@ -233,7 +234,7 @@ def legend_below(
 def finish(
     figure: Figure, handles: Sequence = (), columns: int = 3, width: float | None = None
 ) -> Figure:
-    """Add the legend, if it has entries, set all fonts, and return the figure."""
+    """Add the legend if it has entries, set all fonts, and return the figure."""
     if handles:
         legend_below(figure, handles, columns, width)
     for text in figure.findobj(Text):

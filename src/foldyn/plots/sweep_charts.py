@@ -1,4 +1,4 @@
-"""Charts of sweeps: a measure over one parameter, and main effects."""
+"""Charts of sweeps: a measure against one parameter, and main effects."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from foldyn.results.sweep_dataset import (
 )
 from foldyn.values import choice
 
-MOST_LINES = 12  # most curves in one chart
-RATIO = 30.0  # least ratio of the largest to the smallest value for a logarithmic axis
+MOST_LINES = 12  # largest number of curves in one chart
+RATIO = 30.0  # an axis is logarithmic from this ratio of the largest to the smallest value
 
 
 def line_chart(
@@ -34,7 +34,7 @@ def line_chart(
     at: Mapping[str, Any] | None,
     most: int = MOST_LINES,
 ) -> Chart:
-    """A measure over one parameter, a curve for each value of another; see `plot_sweep_lines`."""
+    """A measure by one parameter, a curve for each value of another; see `plot_sweep_lines`."""
     choice("measure", measure, measures_of(sweep))
     names = [name for name in parameters_of(sweep) if name not in (at or {})]
     along = choice("x", x, names) if x is not None else (names or parameters_of(sweep))[0]
@@ -68,7 +68,7 @@ def line_chart(
 def effect_charts(
     sweep: xr.Dataset, measure: str, at: Mapping[str, Any] | None, points: bool = False
 ) -> list[Chart]:
-    """Main effects on a measure, a chart for each parameter, optionally with the points."""
+    """Main effects on a measure, a chart for each parameter, optionally with the sweep's points."""
     found, charts = measured(sweep, measure, at), []
     check_some(found.values, measure)
     for effect in main_effects(sweep, measure, at=at):
@@ -92,13 +92,13 @@ def places(values: NDArray) -> tuple[NDArray[np.float64], list[str]]:
 
 
 def by_ratio(values: NDArray, words: Sequence[str] = ()) -> bool:
-    """Whether values are spaced by ratios."""
+    """Whether values are spaced by ratios, so that a logarithmic axis suits them."""
     steps = np.unique(values)
     return not words and bool(steps.size > 2 and steps[0] > 0.0 and steps[-1] > RATIO * steps[0])
 
 
 def check_left(found: xr.DataArray, shown: Sequence[str]) -> None:
-    """Refuse a further parameter whose value is not given."""
+    """Refuse parameters left over: they have several values, and none is given."""
     left = [str(dim) for dim in found.dims if dim not in shown]
     if left:
         raise InputError(
@@ -115,7 +115,7 @@ def check_some(values: NDArray, measure: str) -> None:
 
 
 def named(found: xr.DataArray, by: str | None = None) -> str:
-    """Label of a measure, with the coordinates along its own dimensions."""
+    """Label of a measure, with its position along its own dimensions, such as the mode."""
     at = [
         f"{one.attrs.get('long_name', name)} {short(one.item())}"
         for name, one in found.coords.items()

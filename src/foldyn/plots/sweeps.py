@@ -1,4 +1,4 @@
-"""Sweeps: maps, lines, main effects and Sobol indices of measures."""
+"""Figures of sweeps: maps, lines, main effects and Sobol indices of measures."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def plot_sweep_map(
     at: Mapping[str, Any] | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw a measure over two parameters of a sweep in shades, with contour lines.
+    """Draw a measure in the plane of two parameters of a sweep, in shades with contour lines.
 
     Parameters
     ----------
@@ -43,21 +43,22 @@ def plot_sweep_map(
     x, y : str, optional
         Parameters along the axes, by default the first two that `at` does not fix.
     at : mapping, optional
-        Coordinates along the measure's own dimensions, {"mode": 2}, by default the first; and the
-        value of each further parameter of a grid.
+        Position along the measure's own dimensions, such as {"mode": 2}, by default the first; and
+        the value of each further parameter of a grid.
     title : str
         Title of the figure.
 
     Returns
     -------
     matplotlib.figure.Figure
-        One axes and a color bar. Points that failed, or lack the value, are crosses. Samples are
-        shaded dots, without contour lines.
+        One axes and a color bar. Points that failed or lack the measure are crosses. Sampled points
+        are shaded dots, without contour lines.
 
     Raises
     ------
     InputError
-        Not a sweep of two parameters, no such measure or parameter, no value at any point.
+        `sweep` is not a sweep of two parameters, there is no such measure or parameter, or no point
+        has a value.
     """
     found = measured(sweep, measure, at)
     first, second = _two(sweep, x, y, at)
@@ -99,7 +100,7 @@ def plot_sweep_lines(
     at: Mapping[str, Any] | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw a measure over one parameter of a sweep, a curve for each value of another one.
+    """Draw a measure against one parameter of a sweep, a curve for each value of another one.
 
     Parameters
     ----------
@@ -120,13 +121,13 @@ def plot_sweep_lines(
     Returns
     -------
     matplotlib.figure.Figure
-        One axes. Samples are dots. At most 12 curves, spread over the values of `by`.
+        One axes with at most 12 curves, spread over the values of `by`. Sampled points are dots.
 
     Raises
     ------
     InputError
-        Not a sweep, no such measure or parameter, no value at any point, or a further parameter of
-        a grid that `at` does not name.
+        `sweep` is not a sweep, there is no such measure or parameter, no point has a value, or `at`
+        does not name a further parameter of a grid.
     """
     chart = sweep_charts.line_chart(sweep, measure, x, by, at)
     return figure_of([chart], (6.2, 4.0), title)
@@ -135,7 +136,7 @@ def plot_sweep_lines(
 def plot_main_effects(
     sweep: xr.Dataset, measure: str, *, at: Mapping[str, Any] | None = None, title: str = ""
 ) -> Figure:
-    """Draw the mean of a measure over the values of each parameter of a sweep.
+    """Draw the mean of a measure against each parameter of a sweep.
 
     Parameters
     ----------
@@ -146,7 +147,8 @@ def plot_main_effects(
     -------
     matplotlib.figure.Figure
         Axes for each parameter, with a common vertical axis: the mean over all other parameters,
-        with a band of one standard deviation to either side. Samples are averaged over 8 ranges.
+        with a band of one standard deviation to either side. Sampled points are averaged in 8
+        ranges of the parameter.
 
     Raises
     ------
@@ -177,12 +179,12 @@ def plot_sobol_indices(indices: SobolIndices, title: str = "") -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Two bars for each parameter, its share alone and with interactions, with intervals.
+        Two bars for each parameter, with intervals: its share alone, and with interactions.
 
     Raises
     ------
     InputError
-        Not Sobol indices.
+        The input is not Sobol indices.
     """
     if not isinstance(indices, SobolIndices):
         raise InputError("indices: give what foldyn.results.sobol_indices returns")
@@ -227,7 +229,7 @@ def _two(
 
 
 def _places(axes: Axes, one: xr.DataArray, which: Literal["x", "y"]) -> NDArray:
-    """Coordinates of a parameter's values along an axis, whose ticks or scale it sets."""
+    """Coordinates of a parameter's values along an axis; also sets the axis's ticks or scale."""
     values, words = sweep_charts.places(one.values)
     if words:
         getattr(axes, f"set_{which}ticks")(range(len(words)), words)

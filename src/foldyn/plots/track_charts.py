@@ -19,9 +19,9 @@ def track_charts(
     axes: Sequence[str],
     truth: Mapping[int, ArrayLike] | None = None,
 ) -> list[Chart]:
-    """Displacements (m) of nodes over time, photograph or load, a chart for each node.
+    """Displacements (m) of nodes against time, photograph or load, a chart for each node.
 
-    Each axis is a curve, in dots. The truth is along a single axis.
+    Each axis is a curve of dots. True displacements may be given for a single axis.
     """
     along = dimension(tracks)
     shown = "load" if along == "photo" and "load" in tracks.coords else along

@@ -1,4 +1,4 @@
-"""Tracked nodes: their histories, and the model over the picture that it was matched to."""
+"""Tracked nodes: their histories, and the model drawn over the picture that it was matched to."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ def plot_tracks(
     truth: Mapping[int, ArrayLike] | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw the measured displacements of nodes, one row each; gaps mark lost nodes.
+    """Draw the measured displacements of nodes, a row for each; gaps show where a node was lost.
 
     Parameters
     ----------
     tracks : xarray.Dataset
-        From `foldyn.experiment`, with a model.
+        Tracks of `foldyn.experiment` that were made with a model.
     nodes : int or sequence of int
     axis : str or None
-        "x", "y" or "z"; None means the one with the largest measured motion.
+        "x", "y" or "z"; None means the axis with the largest measured motion.
     truth : mapping of int to array_like, optional
-        True displacements (m) of nodes at the same times, drawn behind.
+        True displacements (m) of nodes at the same times, drawn behind the measured ones.
     title : str
 
     Returns
@@ -50,7 +50,7 @@ def plot_tracks(
     Raises
     ------
     InputError
-        Tracks without a model, a node or an axis that they lack, or a node never measured.
+        The tracks have no model, lack a node or an axis, or a node was never measured.
     """
     if "displacement" not in alone("tracks", tracks):
         raise InputError("tracks: without a model there are pixels only; track with a model")
@@ -67,12 +67,13 @@ def plot_tracks(
 def plot_steps(
     steps: Mapping[str, tuple[ArrayLike, ArrayLike]], unit: str = "m", *, title: str = ""
 ) -> Figure:
-    """Draw a history after each step of its processing, one row each.
+    """Draw a history after each step of its processing, a row for each step.
 
     Parameters
     ----------
     steps : mapping of str to (time, values)
-        The step, and the record (s, `unit`) after it; the first is the measured record.
+        The name of each step, and the record (s, `unit`) after it; the first is the measured
+        record.
     unit : str
     title : str
 
@@ -83,7 +84,7 @@ def plot_steps(
     Raises
     ------
     InputError
-        No steps, or times and values differ in number.
+        There are no steps, or times and values differ in number.
     """
     if not isinstance(steps, Mapping) or not steps:
         raise InputError(": give a mapping with at least {'as measured': (time, values)}", "steps")

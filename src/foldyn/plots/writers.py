@@ -24,12 +24,12 @@ from foldyn.writing import whole
 
 DPI = {".gif": 100, ".mp4": 200}  # dots per inch of an animation by the file's suffix
 _FASTEST = {".gif": 50, ".mp4": 60}  # viewers slow down GIFs with shorter frames
-_COLORS = 128  # for all pictures of a GIF: 256 per picture would take three times the space
-_SAMPLES = 8  # number of pictures that these colors are taken from
+_COLORS = 128  # colors for all pictures of a GIF: 256 for each would take three times the space
+_SAMPLES = 8  # number of pictures from which these colors are taken
 
 
 class GifWriter(PillowWriter):
-    """A GIF that loops forever, all its pictures with one small palette.
+    """A GIF that loops forever; all pictures share one small palette.
 
     Attributes
     ----------
@@ -120,12 +120,12 @@ def checked_file(path: str | PathLike[str], frames: int, fps: int) -> Path:
 
 @contextmanager
 def filmed(figure: Figure, path: Path, fps: int) -> Iterator[GifWriter | Mp4Writer]:
-    """Write a file from the pictures that the writer grabs in the block; it appears once complete.
+    """Write a file of the pictures grabbed in the block; the file appears once it is complete.
 
     Raises
     ------
     ComputationError
-        ffmpeg could not write it.
+        ffmpeg could not write the file.
     """
     kind = path.suffix.lower()
     writer = WRITERS[kind](fps=fps)
@@ -146,7 +146,7 @@ def find_ffmpeg() -> str:
     Raises
     ------
     InputError
-        Neither is found.
+        ffmpeg is found in neither place.
     """
     program = shutil.which("ffmpeg")
     if program is not None:
@@ -155,7 +155,8 @@ def find_ffmpeg() -> str:
         from imageio_ffmpeg import get_ffmpeg_exe  # pyright: ignore[reportMissingImports]
 
         return get_ffmpeg_exe()
-    except (ImportError, RuntimeError):  # the package, or its program for this machine, is missing
+    # imageio-ffmpeg is missing, or has no program for this machine
+    except (ImportError, RuntimeError):
         raise InputError(
             "MP4 needs ffmpeg, which is not on the PATH: install it, or the package that brings "
             "it (pip install imageio-ffmpeg), or write a GIF"

@@ -20,13 +20,13 @@ ByRule = Mapping[str, xarray.Dataset]
 """Results by mass rule."""
 DPI = 150
 MOST_NODES = 12
-"""Most nodes in one figure."""
+"""Largest number of nodes in one figure."""
 MOST_PAIRS = 24
-"""Most pairs of panels in a table."""
+"""Largest number of pairs of panels in a table."""
 
 
 class Album:
-    """Figures of a page, each also a file of its own in a folder.
+    """Figures of a page; each is also saved as a file in a folder.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def shown_nodes(chosen: list[int], most: int = MOST_NODES) -> tuple[list[int], s
 
 
 def visible_scale(case: Case, result: xarray.Dataset) -> tuple[float, str]:
-    """Scale that makes a small motion visible, at most 1000, and a remark on it."""
+    """Scale that makes a small motion visible, at most 1000, and a remark on the scale."""
     largest = float(np.abs(result["displacement"].to_numpy()).max())
     wanted = 0.1 * case.structure.pattern.size / max(largest, 1e-30)
     steps = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0]
@@ -125,7 +125,7 @@ def rules(results: ByRule) -> str:
 def by_mass_rule(
     results: ByRule, columns: Mapping[str, str | Callable[[xarray.Dataset], Any]], caption: str
 ) -> Table:
-    """Table with a row per mass rule; columns are attributes or functions of its result."""
+    """Table with a row for each mass rule; columns are attributes or functions of the result."""
     rows = []
     for rule, result in results.items():
         cells = (

@@ -98,8 +98,8 @@ def write_report(
     Parameters
     ----------
     sections : iterable of Heading, Text, Table, Listing, Picture, Charts or Stage
-        In the order of the page. With two or more headings of level 2 the page begins with a list
-        of them, or with its Stages if they come first.
+        Parts of the page, in order. A page with two or more headings of level 2 begins with a list
+        of these headings; Stages at the very beginning stay above the list.
     path : path-like
         File to write, in an existing directory.
     title : str
@@ -113,7 +113,7 @@ def write_report(
     Raises
     ------
     InputError
-        A section of another type, a picture that cannot be read, or no such directory.
+        A section is of another type, a picture cannot be read, or the directory does not exist.
     """
     path = Path(path)
     if not path.parent.is_dir():

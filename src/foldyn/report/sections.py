@@ -23,7 +23,7 @@ _WIDE = 1200  # pixels; wider pictures scroll on a phone, where they would be to
 
 @dataclass(frozen=True)
 class Heading:
-    """A heading of a part (level 2) or of a section within one (level 3).
+    """A heading of a part (level 2) or of a section within a part (level 3).
 
     Headings of level 2 are listed at the top of the page.
     """
@@ -114,7 +114,7 @@ class Table:
     def _cell(self, value: Any) -> str:
         if value is None:
             return ""
-        if isinstance(value, bool) or type(value).__name__ == "bool":  # including numpy's
+        if isinstance(value, bool) or type(value).__name__ == "bool":  # includes the type of numpy
             return "yes" if value else "no"
         if isinstance(value, Integral):
             return str(int(value))
@@ -150,7 +150,7 @@ class Picture:
     caption : str
         Written below the picture.
     alt : str
-        What the picture shows, for readers who cannot see it; the caption where empty.
+        Description of the picture for readers who cannot see it; by default the caption.
     """
 
     source: Any
@@ -239,8 +239,8 @@ def rounded(value: float, digits: int) -> str:
 def _aligned(cells: Sequence[str]) -> list[str]:
     """Table cells of a column of numbers, which the page's style aligns at the decimal point.
 
-    Each cell carries the characters that it lacks after the point compared with the longest number;
-    their width is the space left free. An exponent counts as characters after the point.
+    Numbers with fewer characters after the point than the longest number get the missing characters
+    as invisible filling. An exponent counts as characters after the point.
     """
     tails = [re.search(r"[.e].*", text) for text in cells]
     found = ["" if tail is None else tail[0] for tail in tails]

@@ -3,9 +3,9 @@
 Values over time are stored as a sum of a few shapes times their histories (a singular value
 decomposition; "proper orthogonal decomposition" in the literature of motions). A page with 20
 shapes holds all samples of a motion at every node in the space of some pictures. Histories change
-little from sample to sample, so first or second differences of the rounded values, whichever pack
-smaller, compress well. Bytes of equal significance are grouped. The page's `data.js` decodes all of
-this.
+little from sample to sample, so first or second differences of the rounded values compress well;
+the smaller of the two is stored. Bytes of equal significance are grouped. The page's `data.js`
+decodes all of this.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _TYPES = {"i1": "i8", "i2": "i16", "u1": "u8", "u2": "u16", "u4": "u32", "f4": "f32"}
-"""The page's names of number types."""
+"""Names that the page uses for number types."""
 
 
 LARGEST = 2**15 - 1
@@ -34,7 +34,7 @@ class Arrays:
     about : dict
         Metadata of each array for the page: "type", "shape", "differences" and "step".
     packed : dict of bytes
-        Their content, deflated.
+        Content of each array, deflated.
     """
 
     about: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -47,8 +47,8 @@ class Arrays:
     def changing(self, name: str, values: NDArray, tolerance: float) -> dict[str, Any]:
         """Add values (t, ...) over time, to a relative tolerance; return their description.
 
-        Either "shapes" and "histories", whose product they are, or the "values" if these take less
-        space.
+        The description names "shapes" and "histories", whose product the values are, or "values" if
+        storing them directly takes less space.
         """
         flat = np.nan_to_num(np.asarray(values, float).reshape(len(values), -1))
         about: dict[str, Any] = {"shape": list(np.shape(values))}

@@ -17,23 +17,24 @@ _TYPES = {b"\xff\xd8\xff": "jpeg", b"\x89PNG": "png"}
 
 @dataclass(frozen=True, eq=False)
 class Backdrop:
-    """Photographs of a specimen, and the projection of their camera.
+    """Photographs of a specimen, and the projection matrix of the camera that took them.
 
     Parameters
     ----------
     pictures : mapping of float to bytes
-        The files (JPEG or PNG) by the moment they were taken: s in a motion, the position along a
-        path. The page shows the latest one up to its own moment.
+        The files (JPEG or PNG) by the moment they were taken: time (s) in a motion, position along
+        a path. The page shows the latest photograph up to the moment it displays.
     size : tuple of int
-        Their width and height (pixels).
+        Width and height of the photographs (pixels).
     matrix : ndarray, shape (3, 4)
-        From a point (x, y, z, 1), m, to (u w, v w, w): pixels, (0, 0) being the center of the upper
-        left one, times the point's distance along the camera's axis in any unit. See `projection`.
+        Maps a point (x, y, z, 1), m, to (u w, v w, w). The point appears at the pixel (u, v),
+        counted from the center of the upper left pixel; w is its distance along the camera axis in
+        any unit. See `projection`.
 
     Raises
     ------
     InputError
-        No pictures, pictures of another type, or a matrix of another shape.
+        There are no pictures, or a picture or the matrix has the wrong type or shape.
     """
 
     pictures: Mapping[float, bytes]
@@ -71,7 +72,7 @@ def projection(points: NDArray, pixels: NDArray) -> NDArray:
     Raises
     ------
     InputError
-        Fewer points, or coplanar points, which do not determine the camera.
+        There are fewer points, or they are coplanar and do not determine the camera.
     """
     points, pixels = np.asarray(points, float), np.asarray(pixels, float)
     if len(points) < 6 or points.shape[1:] != (3,) or pixels.shape != (len(points), 2):

@@ -12,20 +12,21 @@ from foldyn.periodic.balance import Fourier, values_of
 from foldyn.viewer.arrays import Arrays
 
 OF_MOTIONS = 1e-4
-"""Error of Fourier coefficients, relative to the largest displacement of their motion."""
+"""Error of Fourier coefficients, relative to the largest displacement of the motion."""
 MOST_NUMBERS = 10_000_000
-"""Most numbers for all motions of a result; beyond, only every k-th point and named ones remain."""
+"""Largest number of values stored for all motions of a result; if there are more, only every k-th
+point and named points remain."""
 SAMPLES = 64
-"""Samples of a period for its largest displacement."""
+"""Number of samples of a period from which the largest displacement is found."""
 
 
 def orbits(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
     """Describe the motions of one result; its arrays get names that begin with key.
 
-    "x" and "y" (point), what varies and the amplitude; "sizes" (point), the largest displacement in
-    a period, m; "displacement", a_0, a_1, b_1, a_2, ... (point, coefficient) of every node and
-    axis, sums of a_k cos k tau + b_k sin k tau over the size; lists over the points: "stable",
-    "bifurcations", "branches" and "periods".
+    "x" and "y" (point), the varied quantity and the amplitude; "sizes" (point), the largest
+    displacement in a period, m; "displacement", a_0, a_1, b_1, a_2, ... (point, coefficient) of
+    every node and axis, where the sum of a_k cos k tau + b_k sin k tau is the motion divided by
+    that size; lists with one entry per point: "stable", "bifurcations", "branches" and "periods".
     """
     chosen = points(result)
     some = result.isel(point=chosen)
@@ -49,7 +50,7 @@ def orbits(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
 
 
 def _listed(result: xr.Dataset, name: str, otherwise: list[Any]) -> list[Any]:
-    """Values over the points, or an empty list for a backbone, which lacks them."""
+    """One value for each point, or an empty list for a backbone without these values."""
     return result[name].values.tolist() if name in result else otherwise
 
 

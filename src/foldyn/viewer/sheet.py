@@ -21,8 +21,8 @@ def sheet(arrays: Arrays, key: str, case: Case) -> dict[str, Any]:
     """Describe a case's sheet at rest; its arrays get names that begin with key.
 
     "nodes" (n, 3), m; "triangles" (t, 3) and the "panel" of each; "edges" (k, 2), pieces of the
-    pattern's edges, with their "kind", the "crease" they belong to and how far "along" it they
-    begin and end (k, 2), m; "bars" (b, 2) of bars and hinges; "held" and "loads", see below.
+    pattern's edges, with their "kind", their "crease", and "along" (k, 2), the positions of their
+    ends along that crease, m; "bars" (b, 2) of bars and hinges; "held" and "loads", see below.
     """
     structure = case.structure
     out = _surface(arrays, key, structure.pattern, structure, structure.edge_nodes)
@@ -58,7 +58,7 @@ def _surface(
 def edge_pieces(
     pattern: Pattern, nodes: NDArray, edge_nodes: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Pieces (k, 2) of the pattern's edges; kind, edge and ends along the edge of each.
+    """Pieces (k, 2) of the pattern's edges; each with its kind, its edge and its ends along it.
 
     Welds are left out.
     """
@@ -80,7 +80,7 @@ def held(case: Case) -> list[list[Any]]:
 
 
 def load_arrows(case: Case) -> list[list[Any]]:
-    """Nodes with forces, relative to the largest: [[7, [1.0, 0.0, 0.0]], ...]; no gravity."""
+    """Nodal forces, divided by the largest: [[7, [1.0, 0.0, 0.0]], ...]; without gravity."""
     forces = np.zeros_like(case.structure.nodes)
     for vectors, _ in case.force_terms:
         forces += vectors

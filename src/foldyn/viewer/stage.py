@@ -29,15 +29,16 @@ from foldyn.viewer.states import Field, energies, fields, folding_fields
 from foldyn.viewer.waves import about_waves, waves
 
 OF_SIZE, OF_LARGEST, OF_COLORS = 5e-5, 1e-3, 4e-3
-"""Errors of the page's displacements relative to the sheet's size and to the largest of them, the
-smaller of which applies, and of values for colors relative to the largest."""
+"""Allowed errors on the page: of displacements relative to the sheet's size and to the largest
+displacement (the smaller error applies), and of colored values relative to the largest value."""
 MOST_LINES = 20_000
-"""Most bars or creases that a page colors: in larger sheets they are too fine to see and take most
-of the page's size."""
+"""Largest number of bars or creases that a page colors: in larger sheets they are too fine to see
+and take most of the page's size."""
 MOST = 30_000_000
-"""Most displacements of a result that are used; of more, every k-th sample."""
+"""Largest number of displacements of a result that are used; of longer results only every k-th
+sample."""
 THIN = 1e-3
-"""Thickness of a folding's sheet relative to the pattern's size; it has no visible effect."""
+"""Thickness of the sheet of a folding, relative to the pattern's size; has no visible effect."""
 
 Results = Mapping[str, xr.Dataset]
 
@@ -78,16 +79,16 @@ def stage(
 ) -> Stage:  # fmt: skip
     """Show results of one kind by name: motions, paths, modes, bands or others that move.
 
-    cases : cases of the results; foldings have none.
+    cases : cases of the results; foldings have no cases.
     nodes : nodes listed at the start; the first is selected.
-    backdrop : photographs under the sheets.
+    backdrop : photographs behind the sheets.
     """
     arrays, sheets, listed = Arrays(), {}, []
     kind = _kind(next(iter(results.values())))
     node = None if kind in ("modes", "bands") or not nodes else nodes[0]
     about = {"title": title, "kind": kind, "version": __version__, "node": node}
     keys: dict[int, str] = {}
-    with one_thread():  # its matrices are small
+    with one_thread():  # threads do not pay for small matrices
         for name, result in results.items():
             case = folding_case(result) if kind == "folding" else cases[name]
             key = keys.setdefault(id(case.structure.pattern), f"s{len(keys)}")
@@ -125,7 +126,7 @@ def rest_stage(shown: Pattern | Case, title: str) -> Stage:
 
 
 class _Shown(NamedTuple):
-    """A result to describe with the arrays of a page, which get names that begin with its key."""
+    """A result to show: its arrays on the page get names that begin with `key`."""
 
     arrays: Arrays
     key: str
@@ -244,7 +245,7 @@ _LISTED: Mapping[str, Callable[[_Shown], Iterable[dict[str, Any]]]] = {
     "bands": lambda one: [waves(one.arrays, one.key, one.result)],
     "periodic": lambda one: [orbits(one.arrays, one.key, one.result)],
 }  # fmt: skip
-"""Descriptions of a result of each kind: one, or one of each mode."""
+"""Function for each kind of result that describes it once, or once for each mode."""
 
 
 def _moved(kind: str, result: xr.Dataset) -> str:
@@ -280,7 +281,7 @@ def _more(
 
 
 def _likeness(results: Results, cases: Mapping[str, Case]) -> list[list[float | None]] | None:
-    """MAC of all modes with all others, at the vertices; None if patterns differ."""
+    """MAC of all modes of all results with each other, at the vertices; None if patterns differ."""
     counts = {len(case.structure.pattern.vertices) for case in cases.values()}
     if len(counts) > 1:
         return None

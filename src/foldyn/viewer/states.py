@@ -25,15 +25,15 @@ from foldyn.structures.mesh import double_areas
 
 
 class States(NamedTuple):
-    """States (samples, ...) of creases with k hinges, some several in a row, and of panels.
+    """States (samples, ...) of panels and of creases, which have one or more of k hinges each.
 
     turn : rotation (samples, nf) from rest, without the rotation of the adjacent panels, rad.
     moment : of the whole crease, N m.
     pairs, energy : ends (k, 2) of the hinges and their energies (samples, k), J.
-    plates : energy of each panel as a plate, or of each triangle of a shell (samples, p), J.
-    rest : rest angles as loads change them (samples, nr), rad.
-    stress, free : thermal stress of single bars over Young's modulus (samples, nb), and stress-free
-        Green strains of membranes (samples, .); no columns if no panel is warm.
+    plates : energy (samples, p) of each panel if it is a plate, or of each triangle of a shell, J.
+    rest : rest angles (samples, nr), which loads may change, rad.
+    stress, free : thermal stress of single bars divided by Young's modulus (samples, nb), and
+    stress-free Green strains of membranes (samples, .); without columns if no panel is warm.
     """
 
     turn: NDArray
@@ -47,7 +47,7 @@ class States(NamedTuple):
 
 
 def memory_acts(case: Case, result: xr.Dataset) -> bool:
-    """Whether creases have memory: dampers in series with panels do, in a motion."""
+    """Whether creases have memory; dampers in series with panels only have it while time passes."""
     passes = "time" in result.sizes or "elapsed" in result
     return any(passes or not isinstance(part.law, CreaseDampers) for part in case.remembering)
 
@@ -55,7 +55,8 @@ def memory_acts(case: Case, result: xr.Dataset) -> bool:
 def creases_known(case: Case, result: xr.Dataset) -> bool:
     """Whether displacements determine the rotation of creases.
 
-    They do not if panels yield next to creases with memory or, in motions, with dampers.
+    Displacements do not determine it if panels yield next to creases that have memory or, in
+    motions, dampers.
     """
     sheet = case.body.sheet
     give = len(sheet.hidden) > 0 or bool(sheet.fold_hinges().softness.any())
@@ -75,7 +76,8 @@ def states(case: Case, result: xr.Dataset, displacement: NDArray) -> States:
     changes, hinges = rest - body.sheet.rest_angles, body.sheet.fold_hinges()
     angle = hinge_angles(structure, hinges.nodes, displacement)
     plates, (stress, free, curl) = np.zeros((samples, 0)), _warm(acting, samples)
-    if len(body.hidden) or not isinstance(structure, Structure):  # includes a shell of rigid panels
+    # also for a shell with rigid panels
+    if len(body.hidden) or not isinstance(structure, Structure):
         parts = (
             (part, k) for k, (load, _) in enumerate(acting) for part, _ in load.following_terms
         )
@@ -134,14 +136,14 @@ def hinge_angles(structure: Discretized, hinges: NDArray, displacement: NDArray)
 
 
 def bar_strain(structure: Discretized, displacement: NDArray) -> NDArray:
-    """Elongation of bars over their length (samples, nb)."""
+    """Elongation of bars divided by their length (samples, nb)."""
     i, j = structure.bars.T
     apart = structure.nodes[j] - structure.nodes[i] + displacement[:, j] - displacement[:, i]
     return np.linalg.norm(apart, axis=2) / structure.bar_length - 1.0
 
 
 def energy_density(structure: Discretized, displacement: NDArray, found: States) -> NDArray:
-    """Strain energy over the area of each panel (samples, m), J/m2.
+    """Strain energy of each panel divided by its area (samples, m), J/m2.
 
     The energy of a bar or hinge is split equally between the adjacent triangles; springs, and
     clamped edges of models without plates, are left out.
@@ -183,7 +185,7 @@ def energy_density(structure: Discretized, displacement: NDArray, found: States)
 
 
 def shares(pairs: NDArray, triangles: NDArray, panel: NDArray) -> sparse.csr_array:
-    """Share (k, m) of each panel in elements along pairs of nodes (k, 2)."""
+    """Share (k, m) of the element along each pair of nodes (k, 2) that belongs to each panel."""
     if not len(pairs):
         return sparse.csr_array((0, int(panel.max(initial=-1)) + 1))
     sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
@@ -216,10 +218,10 @@ class Field(NamedTuple):
 def fields(case: Case, result: xr.Dataset, displacement: NDArray) -> dict[str, Field]:
     """Fields of a motion or path with displacements (samples, n, 3), by name.
 
-    Fields that displacements do not determine are left out: moments and energies if laws have
-    memory, and also crease angles if panels yield next to such creases or, in motions, next to
-    damped ones, or reach no equilibrium. Speeds are not included: the page computes them from
-    displacements.
+    Fields that displacements do not determine are left out. These are moments and energies if laws
+    have memory. They are crease angles too if panels yield next to creases with memory or (in
+    motions) with dampers, or if panels reach no equilibrium. Speeds are not included: the page
+    computes them from displacements.
     """
     structure, out = case.structure, {}
     if CONTACT_FORCE in result:
@@ -243,7 +245,7 @@ def fields(case: Case, result: xr.Dataset, displacement: NDArray) -> dict[str, F
 
 
 def folding_fields(case: Case, displacement: NDArray, fold_angle: NDArray) -> dict[str, Field]:
-    """Fields of a folding by name: fold angles (samples, nc), rad; it has no sheet."""
+    """Fields of a folding by name: only fold angles (samples, nc), rad, for lack of a sheet."""
     angle = np.degrees(fold_angle)
     return {
         "bar_strain": _strain_field(bar_strain(case.structure, displacement)),
@@ -256,7 +258,7 @@ def _strain_field(strain: NDArray) -> Field:
 
 
 def energies(case: Case, result: xr.Dataset) -> dict[str, NDArray]:
-    """Energies of a result (samples), J, by name, as far as it has them."""
+    """Energies (samples) that a result contains, by name, J."""
     names = {"kinetic": "kinetic", **case.energy_groups, "dissipated": "dissipated"}
     names |= {"air": "lost to the air", "work": "work"}
     return {

@@ -14,13 +14,14 @@ from foldyn.patterns.screw import Screw
 from foldyn.viewer.arrays import Arrays
 
 OF_SHAPES = 4e-3
-"""Error of Bloch modes, relative to the largest displacement of each."""
+"""Error of each Bloch mode, relative to its largest displacement."""
 OF_ZONE = 1e-3
-"""Error of frequencies in the zone, relative to the largest."""
+"""Error of frequencies in the zone, relative to the largest frequency."""
 MOST_NUMBERS = 300_000
-"""Most numbers for the Bloch modes of a page; beyond, only every k-th wave vector has modes."""
+"""Largest number of values for the Bloch modes of a page; if there are more, only every k-th wave
+vector has modes."""
 MOST_TRIANGLES = 6_000
-"""Most triangles of the cells shown together, unless a single cell has more."""
+"""Largest number of triangles of all cells shown, unless a single cell has more."""
 CELLS = {1: 8, 2: 4}
 """Number of cells shown along each period, by the number of periods."""
 EDGES = ("below", "bottom", "top")
@@ -31,8 +32,8 @@ def waves(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
     """Describe the bands of one result; its arrays get names that begin with key.
 
     "frequency" (state, phase, band), Hz; "displacement", Bloch modes of every k-th phase, real and
-    imaginary parts (state, band, phase / k, 2, node, axis), the largest displacement of each being
-    1; "places" (state, node, axis), m; "maps" (state, period, 3, 4), to the next cell; "gaps", the
+    imaginary parts (state, band, phase / k, 2, node, axis), scaled to a largest displacement of 1;
+    "places" (state, node, axis), m; "maps" (state, period, 3, 4), to the next cell; "gaps", the
     full ones, as rows of the state, the band below, bottom and top (Hz); where they are computed
     "zone", frequencies (state, band, n, n), "damping" (state, phase, band), "attenuation" (state,
     leg, level) and "levels" (state, level), Hz.
