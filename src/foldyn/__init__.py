@@ -1,7 +1,7 @@
 """Foldyn: statics and dynamics of origami structures.
 
-From a crease pattern to a validated motion: bars and hinges with the stiffness of MERLIN2, several
-mass rules, and integration of M x'' + C x' + F_int(x) = p(t).
+It turns a crease pattern into a validated motion: with bars and hinges of the stiffness of MERLIN2,
+several mass rules, and integration of M x'' + C x' + F_int(x) = p(t).
 
 >>> import foldyn as fd
 >>> pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)

@@ -2,8 +2,8 @@
 
 The same declarations read tables of files (`foldyn.tables`).
 
-Annotations of its type declare the check of an argument, its unit, and its case-file key if that
-differs from its name:
+Annotations of the type of an argument declare its check, its unit, and its key in case files if the
+key differs from the name:
 
     stiffness: Annotated[float, Check(number, above=0.0, unit="N/m")]
     vector: Annotated[Sequence[float], Check(vector, unit="N"), Key("force")]
@@ -37,11 +37,11 @@ from foldyn.values import flag, plain
 
 T = TypeVar("T")
 SOME = 6
-"""Items of a list, and of an array, that a repr shows."""
+"""Number of items of a list, and of an array, that a repr shows."""
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 CONTEXT = frozenset({"folder", "find", "beside", "others"})
-"""What checks of a file may ask for: where its paths start, how else a name in it is found, what
-its table says up to there, and the table at the same place of files of other kinds, by kind."""
+"""Names of data that checks of a file may request: the folder in which its paths start, a function
+that finds names, the table as read so far, and tables at the same place in files of other kinds."""
 
 
 class Unit:
@@ -59,11 +59,11 @@ class Check(Unit):
     check : callable
         ``check(name, value, **limits)`` returns the value to store, or raises `InputError`.
     unit : str
-        For tables, and for messages of checks that take it.
+        Unit, for tables and for messages of checks that take a unit.
     words : iterable of str, optional
         Texts that the check accepts, unless `limits` contain them.
     given : type, optional
-        Type that it accepts, if it stores another.
+        Type that the check accepts, if it stores another type.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class Check(Unit):
 
 
 class Placed(Check):
-    """A check whose function takes the value only; its messages continue the name."""
+    """A check whose function takes only the value; its messages continue the argument's name."""
 
     def __call__(self, name: str, value: Any, context: Mapping[str, Any] = NOTHING) -> Any:
         """The value as stored; see `Check`."""
@@ -104,7 +104,7 @@ Flag = Annotated[bool, Check(flag)]
 
 
 class Read:
-    """How an argument is read from a file, if its value there has another form."""
+    """How an argument is read from a file, if its value has another form in files."""
 
     def __init__(self, check: Check) -> None:
         self.check = check
@@ -125,7 +125,7 @@ class Argument(NamedTuple):
     reader: Check | None = None
 
     def read(self, name: str, value: Any, context: Mapping[str, Any]) -> Any:
-        """Value from its form in a file."""
+        """Value of the argument, converted from its form in a file."""
         if self.reader is not None:
             value = self.reader(name, value, context)
         return self.checked(name, value, context)
@@ -148,7 +148,7 @@ class Argument(NamedTuple):
 
 @cache
 def arguments(kind: type) -> Mapping[str, Argument]:
-    """Arguments of a data class by name, in its order."""
+    """Arguments of a data class by name, in the order of its fields."""
     hints, found = get_type_hints(kind, include_extras=True), {}
     for item in fields(kind):
         notes = list(_notes(hints[item.name]))
@@ -175,18 +175,18 @@ def _notes(hint: Any) -> Iterator[Any]:
 class Checked:
     """Base of frozen data classes that check their arguments as declared.
 
-    An argument whose default is None may be None. `brief` defines their display.
+    An argument whose default is None may be None. `brief` defines how objects are displayed.
 
     Attributes
     ----------
     place : str
-        Prefix of arguments in messages: "settings: ".
+        Prefix of arguments in messages, such as "settings: ".
     missing : mapping of str to str
-        Remedies in messages about required keys that a file lacks.
+        Remedy for each required key, for messages about files that lack it.
     in_files : Check or None
         Reader for arguments of this type, if no annotation names one.
     like : sequence
-        Functions and classes whose docstrings describe its arguments.
+        Functions and classes whose docstrings describe the arguments.
     """
 
     place: ClassVar[str] = ""
@@ -207,22 +207,22 @@ class Checked:
             self.agree()
 
     def agree(self) -> None:
-        """Refuse incompatible arguments; may set an argument that another implies."""
+        """Refuse incompatible arguments; may set an argument that follows from another."""
 
     def _set(self, **values: Any) -> None:
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
     def given(self, *names: str) -> list[str]:
-        """Names among the given ones whose arguments are not None."""
+        """Those of the given names whose arguments are not None."""
         return [name for name in names if getattr(self, name) is not None]
 
 
 def brief(cls: type[T]) -> type[T]:
     """Give a data class a repr of one short line, and a table for notebooks unless it has one.
 
-    Arrays are shown by their shape, lists by their ends; arguments that are None unless given are
-    left out.
+    Arrays are shown by their shape, lists by their first and last items; optional arguments that
+    were not given are left out.
     """
 
     def shown(self: Any) -> str:

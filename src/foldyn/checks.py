@@ -17,7 +17,7 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> float:
     Parameters
     ----------
     steps, errors : array_like, shape (n,)
-        Step sizes (or mesh sizes) and the errors with each; signs are ignored.
+        Step sizes (or mesh sizes), and the error with each of them; signs are ignored.
 
     Examples
     --------
@@ -40,18 +40,19 @@ def gradient_error(
     seed: int = 0,
     size: float | None = None,
 ) -> float:
-    """Relative difference of a force and the central difference of its energy.
+    """Relative difference between a force and central differences of its energy.
 
-    Along random directions, extrapolated from two steps (error of order h^4).
+    Both are compared along random directions; differences are extrapolated from two steps (error of
+    order h^4).
 
     Parameters
     ----------
     energy, force : callable
-        Functions of an array; the force has its shape.
+        Functions of an array; the force has the shape of the array.
     at : array_like
-        Where they are compared, of any shape.
+        Array of any shape at which they are compared.
     seed : int
-        Of the random directions.
+        Seed of the random directions.
     size : float, optional
         Scale of the array; steps are a thousandth of it. By default its largest entry, or 1e-3 if
         all are zero.
@@ -75,10 +76,10 @@ def tangent_error(
     seed: int = 0,
     size: float | None = None,
 ) -> float:
-    """Relative difference of a tangent and the central difference of its force.
+    """Relative difference between a tangent and central differences of its force.
 
-    The tangent is a matrix on the flattened array. Along a random direction, extrapolated as in
-    `gradient_error`.
+    The tangent is a matrix that acts on the flattened array. Both are compared along a random
+    direction; differences are extrapolated as in `gradient_error`.
     """
     point = np.asarray(at, float)
     d = np.random.default_rng(seed).standard_normal(point.shape)

@@ -15,7 +15,7 @@ from importlib import import_module
 from typing import Any
 
 MOST_LINES, LONGEST_LINE, LONGEST = 20, 800, 4000
-"""Limits of a message: in lines, in characters of a line, and in all."""
+"""Limits of a message: number of lines, characters of a line, and characters in total."""
 
 
 def shortened(message: str) -> str:
@@ -37,7 +37,7 @@ def shortened(message: str) -> str:
 
 
 ALSO = "\n  also "
-"""Between the lines of a message with several faults."""
+"""Text between the lines of a message with several faults."""
 
 
 class FoldynError(Exception):
@@ -56,9 +56,9 @@ class InputError(FoldynError, ValueError):
         What is wrong and what to do. With a field, it continues the field's name: " = -1: must be
         ...", or ": missing; ...".
     field : str
-        Path of the wrong value: "duration", "loads[0].history".
+        Path of the wrong value, such as "duration" or "loads[0].history".
     file : path, optional
-        File that contains it.
+        File that contains the wrong value.
     others : sequence of InputError
         Further errors, one line each in the message.
     """
@@ -80,7 +80,7 @@ class InputError(FoldynError, ValueError):
         return self.field.partition(".")[0].partition("[")[0]
 
     def within(self, field: str, file: object = None) -> InputError:
-        """Copy of the error with its field as part of another, or of a file."""
+        """Copy of the error, with its field placed inside another field or in a file."""
         inner = self.field if self.file is None else f"{self.file}: {self.field}"
         others = [other.within(field) for other in self.others]
         return type(self)(self.reason, field + inner, file, others)
@@ -101,16 +101,16 @@ def optional(module: str, need: str, install: str) -> Any:
     Parameters
     ----------
     module : str
-        Its name to import.
+        Name by which the module is imported.
     need : str
-        Feature that needs it, and its name: "camera tracking needs OpenCV".
+        Feature and the library it needs, as in "camera tracking needs OpenCV".
     install : str
         Argument of "pip install".
 
     Raises
     ------
     InputError
-        It is not installed.
+        The module is not installed.
     """
     try:
         return import_module(module)
@@ -182,7 +182,7 @@ class FoldynWarning(UserWarning):
     message : str
         What is doubtful, with its value and the remedy.
     page : str
-        Section of `docs` that explains it: "modes.md#choose-the-state".
+        Section of `docs` that explains the warning, such as "modes.md#choose-the-state".
     """
 
     def __init__(self, message: object = "", page: str = "") -> None:
@@ -191,11 +191,11 @@ class FoldynWarning(UserWarning):
 
 
 class CrossingWarning(FoldynWarning):
-    """Panels pass through each other in a result; the message says which, and when first."""
+    """Panels pass through each other in a result; the message names them and the first time."""
 
 
 class StretchWarning(FoldynWarning):
-    """Panels that stretch hold much of the strain energy, which the model predicts roughly."""
+    """Stretched panels hold much of the strain energy, which the model predicts only roughly."""
 
 
 class ModelRangeWarning(FoldynWarning):
@@ -203,8 +203,8 @@ class ModelRangeWarning(FoldynWarning):
 
 
 OF_MODELS = (StretchWarning, ModelRangeWarning)
-"""Warnings of models, which studies and shipped cases show on their pages only: they use these
-models on purpose."""
+"""Warnings about models. Studies and shipped cases use these models on purpose, and show the
+warnings only on their pages."""
 
 
 class UnitsWarning(FoldynWarning):
@@ -212,7 +212,7 @@ class UnitsWarning(FoldynWarning):
 
 
 INSIDE = sys.stdlib_module_names | {"foldyn", "numba", "scipy", "xarray"}
-"""What stands between a warning and the line of the user who is warned."""
+"""Modules whose lines are skipped to find the user's line that caused a warning."""
 
 
 def warn(message: str, page: str, category: type[FoldynWarning] = FoldynWarning) -> None:
@@ -225,15 +225,15 @@ def _issue(warning: Warning) -> None:
     while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in INSIDE:
         frame = frame.f_back
     place = frame.f_code.co_filename, frame.f_lineno
-    known = frame.f_globals.setdefault("__warningregistry__", {})  # like `warnings.warn`
+    known = frame.f_globals.setdefault("__warningregistry__", {})  # as `warnings.warn` does
     warnings.warn_explicit(warning, type(warning), *place, registry=known)
 
 
 _NUMBER = r"[-+]?\d[\d.]*(?:e[-+]?\d+)?"
 NUMBERS = re.compile(rf"(?<![\w\[]){_NUMBER}(?:, {_NUMBER})*")
-"""Numbers in a text, but for those that are part of a name, as "loads[0]" and "node8"."""
+"""Numbers in a text, except for numbers in names such as "loads[0]" and "node8"."""
 NAMED = 6
-"""Places that are listed."""
+"""Largest number of places that are listed."""
 
 
 def listed(names: Sequence[object]) -> str:
@@ -263,7 +263,7 @@ class Told:
         return new
 
     def __iter__(self) -> Iterator[str]:
-        """Each text once, with its origins, or the number of similar ones."""
+        """Yield each text once, with its origins, or with the number of similar texts."""
         return (text for text, _ in self._texts())
 
     def _texts(self) -> Iterator[tuple[str, type[Warning]]]:
@@ -288,7 +288,7 @@ class Told:
         return "\n".join(f"{kind.__name__}: {text}" for text, kind in found)
 
     def add_kept(self, lines: str, where: str) -> None:
-        """Add warnings from the text of `kept`."""
+        """Add warnings from lines that `kept` returned."""
         for kind, _, text in (line.partition(": ") for line in lines.splitlines()):
             self.add(text, where, globals()[kind])
 
@@ -300,7 +300,7 @@ class Told:
 
 @contextmanager
 def told_once() -> Iterator[Told]:
-    """Issue the warnings of the block at its end, one of each kind."""
+    """Issue the warnings of the block at the end of the block, one of each kind."""
     told = Told()
     with told.noting():
         yield told

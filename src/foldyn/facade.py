@@ -21,7 +21,7 @@ def lazy(
     Parameters
     ----------
     package, file : str
-        Its `__name__` and `__file__`.
+        `__name__` and `__file__` of the package.
     *own : str
         Public names that the package defines itself.
     """

@@ -1,4 +1,4 @@
-"""Reads all external files: of any kind and size; TOML and JSON of any depth.
+"""Safe reading of external files, whatever their kind, size or depth of nesting.
 
 Every message says what is wrong and what to do; the caller adds the location in front.
 """
@@ -21,7 +21,7 @@ from foldyn.errors import InputError
 from foldyn.values import show
 
 DEEPEST = 50
-"""Levels of nested tables and lists that a TOML or JSON text may have."""
+"""Largest number of levels of nested tables and lists in a TOML or JSON text."""
 
 MEBI = 2**20
 _DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{DEEPEST},}}""")
@@ -35,7 +35,7 @@ def read_text(path: str | os.PathLike[str], what: str, most: int, thin: str) -> 
     path : path
         A file; links are followed.
     what : str
-        Expected kind of file, for messages: "a CSV file".
+        Expected kind of file for messages, such as "a CSV file".
     most : int
         Largest accepted size (MiB).
     thin : str
@@ -81,12 +81,12 @@ def check_file(path: str | os.PathLike[str], what: str) -> Path:
         mode = path.stat().st_mode
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
-    except (OSError, ValueError) as error:  # no such path, or an invalid name
+    except (OSError, ValueError) as error:  # the path does not exist, or the name is invalid
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{path}: cannot be read: {reason}") from None
     if stat.S_ISDIR(mode):
         raise InputError(f"{path}: is a folder; give {what}")
-    if not stat.S_ISREG(mode):  # reading it might never end
+    if not stat.S_ISREG(mode):  # reading a pipe or a device might never end
         raise InputError(
             f"{path}: is a pipe or a device, not a file; save its content, and give {what}"
         )
@@ -94,7 +94,7 @@ def check_file(path: str | os.PathLike[str], what: str) -> Path:
 
 
 def file_digest(path: Path) -> str:
-    """Digest of the content of a file, "1f0c6a2b9d3e4f58"."""
+    """Digest of the content of a file, such as "1f0c6a2b9d3e4f58"."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()[:16]
 
@@ -105,7 +105,8 @@ def from_toml(text: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The text is not TOML, or nested deeper than any supported file; the message begins "is not".
+        The text is not TOML, or is nested deeper than any supported file. The message begins with
+        "is not".
     """
     deep = _DEEP_KEY.search(text)
     if deep:  # tomllib would take minutes
@@ -123,12 +124,13 @@ def from_json(text: str, repeated: list[str] | None = None) -> Any:
     Parameters
     ----------
     repeated : list of str, optional
-        Receives keys that occur repeatedly in an object; the last one counts.
+        Receives keys that occur more than once in an object; the last value counts.
 
     Raises
     ------
     InputError
-        The text is not JSON, or nested deeper than any supported file; the message begins "is not".
+        The text is not JSON, or is nested deeper than any supported file. The message begins with
+        "is not".
     """
     try:
         return _shallow(json.loads(text, object_pairs_hook=partial(_object, repeated)))

@@ -1,4 +1,4 @@
-"""JSON Schema (draft 7) of types with limits, with descriptions from docstrings."""
+"""JSON Schema (draft 7) of types and their limits, with descriptions from docstrings."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def closed(
 ) -> Schema:
     """Schema of a table without further keys, with the description of `thing`.
 
-    word : value of its key `kind`, if it has one.
+    word : value of the key `kind` of the table, if it has this key.
     """
     kind = {"kind": {"enum": [word]}} if word else {}
     schema = {
@@ -90,7 +90,7 @@ def closed(
 
 
 def of_call(function: Callable[..., Any], word: str, more: Mapping[str, Schema]) -> Schema:
-    """Schema of a table with its kind, the arguments of a function, and further keys."""
+    """Schema of a table whose keys are its kind, the arguments of a function, and further keys."""
     hints, texts = get_type_hints(function), explained(function)
     parameters = inspect.signature(function).parameters
     own = {key: described(of_type(hints[key], {}), texts.get(key)) for key in parameters}
@@ -99,7 +99,7 @@ def of_call(function: Callable[..., Any], word: str, more: Mapping[str, Schema])
 
 
 def explained(*things: Any) -> dict[str, str]:
-    """Descriptions of arguments from the docstrings of functions and classes; the first counts."""
+    """Descriptions of arguments from docstrings of functions and classes; the first one counts."""
     found: dict[str, str] = {}
     for thing in things:
         for part in _SECTION.findall(inspect.cleandoc(thing.__doc__ or "")):

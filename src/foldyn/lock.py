@@ -1,4 +1,4 @@
-"""Locks that let one process at a time write; the system releases them when it ends."""
+"""Locks that let one process at a time write; the system releases a lock when its process ends."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from foldyn.errors import warn
 
 
 class LockedError(Exception):
-    """Another process has the lock; the message says which."""
+    """Another process has the lock; the message names that process."""
 
 
 @contextmanager
@@ -29,9 +29,9 @@ def locked(path: Path) -> Iterator[None]:
     Raises
     ------
     LockedError
-        Another process holds it.
+        Another process holds the lock.
     OSError
-        The file cannot be made.
+        The lock file cannot be made.
     """
     held = _take(path)
     try:
@@ -51,14 +51,14 @@ def _take(path: Path) -> int:
         opened = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         try:
             _lock(opened)
-            if _is(path, opened):  # the holder may have just removed it
+            if _is(path, opened):  # the previous holder may have just removed the file
                 return opened
             os.close(opened)
         except BlockingIOError:
             said = os.read(opened, 200).decode("utf-8", "replace") or "another process"
             os.close(opened)
             raise LockedError(said) from None
-        except OSError as error:  # a file system without locks
+        except OSError as error:  # the file system has no locks
             warn(
                 f"{path}: cannot be locked ({error.strerror}): see that no other process "
                 "writes there",

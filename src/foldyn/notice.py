@@ -1,8 +1,8 @@
 """Messages while kernels compile: how many are missing on disk, and the expected time.
 
-A kernel called from Python requires the kernels that it calls, which its sources name
-(`jit.sources`). So when one must be compiled, the number of missing ones is known, and earlier
-compile times give an estimate.
+A kernel called from Python requires the kernels that it calls; its sources name them
+(`jit.sources`). So when a kernel must be compiled, the number of missing kernels is known, and
+earlier compile times give an estimate.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from multiprocessing import parent_process
 import numpy as np
 
 PER_KERNEL = 0.14
-"""Seconds of a processor at least: 76 of modes took 10 s, 109 of a motion with RK4 17 s."""
+"""Smallest processor time (s) per kernel: 76 kernels of modes took 10 s, 109 kernels of a motion
+with RK4 took 17 s."""
 SHORTEST = 3.0
-"""Seconds below which nothing is told."""
+"""Expected times (s) below this are not announced."""
 
 
 def on_terminal(text: str) -> None:
@@ -56,8 +57,8 @@ class Notice:
     def begin(self, kernel: object, missing: Callable[[], Iterable[object]]) -> None:
         """Note the start of a kernel's compilation.
 
-        missing : returns the kernels that it consists of, itself included, and that are not on
-        disk; called only if no earlier kernel included this one.
+        missing : function that returns the kernels that this kernel consists of, itself included,
+        and that are not on disk; called only if no earlier kernel included this kernel.
         """
         self._count += 1
         if kernel in self._known:
@@ -104,4 +105,4 @@ def _about(seconds: float) -> str:
 
 
 NOTICE = Notice()
-"""That of this process, as there is one compiler in it."""
+"""The notice of this process, which has a single compiler."""

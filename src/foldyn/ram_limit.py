@@ -1,7 +1,7 @@
-"""Memory limits: refuse input that is too large for the machine, from an estimate.
+"""Memory limits: input that is estimated to be too large for the machine is refused.
 
-Estimates are right within a factor of about two. The bytes per item are documented where the item
-is made, with their measurement.
+Estimates are right within a factor of about two. The bytes per item, and how they were measured,
+are documented where the item is made.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from foldyn.errors import InputError
 
 MEBI, GIB = 2.0**20, 2.0**30
 HALF = 0.5
-"""Share of the memory that the command takes unless forced."""
+"""Share of the memory that commands may use without --force."""
 _LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 _share: ContextVar[float] = ContextVar("share of the memory", default=1.0)
 
@@ -60,7 +60,7 @@ def check_memory(field: str, what: str, needed: float, remedy: str) -> None:
     Parameters
     ----------
     field : str
-        Field that makes it large, as the user knows it.
+        Field that makes the input large, by the name that users know.
     what : str
         What is too large, with its size: "a pattern of 1e+06 vertices".
     needed : float
@@ -71,7 +71,7 @@ def check_memory(field: str, what: str, needed: float, remedy: str) -> None:
     Raises
     ------
     InputError
-        It needs more than the memory, or than the share that `at_most` allows.
+        The input needs more than the memory, or more than the share that `at_most` allows.
     """
     there = memory()
     if needed <= _share.get() * there:
@@ -96,5 +96,5 @@ def _limit(file: str) -> float:
     """Limit of a container, in bytes."""
     try:
         return float(Path(file).read_text())
-    except (OSError, ValueError):  # none, or "max"
+    except (OSError, ValueError):  # the file does not exist, or contains "max"
         return math.inf

@@ -1,8 +1,8 @@
 """Results stored in files, so that interrupted work can continue.
 
-A file holds a stamp of everything that its result depends on, including a digest of the program's
-sources. Results of other inputs or another program, and damaged files, are ignored and computed
-again.
+A file holds a stamp of everything on which its result depends, including a digest of the program's
+sources. Files that are damaged, or hold results of other inputs or of another program, are ignored,
+and the results are computed again.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ COMPUTING = (
 
 @cache
 def program(*more: str) -> str:
-    """Digest of the program, "1f0c6a2b9d3e4f58".
+    """Digest of the program, such as "1f0c6a2b9d3e4f58".
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def program(*more: str) -> str:
 
 
 def digest(package: Path, *more: str) -> str:
-    """Digest of the sources of a package that compute."""
+    """Digest of those sources of a package that compute results."""
     sources = [path for part in (*COMPUTING, *more) for path in _sources(package / part)]
     found = hashlib.sha256()
     for path in sorted(sources):

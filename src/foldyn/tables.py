@@ -20,7 +20,7 @@ from foldyn.values import SHOWN, nearest, show, suggest
 
 C = TypeVar("C", bound=Checked)
 MOST_TOLD = 12
-"""Mistakes of a file that are told one by one."""
+"""Largest number of mistakes of a file that are reported one by one."""
 
 
 class UnknownKeyError(InputError):
@@ -40,7 +40,7 @@ def read(
         Location of the table.
     table : mapping
     folder, find, others
-        For checks that ask for them; see `foldyn.arguments.CONTEXT`.
+        Data for checks that request them; see `foldyn.arguments.CONTEXT`.
     """
     check_table(name, table)
     own = {argument.key: field for field, argument in arguments(kind).items()}
@@ -50,7 +50,7 @@ def read(
         reason = _of_others(key, others) or unknown_key(key, own)
         faults.add(UnknownKeyError(f": {reason}", f"{name}.{key[:SHOWN]}"))
     context = {"folder": folder, "find": find, "beside": found}
-    meant = {nearest(key, own) for key in unknown}  # that these are missing need not be said
+    meant = {nearest(key, own) for key in unknown}  # these keys need not be reported as missing
     for field, argument in arguments(kind).items():
         key, place = argument.key, f"{name}.{argument.key}"
         if key in table:
@@ -101,7 +101,7 @@ def _placed(name: str, kind: type[Checked]) -> Iterator[None]:
 
 @cache
 def needs(kind: type[Checked]) -> Mapping[str, str]:
-    """Keys that the table of a data class must have, and what to do where one is missing."""
+    """Keys that the table of a data class must have, each with the remedy if it is missing."""
     return {
         one.key: f"give it ({one.unit})" if one.unit else "give its value"
         for one in arguments(kind).values()
@@ -166,9 +166,9 @@ class ListOf(Check):
     Parameters
     ----------
     item : Check
-        What each of its items must be.
+        Check that each item of the list must pass.
     what : str
-        For messages, unless it is a list of tables: "a list of numbers, as in [0, 1]".
+        Text for messages, such as "a list of numbers, as in [0, 1]"; not used for lists of tables.
     least, most : int
         Bounds of the number of items.
     """
@@ -205,7 +205,7 @@ def schema_of(
     """JSON Schema of the table of a data class, added to the definitions.
 
     without : excluded keys.
-    word : value of its key `kind`, if it has one.
+    word : value of the key `kind` of the table, if it has this key.
     """
     name = "-".join((kind.__name__, *without))
     if name not in definitions:
@@ -242,12 +242,12 @@ class Section(Checked):
         """Skip checks: defaults need none, and tables are checked as they are read."""
 
     def values(self) -> dict[str, Any]:
-        """Its arguments by name."""
+        """Arguments of the table by name."""
         return {name: getattr(self, name) for name in arguments(type(self))}
 
 
 def told(error: InputError, file: object) -> InputError:
-    """Error of a file, unknown keys first, as other errors may follow from them."""
+    """Error of a file, with unknown keys first, because other errors may follow from them."""
     found = sorted((error, *error.others), key=lambda one: not isinstance(one, UnknownKeyError))
     shown = [InputError(one.reason, one.field.removeprefix(".")) for one in found[:MOST_TOLD]]
     if len(found) > MOST_TOLD:

@@ -15,7 +15,7 @@ from threadpoolctl import ThreadpoolController, threadpool_limits
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-FEW = 2000  # rows of a full matrix up to which more threads are slower
+FEW = 2000  # up to this number of rows of a full matrix, more threads are slower
 
 
 def processors() -> int:
@@ -28,7 +28,7 @@ def processors() -> int:
 def in_threads(do: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
     """Results of `do` for each item, computed by threads on all processors.
 
-    This pays off for linear algebra, which runs without Python's lock, on one thread each.
+    This pays off for linear algebra, which runs without Python's lock; each item uses one thread.
     """
     with threadpool_limits(1), ThreadPoolExecutor(processors()) as pool:
         return list(pool.map(do, items))
@@ -58,13 +58,13 @@ _ONE = _Limit()
 
 
 def one_thread(rows: int = 0) -> AbstractContextManager:
-    """Keep LAPACK on one thread: more slow down factorizations of bands and of few rows.
+    """Keep LAPACK on one thread: more threads slow down factorizations of small or band matrices.
 
-    Measured with two threads, SciPy's OpenBLAS: bands 5 times at 333 dofs, 1.4 at 6000; full
-    matrices twice at 400 to 900 rows. They also wait for each other if other programs run. Threads
-    of other libraries (PARDISO) are not limited.
+    With two threads of SciPy's OpenBLAS, band matrices took 5 times as long at 333 dofs and 1.4
+    times at 6000; full matrices took twice as long at 400 to 900 rows. Threads also wait for each
+    other if other programs run. Threads of other libraries (PARDISO) are not limited.
 
-    rows : of a full matrix; above FEW, threads are not limited.
+    rows : number of rows of a full matrix; above `FEW`, threads are not limited.
     """
     return nullcontext() if rows > FEW else _ONE
 

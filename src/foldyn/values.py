@@ -19,21 +19,23 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import InputError, UnitsWarning, warn
 
 LARGEST, SMALLEST = 1e50, 1e-50
-"""Sizes of numbers other than 0, in SI units: their fourth powers and quotients stay in range."""
+"""Smallest and largest size of numbers except 0, in SI units: fourth powers and quotients of such
+numbers stay in range."""
 LONGEST, SHORTEST = 1e30, 1e-30
-"""Sizes of lengths (m), whose eighth powers occur: a thousand universes to less than Planck's."""
+"""Smallest and largest length (m): eighth powers of lengths occur. The range goes from less than
+Planck's length to a thousand universes."""
 MOST = 2**63 - 1
-"""Largest whole number: what arrays of them hold."""
+"""Largest whole number that arrays of whole numbers hold."""
 ROUND, DIGITS = 7.0, 1e-4
-"""Largest angle in radians, and how near it is to a part of pi."""
+"""Largest angle that may be meant in radians, and its tolerance to a simple part of pi."""
 PARTS = np.array([*range(1, 13), 18])
-"""Such parts: multiples of 10 and of 15 degrees among them."""
+"""Simple parts of pi; they include multiples of 10 and of 15 degrees."""
 LARGE = ("panel_angle", "dihedral", "crease_rest", "angle")
-"""Angles that are hardly as small as one in radians."""
+"""Names of angles that, in degrees, are hardly as small as angles in radians."""
 SMALL, TURN, ROUNDED = 0.35, 2.0 * np.pi, 1e-6
-"""Those in radians (20 degrees and more), and how near tenths of degrees are to whole ones."""
+"""Smallest such angle in radians (20 degrees), and the tolerance to whole tenths of degrees."""
 SHOWN = 60
-"""Characters of a value in a message."""
+"""Largest number of characters of a value in a message."""
 T = TypeVar("T")
 N = TypeVar("N", int, float)
 
@@ -150,7 +152,7 @@ def listed(name: str, value: Any, what: str) -> list[Any]:
     Parameters
     ----------
     what : str
-        What to give, for messages: "pairs of vertices".
+        Items of the list, for messages, such as "pairs of vertices".
     """
     try:
         if isinstance(value, str | bytes):
@@ -189,9 +191,9 @@ def number(
     above, least, below, most : float, optional
         Open and closed bounds.
     unit : str
-        For messages: "degrees".
+        Unit for messages, such as "degrees".
     smallest, largest : float
-        Sizes of numbers but 0.
+        Smallest and largest size of numbers except 0.
     """
     value = single(value)
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
@@ -223,8 +225,9 @@ def number(
 def doubt_degrees(name: str, value: Any) -> None:
     """Warn if an angle (degrees), or all of several, look like radians.
 
-    Below 7 and a simple part of pi to four digits, as np.pi / 3 or 1.0472; of angles between panels
-    and of panels, which are hardly that small, any of 0.35 to 2 pi with two decimals or more.
+    An angle is doubted if it is below 7 and a simple part of pi to four digits, such as np.pi / 3
+    or 1.0472. Angles between panels and of panels are rarely that small; they are doubted if they
+    are from 0.35 to 2 pi with two decimals or more.
     """
     angles = np.abs(np.ravel(np.asarray(value, float)))
     angles = angles[angles > 0.0]
@@ -263,7 +266,7 @@ def whole(
     least, most : int, optional
         Closed bounds.
     what : str
-        For messages: the counted items, or the unit.
+        Counted items or unit, for messages.
     """
     value, what = single(value), f" ({what})" if what else ""
     counts = not isinstance(value, bool | np.bool_) and isinstance(value, Integral)
@@ -280,14 +283,14 @@ def whole(
 def numbers(name: str, value: Any) -> NDArray[np.float64]:
     """Return `value` as a new read-only float array of any shape.
 
-    Its numbers are finite and of a computable size: at most `LARGEST`, and one of them at least
-    `SMALLEST`, unless all are 0.
+    The numbers are finite and at most `LARGEST` in size; at least one of them reaches `SMALLEST`,
+    unless all are 0.
     """
     try:
         array = np.asarray(value)
     except ValueError:
         raise InputError(f" = {show(value)}: rows have different lengths", name) from None
-    if array.dtype == object:  # integers beyond 64 bits are numbers too, though too large
+    if array.dtype == object:  # integers beyond 64 bits are numbers, but too large
         array = _as_floats(array)
     if array.dtype.kind not in "iuf" or _has_truth_values(value):
         raise InputError(f" = {show(value)}: must be numbers", name)
@@ -310,7 +313,7 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
 
 
 def writable(array: ArrayLike) -> NDArray[np.float64]:
-    """Contiguous writable floats: others would compile kernels once more."""
+    """Contiguous writable floats; other arrays would cause kernels to be compiled again."""
     floats = np.ascontiguousarray(array, float)
     return floats if floats.flags.writeable else floats.copy()
 
@@ -330,9 +333,9 @@ def number_or_list(name: str, value: Any, what: str, **limits: Any) -> float | t
     Parameters
     ----------
     what : str
-        Items with one number each, for messages: "node".
+        Name of the items that have one number each, for messages, such as "node".
     **limits
-        Bounds of each, as for `number`.
+        Bounds of each number, as in `number`.
     """
     value = single(value)
     if not isinstance(value, list | tuple | np.ndarray):
@@ -346,7 +349,7 @@ def number_or_list(name: str, value: Any, what: str, **limits: Any) -> float | t
 def one_or_each(name: str, value: Any, count: int, what: str) -> NDArray[np.float64]:
     """Array (count,) from `number_or_list`: one number for all, or one for each.
 
-    what : name of the counted items, for messages: "nodes".
+    what : name of the counted items in messages, such as "nodes".
     """
     array = np.array(value)
     if array.ndim and len(array) != count:
@@ -364,7 +367,7 @@ def indices(name: str, value: Any, what: str, alternative: str) -> tuple[int, ..
     Parameters
     ----------
     what : str
-        Name of the numbered items, for messages: "node".
+        Name of the numbered items in messages, such as "node".
     alternative : str
         Alternative to numbers, for messages.
     """

@@ -1,7 +1,8 @@
 """Worker processes, which end with this process.
 
-All workers hold the reading end of one pipe, and only this process holds the other end. When it
-closes, because the work is abandoned or this process has ended in any way, they end at once.
+All workers hold the reading end of one pipe, and only this process holds the other end. When that
+end closes, because the work is abandoned or this process has ended in any way, all workers end at
+once.
 """
 
 from __future__ import annotations
@@ -27,16 +28,17 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 AHEAD = 2
-"""Items that wait for each process, so that none is idle."""
+"""Number of items that wait for each process, so that no process is idle."""
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-"""Environment variables that tell a process, which runs next to others, to use one thread."""
+"""Environment variables that restrict a process to one thread, for processes that run side by
+side."""
 GONE = "the process that computed it was ended from outside, perhaps for lack of memory"
 
 
 class Workers(Generic[Item, Result]):
     """Worker processes; a context manager.
 
-    Each runs on one thread, and refuses work that needs more than its share of the memory.
+    Each worker runs on one thread, and refuses work that needs more than its share of the memory.
 
     Parameters
     ----------
@@ -50,7 +52,7 @@ class Workers(Generic[Item, Result]):
         self.do, self.count = do, count
         self._context = get_context("spawn")
         line, self._end = self._context.Pipe(duplex=False)
-        self._line = line  # open here too: later workers need it
+        self._line = line  # stays open in this process: later workers need it
         self._pool = self._started()
 
     def _started(self) -> ProcessPoolExecutor:
@@ -58,9 +60,10 @@ class Workers(Generic[Item, Result]):
         return ProcessPoolExecutor(self.count, self._context, initializer=_live, initargs=given)
 
     def _submit(self, do: Callable[..., Any], *given: object) -> Future[Any]:
-        """Submit work.
+        """Submit a function to the pool.
 
-        A process started for it ignores the terminal's Ctrl-C, which is meant for this process.
+        A worker process that this starts ignores the terminal's Ctrl-C, which is meant for this
+        process.
         """
         if os.name != "posix":
             return self._pool.submit(do, *given)
@@ -79,7 +82,7 @@ class Workers(Generic[Item, Result]):
     ) -> None:
         """Compute a result for each item, and keep each as soon as it is ready.
 
-        Results that are ready at an interruption by Ctrl-C are kept, too.
+        Results that are ready when Ctrl-C interrupts are kept, too.
 
         Parameters
         ----------
@@ -87,9 +90,9 @@ class Workers(Generic[Item, Result]):
         keep : callable
             Called with an item and its result.
         lost : callable, optional
-            Result for an item whose process was killed twice, the second time while it computed
-            nothing else; called with the item and the reason. Other items are still computed. Only
-            for calls from one thread at a time.
+            Called with an item and a reason if the item's process was killed twice, the second time
+            while it computed nothing else; returns the result of the item. Other items are still
+            computed. Only for calls from one thread at a time.
         first : bool
             Whether to compute the first item here while the processes start, so that they find its
             kernels compiled.
@@ -117,14 +120,14 @@ class Workers(Generic[Item, Result]):
                 )
             doubtful.extend(broken)
             self._restart()
-            while doubtful:  # one by one, to find the item at fault
+            while doubtful:  # one item at a time, to find the one that kills its process
                 item = doubtful.popleft()
                 if self._each(iter([item]), keep):
                     keep(item, lost(item, GONE))
                     self._restart()
 
     def _each(self, left: Iterator[Item], keep: Callable[[Item, Result], None]) -> list[Item]:
-        """Compute the remaining items; return those under way when a process was killed."""
+        """Compute the remaining items; return the items under way when a process was killed."""
         waiting: dict[Future[Any], Item] = {}
         broken: list[Item] = []
         try:
@@ -194,11 +197,12 @@ def _nothing() -> None:
 def _live(line: Connection, share: float, do: bytes) -> None:
     """Start a worker that ends with the pipe, with its share of the memory and one thread.
 
-    The function arrives as bytes: unpickling it loads libraries, which then read the environment.
+    The function arrives as bytes, because unpickling it loads libraries, which must read the
+    environment set here.
     """
     Thread(target=_follow, args=(line,), daemon=True).start()
     _arm(line)
-    if line.poll():  # it has already closed
+    if line.poll():  # the pipe has already closed
         os._exit(1)
     ram_limit.allow(share)
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
@@ -222,7 +226,7 @@ def _arm(line: Connection) -> None:
         return
     import fcntl
 
-    try:  # opened again, as only one process is notified per open file
+    try:  # opened again, because only one process is notified per open file
         own = os.open(f"/proc/self/fd/{line.fileno()}", os.O_RDONLY | os.O_NONBLOCK)
     except OSError:
         return

@@ -22,8 +22,8 @@ _LEFT = re.compile(r"\..+\.(\d+)\.tmp(\.\w+)?")
 def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Path of a temporary file that replaces `path` if the block succeeds.
 
-    Until then `path` is unchanged; after an exception the temporary file is removed. Its content is
-    on disk before it appears. Links are followed.
+    Until then `path` is unchanged; after an exception the temporary file is removed. The content is
+    on disk before the file appears at `path`. Links are followed.
     """
     target = Path(os.path.realpath(path))
     part = _beside(target, target.suffix)
@@ -46,7 +46,8 @@ def write_bytes(content: bytes, path: str | os.PathLike[str]) -> None:
 def write_text(text: str, path: str | os.PathLike[str]) -> None:
     r"""Write a UTF-8 text file atomically.
 
-    Characters that UTF-8 cannot encode, such as raw bytes of file names, are escaped, "\udcff".
+    Characters that UTF-8 cannot encode, such as raw bytes of file names, are escaped, as in
+    "\udcff".
     """
     write_bytes(text.encode("utf-8", "backslashreplace"), path)
 
@@ -57,7 +58,7 @@ def plain(value: Any) -> Any:
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
-    if hasattr(value, "tolist"):  # of NumPy
+    if hasattr(value, "tolist"):  # numbers and arrays of NumPy
         return plain(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
@@ -84,7 +85,7 @@ def made_folder(folder: str | os.PathLike[str], field: str = "folder") -> Path:
     Raises
     ------
     InputError
-        It is a file, or cannot be created.
+        The path is a file, or the folder cannot be created.
     """
     path = Path(folder)
     try:

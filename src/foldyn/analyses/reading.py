@@ -270,7 +270,7 @@ def _radians(angles: Any) -> Any:
 
 
 def _facets(pattern: Pattern, table: Mapping[str, Any]) -> Pattern:
-    """The pattern with flat creases as the case file asks, by default hinges, and convex panels."""
+    """The pattern with convex panels, and flat creases as the file defines (default: hinges)."""
     wanted = table.get(FACETS, HINGE)
     pattern = pattern if wanted == HINGE else welded(pattern, join=wanted == WELD)
     parts = pattern if wanted == LINE else convex(pattern)

@@ -16,8 +16,8 @@ from foldyn.arguments import brief
 from foldyn.errors import InputError, optional
 from foldyn.values import choice, number
 
-_TERMS = 6  # degree in r^2 of the polynomial that inverts the distortion
-_REACH = 1.08  # radius of that fit, relative to half the image diagonal
+_TERMS = 6  # degree, in r^2, of the polynomial that inverts the distortion
+_REACH = 1.08  # radius up to which it is fitted, relative to half the image diagonal
 _LARGEST_SPREAD = 0.02  # allowed spread of the lengths that define a scale
 
 # Unit vectors by name: "x", "-x", "+z".
@@ -46,7 +46,7 @@ def axes_of_view(up: str = "-x", facing: str = "z") -> NDArray[np.float64]:
     Parameters
     ----------
     up : str
-        Direction of the model that points up in the image, for example "-x": x runs down.
+        Direction of the model that points up in the image; with "-x", for example, x points down.
     facing : str
         Direction of the model that points towards the camera.
 
@@ -58,7 +58,7 @@ def axes_of_view(up: str = "-x", facing: str = "z") -> NDArray[np.float64]:
     Raises
     ------
     InputError
-        Not two directions at a right angle.
+        The two directions are not at a right angle.
     """
     top = DIRECTIONS[choice("up", up, DIRECTIONS)]
     toward = DIRECTIONS[choice("facing", facing, DIRECTIONS)]
@@ -70,7 +70,7 @@ def axes_of_view(up: str = "-x", facing: str = "z") -> NDArray[np.float64]:
 @brief
 @dataclass(frozen=True)
 class Camera:
-    """Pinhole with radial distortion; pixel (0, 0) is the center of the upper left one.
+    """Pinhole camera with radial distortion; (0, 0) is the center of the upper left pixel.
 
     A point with the camera coordinates (x, y, z), z forward, is seen at
     center + focal (1 + k1 r^2 + k2 r^4) (x, y)/z with r^2 = (x^2 + y^2)/z^2 (Brown, 1971).
@@ -82,7 +82,7 @@ class Camera:
     focal : float
         Focal length (pixels).
     rotation : ndarray, shape (3, 3)
-        Rows: to the right, down and forward, in the model's axes.
+        Rows are the unit vectors to the right, down and forward, in the model's axes.
     position : ndarray, shape (3,)
         Position of the pinhole (m).
     k1, k2 : float
@@ -123,8 +123,9 @@ class Camera:
     ) -> Camera:
         """Camera at a distance (m) from a point, which it shows in the middle of the image.
 
-        `metres_per_pixel` holds in the plane through the target; `turned` are angles (degrees)
-        about the image's right, down and forward, by which the camera goes around the target.
+        `metres_per_pixel` is the scale in the plane through the target. `turned` are the angles
+        (degrees) by which the camera goes around the target, about the directions right, down and
+        forward of the image.
         """
         number("distance", distance, above=0.0, unit="m")
         number("metres_per_pixel", metres_per_pixel, above=0.0)
@@ -156,7 +157,7 @@ class Camera:
         return self.center + self.focal * (1.0 + self.k1 * r2 + self.k2 * r2**2) * slope
 
     def rays(self, uv: ArrayLike) -> NDArray[np.float64]:
-        """Slopes (x, y)/z of the rays through pixels (..., 2): the inverse of the distortion."""
+        """Slopes (x, y)/z of the rays through pixels (..., 2), by inverting the distortion."""
         seen = (np.asarray(uv, dtype=np.float64) - self.center) / self.focal
         r2 = np.sum(seen**2, axis=-1, keepdims=True)
         slope = seen * np.polynomial.polynomial.polyval(r2, self.inverse)
@@ -168,7 +169,7 @@ class Camera:
         return slope
 
     def on_plane(self, uv: ArrayLike, depth: ArrayLike) -> NDArray[np.float64]:
-        """Points (..., 3) in m seen at pixels (..., 2), at given depths (m) before the camera."""
+        """Points (..., 3) in m seen at pixels (..., 2), at depths (m) in front of the camera."""
         slope = self.rays(uv)
         z = np.broadcast_to(np.asarray(depth, dtype=np.float64), slope.shape[:-1])[..., np.newaxis]
         return self.position + np.concatenate([slope * z, z], axis=-1) @ self.rotation
@@ -180,7 +181,7 @@ class Camera:
 
     @cached_property
     def inverse(self) -> NDArray[np.float64]:
-        """Coefficients, by powers of r^2, of the factor from distorted to undistorted slopes."""
+        """Coefficients of the factor from distorted to undistorted slopes, a polynomial in r^2."""
         r = self._outermost * np.linspace(0.01, 1.0, 200)
         seen = r * (1.0 + self.k1 * r**2 + self.k2 * r**4)
         top = seen.max() ** 2
@@ -189,18 +190,19 @@ class Camera:
 
 
 class Sight(NamedTuple):
-    """A camera in the model's axes.
+    """Position and viewing direction of a camera in the model's axes.
 
-    A track is where a node's line of sight meets the plane that contained the node when the model
-    was recognized: one camera cannot measure motion along the line of sight. The model has this
-    motion, so it is compared as the camera would see it.
+    A single camera cannot measure motion along the line of sight. So a track gives the point where
+    the line of sight to a node meets the plane that contained the node when the model was
+    recognized. The model also moves along the line of sight, so it is compared as the camera would
+    see it.
 
     Attributes
     ----------
     position, direction : ndarray, shape (3,)
         Position of the camera (m), and its viewing direction (a unit vector), in the model's axes.
     depth : ndarray, shape (n,)
-        Distance (m) along this direction of the planes of nodes 0..n-1.
+        Distance (m) of the planes of nodes 0..n-1 from the camera along this direction.
     """
 
     position: NDArray[np.float64]
@@ -209,7 +211,7 @@ class Sight(NamedTuple):
 
     @classmethod
     def of(cls, tracks: xr.Dataset) -> Sight | None:
-        """The camera of a film; None if its tracks do not describe it."""
+        """The camera that took a film; None if the tracks do not describe it."""
         if "camera_depth" not in tracks:
             return None
         there, way = (
@@ -218,7 +220,7 @@ class Sight(NamedTuple):
         return cls(there, way, tracks["camera_depth"].values)
 
     def seen(self, nodes: NDArray[np.int64], rest: NDArray, moved: NDArray) -> NDArray[np.float64]:
-        """Apparent displacements (t, m, 3), m, of nodes (m,) which move by `moved`.
+        """Apparent displacements (t, m, 3), in m, of nodes (m,) whose displacements are `moved`.
 
         rest : (m, 3) positions at rest, m.
         """
@@ -235,8 +237,8 @@ class Scale:
     ----------
     metres_per_pixel : float
     spread : float
-        Largest relative deviation among the lengths that define it: large if the camera was tilted,
-        or the lengths lie at different depths. NaN for a single length.
+        Largest relative deviation among the lengths that define the scale: large if the camera was
+        tilted, or the lengths lie at different depths. NaN for a single length.
     """
 
     metres_per_pixel: float
@@ -246,7 +248,7 @@ class Scale:
         number("--scale", self.metres_per_pixel, above=0.0, unit="m per pixel")
 
     def at_depth(self, behind: ArrayLike, distance: float) -> NDArray[np.float64]:
-        """Metres per pixel `behind` the plane (m), whose own distance is `distance` (m).
+        """Metres per pixel at a depth `behind` (m) the plane, which is at `distance` (m).
 
         A pinhole image shrinks in inverse proportion to distance.
         """
@@ -260,12 +262,12 @@ def scale_of_lengths(references: Sequence[Sequence[float]]) -> Scale:
     Parameters
     ----------
     references : sequence of (u1, v1, u2, v2, metres)
-        Usually two, one across and one along.
+        Two pixels and the length between them; usually two lengths, one across and one along.
 
     Raises
     ------
     InputError
-        No lengths, a length of zero, or lengths whose scales differ by more than 2 %.
+        There is no length, a length is zero, or the scales of the lengths differ by more than 2 %.
     """
     if not len(references):
         raise InputError("--reference: give at least one PX1,PY1,PX2,PY2,METRES")
@@ -307,7 +309,7 @@ def scale_of_target(
     Returns
     -------
     Scale
-        With the spread over the sides of all squares, which grows as the board tilts.
+        Scale, whose spread is that of the sides of all squares; it grows as the board tilts.
 
     Raises
     ------

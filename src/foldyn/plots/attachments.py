@@ -113,7 +113,7 @@ def _hatched(sheet: Sheet3D, points: Points, edges: Any, size: float) -> Points:
 
 
 def direction_triangles(case: Case, kind: type, points: Points, size: float, sight: View) -> Points:
-    """Triangles (k, 3, 3) at nodes that `Fix` or `Impose`, the kind, holds along directions."""
+    """Triangles (k, 3, 3) at nodes held along directions by one kind, `Fix` or `Impose`."""
     middle, found = points.mean(axis=0), []
     for support in case.supports:
         if not isinstance(support, Fix | Impose) or type(support) is not kind:

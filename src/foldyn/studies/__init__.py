@@ -11,18 +11,18 @@ _HERE = Path(__file__).parent
 
 
 def shipped_cases() -> dict[str, Path]:
-    """Shipped case files by name ("herkal/case1")."""
+    """Shipped case files by name, such as "herkal/case1"."""
     found = {f"{path.parts[-3]}/{path.stem}": path for path in _HERE.glob("*/cases/*.toml")}
     return dict(sorted(found.items()))
 
 
 def find_case(name: str) -> Path:
-    """Path of a case file, given as a file or as the name of a shipped one ("herkal/case1").
+    """Path of a case file, given as a file or as the name of a shipped case ("herkal/case1").
 
     Raises
     ------
     InputError
-        Neither exists.
+        Neither such a file nor such a shipped case exists.
     """
     if os.path.exists(name):  # Path.exists raises if a name is too long
         return Path(name)

@@ -1,7 +1,7 @@
-"""Tasks run in processes; each keeps its own result, so that interrupted work resumes.
+"""Tasks that run in processes; each keeps its own result, so that interrupted work resumes.
 
-A file records the settings of its task and a digest of the program's sources: results of another
-program are recomputed.
+A file records the settings of its task and a digest of the program's sources; results of another
+version of the program are recomputed.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ SETTINGS = "study_settings"
 
 
 class Task(ABC):
-    """A computation whose result is a file, `name` with a `suffix`, in a `store`.
+    """A computation whose result is kept by `store` in a file named `name` plus `suffix`.
 
-    It is hashable and can be sent to another process.
+    A task is hashable and can be sent to another process.
     """
 
     store: ClassVar[Store[Any]]
@@ -40,26 +40,26 @@ class Task(ABC):
 
     @abstractmethod
     def settings(self) -> dict[str, Any]:
-        """Everything that its result depends on."""
+        """Everything on which the result depends."""
 
     @abstractmethod
     def compute(self, folder: Path) -> Any:
-        """Compute its result, which may depend on others in the folder."""
+        """Compute the result, which may depend on other results in the folder."""
 
     def file(self, folder: Path) -> Path:
-        """File of its result in a folder."""
+        """File of the result in a folder."""
         return folder / f"{self.name}{self.suffix}"
 
     def result(self, folder: Path) -> Any:
-        """Its result in a folder; None if missing or computed with other settings."""
+        """The result in a folder; None if it is missing or was computed with other settings."""
         return self.store.find(self.file(folder), self.settings())
 
     def there(self, folder: Path) -> bool:
-        """Whether its result is in a folder."""
+        """Whether the result is in a folder."""
         return self.result(folder) is not None
 
     def make(self, folder: Path) -> None:
-        """Compute its result into a folder."""
+        """Compute the result and store it in a folder."""
         self.store.keep(self.file(folder), self.settings(), self.compute(folder))
 
 
@@ -86,9 +86,9 @@ class Done:
     seconds : float
         Computing time; 0 if skipped.
     skipped : bool
-        Whether its result already existed.
+        Whether the result already existed.
     failure : str
-        Reason for a missing result, or "".
+        Reason why the task failed, or "".
     warnings : tuple of str
         Warnings of the task.
     """
@@ -111,7 +111,7 @@ def run(
     Parameters
     ----------
     tasks : iterable of Task
-        The longest first.
+        Tasks, the longest first.
     folder : Path
         Existing folder for the results.
     tell : callable
@@ -122,7 +122,7 @@ def run(
     Returns
     -------
     list of Done
-        A failing task does not stop the others.
+        Outcomes of all tasks; a failing task does not stop the others.
     """
     ended: list[Done] = []
 

@@ -1,4 +1,4 @@
-"""Values and claims of a paper and computed values: the rows of a study's `targets.toml`."""
+"""Values and claims of a paper, with computed values: the rows of a study's `targets.toml`."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class Target:
         Section, table or figure.
     what : str
     tolerance : float or None
-        Largest deviation, as a fraction of the value, that counts as agreement; None if the two are
-        only shown side by side.
+        Largest deviation, relative to the value, that counts as agreement; None if given and
+        computed value are only shown side by side.
     bound : {"least", "most"} or None
         For a claim: it holds if the computed value is at least, or at most, `value`.
     group : str
-        Part of the study that computes it.
+        Part of the study that computes the value.
     """
 
     key: str
@@ -43,7 +43,7 @@ class Target:
     group: str = ""
 
     def __post_init__(self) -> None:
-        """Check that it is either a value or a bound."""
+        """Check that the target is either a value or a bound."""
         if self.bound not in (None, "least", "most"):
             raise InputError(f'{self.key}: bound = {self.bound!r}: give "least" or "most"')
         if self.bound is not None and self.tolerance is not None:
@@ -59,12 +59,12 @@ class Verdict:
 
     @property
     def deviation(self) -> float:
-        """Computed relative to given value, minus one."""
+        """Computed value divided by given value, minus one."""
         return self.computed / self.target.value - 1.0
 
     @property
     def holds(self) -> bool | None:
-        """Whether they agree; None if neither tolerance nor bound is set."""
+        """Whether both values agree; None if neither tolerance nor bound is set."""
         if self.target.bound == "least":
             return self.computed >= self.target.value
         if self.target.bound == "most":
@@ -87,13 +87,13 @@ class Verdict:
 
     @property
     def asked(self) -> str:
-        """The target's number; for a claim, as a bound."""
+        """Text of the target's value; for a claim, written as a bound."""
         before = {"least": "at least ", "most": "at most ", None: ""}[self.target.bound]
         return f"{before}{self.target.value:.4g}"
 
 
 def read_targets(path: Path, group: str | None = None) -> Mapping[str, Target]:
-    """Targets of a file by key, one table each; of one group if given."""
+    """Targets of a file by key, one for each table; only those of a group if it is given."""
     tables = tomllib.loads(path.read_text("utf-8"))
     targets = {key: Target(key=key, **table) for key, table in tables.items()}
     return {k: t for k, t in targets.items() if group is None or t.group == group}

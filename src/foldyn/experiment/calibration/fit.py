@@ -25,8 +25,8 @@ from foldyn.sweeps.evaluations import Evaluation, Evaluations
 from foldyn.sweeps.pool import Pool, pool_of
 from foldyn.values import number, whole
 
-PREDICTED = "predicted"  # name of an evaluation's predictions
-SLOPES = "slopes"  # name of their derivatives with respect to the parameters
+PREDICTED = "predicted"  # name under which an evaluation stores its predictions
+SLOPES = "slopes"  # name of the derivatives of predictions with respect to parameters
 
 
 class Point(NamedTuple):
@@ -39,7 +39,7 @@ class Point(NamedTuple):
     runs : tuple of int, optional
         Runs to compute, without derivatives; by default all runs, with derivatives.
     second : bool
-        Whether derivatives have second-order accuracy, as intervals need.
+        Whether derivatives have second-order accuracy, which intervals need.
     """
 
     values: tuple[float, ...]
@@ -71,7 +71,7 @@ def evaluate(problem: Problem, point: Point) -> Evaluation:
 STEP = 1e-3
 ENOUGH = 1e-5  # a search ends at this relative change of the parameters
 LEVEL = 1e-8  # a search ends at this relative decrease of the cost
-TRIED = 60  # most steps of a search
+TRIED = 60  # largest number of steps of a search
 # Reasons for the end of a search, by the status of `least_squares`.
 WHY = {
     0: f"given up after {TRIED} steps",
@@ -81,10 +81,11 @@ WHY = {
     4: "neither cost nor parameters move any more",
 }
 
-MOST_PROCESSES = 1024  # most parallel processes; a larger number is a typing error
+MOST_PROCESSES = 1024  # largest number of processes; a larger one must be a typing error
 
-COUNTED = ("computed", "found")  # counts of a `Course`
-Outcome = NDArray[np.float64] | str  # all predictions in a row, or the reason for their absence
+COUNTED = ("computed", "found")  # attributes of a `Course` that count evaluations
+# all predictions in one array, or the reason why there are none
+Outcome = NDArray[np.float64] | str
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ class Course:
     Attributes
     ----------
     computed, found : int
-        Number of computed evaluations of the model, and of stored ones.
+        Number of evaluations of the model that were computed, and that were found stored.
     cost : float
         Smallest cost so far.
     """
@@ -134,10 +135,11 @@ def fit(
         `DampingRatios`, `ModeShapes`, `FrequencyResponse`.
     parameters : sequence of Parameter
     ties : mapping of str to str, optional
-        Keys that follow parameters, ``{"model.fold_law.theta2": "360 - model.fold_law.theta1"}``.
+        Keys that depend on parameters, such as ``{"model.fold_law.theta2": "360 -
+        model.fold_law.theta1"}``.
     searches : int
-        Number of searches: the first from the given values, the others from random ones within the
-        bounds.
+        Number of searches: the first begins from the given values, the others from random values
+        within the bounds.
     seed : int
         Random seed of the guesses.
     processes : int
@@ -169,9 +171,10 @@ def fit(
 
     Notes
     -----
-    A motion is computed with fixed steps, `analysis.dt`, or for an implicit method without it the
-    interval of its output: adaptive steps would make the misfit jump. At the end the motion is
-    recomputed with half the step, and intervals are widened by the change.
+    A motion is computed with fixed steps, because adaptive steps would make the misfit jump: with
+    `analysis.dt`, or if that is missing and the method is implicit, with the interval of the
+    output. At the end the motion is recomputed with half the step, and intervals are widened by the
+    change.
     """
     confidence = number("confidence", confidence, above=0.0, below=1.0)
     whole("processes", processes, least=1, most=MOST_PROCESSES)
@@ -211,12 +214,12 @@ def fit(
 def _at_a_time(
     count: int, pool: Pool, search: _Search, points: NDArray[np.float64]
 ) -> list[Descent]:
-    """Search from several guesses in threads, which end if this one is interrupted."""
+    """Search from several guesses in threads, which end if the calling thread is interrupted."""
     with ThreadPoolExecutor(count) as threads:
         try:
             return list(threads.map(search.descend, points))
         except BaseException:
-            pool.stop()  # fail in threads that wait for an evaluation
+            pool.stop()  # evaluations that threads wait for fail
             threads.shutdown(cancel_futures=True)
             raise
 
@@ -295,9 +298,9 @@ class _Search:
     def shifts(self, values: NDArray[np.float64], known: Uncertainty) -> list[NDArray[np.float64]]:
         """Shifts of the estimates in the limit of small time steps and elements.
 
-        The misfit at the optimum is recomputed with each halved. Its change moves the optimum by
-        `influence`, and Richardson's extrapolation gives the limit. Doubts about the extrapolation
-        are added as shifts to both sides.
+        The misfit at the optimum is recomputed with half the time step, and with half the element
+        size. From each change, `influence` gives the shift of the optimum, and Richardson's
+        extrapolation the limit. Doubts about the extrapolation are added as shifts to both sides.
         """
         found = []
         coarse = np.asarray(self.at([values])[0])
@@ -331,9 +334,9 @@ class _Search:
         self, finer: Finer, values: NDArray[np.float64], shift: NDArray[np.float64],
         known: Uncertainty,
     ) -> NDArray[np.float64]:  # fmt: skip
-        """Distance of a much finer model's estimates from the extrapolated shift.
+        """Distance between the estimates of a much finer model and the extrapolated estimates.
 
-        At the shifted values, the finer model must fit up to its own remaining discretization
+        At the shifted values, the finer model must fit, apart from its own remaining discretization
         error.
         """
         there = np.clip(values + shift, self.lower, self.upper)
@@ -380,7 +383,7 @@ class _Search:
     def _slopes(
         self, values: NDArray[np.float64], second: bool
     ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-        """Derivatives of all predictions, and the runs that have none."""
+        """Derivatives of all predictions, and the runs without derivatives."""
         (found,) = self.evaluations.at([Point(tuple(map(float, values)), None, second)])
         slopes = found.values[SLOPES]
         lost = self.chosen & np.isnan(slopes).any(axis=1)
@@ -395,9 +398,10 @@ class _Search:
     def _quotients(
         self, values: NDArray[np.float64], runs: tuple[int, ...], rows: NDArray, both_sides: bool
     ) -> NDArray[np.float64]:
-        """Some rows of the Jacobian: difference quotients of whole runs within the bounds."""
+        """Rows of the Jacobian as difference quotients of whole runs, with points within bounds."""
         points: list[NDArray[np.float64]] = []
-        pairs: list[tuple[int, int, float]] = []  # points of each quotient, and their distance
+        # the two points of each quotient, and the distance between them
+        pairs: list[tuple[int, int, float]] = []
         for k, scale in enumerate(self.scale):
             step = np.zeros(len(values))
             step[k] = STEP * scale

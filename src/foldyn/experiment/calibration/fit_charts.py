@@ -50,7 +50,7 @@ def _beside(
     one: TimeHistory | Spectrum, along: NDArray, xlabel: str, ylabel: str,
     said: NDArray, seen: NDArray, case: Case,
 ) -> list[Chart]:  # fmt: skip
-    """A chart of histories for each node, with the misfit."""
+    """Charts of measured and computed histories, one for each node, with the misfit."""
     charts = []
     for k, node in enumerate(one.where(case)[:MOST].tolist()):
         curves = [Curve("model", along, said[:, k]), Curve(one.label, along, seen[:, k], True)]
@@ -61,7 +61,7 @@ def _beside(
 
 
 def _shapes(one: Shapes, result: xr.Dataset, case: Case) -> list[Chart]:
-    """A chart for each load factor."""
+    """Charts of measured and computed shapes, one for each load factor."""
     model, (across, up) = one.shapes(result, case), picture_plane(one, case)
     letters = [AXES.index(axis) for axis in one.axes]
     rest = case.structure.nodes[one.where(case)][:, letters]
@@ -77,7 +77,7 @@ def _shapes(one: Shapes, result: xr.Dataset, case: Case) -> list[Chart]:
 
 
 def _mode_shapes(one: ModeShapes, result: xr.Dataset, case: Case) -> list[Chart]:
-    """Measured over predicted components of mode shapes, a chart for each mode."""
+    """Measured against predicted components of mode shapes, a chart for each mode."""
     model = one.shapes(result, case)
     charts = []
     for mode, seen, said in zip(one.mode[:MOST].tolist(), one.values, model, strict=False):
@@ -96,7 +96,8 @@ def _responses(one: FrequencyResponse, result: xr.Dataset, case: Case) -> list[C
     parts = [(_decibels(model), _decibels(one.values))]
     if not one.magnitude:
         phase = np.degrees(np.angle(model))
-        near = phase + np.degrees(np.angle(one.values * model.conj()))  # no jumps by 360 degrees
+        # avoids jumps by 360 degrees
+        near = phase + np.degrees(np.angle(one.values * model.conj()))
         parts.append((phase, near))
     return [
         Chart(

@@ -22,7 +22,7 @@ WIDTH = 9.0  # inches
 def plot_measured(one: Measurement, result: xr.Dataset, case: Case, note: str = "") -> Figure:
     """Draw measurements and a result of the fitted model.
 
-    Shapes stand in the plane of the two measured axes along which the nodes lie farthest apart,
+    Shapes are drawn in the plane of the two measured axes along which the nodes lie farthest apart,
     with the bars between measured nodes.
     """
     charts = charts_of(one, result, case)

@@ -36,7 +36,7 @@ CLASSES = {
         ModeShapes, FrequencyResponse,
     )
 }  # fmt: skip
-# Fields of measurements that come from their file, or have another name in a fit file.
+# Fields of measurements that come from a data file, or have another name in a fit file.
 MADE = (
     "kind", "case", "changes", "held_out", "displacement", "force", "values", "time", "frequency",
     "axes", "mode", "damping_ratio",
@@ -48,7 +48,7 @@ NAMED = (TimeHistory.kind, Spectrum.kind, FrequencyResponse.kind)
 def _case(name: str, value: Any, folder: Path, find: Callable[[str], Path] | None) -> Path:
     """Case file relative to the fit file, or found by its name."""
     case = text(name, value)
-    if os.path.isfile(folder / case) or find is None:  # false if the name is too long
+    if os.path.isfile(folder / case) or find is None:  # False if the name is too long for a file
         return folder / case
     with within(f"{name}: "):
         return find(case)
@@ -97,7 +97,7 @@ def _known(kind: str) -> list[str]:
 
 
 class SolverSection(Section):
-    """[solver]: other arguments of `fit`."""
+    """[solver]: further arguments of `fit`."""
 
     searches: Count = 1
     seed: Seed = 0
@@ -168,7 +168,7 @@ def read_fit(
     Raises
     ------
     InputError
-        Something in it, or in a file that it names, cannot be used.
+        Something in the fit file, or in a file that it names, cannot be used.
     """
     path = Path(path)
     try:

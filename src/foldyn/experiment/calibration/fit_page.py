@@ -54,7 +54,7 @@ def write_fit(
     folder : path
     title : str
     note : str
-        Written on every figure.
+        Text written on every figure.
     call : Call, optional
         The command or call, for the page.
     figures : {"png", "svg", "pdf"}, optional
@@ -105,7 +105,7 @@ def _runs(fit: Fit) -> list[_Run]:
 
 
 def _stages(fit: Fit, runs: Sequence[_Run], title: str) -> Iterator[Stage]:
-    """Stages of the fitted model: its paths in step, and its motions in step."""
+    """Stages of the fitted model: one with all paths in step, one with all motions in step."""
     for kind in dict.fromkeys(run.case_file.analysis.kind for run in runs):
         own = {run.name: run for run in runs if run.case_file.analysis.kind == kind}
         nodes = _nodes(fit, own.values())
@@ -115,7 +115,7 @@ def _stages(fit: Fit, runs: Sequence[_Run], title: str) -> Iterator[Stage]:
 
 
 def _nodes(fit: Fit, runs: Iterable[_Run]) -> list[int]:
-    """Measured nodes of the first run with any; otherwise the case file's output nodes."""
+    """Measured nodes of the first run that has any; otherwise the case file's output nodes."""
     for run in runs:
         for one in (fit.problem.measurements[i] for i in run.members):
             if isinstance(one, AtNodes):

@@ -33,7 +33,7 @@ from foldyn.values import listed, show
 ASIDE = ("name", "label", "sigma", "held_out", "case", "force")
 # Tables of a case file that define its structure.
 STRUCTURAL = "pattern", "sheet", "model", "supports"
-VIBRATIONS = ("modes", "frf")  # analyses whose results are examined before a search
+VIBRATIONS = ("modes", "frf")  # kinds of analysis whose results are checked before a search
 MESH_ORDER = 2  # order of convergence of a shell's elements
 Predicted = dict[int, NDArray[np.float64]]  # predictions by the number of the measurement
 
@@ -47,7 +47,7 @@ class Problem:
     path : Path
         The case file.
     document : dict
-        Its content.
+        Content of the case file.
     space : Space
     measurements : tuple of Measurement
     runs : tuple of PredictedRun
@@ -62,7 +62,7 @@ class Problem:
     def predict(
         self, values: Sequence[float] | NDArray, runs: Sequence[int] | None = None
     ) -> list[NDArray[np.float64]]:
-        """Predictions for each measurement; nan for runs that are left out.
+        """Predictions for each measurement; nan for measurements whose run is left out.
 
         Raises
         ------
@@ -84,8 +84,8 @@ class Problem:
 
         second : whether derivatives have second-order accuracy in the parameter steps.
 
-        Derivatives are nan for runs without neighboring solutions, and 0 for measurements not
-        fitted.
+        Derivatives are nan for runs whose neighbors cannot be computed along with them, and 0 for
+        measurements that are not fitted.
         """
         predicted: dict[int, NDArray[np.float64]] = {}
         slopes: dict[int, NDArray[np.float64]] = {}
@@ -123,12 +123,12 @@ class Problem:
     def _beside(
         self, run: PredictedRun, values: NDArray, second: bool, fitted: Sequence[int]
     ) -> tuple[Predicted, list[tuple[Beside, Predicted]]]:
-        """Predictions of a run at given values, and of `fitted` ones at points for differences.
+        """Predictions of a run at given values, and of `fitted` measurements at nearby points.
 
         Raises
         ------
         FoldynError
-            The differences need whole runs.
+            Differences can only be computed from whole runs.
         """
         if not fitted:
             return self._computed(run, values), []
@@ -186,7 +186,7 @@ class Problem:
         values: Sequence[float] | NDArray,
         members: Sequence[Measurement] | None = None,
     ) -> Any:
-        """Path or motion at given values, for its own measurements or others."""
+        """Result of a run at given values, for the measurements of the run or for other ones."""
         case_file = self.case_file(run, values)
         return predicted_run.result_of(run, case_file, members or run.those_of(self.measurements))
 
@@ -214,9 +214,9 @@ class Problem:
         return digest.hexdigest()
 
     def examine(self, values: Sequence[float] | NDArray) -> None:
-        """Refuse values at which the measured modes cannot be identified in the model.
+        """Refuse parameter values at which the measured modes cannot be identified in the model.
 
-        Warnings of the analysis are shown here, unlike those from motions or paths.
+        Warnings of the analysis are shown here; warnings of motions or paths are not.
         """
         for run in self.runs:
             if run.kind in VIBRATIONS:
@@ -264,7 +264,7 @@ class Problem:
 
 
 class Like(NamedTuple):
-    """A case file, and the parameter values that it was made with."""
+    """A case file, and the parameter values with which it was made."""
 
     values: NDArray[np.float64]
     case_file: CaseFile
@@ -275,8 +275,8 @@ class Finer(NamedTuple):
 
     what : "time step" or "mesh".
     remedy : the corresponding setting in a case file.
-    order : order of convergence.
-    proof : a problem `times` times finer, which checks the extrapolation from the other two.
+    order : order of convergence of the discretization.
+    proof : a problem that is `times` times finer, to check the extrapolation from the other two.
     """
 
     what: str

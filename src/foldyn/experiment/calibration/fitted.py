@@ -26,7 +26,7 @@ from foldyn.writing import plain, write_json, write_text
 
 # Singular value, relative to the largest, below which a direction is not determined at all.
 WEAK = 1e-5
-# Component of a parameter along such a direction above which it counts as not determined.
+# A parameter with a larger component along such a direction counts as not determined.
 PART = 0.1
 
 
@@ -43,13 +43,14 @@ class Estimate:
     lower, upper : float
         Confidence interval, widened by the discretization.
     determined : bool
-        Whether the data determine it.
+        Whether the data determine the parameter.
     at_bound : bool
-        Whether it ended at one of its bounds, which then determines its value.
+        Whether the parameter ended at one of its bounds, which then determines the value.
     discretization : float
-        Shift of the value in the limit of small time steps and, for a shell, elements, by
-        Richardson's extrapolation of the misfit at the optimum with these halved. The interval is
-        extended by it on that side. nan if it could not be computed.
+        Shift of the value in the limit of small time steps and, for a shell, of small elements. It
+        follows by Richardson's extrapolation from the misfit at the optimum with half the step and
+        half the element size. The interval is extended by this shift on that side. nan if the shift
+        could not be computed.
     """
 
     key: str
@@ -63,7 +64,7 @@ class Estimate:
 
     @property
     def note(self) -> str:
-        """Remark on its numbers, if any."""
+        """Remark on the numbers of this estimate; "" if there is none."""
         if self.at_bound:
             return "at its bound: the data pull it further"
         return "" if self.determined else "the data do not determine it"
@@ -86,7 +87,7 @@ class Uncertainty:
         Singular values of the weighted Jacobian with respect to scaled parameters, decreasing; 0
         for parameters at a bound.
     directions : ndarray, shape (p, p)
-        Row k: the change of scaled parameters that belongs to singular value k.
+        Row k is the change of scaled parameters that belongs to singular value k.
     determined : ndarray of bool, shape (p,)
     freedom : int
         Number of values minus free parameters.
@@ -121,12 +122,13 @@ class Uncertainty:
         """Linearized uncertainty of a fit at its optimum.
 
         With the singular values s_k and directions v_k of the Jacobian J, cov = misfit^2 sum v_k
-        v_k^T / s_k^2, and the half width of an interval is the standard error times the quantile of
-        Student's t of the degrees of freedom.
+        v_k^T / s_k^2. The half width of an interval is the standard error times a quantile of
+        Student's t distribution with the given degrees of freedom.
 
-        The data do not determine a direction whose singular value is below `WEAK` of the largest,
-        and barely determine one whose standard error exceeds the parameter scales. Both are left
-        out of the covariance, and parameters with a part in them count as not determined.
+        The data do not determine a direction whose singular value is below `WEAK` times the
+        largest, and barely determine a direction whose standard error exceeds the parameter scales.
+        Both kinds of directions are left out of the covariance, and parameters with a component
+        along them count as not determined.
 
         Parameters
         ----------
@@ -190,24 +192,24 @@ class Uncertainty:
         return tuple(Estimate(*row) for row in rows)
 
 
-RARE = 0.01  # probability of a misfit by noise alone, below which there must be another cause
+RARE = 0.01  # a misfit with a lower probability cannot be explained by noise alone
 
 
 @brief
 @dataclass(frozen=True)
 class Descent:
-    """One search.
+    """One search of a fit.
 
     Attributes
     ----------
     guess, values : tuple of float
-        Parameters at its beginning and end.
+        Parameters at the beginning and at the end of the search.
     cost : float
-        Half the sum of squares of the weighted residuals at its end; inf if it failed.
+        Half the sum of squares of the weighted residuals at the end; inf if the search failed.
     evaluations : int
         Number of attempted steps.
     message : str
-        Why it ended.
+        Why the search ended.
     converged : bool
     """
 
@@ -233,7 +235,7 @@ class Score:
         Root mean square of the misfit, in `unit`.
     unit : str
     relative : float
-        `rms` over the root mean square of the measured values about their mean.
+        `rms` divided by the root mean square deviation of the measured values from their mean.
     sigmas : float
         Root mean square of the misfit in standard errors of the data; nan without `sigma`.
     """
@@ -268,11 +270,11 @@ class Fit:
         Number of fitted values minus free parameters, minus scales, shifts and trends of the data.
     misfit : float
         Root mean square of the weighted residuals per degree of freedom, the root of the reduced
-        chi-square: about 1 if every `sigma` is given and both these and the model are right.
+        chi-square: about 1 if every `sigma` is given, and both all `sigma` and the model are right.
     scores : tuple of Score
-        One per measurement.
+        One score for each measurement.
     descents : tuple of Descent
-        One per search, in order.
+        One descent for each search, in order.
     problem : Problem
     predicted : tuple of ndarray
         The model's prediction of each measurement.
@@ -319,12 +321,12 @@ class Fit:
 
     @property
     def weighed(self) -> bool:
-        """Whether the misfit is in standard errors, because all data have one."""
+        """Whether the misfit is in standard errors, which requires that all data have them."""
         return all(one.sigma is not None for one in self.problem.measurements if not one.held_out)
 
     @property
     def unlikely(self) -> str:
-        """Remark on a misfit that noise in the data can hardly explain; "" for others."""
+        """Remark on a misfit that noise in the data can hardly explain; "" otherwise."""
         if not self.weighed or not np.isfinite(self.misfit):
             return ""
         square = self.freedom * self.misfit**2
@@ -360,7 +362,7 @@ class Fit:
         write_text(text + tomli_w.dumps(files_moved(self.document(), moved)), path)
 
     def summary(self) -> dict[str, Any]:
-        """All numbers except measured and predicted values, as JSON types (nan is null)."""
+        """All numbers except measured and predicted values, in types of JSON (nan becomes null)."""
         return {
             "foldyn_version": foldyn.__version__,
             "case": self.problem.path.name,

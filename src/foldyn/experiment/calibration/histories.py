@@ -21,7 +21,7 @@ from foldyn.signals import sampling_interval, spectrum
 from foldyn.values import choice, number, numbers, show
 
 DETRENDS = (None, "constant", "linear")
-REFINED = 8  # Newton steps that refine the time shift: they converge quadratically
+REFINED = 8  # number of Newton steps that refine the time shift; they converge quadratically
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -38,14 +38,14 @@ class TimeHistory(NodeValues):
     delay : float
         Time of the model minus that of the measurement (s).
     align : float
-        Largest further shift in time (s) of the model, in addition to `delay`, to minimize the
+        Largest time (s) by which the model may be shifted, in addition to `delay`, to minimize the
         misfit: the instant of a release is rarely known to a fraction of a frame. 0 by default.
     detrend : {None, "constant", "linear"}
-        Trend subtracted from the misfit: none, its mean, or the best-fit line. Use the mean if the
-        zero of the measured displacements is arbitrary.
+        Trend subtracted from the misfit: none, the mean of the misfit, or its best-fit line. Use
+        "constant" if the zero of the measured displacements is arbitrary.
     sight : Sight, optional
-        Camera that measured the displacements: the model is then compared as this camera would see
-        it; `Sight.of` takes it from tracks.
+        Camera that measured the displacements; the model is then compared as this camera would see
+        it. `Sight.of` takes a camera from tracks.
     """
 
     time: Any = ()
@@ -77,7 +77,7 @@ class TimeHistory(NodeValues):
             self._refuse_constant(node)
 
     def _refuse_constant(self, node: int) -> None:
-        """Refuse a history without motion."""
+        """Refuse a history of a node that did not move."""
         seen = self.values[:, node][np.isfinite(self.values[:, node])]
         named = np.ravel(self.nodes)
         one = f"node {named[node]}" if len(named) == self.values.shape[1] else f"column {node}"
@@ -128,7 +128,7 @@ class TimeHistory(NodeValues):
         step = 0.25 * float(np.diff(self.time).min())
         tried = np.linspace(-self.align, self.align, 2 * math.ceil(self.align / step) + 1)
         by = float(tried[np.argmin([float(r @ r) for r in map(misfit, tried)])])
-        for _ in range(REFINED):  # Gauss-Newton steps from a close start
+        for _ in range(REFINED):  # Gauss-Newton steps from a start close to the solution
             slope = self._reduced(speed(there + by))
             by = float(np.clip(by - slope @ misfit(by) / (slope @ slope), *tried[[0, -1]]))
         return by
@@ -169,9 +169,9 @@ class Spectrum(NodeValues):
         record, so that resolution and leakage agree.
     axis : {"x", "y", "z"}
     detrend : {None, "constant", "linear"}
-        Trend first subtracted from the model's motion, as for the record.
+        Trend that is first subtracted from the model's motion, as it was from the record.
     taper : str, optional
-        Window function of both, as in `foldyn.signals.spectrum`.
+        Window function of record and model, as in `foldyn.signals.spectrum`.
     sight : Sight, optional
         As in `TimeHistory`.
     """
@@ -264,7 +264,7 @@ def _spline(
 
 
 def _within(name: str, times: NDArray[np.float64], arguments: Mapping[str, Any]) -> None:
-    """Refuse times outside the motion of a case."""
+    """Refuse times that lie outside the motion of a case."""
     first = float(arguments.get("start", 0.0))
     last = first + arguments["duration"]
     slack = 1e-9 * (last - first)

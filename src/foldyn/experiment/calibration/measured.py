@@ -16,10 +16,10 @@ from foldyn.errors import InputError
 from foldyn.experiment.calibration.measurement import AtNodes, NodeValues, check_axes, column
 from foldyn.values import choice
 
-IMPOSED = "imposed"  # selects all nodes that supports of the case move along the axis
+IMPOSED = "imposed"  # as `nodes`: all nodes that supports of the case move along the axis
 QUANTITIES = ("displacement", "position")
-MOST = 8  # most nodes, and shapes, in pages and figures
-POINTS = 25  # points of the curve through measured forces
+MOST = 8  # largest number of nodes, and of shapes, in pages and figures
+POINTS = 25  # number of points of the model's curve beside measured forces
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -29,10 +29,10 @@ class ForceDisplacement(AtNodes):
     Parameters
     ----------
     nodes : sequence of int, or str
-        As in every measurement; "imposed", the default, means all nodes that supports move along
-        the axis.
+        Nodes of the structure, as in every measurement; "imposed", the default, means all nodes
+        that supports move along the axis.
     displacement : array_like, shape (n,)
-        Mean displacement of the nodes along the axis (m); with yielding creases their order
+        Mean displacements of the nodes along the axis (m); with yielding creases their order
         matters.
     force : array_like, shape (n,)
         Total force on the nodes along the axis (N), positive along the axis.
@@ -85,7 +85,7 @@ class ForceDisplacement(AtNodes):
         return self.displacement / self._full(case)
 
     def at(self, displacement: NDArray[np.float64]) -> ForceDisplacement:
-        """The same test at other displacements, without known forces."""
+        """The same test at other displacements, where forces are unknown."""
         return replace(self, displacement=displacement, force=np.zeros(len(displacement)))
 
     def _full(self, case: Case) -> float:
@@ -111,7 +111,7 @@ class Shapes(NodeValues):
     values : array_like, shape (s, m, a)
         Values of each node along each axis (m); NaN if not seen.
     axes : str
-        The axes measured, "xz" for a picture from the side.
+        The measured axes, such as "xz" for a picture from the side.
     quantity : {"displacement", "position"}
     """
 
@@ -159,7 +159,7 @@ class Shapes(NodeValues):
 
 
 def _steps(result: xr.Dataset, factors: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Steps of a path at requested load factors: in order, or the nearest ones."""
+    """Steps of a path at requested load factors: in the same order, or else the nearest steps."""
     place, found = np.cumsum(np.append(0, np.diff(factors) != 0.0)), result["load_factor"].values
     if len(found) > place[-1] and np.array_equal(found[place], factors):
         return place  # works for paths that pass a load factor several times
@@ -175,7 +175,7 @@ def dense_curve(one: ForceDisplacement) -> ForceDisplacement:
 def picture_plane(one: Shapes, case: Case) -> tuple[int, int]:
     """Indices in `axes` of the horizontal and vertical directions of pictures.
 
-    They are the axes along which the nodes extend farthest.
+    These are the axes along which the nodes extend farthest.
     """
     rest = case.structure.nodes[one.where(case)]
     spans = [np.ptp(rest[:, AXES.index(axis)]) for axis in one.axes]

@@ -63,10 +63,10 @@ def shapes(
     Parameters
     ----------
     file : Path
-        CSV with the columns load_factor, node, and the measured ones of x, y, z, empty where a node
-        was lost; or tracks of photographs (``*.nc`` or ``*.csv``).
+        CSV with the columns load_factor, node, and those of x, y, z that were measured, empty where
+        a node was lost; or tracks of photographs (``*.nc`` or ``*.csv``).
     nodes : sequence of int, optional
-        Nodes to take; all in the file by default.
+        Nodes to take; by default all in the file.
     load_factor : sequence of float, optional
         Load factor of each photograph in tracks.
     **known
@@ -135,13 +135,13 @@ def spectrum(
 def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
     """Recognize a measurement in a file from its columns.
 
-    Columns displacement and force: forces on all nodes that supports move along the axis. A column
-    load_factor: shapes. A first column of times and others such as "node 8 x": histories of the
-    nodes along the axis. Tracks of a film: histories of all nodes that were seen; one that was seen
-    only once shows no motion and is left out. A column mode: mode shapes if there is also a column
-    node, else natural frequencies. A column frequency and others such as "node 8 x real": frequency
-    responses of the nodes along the axis. Results of Foldyn: natural frequencies, or frequency
-    responses.
+    Columns displacement and force mean forces on all nodes that supports move along the axis. A
+    column load_factor means shapes. A first column of times, with columns such as "node 8 x", means
+    histories of these nodes along the axis. Tracks of a film are histories of all nodes that were
+    seen; a node that was seen only once shows no motion and is left out. A column mode means mode
+    shapes if there is also a column node, else natural frequencies. A column frequency, with
+    columns such as "node 8 x real", means frequency responses of these nodes along the axis.
+    Results of Foldyn are natural frequencies or frequency responses.
     """
     choice(f"{file}: axis", axis, AXES)
     modal = modal_files.recognized(file, axis, **known)
@@ -181,7 +181,7 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
 
 
 def _opened(file: Path) -> tuple[xr.Dataset | None, list[str]]:
-    """Tracks and their dimensions, or None and the column names of a CSV file."""
+    """Tracks and the names of their dimensions, or None and the column names of a CSV file."""
     if file.suffix.lower() == ".nc":
         tracks = load_tracks(file)
         return tracks, [str(name) for name in tracks.sizes]

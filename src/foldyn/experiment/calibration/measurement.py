@@ -27,16 +27,16 @@ class Measurement(ABC):
     Parameters
     ----------
     name : str
-        Its name in messages and figures; the kind by default.
+        Name of the measurement in messages and figures; by default its kind.
     label : str
         Label of the data in figures: "measured", or "synthetic" if a model made them.
     sigma : float, optional
         Standard error of one value, in the unit of the values. A fit to several measurements needs
-        it for each, as weights. Some kinds take a list with one for each value.
+        it for each of them as a weight. Some kinds take a list with an error for each value.
     held_out : bool
-        Whether to compare the data only with the fit to the others, without fitting them.
+        Whether these data are not fitted, but only compared with the fit to the other data.
     case : path, optional
-        Case file of this measurement, if it differs from the fit's.
+        Case file of this measurement, if it differs from the case file of the fit.
     changes : mapping of str to object
         Keys of the case file that have other values in this measurement, such as
         ``{"supports[3].displacement": 0.04}``.
@@ -51,7 +51,7 @@ class Measurement(ABC):
     kind: ClassVar[str] = ""
     analysis: ClassVar[str] = ""
     each: ClassVar[bool] = False  # whether sigma may be a list
-    unit: ClassVar[str] = "m"  # of the values; empty if none
+    unit: ClassVar[str] = "m"  # unit of the values; empty if they have none
     adapts: ClassVar[bool] = False  # whether predictions depend on the measured values
     # degrees of freedom that predictions take from the data: scales, shifts and trends
     absorbed: ClassVar[int] = 0
@@ -109,7 +109,7 @@ class AtNodes(Measurement):
     """
 
     nodes: int | str | Sequence[int] = ()
-    word: ClassVar[str] = ""  # for `nodes`, which only this kind accepts
+    word: ClassVar[str] = ""  # text that `nodes` may be in this kind only
 
     def __post_init__(self) -> None:
         """Check the nodes."""
@@ -154,7 +154,7 @@ def column(name: str, values: Any, length: int | None = None) -> NDArray[np.floa
 
 
 def plain_array(name: str, values: Any) -> NDArray:
-    """Numeric array, with NaN allowed."""
+    """Numeric array, which may contain NaN."""
     try:
         return np.array(values)
     except ValueError:
@@ -162,7 +162,7 @@ def plain_array(name: str, values: Any) -> NDArray:
 
 
 def spread(observed: NDArray) -> float:
-    """Spread of measured values, which weights them if their error is unknown."""
+    """Spread of measured values: their weight if the standard error is unknown."""
     return float(np.std(observed)) or float(np.abs(observed).max()) or 1.0
 
 

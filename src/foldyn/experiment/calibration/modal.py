@@ -26,16 +26,16 @@ from foldyn.linear.frf import METHODS
 from foldyn.results.quantities import RESPONSES
 from foldyn.values import choice, numbers, show
 
-LEAST = 0.5  # least MAC of a partner
-CLOSE = 0.1  # least difference of the MAC with two modes of the model for a unique partner
-FEWEST = 2  # least number of components of a shape: a single one resembles any other
+LEAST = 0.5  # smallest MAC between a measured mode and its partner in the model
+CLOSE = 0.1  # a partner is unique if its MAC exceeds that of every other mode by this
+FEWEST = 2  # smallest number of components of a shape: a single one fits any shape
 
 
 class Pairing(NamedTuple):
     """Pairing of measured modes with modes of the model.
 
-    place : index (k,) of each partner among the model's modes with stiffness.
-    mac : (k, K), between measured modes and all of these.
+    place : index (k,) of each measured mode's partner among the model's modes with stiffness.
+    mac : (k, K), between measured modes and all of the model's modes with stiffness.
     """
 
     place: NDArray[np.int64]
@@ -46,21 +46,21 @@ class Pairing(NamedTuple):
 class ModeShapes(NodeValues):
     """Mode shapes at nodes; only their form matters, not their sign or size.
 
-    Each measured shape is compared with the mode of the model, among those that its case computes,
-    with the highest MAC, scaled for the best fit. The sum of squared differences is then 1 - MAC
-    for a shape of length 1.
+    Each measured shape is compared with the mode of the model that has the highest MAC, among the
+    modes that its case computes, scaled for the best fit. For a shape of length 1 the sum of
+    squared differences is then 1 - MAC.
 
     Parameters
     ----------
     values : array_like, shape (k, m, a)
         Component of each mode at each node along each axis, in any unit; NaN where not measured.
-        They are stored divided by the largest of each mode.
+        Values are stored divided by the largest component of each mode.
     axes : str
-        The axes measured, "z" for a sensor that looks along z.
+        The measured axes, such as "z" for a sensor that looks along z.
     mode : sequence of int, optional
         Numbers of the modes, for messages and figures; 1, 2, ... by default.
     sigma : float, optional
-        Standard error of a component, as a fraction of the largest one of its mode.
+        Standard error of a component, relative to the largest component of its mode.
     """
 
     axes: str = "xyz"
@@ -135,7 +135,7 @@ class ModeShapes(NodeValues):
         return Pairing(pair_modes(alike).second, alike)
 
     def examine(self, result: xr.Dataset, case: Case) -> None:
-        """Refuse a result unless each measured mode resembles exactly one mode of the model."""
+        """Refuse a result unless every measured mode resembles exactly one mode of the model."""
         place, alike = self.pairing(result, case)
         kept = resisted(result)
         names, hertz = result["mode"].values[kept], result["frequency"].values[kept]
@@ -159,7 +159,7 @@ class ModeShapes(NodeValues):
                 )
 
     def shapes(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
-        """Shapes of the partners, scaled to fit best where measured, shape (k, m, a)."""
+        """Shapes of the partners, scaled to fit best at measured components, shape (k, m, a)."""
         shapes = self._of_model(result, case)[self.pairing(result, case).place]
         seen = np.isfinite(self.values)
         own, other = np.where(seen, shapes, 0.0), np.where(seen, self.values, 0.0)
@@ -176,7 +176,7 @@ class ModeShapes(NodeValues):
         return resisted(result)[self.pairing(result, case).place]
 
     def _of_model(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
-        """Shapes (K, m, a) of the model's modes with stiffness, where measured."""
+        """Shapes (K, m, a) of the model's modes with stiffness at the measured components."""
         shapes = result["shape"].transpose("mode", "node", "axis").values[resisted(result)]
         return shapes[:, self.where(case)][..., [AXES.index(axis) for axis in self.axes]]
 
@@ -189,10 +189,11 @@ class ModalParameters(Measurement):
     ----------
     mode : sequence of int, optional
         Number of each mode in the model, counted from 1 by frequency without modes of zero
-        stiffness; by default the lowest ones. With `shapes`, numbers for messages and figures.
+        stiffness; by default the lowest modes. With `shapes`, the numbers only serve messages and
+        figures.
     shapes : ModeShapes, optional
-        The shapes of the same modes, in the same order: each is then paired with the model's mode
-        of the most similar shape, whatever its number. They are not fitted.
+        The shapes of the same modes, in the same order: each mode is then paired with the model's
+        mode of the most similar shape, whatever its number. The shapes are not fitted.
     sigma : float or array_like, shape (k,), optional
         Standard error of each number.
     """
@@ -232,7 +233,7 @@ class ModalParameters(Measurement):
 
     @abstractmethod
     def _check_values(self, values: NDArray[np.float64]) -> None:
-        """Refuse values that are impossible for modes."""
+        """Refuse values that no mode can have."""
 
     @property
     def adapts(self) -> bool:
@@ -361,7 +362,7 @@ def _numbered(name: str, given: Any, count: int) -> NDArray[np.int64]:
     return modes
 
 
-MOTION = "transmissibility"  # the quantity of a moving base; the others are per force
+MOTION = "transmissibility"  # the quantity for a moving base; other quantities are per force
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -379,8 +380,8 @@ class FrequencyResponse(NodeValues):
         or its magnitude. NaN where not measured.
     axis : {"x", "y", "z"}
     quantity : {"receptance", "mobility", "accelerance", "transmissibility"}
-        Displacement (m/N), velocity (m/(N s)) or acceleration (m/(N s2)) per newton of the driving
-        forces, all their magnitudes together; or motion per motion of the base.
+        Displacement (m/N), velocity (m/(N s)) or acceleration (m/(N s2)), divided by the sum of the
+        magnitudes of all driving forces; or motion divided by the motion of the base.
     magnitude : bool
         Whether the values are magnitudes.
     sigma : float or array_like, shape (f, m), optional
@@ -494,6 +495,6 @@ class FrequencyResponse(NodeValues):
         return self._flat(np.abs(curves) if self.magnitude else curves)
 
     def _flat(self, curves: NDArray) -> NDArray[np.float64]:
-        """Measured entries, node by node: all real parts, then all imaginary parts."""
+        """Measured values, node by node: first all real parts, then all imaginary parts."""
         seen: NDArray[Any] = curves.T[np.isfinite(self.values).T]
         return np.concatenate([np.real(seen), np.imag(seen)]) if np.iscomplexobj(seen) else seen

@@ -31,7 +31,7 @@ from foldyn.results.netcdf import read
 from foldyn.results.quantities import RESPONSES
 from foldyn.values import choice, indices, show
 
-# Unit that each kind of modal value is converted to.
+# Unit to which each kind of modal value is converted.
 UNIT: Mapping[str, str] = {"frequency": "Hz", "damping_ratio": "-"}
 # Units of each quantity of a response in a CSV file.
 UNITS_OF: Mapping[str, Sequence[str]] = {
@@ -54,7 +54,7 @@ def frequencies(
     modes : sequence of int, optional
         Numbers of the modes to take; all in the file by default.
     shapes : Path, optional
-        File with the shapes of these modes, which pair them with the model's.
+        File with the shapes of these modes, by which they are paired with modes of the model.
     **known
         Other arguments of `NaturalFrequencies`.
     """
@@ -64,7 +64,7 @@ def frequencies(
 def damping_ratios(
     file: Path, modes: Any = None, shapes: Path | None = None, **known: Any
 ) -> DampingRatios:
-    """Damping ratios like `frequencies`: columns mode, damping_ratio, damping_ratio_sigma."""
+    """Damping ratios, as in `frequencies`: columns mode, damping_ratio, damping_ratio_sigma."""
     return _of_modes(DampingRatios, file, known, _numbers(file, "damping_ratio", modes, shapes))
 
 
@@ -75,14 +75,14 @@ def _of_modes(kind: Any, file: Path, known: dict[str, Any], given: dict[str, Any
 
 
 def _with_sigma(file: Path, known: dict[str, Any], errors: NDArray) -> dict[str, Any]:
-    """Add the standard errors of a file to the arguments; refuse a second source of them."""
+    """Add the standard errors of a file to the arguments; refuse them if `sigma` is also given."""
     if known.get("sigma") is not None:
         raise InputError(f"{file}: sigma: leave it out, the file has a column of it")
     return {**known, "sigma": errors}
 
 
 def _numbers(file: Path, name: str, modes: Any, shapes: Path | None) -> dict[str, Any]:
-    """Arguments from a file of numbers per mode."""
+    """Arguments read from a file with one number for each mode."""
     if _is_result(file):
         found = _result(file, "modes")
         values = found[name].values[resisted(found)]
@@ -108,8 +108,8 @@ def mode_shapes(
     Parameters
     ----------
     file : Path
-        CSV with the columns mode, node, and the measured ones of x, y, z, empty where not measured;
-        or a result of `fd.modes`.
+        CSV with the columns mode, node, and those of x, y, z that were measured, empty where a
+        value is missing; or a result of `fd.modes`.
     nodes : sequence of int, optional
         Nodes to take; all in the file by default.
     axes : str, optional
@@ -150,13 +150,13 @@ def frf(
     file : Path
         CSV with the columns frequency and, for each node, "node 8 x real" and "node 8 x imag" or
         "node 8 x magnitude", empty where nothing was measured; "node 8 x sigma" holds standard
-        errors. The unit determines the quantity. Or a result.
+        errors. The unit determines the quantity. Or a result of `fd.frf`.
     nodes : sequence of int
     axis : {"x", "y", "z"}
     quantity : str, optional
-        Quantity to convert a result to.
+        Quantity to which a result is converted.
     magnitude : bool, optional
-        Whether to compare magnitudes if the file has complex values.
+        Whether to compare only magnitudes if the file has complex values.
     band : (float, float), optional
         First and last frequency (Hz) to take.
     **known
@@ -200,7 +200,7 @@ def frf(
 
 
 def recognized(file: Path, axis: str, **known: Any) -> Measurement | None:
-    """Modes or frequency responses in a file; None if there are none."""
+    """Measurement of modes or frequency responses in a file; None if the file has neither."""
     if _is_result(file):
         kind = read(file, "cannot be read as NetCDF").attrs.get("foldyn_result")
         if kind == "modes":
@@ -294,7 +294,7 @@ def _is_result(file: Path) -> bool:
 
 
 def _result(file: Path, kind: str) -> xr.Dataset:
-    """A result of one kind of analysis."""
+    """Read a result that must be of one kind of analysis."""
     found = load(file)
     held = found.attrs["foldyn_result"]
     if held != kind:

@@ -15,15 +15,15 @@ from foldyn.arguments import brief
 from foldyn.errors import InputError
 from foldyn.values import number, show, suggest, whole
 
-NEAR = 1e-4  # change of a scaled parameter for differences of neighboring solutions
+NEAR = 1e-4  # change of a scaled parameter between neighboring solutions, for differences
 FIRST = ((0, -1.0), (1, 1.0)), ((0, 1.0), (-1, -1.0))
-# Steps and weights of difference quotients by order; later ones apply if a bound is near.
+# Steps and weights of difference quotients by order; later rows apply if a bound is near.
 SECOND = (
     ((1, 0.5), (-1, -0.5)),
     ((0, -1.5), (1, 2.0), (2, -0.5)),
     ((0, 1.5), (-1, -2.0), (-2, 0.5)),
 )
-MOST_SEARCHES = 100_000  # a larger number is a typing error
+MOST_SEARCHES = 100_000  # a larger number must be a typing error
 
 
 @dataclass(frozen=True)
@@ -33,15 +33,15 @@ class Parameter:
     Parameters
     ----------
     key : str
-        Key in the case file: "sheet.length_scale_ratio", "damping.alpha",
-        "model.fold_law.theta1" (degrees, as there), "loads[0].force[2]".
+        Key in the case file, such as "sheet.length_scale_ratio", "damping.alpha",
+        "model.fold_law.theta1" (in degrees, as in the file) or "loads[0].force[2]".
     guess : float, optional
-        Value to begin from; by default the case file's.
+        Value from which the search begins; by default the value in the case file.
     lower, upper : float
         Bounds; none by default. Several searches need both.
     scale : float, optional
         A significant change of the value; by default the magnitude of the guess or, if that is 0,
-        the distance of the bounds.
+        the distance between the bounds.
     """
 
     key: str
@@ -91,7 +91,7 @@ class Space:
     Attributes
     ----------
     parameters : tuple of Parameter
-        With guess and scale filled in.
+        Parameters with guess and scale filled in.
     ties : tuple of Tie
     """
 
@@ -104,11 +104,11 @@ class Space:
         return tuple(p.key for p in self.parameters)
 
     def column(self, name: str) -> NDArray[np.float64]:
-        """One field, "guess", "lower", "upper" or "scale", of all parameters."""
+        """Values of one field ("guess", "lower", "upper" or "scale") of all parameters."""
         return np.array([getattr(p, name) for p in self.parameters], dtype=np.float64)
 
     def changes(self, values: Sequence[float] | NDArray) -> dict[str, float]:
-        """Values of all keys, parameters and ties, at given values of the parameters."""
+        """Values of all keys (parameters and ties) at given values of the parameters."""
         own = {key: float(value) for key, value in zip(self.keys, values, strict=True)}
         return own | {tie.key: tie.value(own) for tie in self.ties}
 
@@ -120,7 +120,7 @@ class Space:
         Raises
         ------
         InputError
-            The bounds leave no room.
+            The bounds leave no room for neighboring points.
         """
         found = []
         for k, one in enumerate(self.parameters):
@@ -138,10 +138,10 @@ class Space:
         return found
 
     def guesses(self, count: int, seed: int) -> NDArray[np.float64]:
-        """Values to begin from, shape (count, p): the given ones, then random ones.
+        """Values from which searches begin, shape (count, p): the given values, then random ones.
 
-        The random ones are a Latin hypercube within the bounds: each parameter's range is cut
-        into as many pieces as there are of them, and each piece is used once.
+        The random values are a Latin hypercube within the bounds: each parameter's range is cut
+        into as many pieces as there are random guesses, and each piece is used once.
         """
         whole("searches", count, least=1, most=MOST_SEARCHES)
         whole("seed", seed, least=0)
@@ -168,8 +168,8 @@ def space(
     Raises
     ------
     InputError
-        No parameter; a parameter given twice, without a guess or not a number; a tie to something
-        that is not a parameter.
+        There is no parameter, a parameter is given twice, has no guess or is not a number, or a tie
+        depends on something that is not a parameter.
     """
     if not parameters:
         raise InputError("parameters: none; name at least one key of the case file")

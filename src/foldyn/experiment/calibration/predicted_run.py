@@ -25,31 +25,31 @@ from foldyn.patterns import Pattern
 from foldyn.values import show
 
 STEADY = "generalized_alpha"  # integrator of a fit if the case file does not choose one
-# Relative change that ends the iterations for differences of motions: during a search, after it.
+# Iterations for differences of motions end at this relative change: during a search, after it.
 SHARES = 1e-4, 1e-6
-# Analyses whose neighbors are computed more accurately than the result, so that it is recomputed as
-# one.
+# Analyses whose neighboring results are computed more accurately than the result itself. The result
+# is then recomputed like a neighbor.
 REFINED = "statics", "modes"
-# Number of coordinates above which modes are as quick to compute as differences to neighbors.
+# With more coordinates, computing modes anew is as fast as computing differences to neighbors.
 MANY = 2000
 
 
 @dataclass(frozen=True, eq=False)
 class PredictedRun:
-    """One path or motion that predicts several measurements.
+    """One computation (path, motion, modes or frequency response) that predicts some measurements.
 
     Attributes
     ----------
     path : Path
-        Its case file.
+        Case file of the run.
     document : dict
-        Its content, with the changes of these measurements.
+        Content of the case file, with the changes of these measurements.
     members : tuple of int
         Numbers of the measurements.
     patterns : list of Pattern
-        Its pattern once generated, for all parameter values that do not change it.
+        The pattern, once it is generated, for all parameter values that do not change it.
     starts : list of State or None
-        The stored initial state, once read.
+        The stored initial state, once it is read.
     """
 
     path: Path
@@ -60,15 +60,15 @@ class PredictedRun:
 
     @property
     def kind(self) -> str:
-        """Kind of its analysis."""
+        """Kind of analysis of the run."""
         return self.document["analysis"]["kind"]
 
     def those_of(self, measurements: Sequence[Measurement]) -> list[Measurement]:
-        """Select its measurements from all."""
+        """Select the measurements of this run from all measurements."""
         return [measurements[i] for i in self.members]
 
     def start(self, case_file: CaseFile) -> State | None:
-        """Initial state of its case."""
+        """Initial state of the case of this run."""
         if "file" not in self.document.get("initial", ()):
             return case_file.initial()
         if not self.starts:
@@ -89,7 +89,7 @@ def computed(run: PredictedRun, case_file: CaseFile, members: Sequence[Measureme
 
 
 def seen(run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]) -> Any:
-    """The part of the result that measurements compare."""
+    """The part of the result with which measurements are compared."""
     computation = _computation(run, case_file, members)
     if run.kind != "dynamics":
         return computation.result()
@@ -105,7 +105,7 @@ def motion_of(run: PredictedRun, case_file: CaseFile) -> Motion:
 
 
 def _moved(motion: Motion) -> dict[str, Variable]:
-    """The part of a computed motion that measurements compare."""
+    """The part of a computed motion with which measurements are compared."""
     out, _ = motion.output.first(motion.stored)
     return {
         "time": Variable("time", out.time),
@@ -123,7 +123,7 @@ def _computation(
 def _changes(
     run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]
 ) -> dict[str, Any]:  # fmt: skip
-    """Arguments of the analysis that override the case file's."""
+    """Arguments of the analysis that override the case file."""
     case, given = case_file.case(), case_file.analysis.arguments
     if run.kind == "dynamics":
         return {**steady(case_file), "initial": run.start(case_file)}
@@ -143,14 +143,14 @@ def with_neighbors(
     run: PredictedRun, case_file: CaseFile, others: Sequence[CaseFile],
     members: Sequence[Measurement], second: bool,
 ) -> tuple[Any, list[Any]]:  # fmt: skip
-    """Compared results of a case, and of other cases close to it.
+    """Results to compare with measurements: of a case, and of other cases close to it.
 
     second : whether differences need second-order accuracy.
 
     Raises
     ------
     FoldynError
-        The others would need computations of their own.
+        The results of the other cases cannot be computed together with the first result.
     """
     if run.kind != "dynamics" and run.start(case_file) is not None:
         raise InputError("what starts from a state has no neighbors")
@@ -179,7 +179,7 @@ def with_neighbors(
 
 
 def _path(case: Case, members: Sequence[Measurement]) -> list[float]:
-    """Load factors at which a case is measured; with yielding creases, in the order of the test."""
+    """Load factors at which a case is measured; with yielding creases in the order of the test."""
     given = [one.factors(case) for one in members]
     if all(part.law.relaxes for part in case.remembering):
         factors = np.unique(np.concatenate(given))

@@ -1,4 +1,4 @@
-"""Shared readers of measurements: nodes and ranges of a fit file, and tables by node."""
+"""Shared readers of measurements: nodes and ranges of fit files, tables with a line per node."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def listed_nodes(file: Path, nodes: Any) -> list[int]:
 
 
 def limits(name: str, given: Any, what: str) -> tuple[float, float]:
-    """Two increasing numbers."""
+    """Check that a range is two increasing numbers, and return them."""
     pair = numbers(name, given) if isinstance(given, list | tuple) else np.zeros(0)
     if pair.shape != (2,) or not pair[0] < pair[1]:
         raise InputError(f"{name} = {show(given)}: give two {what}, as in [2, 30]")
@@ -47,12 +47,12 @@ def by_node(
     Parameters
     ----------
     file : Path
-        With the columns `key`, node, and the measured ones of x, y, z.
+        CSV file with the columns `key`, node, and those of x, y, z that were measured.
     key : str
     nodes : sequence of int or None
         Nodes to take; all in the file by default.
     unit : str, optional
-        Unit to convert the components to; by default the unit of the file's first one.
+        Unit to which components are converted; by default the unit of the first component column.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Picture of a moving structure: paper, light, rays over each pixel and exposure."""
+"""Picture of a moving structure: paper, light, and rays spread over each pixel and the exposure."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Look:
         Radius (m) of the markers: around each vertex every other panel is inked, so that lines
         cross at the vertex. 0 means no markers.
     grain : float
-        Standard deviation of the paper's reflectance, relative to it.
+        Standard deviation of the paper's reflectance, relative to the mean reflectance.
     grain_size : float
         Spacing of the grain's texels (m).
     light : tuple of float
@@ -61,7 +61,7 @@ class Look:
 
 @dataclass(frozen=True, eq=False)
 class Paper:
-    """Triangles of a structure with their print.
+    """Triangles of a structure with what is printed on them.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ def grain_tile(look: Look, rng: np.random.Generator) -> NDArray[np.float32]:
     """Reflectance of the paper on a square of texels that tiles seamlessly."""
     frequency = np.hypot(np.fft.fftfreq(_TILE)[:, np.newaxis], np.fft.rfftfreq(_TILE))
     frequency[0, 0] = np.inf
-    # fibers of all lengths, with more long ones, as in real paper
+    # fibers of all lengths, mostly long ones, as in real paper
     noise = np.fft.irfft2(np.fft.rfft2(rng.standard_normal((_TILE, _TILE))) / frequency**0.7)
     tile = look.paper * (1.0 + look.grain * noise / noise.std())
     return np.clip(tile, 0.0, 1.0).astype(np.float32)
@@ -132,7 +132,7 @@ def shading(
     light: NDArray[np.float64],
     ambient: float,
 ) -> NDArray[np.float64]:
-    """Light on each triangle, on either face: ambient, plus by the angle to the lamp."""
+    """Light on each triangle, on either face: ambient, plus light by the angle to the lamp."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=1)
@@ -149,14 +149,14 @@ class Sensor:
     exposure : float
         Time (s) during which a frame gathers light; 0 gives no blur of motion.
     softness : float
-        Standard deviation of the lens's own blur (pixels).
+        Standard deviation of the blur of the lens (pixels).
     read_noise : float
         Standard deviation of the noise in the dark, in gray values of 0 to 255.
     shot_noise : float
         Standard deviation of the noise at full brightness; it grows with the square root of
         brightness.
     samples : int
-        Rays per pixel, each with its own place and time.
+        Number of rays per pixel, each with its own place and time.
     """
 
     exposure: float = 0.0
@@ -184,7 +184,7 @@ class Sensor:
 
 
 def _halton(k: NDArray[np.int64], base: int) -> NDArray[np.float64]:
-    """Van der Corput sequence: digits of k reversed behind the point, centered on average."""
+    """Van der Corput sequence: the digits of k reversed behind the point, minus the mean."""
     value, scale, rest = np.zeros(len(k)), 1.0, k.copy()
     while rest.any():
         scale /= base
@@ -233,7 +233,7 @@ class Studio:
         -------
         picture : ndarray of uint8, shape (height, width)
         seen : ndarray of bool, shape (n,)
-            Nodes that no panel hides, in the middle of the exposure.
+            Nodes that no panel hides in the middle of the exposure.
         """
         cv2 = opencv()
         positions = np.broadcast_to(positions, (self.sensor.samples, *positions.shape[-2:]))
@@ -280,7 +280,7 @@ class Studio:
         return seen
 
     def _box(self, positions: NDArray[np.float64]) -> tuple[NDArray[np.int64], tuple[int, int]]:
-        """First pixel (u, v) of the part of the image around the structure, and its shape."""
+        """First pixel (u, v) and shape of the part of the image around the structure."""
         pixels = self.camera.project(positions).reshape(-1, 2)
         low = np.clip(np.floor(pixels.min(axis=0)) - _MARGIN, 0, np.array(self.camera.size) - 1)
         high = np.clip(np.ceil(pixels.max(axis=0)) + _MARGIN, low, np.array(self.camera.size) - 1)
@@ -299,6 +299,6 @@ def _unhidden(
     for node in np.flatnonzero(inside):
         u, v = at[node]
         around = depth[v - 1 : v + 2, u - 1 : u + 2]
-        # some of the nine pixels around it show a neighboring panel, not one in front
+        # some of the nine pixels around a node show one of its own panels, not one in front
         seen[node] = around.min() <= near[node] * 1.01
     return seen

@@ -1,4 +1,4 @@
-"""Rasterize triangles: one ray through each pixel, the nearest triangle, its paper and light."""
+"""Rasterize triangles: one ray per pixel finds the nearest triangle, with its paper and light."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from foldyn.jit.compiled import strict, strict_inlined
 
-_MARGIN = 3  # pixels around a triangle's box, as distortion curves its edges slightly
+_MARGIN = 3  # pixels around a triangle's box, because distortion bends its edges slightly
 
 
 @strict
@@ -29,7 +29,7 @@ def draw(
     depth: Any,
     bright: Any,
 ) -> None:
-    """Draw triangles over the content of `bright`, the nearest in front.
+    """Draw triangles over the content of `bright`, with the nearest in front.
 
     Parameters
     ----------
@@ -43,13 +43,13 @@ def draw(
     flat : ndarray, shape (m, 3, 2)
         Corners of each triangle in the plane of its paper (m).
     marked : ndarray of bool, shape (m, 3)
-        Corners around which the marker is painted,
+        Corners around which the marker is painted.
     dark : ndarray of bool, shape (m,)
-        and the triangles that it inks.
+        Triangles that the marker inks.
     shade : ndarray, shape (m,)
         Light on each triangle.
     grain : ndarray, shape (k, k)
-        Reflectance of the paper, repeated; k a power of two.
+        Reflectance of the paper, as a tile that is repeated; k is a power of two.
     look : ndarray, shape (3,)
         Radius of the markers (m), reflectance of their ink, texels per m.
     lens : ndarray, shape (9,)
@@ -75,7 +75,7 @@ def draw(
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if area == 0.0:
             continue
-        # functions linear over the image: barycentric shares, 1/z, and (s, q)/z of the paper
+        # linear functions of the pixel: barycentric coordinates, 1/z, and (s, q)/z of the paper
         share_a = _plane(bx * cy - by * cx, by - cy, cx - bx, area)
         share_b = _plane(cx * ay - cy * ax, cy - ay, ax - cx, area)
         share_c = (

@@ -1,4 +1,4 @@
-"""Synthetic films and photographs of a simulated motion, with the true motion."""
+"""Synthetic films and photographs of simulated motions, together with the true motion."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ class SyntheticFilm:
     ----------
     studio : Studio
     time : ndarray, shape (nt,)
-        Middle of the exposure of each frame (s), 0 for the first one.
+        Middle of the exposure of each frame (s); 0 for the first frame.
     motion : callable
         Positions of all nodes (m), shape (k, n, 3), at k times (s).
     rate : float
         Frames per second.
     dropped : tuple of int
-        Frames in which the camera repeats the previous one.
+        Numbers of frames in which the camera repeats the previous frame.
     seed : int
         Random seed of paper and noise; equal seeds give equal films.
     """
@@ -75,8 +75,8 @@ class SyntheticFilm:
         Returns
         -------
         xarray.Dataset
-            `position` (time, node, axis) in m, `position_px` (time, node, uv), and `seen` (node,
-            False if a panel hides it or it is outside the image) for rendered frames, `dropped`
+            `position` (time, node, axis) in m, `position_px` (time, node, uv), for rendered frames
+            `seen` (node; False if a panel hides it or it is outside the image), and `dropped`
             (time).
         """
         positions = self.motion(self.time)
@@ -123,12 +123,12 @@ def film_of(
     rate : float
         Frames per second.
     duration, start : float
-        Part of the motion (s) that is filmed; by default to its end. The film's time is 0 at
-        `start`.
+        Part of the motion (s) that is filmed; by default from `start` to the end of the motion. The
+        film's time is 0 at `start`.
     look, sensor : Look, Sensor
         Appearance of the specimen, and effects of lens and sensor.
     dropped : sequence of int
-        Frames that repeat the previous one.
+        Numbers of frames that repeat the previous frame.
     seed : int
 
     Returns
@@ -138,7 +138,7 @@ def film_of(
     Raises
     ------
     InputError
-        Not a motion, a time span outside it, or nodes behind the camera.
+        `motion` is no motion, the time span lies outside it, or nodes are behind the camera.
     """
     structure = case_of(motion).structure
     if "time" not in motion.dims or motion.sizes["time"] < 4:
@@ -171,14 +171,14 @@ def photos_of(
     sensor: Sensor | None = None,
     seed: int = 0,
 ) -> tuple[list[NDArray[np.uint8]], xr.Dataset]:
-    """Photographs of equilibria, each with its own noise, and the truth in the layout of a film's.
+    """Photographs of equilibria, each with its own noise, and the truth as `truth` of a film.
 
     Parameters
     ----------
     path : xarray.Dataset
         Result of `trace`.
     steps : sequence of int
-        Numbers of its states.
+        Numbers of the states of the path.
     camera, look, sensor, seed
         As in `film_of`; nothing moves during the exposure.
 
@@ -207,7 +207,7 @@ def write_film(film: SyntheticFilm, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        Another ending, or a file that cannot be written.
+        The path has another suffix, or the file cannot be written.
     ComputationError
         OpenCV's build lacks the codec.
     """

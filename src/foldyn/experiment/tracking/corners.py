@@ -1,11 +1,12 @@
-"""Corner detection: Harris's measure, then intersection of straight edges, to subpixel accuracy.
+"""Corner detection to subpixel accuracy: Harris's measure, then intersection of straight edges.
 
 Corners of folded paper are where creases and boundaries cross. Each of these edges is located by
-its own profiles, some pixels away from the corner, and the lines through them are intersected. The
-usual refinement by gradients alone (Foerstner and Guelch, Intercommission Conference on Fast
-Processing of Photogrammetric Data, 1987; OpenCV's cornerSubPix) is drawn into sharp panels by up to
-a pixel, because a blurred tip ends before the true one, and by more as the panel gets sharper: it
-would turn a change of shape into a motion.
+gray-value profiles across it, some pixels away from the corner, and the lines through the located
+edges are intersected. The usual refinement by gradients alone (Foerstner and Guelch,
+Intercommission Conference on Fast Processing of Photogrammetric Data, 1987; OpenCV's cornerSubPix)
+shifts corners of acute panels inward by up to a pixel, because a blurred tip ends before the true
+tip. The shift grows as the panel's angle gets smaller, so a change of shape would appear as a
+motion.
 """
 
 from __future__ import annotations
@@ -24,16 +25,16 @@ from foldyn.values import number
 
 _CANDIDATES = 5  # candidates of Harris's measure per requested corner
 _DIRECTIONS = 120  # samples on a circle around a point, to look for edges
-_APART = 4  # directions, at least, between two edges of a corner (12 degrees)
-_EDGES = 6  # most edges of a corner
-_FAINTEST = 4.0  # least contrast (gray values) between the sides of an edge
-_RELATIVE = 0.12  # least contrast, relative to the corner's strongest edge
-_PROFILES = 12  # least number of profiles across an edge
+_APART = 4  # smallest number of directions between two edges of a corner (12 degrees)
+_EDGES = 6  # largest number of edges of a corner
+_FAINTEST = 4.0  # smallest contrast (gray values) between the sides of an edge
+_RELATIVE = 0.12  # smallest contrast, relative to the corner's strongest edge
+_PROFILES = 12  # smallest number of profiles across an edge
 _STEP = 0.5  # pixels between samples across an edge
 _ROUNDS = 3
-_NARROWEST = 1.6  # pixels of room on each side of an edge
+_NARROWEST = 1.6  # smallest room on each side of an edge, in pixels
 _STRAIGHT = 0.35  # pixels, rms: largest deviation of an edge from a line
-_FLATTEST = 0.02  # least ratio of eigenvalues; lower ones mean nearly parallel edges
+_FLATTEST = 0.02  # smallest ratio of eigenvalues; lower ratios mean nearly parallel edges
 
 
 @dataclass(frozen=True)
@@ -43,11 +44,11 @@ class CornerSettings:
     Attributes
     ----------
     spacing : float or None
-        Least distance of two corners (pixels); None means 1.5 `reach`.
+        Smallest distance between two corners (pixels); None means 1.5 times `reach`.
     quality : float
-        Harris's measure of the weakest corner, relative to the strongest one.
+        Harris's measure of the weakest corner, relative to that of the strongest corner.
     most : int
-        Largest number of corners, the strongest first.
+        Largest number of corners; the strongest are kept.
     reach : float or None
         Length of the edges from which a corner is refined (pixels): about a quarter of the distance
         between corners. None means 0.012 of the picture's diagonal, from 7 to 24 pixels.
@@ -90,7 +91,7 @@ def find_corners(
     Raises
     ------
     InputError
-        There are none.
+        The picture has no corners.
 
     Notes
     -----
@@ -109,7 +110,7 @@ def find_corners(
     if candidates is None or not len(candidates):
         raise InputError(f"{place}: no corners found; take a sharp, well lit one, or another --roi")
     junctions = refine(image, candidates.reshape(-1, 2), reach=reach, moved=0.6 * reach)
-    # with more edges it is more likely a corner of the pattern than the end of a stain
+    # a point with more edges is more likely a corner of the pattern than the end of a stain
     order = np.lexsort([junctions.error, -np.minimum(junctions.edges, 4)])
     order = order[np.isfinite(junctions.position[order, 0])]
     points = junctions.position[order]
@@ -123,7 +124,7 @@ def find_corners(
 
 
 def _first_of_each(points: NDArray[np.float64], apart: float) -> NDArray[np.bool_]:
-    """Points without an earlier one within a distance."""
+    """Points that have no earlier point within a distance."""
     kept = np.zeros(len(points), dtype=bool)
     for k, point in enumerate(points):
         distance = np.hypot(*(points[kept] - point).T)
@@ -161,7 +162,7 @@ def refine(image: NDArray[np.uint8], points: ArrayLike, *, reach: float, moved: 
     points : array_like, shape (p, 2)
         Pixels (u, v), within about a quarter of `reach` of their corners; NaN stays NaN.
     reach : float
-        Length of the edges that is used (pixels): no other corner may lie closer.
+        Length of edges used for the refinement (pixels): no other corner may lie closer.
     moved : float
         Largest accepted distance of a corner from its point (pixels).
 
@@ -202,7 +203,7 @@ def _refine_all(image: Any, start: Any, reach: float, moved: float, found: Any) 
 def _inside(image: Any, u: float, v: float, margin: float) -> bool:
     height, width = image.shape
     inside = margin <= u <= width - 1 - margin and margin <= v <= height - 1 - margin
-    return inside  # False for NaN
+    return inside  # a comparison with NaN is False
 
 
 @strict
@@ -242,7 +243,7 @@ def _directions(image: Any, u: float, v: float, inner: float, reach: float, foun
         edges += 1
         for m in range(-_APART + 1, _APART):
             size[(k + m) % n] = 0.0
-        # a further decrease belongs to the same edge
+        # further decrease belongs to the same edge
         for side in (-1, 1):
             m = side * _APART
             while abs(m) < n // 2 and 0.0 < size[(k + m) % n] < abs(change[(k + m - side) % n]):
@@ -255,7 +256,7 @@ def _directions(image: Any, u: float, v: float, inner: float, reach: float, foun
 def _meet(
     image: Any, u: float, v: float, inner: float, reach: float, width: float
 ) -> tuple[float, float, float, int]:
-    """Shift to the intersection of edges around a point, its standard error, number of edges."""
+    """Shift to the intersection of edges around a point, standard error, and number of edges."""
     found = np.empty((_EDGES, 2))
     edges = _directions(image, u, v, inner, reach, found)
     lines = np.zeros((_EDGES, 4))  # normal, offset, standard error of the offset
@@ -287,7 +288,7 @@ def _intersection(lines: Any) -> tuple[float, float, float, int]:
         d = np.sum(weight * lines[:, 1] ** 2)
         half, turn = 0.5 * (a + d), np.hypot(0.5 * (a - d), b)
         count = int(np.sum(weight > 0.0))
-        # two lines always meet, which does not prove them right if others missed
+        # two lines always meet, so they prove nothing if other lines missed
         if count < (2 if attempt == 0 else 3) or not half - turn > _FLATTEST * (half + turn):
             return np.nan, np.nan, np.nan, 0
         p = np.sum(weight * lines[:, 0] * lines[:, 2])
@@ -318,16 +319,17 @@ def _line(
     reach: float,
     width: float,
 ) -> tuple[float, float, float]:
-    """Offset at the point and slope of the line through an edge, standard error of the offset.
+    """Offset (at the point) and slope of the line through an edge, and error of the offset.
 
-    Relative to the ray (c, s) on which the edge was looked for; NaN without a line.
+    Offset and slope are relative to the ray (c, s) along which the edge was sought; NaN if no line
+    is found.
     """
     step = min(1.0, (reach - inner) / _PROFILES)
     most = int((reach - inner) / step) + 1
     radius, place, used = np.empty(most), np.empty(most), 0
     for m in range(most):
         r = inner + m * step
-        # near another edge a profile shows both: use it only up to half way between them
+        # near another edge a profile crosses both edges: use it only up to half way between them
         side = min(width, room * r)
         if side < _NARROWEST:
             continue
@@ -361,7 +363,7 @@ def _line(
 def _edge_place(
     image: Any, u: float, v: float, nu: float, nv: float, sign: float, side: float
 ) -> float:
-    """Position of an edge along the normal (nu, nv), within `side` pixels; NaN without one."""
+    """Position of an edge along the normal (nu, nv), within `side` pixels; NaN if none is found."""
     n = int(side / _STEP)
     rise = np.zeros(2 * n + 1)
     before = _gray(image, u - (n + 1) * _STEP * nu, v - (n + 1) * _STEP * nv)
@@ -373,7 +375,7 @@ def _edge_place(
         before, here = here, after
     if 0.5 * rise.sum() < _FAINTEST:
         return np.nan
-    # first over the whole profile, then around the edge found, so that the window is symmetric
+    # first in the whole profile, then around the found edge, so that the window is symmetric
     middle, reach = 0.0, 1e9
     for _ in range(3):
         top, total = 0.0, 0.0

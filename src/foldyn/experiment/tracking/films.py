@@ -38,10 +38,10 @@ class Film:
     box : tuple of int
         Region of interest: column and row of its first pixel, width and height.
     timed : bool
-        Whether times come from the file; otherwise they follow from the rate.
+        Whether times are read from the file; otherwise they follow from the rate.
     declared : int
-        Frames that the file claims to have, often the rate times the duration: an estimate. 0 where
-        unknown.
+        Number of frames that the file declares; often only an estimate, the rate times the
+        duration. 0 if unknown.
     """
 
     path: Path
@@ -71,7 +71,7 @@ class Film:
         raise InputError(f"{self.path}: frame {index} cannot be read")
 
     def _time(self, index: int, stamp: float) -> float:
-        """Time from the frame count, unless the file's time differs by more than rounding to ms."""
+        """Time by the frame count, unless the file's time differs by more than rounding to ms."""
         counted = index / self.rate
         if not self.timed or not np.isfinite(stamp) or (index > 0 and stamp <= 0.0):
             return counted
@@ -109,7 +109,7 @@ def open_film(
     cv2 = opencv()
     path = check_file(path, "a film")
     with _capture(path) as film:
-        read, picture = film.read()  # false if it cannot be opened
+        read, picture = film.read()  # `read` is False if the film cannot be opened
         own_rate, frames = film.get(cv2.CAP_PROP_FPS), film.get(cv2.CAP_PROP_FRAME_COUNT)
     if not read or picture is None:
         raise InputError(

@@ -1,8 +1,8 @@
-"""Track corners from frame to frame: pyramidal Lucas-Kanade, forward-backward, then the junction.
+"""Track corners from frame to frame by pyramidal Lucas-Kanade flow and junctions of edges.
 
-The flow predicts a corner's position to a few pixels; the junction of edges in the frame itself
-locates it exactly. So errors do not accumulate over a film, and panels may rotate and change
-brightness. `by_neighbors` predicts lost points.
+The flow, checked forward and backward, predicts a corner's position to a few pixels; the junction
+of edges in the frame itself locates the corner exactly. So errors do not accumulate over a film,
+and panels may rotate and change brightness. `by_neighbors` predicts lost points.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ def by_neighbors(
     Parameters
     ----------
     reference : ndarray, shape (n, n, 2)
-        For each point the positions of all in its reference picture (pixels), NaN if unknown.
+        For each point, the positions of all points in its reference picture (pixels); NaN if
+        unknown.
     place : ndarray, shape (n, 2)
         Current positions, NaN if unknown.
     asked : iterable of int
@@ -55,14 +56,16 @@ def by_neighbors(
     count : int
         Number of neighbors used.
     firmness : float
-        Regularization of the gradient towards zero: a row of neighbors does not determine it.
+        Regularization of the motion's gradient towards zero, because neighbors in a row do not
+        determine the gradient.
     robust : bool
-        Start from the median, so that one wrong neighbor does not spoil the fit.
+        Whether to start from the median, so that one wrong neighbor does not spoil the fit.
 
     Returns
     -------
     expected : ndarray, shape (n, 2)
-        NaN for points not requested, and where fewer than four neighbors are known.
+        Predicted positions; NaN for points not in `asked`, and if fewer than four neighbors are
+        known.
     distance : ndarray, shape (n,)
         Median distance of the neighbors in the reference picture.
     """
@@ -86,12 +89,12 @@ def by_neighbors(
 
 LOST, FOUND_AGAIN, TRACKED = 0, 1, 2
 
-_MARGIN = 220  # pixels around all points that are searched
-_NEIGHBORS, _FIRMNESS = 8, 0.05  # neighbors whose motion predicts a point: `by_neighbors`
+_MARGIN = 220  # margin (pixels) of the part of the picture around all points
+_NEIGHBORS, _FIRMNESS = 8, 0.05  # number of neighbors and firmness in `by_neighbors`
 _STRAY = 0.4  # largest distance from a guide's prediction, relative to the reach
-_SURE = 0.3  # largest distance of neighbors, relative to the reach, to trust a guide
-_CLEAR = 0.55  # share of the allowed error for a corner of few edges to be found again
-_MOST_MISSES = 3  # frames after which a lost corner of two edges is found again only with a guide
+_SURE = 0.3  # a guide is trusted if neighbors are closer to it than this share of the reach
+_CLEAR = 0.55  # error, relative to the allowed one, at which corners of few edges are found again
+_MOST_MISSES = 3  # after this many frames, only a guide finds a lost corner of two edges again
 
 # Maps the positions of points (p, 2), NaN if lost, to their predicted positions.
 #
@@ -114,8 +117,8 @@ class FollowSettings:
     error : float
         Largest standard error of a junction (pixels).
     stray : float
-        Largest deviation of a point from its neighbors' motion, relative to the distance of the
-        neighbors.
+        Largest deviation of a point from the motion of its neighbors, relative to the distance to
+        the neighbors.
     """
 
     window: int = 31
@@ -171,16 +174,16 @@ def follow(
     Parameters
     ----------
     frames : iterable of (float, ndarray of uint8)
-        Times (s) and gray pictures, beginning with the one in which the points were found.
+        Times (s) and gray pictures, beginning with the frame in which the points were found.
     points : ndarray, shape (p, 2)
         Corners in the first frame (pixels).
     reach : float
         Length of the edges that make a corner (pixels).
     settings : FollowSettings
     unseen : ndarray of bool, shape (p,), optional
-        Points not yet visible, which are searched for like lost ones.
+        Points not yet visible; they are searched for like lost points.
     guide : callable, optional
-        Predicts points from the others; None uses the motion of their neighbors.
+        Predicts points from the positions of all points; None uses the motion of neighbors.
 
     Yields
     ------
@@ -222,15 +225,15 @@ class _State:
     Attributes
     ----------
     here : ndarray, shape (p, 2)
-        Last known position, or for a lost corner the one predicted by its neighbors.
+        Last known position; for a lost corner the position predicted by its neighbors.
     step : ndarray, shape (p, 2)
         Motion since the previous frame.
     misses : ndarray of int, shape (p,)
         Frames since the corner was last measured.
     anchor : ndarray, shape (p, p, 2)
-        For each corner the positions of all when it was last seen, NaN where unknown. The
-        neighbors' motion is measured from these, so that errors do not accumulate while a corner is
-        lost.
+        For each corner, the positions of all corners when it was last seen; NaN where unknown. The
+        motion of neighbors is measured from these positions, so that errors do not accumulate while
+        a corner is lost.
     """
 
     here: Array
@@ -264,7 +267,7 @@ def _advance(
 ) -> tuple[_State, Array, NDArray[np.int8]]:
     led = state.misses == 0
     flown, there = _flow(last, frame, state.here, state.here + state.step, led, reach, settings)
-    # a junction near the flow's prediction
+    # corners at a junction near the flow's prediction
     junction = refine(frame, _only(there, flown), reach=reach, moved=0.5 * reach)
     good = there & np.isfinite(junction.position[:, 0]) & (junction.error < settings.error)
     place = np.where(good[:, np.newaxis], junction.position, flown)
@@ -276,13 +279,13 @@ def _advance(
         good &= ~(stray > _STRAY * reach + 4.0 * usual)
     good &= ~_crowded(place, good, junction.error, 0.4 * reach)
 
-    # the others: at their prediction, if a junction is there
+    # other corners: at their prediction, if edges meet at that point
     expected, _ = _by_neighbors(state, place, good)
     barred = np.zeros(len(place), bool)
     if guide is not None:
         guided = guide(_only(good, place))
         _, usual = _strays(_only(good, place), guided)
-        # if the guide itself is lost, neighbors do no better
+        # where the guide fails, neighbors do no better
         barred = ~(np.isfinite(guided[:, 0]) & (usual < _SURE * reach))
         expected = np.where(barred[:, np.newaxis], expected, guided)
     guess = np.where(np.isfinite(expected), expected, state.here)
@@ -290,7 +293,7 @@ def _advance(
     # with few edges, the end of a stain on an edge may be mistaken for the corner
     allowed = settings.error * np.where(again.edges >= 4, 1.0, _CLEAR)
     found = ~good & np.isfinite(again.position[:, 0]) & (again.error < allowed)
-    if guide is None:  # after some frames the corner's identity must be certain
+    if guide is None:  # a corner that was lost for some frames must be identified with certainty
         found &= (again.edges >= 3) | (state.misses < _MOST_MISSES)
     place = np.where(good[:, np.newaxis], place, guess)
     place = np.where(found[:, np.newaxis], again.position, place)
@@ -336,13 +339,13 @@ def _within(points, shape, margin):
 
 
 def _by_neighbors(state: _State, place: Array, good: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Positions predicted by neighbors' motion since each corner was last seen; their distance."""
+    """Positions predicted by neighbors' motion since corners were seen; neighbors' distance."""
     asked = range(len(place)) if good.sum() > 4 else ()
     return by_neighbors(state.anchor, _only(good, place), asked, _NEIGHBORS, _FIRMNESS)
 
 
 def _strays(place: Array, guided: Array) -> tuple[Array, Array]:
-    """Distance of points from a guide's prediction, and their neighbors' distance."""
+    """Distance of points from a guide's prediction, and the distance of their neighbors from it."""
     stray = np.hypot(*(place - guided).T)
     known = np.flatnonzero(np.isfinite(stray))
     usual = np.full(len(place), np.inf)
@@ -354,7 +357,7 @@ def _strays(place: Array, guided: Array) -> tuple[Array, Array]:
 
 
 def _crowded(place: Array, good: NDArray, error: Array, apart: float) -> NDArray[np.bool_]:
-    """Points that coincide with another one, except the best measured of them."""
+    """Points that coincide with another point, except for the best measured of such points."""
     out, known = np.zeros(len(place), bool), np.flatnonzero(good)
     better = error[known] <= error[known][:, np.newaxis]
     out[known] = ((distances(place[known]) < apart) & better).any(axis=1)
@@ -362,14 +365,14 @@ def _crowded(place: Array, good: NDArray, error: Array, apart: float) -> NDArray
 
 
 def _taken(place: Array, good: NDArray, found: NDArray, apart: float) -> NDArray[np.bool_]:
-    """Points found again at the position of another corner."""
+    """Points that were found again at the position of another corner."""
     out, held = np.zeros(len(place), bool), np.flatnonzero(good | found)
     out[held] = (distances(place[held]) < apart).any(axis=1)
     return out & found
 
 
 def _only(these: NDArray[np.bool_], places: Array) -> Array:
-    """Positions of these points, NaN for all others."""
+    """Positions of some points, and NaN for all others."""
     return np.where(these[:, np.newaxis], places, np.nan)
 
 

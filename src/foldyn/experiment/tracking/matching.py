@@ -1,7 +1,7 @@
-"""Match corners to nodes: project the model, assign corners to nodes, look up all nodes.
+"""Match corners to nodes: project the model, assign corners to nodes, search for all nodes.
 
-A folded sheet looks much the same when shifted by one cell. So placements are ranked by the nodes
-confirmed in the picture: edges must meet at a node's predicted position.
+A folded sheet looks much the same when shifted by one cell. So placements are ranked by the number
+of nodes confirmed in the picture, where edges meet at the node's predicted position.
 """
 
 from __future__ import annotations
@@ -22,27 +22,28 @@ from foldyn.experiment.tracking.view import View, fit_view, hidden_nodes
 from foldyn.values import number
 
 _TURNS = np.radians(np.arange(-12.0, 12.1, 4.0))  # rotations of the image about the line of sight
-_SCALES = np.exp(np.linspace(-0.35, 0.35, 15))  # range of scales about the one by size, if unknown
-_STATES = 9  # states of a path that are tried before the best is refined
+# unknown scales are tried relative to an estimate from the size
+_SCALES = np.exp(np.linspace(-0.35, 0.35, 15))
+_STATES = 9  # number of states of a path that are tried before the best is refined
 _BEST = 6  # number of placements that are refined
-_FEWEST = 6  # matched nodes, below which a placement is chance
-_LEAST_SHARE = 0.5  # share of the nodes that no panel hides
-_NEIGHBORS, _FIRMNESS = 6, 0.1  # neighbors whose positions correct a node: `by_neighbors`
-_STRAY = 0.2  # largest deviation from the neighbors' prediction, relative to the nodes' spacing
+_FEWEST = 6  # with fewer matched nodes, a placement is due to chance
+_LEAST_SHARE = 0.5  # smallest share of the visible nodes that must be found
+_NEIGHBORS, _FIRMNESS = 6, 0.1  # number of neighbors and firmness in `by_neighbors`
+_STRAY = 0.2  # largest deviation from the neighbors' prediction, relative to node spacing
 
 
 @dataclass(frozen=True)
 class Placing:
-    """What the user knows of the camera's view of the model.
+    """What the user knows about how the camera sees the model.
 
     Attributes
     ----------
     up, facing : str
         Directions of the model that point up in the image and towards the camera.
     metres_per_pixel : float or None
-        Scale in the plane of the model nearest to the camera; None means fitted.
+        Scale in the plane of the model nearest to the camera; if None, it is fitted.
     distance : float or None
-        Distance of that plane from the camera (m); None means fitted.
+        Distance of that plane from the camera (m); if None, it is fitted.
     axis : tuple of float or None
         Pixel on the camera's axis; None means the middle of the whole image.
     """
@@ -67,9 +68,9 @@ class Match:
     Attributes
     ----------
     node : ndarray of int, shape (m,)
-        Nodes, increasing, and
+        Numbers of the nodes, increasing.
     uv : ndarray, shape (m, 2)
-        their pixels.
+        Pixels of these nodes.
     view : View
     positions : ndarray, shape (n, 3)
         Positions of all nodes (m) in the state that fits best.
@@ -81,7 +82,7 @@ class Match:
     seen : ndarray of bool, shape (n,)
         Nodes that no panel hides.
     expected : ndarray, shape (n, 2)
-        Pixel of each node predicted by its neighbors, measured or not.
+        Pixel of each node, measured or not, as predicted by its neighbors.
     """
 
     node: NDArray[np.int64]
@@ -136,7 +137,7 @@ def match_nodes(
     Raises
     ------
     InputError
-        Too few corners, or no placement with enough nodes confirmed.
+        There are too few corners, or no placement has enough confirmed nodes.
     """
     if len(corners) < _FEWEST:
         raise InputError(
@@ -197,7 +198,7 @@ def _scales(uv: Array, seen: Array, placing: Placing) -> Array:
 
 
 def _most_votes(uv: Array, flat: Array, tolerance: float) -> Array:
-    """Shift with most nodes on points; every pair votes for its own."""
+    """Shift that puts most nodes on points; every pair of node and point votes for its shift."""
     votes = (uv[:, np.newaxis] - flat).reshape(-1, 2)
     low = votes.min(axis=0)
     cell = np.floor((votes - low) / tolerance).astype(np.int64)
@@ -211,14 +212,14 @@ def _most_votes(uv: Array, flat: Array, tolerance: float) -> Array:
 
 
 def _spacing(flat: Array) -> float:
-    """Median distance of a node to its nearest neighbor, as seen."""
+    """Median distance of a node to its nearest neighbor in the picture."""
     return float(np.median(distances(flat).min(axis=1)))
 
 
 def _view_of(
     points: Array, axes: Array, scale: float, turn: float, shift: Array, placing: Placing
 ) -> View:
-    """View of a placement, with the scale in the model's nearest plane."""
+    """View of a placement, with the scale in the plane of the model nearest to the camera."""
     middle = points.mean(axis=0)
     nearest = ((points - middle) @ axes[2]).min()
     distance = placing.distance or 1e3 * float(np.ptp(points, axis=0).max())
@@ -243,7 +244,7 @@ def _refined(
     placing: Placing,
     reach: float,
 ) -> Match | None:
-    """Alternate assignment and fit, then look up all nodes."""
+    """Alternate assignment and fit, then search for all nodes."""
     state, positions = float(index), states[index]
     known = placing.metres_per_pixel is not None, placing.distance is not None
     for part in (0.45, 0.35, 0.3, 0.25):
@@ -276,7 +277,7 @@ def _fitted(
     uv: Array,
     known: tuple[bool, bool],
 ) -> tuple[View, float, Array, float]:
-    """View, state, positions of all nodes in it, and the residual (pixels, rms)."""
+    """View, state, positions of all nodes in this state, and the residual (pixels, rms)."""
     last = len(states) - 1
     ends = max(state - 3.0, 0.0), min(state + 3.0, float(last))
     around = np.stack([_between(states, end)[node] for end in ends]) if last else None
@@ -288,7 +289,7 @@ def _fitted(
 def _looked_up(
     image: NDArray[np.uint8], place: Array, flat: Array, asked: NDArray[np.int64], reach: float
 ) -> Array:
-    """Positions of requested nodes: at their neighbors' prediction, if edges meet there."""
+    """Positions of requested nodes, found where edges meet near their neighbors' prediction."""
     kept = _without_strays(place, flat, asked)
     expected = by_model(kept, flat, asked)
     missing = np.where(np.isfinite(kept), np.nan, expected)
@@ -296,15 +297,16 @@ def _looked_up(
     sure = np.isfinite(junctions.position[:, 0]) & (junctions.error < 0.5)
     for node in np.flatnonzero(sure):
         apart = np.hypot(*(kept - junctions.position[node]).T)
-        if not (apart < 0.5 * reach).any():  # otherwise it belongs to another node
+        if not (apart < 0.5 * reach).any():  # otherwise the corner belongs to another node
             kept[node] = junctions.position[node]
     return kept
 
 
 def _without_strays(place: Array, flat: Array, asked: NDArray[np.int64]) -> Array:
-    """Positions of nodes without those that contradict their neighbors, worst first.
+    """Positions of nodes, without positions that contradict their neighbors.
 
-    They are removed one by one, as a wrong position also disturbs its neighbors' prediction.
+    Contradicting positions are removed one by one, worst first, because a wrong position also
+    disturbs its neighbors' prediction.
     """
     kept = np.full(place.shape, np.nan)
     kept[asked] = place[asked]
@@ -324,14 +326,14 @@ def _without_strays(place: Array, flat: Array, asked: NDArray[np.int64]) -> Arra
 def by_model(place: Array, flat: Array, asked: NDArray[np.int64]) -> Array:
     """Predict nodes (n, 2) from the deviation of their neighbors from the projected model, `flat`.
 
-    NaN for all others, and where fewer than four neighbors are known.
+    NaN for nodes not in `asked`, and if fewer than four neighbors are known.
     """
     reference = np.broadcast_to(flat, (len(flat), *flat.shape))
     return by_neighbors(reference, place, asked, _NEIGHBORS, _FIRMNESS, robust=True)[0]
 
 
 def _between(states: Array, state: float) -> Array:
-    """Interpolated state between two of a path."""
+    """State interpolated between two states of a path."""
     if len(states) == 1:
         return states[0]
     low = min(int(state), len(states) - 2)
@@ -339,9 +341,9 @@ def _between(states: Array, state: float) -> Array:
 
 
 def assign(nodes: Array, points: Array, limit: float) -> tuple[NDArray, NDArray]:
-    """Pairs of nodes and points (pixels) with the shortest total distance, none above a limit."""
+    """Pairs of nodes and points (pixels), none beyond a limit, of shortest total distance."""
     distance = np.hypot(*(nodes[:, np.newaxis] - points).transpose(2, 0, 1))
-    # leaving a node unpaired costs the limit, so no pair is farther apart
+    # an unpaired node costs the limit, so no pair is farther apart
     padded = np.concatenate([np.minimum(distance, 1e6), np.full((len(nodes),) * 2, limit)], axis=1)
     rows, columns = linear_sum_assignment(padded)
     paired = columns < len(points)

@@ -18,8 +18,8 @@ from foldyn.experiment.tracking.matching import Match, Placing, by_model, match_
 from foldyn.experiment.tracking.tracks_dataset import add_displacements, tracks_of
 from foldyn.experiment.tracking.view import TrackedModel, hidden_nodes
 
-_GUIDING = 6  # tracked nodes, below which the model's states do not guide the search
-_WHOLE = 0.95  # least share of the declared frames in a complete film
+_GUIDING = 6  # with fewer tracked nodes, the model's states do not guide the search
+_WHOLE = 0.95  # a film with a smaller share of its declared frames is incomplete
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class Tracking:
     placing : Placing
         How the camera sees the model.
     match : {"first", "last"}
-        Frame in which to recognize the model's nodes; the specimen must be in one of the model's
-        states there.
+        Frame in which the model's nodes are recognized; in that frame the specimen must be in one
+        of the model's states.
     nodes : tuple of int or None
         Nodes that must be found; None means as many as possible.
     """
@@ -50,14 +50,14 @@ class Tracking:
             raise InputError(f'--match {self.match!r}: use "first" or "last"')
 
     def centered(self, size: tuple[int, ...], box: tuple[int, ...]) -> Tracking:
-        """Copy with the camera's axis in the middle of the image if none is given."""
+        """Copy with the camera's axis in the middle of the image, unless the axis is given."""
         if self.placing.axis is not None:
             return self
         u, v = (0.5 * (np.array(size) - 1.0) - np.array(box[:2])).tolist()
         return replace(self, placing=replace(self.placing, axis=(u, v)))
 
     def reach(self, shape: tuple[int, ...]) -> float:
-        """Length of the edges that make a corner (pixels); refused if it does not fit."""
+        """Length of the edges that make a corner (pixels); refused if too long for the picture."""
         reach, most = self.corners.reach_in(shape), 0.25 * min(shape)
         if self.corners.reach is not None and reach > most:
             raise InputError(
@@ -89,16 +89,16 @@ def track_film(
     -------
     xarray.Dataset
         `position_px` (time, point, uv), pixels of the whole image, NaN where a point is lost;
-        `error_px` (time, point), its standard error; `status` (time, point): 0 lost, 1 found
-        again, 2 tracked; `repeated` (time): the frame repeats the previous one. With a model,
-        `displacement` (time, node, axis) in m from rest, NaN where lost and along the line of
-        sight, `node_of_point` (point), -1 for none, and figures of quality of each node.
+        `error_px` (time, point), the standard error of the position; `status` (time, point): 0
+        lost, 1 found again, 2 tracked; `repeated` (time): the frame repeats the previous one. With
+        a model, `displacement` (time, node, axis) in m from rest, NaN where lost and along the line
+        of sight, `node_of_point` (point), -1 for none, and figures of quality of each node.
 
     Raises
     ------
     InputError
-        No corners, a model that does not fit them, fewer points than the nodes asked for, or a film
-        of one frame.
+        There are no corners, the model does not fit them, there are fewer points than requested
+        nodes, or the film has a single frame.
 
     Warns
     -----
@@ -163,7 +163,7 @@ def track_photos(
     paths : sequence of path
         At least two photographs.
     model : TrackedModel
-        With the states of a path, if the specimen changes its shape.
+        Model, with the states of a path if the specimen changes its shape.
     tracking : Tracking
     loads : array_like, shape (number of photographs,), optional
     roi : tuple of int, optional
@@ -180,8 +180,8 @@ def track_photos(
     Raises
     ------
     InputError
-        One photograph alone, photographs of several sizes, no corners, a model that does not
-        fit.
+        There is only one photograph, photographs differ in size, there are no corners, or the model
+        does not fit.
     """
     if len(paths) < 2:
         raise InputError(
@@ -221,11 +221,11 @@ def track_photos(
 
 
 def _guide_of(match: Match, model: TrackedModel) -> Guide:
-    """Guide for points whose first ones are the model's vertices, in order.
+    """Guide for points, of which the first are the model's vertices in order.
 
-    In each frame it takes the state whose projection is nearest to the tracked nodes, and corrects
-    each node by its neighbors' residuals. Lost nodes that a panel hides in that state are not
-    searched for.
+    In each frame the guide takes the state whose projection is nearest to the tracked nodes, and
+    corrects each node by the residuals of its neighbors. Lost nodes that a panel hides in that
+    state are not searched for.
     """
     count, view = model.vertices, match.view
     flat = np.array([view.project(state[:count]) for state in model.states])
@@ -280,7 +280,7 @@ def _matched(
 
 
 def _linked(steps: list[Step], match: Match, apart: float) -> NDArray[np.int64]:
-    """Node of each tracked point, by their positions in the last frame."""
+    """Node of each tracked point, found from its position in the last frame."""
     last = next(step for step in reversed(steps) if not step.repeated)
     nodes = np.full(len(last.position), -1)
     for node, uv in zip(match.node, match.uv, strict=True):

@@ -1,4 +1,4 @@
-"""Datasets of tracks: made from the steps of a film or photographs, in metres, in files."""
+"""Datasets of tracks: made from steps of a film or photographs, with displacements, and saved."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def tracks_of(
     size : tuple of int
         Width and height of the pictures (pixels).
     box : tuple of int
-        Region of interest, which is the origin of the steps' pixels.
+        Region of interest; pixels of the steps count from its first pixel.
     along : {"time", "photo"}
     """
     place, units = (along, "point"), {"units": "pixel"}
@@ -64,9 +64,9 @@ def add_displacements(
 ) -> xr.Dataset:
     """Add displacements from rest of the tracked nodes.
 
-    Each node is assumed to keep its distance from the camera when the model was recognized,
-    `camera_depth` along `camera_direction` from `camera_position`; the component along the line of
-    sight is unknown (NaN). The camera must stand still.
+    Each node is assumed to keep the distance from the camera that it had when the model was
+    recognized: `camera_depth`, along `camera_direction` from `camera_position`. The component along
+    the line of sight is unknown (NaN). The camera must stand still.
 
     Parameters
     ----------
@@ -80,9 +80,9 @@ def add_displacements(
     Returns
     -------
     xarray.Dataset
-        With `displacement` (m), `rest_position`, `tracked` (share of frames in which a node was
-        measured), `longest_gap` (frames), `error` (m, root mean square of the standard errors),
-        and, for pictures, `projected_px` of the model as it was recognized and its `edges`.
+        Tracks with `displacement` (m), `rest_position`, `tracked` (share of frames in which a node
+        was measured), `longest_gap` (frames), `error` (m, root mean square of the standard errors),
+        and, for pictures, `projected_px` and `edges` of the model as it was recognized.
     """
     along = "photo" if "photo" in ds.dims else "time"
     origin = np.asarray(ds.attrs["roi"][:2], dtype=np.float64)
@@ -144,7 +144,7 @@ def save_tracks(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        Not tracks, or the path cannot be written.
+        The dataset holds no tracks, or the path cannot be written.
     """
     if "foldyn_tracks" not in ds.attrs:
         raise InputError("cannot save: these are no tracks; use foldyn.save for results")

@@ -25,9 +25,9 @@ from foldyn.report.sections import Charts, Heading, Picture, Section, Table, Tex
 from foldyn.shells import shell
 from foldyn.viewer import Backdrop, Stage, projection, stage
 
-MOST = 3  # most nodes in charts
-ROOM = 4_000_000  # most bytes of the pictures of a page
-SEEN = 0.9  # relative to the frames of the best-measured node: nodes with fewer are not shown
+MOST = 3  # largest number of nodes in charts
+ROOM = 4_000_000  # largest size of all pictures of a page, in bytes
+SEEN = 0.9  # nodes measured in a smaller share of the best node's frames are not shown
 FILLED = (
     "Dots are what was measured. The sheet in three dimensions is filled where nothing was: a node "
     "that was lost for some frames moves evenly between them, one that was never seen moves as its "
@@ -49,7 +49,7 @@ class Footage:
     case : Case, optional
         The recognized model.
     settings : mapping of str to str
-        Scale, region and others, in words.
+        Scale, region and other settings, in words.
     """
 
     files: Sequence[str]
@@ -84,7 +84,7 @@ def write_tracks_page(
 def spread(count: int, encoded: Callable[[int], bytes]) -> dict[int, bytes]:
     """Pictures spread evenly over a film, as many as a page has room for, by number.
 
-    encoded : returns the encoded picture of a frame, given its number.
+    encoded : function of a frame number that returns the encoded picture.
     """
     first = encoded(0)
     kept = min(count, max(2, ROOM // max(len(first), 1)))
@@ -93,7 +93,7 @@ def spread(count: int, encoded: Callable[[int], bytes]) -> dict[int, bytes]:
 
 
 def most_moved(tracks: xr.Dataset) -> list[int]:
-    """Nodes that move most among those measured most of the time."""
+    """Nodes that move most among the nodes that were measured most of the time."""
     moved = tracks["displacement"].values
     known = np.isfinite(moved)
     high = np.where(known, moved, -np.inf).max(axis=0)
@@ -135,9 +135,9 @@ def filled(tracks: xr.Dataset) -> NDArray[np.float64]:
 def _stage(
     tracks: xr.Dataset, case: Case, nodes: list[int], title: str, pictures: Mapping[int, bytes]
 ) -> Stage:
-    """Stage of the tracked sheet of the pattern's vertices; a path for photographs.
+    """Stage of the tracked sheet, made of the pattern's vertices; a path for photographs.
 
-    Its camera is the one fitted when the model was recognized.
+    The camera of the stage is the camera fitted when the model was recognized.
     """
     pattern, sheet = case.structure.pattern, case.structure.sheet
     vertices = Case(shell(pattern, sheet, divisions=1))

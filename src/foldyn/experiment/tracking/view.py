@@ -19,7 +19,7 @@ from foldyn.results.contents import check_variable
 Array = NDArray[np.float64]
 
 _MOST_STATES = 200
-FARTHEST = 1e4  # m: a camera this far away has parallel lines of sight
+FARTHEST = 1e4  # m, largest distance of a camera: from here lines of sight are parallel
 
 
 @brief
@@ -30,14 +30,14 @@ class TrackedModel:
     Attributes
     ----------
     rest : ndarray, shape (n, 3)
-        Positions of all nodes at rest (m), the vertices of the pattern first.
+        Positions of all nodes at rest (m); vertices of the pattern come first.
     states : ndarray, shape (k, n, 3)
         Positions (m) in the possible states of the specimen, in the order of a path.
     triangles : ndarray, shape (m, 3)
     vertices : int
         Number of the pattern's vertices: only they can be seen as corners.
     edges : ndarray, shape (e, 2)
-        Creases and boundary, for pictures.
+        Creases and boundary edges, for pictures.
     """
 
     rest: NDArray[np.float64]
@@ -74,25 +74,25 @@ class TrackedModel:
 @brief
 @dataclass(frozen=True)
 class View:
-    """A distant camera, described by the scale in one plane.
+    """View of a camera, described by the scale in one plane.
 
-    Points are seen at center + (right, down) / (metres_per_pixel (1 + depth / distance)), all
-    relative to `origin`, whose plane has the scale; right, down and depth are along the rows of
-    `rotation`.
+    Points are seen at center + (right, down) / (metres_per_pixel (1 + depth / distance)). Here
+    right, down and depth are measured from `origin` along the rows of `rotation`; the scale holds
+    in the plane through `origin`.
 
     Attributes
     ----------
     rotation : ndarray, shape (3, 3)
-        Rows: to the right, down and away, in the model's axes.
+        Rows are the unit vectors to the right, down and away from the camera, in the model's axes.
     origin : ndarray, shape (3,)
-        A point of the model (m), and
+        A point of the model (m).
     center : ndarray, shape (2,)
-        the pixel at which it is seen.
+        Pixel at which `origin` is seen.
     metres_per_pixel : float
-        In the plane through `origin`.
+        Scale in the plane through `origin`.
     distance : float
-        Distance of that plane from the camera (m); if infinite, depth does not change an object's
-        size.
+        Distance of that plane from the camera (m); if infinite, depth does not change the size of
+        an object in the picture.
     axis : ndarray, shape (2,)
         Pixel at which the camera's axis meets the image; points farther away appear closer to it.
     """
@@ -116,7 +116,7 @@ class View:
         return (np.asarray(points, dtype=np.float64) - self.origin) @ self.rotation[2]
 
     def back(self, uv: ArrayLike, depth: ArrayLike) -> Array:
-        """Points (..., 3) seen at pixels (..., 2), `depth` (m) behind the plane of the scale."""
+        """Points (..., 3) seen at pixels (..., 2), at `depth` (m) behind the plane of the scale."""
         z = np.asarray(depth, dtype=np.float64)[..., np.newaxis]
         flat = (np.asarray(uv, dtype=np.float64) - self.axis) * (1.0 + z / self.distance)
         seen = (flat - (self.center - self.axis)) * self.metres_per_pixel
@@ -143,14 +143,14 @@ def fit_view(
     Parameters
     ----------
     view : View
-        A guess; its axis is kept.
+        View to start from; its `axis` is kept.
     points : ndarray, shape (m, 3)
         Positions in the model (m).
     uv : ndarray, shape (m, 2)
     scaled : bool
-        Whether the scale is known and kept,
+        Whether the scale is known and kept.
     placed : bool
-        and so is the distance.
+        Whether the distance is known and kept.
     shapes : ndarray, shape (2, m, 3), optional
         Positions in the previous and next states; the state is then fitted too.
 
@@ -160,7 +160,7 @@ def fit_view(
     state : float
         0 for `points`, down to -1 for the previous state and up to 1 for the next.
     rms : float
-        Root mean square of the distances between seen and projected (pixels).
+        Root mean square distance between seen and projected points (pixels).
     """
     extent = float(np.ptp(points, axis=0).max())
     size, nearness = extent / view.metres_per_pixel, extent / view.distance
@@ -184,7 +184,7 @@ def fit_view(
 
     count = 5 + (not scaled) + (not placed) + (shapes is not None)
     low, high = np.full(count, -1.0), np.full(count, 1.0)
-    if not placed:  # between infinitely far away and twice the model's size
+    if not placed:  # fitted between infinity and twice the model's size
         low[5 + (not scaled)], high[5 + (not scaled)] = -nearness - 1e-6, 0.5 - nearness
     fit = least_squares(misfit, np.zeros(count), bounds=(low, high), loss="soft_l1", f_scale=3.0)
     fitted, _, state = unpack(fit.x)

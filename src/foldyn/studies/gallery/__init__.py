@@ -1,1 +1,1 @@
-"""Motions to look at: a self-deploying sheet, and one that tumbles in free flight."""
+"""Motions to look at: a self-deploying sheet, and a sheet that tumbles in free flight."""

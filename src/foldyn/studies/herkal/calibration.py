@@ -1,7 +1,7 @@
-"""The paper's specimen calibrated: folds from the static test, damping from the release.
+"""Calibration of the paper's specimen: folds from the static test, damping from the release.
 
-The paper's raw data are not public: `static_data` and `release_data` are computed by the same model
-with the paper's parameters (no model error), and `noisy` adds errors of a camera and scales.
+The paper's raw data are not public. `static_data` and `release_data` are computed by the same model
+with the paper's parameters (no model error), and `noisy` adds the errors of a camera and of scales.
 `python -m foldyn.studies.herkal.calibration FOLDER` fits both and draws them (a few minutes).
 """
 
@@ -45,7 +45,7 @@ FULL = 0.056  # m, displacement of the top in the shipped case
 WEIGHTS = (0.125, 0.226, 0.312)  # N
 TOP = tuple(range(7))
 WATCHED = 8  # the paper's node 9
-# Nodes seen by a camera in front of the specimen, without the bottom row, which stands still.
+# Nodes that a camera in front of the specimen sees, without the bottom row, which does not move.
 FRONT = tuple(7 * i + j for i in range(8) for j in (1, 3, 5))
 SYNTHETIC = "synthetic"
 FORCE_ERROR = 2e-4  # N: a scale that reads to 0.02 g
@@ -57,8 +57,8 @@ TURNED = 0.05  # s from the release to the first turning point
 SEEN = 0.6  # s: length of the decaying free vibration
 STEP = 0.001  # s: step of the simulation
 BOTTOM = list(range(56, 63))
-# Supports of the bottom: a smooth plate (the static test's, ideal); the plate with node 59 glued to
-# it, as in the paper's text; the glue alone, without a plate.
+# Supports of the bottom: a smooth plate (ideal, as in the static test); the plate with node 59
+# glued to it, as in the paper's text; the glue alone, without a plate.
 SUPPORTS: Mapping[str, list[dict[str, Any]]] = {
     "plate": [
         {"nodes": BOTTOM, "axes": "x"},
@@ -69,14 +69,13 @@ SUPPORTS: Mapping[str, list[dict[str, Any]]] = {
     "glue alone": [{"nodes": [59], "axes": "xyz"}],
 }
 # Displacement of the top before the release (m).
-#
-# From the 20 mm of the smallest weight this damping lets nothing swing: K0 stays what it was at
-# rest, and resists the large turns of the panels.
+# Released from the 20 mm of the smallest weight, the sheet would not swing with this damping: K0 is
+# the stiffness at rest throughout, and resists the large rotations of the panels.
 PRESSED = 0.005
 
 
 def pressed(factors: Sequence[float] | NDArray, changes: Mapping[str, Any] | None = None) -> Any:
-    """Path of the specimen as its top is pressed down to fractions of 56 mm."""
+    """Path of the specimen while its top is pressed down to fractions of 56 mm."""
     at = {"method": "newton", "load_factors": list(factors)}
     return shipped("specimen", changes).run(settings=Settings(stability=False), **at)
 
@@ -105,7 +104,7 @@ def weighed(changes: Mapping[str, Any] | None = None) -> NDArray[np.float64]:
 
 
 def static_data() -> list[experiment.Measurement]:
-    """Forces at the displacements under the three weights, and the shapes of the front nodes."""
+    """Forces at the displacements under the three weights, and positions of the front nodes."""
     factors = weighed()
     path = pressed(factors)
     free = FRONT[3:]  # the displacement of the top is imposed
@@ -131,14 +130,14 @@ def released_case(
 ) -> Path:
     """Case file of the free vibration after the top was pressed down and released.
 
-    It starts from the equilibrium on the smooth plate under this displacement of the top.
+    The motion starts from the equilibrium on the smooth plate with this displacement of the top.
 
     Parameters
     ----------
     folder : Path
         Receives the case file and its initial state; created if missing.
     changes : mapping, optional
-        Values of the static calibration, by key.
+        Values found by the static calibration, by key.
     step : float
         Time step of the simulation (s).
     press : float
@@ -209,7 +208,7 @@ def peak(values: NDArray[np.float64], step: float = 1.0 / RATE) -> tuple[float, 
 def calibrate(folder: Path) -> tuple[experiment.Fit, experiment.Fit]:
     """Fit the folds to the synthetic static test, then the damping to the release.
 
-    The folder keeps the evaluations and the release's case files.
+    The folder keeps the evaluations and the case files of the release.
     """
     kept, draw = folder / "evaluations", np.random.default_rng(1)
     folds = fit_folds(noisy(static_data(), draw), folder=kept)

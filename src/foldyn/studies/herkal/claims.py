@@ -18,8 +18,8 @@ from foldyn.studies.herkal.study import Study, mean_ranks
 from foldyn.studies.targets import Target, Verdict, read_targets, verdicts
 
 TARGETS = Path(__file__).with_name("targets.toml")
-BAND = (1.4, 2.4)  # Hz: band of second peaks
-PROMINENCE = 0.01  # least prominence of a peak, relative to the highest amplitude
+BAND = (1.4, 2.4)  # Hz: band in which second peaks are sought
+PROMINENCE = 0.01  # smallest prominence of a peak, relative to the highest amplitude
 NO_VALUE = math.nan
 NO_MOTION = np.full((1, 2), math.nan)
 
@@ -35,7 +35,7 @@ def _edge(motion: xarray.Dataset) -> NDArray:
 
 
 def _asymmetry(study: Study, models: Iterable[str]) -> float:
-    """Largest difference, among some models, between the motions of the two nodes of case 1."""
+    """Largest difference between the motions of the two nodes of case 1, among some models."""
     motions = [_motion(study, "case1", model) for model in models]
     moved = [NO_MOTION if motion is None else _edge(motion) for motion in motions]
     return max(
@@ -71,7 +71,7 @@ def _mismatch(study: Study, places: list[int]) -> float:
 
 
 def softer_folds_move_more(study: Study) -> float:
-    """Displacement of node 7 of the shell, case 4 relative to case 2."""
+    """Displacement of node 7 of the shell in case 4, divided by that in case 2."""
     moved = []
     for case in ("case4", "case2"):
         path = study.result(case, REFERENCE, "path")
@@ -81,28 +81,28 @@ def softer_folds_move_more(study: Study) -> float:
 
 
 def softer_folds_err_less(study: Study) -> float:
-    """Largest of the five ratios of errors, case 4 relative to case 2."""
+    """Largest of the five ratios of the error in case 4 to the error in case 2."""
     ratios = [study.error("case4", m) / study.error("case2", m) for m in paper_rules()]
     return float(np.max(ratios))
 
 
 def _over_best(study: Study, case: str, model: str) -> float:
-    """Error of a model relative to the smallest of the five: 1 if it is the best."""
+    """Error of a model divided by the smallest error of the five: 1 for the best model."""
     row = {m: study.error(case, m) for m in paper_rules()}
     known = all(0.0 < error < math.inf for error in row.values())
     return row[model] / min(row.values()) if known else NO_VALUE
 
 
 def best_overall(study: Study) -> float:
-    """Mean rank of circumcenter relative to the smallest of the five."""
+    """Mean rank of circumcenter divided by the smallest mean rank of the five."""
     means = mean_ranks(study.table(models=paper_rules()), paper_rules())
     known = len(study.plan.cases) == 4 and all(map(math.isfinite, means.values()))
     return means["circumcenter"] / min(means.values()) if known else NO_VALUE
 
 
-# Claims by the key of their row, with the function that measures each; nan if it cannot.
+# Function that computes the number of each claim, by the key of its row; nan if it cannot.
 CLAIMS: Mapping[str, Callable[[Study], float]] = {
-    # how differently the two nodes of the free edge move: two heavy corners lie across each panel
+    # difference of the two nodes of the free edge: heavy corners lie opposite in each panel
     "asymmetry_equi_inertial": partial(_asymmetry, models=("equi_inertial",)),
     "asymmetry_others": partial(
         _asymmetry, models=[m for m in paper_rules() if m != "equi_inertial"]
@@ -125,7 +125,7 @@ CLAIMS: Mapping[str, Callable[[Study], float]] = {
 
 
 def claims(study: Study) -> list[Verdict]:
-    """The paper's claims with computed values, where these exist."""
+    """The paper's claims with computed values, if these exist."""
     return _known(study, "claims", {key: _value(claim, study) for key, claim in CLAIMS.items()})
 
 
@@ -144,12 +144,12 @@ def paper_table() -> dict[str, dict[str, float]]:
 
 
 def tolerance() -> float:
-    """Relative deviation up to which a number of Table 1 counts as reproduced."""
+    """Largest relative deviation at which a number of Table 1 counts as reproduced."""
     return max(target.tolerance or 0.0 for target in _table1().values())
 
 
 def table1(study: Study) -> list[Verdict]:
-    """The paper's Table 1 with ours, one row per number."""
+    """The paper's Table 1 and ours, one row for each number."""
     computed = {
         f"{case}_{model}": study.error(case, model)
         for case in study.plan.cases
@@ -161,7 +161,7 @@ def table1(study: Study) -> list[Verdict]:
 def _value(claim: Callable[[Study], float], study: Study) -> float:
     try:
         return claim(study)
-    except InputError:  # if the motion is too short for it
+    except InputError:  # the motion is too short for a spectrum
         return NO_VALUE
 
 

@@ -1,7 +1,8 @@
-"""Distance of a model from the shell: the paper's metric, and frequencies of similar modes.
+"""Error of a model relative to the shell: the paper's metric, and frequencies of similar modes.
 
-The metric of a node is the norm of the difference of the amplitude spectra up to a frequency, over
-the norm of the shell's spectrum; the metric of a case is the mean over its reported nodes.
+The metric of a node is the norm of the difference of the amplitude spectra up to a frequency,
+divided by the norm of the shell's spectrum. The metric of a case is the mean over its reported
+nodes.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from foldyn.signals import find_peaks, sampling_interval, spectrum
 
 UP_TO = 5.0  # Hz
 AXES = ("x", "y", "z")
-LEAST_MAC = 0.5  # smaller values make no partners
-FAR = 2.0  # largest ratio of partners' frequencies
+LEAST_MAC = 0.5  # modes with a smaller MAC are no partners
+FAR = 2.0  # largest ratio of the frequencies of partners
 
 
 def content(
@@ -72,7 +73,7 @@ def strongest_peak(
 
 
 def deviation(amplitude: ArrayLike, reference: ArrayLike) -> NDArray[np.float64]:
-    """Norm of the difference of two spectra relative to the norm of the second, per node.
+    """Norm of the difference of two spectra divided by the norm of the second, for each node.
 
     Parameters
     ----------
@@ -107,9 +108,9 @@ def errors(
     axis: str,
     up_to: float = UP_TO,
 ) -> NDArray[np.float64]:
-    """Deviation of a motion's frequency content from a reference's, per node.
+    """Deviation of the frequency content of a motion from that of a reference, for each node.
 
-    The paper's metric is the mean of these.
+    The paper's metric is the mean of these deviations.
     """
     return deviation(
         content(motion, nodes, axis, up_to)[1], content(reference, nodes, axis, up_to)[1]
@@ -130,7 +131,7 @@ def best(values: Mapping[str, float]) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Partners:
-    """Modes of the shell and their partners in a model; nan if none.
+    """Modes of the shell and their partners in a model; nan for modes without a partner.
 
     Attributes
     ----------
@@ -146,7 +147,7 @@ class Partners:
 
     @property
     def deviation(self) -> NDArray:
-        """Frequency relative to the shell's, minus one."""
+        """Frequency divided by the shell's, minus one."""
         return self.frequency / self.reference - 1.0
 
     @property
@@ -161,7 +162,7 @@ def partners(reference: xarray.Dataset, ours: xarray.Dataset) -> Partners:
     vertices = reference["node"].values.tolist()
     theirs = reference["frequency"].values
     ratio = ours["frequency"].values / theirs[:, None]
-    near = (ratio > 1.0 / FAR) & (ratio < FAR)  # few vertices cannot distinguish short waves
+    near = (ratio > 1.0 / FAR) & (ratio < FAR)  # a few vertices cannot distinguish short waves
     pairs = pair_modes(np.where(near, mac(reference, ours, nodes=vertices), 0.0), LEAST_MAC)
     frequency, likeness = (np.full(len(theirs), np.nan) for _ in range(2))
     frequency[pairs.first] = ours["frequency"].values[pairs.second]

@@ -31,8 +31,8 @@ from foldyn.studies.targets import Verdict
 from foldyn.viewer import Stage, stage
 
 TITLE = "Dynamic behavior of origami structures: the case studies of Herkal et al."
-CHOSEN_BY = "case1_"  # rows of the targets that the assumptions were chosen to match
-SENSITIVITY = "sensitivity"  # folder of its tables within the study's folder
+CHOSEN_BY = "case1_"  # prefix of the targets that our assumptions were chosen to match
+SENSITIVITY = "sensitivity"  # folder of the sensitivity's tables within the study's folder
 
 
 def write(study: Study, call: Call | None = None) -> Path:
@@ -206,7 +206,7 @@ def _table_1(study: Study) -> Table:
 
 
 def rank_table(study: Study) -> Table:
-    """Mean rank of each distribution, the paper's and ours."""
+    """Table of the mean rank of each distribution, in the paper and in ours."""
     names, paper = _papers(study), {c: paper_table()[c] for c in study.plan.cases}
     theirs, five = mean_ranks(paper, names), mean_ranks(study.table(models=names), names)
     every = mean_ranks(study.table(), study.plan.models)
@@ -228,7 +228,7 @@ def rank_table(study: Study) -> Table:
 
 
 def _frequency_error(study: Study, model: str, up_to: float) -> float:
-    """Mean error over the cases, for modes up to some multiple of a free plate's frequency."""
+    """Mean error over the cases, for modes up to a multiple `up_to` of a free plate's frequency."""
     errors = []
     for case in study.plan.cases:
         found, file = study.frequencies(case, model), runs.case_study(case)
@@ -396,7 +396,7 @@ def _how(study: Study) -> str:
 
 
 def stage_of(study: Study, case: str) -> Stage | None:
-    """Stage of a case's motions with the shell and all models, in step; None if there are none.
+    """Stage of a case's motions with the shell and all models in step; None if no motion exists.
 
     Motions are stored at the pattern's vertices, which are the nodes of the coarsest shell.
     """

@@ -38,14 +38,15 @@ LOADS = ("file", "edge")
 
 @dataclass(frozen=True)
 class Variant:
-    """Changes to the case file; by default none.
+    """Changes to the case file; by default nothing is changed.
 
     Attributes
     ----------
     pulse : float or None
         Duration (s) of the half-sine pulse.
     loads : {"file", "edge"}
-        "edge" puts the file's force on each of the nodes that the case reports, the whole edge.
+        "edge" puts the file's force on each node that the case reports, which together are the
+        whole edge.
     bend_law : {"linear", "superlinear"} or None
     calibration : {"standard", "merlin2"} or None
     """
@@ -61,7 +62,7 @@ class Variant:
 
     @property
     def name(self) -> str:
-        """Part of file names; empty for the unchanged case file."""
+        """Part of file names that names the changes; empty for the unchanged case file."""
         pulse = "" if self.pulse is None else f"pulse{self.pulse:g}"
         loads = "" if self.loads == "file" else self.loads
         return "-".join(filter(None, (pulse, loads, self.bend_law, self.calibration)))
@@ -93,11 +94,11 @@ class SheetModel:
         Builds the structure of a case file: ``structure(case_file, options, divisions)``; options
         are changed arguments of `discretize`.
     statics : str
-        Models with the same value differ only in mass and share their equilibria.
+        Name of the stiffness: models with the same name differ only in mass and share equilibria.
     paper : bool
-        Whether it is one of the paper's models.
+        Whether the paper has this model.
     implicit : bool
-        Whether its motions use Newmark's method with the study's time step.
+        Whether motions of this model use Newmark's method with the study's time step.
     """
 
     name: str
@@ -109,7 +110,7 @@ class SheetModel:
 
     @property
     def distribution(self) -> bool:
-        """Whether it differs from the case file's model only in the distribution of mass."""
+        """Whether the model differs from the case file's model only in the distribution of mass."""
         return self.statics == BARS_AND_HINGES
 
 
@@ -183,7 +184,7 @@ def paper_rules() -> tuple[str, ...]:
 
 
 def case_study(name: str) -> CaseFile:
-    """Shipped case file of a case study, "case1"."""
+    """Shipped case file of a case study, such as "case1"."""
     return read_case(find_case(f"herkal/{name}"))
 
 
@@ -200,7 +201,7 @@ def case_with(
     Raises
     ------
     InputError
-        No such model; the variant changes a pulse that the file does not have.
+        The model does not exist, or the variant changes a pulse that the file does not have.
     """
     structure = model_of(model).structure(case_file, variant.options, divisions)
     loads = [_varied(load, case_file, variant) for load in case_file.case().loads]
@@ -219,11 +220,12 @@ def _varied(load: Any, case_file: CaseFile, variant: Variant) -> Any:
     return load
 
 
-# Files that the results of the case studies depend on, in addition to the solvers.
+# Files on which results of the case studies depend, in addition to the solvers.
 COMPUTING = tuple(f"studies/herkal/{name}.py" for name in ("runs", "metric", "sensitivity"))
 INTERVAL = 0.01  # s, between samples, unless the case file sets it
-STEPS = 10  # steps of a path's load
-SHELL_MODES, RULE_MODES = 5, 12  # modes of the reference; candidates for partners
+STEPS = 10  # number of load steps of a path
+# number of modes of the reference; number of candidates for their partners
+SHELL_MODES, RULE_MODES = 5, 12
 SECANT = 1.0  # degrees, amplitude of the hinges: superlinear bends have no slope at rest
 
 
@@ -253,7 +255,7 @@ class Job(Task):
     Attributes
     ----------
     case : str
-        Name of a shipped case study, "case1".
+        Name of a shipped case study, such as "case1".
     model : str
         One of `foldyn.studies.herkal.runs.MODELS`.
     kind : {"path", "modes", "motion"}
@@ -274,7 +276,7 @@ class Job(Task):
         return "-".join(filter(None, (self.case, self.model, self.kind, self.variant.name)))
 
     def settings(self) -> dict[str, Any]:
-        """Everything that its result depends on."""
+        """Everything on which the result depends."""
         numerics = {} if self.kind != "motion" else {"duration": self.numerics.duration}
         if self.model == REFERENCE:  # other models have no mesh
             numerics["divisions"] = self.numerics.divisions
@@ -291,7 +293,7 @@ class Job(Task):
         }
 
     def compute(self, folder: Path) -> xarray.Dataset:
-        """Run it; the result covers the pattern's vertices, which all models share."""
+        """Run the computation; the result covers the pattern's vertices, which all models share."""
         return compute(self)
 
 

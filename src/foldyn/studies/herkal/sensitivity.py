@@ -1,9 +1,9 @@
-"""How far the results of the case studies depend on settings that the paper does not state.
+"""Dependence of the results of the case studies on settings that the paper does not state.
 
 All combinations of pulse, loaded nodes, law of the bends and calibration are run with every mass
-distribution. A task computes one motion of the shell with all models' motions under the same load,
-and keeps only the errors. Density needs no motions of its own: it only rescales time for pulse,
-damping and record together.
+distribution. A task computes one motion of the shell and the motions of all models under the same
+load, and keeps only the errors. Other densities need no further motions: density only rescales
+time, for pulse, damping and record together.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from foldyn.writing import write_text
 PULSES = (0.1, 0.25, 0.5, 1.0)  # s
 BEND_LAWS = ("superlinear", "linear")
 CALIBRATIONS = ("standard", "merlin2")
-# Models compared with the shell: the distributions, and equi-inertial in the other orientation.
+# Models compared with the shell: all distributions, and equi-inertial with the other orientation.
 MODELS = (*runs.rules(), *runs.OTHERS)
 
 MOST = 64  # largest stored file (MiB)
 
 
 def stiffnesses(load: Variant = runs.AS_FILED) -> list[Variant]:
-    """Variants of bars and hinges under one load."""
+    """Variants of law and calibration of bars and hinges under one load."""
     laws = product(BEND_LAWS, CALIBRATIONS)
     return [Variant(load.pulse, load.loads, *law) for law in laws]
 
 
 def load_sets(case_file: CaseFile) -> tuple[str, ...]:
-    """Sets of loaded nodes; a single one if the case file loads the whole edge."""
+    """Sets of loaded nodes; a single set if the case file loads the whole edge."""
     loaded = {node for load in case_file.case().loads for node in getattr(load, "nodes", ())}
     return runs.LOADS[:1] if loaded == set(case_file.output.nodes.tolist()) else runs.LOADS
 
@@ -76,8 +76,8 @@ class Comparison(Task):
     case : str
     numerics : Numerics
     load : Variant or None
-        Load under which to compare the frequency content of motions; None compares first
-        frequencies.
+        Load under which the frequency content of motions is compared; with None the first
+        frequencies at rest are compared.
     """
 
     case: str
@@ -93,7 +93,7 @@ class Comparison(Task):
         return f"{self.case}-{what}"
 
     def settings(self) -> dict[str, Any]:
-        """Everything that its result depends on."""
+        """Everything on which the result depends."""
         return {
             "task": self.name,
             "case_file": runs.case_file_digest(self.case),
@@ -103,11 +103,11 @@ class Comparison(Task):
         }
 
     def compute(self, folder: Path) -> list[dict[str, Any]]:
-        """Its rows."""
+        """Compute the rows of the table."""
         return list(self._frequencies() if self.load is None else self._errors(self.load))
 
     def _errors(self, load: Variant) -> Iterator[dict[str, Any]]:
-        """Errors of the frequency content under one load."""
+        """Rows with errors of the frequency content under one load."""
         shown = runs.reported(self.case)
         reference = runs.compute(Job(self.case, runs.REFERENCE, "motion", self.numerics, load))
         for variant in stiffnesses(load):
@@ -118,7 +118,7 @@ class Comparison(Task):
             yield row
 
     def _frequencies(self) -> Iterator[dict[str, Any]]:
-        """First frequencies compared with the shell's."""
+        """Rows that compare first frequencies with the shell's."""
         reference = runs.compute(Job(self.case, runs.REFERENCE, "modes", self.numerics))
         for variant, model in product(stiffnesses(), MODELS):
             ours = runs.compute(Job(self.case, model, "modes", self.numerics, variant))

@@ -1,4 +1,4 @@
-"""Page of the sensitivity: how robust the ranking of the distributions is."""
+"""Page of the sensitivity: robustness of the ranking of the distributions."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def sections(found: Variations, album: Album, tolerance: float) -> list[Section]
 def plot_sensitivity(
     found: Variations, models: Sequence[str], paper: Mapping[str, Mapping[str, float]]
 ) -> Figure:
-    """Draw the errors under all combinations, one frame per case, one row per model.
+    """Draw the errors in all combinations, a frame for each case, a row for each model.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def plot_sensitivity(
 
 
 def opinion(found: Variations) -> str:
-    """Say from the numbers how robust a ranking is."""
+    """Text on how robust a ranking is, from the numbers."""
     parts = []
     paper, names = paper_table(), paper_rules()
     for law in BEND_LAWS:
@@ -178,7 +178,7 @@ def _best_table(
 
 
 def by_load(found: Variations) -> Table:
-    """Best of the five by load, with the files' bars and hinges."""
+    """Table of the best of the five by load, with the files' bars and hinges."""
     tables: list[tuple[Any, Any, variations.Errors]] = []
     for loads, pulse in product(LOADED, PULSES):
         rows = found.chosen(**{**variations.FILED, "loads": loads, "pulse": pulse})
@@ -193,7 +193,7 @@ def by_load(found: Variations) -> Table:
 
 
 def by_stiffness(found: Variations) -> Table:
-    """Best of the five by law and calibration of bends, with the files' load."""
+    """Table of the best of the five by law and calibration of bends, with the files' load."""
     return _best_table(
         found,
         ["bends", "calibration"],
@@ -204,7 +204,7 @@ def by_stiffness(found: Variations) -> Table:
 
 
 def over_all(found: Variations, law: str) -> Table:
-    """Ranks of each distribution over all combinations with one law of the bends."""
+    """Table of ranks of each distribution in all combinations with one law of the bends."""
     chosen = found.chosen(bend_law=law)
     five, every = variations.standings(chosen, paper_rules()), variations.standings(chosen, rules())
     rows: list[list[Any]] = []
@@ -223,7 +223,7 @@ def over_all(found: Variations, law: str) -> Table:
 
 
 def orientations(found: Variations) -> Table:
-    """Equi-inertial masses in both orientations."""
+    """Table of errors of equi-inertial masses in both orientations."""
     rows = []
     for case, filed in found.filed().items():
         every = found.chosen(case=case)
@@ -240,7 +240,7 @@ def orientations(found: Variations) -> Table:
 
 
 def frequencies(found: Variations) -> Table:
-    """Errors of the first frequencies, which do not depend on the load."""
+    """Table of errors of the first frequencies, which do not depend on the load."""
     names = (*rules(), TURNED)
     columns = [
         variations.frequency_errors(

@@ -1,7 +1,7 @@
-"""The case studies and the specimen with other stiffnesses than the paper's.
+"""The case studies and the specimen with stiffnesses other than the paper's.
 
-Small loads on the case studies, and modes and peaks of the specimen, by the models that
-`foldyn.fidelity` compares with the shell. Each computation is kept as rows of a JSON file.
+The models that `foldyn.fidelity` compares with the shell compute the case studies under small
+loads, and modes and peaks of the specimen. Each computation is kept as rows of a JSON file.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from foldyn.studies.herkal.runs import case_file_digest
 from foldyn.studies.herkal.sensitivity import KEPT
 from foldyn.studies.pool import Task
 
-# Files that the results depend on, in addition to the solvers.
+# Files on which results depend, in addition to the solvers.
 COMPUTING = "studies/herkal/stiffnesses.py", "studies/herkal/vibration.py"
 OWN = "own"  # the model of the specimen's case file
 BESIDE = ("standard", "plate", "n5b8e")  # other models whose modes are computed
 PEAKED = (OWN, "plate", "n5b8e")
 SPECIMEN = ("specimen-modes", "specimen-frf")
 MODES = 5
-MESHES = (6, 12)  # divisions of the specimen's shells
-STUDIED = (8, 16)  # and of those of the case studies
+MESHES = (6, 12)  # divisions of the shells for the specimen
+STUDIED = (8, 16)  # divisions of the shells for the case studies
 
 Rows = list[dict[str, Any]]
 
@@ -66,7 +66,7 @@ class Stiffness(Task):
         return f"{self.of}-{self.kind}" if self.kind != "peaks" else f"specimen-{self.of}-peaks"
 
     def settings(self) -> dict[str, Any]:
-        """Everything that its result depends on."""
+        """Everything on which the result depends."""
         files = (self.of,) if self.kind == "small-loads" else SPECIMEN
         mesh = {"divisions": list(self.divisions)} if self.kind == "modes" else {}
         return {
@@ -77,7 +77,7 @@ class Stiffness(Task):
         }
 
     def compute(self, folder: Path) -> Rows:
-        """Its rows."""
+        """Compute the rows of the table."""
         return ROWS[self.kind](self)
 
 
@@ -95,7 +95,7 @@ class Softness(NamedTuple):
     ----------
     case : str
     shell : float
-        Displacement of the loaded nodes along their load, by the shell, m.
+        Displacement of the loaded nodes along their load, computed with the shell, m.
     error : mapping of str to float
     """
 
@@ -105,13 +105,13 @@ class Softness(NamedTuple):
 
 
 def between(values: Callable[[int], Any], meshes: tuple[int, int]) -> Any:
-    """What a shell would give with ever finer meshes, from its values with two of them."""
+    """Value of a shell in the limit of fine meshes, from its values with two meshes."""
     coarse, fine = (np.asarray(values(n)) for n in meshes)
     return extrapolated(coarse, fine, meshes[1] / meshes[0])
 
 
 def softness(name: str) -> Softness:
-    """One of the paper's case studies."""
+    """Displacement and errors for one of the paper's case studies."""
     given = read_case(find_case(f"herkal/{name}")).case("circumcenter")
     pattern, sheet = given.structure.pattern, given.structure.sheet
 
@@ -124,7 +124,7 @@ def softness(name: str) -> Softness:
 
 
 def _small_loads(asked: Stiffness) -> Rows:
-    """Displacement (m) of the shell and relative errors, as in the fidelity study."""
+    """Rows with the displacement (m) of the shell and relative errors, as in the fidelity study."""
     found = softness(asked.of)
     return [{"shell": found.shell, **found.error}]
 
@@ -142,8 +142,8 @@ def specimen_modes(divisions: tuple[int, int] = MESHES, **changes: Any) -> Rows:
     Returns
     -------
     sequence of mappings
-        One per model and mode: model, mode, frequencies `shell` and `frequency` (Hz, None without a
-        partner) and mac.
+        One for each model and mode: model, mode, frequencies `shell` and `frequency` (Hz, None for
+        a mode without a partner) and mac.
     """
     file = vibration.specimen("modes", changes={f"model.{k}": v for k, v in changes.items()})
     secant = file.analysis.arguments["secant"]
@@ -169,7 +169,7 @@ def specimen_peaks(model: str) -> Rows:
     Returns
     -------
     sequence of mappings
-        One per peak: frequency (Hz) and damping, None without half-power points.
+        One for each peak: frequency (Hz) and damping, which is None without half-power points.
     """
     own = {} if model == OWN else {k: v for k, v in MODELS[model].items() if k != "straight"}
     file = vibration.specimen("frf", changes={f"model.{key}": value for key, value in own.items()})
@@ -180,7 +180,7 @@ def specimen_peaks(model: str) -> Rows:
     ]
 
 
-# Computation of each kind.
+# Function that computes each kind.
 ROWS: Mapping[str, Callable[[Stiffness], Rows]] = {
     "small-loads": _small_loads,
     "modes": lambda asked: specimen_modes(asked.divisions),

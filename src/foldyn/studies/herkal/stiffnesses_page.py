@@ -1,4 +1,4 @@
-"""Page sections on other stiffnesses than the paper's: static displacements, the specimen."""
+"""Page sections on stiffnesses other than the paper's: static displacements, the specimen."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from foldyn.studies.herkal.study import Study
 from foldyn.studies.herkal.vibration import ORDINALS
 from foldyn.studies.targets import read_targets
 
-# Models of the fidelity study by the label of their path.
+# Models of the fidelity study, by the label of the equilibrium path they belong to.
 SMALL = {f"{BARS_AND_HINGES}, linear bends": "standard", "plate": "plate", "n5b8e": "n5b8e"}
 PATHS = (BARS_AND_HINGES, *SMALL)
 LABELS = {OWN: "as filed (superlinear bends)", "standard": "standard, linear bends"}
@@ -87,7 +87,7 @@ def _peaks(study: Study) -> dict[str, Rows]:
 
 
 def specimen(modes: Rows | None, peaks: Mapping[str, Rows]) -> list[Section]:
-    """The paper's specimen by these models: modes with the shell's, peaks with the paper's."""
+    """The paper's specimen by these models: modes compared with the shell, peaks with the paper."""
     found: list[Section] = [] if not modes else [_modes(modes)]
     return found if not peaks else [*found, _peak_table(peaks), Text(verdict(peaks))]
 
@@ -120,7 +120,7 @@ def _measured() -> list[float]:
 
 
 def _deviations(rows: Rows) -> list[float]:
-    """Deviations from the paper's peaks, in order; fewer if the model has fewer peaks."""
+    """Deviations from the paper's peaks, in order; as many as the model has peaks."""
     return [row["frequency"] / f - 1.0 for row, f in zip(rows, _measured(), strict=False)]
 
 
@@ -141,7 +141,7 @@ def _peak_table(peaks: Mapping[str, Rows]) -> Table:
 
 
 def verdict(peaks: Mapping[str, Rows]) -> str:
-    """Say which model is closest to the experiment, and that none was fitted to it."""
+    """Text on which model is closest to the experiment, to which none was fitted."""
     off = {
         model: float(np.abs(_deviations(rows)).mean())
         for model, rows in peaks.items()

@@ -1,4 +1,4 @@
-"""The four case studies: their computations, and the tables made from them."""
+"""The four case studies: computations, and tables made from the results."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class StudyPlan:
     numerics : Numerics
     cases : tuple of str
     models : tuple of str
-        Models besides the reference, which is always included.
+        Models in addition to the reference, which is always included.
     shot : Shot
         Settings of the synthetic film of the specimen.
     meshes : tuple of int
-        Divisions of the specimen's shells.
+        Divisions of the shells for the specimen.
     """
 
     numerics: Numerics = field(default_factory=Numerics)
@@ -60,11 +60,11 @@ class StudyPlan:
         ]
 
     def stiffnesses(self) -> list[Stiffness]:
-        """Computations with stiffnesses other than the paper's, in addition to jobs."""
+        """Computations with stiffnesses other than the paper's, in addition to `jobs`."""
         return stiffnesses.tasks(self.cases, self.meshes)
 
     def paths(self) -> dict[str, tuple[str, Variant]]:
-        """Model and variant of each stiffness, by label: mass does not matter in statics."""
+        """Model and variant for each stiffness, by label; mass does not matter in statics."""
         found: dict[str, tuple[str, Variant]] = {}
         for name in (runs.REFERENCE, *self.models):
             stiffness = runs.model_of(name).statics
@@ -76,7 +76,7 @@ class StudyPlan:
 
 FULL = StudyPlan()
 QUICK = StudyPlan(Numerics(divisions=8, dt=0.01), shot=COARSE, meshes=(3, 6))
-VARIED = Numerics(divisions=8, dt=0.01)  # the sensitivity's part
+VARIED = Numerics(divisions=8, dt=0.01)  # resolution of the sensitivity
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ class Study:
 
     @property
     def parts(self) -> tuple[list[Part], list[Part]]:
-        """Computations of the specimen: independent ones, and those that depend on them."""
+        """Computations for the specimen: independent ones, and those that depend on these."""
         return ([], []) if self.data is None else parts(self.plan.shot, self.data)
 
     @property
@@ -128,7 +128,7 @@ class Study:
         return self._read[job]
 
     def rows(self, kind: str, of: str = "specimen") -> Rows | None:
-        """Result of a computation of `stiffnesses`, or None if missing."""
+        """Rows of a computation of `stiffnesses`, or None if missing."""
         task = Stiffness(kind, of, self.plan.meshes)  # type: ignore[arg-type]
         return task.result(self.folder / RESULTS)
 
@@ -136,7 +136,7 @@ class Study:
     def node_errors(
         self, case: str, model: str, variant: Variant = runs.AS_FILED
     ) -> NDArray | None:
-        """Deviation of the frequency content from the shell's, per node."""
+        """Deviation of the frequency content from that of the shell, for each node."""
         reference = self.result(case, runs.REFERENCE, "motion", variant.of_shell)
         motion = self.result(case, model, "motion", variant)
         if reference is None or motion is None:
@@ -149,7 +149,7 @@ class Study:
         return float("nan") if found is None else float(found.mean())
 
     def table(self, models: Iterable[str] | None = None) -> dict[str, dict[str, float]]:
-        """The paper's Table 1: its metric by case and model."""
+        """The numbers of the paper's Table 1, computed: the metric by case and model."""
         names = self.plan.models if models is None else tuple(models)
         return {c: {m: self.error(c, m) for m in names} for c in self.plan.cases}
 
@@ -170,7 +170,7 @@ class Study:
         return {label: path for label, path in found.items() if path is not None}
 
     def frequencies(self, case: str, model: str) -> metric.Partners | None:
-        """Modes of a model matched with the shell's."""
+        """Modes of a model, matched with modes of the shell."""
         reference = self.result(case, runs.REFERENCE, "modes")
         ours = self.result(case, model, "modes")
         if reference is None or ours is None:
@@ -186,9 +186,9 @@ def mean_ranks(table: Mapping[str, Mapping[str, float]], models: Iterable[str]) 
 
 
 def second_table(study: Study) -> dict[str, tuple[int, dict[str, float]]]:
-    """Divisions of OpenSees' finest stored motion, and errors against it, by case.
+    """By case, the divisions of OpenSees' finest stored motion, and errors relative to that motion.
 
-    Cases without one, or with one of another duration than the study's motions, are left out.
+    Cases without such a motion, or with a duration other than that of the study, are left out.
     """
     found = {}
     for case in study.plan.cases:

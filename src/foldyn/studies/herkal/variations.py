@@ -38,11 +38,11 @@ class Variations:
     about : str
         Settings of the computation.
     motions : sequence of mappings
-        One per combination: case, pulse (s), loads, bend_law, calibration, and by model the error
-        of the frequency content.
+        One for each combination: case, pulse (s), loads, bend_law, calibration, and for each model
+        the error of the frequency content.
     frequencies : sequence of mappings
-        One per mode: case, bend_law, calibration, model, mode, frequencies `shell` and `frequency`
-        (Hz, nan without a partner) and mac.
+        One for each mode: case, bend_law, calibration, model, mode, frequencies `shell` and
+        `frequency` (Hz, nan for a mode without a partner) and mac.
     """
 
     about: str
@@ -50,7 +50,7 @@ class Variations:
     frequencies: Sequence[Row]
 
     def chosen(self, **asked: Any) -> list[Row]:
-        """Motions with these values."""
+        """Motions whose settings have the given values."""
         return [row for row in self.motions if all(row[k] == v for k, v in asked.items())]
 
     def filed(self, **changes: Any) -> dict[str, Row]:
@@ -125,7 +125,7 @@ class Standing:
     Attributes
     ----------
     mean_rank : float
-        Mean over the cases of the mean over each one's combinations.
+        Mean rank over the combinations of each case, averaged over the cases.
     worst_rank, best : int
         The worst rank, and the number of combinations in which it is the best.
     median, largest : float
@@ -172,13 +172,13 @@ class Likeness:
     Attributes
     ----------
     within : int
-        Number of entries that differ by less than the tolerance, relative to the other's,
+        Number of entries whose difference, relative to the other table, is below the tolerance.
     of : int
-        out of this many.
+        Number of compared entries.
     median, largest : float
-        Median and largest difference.
+        Median and largest relative difference.
     same_best : int
-        Cases with the same best model.
+        Number of cases with the same best model.
     correlation : float
         Mean rank correlation over the cases.
     """
@@ -208,7 +208,7 @@ def likeness(ours: Errors, theirs: Errors, models: Sequence[str], tolerance: flo
 
 # ---------------------------------------------------------------------- frequencies
 def frequency_errors(rows: Iterable[Row], models: Sequence[str]) -> tuple[dict[str, float], int]:
-    """Mean absolute deviation of each model's frequencies, over modes that all models have.
+    """Mean absolute deviation of each model's frequencies, for modes that all models have.
 
     Return the errors by model, and the number of modes.
     """

@@ -1,4 +1,4 @@
-"""The vibration of the paper's specimen from the shipped cases, compared with the paper.
+"""The vibration of the paper's specimen, computed from shipped cases and compared with the paper.
 
 `python -m foldyn.studies.herkal.vibration` prints the table (about a minute).
 """
@@ -23,7 +23,7 @@ TARGETS = Path(__file__).with_name("targets.toml")
 CORNER, TOP = 0, 3  # top nodes at a corner and in the middle
 HIGHEST = 22.0  # Hz: upper limit of reported peaks
 RELEASED = 2.0  # s: time at which the weight is removed
-SETTLED = 0.05  # s from there to the first minimum
+SETTLED = 0.05  # s from the release to the first minimum
 PAIR, ALONE = Rayleigh(14.4, 4.1e-4), Rayleigh(15.8)
 IN_AIR = {"air.density": 1.204}  # kg/m3
 ORDINALS = ("first", "second", "third")
@@ -38,7 +38,7 @@ class Response:
     frequencies : tuple of float
         Hz.
     damping : tuple of float
-        From the half-power points, textbook formula; nan without them.
+        Damping ratios from half-power points by the textbook formula; nan without such points.
     """
 
     frequencies: tuple[float, ...]
@@ -55,13 +55,13 @@ class Response:
 def specimen(
     name: str, damping: Rayleigh | None = None, changes: Mapping[str, Any] | None = None
 ) -> CaseFile:
-    """Shipped case file of the specimen ("modes", "frf-published", ...), optionally changed.
+    """Shipped case file of the specimen (such as "modes" or "frf-published"), optionally changed.
 
     Parameters
     ----------
     name : str
     damping : Rayleigh, optional
-        Replaces the file's damping.
+        Damping that replaces the damping of the file.
     changes : mapping, optional
         Changed values of keys.
     """
@@ -85,7 +85,7 @@ def response(
     air : bool
         Whether to include the mass of the surrounding air.
     **changes
-        Other arguments of `frf`.
+        Further arguments of `frf`.
     """
     name = "frf-published" if published else "frf"
     damping = replace(damping, state="initial" if published else "rest")
@@ -99,10 +99,11 @@ class Release:
     Attributes
     ----------
     decrement : LogDecrement
-        From the maxima, as in the paper; few of them exceed a tenth of the first.
+        Logarithmic decrement from the maxima, as in the paper; few maxima exceed a tenth of the
+        first.
     frequency, damping_ratio : float
         Frequency (Hz) and damping of the strongest decaying cosine between 7 and 12 Hz: the motion
-        has several modes, which maxima do not separate.
+        has several modes, and maxima do not separate them.
     motion : xarray.Dataset
     """
 
@@ -130,7 +131,7 @@ def shapes(published: bool = False, mass: str = "circumcenter") -> xarray.Datase
 
 
 def vibration() -> list[Verdict]:
-    """The paper's values and ours: stress-free folds, circumcenter mass."""
+    """The paper's values and ours, for stress-free folds and circumcenter mass."""
     pair = response()
     computed = {}
     for which, frequency, ratio in zip(ORDINALS, pair.frequencies, pair.damping, strict=False):

@@ -30,10 +30,10 @@ from foldyn.signals import Pulse, pulse
 from foldyn.structures import Sheet, Structure, discretize
 
 SIDES = 6
-SUBSTEPS = 4  # per critical step, as cells stiffen in tension
+SUBSTEPS = 4  # time steps per critical step at rest, because cells stiffen in tension
 SAMPLES = 1e-3  # s, between samples of a motion
-UNTIL = 0.8  # share of a chain that is evaluated: its end reflects waves
-SHARE = 0.85  # least peak that counts, relative to the cell's largest strain
+UNTIL = 0.8  # share of a chain that is evaluated, because the end reflects waves
+SHARE = 0.85  # smallest peak that counts, relative to the cell's largest strain
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,9 @@ class Unit:
     youngs_modulus, thickness, density : float
         Properties of the sheet (N/m2, m, kg/m3).
     crease : float
-        Stiffness per length (N) of the mountains, the sides and the rings; diagonals have none.
+        Stiffness per length (N) of mountain creases: the sides and the rings; diagonals have none.
     plate_mass : float
-        Mass of a plate, at the corners of its ring (kg).
+        Mass of a plate (kg), which is placed at the corners of its ring.
     plate_stiffness : float
         Stiffness of the springs between three corners (N/m).
     """
@@ -83,7 +83,7 @@ class Unit:
         )
 
     def case(self, structure: Structure, rings: Iterable[int]) -> Case:
-        """A case of a tower with plates on some rings."""
+        """A case of a tower with plates at some rings."""
         supports: list[Any] = []
         for r in rings:
             a, b, c, d, e, f = range(SIDES * r, SIDES * (r + 1))
@@ -101,14 +101,14 @@ class Unit:
 
     @property
     def cell(self) -> UnitCell:
-        """Unit cell of the chain; settings of its lower ring also apply to the upper one."""
+        """Unit cell of the chain; settings of its lower ring also apply to its upper ring."""
         return UnitCell(self.case(self.structure(1), [0]))
 
     @property
     def two_dofs(self) -> LongWaves:
-        """Static stiffness of a cell against elongation and twist of rigid plates, and mass.
+        """Matrices of a cell for elongation and twist of rigid plates: static stiffness, and mass.
 
-        The lower plate is fixed while the upper one moves; creases at the plates, between two
+        The lower plate is fixed while the upper plate moves. Creases at the plates, between two
         cells, do not contribute.
         """
         structure = self.structure(1)
@@ -148,8 +148,8 @@ def guided(found: xarray.Dataset) -> NDArray[np.float64]:
 def dispersion(unit: Unit, count: int = 41) -> xarray.Dataset:
     """Bands of the chain and of the two-dof unit.
 
-    Variables over phase (0 to pi) and branch: `bands` of the chain; `two_dof`; `free`, of the chain
-    without creases, and `free_two_dof`; all in Hz.
+    Variables over phase (0 to pi) and branch, in Hz: `bands` of the chain and `two_dof` of the
+    unit; `free` and `free_two_dof`, the same without creases.
     """
     phases = np.linspace(0.0, np.pi, count)
     free = replace(unit, crease=0.0)
@@ -166,8 +166,9 @@ def dispersion(unit: Unit, count: int = 41) -> xarray.Dataset:
 def impact(unit: Unit, cells: int, velocity: float, duration: float) -> xarray.Dataset:
     """Motion of each cell after an initial velocity (m/s) of the free chain's first plate.
 
-    Variables of `space_time`, the rotation of the plates (rad), and energies (J) and momentum
-    (kg m/s) over time; attributes: the balance of energy, the speeds of long waves (cells per s).
+    The result has the variables of `space_time`, the rotation of the plates (rad), and energies (J)
+    and momentum (kg m/s) over time; attributes are the error of the energy balance and the speeds
+    of long waves (cells per s).
     """
     case = unit.chain(cells)
     start = np.zeros_like(case.structure.nodes)
@@ -204,12 +205,12 @@ class Overtaking:
     compression, rarefaction : Pulse
         Pulses of strain in the cells, except those at the end.
     cell : int
-        Cell that best separates cells where compression peaks first from cells where tension does.
+        First cell from which tension peaks before compression, as the best division of the chain.
     share : float
-        Share of cells from there on in which tension peaks first.
+        Share of the cells from `cell` on in which tension peaks first.
     before : float
         Largest compression of a cell before its highest tension, relative to that tension; median
-        of the last third.
+        over the last third of the cells.
     """
 
     compression: Pulse
@@ -220,7 +221,7 @@ class Overtaking:
 
 
 def overtaking(found: xarray.Dataset) -> Overtaking:
-    """Follow the first high peaks of compression and of tension."""
+    """Follow the first high peaks of compression and of tension through the chain."""
     last = int(UNTIL * found.sizes["gap"])
     strain = found["strain"].values[:, :last]
     time = found["time"].values

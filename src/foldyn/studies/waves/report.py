@@ -22,9 +22,10 @@ TITLE = "Waves in periodic origami"
 STATES = 4  # number of fold states with drawn bands
 FROM, TO = 0.3, 0.7  # part of the chain where the pulse is followed
 SHEETS = {"miura": "Miura", "eggbox": "eggbox"}
-FELT = 0.05  # least compression before the highest tension, relative to it, that counts
-KEPT = 0.2  # largest relative change of height and width of a pulse that keeps its form
-SPEEDS = 0.01  # largest relative difference of equal speeds
+# smallest compression before the highest tension, relative to that tension, that counts
+FELT = 0.05
+KEPT = 0.2  # a pulse keeps its form if height and width change by at most this share
+SPEEDS = 0.01  # speeds count as equal up to this relative difference
 
 
 def write(study: Study) -> Path:
@@ -184,7 +185,7 @@ def _of(pulse: Pulse, cells: slice) -> tuple[float, float]:
 
 
 def verdict(hit: xarray.Dataset, passed: kresling.Overtaking) -> str:
-    """Say from the numbers what agrees with the paper and what does not."""
+    """Text on what agrees with the paper and what does not, from the numbers."""
     slow = float(np.asarray(hit.attrs["long_waves"])[0])
     rare, press = passed.rarefaction, passed.compression
     momentum = hit["momentum"].values
@@ -215,7 +216,7 @@ def verdict(hit: xarray.Dataset, passed: kresling.Overtaking) -> str:
 
 
 def _first(passed: kresling.Overtaking) -> str:
-    """Whether the far part of the chain feels tension first."""
+    """Text on whether the far part of the chain feels tension first."""
     does = "holds" if passed.before < FELT else "does not hold strictly"
     return (
         f"That the end of the chain feels tension first {does}: before it comes a compression of "
@@ -225,7 +226,7 @@ def _first(passed: kresling.Overtaking) -> str:
 
 
 def _form(rare: Pulse) -> str:
-    """Whether the rarefaction keeps its form, like a solitary wave."""
+    """Text on whether the rarefaction keeps its form, like a solitary wave."""
     count = len(rare.arrival) / kresling.UNTIL
     parts = [slice(int(a * count), int(b * count)) for a, b in ((0.3, 0.4), (0.65, 0.75))]
     (early, narrow), (late, wide) = (_of(rare, part) for part in parts)

@@ -1,8 +1,9 @@
 """Bands of Miura and eggbox sheets by fold state.
 
 Pratapa, Suryanarayana and Paulino (J. Mech. Phys. Solids 118, 2018) compute them with bars and
-hinges. Their dimensions and numbers were not available: panels here are as in the paper specimen of
-the other study (25 mm, Canson Mi-Teintes), with the scheme n4b5 and lumped masses.
+hinges. The dimensions and numbers of that paper were not available. Panels here are those of the
+paper specimen of the other study (25 mm, Canson Mi-Teintes), with the scheme n4b5 and lumped
+masses.
 """
 
 from __future__ import annotations
@@ -41,9 +42,9 @@ def fold_states(
 ) -> xarray.Dataset:
     """Bands in fold states, and their gaps.
 
-    Variables: `frequency` (dihedral, phase, band), Hz, along the edge of the zone; `bottom`, `top`
-    (direction, dihedral, below), Hz, of the gaps above `below` bands, nan if there is none, for
-    waves along x only and for the whole zone. Attributes: ticks of the path.
+    Variables: `frequency` (dihedral, phase, band), Hz, along the edge of the zone; `bottom` and
+    `top` (direction, dihedral, below), Hz, the edges of the gap above the lowest `below` bands (nan
+    without a gap), for waves along x only and for the whole zone. Attributes: ticks of the path.
     """
     path = cell_of(kind, 90.0).path(PATH, count)
     frequency, edges = [], np.full((2, 2, len(dihedrals), COUNT), np.nan)

@@ -29,7 +29,7 @@ class Plan:
     dihedrals : int
         Fold states of each sheet, from 20 to 170 degrees.
     phases : int
-        Number of phases along the zone's edge of a sheet, and of the chain.
+        Number of phases along the edge of the zone of a sheet, and of the chain.
     cells : int
         Number of cells of the chain.
     velocity : float

@@ -18,7 +18,7 @@ RESULTS = Path(__file__).parent / "results"
 
 @dataclass(frozen=True, eq=False)
 class Still:
-    """Statics and frequencies of a case at one mesh.
+    """Statics and frequencies of a case with one mesh.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Still:
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """A motion of a case at one mesh and time step.
+    """A motion of a case with one mesh and time step.
 
     Attributes
     ----------

@@ -28,12 +28,12 @@ from foldyn.studies.herkal.specimen.prepared import FreeVibration, prepare
 from foldyn.writing import write_text
 
 FILM_SUPPORT = "glued"
-PROMINENCE = 0.05  # least prominence of a peak, relative to the highest amplitude
+PROMINENCE = 0.05  # smallest prominence of a peak, relative to the highest amplitude
 NEAR = (4.0, 14.0)  # Hz: band of the axial vibration
-FINER = 8  # refinement of the frequency grid relative to the resolution
+FINER = 8  # points of the frequency grid per interval of resolution
 UNLIKE = 0.2  # largest misfit of nodes to a state of the model, relative to their displacement
 SAME = 1e-4  # m: largest difference of rest positions
-FACTORS = np.linspace(0.0, 1.1, 34)  # load factors to search for measured shapes
+FACTORS = np.linspace(0.0, 1.1, 34)  # load factors that are searched for measured shapes
 
 
 def load_factor(path: xr.Dataset, nodes: Sequence[int], moved: NDArray[np.float64]) -> float:
@@ -45,7 +45,7 @@ def load_factor(path: xr.Dataset, nodes: Sequence[int], moved: NDArray[np.float6
         Result of `foldyn.studies.herkal.calibration.pressed`.
     nodes : sequence of int
     moved : ndarray, shape (m,)
-        Displacement along x (m), NaN for nodes not seen.
+        Displacement along x (m); NaN for nodes that were not seen.
 
     Raises
     ------
@@ -92,11 +92,11 @@ def _along(path: xr.Dataset, nodes: Sequence[int]) -> CubicSpline:
 def static_test(
     photos: xr.Dataset, label: str, changes: Mapping[str, Any] | None = None
 ) -> list[Measurement]:
-    """Forces over displacements of the top, and shapes of the front, from tracked photographs.
+    """Forces at displacements of the top, and shapes of the front, from tracked photographs.
 
-    The straight edge of the top shows no corners once loaded: its displacement is taken from the
-    model's state that best fits the corners below. The specimen is not glued: sliding along y is
-    ignored.
+    The straight edge of the top shows no corners once it is loaded, so its displacement is taken
+    from the model's state that best fits the corners below. The specimen is not glued, so sliding
+    along y is ignored.
 
     Parameters
     ----------
@@ -105,12 +105,12 @@ def static_test(
     label : str
         Label of the data.
     changes : mapping, optional
-        Values of the model, by key, for the compared states.
+        Changed values of the model whose states are compared, by key.
 
     Raises
     ------
     InputError
-        No loads, or displacements that match no state of the model.
+        There are no loads, or displacements match no state of the model.
     """
     check_tracks(photos)
     loads = photos["load"].values if "load" in photos.coords else np.zeros(photos.sizes["photo"])
@@ -143,12 +143,12 @@ def static_test(
 
 
 def check_tracks(tracks: xr.Dataset) -> None:
-    """Refuse tracks that are not of the specimen seen from the front.
+    """Refuse tracks that do not show the specimen from the front.
 
     Raises
     ------
     InputError
-        No model, another sheet, or x unknown.
+        The tracks have no model, show another sheet, or lack displacements along x.
     """
     rest = calibration.shipped("specimen").pattern.vertices[list(FRONT)]
     if "displacement" not in tracks:
@@ -192,16 +192,16 @@ def fit_release(
     step: float = calibration.STEP,
     **options: Any,
 ) -> Released:
-    """Fit the damping to node 8 only, on the plate with node 59 glued and without glue.
+    """Fit the damping to node 8 only: with node 59 glued to the plate, and without glue.
 
     Parameters
     ----------
     measured : TimeHistory
         Histories of the tracked nodes along x, beginning before the release.
     models : Path
-        Receives the case files of the models, a folder for each support.
+        Folder that receives the case files of the models, a subfolder for each support.
     changes : mapping
-        Values that the static test has changed in the case, by key.
+        Values of the case that the static test has changed, by key.
     step : float
         Time step of the simulations (s).
     **options
@@ -230,7 +230,7 @@ def press_of(free: FreeVibration, changes: Mapping[str, Any] | None = None) -> f
     Raises
     ------
     InputError
-        Their displacements match no state of the model.
+        Displacements of the front nodes match no state of the model.
     """
     front = np.where(np.isin(free.nodes, FRONT), free.before, np.nan)
     return FULL * load_factor(calibration.pressed(FACTORS, changes), free.nodes, front)
@@ -269,9 +269,9 @@ def compared(
     Returns
     -------
     xarray.Dataset
-        In m: `measured` (time, node), NaN while a node was lost; `whole` (time, node), with short
-        gaps filled, and NaN throughout for nodes with longer ones; `model` (support, time, node);
-        and `true` (time, node) if known.
+        Displacements in m: `measured` (time, node), NaN while a node was lost; `whole` (time,
+        node), with short gaps filled, and NaN throughout for nodes with longer gaps; `model`
+        (support, time, node); and `true` (time, node) if the truth is known.
     """
     front = [node for node in released.free.nodes if node in FRONT]
     one = released.free.of(front, "front nodes")
@@ -308,14 +308,14 @@ def content(x: NDArray[np.float64], step: float) -> tuple[NDArray, NDArray] | No
 
 @dataclass(frozen=True)
 class Vibration:
-    """Axial vibration of a record; nan if there is none.
+    """Axial vibration of a record; nan if the record does not vibrate.
 
     Attributes
     ----------
     peak : float
         Frequency (Hz) of the highest peak of the amplitude spectrum.
     frequency, damping_ratio : float
-        From the maxima over time, by the logarithmic decrement (Hz).
+        Frequency (Hz) and damping ratio from the maxima over time, by the logarithmic decrement.
     """
 
     peak: float = math.nan
@@ -339,7 +339,7 @@ def vibration_of(x: NDArray[np.float64], step: float) -> Vibration:
 
 
 def misfit(film: NDArray[np.float64], model: NDArray[np.float64]) -> float:
-    """Root mean square of the difference, relative to the measured samples."""
+    """Root mean square of the difference, divided by that of the measured samples."""
     known = np.isfinite(film)
     return float(np.linalg.norm((model - film)[known]) / np.linalg.norm(film[known]))
 

@@ -1,4 +1,4 @@
-"""Data for the study of the specimen: measured files, or synthetic data without any."""
+"""Data for the study of the specimen: measured files, or synthetic data if no file is given."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ AXIS = "x"
 
 @dataclass(frozen=True)
 class Data:
-    """Measured files; synthetic data if there are none.
+    """Measured files; data are synthetic if there are no files.
 
     Attributes
     ----------
     static : Path or None
-        Forces over displacements or shapes (CSV), or tracks of photographs with loads.
+        Forces at displacements, or shapes (CSV), or tracks of photographs with loads.
     release : Path or None
         A film, its tracks, or histories (CSV).
     """
@@ -41,7 +41,7 @@ class Data:
 
     @property
     def film(self) -> Path | None:
-        """The release, if it is a film still to be tracked."""
+        """The file of the release, if it is a film that is still to be tracked."""
         is_film = self.release is not None and self.release.suffix.lower() not in (".nc", ".csv")
         return self.release if is_film else None
 
@@ -67,8 +67,8 @@ def data_of(names: Sequence[str]) -> Data:
     Raises
     ------
     InputError
-        A file cannot be read, is of neither a static test nor a release, or there are two of a
-        kind.
+        A file cannot be read, holds neither a static test nor a release, or there are two files of
+        a kind.
     """
     found: dict[str, Path] = {}
     for name in names:
@@ -91,7 +91,7 @@ def measurement(file: Path, label: str) -> Measurement:
 
 
 def _kind(file: Path) -> str:
-    """Kind of a file: of a static test ("static") or of a release ("release").
+    """Kind of measurement in a file: a static test ("static") or a release ("release").
 
     All errors in the file are reported here, before anything is computed.
     """
@@ -144,5 +144,5 @@ def _digest(file: Path) -> str:
 
 @cache
 def _digest_of(file: Path, size: int, changed: int) -> str:
-    """Digest of a file with this size and time, cached, as a long film takes seconds."""
+    """Digest of a file with this size and time, cached because a long film takes seconds."""
     return file_digest(file)

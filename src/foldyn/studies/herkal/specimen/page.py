@@ -1,4 +1,4 @@
-"""Sections of the study's page on the specimen, with figures of its film and its model."""
+"""Sections of the study's page on the specimen, with figures of the film and of the model."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from foldyn.studies.herkal.vibration import CORNER, ORDINALS, TARGETS, Response
 from foldyn.studies.targets import Target, read_targets
 
 WIDTH = 9.0  # inches
-COLUMNS = 3  # front nodes per row of the pattern
+COLUMNS = 3  # number of front nodes in a row of the pattern
 SUPPORT_NAMES = {
     "glued": "plate, node 59 glued",
     "plate": "plate alone (ideal)",
@@ -39,7 +39,7 @@ SUPPORT_NAMES = {
 
 
 def plot_front(front: xr.Dataset, support: str, label: str, note: str) -> Figure:
-    """Draw all front nodes of the film and of the model over time, one frame each."""
+    """Draw all front nodes of the film and of the model against time, a frame for each node."""
     measured, model = front["measured"], front["model"].sel(support=support)
     curves = {
         node: (front["time"].values, measured.sel(node=node).values, model.sel(node=node).values)
@@ -49,7 +49,7 @@ def plot_front(front: xr.Dataset, support: str, label: str, note: str) -> Figure
 
 
 def plot_front_content(front: xr.Dataset, support: str, label: str, note: str) -> Figure:
-    """Draw amplitude spectra of all front nodes of the film and of the model, one frame each."""
+    """Draw amplitude spectra of all front nodes of the film and of the model, a frame for each."""
     step = sampling_interval(front["time"].values)
     curves = {}
     for node in front["node"].values.tolist():
@@ -155,9 +155,9 @@ def sections(folder: Path, parts: Sequence[Part], album: Album) -> list[Section]
     folder : Path
         Folder of the results.
     parts : sequence of Part
-        The fit, and the response after it.
+        The fit, and the response computed with it.
     album : Album
-        Receives the figures.
+        Album that receives the figures.
     """
     fit, response = parts
     if not fit.there(folder):
@@ -296,7 +296,7 @@ def _release(folder: Path, found: dict[str, Any], fit: Part, album: Album) -> li
 
 
 def _vibrations(front: xr.Dataset, data: Data) -> list[Section]:
-    """Vibration of the watched node, quality of its track, and the effect of the supports."""
+    """Vibration of the watched node, quality of the tracks, and the effect of the supports."""
     step, at = sampling_interval(front["time"].values), front.sel(node=WATCHED)
     curves = {f"{data.label}, as filmed": at["whole"]}
     if "true" in front:

@@ -18,35 +18,35 @@ from foldyn.experiment import TimeHistory
 from foldyn.studies.herkal.calibration import SEEN, WATCHED
 
 GAP = 1 / 30  # s, longest gap that is filled: a third of a period
-SLOWEST = 60.0  # least frames per second
+SLOWEST = 60.0  # smallest number of frames per second
 SLACK = 0.015  # s, largest error of the instant of the release
-SETTLED = 0.1  # share of the record over which the final position is averaged
-ROUNDED = 0.01  # largest rounding error of times, relative to their interval
-FEWEST = 0.5  # least share of frames in which a node must be measured
-HELD = 0.0125  # s: least time that it is still before the release
+SETTLED = 0.1  # share of the record, at its end, over which the final position is averaged
+ROUNDED = 0.01  # largest rounding error of times, relative to the interval between them
+FEWEST = 0.5  # smallest share of frames in which a node must be measured
+HELD = 0.0125  # s: shortest time for which the node must stand still before the release
 AVERAGED = 0.05  # s, over which the held position is averaged
-STILL = 0.05  # largest drift of the held node, relative to its motion
-SLOW = 0.1  # largest speed of a held node, relative to its maximum
-ENOUGH = 8  # least number of frames with the watched node
+STILL = 0.05  # largest drift of the held node, relative to its motion after the release
+SLOW = 0.1  # largest speed of a held node, relative to its maximum speed
+ENOUGH = 8  # smallest number of frames in which the watched node is measured
 
 
 @dataclass(frozen=True, eq=False)
 class FreeVibration:
-    """Histories of a release from the first turning point on.
+    """Histories of a free vibration from the first turning point after a release.
 
     Attributes
     ----------
     history : TimeHistory
-        All nodes relative to their final positions, NaN while lost; time is 0 at the release, as
-        far as known.
+        Displacements of all nodes relative to their final positions, NaN while lost; time is 0 at
+        the release, as accurately as it is known.
     whole : ndarray, shape (t, m)
-        The same with short gaps filled; NaN throughout for nodes lost for longer.
+        The same displacements with short gaps filled; NaN throughout for nodes with longer gaps.
     before : ndarray, shape (m,)
-        Displacement of these nodes before the release (m), relative to the final position.
+        Displacement of the nodes before the release (m), relative to the final position.
     released : float
         Time of the release in the record (s).
     steps : mapping of str to (time, values)
-        The watched node after each step (s, m).
+        Record of the watched node after each step (s, m).
     """
 
     history: TimeHistory
@@ -68,7 +68,8 @@ class FreeVibration:
     def whole_of(self, one: TimeHistory) -> TimeHistory | None:
         """The history of nodes never lost for long, with gaps filled; None if there are none.
 
-        The model is not shifted in time to fit it, as spectra do not depend on that.
+        The model is not shifted in time to fit this history, because spectra do not depend on
+        shifts.
         """
         columns = [self.nodes.index(node) for node in numbers_of(one)]
         kept = [k for k in columns if np.isfinite(self.whole[:, k]).all()]
@@ -84,12 +85,12 @@ def numbers_of(history: TimeHistory) -> list[int]:
 
 
 def _release_of(x: NDArray[np.float64], step: float, name: str) -> tuple[int, int]:
-    """Find the release, where the fastest motion of a record begins.
+    """Find the release: the beginning of the fastest motion of a record.
 
     Parameters
     ----------
     x : ndarray, shape (n,)
-        Record of a node, NaN while lost.
+        Record of a node; NaN while it is lost.
     step : float
         Sampling interval (s).
     name : str
@@ -98,12 +99,12 @@ def _release_of(x: NDArray[np.float64], step: float, name: str) -> tuple[int, in
     Returns
     -------
     first, released : int
-        Samples between which the node is held still, up to the last one before the release.
+        First and last sample of the time in which the node is held still; the release follows.
 
     Raises
     ------
     InputError
-        Too few samples, or the node is not still before it moves.
+        There are too few samples, or the node is not still before it moves.
     """
     known = np.flatnonzero(np.isfinite(x))
     if known.size < ENOUGH:
@@ -127,7 +128,7 @@ def _release_of(x: NDArray[np.float64], step: float, name: str) -> tuple[int, in
 
 
 def _filled(x: NDArray[np.float64], start: int, stop: int, gap: int) -> NDArray[np.float64]:
-    """Part of a record with short gaps filled; NaN throughout if it was lost for longer."""
+    """Part of a record with short gaps filled; NaN throughout if a gap is longer."""
     known = np.flatnonzero(np.isfinite(x))
     before, after = known[known <= start], known[known >= stop - 1]
     if not before.size or not after.size:
@@ -151,7 +152,7 @@ def prepare(measured: TimeHistory) -> FreeVibration:
     ------
     InputError
         The watched node was not measured, is not still before the release, was lost for long while
-        it swings, or does not swing; fewer than 60 frames per second.
+        it swings, or does not swing; or there are fewer than 60 frames per second.
     """
     nodes, name = numbers_of(measured), f"{measured.name}: node {WATCHED}"
     if WATCHED not in nodes:
@@ -199,7 +200,7 @@ def prepare(measured: TimeHistory) -> FreeVibration:
 
 
 def _even(time: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Evenly spaced times, if the given ones differ from them only by rounding."""
+    """Evenly spaced times, if the given times differ from even spacing only by rounding."""
     even = np.linspace(time[0], time[-1], len(time))
     if np.abs(time - even).max() > ROUNDED * (even[1] - even[0]):
         signals.sampling_interval(time)  # reports the error
@@ -231,7 +232,7 @@ def _known(x: NDArray[np.float64], name: str, gap: int) -> tuple[int, NDArray[np
 
 
 def _mean(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean over time of the measured samples, shape (m,); NaN for nodes without any."""
+    """Mean over time of the measured samples, shape (m,); NaN for nodes without samples."""
     known = np.isfinite(x)
     count = known.sum(axis=0)
     return np.where(count > 0, np.where(known, x, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)

@@ -25,7 +25,7 @@ from foldyn.studies import find_case
 from foldyn.studies.herkal import calibration
 
 SOFTER = {"sheet.youngs_modulus": 0.97 * 1.219e9}  # Pa: 3 % softer than the model
-RATIO, TIME = 0.05, 0.5  # of the creases' branch: relative stiffness, relaxation time (s)
+RATIO, TIME = 0.05, 0.5  # relaxing branch of the creases: relative stiffness, relaxation time (s)
 RELAXING: Mapping[str, Any] = {
     "model.fold_law": {
         "kind": "prony",
@@ -34,7 +34,8 @@ RELAXING: Mapping[str, Any] = {
         "law": read_document(find_case("herkal/specimen-release"))["model"]["fold_law"],
     }
 }
-OTHERWISE: Mapping[str, Any] = {  # the model: circumcenter masses, elastic creases
+# changes to the model, which has circumcenter masses and elastic creases
+OTHERWISE: Mapping[str, Any] = {
     **SOFTER,
     **RELAXING,
     "model.mass": "consistent",
@@ -50,7 +51,7 @@ class Shot:
     Attributes
     ----------
     size : tuple of int
-        Width and height (pixels); the paper's by default.
+        Width and height (pixels); by default as in the paper.
     metres_per_pixel : float
         Scale in the plane through the front of the specimen.
     distance : float
@@ -94,7 +95,7 @@ def photograph(folder: Path, shot: Shot) -> list[Path]:
     Returns
     -------
     list of Path
-        load0.png to load3.png, in a folder that exists.
+        The files load0.png to load3.png, in a folder that must exist.
     """
     path = calibration.pressed([0.0, *calibration.weighed(SOFTER)], SOFTER)
     photos, _ = experiment.photos_of(
@@ -113,7 +114,7 @@ def film(
 ) -> experiment.SyntheticFilm:
     """Film a sheet that is held and released; write its case file to the folder.
 
-    changes : its differences from the model, by key.
+    changes : values of keys in which the filmed sheet differs from the model.
     """
     moved = released(folder, shot, changes)
     return experiment.film_of(

@@ -26,7 +26,7 @@ from foldyn.studies.herkal.specimen.synthetic import PAPERS, Shot
 from foldyn.studies.pool import Task
 from foldyn.writing import scratch, whole, write_text
 
-# Files and folders that the results depend on, in addition to the solvers.
+# Files and folders on which results depend, in addition to the solvers.
 COMPUTING = (
     "experiment", "studies/herkal/calibration.py", "studies/herkal/vibration.py",
     "studies/herkal/specimen", "studies/herkal/cases",
@@ -48,20 +48,20 @@ def _write_stamp(file: Path, stamp: str, files: dict[str, str]) -> None:
     write_text(f"{stamp}\n{json.dumps(files)}\n", file)
 
 
-# the files of a part with their digests; `Part.result` reports damage by file name
+# a part's files with their digests; `Part.result` reports damage by the name of the file
 STAMPS: Store[dict[str, str]] = Store(_read, _write_stamp, warns=False)
 
 
 @dataclass(frozen=True)
 class Part(Task):
-    """A part of the study; its result are the digests of its files, by name.
+    """A part of the study; its result is the digests of the part's files, by file name.
 
     Attributes
     ----------
     part : str
         One of `PARTS`.
     shot : Shot
-        Settings of the synthetic film; photographs always have the paper's.
+        Settings of the synthetic film; photographs always have the paper's settings.
     data : Data
     """
 
@@ -72,7 +72,7 @@ class Part(Task):
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Name of the part."""
         return f"specimen-{self.part}"
 
     @property
@@ -81,7 +81,7 @@ class Part(Task):
         return NOTE if self.data.synthetic else ""
 
     def settings(self) -> dict[str, Any]:
-        """Everything that its result depends on."""
+        """Everything on which the result depends."""
         shot = asdict(self.shot) if self.data.synthetic else {}
         data = self.data.digests()
         if self.part == "film":
@@ -102,12 +102,12 @@ class Part(Task):
         return files
 
     def compute(self, folder: Path) -> dict[str, str]:
-        """Write its files into a folder.
+        """Write the files of the part into a folder.
 
         Raises
         ------
         ComputationError
-            A part that it needs has not been computed.
+            A part on which this part depends has not been computed.
         """
         inside = folder / FOLDER
         inside.mkdir(parents=True, exist_ok=True)
@@ -150,7 +150,7 @@ def _film(part: Part, folder: Path) -> None:
     if part.data.film is not None:
         _tracked(part, part.data.film, folder)
         return
-    with scratch(folder, FILM) as there:  # it takes most of a gigabyte
+    with scratch(folder, FILM) as there:  # the film takes most of a gigabyte
         file = there / synthetic.TRACKED
         film = synthetic.film(there, part.shot)
         experiment.write_film(film, file)
@@ -199,7 +199,7 @@ def _fit(part: Part, folder: Path) -> None:
     static = _static(part, folder)
     if static:
         folds = calibration.fit_folds(static, **kept)
-        if len(static) > 1:  # displacements assumed other folds: redo them
+        if len(static) > 1:  # displacements were found with other folds: find them anew
             static = _static(part, folder, calibration.changes_of(folds))
             folds = calibration.fit_folds(static, **kept)
         changes = calibration.changes_of(folds)
@@ -247,7 +247,7 @@ def _response(part: Part, folder: Path) -> None:
         save(vibration.specimen("modes", changes=given).run(), folder / name)
 
 
-# Computation of each part, and the files that it leaves for other parts or for the page.
+# Computation of each part, and the files that it writes for other parts or for the page.
 PARTS: Mapping[str, tuple[Callable[[Part, Path], None], tuple[str, ...]]] = {
     "photographs": (_photographs, (PHOTOS,)),
     "film": (_film, (FILM, TRUTH)),
