@@ -44,7 +44,7 @@ def _asymmetry(study: Study, models: Iterable[str]) -> float:
 
 
 def second_peak_case1(study: Study) -> float:
-    """Peak (Hz) of the spectrum of the difference of the two nodes, equi-inertial."""
+    """Peak (Hz) of the spectrum of the difference between the two nodes (equi-inertial masses)."""
     motion = _motion(study, "case1", "equi_inertial")
     if motion is None:
         return NO_VALUE

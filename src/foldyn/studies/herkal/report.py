@@ -327,7 +327,7 @@ def _statics(found: Mapping[str, NDArray], nodes: list[int], force: float) -> Ta
 def _plot_statics(
     paths: Mapping[str, xarray.Dataset], nodes: Sequence[int], axis: str, force: float
 ) -> Figure:
-    """Draw the force (N at factor 1) on each loaded node over its displacement, a frame each."""
+    """Draw the force (N at factor 1) on each loaded node against displacement, a frame each."""
     figure = style.new_figure(9.0, 3.4)
     frames = figure.subplots(1, len(nodes), squeeze=False, sharey=True)[0]
     for frame, node in zip(frames, nodes, strict=True):

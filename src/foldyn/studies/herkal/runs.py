@@ -75,7 +75,7 @@ class Variant:
 
     @property
     def of_shell(self) -> Variant:
-        """Changes that apply to the shell, which has neither bends nor their calibration."""
+        """Changes that apply to the shell, which has neither bends nor a calibration of them."""
         return replace(self, bend_law=None, calibration=None)
 
 

@@ -134,7 +134,7 @@ def opinion(found: Variations) -> str:
 
 
 def one_at_a_time(found: Variations, tolerance: float) -> Table:
-    """Distance of the table from the paper's, and its change, as one setting varies at a time."""
+    """Table of agreement with the paper, and of changes of errors, for one change at a time."""
     names, filed = paper_rules(), found.filed()
     rows: list[list[Any]] = []
     for what, change in CHANGES.items():

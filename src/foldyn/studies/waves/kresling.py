@@ -205,7 +205,7 @@ class Overtaking:
     compression, rarefaction : Pulse
         Pulses of strain in the cells, except those at the end.
     cell : int
-        First cell from which tension peaks before compression, as the best division of the chain.
+        Cell that best divides the chain: before it compression peaks first, from it on tension.
     share : float
         Share of the cells from `cell` on in which tension peaks first.
     before : float

@@ -76,7 +76,7 @@ def fold_states(
 
 
 def widest(found: xarray.Dataset, direction: str) -> tuple[float, float, float]:
-    """Dihedral (degrees) and edges (Hz) of the gap widest relative to its middle, or nan."""
+    """Dihedral (degrees) and edges (Hz) of the gap of largest ratio of width to middle, or nan."""
     bottom, top = (found[name].sel(direction=direction).values for name in ("bottom", "top"))
     width = np.nan_to_num((top - bottom) / (top + bottom))
     k, below = np.unravel_index(width.argmax(), width.shape)

@@ -237,7 +237,7 @@ def press_of(free: FreeVibration, changes: Mapping[str, Any] | None = None) -> f
 
 
 def motions(released: Released) -> dict[str, xr.Dataset]:
-    """Motions of the model with every support; damping not fitted is taken from the film's support.
+    """Motions of the model with every support; without a fit, the film's support gives damping.
 
     Returns
     -------

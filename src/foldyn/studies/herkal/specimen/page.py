@@ -87,7 +87,7 @@ def _grid(
 
 
 def plot_supports(front: xr.Dataset, label: str, note: str) -> Figure:
-    """Draw the watched node of the film and of the model with each support, and their spectra."""
+    """Draw motion and spectrum of the watched node in the film and with each support."""
     figure = style.new_figure(WIDTH, 3.6, note)
     left, right = figure.subplots(1, 2)
     style.frame(left, "time (s)", "x displacement (mm)", f"node {WATCHED}")
@@ -220,7 +220,7 @@ def _static(folder: Path, found: dict[str, Any], data: Data) -> list[Section]:
 
 
 def _estimates(fits: Mapping[str, dict[str, Any]], truth: Mapping[str, float], data: Data) -> Table:
-    """Fitted parameters with intervals and the paper's values, by support if it has a name."""
+    """Table of fitted parameters with intervals and the paper's values, for each named support."""
     rows = [
         [*filter(None, [SUPPORT_NAMES.get(support)]), SYMBOLS[one["key"]], one["value"],
          one["lower"], one["upper"], truth[one["key"]], one["note"]]
@@ -339,7 +339,7 @@ def _tracked(front: xr.Dataset) -> list[Section]:
 
 
 def _glue(held: float, alone: float, paper: float) -> str:
-    """Effect of the supports on the frequency (Hz), and whether it distinguishes them."""
+    """Text on the effect of the supports on the frequency (Hz), which may tell them apart."""
     if not math.isfinite(held) or not math.isfinite(alone):
         return "With one of the supports the model has no peak where it is sought."
     text = (

@@ -66,7 +66,7 @@ class FreeVibration:
         return replace(self.history, nodes=nodes, values=self.history.values[:, columns], name=name)
 
     def whole_of(self, one: TimeHistory) -> TimeHistory | None:
-        """The history of nodes never lost for long, with gaps filled; None if there are none.
+        """History of nodes that were never lost for long, with gaps filled; None without them.
 
         The model is not shifted in time to fit this history, because spectra do not depend on
         shifts.
@@ -219,7 +219,7 @@ def _turn(swing: NDArray[np.float64], name: str) -> int:
 
 
 def _known(x: NDArray[np.float64], name: str, gap: int) -> tuple[int, NDArray[np.float64]]:
-    """Record of the watched node after its last long gap, and where it begins."""
+    """Record of the watched node after its last long gap, and the index of its first sample."""
     known = np.flatnonzero(np.isfinite(x))
     long = np.flatnonzero(np.diff(known) - 1 > gap)
     first, last = (int(known[long[-1] + 1]) if len(long) else int(known[0])), int(known[-1])

@@ -93,7 +93,7 @@ class Part(Task):
         return folder / FOLDER / f".{self.part}.done"
 
     def result(self, folder: Path) -> dict[str, str] | None:
-        """Its files; None if one is missing, damaged, or computed with other settings."""
+        """Digests of the files; None if one is missing, damaged, or made with other settings."""
         files = super().result(folder)
         for name, digest in (files or {}).items():
             if _digest(folder / FOLDER / name) != digest:
