@@ -148,7 +148,7 @@ def _cell_fields(mesh: Mesh, known: Mapping[str, Field]) -> dict[str, NDArray]:
 
 
 def _along(result: xr.Dataset, dimension: str, *rest: str) -> dict[str, NDArray]:
-    """Scalars and vectors of a result along a dimension, which may have further dimensions."""
+    """Scalars and vectors of a result along a dimension and, if given, along further dimensions."""
     shapes = {(dimension, *rest), (dimension, *rest, "axis")} if rest else {(dimension,)}
     return {
         str(name): each.values

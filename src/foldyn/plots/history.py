@@ -46,9 +46,9 @@ def plot_history(
         Direction shown: one of "x", "y", "z" for all nodes, or one for each node (a sequence of
         length one serves all). None: the direction in which each node moves most.
     max_frequency : float or None
-        Upper end of the frequency axis (Hz). None: a round number above the last frequency at
-        which any curve of a node has 2 % of the height of that node's highest curve; at most half
-        the smallest sampling frequency.
+        Upper end of the frequency axis (Hz). None: a round number above the last frequency at which
+        any curve of a node has 2 % of the height of that node's highest curve; at most half the
+        smallest sampling frequency.
     title : str
         Title of the figure.
     window, detrend : str or None

@@ -25,7 +25,7 @@ from foldyn.structures.mesh import double_areas
 
 
 class States(NamedTuple):
-    """States (samples, ...) of panels and of creases, which have one or more of k hinges each.
+    """States (samples, ...) of panels and creases; some creases have several of the k hinges.
 
     turn : rotation (samples, nf) from rest, without the rotation of the adjacent panels, rad.
     moment : of the whole crease, N m.

@@ -135,8 +135,8 @@ def fit(
         `DampingRatios`, `ModeShapes`, `FrequencyResponse`.
     parameters : sequence of Parameter
     ties : mapping of str to str, optional
-        Keys that depend on parameters, such as ``{"model.fold_law.theta2": "360 -
-        model.fold_law.theta1"}``.
+        Keys that depend on parameters, such as
+        ``{"model.fold_law.theta2": "360 - model.fold_law.theta1"}``.
     searches : int
         Number of searches: the first begins from the given values, the others from random values
         within the bounds.

@@ -19,7 +19,7 @@ from foldyn.values import choice
 IMPOSED = "imposed"  # as `nodes`: all nodes that supports of the case move along the axis
 QUANTITIES = ("displacement", "position")
 MOST = 8  # largest number of nodes, and of shapes, in pages and figures
-POINTS = 25  # number of points of the model's curve beside measured forces
+POINTS = 25  # number of points of the curve drawn through measured forces
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

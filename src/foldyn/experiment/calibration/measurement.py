@@ -162,7 +162,7 @@ def plain_array(name: str, values: Any) -> NDArray:
 
 
 def spread(observed: NDArray) -> float:
-    """Spread of measured values: their weight if the standard error is unknown."""
+    """Spread of measured values, which stands for their standard error if that is unknown."""
     return float(np.std(observed)) or float(np.abs(observed).max()) or 1.0
 
 

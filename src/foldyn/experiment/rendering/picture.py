@@ -120,7 +120,7 @@ def grain_tile(look: Look, rng: np.random.Generator) -> NDArray[np.float32]:
     """Reflectance of the paper on a square of texels that tiles seamlessly."""
     frequency = np.hypot(np.fft.fftfreq(_TILE)[:, np.newaxis], np.fft.rfftfreq(_TILE))
     frequency[0, 0] = np.inf
-    # fibers of all lengths, mostly long ones, as in real paper
+    # fibers of all lengths, more long ones than short ones, as in real paper
     noise = np.fft.irfft2(np.fft.rfft2(rng.standard_normal((_TILE, _TILE))) / frequency**0.7)
     tile = look.paper * (1.0 + look.grain * noise / noise.std())
     return np.clip(tile, 0.0, 1.0).astype(np.float32)

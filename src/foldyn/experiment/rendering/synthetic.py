@@ -171,7 +171,7 @@ def photos_of(
     sensor: Sensor | None = None,
     seed: int = 0,
 ) -> tuple[list[NDArray[np.uint8]], xr.Dataset]:
-    """Photographs of equilibria, each with its own noise, and the truth as `truth` of a film.
+    """Photographs of equilibria, each with its own noise, and the truth, laid out as for films.
 
     Parameters
     ----------

@@ -92,8 +92,8 @@ LOST, FOUND_AGAIN, TRACKED = 0, 1, 2
 _MARGIN = 220  # margin (pixels) of the part of the picture around all points
 _NEIGHBORS, _FIRMNESS = 8, 0.05  # number of neighbors and firmness in `by_neighbors`
 _STRAY = 0.4  # largest distance from a guide's prediction, relative to the reach
-_SURE = 0.3  # a guide is trusted if neighbors are closer to it than this share of the reach
-_CLEAR = 0.55  # error, relative to the allowed one, at which corners of few edges are found again
+_SURE = 0.3  # a guide is trusted if neighbors deviate less from its prediction, relative to reach
+_CLEAR = 0.55  # corners of few edges are found again up to this share of the allowed error
 _MOST_MISSES = 3  # after this many frames, only a guide finds a lost corner of two edges again
 
 # Maps the positions of points (p, 2), NaN if lost, to their predicted positions.

@@ -69,6 +69,7 @@ SUPPORTS: Mapping[str, list[dict[str, Any]]] = {
     "glue alone": [{"nodes": [59], "axes": "xyz"}],
 }
 # Displacement of the top before the release (m).
+#
 # Released from the 20 mm of the smallest weight, the sheet would not swing with this damping: K0 is
 # the stiffness at rest throughout, and resists the large rotations of the panels.
 PRESSED = 0.005

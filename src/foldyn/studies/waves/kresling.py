@@ -30,7 +30,7 @@ from foldyn.signals import Pulse, pulse
 from foldyn.structures import Sheet, Structure, discretize
 
 SIDES = 6
-SUBSTEPS = 4  # time steps per critical step at rest, because cells stiffen in tension
+SUBSTEPS = 4  # time steps per critical step, because cells stiffen in tension
 SAMPLES = 1e-3  # s, between samples of a motion
 UNTIL = 0.8  # share of a chain that is evaluated, because the end reflects waves
 SHARE = 0.85  # smallest peak that counts, relative to the cell's largest strain
