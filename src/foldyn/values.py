@@ -31,7 +31,7 @@ ROUND, DIGITS = 7.0, 1e-4
 PARTS = np.array([*range(1, 13), 18])
 """Simple parts of pi; they include multiples of 10 and of 15 degrees."""
 LARGE = ("panel_angle", "dihedral", "crease_rest", "angle")
-"""Names of angles that, in degrees, are hardly as small as angles in radians."""
+"""Names of angles that in degrees are rarely as small as an angle in radians."""
 SMALL, TURN, ROUNDED = 0.35, 2.0 * np.pi, 1e-6
 """Smallest such angle in radians (20 degrees), and the tolerance to whole tenths of degrees."""
 SHOWN = 60
@@ -62,7 +62,7 @@ def _written(value: Any, depth: int) -> str:
         return f"[{', '.join(shown)}{', ...' if len(value) > 6 else ''}]"
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, int):  # Python refuses to write the digits of very large ones
+    if isinstance(value, int):  # Python refuses to write the digits of very large integers
         digits = int(value.bit_length() * math.log10(2.0)) + 1
         return repr(value) if digits < SHOWN else f"a number of about {digits} digits"
     return repr(value) if isinstance(value, float) else str(value)

@@ -66,7 +66,7 @@ class Output:
     nodes : ndarray of int64
         Nodes that figures and spectra show.
     named : bool
-        Whether the file names these nodes; otherwise they are the default ones.
+        Whether the file names the nodes; otherwise they are the default nodes.
     axis : str or None
         Component that figures show: "x", "y" or "z", for paths also "-x", "-y" or "-z". None: the
         component with the largest motion of a node.
@@ -170,7 +170,7 @@ class Analysis(ABC):
         """Refuse computations of several mass rules that cannot be run or drawn together."""
 
     def shown(self, case: Case) -> NDArray[np.int64]:
-        """Default nodes to show: loaded ones, or else all that can move."""
+        """Default nodes to show: the loaded nodes, or else all nodes that can move."""
         return case.loaded_nodes if case.loaded_nodes.size else movable(case)
 
 

@@ -230,7 +230,7 @@ class FrfAnalysis(Analysis):
         )
 
     def shown(self, case: Case) -> NDArray[np.int64]:
-        """Nodes with a driving force, or else all that can move."""
+        """Nodes with a driving force, or else all nodes that can move."""
         forces = [
             one.loaded(case.structure, f"drive[{i}]")
             for i, one in enumerate(self.arguments["drive"])

@@ -152,7 +152,7 @@ class ModesAnalysis(Analysis):
 
 
 def shown_modes(modes: xarray.Dataset, shapes: int | tuple[int, ...] | None) -> list[int]:
-    """Numbers of the drawn modes: the requested ones, or the first that are not rigid."""
+    """Numbers of the drawn modes: the requested modes, or the first that are not rigid."""
     from foldyn.plots.readings import chosen_modes
 
     if isinstance(shapes, tuple):

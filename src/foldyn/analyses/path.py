@@ -203,7 +203,7 @@ class PathAnalysis(Analysis):
         )
 
     def shown(self, case: Case) -> NDArray[np.int64]:
-        """Loaded nodes, or else nodes that supports move, or else all that can move."""
+        """Loaded nodes, or else nodes that supports move, or else all nodes that can move."""
         moved = [vectors.any(axis=1) for vectors, _ in case.prescribed_terms]
         if not case.loaded_nodes.size and np.any(moved):
             return np.flatnonzero(np.any(moved, axis=0))

@@ -226,7 +226,7 @@ class ShownSection(Section):
     Parameters
     ----------
     nodes : int, sequence of int, or str
-        Node numbers or a selection; by default the loaded, driven or moved ones.
+        Node numbers or a selection; by default the loaded, driven or moved nodes.
     axis : {"x", "y", "z"}, optional
         Component that figures show; by default the component with the largest motion.
     """

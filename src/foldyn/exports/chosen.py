@@ -33,7 +33,7 @@ def quantities_of(result: xr.Dataset) -> list[str]:
 
 
 def chosen_fields(known: Iterable[str], fields: str | Sequence[str] | None) -> list[str]:
-    """Names of the requested variables, or of all known ones.
+    """Names of the requested variables, or of all known variables.
 
     Raises
     ------

@@ -84,7 +84,7 @@ class Chords:
     def drawing(
         self, curved: int, fold_angles: ArrayLike, repairs: Sequence[str], **more: Any
     ) -> Drawing:
-        """Drawing of all lines, with further repairs and fields; `curved` shapes were curves."""
+        """Drawing of all lines, with further repairs and fields; `curved` counts the curves."""
         told = [f"{count(curved, 'curve')} drawn as chords, within {self.tolerance:.3g} units"]
         repairs = (*told[:curved], *without_length(self._has_length), *repairs)
         if not self.letters:

@@ -106,7 +106,7 @@ def _document(text: str) -> tuple[dict[str, Any], list[str]]:
 
 
 def _frame(document: dict[str, Any], chosen: int | str | None) -> dict[str, Any]:
-    """Fields of a frame, including inherited ones."""
+    """Fields of a frame, including inherited fields."""
     others = document.get("file_frames", [])
     if not isinstance(others, list) or not all(isinstance(each, dict) for each in others):
         raise InputError("file_frames must be a list of JSON objects, one for each frame.")

@@ -22,7 +22,7 @@ COLORS: dict[RGB, tuple[str, str]] = {
     (255, 0, 255): ("U", "magenta, hinge"),
 }
 """Letter and name of each color."""
-_HUES = (  # degrees within which a hue counts as a color
+_HUES = (  # upper end (degrees) of the range of hues that count as each color
     (30, (255, 0, 0)),
     (90, (255, 255, 0)),
     (165, (0, 255, 0)),

@@ -58,7 +58,7 @@ def enclosed(lines: Lines, tolerance: float) -> tuple[Panels, Lines, int]:
 
 
 def _faces(lines: Lines) -> tuple[Faces, int]:
-    """Faces, counter-clockwise and sorted, and the number of divided ones."""
+    """Faces, counter-clockwise and sorted, and the number of divided faces."""
     polygons = shapely.get_parts(shapely.polygonize(list(segments(lines))))
     hollow = shapely.get_num_interior_rings(polygons) > 0
     if hollow.any():

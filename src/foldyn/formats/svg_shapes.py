@@ -34,7 +34,7 @@ _ANGLES = {"": 1.0, "deg": 1.0, "grad": 0.9, "rad": math.degrees(1.0), "turn": 3
 _LONGEST = 2000  # largest length of a transform, in characters
 SHAPES = ("line", "polyline", "polygon", "rect", "circle", "ellipse", "path")
 Placing = NDArray[np.float64]
-"""Affine map (2, 3) from an element's coordinates to those of the drawing."""
+"""Affine map (2, 3) from the coordinates of an element to coordinates of the drawing."""
 
 
 @dataclass(frozen=True)

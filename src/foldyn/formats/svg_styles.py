@@ -81,7 +81,7 @@ def declarations(text: str) -> dict[str, str]:
 
 
 def rules_of(text: str) -> tuple[Rules, int]:
-    """Rules of a style sheet, weakest first, and the number of unsupported ones."""
+    """Rules of a style sheet, weakest first, and the number of unsupported rules."""
     rules: Rules = []
     left = 0
     for order, block in enumerate(_without_comments(text).split("}")):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 DEEPEST = 100
 """Largest number of levels of nested elements."""
-# characters searched, entities, characters of the result
+# largest numbers: characters searched, entities, characters of the result
 _FIRST, _MOST, _LARGEST = 20_000, 50, 1 << 26
 _SUBSET = re.compile(r"<!DOCTYPE[^\[>]{0,500}\[([^\]]*)\]\s{0,9}>")
 _ENTITY = re.compile(

@@ -92,7 +92,7 @@ class Server(ThreadingHTTPServer):
             with suppress(OSError):
                 request.settimeout(0.0)
                 request.sendall(TOO_MANY)
-                request.recv(MOST_BYTES)  # unread data would lose the answer
+                request.recv(MOST_BYTES)  # if data stayed unread, the answer would be lost
             self.shutdown_request(request)
             return
         super().process_request(request, client_address)

@@ -27,7 +27,8 @@ def springs_and_masses(
     """Marks of springs, clamped edges and point masses of a case at node positions (n, 3).
 
     size : length of a support's mark, m.
-    supports : whether springs and clamps are shown; loads : whether point masses are.
+    supports : whether springs and clamps are shown.
+    loads : whether point masses are shown.
     """
     case, found = sheet.case, []
     clamped = getattr(sheet.structure.options, "clamped", ()) if supports else ()

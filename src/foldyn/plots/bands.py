@@ -116,7 +116,7 @@ def plot_iso_frequency(
 
 
 def _colored(along: np.ndarray, values: np.ndarray, shares: np.ndarray) -> LineCollection:
-    """Lines of bands (phase, band), cut at every phase into pieces, which shares color."""
+    """Lines of bands (phase, band), cut at every phase into pieces that are colored by shares."""
     points = np.stack([np.broadcast_to(along[:, None], values.shape), values], axis=-1)
     pieces = np.stack([points[:-1], points[1:]], axis=2).reshape(-1, 2, 2)
     lines = LineCollection(list(pieces), cmap="viridis", linewidths=1.6, capstyle="round")

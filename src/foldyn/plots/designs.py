@@ -22,7 +22,7 @@ from foldyn.values import choice, of_kind
 
 COLORS = "coolwarm"
 WIDE, HIDDEN = 3.5, 0.25  # width of colored creases in points, and their opacity behind panels
-ROWS = 4  # lines of a legend that take the height of the color bar
+ROWS = 4  # rows of a legend in whose room the color bar fits
 
 
 def plot_convergence(history: xr.Dataset) -> Figure:
@@ -69,7 +69,7 @@ def draw_sensitivity(
     Raises
     ------
     InputError
-        The number of values matches neither creases nor panels, or not those of `on`.
+        The number of values does not match the number of creases or panels.
     """
     sheet, sight = Sheet3D.of(case_or_structure), View(*view)
     shown = np.asarray(values, float)

@@ -30,7 +30,7 @@ def draw_folding(
     view: tuple[float, float] = (28.0, -60.0),
     title: str = "",
 ) -> Figure:
-    """Draw states of a folding side by side, over the first one in gray.
+    """Draw states of a folding side by side, with the first state behind in gray.
 
     Parameters
     ----------

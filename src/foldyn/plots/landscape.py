@@ -15,7 +15,7 @@ from foldyn.statics import Landscape
 from foldyn.values import show
 
 _FALLS = "#F3E4D8"
-# Looks of stable states and of unstable ones.
+# Looks of stable and of unstable states.
 _MARKS: dict[bool, dict[str, Any]] = {
     True: {"marker": "o", "markersize": 6.0, "color": style.BLACK, "linestyle": "none"},
     False: {**style.ring(style.BLACK, 6.0), "color": style.BLACK, "linestyle": "none"},

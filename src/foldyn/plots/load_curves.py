@@ -73,7 +73,7 @@ def panel_arrows(case: Case, points: Points, share: Share) -> tuple[Points, Poin
 
 
 def crease_arcs(case: Case, points: Points, share: Share, radius: float) -> Points:
-    """Arcs (m, STEPS, 3) about the middles of creases, two for each crease; heads go to their ends.
+    """Arcs (m, STEPS, 3) about the middles of creases, two for each crease, each with a head.
 
     Arcs lie on the front. For a positive moment, which opens the crease, they point towards the
     panels; for a negative moment, away from the panels.

@@ -24,10 +24,10 @@ def plot_load_history(
 
     - forces: one curve per history, the largest force at a node times the factor of the history;
     - pressure, changes of temperature and moments of creases: one curve per load, the value of the
-    largest magnitude among its panels or creases times the factor; - gravity: the magnitude of its
-    acceleration times the factor; - imposed displacements and displacements of the base, one curve
-    per value and axis; - rest angles of actuated creases, one curve per pair of first and last
-    angle.
+      largest magnitude among its panels or creases times the factor;
+    - gravity: the magnitude of its acceleration times the factor;
+    - imposed displacements and displacements of the base, one curve per value and axis;
+    - rest angles of actuated creases, one curve per pair of first and last angle.
 
     The last two kinds have at most four curves per history.
 

@@ -90,7 +90,7 @@ def plot_backbone(backbones: xr.Dataset | Mapping[str, xr.Dataset], title: str =
     Returns
     -------
     matplotlib.figure.Figure
-        Axes for each abscissa; amplitude and energy have logarithmic axes.
+        Axes with logarithmic amplitude and, if undamped, axes with logarithmic energy.
 
     Raises
     ------

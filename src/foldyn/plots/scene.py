@@ -271,7 +271,7 @@ def _frame(axes: Axes3D, middle: Points, box: Points, basis: Points) -> None:
 
 
 def _ticks(middle: Points, box: Points, basis: Points) -> list[NDArray]:
-    """Return the ticks of each axis; x and y drop overlapping ones where their axes meet."""
+    """Return the ticks of each axis; x and y drop overlapping ticks where their axes meet."""
     ticks = []
     for center, length in zip(middle, box, strict=True):
         wanted = MaxNLocator(max(2, round(5 * length / box.max())), steps=[1, 2, 2.5, 5, 10])
@@ -308,7 +308,7 @@ def shades(
 
 
 def pieces(vertices: Points, triangles: Indices) -> Points:
-    """Cut each triangle into the same number of smaller ones (np, 3, 3)."""
+    """Cut each triangle into the same number of smaller triangles (np, 3, 3)."""
     count = _divisions(len(triangles))
     corners = []
     for i in range(count):

@@ -58,7 +58,7 @@ def plot_space_time(
     Returns
     -------
     matplotlib.figure.Figure
-        Positive values (tension) are blue, negative ones (compression) red.
+        Positive values (tension) are blue, negative values (compression) red.
 
     Raises
     ------

@@ -48,9 +48,9 @@ def draw_structure(
         Write the numbers of the pattern's vertices; "all" adds all other nodes.
     supports : bool
         Mark held and moved nodes by one triangle for each direction, and by the name of the
-        direction if it is an axis. Arrows show imposed displacements of nodes and, from the middle,
-        the displacement of a moving base. Springs are zigzags, dashpots a cup and a piston, clamped
-        edges are hatched; dotted lines and rings show nodes that are linked.
+        direction if it is an axis. Arrows show displacements imposed on nodes, and on a moving base
+        (from its middle). Springs are zigzags, dashpots a cup and a piston, clamped edges are
+        hatched; dotted lines and rings show nodes that are linked.
     loads : bool
         Draw arrows: from each loaded node along its force, with the full length at the largest
         load; from each panel under pressure; two about each crease with a moment, towards the

@@ -34,7 +34,7 @@ def line_chart(
     at: Mapping[str, Any] | None,
     most: int = MOST_LINES,
 ) -> Chart:
-    """A measure by one parameter, a curve for each value of another; see `plot_sweep_lines`."""
+    """Measure against one parameter, a curve for each value of another; see `plot_sweep_lines`."""
     choice("measure", measure, measures_of(sweep))
     names = [name for name in parameters_of(sweep) if name not in (at or {})]
     along = choice("x", x, names) if x is not None else (names or parameters_of(sweep))[0]

@@ -17,7 +17,7 @@ MODULES = (
     "cells", "contours", "bands", "periodic", "shape", "analyses", "legend", "files", "page",
     "plots", "tables",
 )  # fmt: skip
-"""Modules in an order in which each uses only earlier ones."""
+"""Modules, in an order in which each uses only earlier modules."""
 _IMPORT = re.compile(r"^import (\{[^;]*\}) from \"\./(\w+)\.js\";\n", re.MULTILINE)
 _EXPORT = re.compile(r"^export ((?:async )?(?:class|function|const) (\w+))", re.MULTILINE)
 

@@ -34,7 +34,7 @@ def waves(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
     "frequency" (state, phase, band), Hz; "displacement", Bloch modes of every k-th phase, real and
     imaginary parts (state, band, phase / k, 2, node, axis), scaled to a largest displacement of 1;
     "places" (state, node, axis), m; "maps" (state, period, 3, 4), to the next cell; "gaps", the
-    full ones, as rows of the state, the band below, bottom and top (Hz); where they are computed
+    full gaps, as rows of the state, the band below, bottom and top (Hz); if they were computed
     "zone", frequencies (state, band, n, n), "damping" (state, phase, band), "attenuation" (state,
     leg, level) and "levels" (state, level), Hz.
     """

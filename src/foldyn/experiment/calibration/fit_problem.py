@@ -186,7 +186,7 @@ class Problem:
         values: Sequence[float] | NDArray,
         members: Sequence[Measurement] | None = None,
     ) -> Any:
-        """Result of a run at given values, for the measurements of the run or for other ones."""
+        """Result of a run at given values, for the measurements of the run or for `members`."""
         case_file = self.case_file(run, values)
         return predicted_run.result_of(run, case_file, members or run.those_of(self.measurements))
 

@@ -36,7 +36,7 @@ class TimeHistory(NodeValues):
         Displacement of each node (m); NaN while it was lost.
     axis : {"x", "y", "z"}
     delay : float
-        Time of the model minus that of the measurement (s).
+        Time of the model minus time of the measurement (s).
     align : float
         Largest time (s) by which the model may be shifted, in addition to `delay`, to minimize the
         misfit: the instant of a release is rarely known to a fraction of a frame. 0 by default.

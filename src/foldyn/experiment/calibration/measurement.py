@@ -105,7 +105,7 @@ class AtNodes(Measurement):
     Parameters
     ----------
     nodes : sequence of int, or str
-        Nodes of the structure, or an expression over the pattern's vertices.
+        Node numbers of the structure, or an expression that selects vertices of the pattern.
     """
 
     nodes: int | str | Sequence[int] = ()

@@ -23,7 +23,7 @@ def made(kind: Any, file: Path, **known: Any) -> Any:
 
 
 def listed_nodes(file: Path, nodes: Any) -> list[int]:
-    """Node numbers; a file cannot use expressions over a pattern."""
+    """Node numbers; expressions that select vertices of a pattern are refused."""
     empty = isinstance(nodes, Sized) and not len(nodes)
     chosen = "" if empty else check_nodes("nodes", nodes)
     if isinstance(chosen, str):

@@ -108,7 +108,7 @@ def match_nodes(
 ) -> Match:
     """Recognize the nodes of a model in a picture.
 
-    The model is tried over the corners in every way that `placing` leaves open. The placements with
+    The model is placed on the corners in every way that `placing` leaves open. The placements with
     most nodes on corners are refined by alternating the assignment of nodes to corners (shortest
     total distance) and a fit of the view and the state. Nodes without a corner are searched for at
     their neighbors' prediction. The placement with most nodes wins.
@@ -161,7 +161,7 @@ def match_nodes(
 
 
 def _placements(uv: Array, states: Array, placing: Placing) -> list[tuple[View, int]]:
-    """Best placements of the model over the points, ranked by nodes that fall on a point."""
+    """Best placements of the model on the points, ranked by nodes that fall on a point."""
     tree = cKDTree(uv)
     axes = axes_of_view(placing.up, placing.facing)
     chosen = np.unique(np.linspace(0, len(states) - 1, _STATES).round().astype(int))

@@ -102,7 +102,7 @@ def best_overall(study: Study) -> float:
 
 # Function that computes the number of each claim, by the key of its row; nan if it cannot.
 CLAIMS: Mapping[str, Callable[[Study], float]] = {
-    # difference of the two nodes of the free edge: heavy corners lie opposite in each panel
+    # how differently the two nodes of the free edge move: heavy corners are diagonally opposite
     "asymmetry_equi_inertial": partial(_asymmetry, models=("equi_inertial",)),
     "asymmetry_others": partial(
         _asymmetry, models=[m for m in paper_rules() if m != "equi_inertial"]

@@ -158,7 +158,7 @@ class Partners:
 
 
 def partners(reference: xarray.Dataset, ours: xarray.Dataset) -> Partners:
-    """Match modes of `ours` to those of `reference`; both at the pattern's vertices."""
+    """Match modes of `ours` to modes of `reference`; both have shapes at the pattern's vertices."""
     vertices = reference["node"].values.tolist()
     theirs = reference["frequency"].values
     ratio = ours["frequency"].values / theirs[:, None]

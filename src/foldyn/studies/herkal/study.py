@@ -179,7 +179,7 @@ class Study:
 
 
 def mean_ranks(table: Mapping[str, Mapping[str, float]], models: Iterable[str]) -> dict[str, float]:
-    """Mean rank over the cases, each ranked only among the given models."""
+    """Mean rank of each model over the cases; only the given models are ranked."""
     names = list(models)
     each = [metric.ranks({m: row[m] for m in names if m in row}) for row in table.values()]
     return {m: float(np.mean([r.get(m, np.nan) for r in each])) for m in names if each}
