@@ -108,7 +108,7 @@ class FidelityAnalysis(Analysis):
         yield Text(found.advice)
         yield from album.figure(
             "fidelity",
-            "Above: errors of the models' frequencies over the frequency of the shell, 5 % shaded. "
+            "Above: errors of the models' frequencies against those of the shell, 5 % shaded. "
             "Below: likeness of the shapes (MAC); modes below 0.5 are lost, and have no error. "
             "Dashed: 0.6 of the plate frequency, above which panels vibrate as plates.",
             lambda: plots.plot_fidelity(found),
@@ -216,11 +216,11 @@ def _notes(found: Fidelity) -> str:
     if "deflection" in found.result:
         far = float(found.result["deflection"])
         notes.append(
-            f"Under the forces in full, were the stiffness that at rest, the shell moves by "
-            f"{far:.4g} m along them in the mean, weighted by the forces."
+            f"Under the full forces, with the stiffness at rest, the shell would move by "
+            f"{far:.4g} m along the forces (mean, weighted by the forces)."
         )
     if "not_forces" in facts:
-        notes.append(f"{facts['not_forces']}: no force, which displacements are not compared for.")
+        notes.append(f"{facts['not_forces']}: no force, so it has no displacements to compare.")
     if "secant" in facts:
         notes.append(
             f"Superlinear hinges have the slope of an oscillation by {facts['secant']:g} degrees."

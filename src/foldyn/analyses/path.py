@@ -230,7 +230,7 @@ class PathAnalysis(Analysis):
         if moved is None or not set(nodes) <= set(moved[0]):
             yield from album.figure(
                 "curve",
-                f"Load factor over the displacement of {listed('node', nodes)}{some} along "
+                f"Load factor against the displacement of {listed('node', nodes)}{some} along "
                 f"{direction}.",
                 lambda: plots.plot_load_displacement(path, nodes, direction=direction),
             )
@@ -248,8 +248,8 @@ class PathAnalysis(Analysis):
         if found is not None:
             yield from album.figure(
                 "landscape",
-                "Energy and force over the stroke, with the states that stay without force (dots: "
-                "stable; rings: unstable) and shaded where the force falls.",
+                "Energy and force against the stroke, with the states without force (dots: "
+                "stable; rings: unstable); shaded where the force falls.",
                 lambda: plots.plot_landscape(found),
                 _energy(found),
             )
@@ -327,7 +327,7 @@ def _energy(found: Landscape) -> Charts:
     states = np.array([[state.stroke, state.energy] for state in found.states]).reshape(-1, 2)
     curves = [Curve("energy", stroke, energy), Curve("states", *states.T, dots=True)]
     chart = Chart("stroke (m)", "energy (J)", curves, note=plots.barriers(found))
-    return Charts([chart], "Energy over the stroke, with the states that stay without force.")
+    return Charts([chart], "Energy against the stroke, with the states without force.")
 
 
 def _states(found: Landscape) -> Table:

@@ -24,7 +24,7 @@ TOLERANCE = 1e-9
 
 def _result_file(name: str, value: Any) -> str:
     if not isinstance(value, str) or not value:
-        raise InputError(f" = {show(value)}: must be the path of a result, as result.nc", name)
+        raise InputError(f" = {show(value)}: must be the path of a result, such as result.nc", name)
     return value
 
 

@@ -50,14 +50,14 @@ def add_fit(commands: Any) -> None:
         action="append",
         default=[],
         metavar="KEY[=START[:LOWER:UPPER]]",
-        help="with a case file: a key that is a parameter, as sheet.thickness=2e-4:1e-4:4e-4",
+        help="with a case file: a key that is a parameter, such as sheet.thickness=2e-4:1e-4:4e-4",
     )
     fit.add_argument(
         "--tie",
         action="append",
         default=[],
         metavar="KEY=EXPRESSION",
-        help="with a case file: a key that follows parameters",
+        help="with a case file: a key that depends on parameters",
     )
     fit.add_argument(
         "--sigma",

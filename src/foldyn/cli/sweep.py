@@ -55,7 +55,7 @@ def add_sweep(commands: Any) -> None:
         "--measure",
         action="append",
         metavar="NAME",
-        help="what is measured, as frequencies or peak_frequency[8]; or a function of your own, "
+        help="what is measured, such as frequencies or peak_frequency[8]; or your own function, "
         "[NAME=]module:function or [NAME=]file.py:function",
     )
     sweep.add_argument(
@@ -72,7 +72,7 @@ def add_sweep(commands: Any) -> None:
         "--tie",
         action="append",
         metavar="KEY=EXPRESSION",
-        help="a key that follows others, as b=360 - a",
+        help="a key that depends on others, such as b=360 - a",
     )
     sweep.add_argument(
         "--processes",

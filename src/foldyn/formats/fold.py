@@ -236,8 +236,8 @@ def _angle_doubts(angles: NDArray[np.float64]) -> tuple[str, ...]:
     if abs(largest - np.pi) > 1e-3:
         return ()
     return (
-        f"edges_foldAngle: the largest is {largest:.5g}, as if they were radians; FOLD has "
-        "degrees, as which they are read",
+        f"edges_foldAngle: the largest is {largest:.5g}, as if they were radians; they are "
+        "read as degrees, the unit of FOLD",
     )
 
 

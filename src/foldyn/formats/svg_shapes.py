@@ -63,7 +63,7 @@ def length(text: str | None, whole: float, place: str, default: float = 0.0) -> 
     match = _LENGTH.fullmatch(text.strip()[:_LONGEST])
     unit = match[2].lower() if match else None
     if match is None or unit not in (*_UNITS, "%"):
-        raise InputError(f" = {show(text)}: give a length, as 12, 12px or 5mm", place)
+        raise InputError(f" = {show(text)}: give a length, such as 12, 12px or 5mm", place)
     value = float(match[1])
     return value * whole / 100 if unit == "%" else value * _UNITS[str(unit)]
 

@@ -140,7 +140,7 @@ def plot_wave_spectrum(
         spectrum["phase"].values, frequency, level, cmap=STRENGTH, vmin=-DECADES, vmax=0.0,
         shading="nearest", rasterized=True,
     )  # fmt: skip
-    style.color_bar(figure, mesh, "amplitude over the largest (decades)", ax=axes)
+    style.color_bar(figure, mesh, "amplitude relative to the largest (decades)", ax=axes)
     axes.grid(False)
     keys = []
     if bands is not None:

@@ -279,7 +279,7 @@ def _case(study: Study, case: str, album: Album, shown: Stage | None) -> list[Se
         sections += [
             *album.figure(
                 f"{case}-statics",
-                f"The load applied slowly: force over the {axis} displacement of the reported "
+                f"The load applied slowly: force against the {axis} displacement of the reported "
                 "nodes.",
                 lambda: _plot_statics(paths, nodes, axis, force),
             ),
@@ -318,8 +318,8 @@ def _statics(found: Mapping[str, NDArray], nodes: list[int], force: float) -> Ta
         ["model", *[f"node {n} (m)" for n in nodes], *[f"node {n} (% off)" for n in nodes],
          "stiffness (N/m)"],
         rows,
-        "Displacement at full load, its deviation from the shell's, and the force on a node over "
-        "the largest displacement.",
+        "Displacement at full load, its deviation from the shell's, and the force on a node "
+        "divided by the largest displacement.",
         digits=3,
     )  # fmt: skip
 

@@ -271,7 +271,7 @@ def _sheet(album: Album, kind: str, states: xarray.Dataset) -> list[Any]:
         Table(
             ["direction", "fold states with a gap", "widest at (degrees)", "from (Hz)", "to (Hz)"],
             rows,
-            "Gaps for waves along x and for all waves of the zone; widest relative to its middle.",
+            "Gaps for waves along x and for all waves of the zone; widest by width / middle.",
             digits=4,
         )
     )
