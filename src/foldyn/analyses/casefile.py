@@ -98,7 +98,7 @@ class Analysis(ABC):
     Attributes
     ----------
     kind : str
-        Its name in case files.
+        Name of the kind in case files.
     schema : type
         Schema of case files of this kind.
     files : tuple of str
@@ -200,7 +200,7 @@ class CaseFile:
     path : Path
         The file.
     title : str
-        Its title, or "".
+        Title of the file, or "".
     pattern : Pattern
     sheet : Sheet
     model : str

@@ -150,7 +150,7 @@ class Tie:
     key : str
         The dependent key.
     expression : str
-        Its value in terms of numbers, ``+ - * /``, parentheses and keys of parameters.
+        Value of the key in terms of numbers, ``+ - * /``, parentheses and keys of parameters.
     """
 
     key: str

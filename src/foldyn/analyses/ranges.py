@@ -38,7 +38,7 @@ class Varied:
     ----------
     key : str
     values : tuple
-        Its values; empty if it is sampled from a range.
+        Values of the key; empty if it is sampled from a range.
     lower, upper : float
         Ends of the range.
     log : bool

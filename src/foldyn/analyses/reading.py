@@ -91,7 +91,8 @@ def read_as(
     Warns
     -----
     FoldynWarning
-        Loads, motions of the base or a start have no meaning there and are left out.
+        Loads, motions of the base or a start have no meaning in that kind of analysis and are left
+        out.
     """
     text = _text(path)
     document = _parsed(path, text)

@@ -58,7 +58,7 @@ def add_convert(commands: Any) -> None:
 
 
 def convert(given: argparse.Namespace) -> None:
-    """Do what the arguments of `add_convert` ask for."""
+    """Run `foldyn convert` with the arguments of `add_convert`."""
     if given.out is None and not given.check:
         raise InputError(": missing; name the file to write, or give --check", "OUT")
     source = Path(given.file)

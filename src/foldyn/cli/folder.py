@@ -257,7 +257,7 @@ def rescued(
     Raises
     ------
     ComputationError
-        It cannot be saved there either.
+        The file cannot be saved in the temporary folder either.
     """
     made = None
     place = f"{file}: cannot be written ({reason(failure)})"

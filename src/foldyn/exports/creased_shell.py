@@ -215,7 +215,7 @@ def fold_slopes(structure: Discretized) -> NDArray:
     Raises
     ------
     InputError
-        Folds without a slope at rest, or with a moment there.
+        A fold has no slope at rest, or has a moment at rest.
 
     Warns
     -----

@@ -30,7 +30,7 @@ def write(
     result : xarray.Dataset
         A motion, an equilibrium path or modes.
     path : Path
-        Its suffix selects the pattern format. Files of a series are run_0000.obj, run_0001.obj, ...
+        The suffix selects the pattern format. Files of a series are run_0000.obj, run_0001.obj, ...
     case : None
         Not needed.
     frame : int, optional

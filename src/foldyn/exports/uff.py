@@ -77,7 +77,7 @@ def write(
     Raises
     ------
     InputError
-        Values are missing, which the format cannot express.
+        Values are missing; the format cannot express missing values.
 
     Warns
     -----
@@ -142,7 +142,7 @@ def _trace(number: int, edges: NDArray) -> Iterator[str]:
 
 
 def _panels(pattern: Pattern) -> Iterator[str]:
-    """Panels with three and four corners; larger ones as triangles from their first corner."""
+    """Panels with three and four corners; larger panels as triangles from the first corner."""
     for number, piece in enumerate(chain.from_iterable(map(_pieces, pattern.faces)), 1):
         kind = TRIANGLE if len(piece) == 3 else QUADRILATERAL
         yield f"{number:10d}{kind:10d}{1:10d}{1:10d}{7:10d}{len(piece):10d}"

@@ -31,7 +31,7 @@ def enclosed(lines: Lines, tolerance: float) -> tuple[Panels, Lines, int]:
     loose : Lines
         Lines that bound no panel: open ends, and links between separate parts.
     divided : int
-        Number of panels with others inside, which are divided into triangles.
+        Number of panels that contain other panels; they are divided into triangles.
 
     Raises
     ------

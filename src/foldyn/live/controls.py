@@ -39,7 +39,7 @@ class Control:
     Attributes
     ----------
     place : tuple of str and int
-        Its place in the case file: ("pattern", "cells", 0).
+        Place of the number in the case file, such as ("pattern", "cells", 0).
     value : float
         The value in the file, or the default.
     low, high : float

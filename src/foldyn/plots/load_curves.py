@@ -53,13 +53,13 @@ def moments(case: Case) -> list[Share]:
 
 
 def panel_middles(structure: Discretized, points: Points, share: Share) -> Points:
-    """Mean corners (k, 3) of panels."""
+    """Means (k, 3) of the corners of each panel."""
     faces = structure.pattern.faces
     return np.array([points[list(faces[panel])].mean(axis=0) for panel in share.numbers])
 
 
 def panel_arrows(case: Case, points: Points, share: Share) -> tuple[Points, Points]:
-    """Mean corners of panels (k, 3) and pressure vectors (k, 3), Pa, there."""
+    """Means of the corners of panels (k, 3), and pressure vectors (k, 3), Pa, at these points."""
     structure = case.structure
     middles, vectors = [], []
     for panel, pressure in zip(share.numbers, share.value, strict=True):

@@ -156,7 +156,7 @@ def report_html(title: str, sections: Iterable[Section | Stage]) -> str:
 def document(title: str, main: str, css: str, code: str, allowed: str = "") -> str:
     """Text of an HTML page with one style and one script.
 
-    Its content security policy allows the browser to load nothing from outside the page.
+    The content security policy allows the browser to load nothing from outside the page.
 
     allowed : additions to the policy, such as "; connect-src 'self'".
     """

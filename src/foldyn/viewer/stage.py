@@ -296,8 +296,8 @@ def _likeness(results: Results, cases: Mapping[str, Case]) -> list[list[float | 
 def folding_case(result: xr.Dataset) -> Case:
     """Case of a folding's pattern, with panels cut along their diagonals.
 
-    Its nodes are the vertices. Its sheet is arbitrary, as only the geometry counts; creases have
-    flat rest angles, since the pattern's own may be fully folded.
+    The nodes of the case are the vertices. The sheet is arbitrary, because only the geometry
+    counts; creases have flat rest angles, since the pattern's own may be fully folded.
     """
     pattern = pattern_of(result)
     with warnings.catch_warnings():

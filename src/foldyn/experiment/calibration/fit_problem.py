@@ -157,7 +157,7 @@ class Problem:
     def case_file(
         self, run: PredictedRun, values: Sequence[float] | NDArray, like: Like | None = None
     ) -> CaseFile:
-        """Case file at given values, without warnings, which were given when it was checked.
+        """Case file at given values; its warnings were already shown when it was checked.
 
         like : case file at other values, whose structure is reused if it is the same.
         """
