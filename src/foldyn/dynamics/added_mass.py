@@ -56,7 +56,7 @@ class AddedMass(NamedTuple):
     triangles: NDArray  # (t, 3) nodes
     sides: NDArray  # (t, 2, 3) rest vectors from the first corner to the others, m
     start: NDArray  # (u + 1,) first entry of each unknown in `corner` and `catch`
-    corner: NDArray  # (k,) index 3 triangle + corner of an entry
+    corner: NDArray  # (k,) corner of each entry: 3 t + c for corner c of triangle t
     catch: NDArray  # (k,) factor of area vector . velocity at that corner
     flow: NDArray  # (u, u) F, kg/m4
     resistance: NDArray  # (u, u) F^-1
@@ -250,7 +250,7 @@ def _find_flow(case: Case, own: AddedMass, mass: Inertia, outward: NDArray, u: N
 # ------------------------------------------------------------------ fluxes
 @inner
 def put_sides(own, u, t):
-    """Put the sides of triangle t displaced by u (rows, 3) into the first two vectors."""
+    """Put the vectors from corner 0 of triangle t to corners 1 and 2, at u, into `vectors[:2]`."""
     first, second, third = own.triangles[t, 0], own.triangles[t, 1], own.triangles[t, 2]
     for c in range(3):
         own.vectors[0, c] = own.sides[t, 0, c] + u[second, c] - u[first, c]

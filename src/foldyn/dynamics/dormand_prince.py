@@ -122,7 +122,7 @@ def _error(slopes, h):
 
 @inner
 def _weights(theta, out):
-    """Weights (7,) of the slopes, in units of the step, up to the fraction theta of a step."""
+    """Weights (7,) of the slopes in the change up to the fraction theta of a step, per step."""
     for j in range(7):
         p = P[j]
         out[j] = theta * (p[0] + theta * (p[1] + theta * (p[2] + theta * p[3])))

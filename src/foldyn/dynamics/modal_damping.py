@@ -34,7 +34,7 @@ from foldyn.statics.rigid import free_rigid_motions
 # rest, which the tolerance of statics leaves undetermined
 SOFT = 0.01
 MOST_MODES = 2000  # largest number of free dofs with all modes damped
-RIGID = 1.0 - 1e-6  # share of a shape in the space of rigid motions above which it is rigid
+RIGID = 1.0 - 1e-6  # a shape is rigid if more than this share of it is a rigid motion
 SLOW = 1e-6  # a rigid shape's eigenvalue is below this share of the largest one found
 STILL = 1e-9  # constraints keep a hinge from turning if less than this of its gradient is left
 ALIKE = 1e-6  # relative difference below which two squared frequencies are equal

@@ -250,7 +250,7 @@ def _panel_at(pattern: Pattern, edge: tuple[int, int]) -> int:
 
 # ------------------------------------------------------------------ what is refused
 def _shell_case(case: Case, divisions: int | None) -> Case:
-    """Convert the case to a shell."""
+    """The case with a shell as its structure; a case that has one is returned unchanged."""
     if case.structure.kind == Shell.kind:
         if divisions is not None:
             raise InputError(

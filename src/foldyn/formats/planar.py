@@ -180,7 +180,7 @@ def _cross(a: NDArray, b: NDArray) -> NDArray:
 
 
 def points_on(lines: Lines, tolerance: float) -> NDArray:
-    """Lines and points (k, 2) for points on lines that do not end there."""
+    """Rows (line, point), (k, 2), of the points that lie on a line without being its ends."""
     used = np.unique(lines.ends)
     tree = STRtree(segments(lines))
     number, line = tree.query(

@@ -91,7 +91,7 @@ def made_from(source: Path, name: str) -> set[Part]:
 
 @cache
 def _needed(path: Path, name: str) -> frozenset[Part]:
-    """Parts that a part of a file refers to."""
+    """Parts, in any file, to which the statements that define `name` in a file refer directly."""
     if (path, name) in _WRITTEN:
         return _WRITTEN[path, name][1]
     own = _module(path)

@@ -103,7 +103,7 @@ class Strains(NamedTuple):
     """The stiffness at rest of p bars, h hinges, and panels with membranes."""
 
     bars: NDArray  # (p, 2) nodes
-    vector: NDArray  # (p, 3) from the first to the second at rest, m
+    vector: NDArray  # (p, 3) from the first to the second node of a bar, at rest, m
     bar_stiffness: NDArray  # (p,) N/m
     hinges: NDArray  # (h, 4) nodes: axis j, k, wings i, l
     corners: NDArray  # (h, 4, 3) rest positions, m
@@ -268,7 +268,7 @@ class Term(ABC):
         """Add the term's force scale, N, at the dofs (m,), for unit strain."""
 
     def holds(self, q: NDArray) -> sparse.csr_array:
-        """Unit rows (s, m) of the term's internal constraints: motions along them cause strain."""
+        """Unit rows (s, m), one per internal constraint: a motion along a row strains the term."""
         return sparse.csr_array((0, q.size))
 
     def turning_moments(self) -> float:

@@ -49,7 +49,7 @@ class Change(NamedTuple):
 
     @property
     def critical(self) -> Point | None:
-        """The point of the two that is a located critical point, if any."""
+        """Whichever of the two points is a located critical point; None if neither is."""
         both = sorted(filter(None, (self.before, self.after)), key=lambda point: point.negative)
         return next((point for point in both if point.kind != "regular"), None)
 

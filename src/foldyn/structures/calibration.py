@@ -53,7 +53,7 @@ def calibrated_folds(length: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray
 
 
 def bend_stiffness_per_length(d: NDArray, g: NDArray, t: NDArray) -> NDArray:
-    """Stiffness per length of bend (N/rad) for a panel diagonal d (m)."""
+    """Stiffness of a bend per length of the bend (N/rad), if the panel's diagonal is d (m)."""
     return g * (d / t) ** (1.0 / 3.0) / d
 
 

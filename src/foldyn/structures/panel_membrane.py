@@ -384,7 +384,7 @@ def _moves(edge: Edge, radius: NDArray | None) -> list[NDArray]:
 
 
 def _bowing(kind: Kind, k: int, points: int, length: float, radius: float | None) -> NDArray:
-    """Stiffness of the bows of edge k with the given number of points: the lower half, by rows.
+    """Stiffness matrix of the bows of edge k, which has `points` points: lower triangle, by rows.
 
     Bows of a straight edge have the stiffness 1; they move nothing.
     """

@@ -121,7 +121,7 @@ def facets_of(points: NDArray, corners: int) -> list[tuple[int, int, int]]:
 
 
 class PanelPlate:
-    """A panel as a plate of small triangles; n pieces per edge, G = 1.
+    """A panel as a plate of small triangles, n per edge; its bending modulus G is 1.
 
     The unknowns are heights of the points, then slopes across the sides. The attributes are linear
     functions of the unknowns, given by coefficients by index: `heights` of corners and center;

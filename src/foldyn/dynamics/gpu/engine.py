@@ -48,7 +48,8 @@ class CardEngine(Engine):
         plan, tally = self._plan, self._state.tally
         begun = int(tally.steps)
         end = min(begun + stretch, plan.steps)
-        keeps = self._method.name == "central_difference" and begun > 0  # forces of its end
+        # after a launch with central differences, the forces at its last step are kept on the GPU
+        keeps = self._method.name == "central_difference" and begun > 0
         while not keeps or tally.steps < end:
             first = int(tally.steps)
             last = min(end, first + int(self._launches.fits()[0]))

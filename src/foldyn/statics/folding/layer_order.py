@@ -40,7 +40,7 @@ from foldyn.patterns.transforms import FACE_ORDERS
 Orders = Sequence[Sequence[int]]
 EXACT = 1e-6  # of the size of the pattern: least tolerance of a flat state
 MOST_TRIPLES = 1_000_000
-GRID = 0.1  # of the smallest distance that counts
+GRID = 0.1  # grid size of intersections, relative to the distance that counts as zero
 MOST_TRIES = 100_000  # guesses in one group
 
 
