@@ -26,8 +26,8 @@ body = case.body
 q = 0.2 * np.random.default_rng(1).standard_normal(body.size)
 q[29] = -0.05  # of node 9, along z
 energy = lambda q: body.energies(q).sum()
-assert checks.gradient_error(energy, body.internal, q, size=1e-5) < 1e-6
-assert checks.tangent_error(body.internal, body.tangent, q, size=1e-5) < 1e-6
+assert checks.gradient_error(energy, body.internal, at=q, size=1e-5) < 1e-6
+assert checks.tangent_error(body.internal, body.tangent, at=q, size=1e-5) < 1e-6
 assert np.abs(body.internal(q) - structure.body.internal(q)).max() > 1e-3  # it acts
 path = fd.trace(case, load_factors=[1.0])
 modes = fd.modes(case, 4)

@@ -68,9 +68,9 @@ def test_internal_amplitudes_belong_to_one_scheme(read) -> None:
     driven = RESPONSE.replace("[analysis]", plates).replace("[[drive]]", "internal = 3\n[[drive]]")
     response = read(driven).run(frequencies=[1.0])
     assert response.attrs["internal"] == 3
-    with pytest.raises(InputError, match=r"analysis\.internal = 3: .* the scheme n5b8e"):
+    with pytest.raises(InputError, match=r"analysis\.internal = 3: .*scheme n5b8e"):
         read(MODES + "internal = 3\n").computation()
-    with pytest.raises(InputError, match=r"analysis\.internal = 3: .* the scheme n5b8e"):
+    with pytest.raises(InputError, match=r"analysis\.internal = 3: .*scheme n5b8e"):
         read(RESPONSE.replace("[[drive]]", "internal = 3\n[[drive]]")).computation()
 
 

@@ -185,7 +185,7 @@ def test_both_files_of_photographs_hold_the_same_shapes(photographed):
 
 
 def test_stiffness_from_the_table_of_photographs(photographed):
-    text = 'case = "hangs.toml"\n[[parameters]]\nkey = "sheet.length_scale_ratio"\nstart = 2\n'
+    text = 'case = "hangs.toml"\n[[parameters]]\nkey = "sheet.length_scale_ratio"\nguess = 2\n'
     text += 'lower = 1\nupper = 6\n[[data]]\nkind = "shapes"\nfile = "photos.csv"\n'
     text += f"nodes = [6, 7, 8]\nload_factor = {FACTORS}\n"
     plan = photographed.with_name("fit.toml")

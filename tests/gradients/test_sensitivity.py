@@ -239,7 +239,7 @@ def test_a_parameter_of_zero_needs_a_size():
         made = cell()
         return fd.Case(made.structure, made.supports, [fd.Force("xmax", (force + 0.01, 0, 0))])
 
-    with pytest.raises(InputError, match=r"force = 0: how far.*sizes="):
+    with pytest.raises(InputError, match=r"force = 0: .*sizes="):
         fd.sensitivity(build, {"force": 0.0}, measures="frequency[1]", analysis=state)
     found = fd.sensitivity(
         build, {"force": 0.0}, measures="frequency[1]", analysis=state, sizes={"force": 0.01}

@@ -425,7 +425,7 @@ def test_creases_that_yield_are_refused_by_all_that_would_leave_it_out():
         lambda: fd.linear.damped_bands(cell, [[0.0]], count=1),
         lambda: fd.sensitivity(case, ["fold_stiffness"], measures="frequency[1]", analysis=modes),
     ):
-        with pytest.raises(InputError, match=r"yield|remember"):
+        with pytest.raises(InputError, match=r"yield|memory"):
             asked()
 
 

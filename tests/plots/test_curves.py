@@ -51,7 +51,7 @@ def test_gravity_has_axes_of_its_own(structure):
     line = gravity.get_lines()[0]
     np.testing.assert_allclose(line.get_ydata(), 9.81 * np.minimum(line.get_xdata(), 1.0))
     assert keys(figure) == [
-        "0.01 N along +x on node 7: chirp (start 1, end 5, duration 2, phase 0)",
+        "0.01 N along +x on node 7: chirp (from_frequency 1, to_frequency 5, duration 2, phase 0)",
         "gravity 9.81 m/s2 along -z: ramp (duration 1)",
     ]
     alone = plot_load_history(cases.Case(structure, loads=loads[1:]), 2.0)

@@ -285,7 +285,7 @@ def test_what_a_moving_base_cannot_be(case, response, trajectory):
         plot_frf({"b": moved}, [7], quantity="mobility")
     with pytest.raises(InputError, match="a base drives it; circles need forces"):
         plot_nyquist(moved, 7)
-    with pytest.raises(InputError, match=r"give a result of fd\.frf"):
+    with pytest.raises(InputError, match=r"frequency response, .*fd\.frf"):
         plot_frf({"a": trajectory}, [7])
 
 

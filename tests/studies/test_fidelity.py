@@ -238,7 +238,7 @@ def test_modes_that_turned_into_each_other_are_one_space():
     np.testing.assert_allclose(together[:2, :2], 1.0, atol=1e-12)
     assert apart[0, 0] == pytest.approx(c**2)
     swapped = pairs(far, shapes, far, shapes[[0, 1, 3, 2]], mass)
-    assert [(p.first, p.second) for p in swapped] == [(0, 0), (1, 1), (2, 3), (3, 2)]
+    assert list(zip(swapped.first, swapped.second, strict=True)) == [(0, 0), (1, 1), (2, 3), (3, 2)]
 
 
 def test_an_edge_is_held_along_its_length_in_the_shell():

@@ -436,7 +436,7 @@ def test_a_table_of_weights_alone(tables, monkeypatch) -> None:
                 tasks.read_found(tables / tasks.FOLDER)
     file.write_text(sound)
     for damaged in (b"\xff", b"", b"{}\n[]\n"):
-        stamp = fit._stamp(tables)
+        stamp = fit.file(tables)
         stamp.write_bytes(damaged)
         assert not fit.there(tables)
     fit.make(tables)
