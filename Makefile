@@ -14,10 +14,10 @@ PYTEST_FLAGS ?=
 DRAWS ?= 500
 OLDEST ?= .venv-oldest
 # of results and mechanics only some: others compile long and ask nothing else of these versions
-OLDEST_TESTS := tests/jit tests/materials \
+OLDEST_TESTS := tests/jit tests/mechanics/test_dihedral.py \
+  $(addprefix tests/materials/test_,custom_laws.py registered_laws.py series.py) \
   $(addprefix tests/results/test_,damaged_files.py missing.py pattern_states.py results.py) \
-  $(addprefix tests/mechanics/test_,assembly.py dihedral.py invariance.py) \
-  $(addprefix tests/analyses/test_,casefile.py casefile_messages.py limits.py)
+  $(addprefix tests/analyses/test_,casefile.py limits.py)
 WORKERS ?= -n auto --maxprocesses 4 --dist worksteal
 # each worker keeps one processor busy: with more threads for linear algebra they wait for each other
 export OPENBLAS_NUM_THREADS ?= 1
