@@ -95,7 +95,7 @@ BAD = [
     ("time [],f\n0,0\n1,1\n", 'column "time []": has no unit, and a time in s'),
     ("time [h],f\n0,0\n1,1\n", 'column "time [h]": the unit [h] is not known; use one of s, ms,'),
     ("F [N],t [s]\n0,0\n1,1\n", 'column "F [N]": is a force, and a time in s is asked for'),
-    ("t [s],F [mN]\n0,0\n1,1\n", f'{FORCE} say unit = "mN"'),
+    ("t [s],F [mN]\n0,0\n1,1\n", f'{FORCE} give unit = "mN"'),
     ("t [s],F [lbf]\n0,0\n1,1\n", 'column "F [lbf]": the unit [lbf] is not known; use one of -,'),
     ("t [s],f\n0,0\n\n1,one\n", 'line 4, column "f": "one" is not a number'),
     ("t [s];f\n0;0\n0,5;1\n", f'{CELL}"0,5" is not a number (decimals are written with a point)'),

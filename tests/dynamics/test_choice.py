@@ -76,7 +76,7 @@ def anew(motion, given) -> None:
 
 
 def test_a_motion_whose_energies_do_not_balance_is_computed_anew(given):
-    why = 'anew with dormand_prince: with rk4.* is off by .* method = "dormand_prince" saves'
+    why = 'anew with dormand_prince: with rk4.* is off by .* method = "dormand_prince" avoids'
     with pytest.warns(FoldynWarning, match=why):
         motion = fd.simulate(**given, method="auto")
     assert motion.attrs["energy_error"] < 0.01
@@ -102,7 +102,7 @@ def test_a_second_attempt_that_was_cut_off_goes_on(given):
 def test_a_lasting_motion_is_computed_anew_with_shorter_steps():
     """The errors of central differences do not grow; those of other explicit methods add up."""
     case = fd.Case(cell(), CELL_HELD)
-    why = "anew with steps of .*: with steps of .*; dt = .* saves"
+    why = "anew with steps of .*: with steps of .*; dt = .* avoids"
     with pytest.warns(FoldynWarning, match=why):
         motion = fd.simulate(case, 40.0, method="auto", initial=KICK, interval=0.1)
     assert motion.attrs["method"] == "central_difference"

@@ -216,7 +216,7 @@ def test_edges_without_balance_are_told_of():
     s = model("n5b8e", 2e4, law, pattern, fd.Sheet(1e6, 0.3, 0.03, 1000.0))
     pushed = fd.CreaseMoment(creases=[1], moment=2.0, history=fd.HalfSine(0.2))
     made = fd.Case(s, [fd.Fix([0, 1, 2])], [pushed])
-    with pytest.raises(fd.errors.InstabilityError, match=r'no balance.*take method = "newmark"'):
+    with pytest.raises(fd.errors.InstabilityError, match=r'no balance.*use method = "newmark"'):
         fd.simulate(made, 0.3, method="rk4", interval=0.02)
     assert fd.simulate(made, 0.3, method="newmark", interval=0.02).dissipated[-1] > 0.0
 
