@@ -13,7 +13,7 @@ DEMO_FLAGS ?=
 PYTEST_FLAGS ?=
 DRAWS ?= 500
 OLDEST ?= .venv-oldest
-# of results and mechanics only some: others compile long and ask nothing else of these versions
+# only some of most folders: others compile long and ask nothing else of these versions
 OLDEST_TESTS := tests/jit tests/mechanics/test_dihedral.py \
   $(addprefix tests/materials/test_,custom_laws.py registered_laws.py series.py) \
   $(addprefix tests/results/test_,damaged_files.py missing.py pattern_states.py results.py) \

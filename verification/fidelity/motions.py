@@ -36,11 +36,12 @@ from foldyn.structures import discretize
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.presets import resolved
 from foldyn.studies import find_case
+from foldyn.studies.herkal.runs import CASES as STUDIES
 from verification.fidelity.cases import FidelityCase, documented
 from verification.fidelity.compare import reference
 from verification.fidelity.cycles import Cycles, NoCyclesError, cycles
 from verification.fidelity.motion_results import SHELL, STORED, Run, summaries, write
-from verification.fidelity.statics import LAWS, STUDIES
+from verification.fidelity.statics import LAWS
 
 FIRST_STEP = 0.1  # share of the load that folds a linear shell to the largest amplitude
 MOST_STEPS = 80  # most steps on the way there

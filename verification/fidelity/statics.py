@@ -21,10 +21,10 @@ from foldyn.statics import trace
 from foldyn.structures import Sheet, discretize
 from foldyn.structures.discretized import Discretized
 from foldyn.studies import find_case
+from foldyn.studies.herkal.runs import CASES
 from foldyn.studies.herkal.stiffnesses import Softness, between, softness
 from verification.fidelity.compare import markdown
 
-STUDIES = ("case1", "case2", "case3", "case4")
 STEEL = Sheet(2e11, 0.3, 1e-4, density=7850.0)
 MESHES = (4, 8)  # divisions of the shell of steel
 
@@ -64,7 +64,7 @@ def statics_table() -> str:
     """Both tables in Markdown."""
     sheet, shell_frequency, frequency = steel()
     rows = []
-    for found in [*map(softness, STUDIES), sheet]:
+    for found in [*map(softness, CASES), sheet]:
         errors = [f"{100 * value:+.1f} %" for value in found.error.values()]
         rows.append([found.case, f"{1e3 * found.shell:.4g} mm", *errors])
     for k, true in enumerate(shell_frequency):
@@ -136,7 +136,7 @@ def _paths(case: Case, factors: Sequence[float]) -> Any:
 
 def large_table() -> str:
     """Both tables in Markdown."""
-    found = {name: under_loads(name) for name in STUDIES}
+    found = {name: under_loads(name) for name in CASES}
     found |= {name: twisted(*panel) for name, panel in PANELS.items()}
     rows = []
     for name, errors in found.items():

@@ -37,6 +37,7 @@ from foldyn.linear.bloch import (
 from foldyn.linear.cell_patch import Patch, cell_patch
 from foldyn.linear.linearized import slope_change
 from foldyn.linear.unit_cell import UnitCell, check_commuting, images, rotation
+from foldyn.mechanics.assembly import BALANCED as SETTLED
 from foldyn.mechanics.assembly import Assembly
 from foldyn.patterns.screw import Screw, motion_between
 from foldyn.statics.tracing import displacement_of
@@ -48,7 +49,6 @@ SAME = 1e-12  # changes of a motion below this, relative to the pattern's size, 
 SLACK = 10.0  # times the tolerance: largest distance of nodes from copies of their partners
 PLACES = "None (the rest state), or a State, as fd.initial_state(path)"
 ITERATIONS = 30
-SETTLED = 1e-13  # rad: last Newton step for hidden dofs
 TURNED = 1e-13  # coefficients of constraints below this count as zero
 
 

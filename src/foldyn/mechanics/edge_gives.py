@@ -49,7 +49,7 @@ from foldyn.mechanics.term import (
     nodal,
 )
 
-WORK = ("strain", "along")  # work arrays of `EdgeGives`
+SCRATCH = ("strain", "along")  # arrays of `EdgeGives` for one panel at a time
 
 
 class EdgeGives(NamedTuple):
@@ -347,9 +347,9 @@ def _balanced_pullback(own, u, v, t, weight, product, rate):
 
 
 def _pulled(kernel: Addressed, gives: EdgeGives, rows: int, first: int, factor: Factor) -> Pulled:
-    out = zeros_for(gives, *WORK)
+    out = zeros_for(gives, *SCRATCH)
     own = _Backward(gives, out, rows, first, np.zeros((3, gives.count)), factor)
-    return Pulled(Context(own), kernel, arrays_of(out, *WORK).numbers)
+    return Pulled(Context(own), kernel, arrays_of(out, *SCRATCH).numbers)
 
 
 class EdgeGivesTerm(Term):
@@ -377,7 +377,7 @@ class EdgeGivesTerm(Term):
 
     def arrays(self) -> Arrays:
         """Arrays that the term's forces depend on; see `Term`."""
-        return arrays_of(self.gives, *WORK)
+        return arrays_of(self.gives, *SCRATCH)
 
     def pulled(self) -> Pulled:
         """Pullback of the term's forces; see `Term`."""

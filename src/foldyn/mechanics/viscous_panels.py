@@ -25,7 +25,7 @@ from foldyn.mechanics.model import ranks
 from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback, zeros_for
 from foldyn.mechanics.term import FORCES, CompiledTerm, Term, forces, nodal
 
-WORK = ("along", "rate")  # work arrays of `ViscousPanels`
+SCRATCH = ("along", "rate")  # scratch arrays of `ViscousPanels`
 
 
 class ViscousPanels(NamedTuple):
@@ -186,15 +186,15 @@ class ViscousPanelsTerm(Term):
 
     def arrays(self) -> Arrays:
         """Arrays that the term's forces depend on; see `Term`."""
-        return arrays_of(self.panels, *WORK)
+        return arrays_of(self.panels, *SCRATCH)
 
     def pulled(self) -> Pulled:
         """Pullback of the term's forces; see `Term`."""
-        out = zeros_for(self.panels, *WORK)
+        out = zeros_for(self.panels, *SCRATCH)
         growth, stress = np.zeros((2, 2, len(self.panels.rate)))
         rows = 1 + int(self.panels.nodes.max(initial=0))
         own = Context(_Backward(self.panels, out, growth, stress, rows))
-        return Pulled(own, _pullback, arrays_of(out, *WORK).numbers)
+        return Pulled(own, _pullback, arrays_of(out, *SCRATCH).numbers)
 
     @cached_property
     def damping_places(self) -> tuple[NDArray, NDArray]:

@@ -49,10 +49,14 @@ class Fourier:
         self.harmonics, self.even = harmonics, even
         self.samples = max(OVER * harmonics, 4 * OVER) if samples is None else samples
 
+    @property
+    def count(self) -> int:
+        """Number c of coefficients."""
+        return self.harmonics + 1 if self.even else 2 * self.harmonics + 1
+
     def memory(self, unknowns: int) -> float:
         """Bytes that a balance with this number of unknowns needs, with its derivative."""
-        h, s = float(self.harmonics), self.samples
-        c, s = (h + 1.0, s // 2 + 1) if self.even else (2.0 * h + 1.0, s)
+        c, s = float(self.count), self.samples // 2 + 1 if self.even else self.samples
         return 24.0 * (c * unknowns) ** 2 + 8.0 * s * (c**2 + unknowns**2)
 
     @cached_property

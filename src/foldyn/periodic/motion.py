@@ -199,8 +199,7 @@ def balance_of(
             place = equilibrium(case)
         equation = reduced(equation, count, place)
     fourier = Fourier(harmonics, even=not driven)
-    size = (2 * harmonics + 1 if driven else harmonics + 1) * equation.size
-    needed = fourier.memory(equation.size)  # before any array of this length is made
+    size, needed = fourier.count * equation.size, fourier.memory(equation.size)
     check_memory("harmonics", f"a matrix of {size} unknowns", needed, "take fewer")
     if driven:
         instants, each = 3.0 * steps * periods, equation.size**2 + 4 * equation.body.size

@@ -28,11 +28,10 @@ from foldyn.results import check_result
 from foldyn.statics.branch import problem_of, station_of
 from foldyn.statics.equilibrium import OrigamiProblem
 from foldyn.statics.newton import Settings, Solver, settings_of
-from foldyn.statics.stability import LostError, Section
+from foldyn.statics.stability import SHARP, LostError, Section
 from foldyn.statics.stepping import Station
 
 NO_FORCE = 1e-9  # at the ends of a path, this fraction of the largest driving force is zero
-SHARP = 1e-13  # accuracy of a located point, as a share of the step
 
 
 @brief

@@ -26,7 +26,7 @@ from foldyn.statics.newton import Solver, plane
 from foldyn.statics.stepping import Station, arrive, elapse, kept, recall
 
 APART = 1e-6  # share of a step within which crossings count as one multiple point
-SHARP = 1e-13  # accuracy of a located crossing, as a share of the step
+SHARP = 1e-13  # accuracy of a located point or crossing, as a share of the step
 LOOKS = 0.5, 0.25, 0.75  # shares of the way between two equilibria, tried in turn to find another
 
 

@@ -31,15 +31,15 @@ from foldyn.mechanics.sheet_term import unit_rows
 @kernel
 def touching_pairs(tables, memory):
     """Indices of the listed pairs of each kind closer than d0 at memory.x."""
-    x, out = memory.x, np.empty((2, memory.d0.shape[1]), np.int64)
-    found = np.zeros(2, np.int64)
+    x, triangles, edges = memory.x, tables.triangles, tables.edges
+    out, found = np.empty((2, memory.d0.shape[1]), np.int64), np.zeros(2, np.int64)
     for kind in range(2):
         listed = memory.counts.listed_first if kind == VERTEX else memory.counts.listed_second
         for k in range(listed):
             one, other = memory.pairs[kind, k, 0], memory.pairs[kind, k, 1]
-            inside = closest_of(tables.triangles, tables.edges, x, kind, one, other)[2]
-            gap = gap_of(tables.triangles, tables.edges, x, kind, one, other)
-            if inside and gap < memory.d0[kind, k]:
+            if kind == EDGES and not closest_of(triangles, edges, x, kind, one, other)[2]:
+                continue
+            if gap_of(triangles, edges, x, kind, one, other) < memory.d0[kind, k]:
                 out[kind, found[kind]] = k
                 found[kind] += 1
     return out[0, : found[0]].copy(), out[1, : found[1]].copy()
