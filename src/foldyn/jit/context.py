@@ -55,6 +55,8 @@ class Context:
     value : tuple
         The given tuple.
     kind : ContextType
+    slots : (k,) array of int
+        What is at the address; it is valid as long as the arrays are alive.
     address : int
     """
 
@@ -64,8 +66,8 @@ class Context:
         if looks not in _KINDS:  # Numba takes ms to find the type of a large tuple
             _KINDS[looks] = ContextType(typeof(value))
         self.value: Any = value
-        self._slots = np.array(slots, np.int64)
-        self.kind, self.address = _KINDS[looks], int(self._slots.ctypes.data)
+        self.slots = np.array(slots, np.int64)
+        self.kind, self.address = _KINDS[looks], int(self.slots.ctypes.data)
         self._numba_type_ = self.kind
 
 

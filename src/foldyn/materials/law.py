@@ -139,13 +139,13 @@ class HingeLaw(Law):
         return self._table(theta, rest)[4:]
 
     def _table(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
-        theta, rest = np.broadcast_arrays(np.asarray(theta, float), np.asarray(rest, float))
-        address = np.array(self.addresses or (0, 0, 0), np.int64)
-        flat_rest = np.ascontiguousarray(rest.ravel())
-        parameters = np.ascontiguousarray(self.parameters(flat_rest))
-        flat = self.compiled(
-            self.code, np.ascontiguousarray(theta.ravel()), flat_rest, parameters, address
+        # copies: read-only arrays would compile the table again
+        theta, rest = (
+            np.array(each, float, order="C") for each in np.broadcast_arrays(theta, rest)
         )
+        address = np.array(self.addresses or (0, 0, 0), np.int64)
+        parameters = np.ascontiguousarray(self.parameters(rest.ravel()))
+        flat = self.compiled(self.code, theta.ravel(), rest.ravel(), parameters, address)
         return flat.reshape((len(flat), *theta.shape))
 
 

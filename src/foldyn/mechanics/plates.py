@@ -20,18 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
-from foldyn.jit.context import Context, numbers_at, rows_at
+from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment, hinge_slope
+from foldyn.mechanics.bars_hinges import bars_hinges_kernels
 from foldyn.mechanics.dihedral import gradient_at
-from foldyn.mechanics.discrete_gradient import (
-    add_bar_forces,
-    discrete_gradient,
-    mean_moment,
-    put_motion,
-)
-from foldyn.mechanics.energy import strain_energies
-from foldyn.mechanics.force import ForceScratch, force_scratch, internal_force
+from foldyn.mechanics.discrete_gradient import discrete_gradient, mean_moment, put_motion
+from foldyn.mechanics.force import ForceScratch, force_scratch
 from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.term import (
     ENERGIES,
@@ -169,6 +164,16 @@ def turn_folds(model, x, scratch):
         scratch.fold_angle[f] = scratch.angle[f] - model.per_reach * both
 
 
+def turned_plates(model: BarsPlates, u: NDArray, x: NDArray | None = None) -> PlatesScratch:
+    """Dihedrals and their gradients at displacements u (n, 3); angles of folds if x is given."""
+    scratch = plates_scratch(model)
+    own, room = Context(model), Context(scratch)  # as in `_forces`: one version of each kernel
+    turn_hinges(own, u, room)
+    if x is not None:
+        turn_folds(own, x, room)
+    return scratch
+
+
 @inner
 def turn_plate(model, x, scratch, p):
     """Angles phi of plate p, into scratch.turn."""
@@ -201,10 +206,38 @@ def fold_slope(model, scratch, f):
     )  # fmt: skip
 
 
+class Bars(NamedTuple):
+    """The kernels of the bars, called by address: a model without bars does not compile them."""
+
+    context: NDArray  # slots of their context
+    kernels: NDArray  # (3,) addresses of `FORCES`, `ENERGIES` and `MEAN_FORCES`, 0 without bars
+
+
+def bars_of(model: BarsPlates, scratch: PlatesScratch) -> Bars:
+    """The kernels of the bars, with scratch of the plates."""
+    term = bars_hinges_kernels(model.bars, scratch.bars, 3)
+    kernels = np.zeros(3, np.int64)
+    if len(model.bars.bar_runs):
+        kernels[:] = [term.kernels[k].at(term.context) for k in (FORCES, ENERGIES, MEAN_FORCES)]
+    return Bars(term.context.slots, kernels)
+
+
+@inner_scalar
+def put_bar_forces(bars, u, force):
+    """Write the forces (n, 3) of the bars."""
+    if bars.kernels[0] == 0:
+        for k in range(force.size):
+            flat(force)[k] = 0.0
+    else:
+        run_at(bars.kernels[0], (bars.context, u, u, 0.0, force, force))
+
+
 @inner
-def plates_energy(model, u, x, scratch, out):
+def plates_energy(model, bars, u, x, scratch, out):
     """Energies (J) of bars, folds and bends, to out (3,)."""
-    strain_energies(model.bars, u, out)
+    out[0], out[1], out[2] = 0.0, 0.0, 0.0
+    if bars.kernels[1] != 0:
+        run_at(bars.kernels[1], (bars.context, u, out))
     turn_hinges(model, u, scratch)
     turn_folds(model, x, scratch)
     p = model.fold_parameters
@@ -224,9 +257,9 @@ def plates_energy(model, u, x, scratch, out):
 
 
 @inner
-def plates_force(model, u, x, force, couple, scratch):
+def plates_force(model, bars, u, x, force, couple, scratch):
     """Internal forces on nodes (n, 3), and on the dofs of rotations (r,), N."""
-    internal_force(model.bars, u, force, scratch.bars)
+    put_bar_forces(bars, u, force)
     turn_hinges(model, u, scratch)
     turn_moments(model, x, couple, scratch)
     add_hinge_moments(model, scratch, force)
@@ -277,6 +310,7 @@ def add_plate_moments(model, couple, scratch, p):
 
 class _Context(NamedTuple):
     model: BarsPlates
+    bars: Bars
     scratch: PlatesScratch
     rows: int
     groups: NDArray  # (3,) energy groups of bars, folds and bends
@@ -290,7 +324,7 @@ def _forces(own, u, v, t, force, powers):
     for k in range(3 * n + r, out.size):
         flat(out)[k] = 0.0
     (here, x), (pull, couple) = parted_rows(moved, n, r), parted_rows(out, n, r)
-    plates_force(model, here, x, pull, couple, own.scratch)
+    plates_force(model, own.bars, here, x, pull, couple, own.scratch)
 
 
 @energies
@@ -298,7 +332,7 @@ def _energies(own, u, out):
     model, moved = own.model, rows_at(u, own.rows)
     n, r = model.bars.rest.shape[0], model.rotations
     here, x = parted_rows(moved, n, r)
-    plates_energy(model, here, x, own.scratch, own.energy)
+    plates_energy(model, own.bars, here, x, own.scratch, own.energy)
     for k in range(3):
         numbers_at(out, 3)[own.groups[k]] = own.energy[k]
 
@@ -310,7 +344,8 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
     start, x0 = parted_rows(rows_at(u0, own.rows), n, r)
     end, x1 = parted_rows(rows_at(u1, own.rows), n, r)
     out, couple = parted_rows(rows_at(force, own.rows), n, r)
-    add_bar_forces(model.bars, start, end, out)
+    if own.bars.kernels[2] != 0:
+        run_at(own.bars.kernels[2], (own.bars.context, start, end, before, h, t, out, powers))
     turn_hinges(model, end, scratch)
     turn_folds(model, x1, scratch)
     scratch.moment[:] = 0.0
@@ -351,5 +386,6 @@ def plates_kernels(
     model: BarsPlates, scratch: PlatesScratch, rows: int, groups: tuple[int, int, int]
 ) -> CompiledTerm:
     """Kernels of bars, folds and plates with dofs in `rows` rows, and their energy groups."""
-    own = Context(_Context(model, scratch, rows, np.array(groups), np.zeros(3)))
+    bars = bars_of(model, scratch)
+    own = Context(_Context(model, bars, scratch, rows, np.array(groups), np.zeros(3)))
     return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})

@@ -28,8 +28,10 @@ from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.bars_hinges import pull_bars_hinges
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.plates import (
+    Bars,
     BarsPlates,
     PlatesScratch,
+    bars_of,
     fold_slope,
     plates_energy,
     plates_force,
@@ -269,6 +271,7 @@ def balance(model, u, scratch):
 
 class _Context(NamedTuple):
     model: CondensedPlates
+    bars: Bars
     scratch: CondensedScratch
 
 
@@ -277,7 +280,7 @@ def _forces(own, u, v, t, force, powers):
     model, scratch, rows = own.model, own.scratch, own.model.plates.bars.rest.shape[0]
     moved, out = rows_at(u, rows), rows_at(force, rows)
     balance(model, moved, scratch)
-    plates_force(model.plates, moved, scratch.x, out, scratch.couple, scratch.plates)
+    plates_force(model.plates, own.bars, moved, scratch.x, out, scratch.couple, scratch.plates)
 
 
 @energies
@@ -285,12 +288,12 @@ def _energies(own, u, out):
     model, scratch = own.model, own.scratch
     moved = rows_at(u, model.plates.bars.rest.shape[0])
     balance(model, moved, scratch)
-    plates_energy(model.plates, moved, scratch.x, scratch.plates, numbers_at(out, 3))
+    plates_energy(model.plates, own.bars, moved, scratch.x, scratch.plates, numbers_at(out, 3))
 
 
 def condensed_kernels(model: CondensedPlates, scratch: CondensedScratch) -> CompiledTerm:
     """Kernels of bars, folds and plates with rotations in balance."""
-    own = Context(_Context(model, scratch))
+    own = Context(_Context(model, bars_of(model.plates, scratch.plates), scratch))
     return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies})
 
 

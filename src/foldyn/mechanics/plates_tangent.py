@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.compiled import inner_scalar, kernel
+from foldyn.jit.context import Context
 from foldyn.mechanics.dihedral import add_hessian, carry_wing
 from foldyn.mechanics.plates import (
     BarsPlates,
@@ -22,9 +23,8 @@ from foldyn.mechanics.plates import (
     fold_slope,
     put_points,
     rides,
-    turn_folds,
-    turn_hinges,
     turn_plate,
+    turned_plates,
 )
 from foldyn.mechanics.tangent import distinct
 
@@ -249,18 +249,16 @@ def _add_bends(model, pattern, u, scratch, data):
 
 
 def add_plates_tangent(
-    model: BarsPlates, pattern: PlatesPattern, u: NDArray, x: NDArray, scratch: object,
-    floor: float, data: NDArray,
-) -> None:  # fmt: skip
+    model: BarsPlates, pattern: PlatesPattern, u: NDArray, x: NDArray, floor: float, data: NDArray
+) -> None:
     """Add the tangent of folds and plates at displacements u (n, 3) and rotations x (r,).
 
-    scratch : `PlatesScratch` without moments.
     floor : least slope of the folds' law per unit stiffness; smaller slopes are raised to it.
     """
-    turn_hinges(model, u, scratch)
-    turn_folds(model, x, scratch)
-    _add_folds(model, pattern, u, scratch, floor, data)
+    turned = turned_plates(model, u, x)
+    own, scratch = Context(model), Context(turned)
+    _add_folds(own, pattern, u, scratch, floor, data)
     wide = 3 * int(np.diff(pattern.begin).max(initial=0))
     bend = np.empty((int(np.diff(model.start).max(initial=0)), wide))
-    _add_plates(model, pattern, x, scratch, bend, np.empty(wide), np.empty((wide, wide)), data)
-    _add_bends(model, pattern, u, scratch, data)
+    _add_plates(own, pattern, x, scratch, bend, np.empty(wide), np.empty((wide, wide)), data)
+    _add_bends(own, pattern, u, scratch, data)

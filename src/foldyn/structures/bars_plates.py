@@ -28,8 +28,7 @@ from foldyn.mechanics.plates import (
     PlatesScratch,
     plates_kernels,
     plates_scratch,
-    turn_folds,
-    turn_hinges,
+    turned_plates,
 )
 from foldyn.mechanics.plates_condensed import (
     CondensedScratch,
@@ -136,11 +135,11 @@ class BarsPlatesTerm(SheetTerm):
     def _assembled(
         self, q: NDArray, floor: float, bars: Callable[[], sparse.csr_array]
     ) -> sparse.csr_array:
-        pattern, scratch = self.sparsity, plates_scratch(self.model)
+        pattern = self.sparsity
         data = np.zeros(len(pattern.indices))
         if len(self.model.bars.bar_runs):
             data[pattern.bars] = bars().data
-        add_plates_tangent(self.model, pattern, *self._split(q), scratch, floor, data)
+        add_plates_tangent(self.model, pattern, *self._split(q), floor, data)
         entries = (data, pattern.indices, pattern.indptr)
         return sparse.csr_array(entries, (self.size, self.size))
 
@@ -190,11 +189,10 @@ class BarsPlatesTerm(SheetTerm):
 
     def holds(self, q: NDArray) -> sparse.csr_array:
         """See `SheetTerm`: turns of the clamped edges."""
-        model, scratch = self.model, plates_scratch(self.model)
-        first = len(model.hinges) - len(model.wings)
-        if len(model.wings):
-            turn_hinges(model, self._split(q)[0], scratch)
-        turns = scratch.gradient[first:]
+        model, first = self.model, len(self.model.hinges) - len(self.model.wings)
+        if not len(model.wings):
+            return super().holds(q)
+        turns = turned_plates(model, self._split(q)[0]).gradient[first:]
         turns[:, :3] += turns[:, 9:]  # the first end takes the place of the wing
         return unit_rows(model.hinges[first:, :3], turns[:, :9], self.size)
 
@@ -205,10 +203,8 @@ class BarsPlatesTerm(SheetTerm):
 
     def plate_energies(self, q: NDArray, turn: NDArray) -> NDArray:
         """See `SheetTerm`."""
-        model, scratch = self.model, plates_scratch(self.model)
-        displacement, rotation = self._split(q)
-        turn_hinges(model, displacement, scratch)
-        from_rest = scratch.angle.copy()
+        model, (displacement, rotation) = self.model, self._split(q)
+        from_rest = turned_plates(model, displacement).angle
         from_rest[len(model.fold_rest) :] -= model.bend_rest
         turned = np.append(from_rest, (self.per_hidden * rotation)[::-1])  # number -1 comes last
         angle, size = turned[model.angle], np.diff(model.start)
@@ -244,10 +240,8 @@ class BarsPlatesTerm(SheetTerm):
 
     def turns(self, q: NDArray) -> tuple[sparse.csr_array, NDArray]:
         """Gradients (nq, m), 1/m, of the plates' angles, and slopes (nf,) of the folds, N m/rad."""
-        model, scratch, hinges = self.model, plates_scratch(self.model), len(self.model.hinges)
-        displacement, rotation = self._split(q)
-        turn_hinges(model, displacement, scratch)
-        turn_folds(model, rotation, scratch)
+        model, hinges = self.model, len(self.model.hinges)
+        scratch = turned_plates(model, *self._split(q))
         columns = 3 * model.hinges[:, :, None] + np.arange(3)
         places = (np.repeat(np.arange(hinges), 12), columns.ravel())
         nodal = sparse.coo_array((scratch.gradient.ravel(), places), shape=(hinges, self.size))
