@@ -109,14 +109,18 @@ def stretching(structure: Discretized, displacement: NDArray, motions: NDArray) 
 
 def _gradients(structure: Discretized, field: NDArray) -> NDArray:
     """Mean gradient (..., f, 3, 2) of nodal values (..., n, 3) in each panel."""
-    pattern, found = structure.pattern, []
-    for face, normal in zip(pattern.faces, pattern.face_normals, strict=True):
-        x = pattern.vertices[list(face)]
-        along = np.cross(np.cross(normal, x[1] - x[0]), normal)
-        along /= np.linalg.norm(along)
-        plane = (x - x.mean(axis=0)) @ np.stack([along, np.cross(normal, along)], axis=1)
-        found.append(np.swapaxes(field[..., list(face), :], -1, -2) @ np.linalg.pinv(plane).T)
-    return np.stack(found, axis=-3)
+    pattern, size = structure.pattern, np.array([len(face) for face in structure.pattern.faces])
+    out = np.empty((*field.shape[:-2], len(size), 3, 2), field.dtype)
+    for alike in np.unique(size):
+        at = np.flatnonzero(size == alike)
+        face, normal = np.array([pattern.faces[f] for f in at]), pattern.face_normals[at]
+        x = pattern.vertices[face]
+        along = np.cross(np.cross(normal, x[:, 1] - x[:, 0]), normal)
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        plane = (x - x.mean(axis=1)[:, None]) @ np.stack([along, np.cross(normal, along)], axis=-1)
+        weights = np.swapaxes(np.linalg.pinv(plane), -1, -2)
+        out[..., at, :, :] = np.swapaxes(field[..., face, :], -1, -2) @ weights
+    return out
 
 
 def _of_strains(structure: Discretized, strain: NDArray) -> NDArray:
