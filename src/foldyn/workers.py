@@ -113,10 +113,9 @@ class Workers(Generic[Item, Result]):
                 break
             if lost is None:
                 raise ComputationError(
-                    "a process that computes was ended from outside: perhaps for lack of memory, "
-                    "then what was kept need not be computed again; or, in a script, because this "
-                    'was not called below if __name__ == "__main__" (processes=1 needs no other '
-                    "process)"
+                    "a worker process was ended from outside, perhaps for lack of memory (what was "
+                    "kept need not be computed again). In a script, call this only below "
+                    'if __name__ == "__main__", or give processes=1, which needs no other process'
                 )
             doubtful.extend(broken)
             self._restart()

@@ -53,7 +53,7 @@ def test_several_masses_have_the_other_options_of_the_preset(read):
         ('kind = "shell"\npreset = "plate"', "model.preset: only for model.kind"),
         (
             'preset = "plate"\nbend_law = "superlinear"',
-            'model: bend_law = "superlinear": takes the stiffness of large turns',
+            'model: bend_law = "superlinear": needs the stiffness of large turns',
         ),
     ],
 )

@@ -116,8 +116,8 @@ analysis.duration = 1.0 | analysis.duration: only for analysis.kind = "dynamics"
     "frf"; leave it out
 drive = [{ nodes = 7, force = [1, 0, 0] }] | drive: only for analysis.kind = "frf"; leave it out
 initial = { spin = [0, 0, 1] } | initial.spin: only for analysis.kind = "dynamics"; leave it out
-analysis.state = "rest"; initial = { file = "a.nc" } | analysis.state = "rest": the state is that
-    of initial.file; leave out one of the two
+analysis.state = "rest"; initial = { file = "a.nc" } | analysis.state = "rest": initial.file
+    gives the state already; leave out one of the two
 loads = [{ nodes = 7, force = [1, 0, 0] }] | loads[0]: does not act in the state of rest; write
     state = "equilibrium" under [analysis], or leave it out
 supports[1] = { nodes = 7, axis = "x", displacement = 1 } | supports[1]: moves nothing in the
@@ -135,8 +135,8 @@ output.axis = "-x": did you mean 'x'? choose one of x, y, z
 output = { quantity = "mobility" } | output.quantity: only for analysis.kind = "frf"; leave it out
 """
 BAD_RESPONSE = """
-analysis.method = "harmonic"; analysis.internal = 3 | analysis.internal = 3: the method harmonic
-    goes by the amplitude of the drive, internal
+analysis.method = "harmonic"; analysis.internal = 3 | analysis.internal = 3: internal amplitudes
+    are for small vibrations, and the method harmonic is for
 analysis.frequencies = | analysis.frequencies: missing; give
 analysis.frequencies = "all": must be { first = 1, last = 25, count = 241 }, in Hz, or a
 analysis.frequencies = []: must be { first = 1
@@ -157,8 +157,8 @@ analysis.method = "modal"; analysis.averages = 4 | analysis.averages: only for m
     "burst_random"; leave it out
 analysis.duration = 4.0 | analysis.duration: only for method = "impulse" or "burst_random"; leave
     it out
-analysis.method = "impulse"; analysis.secant = 1 | analysis.secant = 1.0: the method impulse goes
-    by the amplitude of the drive; leave it
+analysis.method = "impulse"; analysis.secant = 1 | analysis.secant = 1.0: the method impulse takes
+    the amplitude of the drive instead; leave it
 analysis.amplitude = 0: must be greater than 0
 analysis.method = "impulse"; analysis.integrator = "rk5" | analysis.integrator = "rk5": did you
     mean 'rk4'? choose one of rk4
@@ -185,10 +185,10 @@ drive[0].base = "x" | drive[0].base: moves all nodes that supports hold along it
 drive[0] = { base = "w" } | drive[0].base = "w": must be one of "x", "y" and "z"
 drive[0].displacement = 1.0 | drive[0].displacement: moves all nodes that
     supports hold along its axis; leave out nodes
-drive[0] = { base = "x" }; drive[1] = { nodes = [7, 6], force = [1, 0, 0] } | drive[0]: a base
-    drives alone, along one axis; run a case file for each
-drive[0] = { base = "x" }; output = { quantity = "mobility" } | output.quantity = "mobility": a
-    base drives, and what responds to it is shown as transm
+drive[0] = { base = "x" }; drive[1] = { nodes = [7, 6], force = [1, 0, 0] } | drive[0]: a moving
+    base must be the only drive; run a case file for each
+drive[0] = { base = "x" }; output = { quantity = "mobility" } | output.quantity = "mobility": the
+    response to a moving base is always shown as transm
 output.quantity = "mobilty": did you mean 'mobility'? choose one of receptance, mob
 output = { animation = "gif" } | output.animation: only for analysis.kind = "dynamics", "statics"
     or "modes"; leave it

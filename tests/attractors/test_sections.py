@@ -95,7 +95,7 @@ def test_what_has_no_section_is_refused(periodic):
         fd.poincare_section(motion.time)
     with pytest.raises(InputError, match='direction = "left"'):
         fd.poincare_section(motion, plane=X, direction="left")
-    with pytest.raises(InputError, match=r"period = 1\.0: give it or a plane"):
+    with pytest.raises(InputError, match=r"period = 1\.0: give either a period or a plane"):
         fd.poincare_section(motion, 1.0, plane=X)
     with pytest.raises(InputError, match=r"period: a section of .* states needs about"):
         fd.poincare_section(motion, 1e-12)

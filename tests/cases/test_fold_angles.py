@@ -90,9 +90,9 @@ def test_wrong_arguments(given, message):
 @pytest.mark.parametrize(
     ("load", "message"),
     [
-        (fd.Actuate("valley", fold_angle=-10), r"loads\[0\].fold_angle = -10: is a size for creas"),
+        (fd.Actuate("valley", fold_angle=-10), r"loads\[0\].fold_angle = -10: must be at least 0"),
         (fd.Actuate([0, 1], fold_angle=[1]), r"fold_angle = .*1 value for 2 creases"),
-        (fd.Actuate([0, 1], fraction=0.5), r"loads\[0\].fraction: a crease is flat, so that it"),
+        (fd.Actuate([0, 1], fraction=0.5), r"loads\[0\].fraction: a crease is flat, so it"),
         (fd.Actuate("all", fraction=0.5), r"fraction: a crease is unassigned"),
         (fd.Actuate("all", fold_angle=5), r"fold_angle: a crease is unassigned"),
     ],

@@ -120,7 +120,7 @@ def test_the_device_is_named_in_a_case_file_and_on_the_command_line(tmp_path, mo
     assert found.attrs["device"] == "cpu"
     file.write_text(MOTION.replace('"dynamics"\nduration = 1e-3', '"modes"'))
     assert main([*command, "--device", "gpu"]) == 2
-    assert "--device: is of motions" in capsys.readouterr().err
+    assert "--device: is for motions" in capsys.readouterr().err
     with pytest.raises(InputError, match=r"device.*only motions"):
         fd.sweep(file, {"sheet.density": [1.0, 2.0]}, measures=["frequency"], device="gpu")
     with pytest.raises(InputError, match=r"device.*choose"):

@@ -191,7 +191,7 @@ def test_a_motion_that_fails_is_stored_until_then(kept, tmp_path):
         ({"store": 3}, "store = 3"),
         ({"store": "run.nc", "checkpoint": 0.0}, "checkpoint"),
         ({"store": "run.nc", "resume": 1}, "resume = 1"),
-        ({"resume": True}, "store: there is nothing to go on with"),
+        ({"resume": True}, "store: there is nothing to resume"),
     ],
 )
 def test_bad_arguments_are_refused_before_anything_is_computed(given, text, tmp_path, monkeypatch):

@@ -331,7 +331,7 @@ def test_a_cyclic_test_gives_yield_moment_and_hardening(tmp_path):
     assert fit["model.fold_law.yield_moment"].value == pytest.approx(2e-3, rel=1e-3)
     assert fit["model.fold_law.kinematic"].value == pytest.approx(0.01, rel=1e-3)
     test, other = (replace(one, sigma=1e-6) for one in (test, cyclic(path, -way[:3])))
-    with pytest.raises(ComputationError, match="creases that yield depend on the way"):
+    with pytest.raises(ComputationError, match="creases that yield depend on the loading path"):
         fd.fit(
             path,
             [test, other],

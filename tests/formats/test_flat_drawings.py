@@ -256,7 +256,7 @@ def test_a_window_that_nothing_connects(letter):
         (drawn(("M", (0, 0), (np.nan, 1))), r"vertices\[1\] = \[nan, 1.0\]: coordinates must be"),
         (drawn(("M", (0, 0), (np.inf, 1))), r"vertices\[1\]"),
         (drawn(("M", (0, 0), (1e40, 1))), r"vertices\[1\].*at most 1e\+30 m"),
-        (drawn(("M", (1e9, 1e9), (1e9 + 1, 1e9))), "vertices: they span 1 m, too little for where"),
+        (drawn(("M", (1e9, 1e9), (1e9 + 1, 1e9))), "vertices: they span 1 m, too little at"),
         (drawn(("M", (0, 0, 0), (1, 1, 1)), ("M", (0, 0, 0), (1, 0, 0))), "lines in space; give a"),
         (square(("M", (0, 0), (1, 1)), angles=[200]), "line 4: a fold angle of 200 degrees"),
         (listed([[0, 0], [1, 0], [0, 1]], [[0, 1, 3]]), r"faces\[0\] = .*vertex 3 does not exist"),

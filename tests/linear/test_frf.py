@@ -275,7 +275,7 @@ OPPOSED = [fd.Force([1], (1, 0, 0)), fd.Force([1], (-1, 0, 0))]
         ({"drive": fd.Force([0], (1, 0, 0))}, r"drive\[0\].*acts only where supports hold"),
         ({"drive": fd.Force([1], (0, 0, 0))}, "drive: the forces are zero"),
         ({"drive": OPPOSED}, "drive: the forces are zero"),
-        ({"drive": [fd.Force([1], (1, 0, 0)), fd.BaseMotion("x")]}, "drives alone"),
+        ({"drive": [fd.Force([1], (1, 0, 0)), fd.BaseMotion("x")]}, "only drive"),
         ({"drive": fd.Gravity((0, 0, -9.81))}, "must be a list of Force"),
         ({"drive": fd.Force([1], (1, 0, 0), fd.Harmonic(1.0))}, r"drive\[0\].history"),
         ({"drive": fd.BaseMotion("x", value=0.0)}, "the base must move"),

@@ -63,7 +63,7 @@ def test_a_response_curve_plays_its_motions(tmp_path, monkeypatch):
     for kind in KINDS:
         assert "error" not in own.compute(wish(kind)), kind
     monkeypatch.setattr(case_session, "MOST_FREE", 1)
-    assert "in the span of 6 modes" in own.compute(wish("response"))["notes"][0]
+    assert "with 6 modes instead of all" in own.compute(wish("response"))["notes"][0]
 
 
 def test_modes_are_those_of_the_changed_case(session, tmp_path):
@@ -95,8 +95,8 @@ def test_a_defect_is_told_as_one(session, monkeypatch):
 def test_warnings_are_notes(session, monkeypatch):
     monkeypatch.setattr(case_session, "MOST_WORK", 1000.0)
     answer = session.compute(wish("dynamics"))
-    (note,) = [note for note in answer["notes"] if "so that it is computed soon" in note]
-    assert "of 2 s, so that it is computed soon" in note
+    (note,) = [note for note in answer["notes"] if "to keep the wait short" in note]
+    assert "of 2 s are computed and shown, to keep the wait short" in note
     assert "error" not in answer
 
 

@@ -210,7 +210,7 @@ REFUSED = {
     "no multiple": fold([PUSH, fd.Force([1], (1e-3, 0, 0), history=fd.Harmonic(0.5))]),
     "needs supports": fd.Case(fold().structure, loads=[PUSH]),
     "constant matrix": fd.Case(fold().structure, fold().supports, [PUSH], fd.StrainDamping(1e-3)),
-    "friction depends on the way there": fd.Case(
+    "friction depends on how it was reached": fd.Case(
         fold().structure, fold().supports, [PUSH], contact=fd.Contact(friction=0.3)
     ),
     "unknowns without mass": fd.Case(

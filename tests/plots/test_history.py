@@ -126,7 +126,7 @@ def test_uneven_times_are_refused(trajectory):
     with pytest.raises(InputError, match="not evenly spaced"):
         plot_history({"run": uneven}, [6])
     for still in (trajectory.isel(time=0), trajectory.drop_vars("displacement")):
-        with pytest.raises(InputError, match="one is no motion"):
+        with pytest.raises(InputError, match="one of them is not a motion"):
             plot_history({"run": trajectory, "still": still}, [6])
 
 

@@ -230,7 +230,7 @@ def test_refusals(changes, text):
 def test_a_panel_too_narrow_for_the_radius_is_refused():
     c, s = np.cos(np.radians(10)), np.sin(np.radians(10))
     skew = fd.Pattern([[0, 0], [1, 0], [1 + c, s], [c, s]], [[0, 1, 2, 3]])
-    with pytest.raises(InputError, match=r"more than half of the 0.0872 m .* at most 0.0436"):
+    with pytest.raises(InputError, match=r"only 0.0872 m .* at most half of that, 0.0436"):
         shell(skew, SHEET, divisions=4, vertex_radius=0.06)
     assert len(shell(skew, SHEET, divisions=4, vertex_radius=0.04).triangles) > 50
 

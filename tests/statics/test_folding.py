@@ -297,7 +297,7 @@ def test_an_interrupted_folding_has_the_steps_that_are_done():
         ({"angles": 30, "fraction": 0.5}, "fraction: give either angles or fraction"),
         ({"fraction": 1.5}, "fraction = 1.5"),
         ({"fraction": "80"}, 'must be as in "80%"'),
-        ({"angles": -30}, "angles = -30: is a size for creases chosen by a word"),
+        ({"angles": -30}, "angles = -30: must be at least 0 for creases chosen by a word"),
         ({"angles": 200}, "must lie between -180 and 180 degrees"),
         ({"angles": [1, 2, 3]}, "has 3 angles for 1 creases"),
         ({"angles": {}}, "angles: is empty"),
@@ -326,7 +326,7 @@ UNASSIGNED = fd.Pattern(SQUARE, HALVES, ["U"], families={"a": [(0, 2)]})
         ([[0, 0, 0]], {"angles": 30}, "pattern: got list, give a Pattern"),
         (fd.Pattern(SQUARE, [(0, 1, 2, 3)]), {"angles": 30}, "has no creases"),
         (UNASSIGNED, {"fraction": 0.5}, "neither mountains and valleys nor fold angles"),
-        (UNASSIGNED, {"angles": {"a": 9}}, "has no way to fold"),
+        (UNASSIGNED, {"angles": {"a": 9}}, "is neither mountain nor valley"),
     ],
 )
 def test_what_cannot_be_folded_is_refused(pattern, arguments, message):

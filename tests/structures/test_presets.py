@@ -115,8 +115,8 @@ def test_positions_of_arguments_stay():
 
 
 LARGE = (
-    'bend_law = "superlinear": takes the stiffness of large turns, calibration = "plate" '
-    'gives that of small ones; take "linear" or "plate_superlinear", or preset = "herkal"'
+    'bend_law = "superlinear": needs the stiffness of large turns, but calibration = "plate" '
+    'gives the stiffness of small ones; take "linear" or "plate_superlinear", or preset = "herkal"'
 )
 
 

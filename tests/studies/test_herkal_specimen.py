@@ -113,7 +113,7 @@ def test_preparation_starts_at_the_first_turning_point() -> None:
 def test_a_film_that_begins_with_the_release_or_after_it(cut) -> None:
     """The press would be taken for less than it was."""
     x = ringing(TIME + cut * STEP)
-    with pytest.raises(InputError, match=r"node 8 is not still for 0.0125 s before it moves"):
+    with pytest.raises(InputError, match=r"node 8 is not still for 0.0125 s before its fastest"):
         prepared.prepare(film(n8=x))
 
 
@@ -169,7 +169,7 @@ def test_gaps() -> None:
 @pytest.mark.parametrize(
     ("nodes", "message"),
     [
-        ({"n9": ringing(TIME)}, "node 8 was not measured; it tells the release"),
+        ({"n9": ringing(TIME)}, "node 8 was not measured; its motion shows the release"),
         ({"n8": np.where(np.arange(240) % 3, np.nan, ringing(TIME, LATE)), "n9": TIME}, None),
         (
             {"n8": np.where((TIME > 0.3) & (TIME < 0.6), np.nan, ringing(TIME, LATE))},
@@ -374,11 +374,11 @@ def test_files_are_sorted_by_what_they_hold(tables) -> None:
         (["nothing.csv"], "there is no such file"),
         (["."], "is a folder"),
         (["grams.csv"], "the unit [g] is not known"),
-        (["other.csv"], "node 8 was not measured; it tells the release"),
+        (["other.csv"], "node 8 was not measured; its motion shows the release"),
         (["weights.csv", "weights.csv"], "is a static test, too; give one of each"),
-        (["one.csv"], "1 force cannot give 2 parameters"),
-        (["metres.csv"], "displacements are 2e+04 to 3.6e+04 mm"),
-        (["upwards.csv"], "must be above 0, downwards"),
+        (["one.csv"], "1 measured force(s); at least 2"),
+        (["metres.csv"], "displacements of the top are 2e+04 to 3.6e+04 mm"),
+        (["upwards.csv"], "must be positive (downwards)"),
         (["pulled.csv"], "a force is -0.226 N"),
         (["reversed.csv"], "turn the sign of x, which points down"),
         (["slow.csv"], "30 frames per second are too few"),

@@ -292,7 +292,7 @@ REFUSED = [
     (VARY, {"measures": ["frequencies", "frequencies"]}, "asked for twice"),
     (VARY, {"measures": []}, "measures: none"),
     (VARY, {"measures": [lambda result, case: 1.0]}, "without a name"),
-    (VARY, {"method": "sobol"}, "method: is of samples"),
+    (VARY, {"method": "sobol"}, "method: is for samples"),
     (THICK, {"samples": 4, "method": "sobl"}, "'sobol'"),
     (VARY, {"ties": {"sheet.density": "2 * sheet.thickness"}}, "no parameter"),
     (VARY, {"ties": {"pattern.dihedral": "3"}}, "named twice"),
@@ -362,4 +362,4 @@ def test_what_a_path_had_before_it_stopped_is_measured(tmp_path):
     assert np.isnan(found["displacement_5_z"])
     told = str(found["failure"].values)
     assert "what there is of the path is measured" in told
-    assert "displacement[5,z]: is of whole paths" in told
+    assert "displacement[5,z]: needs a whole path" in told

@@ -67,7 +67,7 @@ def one_key(value: Any) -> Varied:
         )
     table, _, key = one.key.partition(".")
     if table in ASIDE and not (table == "analysis" and key.partition("[")[0] in STATED):
-        raise InputError(f": {one.key} makes no other state; vary a key of another table")
+        raise InputError(f": {one.key} does not change the state; vary a key of another table")
     if not one.numeric or len(one.values) > MOST_STATES:
         raise InputError(f" = {show(value)}: give numbers, at most {MOST_STATES}")
     return one
@@ -168,7 +168,7 @@ def _cell(case: Case, given: Mapping[str, Any]) -> UnitCell:
         return UnitCell(case, vectors, screw, tolerance)
     if vectors is not None or screw is not None:
         raise InputError(
-            ": chooses among those of the pattern; leave out vectors and screw", PERIODS
+            ": chooses among the periods of the pattern; leave out vectors and screw", PERIODS
         )
     motions = UnitCell(case, tolerance=tolerance).motions
     chosen = given["periods"]
@@ -269,9 +269,8 @@ class BandsSchema(VibrationSchema):
         for i, load in enumerate(self.loads):
             if self.initial is None and not isinstance(load, Actuate):
                 raise InputError(
-                    ": equilibria of cells that repeat are under folded creases and stretched "
-                    "periods alone; leave it out, or compute a path and name its result in "
-                    "initial.file",
+                    ": the equilibrium of a cell is computed only for folded creases and stretched "
+                    "periods; leave it out, or compute a path and name its result in initial.file",
                     f"loads[{i}]",
                 )
 

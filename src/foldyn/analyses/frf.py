@@ -98,15 +98,15 @@ class FrfSection(*(method.options for method in METHODS.values()), AnalysisSecti
                 )
         if "secant" in given and method.by_amplitude:
             raise InputError(
-                f" = {show(self.secant)}: the method {self.method} goes by the amplitude of the "
-                "drive; leave it out, and give amplitude",
+                f" = {show(self.secant)}: the method {self.method} takes the amplitude of the "
+                "drive instead; leave it out, and give amplitude",
                 "secant",
             )
         if self.internal and method.by_amplitude:
             raise InputError(
-                f" = {self.internal}: the method {self.method} goes by the amplitude of the drive, "
-                'internal amplitudes are for small vibrations; take method = "direct" or "modal", '
-                "or leave it out",
+                f" = {self.internal}: internal amplitudes are for small vibrations, and the method "
+                f'{self.method} is for finite ones; take method = "direct" or "modal", or leave '
+                "it out",
                 "internal",
             )
         method.options(**self.options())
@@ -169,12 +169,12 @@ class FrfSchema(VibrationSchema):
         bases = [i for i, one in enumerate(self.drive) if isinstance(one, BaseMotion)]
         if bases and len(self.drive) > 1:
             raise InputError(
-                ": a base drives alone, along one axis; run a case file for each",
+                ": a moving base must be the only drive; run a case file for each drive",
                 f"drive[{bases[0]}]",
             )
         if bases and self.output.quantity is not None:
             raise InputError(
-                f" = {show(self.output.quantity)}: a base drives, and what responds to it is shown "
+                f" = {show(self.output.quantity)}: the response to a moving base is always shown "
                 "as transmissibility; leave it out",
                 "output.quantity",
             )

@@ -195,7 +195,7 @@ class Tie:
                 hint = suggest(key, parameters)
                 raise self._error(f"{written(node)} is no parameter; {hint}use {known}")
             return parameters[key]
-        raise self._error(f"{written(node)} is no number or key")
+        raise self._error(f"{written(node)} is neither a number nor a key")
 
     def _error(self, what: str) -> InputError:
         return InputError(f'tie {self.key} = "{shortened(self.expression)}": {what}; {_REMEDY}')

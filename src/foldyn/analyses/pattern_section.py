@@ -73,8 +73,8 @@ def checked_pattern(value: Any) -> dict[str, Any]:
     if HINGES in value and value[HINGES] != FACES:
         if isinstance(value[HINGES], str):
             raise InputError(
-                f' = {show(value[HINGES])}: give "{FACES}", or heights in m, one, one per crease '
-                "or by name",
+                f' = {show(value[HINGES])}: give "{FACES}", or heights (m): one for all, one per '
+                "crease, or by name",
                 f".{HINGES}",
             )
         if not isinstance(value[HINGES], Mapping):

@@ -61,8 +61,8 @@ class VibrationSchema(CaseSchema):
             )
         if self.initial is not None and "state" in self.analysis.stated:
             raise InputError(
-                f" = {show(self.analysis.state)}: the state is that of initial.file; leave out one "
-                "of the two",
+                f" = {show(self.analysis.state)}: initial.file gives the state already; leave out "
+                "one of the two",
                 "analysis.state",
             )
         if self.initial is not None or self.analysis.state != "rest":

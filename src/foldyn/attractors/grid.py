@@ -210,7 +210,7 @@ def _grid(grid: Any, nodes: int) -> tuple[tuple[str, ...], list[NDArray[np.float
     places = []
     for name, given in grid.items():
         if not isinstance(name, str) or not name.isidentifier():
-            raise InputError(f": {name!r} is no name of an argument", "grid")
+            raise InputError(f": {name!r} cannot be the name of an argument", "grid")
         if name in TAKEN:
             raise InputError(
                 f": {name!r} is a name in the result; give the parameter another one", "grid"

@@ -96,7 +96,7 @@ def poincare_section(
         turns = np.arange(np.ceil(first - ROUNDING), np.floor(last + ROUNDING) + 1.0)
         times = np.clip((turns + shift) * period, *stretch.time[[0, -1]])
     elif period is not None:
-        raise InputError(f" = {show(period)}: give it or a plane, one of the two", "period")
+        raise InputError(f" = {show(period)}: give either a period or a plane", "period")
     else:
         times = _passages(stretch, plane, number("level", level), direction)
     times = times[times >= after]

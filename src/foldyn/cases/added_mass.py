@@ -117,8 +117,8 @@ def added_mass_at(case: Any, displacement: NDArray) -> sparse.csr_array | None:
     added, fits = found
     if not fits:
         raise InputError(
-            f": the fluid couples {len(added.moving)} dofs with each other, and matrices take "
-            f"{MOST_COUPLED} at most; take fewer divisions, the scheme n4b5, or added_mass = "
+            f": the fluid couples {len(added.moving)} dofs with each other, and a full matrix may "
+            f"have {MOST_COUPLED} at most; take fewer divisions, the scheme n4b5, or added_mass = "
             f'"{LOCAL}"',
             "air",
         )

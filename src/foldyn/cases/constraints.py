@@ -317,7 +317,8 @@ def _link(structure: Discretized, link: Link, place: str, nodes: NDArray) -> lis
     corners = resolve_nodes(structure, link.to, f"{place}.to")
     if twice := set(nodes.tolist()) & set(corners.tolist()):
         raise InputError(
-            f": node {min(twice)} is among those that ride on them; leave it out", f"{place}.to"
+            f": node {min(twice)} cannot ride on itself; leave it out of nodes or of to",
+            f"{place}.to",
         )
     weights, off = on_plate(structure.nodes[nodes], structure.nodes[corners])
     if np.isnan(off).any():

@@ -139,9 +139,9 @@ def check_driven(case: Case, states: Iterable[tuple[str, NDArray, NDArray]]) -> 
             if behind.size:
                 node = contact.nodes[nodes[behind[0]]]
                 raise InputError(
-                    f": at {when} it has reached node {node}, whose distance from it "
-                    "supports decide: neither gives way. Stop the plane or the support before, or "
-                    "let the node move along the plane's normal",
+                    f": at {when} it has reached node {node}, and neither can give way, because "
+                    "supports hold the node along the plane's normal. Stop the plane or the "
+                    "support before, or let the node move along the normal",
                     f"contact.planes[{i}]",
                 )
         if look and k % STRIDE == 0:

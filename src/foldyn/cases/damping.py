@@ -89,8 +89,8 @@ class Rayleigh(Part):
         if not lower - slack <= z2 <= upper + slack:
             ends = ("alpha", "beta") if f1 < f2 else ("beta", "alpha")
             raise InputError(
-                f" = {z2:g}: with a ratio of {z1:g} at {f1:g} Hz, that at {f2:g} Hz can be from "
-                f"{lower:.3g} ({ends[0]} alone) to {upper:.3g} ({ends[1]} alone)",
+                f" = {z2:g}: with a ratio of {z1:g} at {f1:g} Hz, the ratio at {f2:g} Hz must lie "
+                f"between {lower:.3g} ({ends[0]} alone) and {upper:.3g} ({ends[1]} alone)",
                 "z2",
             )
         apart = f2**2 - f1**2
@@ -142,8 +142,8 @@ class ModalDamping(Part):
         """Refuse a count together with a ratio for each mode."""
         if self.count is not None and isinstance(self.ratios, tuple):
             raise InputError(
-                f" = {self.count}: {len(self.ratios)} ratios are those of {len(self.ratios)} "
-                "modes; leave count out, or give one ratio",
+                f" = {self.count}: there are {len(self.ratios)} ratios, one for each mode; leave "
+                "count out, or give one ratio",
                 "count",
             )
 

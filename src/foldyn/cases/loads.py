@@ -112,8 +112,8 @@ def dihedrals(
         return flat - folded
     if folded[0] < 0.0:
         raise InputError(
-            f" = {folded[0]:g}: is a size for creases chosen by assignment, each of which folds "
-            "its own way; give at least 0",
+            f" = {folded[0]:g}: must be at least 0 for creases chosen by assignment, which "
+            "decides the direction in which each folds",
             "fold_angle",
         )
     return flat - folded * _signs("fold_angle", letters)
@@ -136,8 +136,8 @@ def _signs(name: str, letters: NDArray[np.str_]) -> NDArray[np.float64]:
     if unknown:
         what = {"F": "flat", "U": "unassigned"}[unknown[0]]
         raise InputError(
-            f": a crease is {what}, so that it has no way to fold; give mountains and valleys, or "
-            "an angle for each crease",
+            f": a crease is {what}, so it is unknown in which direction it folds; give mountains "
+            "and valleys, or an angle for each crease",
             name,
         )
     return np.array([SIGNS[letter] for letter in letters.tolist()])

@@ -155,7 +155,7 @@ def _check(folder: Path, out: str | None, names: Sequence[str]) -> None:
     for name in names:
         if (folder / name).is_dir():
             raise InputError(
-                f"{_place(folder, out)}: {folder / name} is a folder, a file of this name is to be "
+                f"{_place(folder, out)}: {folder / name} is a folder where a file is to be "
                 "written; name another folder"
             )
     with tempfile.TemporaryFile(dir=folder):

@@ -127,7 +127,7 @@ def _device(case_file: CaseFile, device: str | None) -> dict[str, str]:
     if device is None:
         return {}
     if "device" not in case_file.analysis.takes:
-        raise InputError("--device: is of motions; leave it out")
+        raise InputError("--device: is for motions only; leave it out")
     return {"device": device}
 
 

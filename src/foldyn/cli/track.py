@@ -243,7 +243,7 @@ def _tracking(given: Namespace) -> Tracking:
         scale = scale_of_lengths(lengths).metres_per_pixel
     nodes = whole_numbers(given, "nodes")
     if nodes is not None and given.model is None:
-        raise InputError("--nodes: which nodes there are is known with a --model only")
+        raise InputError("--nodes: needs a --model, which says what nodes there are")
     return Tracking(
         corners=CornerSettings(reach=one_number(given, "reach")),
         placing=Placing(given.up, given.facing, scale, one_number(given, "distance")),

@@ -90,7 +90,7 @@ def problem_of(minimize: Any, maximize: Any, subject_to: Any) -> Problem:
     """
     if (minimize is None) == (maximize is None):
         raise InputError(
-            ': give one of both, the expression to make small or large, such as "frequency[1]"',
+            ': give one of the two, an expression to make small or large, such as "frequency[1]"',
             "minimize, maximize",
         )
     name, text = ("minimize", minimize) if maximize is None else ("maximize", maximize)

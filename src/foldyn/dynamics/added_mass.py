@@ -100,7 +100,7 @@ def added_mass(
         return _with_memory(np.zeros((0, 3)), nodes, sparse.csr_array((0, 0)), 0, 0)
     if case.imposed_terms or case.base_terms:
         raise InputError(
-            ": motions with supports that move do not take added mass; give added_mass = false",
+            ": motions with moving supports cannot include added mass; give added_mass = false",
             "air",
         )
     unknown = int(case.boundary_elements.unknown.max(initial=-1)) + 1

@@ -160,7 +160,7 @@ def simulate(
     """
     keeping = None if store is None else check_keeping(store, checkpoint, resume)
     if store is None and flag("resume", resume):
-        raise InputError(": there is nothing to go on with; name the file of the result", "store")
+        raise InputError(": there is nothing to resume; name the file of the result", "store")
     motion = prepare(
         case, duration, method, dt, every_steps, interval, initial, force, tolerance, start,
         spectral_radius, sample, keeping is not None, device,

@@ -128,7 +128,8 @@ def simulate_many(
             for what, own in _shape(motions[k].case).items():
                 if own != _shape(motions[0].case)[what]:
                     raise InputError(
-                        f": has other {what} than cases[0]; all share them", f"cases[{k}]"
+                        f": has other {what} than cases[0]; all cases must have the same",
+                        f"cases[{k}]",
                     )
     least = int(np.argmin([motion.critical for motion in motions]))
     case, plan, critical = motions[0].case, motions[least].plan, motions[least].critical

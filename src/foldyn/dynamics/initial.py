@@ -227,10 +227,10 @@ def warn_of_standing_in_wind(case: Case, v: NDArray) -> None:
     wind = float(np.linalg.norm(air.velocity))
     if wind > SLOW_WIND * float(np.linalg.norm(v, axis=1).max()):
         warn(
-            f"air: in a wind of {wind:g} m/s stationary panels lack a moment of up to 0.3 times "
-            "1/2 density U^2 A a/2 (U the wind, A and a a panel's area and width): added mass "
-            'computes its flow again only when a hinge turns by 3 degrees; added_mass = "local", '
-            "of each panel alone, includes this moment",
+            f"air: in a wind of {wind:g} m/s a moment on stationary panels is missing, of up to "
+            "0.3 times 1/2 density U^2 A a/2 (U the wind, A and a a panel's area and width), since "
+            "the flow is computed again only when a hinge has turned by 3 degrees; "
+            'added_mass = "local" includes this moment, but treats each panel alone',
             "air.md#limits",
             ModelRangeWarning,
         )

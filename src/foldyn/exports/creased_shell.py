@@ -200,8 +200,8 @@ def _joints(shell: Shell, split: _Split) -> tuple[Joint, ...]:
         both = [split.of(panel, row) for panel in pattern.crease_faces[crease].tolist()]
         if both[0] == both[1]:
             raise InputError(
-                f": crease {crease} divides panels that run on into each other elsewhere, across "
-                "its welds; these cannot have nodes of their own",
+                f": the panels on both sides of crease {crease} are joined elsewhere by welds, so "
+                "they cannot have separate nodes at the crease",
                 "pattern",
             )
         stiffness = shell.fold_stiffness[crease] * slope[crease] * shares(len(row))
@@ -228,16 +228,16 @@ def fold_slopes(structure: Discretized) -> NDArray:
     slope, moment = law.slope(rest, rest), law.moment(rest, rest)
     if not (slope > 0.0).all() or np.abs(moment).max(initial=0.0) > 0.0:
         raise InputError(
-            f" = {law}: springs stand for folds with a slope and without a moment at rest; take "
-            '"linear" or "enhanced"',
+            f" = {law}: a spring can replace only a fold that has stiffness and no moment at rest; "
+            'take "linear" or "enhanced"',
             "fold_law",
         )
     low, high = law.linear_between or (np.nan, np.nan)
     curved = np.flatnonzero(~((low < rest) & (rest < high)))
     if len(curved):
         warn(
-            f"fold_law = {law}: {len(curved)} of {len(rest)} folds are not linear about rest, and "
-            "become linear springs with their slope there: frequencies are right, statics are not",
+            f"fold_law = {law}: {len(curved)} of {len(rest)} folds are not linear about rest; they "
+            "become linear springs with the slope at rest: frequencies are right, statics are not",
             "exports.md#input-decks",
         )
     return slope

@@ -204,8 +204,8 @@ def _check_finite(name: str, values: NDArray, abscissa: NDArray, along: str) -> 
     if len(bad):
         raise InputError(
             f": {name} has no value at {len(bad)} of {len(abscissa)} samples, the first at {along} "
-            f"{abscissa[bad[0]]:g}, and universal files have no sign for that; leave these out, as "
-            f"with result.isel({along}=...), or export .csv or .mat",
+            f"{abscissa[bad[0]]:g}, and universal files cannot hold missing values; leave these "
+            f"out, as with result.isel({along}=...), or export .csv or .mat",
             "result",
         )
 

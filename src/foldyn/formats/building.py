@@ -128,8 +128,8 @@ def _lines(drawing: Drawing, unit: float, notes: Notes) -> Lines:
     size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
     if not size * _FARTHEST >= np.abs(points).max(initial=SHORTEST):
         raise InputError(
-            f": they span {size:.3g} m, too little for where they are; draw the pattern larger, "
-            "or nearer to the origin",
+            f": they span {size:.3g} m, too little at this distance from the origin; draw the "
+            "pattern larger, or nearer to the origin",
             "vertices",
         )
     ends = np.asarray(drawing.edges, dtype=np.int64).reshape(-1, 2)

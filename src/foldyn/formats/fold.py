@@ -146,7 +146,7 @@ def _number(frames: Sequence[dict[str, Any]], chosen: int | str | None) -> int:
         has = f"{len(found)} frames" if found else "no frame"
         known = ", ".join(show(title) for title in titles[:12] if title) or "none"
         raise InputError(
-            f": the file has {has} of the title {show(chosen)}: titles are {known}", "frame"
+            f": the file has {has} with the title {show(chosen)}; titles are {known}", "frame"
         )
     number = single(chosen)
     counts = isinstance(number, int | np.integer) and not isinstance(number, bool)

@@ -430,7 +430,7 @@ def one_number(text: str, kind: Any) -> Asked:
     one = asked(text, MEASURES)
     kinds = one.measure.kinds
     if kinds and kind not in kinds:
-        raise InputError(f": {text} is of results of kind {' or '.join(kinds)}, not {kind}")
+        raise InputError(f": {text} needs a result of kind {' or '.join(kinds)}, not {kind}")
     if one.measure.dims:
         raise InputError(f": {text} is an array; ask for one number of it, such as frequency[1]")
     return one

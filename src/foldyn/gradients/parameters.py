@@ -76,8 +76,8 @@ def check_known(seeds: Mapping[str, Any], known: Sequence[str], what: str) -> No
     """Refuse derivatives with respect to variables through which no gradient is computed."""
     if unknown := [name for name in seeds if name not in known]:
         raise InputError(
-            f"there are no derivatives through {', '.join(unknown)} of {what}, but through "
-            f"{', '.join(known)}"
+            f"there are no derivatives through {', '.join(unknown)} of {what}; variables that "
+            f"have them are {', '.join(known)}"
         )
 
 
@@ -215,8 +215,8 @@ class Parameters:
         common = own.max(initial=0.0)
         if not common:
             raise InputError(
-                f" = 0: the size of its changes in differences is unknown; give it, such as "
-                f'sizes={{"{name}": 1.0}}',
+                f" = 0: says nothing of how large a change for differences should be; give a "
+                f'size, such as sizes={{"{name}": 1.0}}',
                 name,
             )
         return np.where(own > LEAST * common, own, common)

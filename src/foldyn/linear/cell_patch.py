@@ -233,7 +233,7 @@ def _per_crease(
         lost = [pair for pair in seams if lattice.edge(*pair).kind not in named]
         if words and lost and not any(word in ASSIGNED for word in given):
             raise InputError(
-                f": none of its names is one of the crease between cells at vertices {lost[0]}; "
+                f": no name in it applies to the crease between cells at vertices {lost[0]}; "
                 'give values by letter too, as {"mountain": ..., "valley": ...}, or one for all',
                 name,
             )

@@ -123,9 +123,7 @@ def drive_of(case: Case, drive: Any, amplitude: float) -> Drive:
     if not bases:
         return _forces(case, forces, amplitude)
     if len(parts) > 1:
-        raise InputError(
-            "drive: a BaseMotion drives alone, along one axis; compute a response for each"
-        )
+        raise InputError("drive: a BaseMotion must be the only drive; compute a response for each")
     return _base(case, bases[0], amplitude)
 
 

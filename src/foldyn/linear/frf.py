@@ -178,8 +178,7 @@ def frf(
     if internal and way.by_amplitude:
         raise InputError(
             f" = {internal!r}: internal amplitudes are for small vibrations, and the method "
-            f'{method} goes by the amplitude of the drive; take method = "direct" or "modal", or '
-            "leave it out",
+            f'{method} is for finite ones; take method = "direct" or "modal", or leave it out',
             "internal",
         )
     began = time.perf_counter()
@@ -275,7 +274,11 @@ def _frequencies(given: ArrayLike, way: ResponseMethod) -> NDArray:
     if frequency[0] == 0.0 and way.name in ("stepped_sine", "burst_random"):
         raise InputError(f": {way.name} cannot give 0 Hz; begin above it", "frequencies")
     if frequency[-1] == 0.0 and not way.linear:
-        raise InputError(": 0 Hz alone needs statics, or the direct method", "frequencies")
+        raise InputError(
+            f": {way.name} needs a frequency above 0 Hz; for 0 Hz alone use statics, or the "
+            "method direct",
+            "frequencies",
+        )
     return frequency
 
 

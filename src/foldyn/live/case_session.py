@@ -118,7 +118,7 @@ class CaseSession:
     def _document(self, wish: Any) -> dict[str, Any]:
         numbers = wish.get("numbers") if isinstance(wish, dict) else None
         if not isinstance(numbers, dict):
-            raise InputError("a wish must be a table with numbers and what to compute")
+            raise InputError("a request must be a table with numbers and what to compute")
         return changed(self.document, self.controls, numbers)
 
     def _computed(self, wish: Any) -> Message:
@@ -216,8 +216,8 @@ def computed(path: Path, document: Document, kind: str) -> tuple[CaseFile, xr.Da
         return case_file, case_file.run()
     duration = asked["duration"] * MOST_WORK / work
     warn(
-        f"the motion is shown for {duration:.3g} s of {asked['duration']:g} s, so that it is "
-        "computed soon; foldyn run computes the whole",
+        f"only {duration:.3g} s of {asked['duration']:g} s are computed and shown, to keep the "
+        "wait short; foldyn run computes the whole motion",
         "pages.md#change-parameters-in-the-viewer",
     )
     return case_file, case_file.run(duration=duration, interval=duration / SAMPLES)
@@ -229,8 +229,8 @@ def _curve_of_motions(case_file: CaseFile) -> xr.Dataset:
     if free <= MOST_FREE or case_file.analysis.arguments.get("modes"):
         return case_file.run()
     warn(
-        f"the curve is computed in the span of {MODES} modes, so that it is there soon, instead of "
-        f"with {free} free dofs; foldyn run takes all of them",
+        f"the curve is computed with {MODES} modes instead of all {free} free dofs, to keep the "
+        "wait short; foldyn run takes all of them",
         "pages.md#change-parameters-in-the-viewer",
     )
     return case_file.run(modes=MODES)

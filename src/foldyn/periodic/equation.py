@@ -152,8 +152,8 @@ def check_smooth(case: Case, name: str) -> None:
     case.check_movable()
     if case.contact is not None and case.contact.rubs:
         raise InputError(
-            f": {name} takes forces that depend on the displacement alone, and friction depends on "
-            "the way there; give friction = 0.0, or simulate the motion",
+            f": {name} takes forces that depend on the displacement alone, but friction depends on "
+            "how it was reached; give friction = 0.0, or simulate the motion",
             "contact.friction",
         )
     refuse_air(case, name)

@@ -218,7 +218,7 @@ def warn_of_errors(
     if truncation > TRUNCATED:
         warn(
             f"harmonics = {harmonics}: twice as many would change the motion by about "
-            f"{truncation:.1g} of it; give more",
+            f"{truncation:.1g} of its size; give more",
             "nonlinear-vibration.md#one-motion",
         )
     crossed = [f"{orbit.omega / TURN:.6g} Hz" for orbit in orbits if orbit.crosses()]
@@ -231,8 +231,8 @@ def warn_of_errors(
     most = 0.0 if reduction is None else float(np.max(reduction))
     if most > REDUCED:
         warn(
-            f"modes: the omitted dofs would change the motion by {most:.1g} of it or more; "
-            "give more",
+            f"modes: the omitted dofs would change the motion by {most:.1g} of its size or more; "
+            "give more modes",
             "nonlinear-vibration.md#big-sheets",
         )
 

@@ -348,8 +348,8 @@ def _values(orbits: list[Orbit], place: NDArray) -> dict[str, Any]:
     worst = float(energies[:, 1].max())
     if worst > LOOSE:
         warn(
-            f"harmonics: the energy of a motion changes by {worst:.1g} of it along the motion, and "
-            "should be constant: give more",
+            f"harmonics: the energy of a motion should be constant, but changes by {worst:.1g} of "
+            "its size: give more",
             "nonlinear-vibration.md#backbones",
         )
     return {"energy": energies[:, 0], "energy_drift": energies[:, 1]}

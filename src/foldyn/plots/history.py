@@ -68,7 +68,9 @@ def plot_history(
     trajectories = by_label("trajectories", trajectories)
     for one in trajectories.values():
         if "displacement" not in one or "time" not in one["displacement"].dims:
-            raise InputError(": one is no motion; give results of fd.simulate", "trajectories")
+            raise InputError(
+                ": one of them is not a motion; give results of fd.simulate", "trajectories"
+            )
     numbers = check_nodes_of(trajectories, nodes)
     moved = {
         label: one["displacement"].transpose("time", ...).sel(node=numbers, axis=list(AXES)).values

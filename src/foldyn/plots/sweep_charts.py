@@ -54,7 +54,7 @@ def line_chart(
             name = f"{label(sweep[by])} {short(values[k])}"
             found[name] = measured(sweep, measure, {**(at or {}), by: values[k]})
     else:
-        raise InputError(f" = {by}: samples have a value of it each; name a dimension", "by")
+        raise InputError(f" = {by}: every sample has its own value of it; name a dimension", "by")
     check_some(np.concatenate([one.values.ravel() for one in found.values()]), measure)
     if grid:
         for one in found.values():

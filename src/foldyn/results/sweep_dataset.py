@@ -260,7 +260,8 @@ def sobol_indices(
     found = measured(ds, measure, at)
     if ds.attrs["method"] != SALTELLI:
         raise InputError(
-            f'sweep: is by {ds.attrs["method"]}; Sobol indices need samples of method = "saltelli"'
+            f'sweep: its method is "{ds.attrs["method"]}", but Sobol indices need samples of '
+            'method = "saltelli"'
         )
     number("confidence", confidence, above=0.0, below=1.0)
     whole("resamples", resamples, least=1)

@@ -328,7 +328,7 @@ def _check_start(problem: OrigamiProblem, factor: float) -> None:
     short = np.flatnonzero(~(length > SHORTEST * structure.bar_length))
     if short.size:
         one, other = structure.bars[short[0]]
-        raise InputError(f": the neighboring nodes {one} and {other} fall together", "initial")
+        raise InputError(f": the neighboring nodes {one} and {other} coincide", "initial")
 
 
 def _check_driven(problem: OrigamiProblem, begin: float, plan: PathPlan) -> None:

@@ -63,9 +63,9 @@ class Grading(NamedTuple):
         reach = self.reach(corners)
         if reach.min() < ROOM * self.radius:
             raise InputError(
-                f" = {self.radius:g}: is more than half of the {reach.min():.3g} m from a corner "
-                "of a panel to the lines between the middles of its edges and its own; take at "
-                f"most {reach.min() / ROOM:.3g}",
+                f" = {self.radius:g}: a corner of a panel is only {reach.min():.3g} m from the "
+                "lines that join the panel's center to the midpoints of its edges; take at most "
+                f"half of that, {reach.min() / ROOM:.3g}",
                 "vertex_radius",
             )
         share = np.moveaxis(self.distances(reach), 0, -2)

@@ -108,8 +108,9 @@ def _check_bends(options: ModelOptions) -> None:
         )
     if isinstance(bends, Superlinear) and of_plates:
         raise InputError(
-            ' = "superlinear": takes the stiffness of large turns, calibration = "plate" gives '
-            'that of small ones; take "linear" or "plate_superlinear", or preset = "herkal"',
+            ' = "superlinear": needs the stiffness of large turns, but calibration = "plate" gives '
+            'the stiffness of small ones; take "linear" or "plate_superlinear", or preset = '
+            '"herkal"',
             "bend_law",
         )
 

@@ -114,7 +114,7 @@ class Asked:
             The measure does not apply to this result.
         """
         if self.measure.whole and result.attrs.get("status") == "stopped":
-            raise InputError(f"{self.text}: is of whole paths, and this one stopped on the way")
+            raise InputError(f"{self.text}: needs a whole path, and this one stopped early")
         try:
             through, subject = self.measure.through, result
             if through is not None:
@@ -153,7 +153,7 @@ class Asked:
             )
         node, count = self.arguments.get(NODE), len(case_file.case().structure.nodes)
         if node is not None and node >= count:
-            raise InputError(f"{self.text}: there is no node {node}, but 0 to {count - 1}")
+            raise InputError(f"{self.text}: there is no node {node}; nodes are 0 to {count - 1}")
 
 
 def asked(text: str, known: Mapping[str, Measure]) -> Asked:

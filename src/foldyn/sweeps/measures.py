@@ -489,12 +489,12 @@ def _of_band(values: NDArray, band: int) -> NDArray:
 
 def _one_state(result: xr.Dataset) -> None:
     if "state" in result.dims:
-        raise InputError("is of one state; leave out analysis.vary, and vary its key in the sweep")
+        raise InputError("needs a single state; leave out analysis.vary, and sweep its key instead")
 
 
 # ------------------------------------------------------------- comparison with the shell
 @_measure(FIDELITY, doc="error of a frequency against the shell", dims=(MODE,))
 def _frequency_errors(result: xr.Dataset, case: Case, model: str) -> NDArray:
     if model not in result["model"].values:
-        raise InputError(f"there is no model {model}, but {', '.join(result['model'].values)}")
+        raise InputError(f"there is no model {model}; choose {', '.join(result['model'].values)}")
     return result["error"].sel(model=model).values

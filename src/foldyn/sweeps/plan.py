@@ -145,7 +145,7 @@ def _chosen(
     """Build a [sweep] table from arguments."""
     if count is None and (method is not None or seed is not None):
         raise InputError(
-            ": is of samples; give samples too, or leave it out for a grid",
+            ": is for samples only; give samples too, or leave it out for a grid",
             "method" if method is not None else "seed",
         )
     if count is not None:

@@ -409,7 +409,8 @@ class _Search:
             sides = [side for side in both if self.lower[k] <= side[k] <= self.upper[k]]
             if not sides:
                 raise ComputationError(
-                    f"{self.made.space.keys[k]}: the bounds are closer than {STEP:g} of its scale"
+                    f"{self.made.space.keys[k]}: the bounds are less than {STEP:g} of its scale "
+                    "apart"
                 )
             first = len(points)
             points += sides if both_sides else sides[:1]

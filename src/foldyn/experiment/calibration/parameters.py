@@ -130,7 +130,9 @@ class Space:
                 if one.lower <= min(ends) and max(ends) <= one.upper:
                     break
             else:
-                raise InputError(f"{one.key}: the bounds are closer than {2 * NEAR:g} of its scale")
+                raise InputError(
+                    f"{one.key}: the bounds are less than {2 * NEAR:g} of its scale apart"
+                )
             for end, (_, weight) in zip(ends, sides, strict=True):
                 point = np.array(values, float)
                 point[k] = end
@@ -197,7 +199,7 @@ def _filled(parameter: Parameter, document: Mapping[str, Any]) -> Parameter:
                 "is right"
             )
         if isinstance(given, bool) or not isinstance(given, int | float):
-            raise InputError(f"{parameter.key} = {show(given)}: is no number that could be fitted")
+            raise InputError(f"{parameter.key} = {show(given)}: is not a number to be fitted")
         guess = float(given)
     scale = parameter.scale
     if scale is None:

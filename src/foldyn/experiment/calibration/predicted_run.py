@@ -153,7 +153,7 @@ def with_neighbors(
         The results of the other cases cannot be computed together with the first result.
     """
     if run.kind != "dynamics" and run.start(case_file) is not None:
-        raise InputError("what starts from a state has no neighbors")
+        raise InputError("a run that starts from a state has no neighbors")
     one, *beside = (
         Asked(each.case(), {**each.analysis.arguments, **_changes(run, each, members)})
         for each in (case_file, *others)
@@ -186,8 +186,8 @@ def _path(case: Case, members: Sequence[Measurement]) -> list[float]:
         return [*factors[factors < 0.0][::-1], *factors[factors >= 0.0]]
     if any(not np.array_equal(one, given[0]) for one in given[1:]):
         raise InputError(
-            "data: creases that yield depend on the way, which differs between these measurements: "
-            "give measurements along one path, or fit them separately"
+            "data: creases that yield depend on the loading path, which differs between these "
+            "measurements: give measurements along one path, or fit them separately"
         )
     return given[0][np.append(True, np.diff(given[0]) != 0.0)].tolist()
 

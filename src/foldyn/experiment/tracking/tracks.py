@@ -301,7 +301,7 @@ def _in_metres(
     missing = [node for node in asked if node not in ds["node_of_point"].values]
     if missing:
         raise InputError(
-            f"--nodes: node {missing[0]} is none of the tracked points; {len(missing)} of the "
-            f"{len(asked)} nodes asked for are not: take fewer, or another --match"
+            f"--nodes: {len(missing)} of the {len(asked)} nodes asked for were not tracked, such "
+            f"as node {missing[0]}: take fewer, or another --match"
         )
     return add_displacements(ds, model, matches, tracking.placing)

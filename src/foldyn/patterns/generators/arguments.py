@@ -85,7 +85,7 @@ def check_turn(name: str, count: int, turn: float, what: str) -> None:
     if abs(turn) * count > ROUND:
         most = math.floor(ROUND / abs(turn))
         raise InputError(
-            f" = {count}: each of the {count} {what} turns by {abs(turn):.4g} degrees against the "
+            f" = {count}: each of the {count} {what} is turned by {abs(turn):.4g} degrees from the "
             f"last, so that the sheet rolls up by more than a full turn and passes through itself; "
             f"take at most {most} {what}, or another dihedral",
             name,

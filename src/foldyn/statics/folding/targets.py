@@ -117,16 +117,16 @@ def _sized(pattern: Pattern, rows: NDArray, value: Any, field: str) -> NDArray[n
     size = _angle(field, value)
     if size < 0.0:
         raise InputError(
-            f" = {size:g}: is a size for creases chosen by a word, each of which folds its own "
-            "way; give at least 0",
+            f" = {size:g}: must be at least 0 for creases chosen by a word, since the assignment "
+            "decides the direction in which each folds",
             field,
         )
     signs = np.array([SIGNS[pattern.assignments[k]] for k in rows.tolist()])
     if size > 0.0 and (signs == 0.0).any():
         a, b = pattern.creases[rows[signs == 0.0][0]]
         raise InputError(
-            f": crease ({a}, {b}) has no way to fold, as it is neither mountain nor valley; give "
-            "its angle by its vertices",
+            f": crease ({a}, {b}) is neither mountain nor valley, so it is unknown in which "
+            "direction it folds; give its angle by its vertices",
             field,
         )
     return math.radians(size) * signs

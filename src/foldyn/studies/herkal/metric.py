@@ -92,8 +92,8 @@ def deviation(amplitude: ArrayLike, reference: ArrayLike) -> NDArray[np.float64]
     ours, theirs = np.asarray(amplitude, float), np.asarray(reference, float)
     if ours.shape != theirs.shape or ours.ndim != 2:
         raise InputError(
-            f"amplitude: shape {ours.shape} beside {theirs.shape} of the reference: give spectra "
-            "(frequencies, nodes) of motions of the same length and sampling interval"
+            f"amplitude: shape {ours.shape}, but the reference has shape {theirs.shape}: give "
+            "spectra (frequencies, nodes) of motions of the same length and sampling interval"
         )
     size = np.linalg.norm(theirs, axis=0)
     if (size == 0.0).any():

@@ -99,7 +99,7 @@ def _read(path: Path) -> tuple[str, list[Row]]:
             raise InputError(f"{path}: has lines of other lengths than the first")
         rows.append({k: v if k in WORDS else float(v or "nan") for k, v in row.items()})
         if any(k in WORDS and not _is_word(v) for k, v in rows[-1].items()):
-            raise InputError(f"{path}: has a number for a text, or none")
+            raise InputError(f"{path}: has a number, or nothing, where a text belongs")
     return first.removeprefix("# ").strip(), rows
 
 

@@ -127,14 +127,17 @@ def _check_forces(given: ForceDisplacement) -> None:
     """Refuse points that do not determine the folds."""
     moved, most = given.displacement, FULL * evaluation.FACTORS[-1]
     if len(moved) < len(FOLD_RANGES):
-        raise InputError(f"{len(moved)} force cannot give {len(FOLD_RANGES)} parameters")
+        raise InputError(
+            f"{len(moved)} measured force(s); at least {len(FOLD_RANGES)} are needed to find "
+            f"{len(FOLD_RANGES)} parameters"
+        )
     if not ((moved > 0.0) & (moved <= most)).all():
         raise InputError(
-            f"displacements are {1e3 * moved.min():.3g} to {1e3 * moved.max():.3g} mm; those of "
-            f"the top must be above 0, downwards, and at most {1e3 * most:.3g} mm"
+            f"displacements of the top are {1e3 * moved.min():.3g} to {1e3 * moved.max():.3g} mm; "
+            f"they must be positive (downwards) and at most {1e3 * most:.3g} mm"
         )
     if not (given.force > 0.0).all():
-        raise InputError(f"a force is {given.force.min():.3g} N; those that press are positive")
+        raise InputError(f"a force is {given.force.min():.3g} N; pressing forces are positive")
 
 
 def _digest(file: Path) -> str:

@@ -120,9 +120,9 @@ def _release_of(x: NDArray[np.float64], step: float, name: str) -> tuple[int, in
     first = max(int(moving[-1]) + 1 if moving.size else 0, released - round(AVERAGED / step))
     if (released - first) * step < HELD:
         raise InputError(
-            f"{name} is not still for {HELD:g} s before it moves fastest, {released * step:.3g} s "
-            "after the beginning: so the press before the release is unknown; give a film that "
-            "begins while the specimen is held"
+            f"{name} is not still for {HELD:g} s before its fastest motion, "
+            f"{released * step:.3g} s after the beginning, so it is unknown how far the specimen "
+            "was pressed; give a film that begins while the specimen is held"
         )
     return first, released
 
@@ -156,7 +156,7 @@ def prepare(measured: TimeHistory) -> FreeVibration:
     """
     nodes, name = numbers_of(measured), f"{measured.name}: node {WATCHED}"
     if WATCHED not in nodes:
-        raise InputError(f"{name} was not measured; it tells the release")
+        raise InputError(f"{name} was not measured; its motion shows the release")
     column, time = nodes.index(WATCHED), _even(measured.time)
     step = float(time[1] - time[0])
     if step * SLOWEST > 1.001:
