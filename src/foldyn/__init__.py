@@ -1,7 +1,7 @@
 """Foldyn: statics and dynamics of origami structures.
 
-It turns a crease pattern into a validated motion: with bars and hinges of the stiffness of MERLIN2,
-several mass rules, and integration of M x'' + C x' + F_int(x) = p(t).
+It turns a crease pattern into a validated motion. Panels become bars and hinges with the stiffness
+of MERLIN2 and a choice of mass rules, and M x'' + C x' + F_int(x) = p(t) is integrated.
 
 >>> import foldyn as fd
 >>> pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)

@@ -92,7 +92,7 @@ class Check(Unit):
 
 
 class Placed(Check):
-    """A check whose function takes only the value; its messages continue the argument's name."""
+    """A check whose function takes only the value; the argument's name precedes its messages."""
 
     def __call__(self, name: str, value: Any, context: Mapping[str, Any] = NOTHING) -> Any:
         """The value as stored; see `Check`."""

@@ -125,7 +125,7 @@ def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> S
     ----------
     pencil : Pencil
     count : int
-        Number of modes; at most that of the pencil.
+        Number of modes; at most as many as the pencil has.
     known : (n, r)
         M-orthonormal modes with the eigenvalue zero.
     verify : bool

@@ -8,8 +8,8 @@ then located by bisection on the count.
 Nested dissection and the symbolic factorization take a third of the time of the numeric one. They
 depend only on the sparsity pattern. As long as it stays the same, they are done once, and once more
 for each further set of factors that is alive at the same time. Parameters are those of `iparm` in
-the Developer Reference of oneMKL, counted from 0. The package mkl consists of libraries without
-Python, which are called through their C interface.
+the Developer Reference of oneMKL, counted from 0. The package mkl has no Python interface; its
+libraries are called through their C interface.
 """
 
 from __future__ import annotations

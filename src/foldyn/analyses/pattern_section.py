@@ -83,7 +83,7 @@ def checked_pattern(value: Any) -> dict[str, Any]:
 
 
 def _check_generator(value: Mapping[str, Any]) -> None:
-    """Refuse an unknown generator, and keys unknown to it (or to the one named most alike)."""
+    """Refuse an unknown generator, and keys that it (or the one with the nearest name) lacks."""
     faults, kind = Faults(), value["kind"]
     with faults.collected():
         choice(".kind", kind, GENERATORS)

@@ -98,7 +98,7 @@ class Air(Part):
 
 
 def _side_ratio(structure: Discretized) -> float:
-    """Ratio of the shorter to the longer side of a rectangle with a sheet's moments at rest."""
+    """Ratio of the sides, at most 1, of a rectangle with the sheet's second moments at rest."""
     corners = structure.nodes[structure.triangles]
     area = np.linalg.norm(double_areas(structure.nodes, structure.triangles), axis=1)
     center = np.average(corners.mean(axis=1), axis=0, weights=area)

@@ -227,7 +227,7 @@ class Case(Loaded, Damped):
             )
 
     def memory_in(self, state: State | None) -> NDArray | str | None:
-        """Memory (b, 2) of a state for the branches of laws; or a word; or None for the default."""
+        """Memory (b, 2) of the laws' branches in a state: as stored, a word, or None (default)."""
         given = None if state is None else state.memory
         if given is None or isinstance(given, str):
             return given

@@ -247,7 +247,7 @@ class Loaded:
 
     @cached_property
     def following_terms(self) -> tuple[tuple[Following, History], ...]:
-        """Forces that depend on the displacement: one item per load with such forces; histories."""
+        """Displacement-dependent forces of each load that has any, with the load's history."""
         found = ((load.following(self.structure, place), load) for place, load in self._loads())
         return tuple((part, load.history) for part, load in found if part is not None)
 

@@ -132,7 +132,7 @@ class Constraints:
         return np.concatenate([self.basis @ x[:count], x[count:]])
 
     def coordinates(self, u: NDArray) -> NDArray:
-        """Coordinates x of displacements u (m,): slaves become the values of their equations."""
+        """Vector x for displacements u (m,): u with each slave replaced by its equation's value."""
         if not self:
             return u
         x = u.copy()

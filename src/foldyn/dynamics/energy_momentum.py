@@ -166,7 +166,7 @@ class EnergyMomentum(Scheme):
 
 @kernel
 def residual(step, h, t):
-    """Put the residual of a step into `out`; return its norm and that of the forces at play, N."""
+    """Put the residual of a step into `out`; return norms of it and of the forces at play, N."""
     old, new, out = step.old, step.new, step.out
     system, mass, s = step.case.system, step.case.mass, step.case.s
     q0, w0, q1, w1, a1 = flat(old.q), flat(old.w), flat(new.q), flat(new.w), flat(new.a)

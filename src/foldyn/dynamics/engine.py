@@ -1,4 +1,4 @@
-"""`Engine`: the base class of what advances a motion, on a processor or on a GPU."""
+"""`Engine`: base class of the objects that advance a motion, on a processor or a GPU."""
 
 from __future__ import annotations
 

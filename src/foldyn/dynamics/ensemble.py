@@ -197,7 +197,7 @@ def _threads(threads: int | None, count: int) -> int:
 
 
 def _takes_starts(motion: Motion, case: Case) -> bool:
-    """Whether the preparation of a motion also serves the case from any other start."""
+    """Whether a motion prepared for one start can be reused for any other start of the case."""
     own = case.damped_at_start or motion.packed.added.acts or bool(case.remembering)
     return motion.case is case and not own
 

@@ -219,7 +219,7 @@ def balanced(step, target, h):
 
 @kernel
 def residual(step, h, t):
-    """Put the residual of a step into `out`; return its norm and that of the forces at play, N."""
+    """Put the residual of a step into `out`; return norms of it and of the forces at play, N."""
     handle, old, new, out = step.handle, step.old, step.new, step.out
     system, mass, s = step.case.system, step.case.mass, step.case.s
     af = step.p.af

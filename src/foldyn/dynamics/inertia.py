@@ -169,7 +169,7 @@ def substitute(m, r, a, scratch):
 
 @inner_scalar
 def _substitute(m, k, x):
-    """Solve with factor k in place; x starts in the order of rows and ends in that of columns."""
+    """Solve with factor k in place; on entry x has the order of rows, on return of columns."""
     first, offset = m.start[k], m.start[k] + k
     count = m.start[k + 1] - first
     for j in range(count):

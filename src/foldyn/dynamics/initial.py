@@ -213,7 +213,7 @@ def warn_of_unstable_damping(case: Case, start: Origin) -> None:
 
 
 def warn_of_standing_in_wind(case: Case, v: NDArray) -> None:
-    """Warn of a moment that added mass lacks for panels in a wind, unless the sheet is much faster.
+    """Warn that added mass misses a moment on panels in a wind, unless the sheet is much faster.
 
     v : (n, 3) velocities at the start, m/s.
     """

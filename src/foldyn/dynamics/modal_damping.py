@@ -60,7 +60,7 @@ def soft_at_rest(case: Case, body: Assembly, q: NDArray) -> tuple[NDArray[np.boo
 
 
 def _turns(case: Case, gradient: sparse.csr_array) -> NDArray[np.bool_]:
-    """Whether constraints let each hinge (h,) turn; `gradient` (h, m) is that of the angles."""
+    """Whether constraints let each hinge (h,) turn, given the gradients (h, m) of their angles."""
     ties = case.constraints
     if not ties:
         return np.ones(gradient.shape[0], bool)

@@ -185,7 +185,7 @@ class Motion:
         return other
 
     def _unlike(self, other: Motion) -> tuple[str, str]:
-        """How the method differs from that of another motion: in words, and as an argument."""
+        """How the method differs from another motion's method: in words, and as an argument."""
         if self.method is other.method:
             return f"steps of {self.plan.dt:.3g} s", f"dt = {self.plan.dt:.6g}"
         return self.method.name, f'method = "{self.method.name}"'
@@ -453,7 +453,7 @@ class Motion:
         return doubts(self.output.balance, self._rounding, self.plan, size, remedy)
 
     def _look_between(self) -> None:
-        """Measure energies at play between the first two samples: at samples all may be at rest."""
+        """Measure energies between the first two samples, since all may be at rest at samples."""
         plan = self.plan
         if self._looked or plan.every == 1 or not (plan.steps or plan.interval):
             return

@@ -1,9 +1,9 @@
 """Energy that constant damping takes from turning panels, although rotation causes no strain.
 
 Beta K0 and modal damping use the matrix C of one state, with the panel orientations of that state.
-Consider a panel that has turned by theta about an axis a and keeps turning at the rate w. To C it
-has, in addition to a rotation, the straining velocity w sin(theta) a x (a x x), which dissipates
-the power w^2 sin^2(theta) kappa,
+Consider a panel that has turned by theta about an axis a and keeps turning at the rate w. C takes
+its velocity for a rotation plus a straining motion w sin(theta) a x (a x x), which dissipates the
+power w^2 sin^2(theta) kappa,
 
     kappa = x' A C A x,    A = a a' - 1,
 

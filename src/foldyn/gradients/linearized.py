@@ -71,7 +71,7 @@ class Products:
     def add_stiffness(
         self, z: NDArray, x: NDArray, by: float, total: dict[str, NDArray]
     ) -> NDArray:  # fmt: skip
-        """Add the gradient of `by` z' K x for z and x (nf,); returns derivatives (m,) by dofs."""
+        """Add the gradient of `by` z' K x, z and x (nf,); returns its derivatives (m,) to dofs."""
         weight, motion = (self._linear.whole(each[:, None])[:, 0] for each in (z, x))
         state = np.zeros(len(self.q))
         if by == 0.0 or not motion.any():
@@ -90,7 +90,7 @@ class Products:
         self, pullback: Pullback, weight: NDArray, motion: NDArray, step: float, by: float,
         total: dict[str, NDArray],
     ) -> NDArray:  # fmt: skip
-        """Add fourth-order differences of a pullback along a motion; returns derivatives by q."""
+        """Add fourth-order differences of a pullback along a motion; returns the part for q."""
         state = np.zeros(len(self.q))
         for place, share in ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0)):
             factor = by * share / (12.0 * step)

@@ -40,7 +40,7 @@ class Derivative(NamedTuple):
         with respect to variables of the result.
     frozen : for a measure that also depends on the case directly. From the result (or the measure's
         intermediate result), the case and the arguments, it returns the measure as a smooth
-        function of another case, with the result held fixed; differences are taken of it.
+        function of another case, with the result held fixed, to be differenced.
     numbers : from the same arguments, derivatives of such a measure with respect to numbers of the
         case.
     places : for an extreme, from the same arguments, all places that reach it; `seeds` and `frozen`

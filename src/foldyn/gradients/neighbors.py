@@ -323,7 +323,7 @@ def _left(
 def _repeated(
     x: NDArray, count: int, left: Callable[[NDArray], NDArray], factors: Any
 ) -> NDArray[np.complex128]:  # fmt: skip
-    """Balanced responses (c, nf) near one response (nf,)."""
+    """Balanced responses (c, nf) of the neighbors, all begun from the first case's x (nf,)."""
     begin = np.repeat(x[:, None], count, axis=1)
     size = float(np.linalg.norm(x))
     return refined(begin, lambda each: -factors.solve(left(each)), size).T

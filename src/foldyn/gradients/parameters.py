@@ -137,7 +137,7 @@ def numbers_of_motion(packed: PackedCase, start: tuple[NDArray, NDArray]) -> Arr
 
 
 def nothing(case: Case, pullback: Pullback) -> dict[str, NDArray]:
-    """Gradient of zeros with respect to the numbers of a case; pullback : of the body's forces."""
+    """Gradient of zeros with respect to a case's numbers; `pullback` is the body's."""
     total = {name: np.zeros_like(out) for name, out in pullback.gradient.items()}
     for kind in ("load", "imposed"):
         for k, (vector, _) in enumerate(getattr(case, f"{kind}_terms")):

@@ -220,7 +220,7 @@ def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None
 
 
 def _by_lengths(areas: Slope, numbers: Gradient) -> Slope:
-    """Derivatives of numbers with respect to cut lengths of bars, from those by stiffness EA / L0.
+    """Derivatives of numbers with respect to the cut lengths of bars, given those to EA / L0.
 
     A bar of length l that is cut to the length L has the excess x = (l^2 - L^2) / L^2 and the
     stiffness EA / L.

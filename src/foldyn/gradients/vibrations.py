@@ -271,10 +271,10 @@ class FrfGradient(Differentiated):
         self, frequency: float, by: Complex, total: dict[str, NDArray], state: NDArray,
         reference: NDArray,
     ) -> None:  # fmt: skip
-        """Add what one frequency (Hz) contributes, to `total` and to derivatives by states (m,).
+        """Add the contribution of one frequency (Hz) to `total`, `state` and `reference`.
 
         by : derivatives (3n,) with respect to the response.
-        state, reference : derivatives with respect to the states of K and K0, to which it adds.
+        state, reference : derivatives (m,) with respect to the states of K and K0.
         """
         linear, rayleigh = self._linear, self.case.rayleigh
         omega = 2.0 * np.pi * frequency
@@ -304,7 +304,7 @@ class FrfGradient(Differentiated):
     def _add_products(
         self, products: Products, z: Complex, x: Complex, total: dict[str, NDArray]
     ) -> NDArray:
-        """Add the gradient of Re(z' K x), z and x complex; returns the derivatives (m,) by dofs."""
+        """Add the gradient of Re(z' K x), z and x complex; returns its derivatives (m,) to dofs."""
         real = products.add_stiffness(z.real, x.real, 1.0, total)
         return real + products.add_stiffness(z.imag, x.imag, -1.0, total)
 

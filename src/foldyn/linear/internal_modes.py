@@ -82,16 +82,16 @@ class Amplitudes(NamedTuple):
         return sparse.csr_array(sparse.block_diag([matrix, none], format="csr"))
 
     def stiffened(self, matrix: sparse.csr_array) -> sparse.csr_array:
-        """A stiffness (m, m), N/m, extended by that of the amplitudes."""
+        """A stiffness (m, m), N/m, extended by the stiffness of the amplitudes."""
         return sparse.csr_array(self.behind(matrix) + self.stiffness) if self.count else matrix
 
     def damped(self, matrix: sparse.csr_array, damping: NDArray) -> sparse.csr_array:
-        """A damping (m + k, m + k), N s/m, plus that of uneven turns by fold (nf,), N m s/rad."""
+        """A damping (m + k, m + k), N s/m, plus `damping` (nf,), N m s/rad, of uneven turns."""
         uneven = self.turns.T @ (self.turns * (damping[self.fold] * self.share)[:, None])
         return sparse.csr_array(matrix + uneven)
 
     def massed(self, matrix: sparse.csr_array) -> sparse.csr_array:
-        """A mass (m, m), kg, extended by that of the amplitudes."""
+        """A mass (m, m), kg, extended by the mass of the amplitudes."""
         return sparse.csr_array(self.behind(matrix) + self.mass) if self.count else matrix
 
 

@@ -41,7 +41,7 @@ class Peak:
         Damping ratios from the half-power points: `half_power` is exact for a single mode,
         `textbook` is (upper - lower) / (2 peak).
     asymmetry : float
-        Asymmetry of the half-power points; above 0.1, the peak is not that of a single mode.
+        Asymmetry of the half-power points; above 0.1, the peak belongs to more than one mode.
     natural_frequency, damping_ratio : float
         Natural frequency (Hz) and damping ratio from the circle fit.
     frequency_error, damping_error : float

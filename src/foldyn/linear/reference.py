@@ -306,10 +306,9 @@ class Refinement(NamedTuple):
 
     @property
     def changes(self) -> NDArray[np.float64]:
-        """Relative changes (2,) of one frequency between meshes, if possible of one not converged.
+        """Relative changes (2,), from mesh to mesh, of the frequency that changes most at the end.
 
-        The frequency chosen is that with the largest change in the last step; nan if a mesh lacks
-        it.
+        A frequency that has not converged is preferred; nan if a mesh lacks the frequency.
         """
         changes = self.frequencies[1:] / self.frequencies[:-1] - 1.0
         return changes[:, (np.isnan(self.order) + np.abs(changes[1])).argmax()]

@@ -302,7 +302,7 @@ class UnitCell:
 def images(
     motions: Sequence[Screw], points: ArrayLike, step: Sequence[int] | NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Points (n, 3), m, moved by each motion as many times as `step` has."""
+    """Points (n, 3), m, moved by each motion as often as its number in `step` says."""
     out = np.asarray(points, float)
     for motion, power in zip(motions, step, strict=True):
         out = motion.images(out, int(power))
@@ -312,7 +312,7 @@ def images(
 def rotation(
     motions: Sequence[Screw], step: Sequence[int] | NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Rotation (3, 3) of all motions, each applied as many times as `step` has."""
+    """Rotation (3, 3) of all motions, each applied as often as its number in `step` says."""
     out = np.eye(3)
     for motion, power in zip(motions, step, strict=True):
         out = motion.rotation(int(power)) @ out

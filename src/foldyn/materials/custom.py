@@ -70,8 +70,8 @@ class CustomHingeLaw(_Called, HingeLaw):
     Parameters
     ----------
     energy_of, moment_of, slope_of : callable
-        Scalar functions of (theta, rest) in radians, per unit stiffness. The moment is the
-        derivative of the energy with respect to theta, and the slope is that of the moment.
+        Scalar functions of (theta, rest) in radians, per unit stiffness. The moment is the first
+        derivative of the energy with respect to theta, and the slope the second.
     name : str
         Name of the law in figures and results.
 

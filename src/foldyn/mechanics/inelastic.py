@@ -350,7 +350,7 @@ class HingeMemory(Term):
         evaluate_at(own, offset, q)
 
     def resists(self, state: NDArray | str | None) -> bool:
-        """Whether a start in such a state counts as an instant turn, neither relaxed nor given."""
+        """Whether branches resist a start in such a state like an instant turn."""
         return isinstance(state, str) or (state is None and not self.settles.all())
 
     def commit(self) -> None:

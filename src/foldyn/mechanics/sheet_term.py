@@ -36,8 +36,8 @@ class FoldHinges(NamedTuple):
     The bends of hinge models have the same form, each like a fold of one hinge.
 
     The fold angle of a hinge is its dihedral minus `per_hidden` times its hidden dofs. If panels
-    are compliant without such dofs, a moment on the crease alone turns the dihedral by `softness`
-    times the moment before the hinge resists (`materials.series`).
+    are compliant without such dofs, a moment Q on the crease alone acts like Q on the hinge, with
+    the law taken at the dihedral plus `softness` times Q (`materials.series`).
     """
 
     fold: NDArray  # (k,) index of the fold

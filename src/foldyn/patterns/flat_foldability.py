@@ -308,9 +308,9 @@ class _Conditions:
         return np.concatenate([sums, ratios]), sparse.vstack([self.kawasaki, slopes]) @ turned
 
     def _ratios(self, directions: NDArray) -> tuple[NDArray, sparse.csr_array]:
-        """Sums (p,) of log |tan(g2/2) / tan(g1/2)| around panels, and derivatives by directions f.
+        """Sums (p,) of log |tan(g2/2) / tan(g1/2)| around panels, and their derivatives to f.
 
-        Let f1, f2, f3 be the directions of three neighboring creases, where the panel's corner lies
+        Let f1, f2, f3 be the directions f of three neighboring creases; the panel's corner lies
         between f1 and f2. The ratio is h((f3 - f1) / 2) / h(f2 - (f1 + f3) / 2), where h is the
         sine if creases 1 and 3 fold opposite ways, else the cosine.
         """

@@ -214,7 +214,7 @@ def main_direction(paths: Mapping[str, xr.Dataset], nodes: Sequence[int]) -> str
 def asked(
     paths: Mapping[str, xr.Dataset], nodes: int | str | Sequence[int], direction: str | None
 ) -> tuple[list[int], str]:
-    """Nodes that all paths have, and a direction, by default that in which they move farthest.
+    """Nodes that all paths have, and a direction, by default the one of their largest motion.
 
     Raises
     ------

@@ -164,7 +164,7 @@ def plot_transmission(
     *,
     title: str = "",
 ) -> Figure:
-    """Draw the transmission to the end of a chain, and the decay per cell with that of the bands.
+    """Draw the transmission to the end of a chain, and the decay per cell, also from bands.
 
     Parameters
     ----------

@@ -168,8 +168,8 @@ def _alone(corners: _Corners) -> _Corners:
 def _numbered(corners: _Corners, half: int, panels: int) -> tuple[NDArray, int]:
     """Indices (c, half + 1, half + 1) of the points of each grid, and their number.
 
-    Vertices come first, then points of edges, spokes from their middles to the centers, centers,
-    and the inside of grids.
+    Vertices come first, then points on edges, points on the spokes from midpoints of edges to
+    centers, centers, and points inside grids.
     """
     count, inside = len(corners.panel), np.arange(1, half)
     middles = int(corners.vertex.max()) + 1

@@ -156,7 +156,7 @@ class Discretized:
                 object.__setattr__(self, item.name, read_only(np.array(value)))
 
     def marked(self) -> Self:
-        """Set `as_made`."""
+        """Set `as_made`; return the structure itself."""
         object.__setattr__(self, "as_made", True)
         return self
 

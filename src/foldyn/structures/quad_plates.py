@@ -1,4 +1,4 @@
-"""Quadrilateral panels whose corners move like those of a thin plate: `calibration="plate"`.
+"""Quadrilateral panels whose corners move like a thin plate's: `calibration="plate"`.
 
 Apart from planes, five nodes have two shapes: the twist w of the corners and the height w0 of the
 center. With the stiffness kp of whole spokes on one diagonal and kq on the other, for G = 1, the

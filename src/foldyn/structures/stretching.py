@@ -2,9 +2,9 @@
 
 A panel's independent bars are exact in uniform strain at best, and otherwise too stiff. Coupled
 bars have the panel's membrane stiffness, but with straight edges. They are accurate if panels bend
-in their plane, but also too stiff if quadrilateral panels stretch as a whole: then the energy is
-that of the panels' mean strains. With the scheme n5b8e edges give way, which is accurate in open
-sheets. Closed sheets and sheets with welds are off by 5 to 20 %, in either direction
+in their plane, but also too stiff if quadrilateral panels stretch as a whole; the energy is then
+computed from the panels' mean strains. With the scheme n5b8e edges give way, which is accurate in
+open sheets. Closed sheets and sheets with welds are off by 5 to 20 %, in either direction
 (docs/models.md, "Where panels stretch").
 """
 

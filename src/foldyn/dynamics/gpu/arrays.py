@@ -94,7 +94,7 @@ class CaseArrays:
         self._slots += len(nodes)
 
     def _again(self, nodes: NDArray, plus: int, first: int = 0) -> None:
-        """Let nodes use the slots from `first` on, also if others do; negative nodes get none."""
+        """Assign slots from `first` on to nodes, even if already in use; skip negative nodes."""
         slots = first + np.arange(len(nodes))
         own = np.asarray(nodes).astype(np.int64)
         some = own >= 0
@@ -179,7 +179,7 @@ def topology(packed: PackedCase) -> tuple[Any, ...]:
 
 
 def _one_or_all(arrays: Sequence[NDArray]) -> NDArray:
-    """Stack the arrays of all models, or return that of one model if all are equal."""
+    """Stack the arrays of all models, or return a single array if all are equal."""
     first = arrays[0]
     alike = all(array is first or np.array_equal(array, first) for array in arrays[1:])
     return np.ascontiguousarray(arrays[0][None] if alike else np.stack(arrays))

@@ -8,7 +8,7 @@ would mean that the energy has passed its minimum. If no equilibrium is found, t
 and halved.
 
 The nodes in contact change from one iteration to the next. The tangent of contact is therefore a
-sparse matrix of its own, which is added to that of the structure before the factorization.
+sparse matrix of its own, which is added to the structure's matrix before the factorization.
 
 As long as nothing touches, a step is first solved without contact, with a matrix that may serve
 several steps. The result is accepted if the straight path to it is free of contact.

@@ -160,7 +160,7 @@ class StepMatrix:
         return self._sparse(weights, self._matrices)
 
     def follow(self, u: NDArray, hidden: float) -> None:
-        """Update the damping to that at u (n, 3); see `Term.damping_entries` for `hidden`."""
+        """Recompute the damping at u (n, 3); see `Term.damping_entries` for `hidden`."""
         if len(self._damped):
             entries = [term.damping_entries(u, hidden) for term in self._damping]
             out = self._matrices.damping.reshape(-1)

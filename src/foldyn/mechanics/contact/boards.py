@@ -1,17 +1,18 @@
 """Boards: contact surfaces, riding on the mesh, of panels hinged off their middle surfaces.
 
-The contact surface of a board is its middle surface. Neighboring boards have separate corners. In
-the arrays, the corners are followed by the nodes of the mesh, which the guards of hinges need.
+The contact surface of a board is its middle surface. Neighboring boards have separate corners.
+Arrays hold the corners first and then the nodes of the mesh, for the guards of hinges.
 
-At a closed crease, the middles of two boards are s = |h + h'| apart, with h and h' the heights of
-the hinge line above each middle. For sheets, s = 0 (`tables`). For boards hinged in their faces,
-s = t, and they touch everywhere at once. In general the contact distance is
+When a crease is closed, the middle surfaces of its two boards are s = |h + h'| apart, where h and
+h' are the heights of the hinge line above each of them. For thin panels s = 0 (`candidates`). For
+boards of thickness t hinged in their faces s = t, and they touch everywhere at once. With d0' the
+contact distance of thin panels and l the distance from the crease, the contact distance is
 
-    d0 = s + (1 - s/t) d0 of sheets, but at most l,
+    d0 = min(s + (1 - s/t) d0', l),
 
-with l the distance from the crease, so that boards that lie flat do not touch with their sides.
-Guards of hinges begin at 1 - s/t times the guard angle for sheets: if the middle surfaces stay
-apart, their distance already shows on which side of each other they lie.
+where l keeps boards that lie flat from touching with their sides. Guards of hinges begin at
+1 - s/t times the guard angle of thin panels: they tell on which side of each other two panels lie,
+and the farther middle surfaces stay apart, the better their distance tells it already.
 
 Corners of boards ride on the triangles of the mesh at an offset. A point that rides on a triangle
 of nodes x_i, with N = (x_b - x_a) x (x_c - x_a), n = N / |N|, is

@@ -41,7 +41,7 @@ MARGIN = 0.05  # extra range relative to the skin, because speeds change within 
 
 
 class Pace(NamedTuple):
-    """Step requirements of a method in contact."""
+    """How well steps of a method must resolve contacts."""
 
     resolved: float  # beta: largest vibration angle of a contact per step, rad
     energy: float  # J, largest k f'' (change of the gap)^2 of unresolved contacts

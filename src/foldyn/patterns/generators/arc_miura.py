@@ -31,14 +31,16 @@ def arc_miura(
 ) -> Pattern:
     """Arc-Miura sheet: a Miura-ori with two alternating zigzag angles, which folds to an arc.
 
-    Vertex (i, j), i along x and j along y, is number i (2 cells[1] + 1) + j, as in `miura`. The
-    zigzag with j even has the angle g1 and edges of length b, the one with j odd g2 and edges of
-    b sin g1/sin g2. Straight creases lie in planes of constant x, in which those with i even are
-    polygons with turns of d1 where j is even and -d2 where it is odd; those with i odd are shifted
-    along the bisectors of their corners, by v1 and v2. With the tilt f = (180 - dihedral)/2:
-    s = b sin g1/sqrt(1 + cos^2 g1 tan^2 f) is the distance of the planes, k = s cos g1 tan f,
-    tan(d1/2) = k/(b cos g1), tan(d2/2) = k/(b sin g1 cot g2),
-    v = sqrt(k^2 + (b cos g1)^2) at j even, and likewise at j odd. The panels are trapezoids.
+    Vertex (i, j), i along x and j along y, is number i (2 cells[1] + 1) + j, as in `miura`.
+    Zigzags with even j have the angle g1 and edges of length b; zigzags with odd j have the angle
+    g2 and edges of length b sin g1/sin g2. The panels are trapezoids.
+
+    The other creases form polygonal lines in planes of constant x, one for each i. A line with
+    even i turns by d1 at even j and by -d2 at odd j. A line with odd i is the same line, with its
+    corners shifted along their bisectors by v1 at even j and by v2 at odd j. With the tilt
+    f = (180 - dihedral)/2, the planes are s = b sin g1/sqrt(1 + cos^2 g1 tan^2 f) apart, and with
+    k = s cos g1 tan f: tan(d1/2) = k/(b cos g1), tan(d2/2) = k/(b sin g1 cot g2),
+    v1 = sqrt(k^2 + (b cos g1)^2), and v2 likewise.
 
     Parameters
     ----------

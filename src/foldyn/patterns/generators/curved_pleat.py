@@ -28,7 +28,7 @@ def curved_pleat(
     from the last; rulings join their corners. Vertex (i, j), i along the arc and j along y, is
     number i (pleats + 1) + j. With the tilt f = (180 - dihedral)/2 of the rulings it lies at
     (X_i, Y_i + a j cos f, a sin f [j odd]), where a chord (x, y) of the flat arc becomes
-    (sqrt(x^2 + y^2 - (y/cos f)^2), y/cos f): all angles of the panels, parallelograms, are kept.
+    (sqrt(x^2 + y^2 - (y/cos f)^2), y/cos f). Panels are parallelograms and keep their angles.
 
     Parameters
     ----------

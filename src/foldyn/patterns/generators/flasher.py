@@ -19,11 +19,10 @@ LETTERS = {"hub": "V", "ray": "V", "ridge": "M", "inner_bend": "V", "outer_bend"
 def flasher(sides: int = 6, a: float = 1.0, *, rings: int = 3, folded: bool = False) -> Pattern:
     """Flasher: a flat sheet that wraps around a polygonal hub; zero thickness.
 
-    Each side of the hub is prolonged by a ray; the wedge of 360/sides degrees between two rays is
-    halved by a ridge. Folded, the two halves of each wedge lie upon each other in the walls of a
-    prism over the hub, around which they wind: their bends, at right angles to the rays at
-    distances of a, are the edges of the prism. The rays come to lie in its base, the ridges rise
-    at 180/sides degrees.
+    A ray extends each side of the hub, and a ridge halves the wedge of 360/sides degrees between
+    two rays. When folded, the halves of each wedge lie on each other and wind around a prism over
+    the hub. They bend at the edges of the prism, along lines that cross the rays at right angles
+    every a. The rays then lie in the base of the prism, and the ridges rise at 180/sides degrees.
 
     Both states are exact; between them the panels must bend (rigid flashers need cuts). The flat
     state has the angles to fold to (`Pattern.fold_angles`).

@@ -46,9 +46,9 @@ def kresling(
     -180/sides, and a Yoshimura cylinder is a tower of these), and below -360/sides the two
     families change their roles.
 
-    With `alternating` every second storey is the mirror image of the one below: it turns back by
-    the twist, and its panels are cut by the diagonal from bottom m+1 to top m. Storeys of both
-    hands turn against each other when the tower is compressed, so that its ends need not.
+    With `alternating` every second storey is the mirror image of the storey below: it turns back
+    by the twist, and its panels are cut by the diagonal from bottom m+1 to top m. When the tower is
+    compressed, neighboring storeys turn in opposite directions, and its ends need not turn.
 
     Parameters
     ----------

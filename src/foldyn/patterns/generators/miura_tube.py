@@ -28,9 +28,9 @@ def miura_tube(
 ) -> Pattern:
     """Tube along x of two mirrored Miura-ori strips, open at its ends.
 
-    Station i along x has four corners, number 4 i to 4 i + 3: those of one cell of `miura` at
-    (i, 0), (i, 1) and (i, 2), and the image of (i, 1) in the plane z = 0. Cross-sections are
-    rhombs; the tube folds rigidly, flat at both ends of its motion.
+    Station i along x has four corners, numbers 4 i to 4 i + 3: the vertices (i, 0), (i, 1) and
+    (i, 2) of one cell of `miura`, and the mirror image of (i, 1) in the plane z = 0. Cross-sections
+    are rhombs. The tube folds rigidly, and is flat at both ends of its motion.
 
     Parameters
     ----------
@@ -108,16 +108,15 @@ def zipper_tubes(
 ) -> Pattern:
     """Two tubes as in `miura_tube` whose zigzag walls fit together, like the rows of a zipper.
 
-    The second tube is the first one turned by 180 degrees about an axis at right angles to the wall
-    between its corners 2 and 3 of each station, and shifted so that one of its own walls lies in
-    that wall. The panels of the two walls lie in the same planes and lean opposite ways, so they
-    overlap only in part, and do so throughout the folding: their corners lie on common lines, at
-    constant distances. Vertex k of the second tube has the number of the first one's plus
-    4 (2 cells + 1).
+    To get the second tube, the first is turned by 180 degrees about an axis at right angles to its
+    wall between corners 2 and 3, and shifted until one of its walls lies in that wall. The panels
+    of the two walls lie in the same planes but lean in opposite directions, so they overlap only
+    in part. This remains so throughout the folding: their corners lie on common lines, at constant
+    distances. Vertex k of the first tube becomes vertex k + 4 (2 cells + 1) of the second.
 
-    A pattern cannot say that walls are joined, so the tubes are two until a case ties them: the
-    entries of `pattern.custom["foldyn:ties"]` are pairs of a vertex of the second tube and three
-    of the first one in whose plane it lies::
+    A pattern cannot join two walls, so the tubes are separate until a case ties them. Each entry
+    of `pattern.custom["foldyn:ties"]` has a vertex of the second tube, and three vertices of the
+    first tube in whose plane it lies::
 
         links = [fd.Link([node], to=corners) for node, corners in pattern.custom["foldyn:ties"]]
 
@@ -131,7 +130,7 @@ def zipper_tubes(
     -------
     Pattern
         8 (2 cells + 1) vertices and 16 cells faces, fronts outside. Families: "zigzag" and "ring",
-        as in `miura_tube`; "zigzag_1", "ring_1", "zigzag_2" and "ring_2" are those of each tube.
+        as in `miura_tube`; "zigzag_1", "ring_1", "zigzag_2" and "ring_2" for each tube alone.
 
     Raises
     ------
@@ -175,10 +174,10 @@ def zipper_tubes(
 
 
 def _turned(one: NDArray, lean: float) -> NDArray[np.float64]:
-    """The second tube, with its wall of corners 0 and 1 placed in the first one's wall of 3 and 2.
+    """The second tube, with the wall of its corners 0 and 1 in the first's wall of 3 and 2.
 
-    Along the walls' edges, the corners of even stations lie at 0 and 1 of their length in the first
-    tube, those of odd ones at `lean` and 1 + lean; in the second one both the other way round.
+    Positions along the walls' edges, divided by their length: in the first tube, corners are at 0
+    and 1 in even stations, at `lean` and 1 + lean in odd ones; in the second tube it is reversed.
     """
     edge = one[1] - one[0]
     x = one - one[0]

@@ -29,17 +29,18 @@ def resch(cells: Sequence[int] = (3, 3), a: float = 1.0, *, dihedral: float = 12
     """Resch's triangular tessellation: tiles that close up over tucked stars.
 
     The flat pattern has equilateral triangles of two sizes: tiles with sides a, and stars with
-    sides 2 a between them, each cut into six by creases from its center to its corners (tucks) and
-    to the middles of its sides. Closed, the stars disappear behind the tiles, which cover the
-    plane: the middles of a star's sides meet in one point, its center hangs a/sqrt(3) below it,
-    the tucks are closed, and the tiles stand at right angles to them.
+    sides 2 a between them. Creases from the center of a star to its corners (tucks) and to the
+    midpoints of its sides cut it into six triangles. When the pattern is closed, the tiles cover
+    the plane and hide the stars: the midpoints of a star's sides meet in one point, its center
+    hangs a/sqrt(3) below this point, the tucks are closed, and the tiles stand at right angles to
+    them.
 
     Between these two states the sheet rolls up to a cylinder about an axis along y, and flattens
     again: only at the two ends can all tiles be coplanar with correct lengths. All stars fold
-    alike, as mirror images of themselves in planes through the axis. With the dihedral d of the
-    tuck along y, seen from the center of a star, the middle of a side beside it lies at a/2
-    sin(d/2) from that plane; three lengths then say how the tuck is inclined, and how far columns
-    of stars are apart and turned, which is solved from the closed state on.
+    alike, and each is symmetric about a plane through the axis, which contains its tuck along y.
+    With d the dihedral of this tuck, the midpoints of the adjacent sides are a/2 sin(d/2) from the
+    plane. Three lengths then determine the inclination of the tuck, and the distance and angle
+    between columns of stars; these are solved for, starting from the closed state.
 
     Parameters
     ----------

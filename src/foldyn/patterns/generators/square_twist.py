@@ -26,16 +26,15 @@ def square_twist(
 ) -> Pattern:
     """Square twist: a square with a pleat from each side.
 
-    Corners 0 to 3 are those of the square, counter-clockwise from the origin. From the ends of side
-    i two parallel creases of length b run outwards, at the acute angle g = panel_angle to the side
-    at its beginning; their outer ends are numbers 4 + i and 8 + i, and 12 + i is the outer corner
-    between two pleats. At every corner the panels have 90, g, 90 and 180 - g degrees.
+    Vertices 0 to 3 are the corners of the square, counter-clockwise from the origin. Two parallel
+    creases of length b run outwards from the ends of side i, at the acute angle g = panel_angle to
+    the side at its beginning. Their outer ends are vertices 4 + i and 8 + i; vertex 12 + i is the
+    outer corner between two pleats. At every corner the panels have 90, g, 90 and 180 - g degrees.
 
-    The assignment says whether the pattern folds rigidly. Of two sides that meet, one folds by p,
-    the other by q, with tan(q/2) = tan(45 - g/2) tan(p/2). Where sides fold by p and q in turn, all
-    panels stay flat: that is the pattern here, sides 0 and 2 with p, in opposite ways.
-    `symmetric` asks for the other, in which all sides are mountains. It has four-fold symmetry and
-    is flat-foldable, but cannot fold without bending its panels: only its flat state exists here,
+    The assignment decides whether the pattern folds rigidly. By default sides 0 and 2 fold by p in
+    opposite directions, and sides 1 and 3 by q, with tan(q/2) = tan(45 - g/2) tan(p/2): then all
+    panels stay flat. With `symmetric` all sides are mountains. This pattern has four-fold symmetry
+    and is flat-foldable, but cannot fold without bending its panels; it is available only flat,
     with the angles to fold to (`Pattern.fold_angles`).
 
     Parameters

@@ -21,17 +21,17 @@ def waterbomb(
     """Waterbomb tessellation: rows of waterbomb bases, each row shifted by half a base.
 
     A base is a rectangle with creases from its center to its corners (valleys) and to the middles
-    of its lower and upper edge (mountains). The grid points on the edges of the rows, `2 cells[0] +
-    1` a row from x = 0 at distances b/2, are numbered first, row by row along y, then the centers,
-    row by row. Odd rows begin and end with half a base.
+    of its lower and upper edge (mountains). The grid points on the edges of the rows come first in
+    the numbering, row by row along y, `2 cells[0] + 1` in each at distances b/2 from x = 0 on; the
+    centers follow, row by row. Odd rows begin and end with half a base.
 
-    It rolls up as it folds, alike in all rows, to a cylinder about an axis along y. With the half
-    lengths h = a/2 and w = b/2 and the height z of the middle of an edge above the center of its
-    base along the axis, h when flat: a row takes up h + z, half a base the angle p,
-    sin^2(p/2) = z^2 (h - z)/((h + z) k) with k = w^2 - (h - z)^2; grid points lie at the distance
-    R = sqrt(k)/(2 sin(p/2)) from the axis, centers at R - sqrt(h^2 - z^2). The dihedral d follows
-    from cos(d/2) = sqrt((h - z)/(h + z)) (h + z + q z)/w with q = (w^2 - h^2 + z^2)/k, which is
-    solved for z.
+    As it folds, the sheet rolls up to a cylinder about an axis along y, with the same shape in all
+    rows. Let h = a/2, w = b/2, and z the distance along the axis from the center of a base to the
+    midpoint of its upper edge (h when flat). A row has the length h + z along the axis. Half a base
+    takes up the angle p, with sin^2(p/2) = z^2 (h - z)/((h + z) k) and k = w^2 - (h - z)^2. Grid
+    points are R = sqrt(k)/(2 sin(p/2)) from the axis, centers R - sqrt(h^2 - z^2). The dihedral d
+    satisfies cos(d/2) = sqrt((h - z)/(h + z)) (h + z + q z)/w with q = (w^2 - h^2 + z^2)/k, which
+    is solved for z.
 
     Parameters
     ----------
@@ -40,8 +40,8 @@ def waterbomb(
     a, b : float
         Lengths of a base along y and along x (m).
     dihedral : float
-        Angle across the sides of bases, from row to row (degrees, above 0, or for b > a above that
-        at which the sheet is closed, 2 arccos(a/b); 180 is flat).
+        Angle across the sides of bases, from row to row (degrees, at most 180, which is flat). It
+        must be above 0 or, for b > a, above 2 arccos(a/b), at which the sheet is closed.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def _height(dihedral: float, h: float, w: float) -> float:
 
 
 def _rolled(z: float, h: float, w: float) -> tuple[float, float, float]:
-    """Angle (rad) of half a base, radius of the grid points, depth (m) of centers inside it."""
+    """Angle (rad) of half a base, radius (m) of the grid points, depth (m) of centers below it."""
     k = w * w - (h - z) ** 2
     half = z * math.sqrt((h - z) / ((h + z) * k))
     if half == 0.0:

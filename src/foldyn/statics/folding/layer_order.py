@@ -38,7 +38,7 @@ from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.patterns.transforms import FACE_ORDERS
 
 Orders = Sequence[Sequence[int]]
-EXACT = 1e-6  # of the size of the pattern: least tolerance of a flat state
+EXACT = 1e-6  # least tolerance for flatness, relative to the size of the pattern
 MOST_TRIPLES = 1_000_000
 GRID = 0.1  # grid size of intersections, relative to the distance that counts as zero
 MOST_TRIES = 100_000  # guesses in one group
@@ -311,14 +311,14 @@ class CrossingError(Exception):
 
 
 def ordered(constraints: LayerConstraints) -> NDArray[np.int64]:
-    """Orders (k,), 1 or -1, of the pairs, that satisfy all conditions.
+    """Find an order, 1 or -1, for each of the k pairs so that all conditions hold.
 
     Raises
     ------
     CrossingError
-        There are none; holds the rows of the first condition that cannot be satisfied.
+        No orders satisfy all conditions; has the rows of the first condition that fails.
     ComputationError
-        None was found within a bounded number of guesses.
+        No orders were found within a bounded number of guesses.
     """
     search = _Search(constraints)
     search.propagate(range(len(search.conditions)))

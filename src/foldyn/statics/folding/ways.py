@@ -162,9 +162,9 @@ def relaxed(
     The allowed distance is a fraction of the turns since the `first` state. The released shape of
     the previous step, `before`, usually leads to it within a few Newton steps.
 
-    First, if `plane` is allowed, panels keep their stiffness, as in rigidly foldable patterns, or
-    ones with drawing errors, by which they bend slightly in the end. Failing that, they bend
-    freely, as thin paper does.
+    First, if `plane` is allowed, panels keep their stiffness. This suits rigidly foldable patterns,
+    even if drawing errors bend the panels slightly in the end. If it fails, panels bend freely, as
+    thin paper does.
     """
     wrong = len(wrong_ways(energy, shape.turns, aim.angles))
     most = max(ISOMETRIC, LESS * largest_strain(shape))

@@ -99,7 +99,7 @@ class Study:
 
     @property
     def parts(self) -> tuple[list[Part], list[Part]]:
-        """Computations for the specimen: independent ones, and those that depend on these."""
+        """Computations for the specimen: the independent ones, then the ones that need them."""
         return ([], []) if self.data is None else parts(self.plan.shot, self.data)
 
     @property

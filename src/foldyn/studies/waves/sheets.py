@@ -1,9 +1,9 @@
 """Bands of Miura and eggbox sheets by fold state.
 
 Pratapa, Suryanarayana and Paulino (J. Mech. Phys. Solids 118, 2018) compute them with bars and
-hinges. The dimensions and numbers of that paper were not available. Panels here are those of the
-paper specimen of the other study (25 mm, Canson Mi-Teintes), with the scheme n4b5 and lumped
-masses.
+hinges. The dimensions and numbers of that paper were not available. Panels here have the size
+(25 mm) and the material (Canson Mi-Teintes) of the specimen in the study `herkal`, with the scheme
+n4b5 and lumped masses.
 """
 
 from __future__ import annotations
