@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-NAMED = 0.5  # the first dof becomes the slave above this share of the largest coefficient
-# relative to the coefficients of an equation: it follows from the others if less than this remains
+NAMED = 0.5  # share of the largest coefficient above which the first dof becomes the slave
+# an equation follows from the others if less than this share of its coefficients remains
 DEPENDENT = 1e-9
 ROUNDING = 1e-14  # coefficients below this share of an equation's coefficients are zero
 

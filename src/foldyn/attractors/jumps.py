@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.results import Quantity
 from foldyn.results.quantities import variable
 
-LARGE = 0.2  # change relative to the larger amplitude that counts as a jump
+LARGE = 0.2  # least change, relative to the larger amplitude, that counts as a jump
 
 
 class Jump(NamedTuple):

@@ -318,25 +318,7 @@ class SomeLoads(Loaded):
 
 
 class Damped(Supported):
-    """The part of `Case` about damping; needs `damping`, and `supports` for dashpots.
-
-    Attributes
-    ----------
-    rayleigh : Rayleigh
-        The Rayleigh part of the damping; zero if there is none.
-    modal_damping : ModalDamping or None
-        Damping ratios of modes, if there are any.
-    crease_damping : ndarray, shape (nf,)
-        Damping of each fold, N m s/rad per m of crease.
-    strain_damping : float
-        Damping of strain rates, s.
-    dashpots : tuple of (str, Dashpot)
-        Dashpots among the supports, with their places for messages.
-    damped : bool
-        Whether anything dissipates energy.
-    damped_at_start : bool
-        Whether any damping refers to the state in which a motion begins.
-    """
+    """The part of `Case` about damping; needs `damping`, and `supports` for dashpots."""
 
     damping: Damping | Sequence[Damping]
 
@@ -363,39 +345,39 @@ class Damped(Supported):
 
     @cached_property
     def rayleigh(self) -> Rayleigh:
-        """See the class."""
+        """The Rayleigh part of the damping; zero if there is none."""
         return next((part for part in self.dampings if isinstance(part, Rayleigh)), Rayleigh())
 
     @cached_property
     def modal_damping(self) -> ModalDamping | None:
-        """See the class."""
+        """Damping ratios of modes, if there are any."""
         return next((part for part in self.dampings if isinstance(part, ModalDamping)), None)
 
     @cached_property
     def crease_damping(self) -> NDArray[np.float64]:
-        """See the class."""
+        """Damping (nf,) of each fold, N m s/rad per m of crease."""
         parts = [part for part in self.dampings if isinstance(part, CreaseDamping)]
         none = np.zeros(len(self.structure.folds))
         return read_only(sum((part.per_length(self.structure, "damping") for part in parts), none))
 
     @property
     def strain_damping(self) -> float:
-        """See the class."""
+        """Damping of strain rates, s."""
         return next((part.beta for part in self.dampings if isinstance(part, StrainDamping)), 0.0)
 
     @cached_property
     def dashpots(self) -> tuple[tuple[str, Dashpot], ...]:
-        """See the class."""
+        """Dashpots among the supports, with their places for messages."""
         return tuple(self._supports(Dashpot))
 
     @property
     def damped_at_start(self) -> bool:
-        """See the class."""
+        """Whether any damping refers to the state in which a motion begins."""
         return any(getattr(part, "state", "rest") == "initial" for part in self.dampings)
 
     @property
     def damped(self) -> bool:
-        """See the class."""
+        """Whether anything dissipates energy."""
         rayleigh = self.rayleigh.alpha > 0.0 or self.rayleigh.beta > 0.0
         modal = self.modal_damping is not None and bool(np.any(self.modal_damping.ratios))
         dashpots = any(dashpot.coefficient > 0.0 for _, dashpot in self.dashpots)

@@ -51,13 +51,6 @@ class Constraints:
     equations : sequence of Equation
     held : ndarray of bool, shape (3n,)
         Dofs that supports hold along their axes.
-
-    Attributes
-    ----------
-    free : ndarray of int
-        Dofs that are neither held nor slaves, increasing: the unknowns.
-    slaves : ndarray of int
-        Dofs that the other dofs determine.
     """
 
     equations: Sequence[Equation]
@@ -88,12 +81,12 @@ class Constraints:
 
     @property
     def slaves(self) -> NDArray[np.int64]:
-        """See the class."""
+        """Dofs that the other dofs determine."""
         return self._solved.slaves
 
     @cached_property
     def free(self) -> NDArray[np.int64]:
-        """See the class."""
+        """Dofs that are neither held nor slaves, increasing: the unknowns."""
         taken = self.held.copy()
         if self:
             taken[self.slaves] = True

@@ -236,8 +236,8 @@ class Actuate(Load):
         Factor of time; constant by default.
     fold_angle : float or sequence of float, optional
         Instead of `angle`, the fold angle of the FOLD format (degrees, -180 to 180): 180 minus the
-        dihedral; 0 if flat, positive for valleys, negative for mountains. A single number for
-        creases chosen by a word has no sign, at least 0: each crease folds as it is assigned.
+        dihedral; 0 if flat, positive for valleys, negative for mountains. For creases chosen by a
+        word, a single number must be at least 0; each crease folds in its assigned direction.
     fraction : float or str, optional
         Instead of `angle`, the fraction of the way to fully folded, 0 to 1 or a text such as "80%":
         valleys fold to 180 degrees times the fraction, mountains to -180 degrees times the

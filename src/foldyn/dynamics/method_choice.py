@@ -26,7 +26,7 @@ from foldyn.mechanics.following import following_force
 
 AUTO = "auto"
 LONG = 30.0  # periods above which an undamped motion needs a conserving method
-CONTENT = 2.0  # factor of the number of steps, as the vibration carries faster ones
+CONTENT = 2.0  # factor on the number of steps, because faster vibrations add to the estimated one
 FEWEST = 50.0  # least number of steps of an implicit run
 MOST_TIMES = 4000  # largest number of times at which loads are evaluated
 AT_REST = 1e-6  # out-of-balance forces below this share of the loads set nothing in motion

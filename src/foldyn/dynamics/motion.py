@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 RECHECKS = 20  # number of checks of the critical step during a motion
 CHUNK = 256  # steps in the first stretch; later stretches last about REPORT_EVERY s
 REPORT_EVERY = 0.25
-BETWEEN = 0.382  # share of the time between samples: no vibration rests at all these times
+BETWEEN = 0.382  # fraction of a sampling interval; a vibration at rest at both its ends moves there
 EXPLODED = 1.0  # relative energy error at which the motion is stopped
 # Crossing panels are searched for at samples so far apart that the search takes little time
 PER_LOOK = 500  # least force evaluations of an explicit method between two searches

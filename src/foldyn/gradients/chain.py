@@ -17,7 +17,7 @@ from foldyn.gradients.parameters import SHORTER, Differentiated, Parameters
 from foldyn.mechanics.pullback import Arrays
 from foldyn.sweeps.measure import Asked
 
-SAME, ROUNDING = 1e-6, 1e-9  # derivatives are equal to this fraction of them, or of the value
+SAME, ROUNDING = 1e-6, 1e-9  # derivatives may differ by these shares of them, and of the value
 
 
 class Wanted(NamedTuple):

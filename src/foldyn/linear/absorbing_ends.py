@@ -33,7 +33,7 @@ PHASE = 1e-3  # rad per cell: phase of a long wave
 LEAST = 0.5  # least share of rigid section motions in the kinetic energy of a wave
 LOOKED_AT = 8  # number of waves computed: bending waves are lower than waves along the chain
 NEGLIGIBLE = 1e-3  # dashpots that are smaller, relative to the largest coefficient, are left out
-ON_AXIS = 1e-6  # distance from the axis, relative to the largest one, that counts as none
+ON_AXIS = 1e-6  # distance from the axis, relative to the largest distance, that counts as zero
 
 
 def _matrix(name: str, value: ArrayLike) -> NDArray[np.float64]:

@@ -356,7 +356,7 @@ def _warn_of_imbalance(residual: float) -> None:
 
 
 class SmallLoads(NamedTuple):
-    """Response of the sheet, with its stiffness at rest, to forces in full.
+    """Linear response of the sheet, with its stiffness at rest, to its forces at factor 1.
 
     Attributes
     ----------

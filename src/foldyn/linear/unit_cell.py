@@ -30,8 +30,8 @@ from foldyn.patterns.tiling import periods as translations_of
 from foldyn.ram_limit import check_memory
 from foldyn.values import number, numbers, of_kind, show, whole
 
-NEAR_MISS = 0.05  # misses of a vertex below this, relative to the pattern's size, are reported
-COMMUTE = 10.0  # times the tolerance: largest effect of the order of two motions
+NEAR_MISS = 0.05  # a vertex this close to a partner, relative to the pattern's size, is reported
+COMMUTE = 10.0  # largest distance that the order of two motions may make, in tolerances
 SHOWN = 6  # most vertices named in a message
 HEXAGONAL = 1e-6  # tolerance for lengths and angle of a hexagonal lattice
 

@@ -43,7 +43,7 @@ def update(p, before, after, dt, spring, other):
     turn = after - before
     now, slope = _relaxed(turn, dt, spring, p[0], p[1])
     lost = 0.5 * (spring + now) * (turn - (now - spring))
-    # the elastic law counts the whole turn; this is the rest
+    # the elastic law counts the whole turn; these are the differences from it
     return now, 0.0, now - after, slope - 1.0, 0.5 * (now * now - after * after), lost
 
 

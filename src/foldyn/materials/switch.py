@@ -51,20 +51,20 @@ hinge_energy, hinge_moment, hinge_slope = (
     )
     for name in ("energy", "moment", "slope")
 )  # fmt: skip
-# derivative of the energy with respect to the rest angle; `address` is that of the energy
+# derivative of the energy with respect to the rest angle; `address` is the energy's
 hinge_rest_slope = switch(
     __name__, "hinge_rest_slope", _HINGE,
     {code: law.energy_slope() for code, law in HINGES.items()},
     ("{0}(address, theta, rest)", (_by_rest,)),
 )  # fmt: skip
-# derivatives of the moment with respect to the rest angle and to a, b and c; `address` is that of
-# the moment
+# derivatives of the moment with respect to the rest angle and to a, b and c; `address` is the
+# moment's
 hinge_moment_by = switch(
     __name__, "hinge_moment_by", _HINGE,
     {code: law.moment_slopes() for code, law in HINGES.items()},
     ("({0}(address, theta, rest), 0.0, 0.0, 0.0)", (_by_rest,)),
 )  # fmt: skip
-# sets those of a hinge's four parameters that follow its rest angle
+# sets the parameters of a hinge that follow its rest angle
 move_rest = switch(
     __name__, "move_rest", "code, rest, parameters",
     {

@@ -25,7 +25,7 @@ from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.strips import shares
 
 HINGES_EACH = 4000  # hinges per thread: half as many pay off only on an idle machine
-MOST = 8  # threads: more have not been measured
+MOST = 8  # largest number of threads; more have not been measured
 SPINS = 100  # checks for other members before the processor is yielded
 ARRIVED, ROUND, BROKEN = 0, 8, 16  # positions in `Team.state`, each on its own cache line
 

@@ -24,7 +24,7 @@ NOISE = 10.0  # a residual below this many times its rounding counts as zero
 STRAIGHT = np.cos(np.radians(25.0))  # least cosine between the tangents at the ends of a step
 SMALLEST = 1e-5  # the branch is lost if steps become shorter than this fraction of the longest
 LOCATED = 1e-11  # accuracy of located points, as a fraction of the step
-MISSES = 8  # a search for a special point ends once more points than this were not found
+MISSES = 8  # a search for a special point ends after more failures than this
 NEAR = 0.2  # a step passes points up to this distance from it, as a fraction of its length
 
 

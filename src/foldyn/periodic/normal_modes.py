@@ -41,7 +41,7 @@ TURN = 2.0 * np.pi
 SAMPLES = 16  # samples of half a period at which energies are compared
 CONSTANT = 1e-10  # goal for the relative change of the energy along a normal mode
 RAISE, RAISES = 1.5, 3  # factor by which the number of harmonics grows, and most increases
-WORTH = 30.0  # an increase must reduce the energy change by this factor to try another one
+WORTH = 30.0  # another increase is tried if the last one reduced the energy change by this factor
 LOOSE = 1e-2  # relative change of the energy above which to warn
 
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from foldyn.plots import scene
 from foldyn.plots.scene import Points, View
 
-CROWD = 20  # if nodes other than vertices have more arrows, these are thinned
-MANY = 100  # with more arrows in all, thinning is stronger
+CROWD = 20  # arrows at nodes other than vertices are thinned if there are more than this
+MANY = 100  # arrows are thinned more strongly if there are more than this in all
 _DIRECTIONS = np.radians(np.arange(90.0, 450.0, 30.0))
 
 

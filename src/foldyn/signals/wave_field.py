@@ -156,7 +156,9 @@ def pulse(time: ArrayLike, values: ArrayLike, *, sign: int = 1, share: float = 0
     moments = records.checked_record("time", time, FEWEST)
     field = records.real_array("values", values)
     if field.ndim != 2 or len(field) != len(moments):
-        raise InputError(f"values: shape {field.shape}; {len(moments)} times need (times, cells)")
+        raise InputError(
+            f"values: shape {field.shape}: give (times, cells) for the {len(moments)} times"
+        )
     if (np.diff(moments) <= 0.0).any():
         raise InputError("time: must increase")
     if isinstance(sign, bool) or sign not in (1, -1):

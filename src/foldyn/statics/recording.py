@@ -74,7 +74,7 @@ class Change(NamedTuple):
 
 
 def stability_changes(points: Sequence[Point], from_rest: bool) -> list[Change]:
-    """Changes of the count along a path; with `from_rest`, also from zero before its start."""
+    """Changes of the count along a path; with `from_rest`, the count is zero before the path."""
     counted = [point for point in points if point.negative >= 0]
     changes = [Change(a, b) for a, b in pairwise(counted) if a.negative != b.negative]
     if from_rest and counted and counted[0].negative:

@@ -19,7 +19,7 @@ from foldyn.errors import InputError
 
 FREE = 1e-9  # motion of held dofs that counts as zero, relative to the size of the rigid motion
 AXES = "xyz"
-TIE = 1e-6  # when pins are chosen: weight of the first dof minus that of the last
+TIE = 1e-6  # difference between the weights of the first and last dof in the choice of pins
 
 
 def rigid_motions(x: NDArray) -> NDArray:

@@ -26,11 +26,11 @@ from foldyn.structures.structure import ModelOptions
 
 STIFF = 3.0  # largest k w/G of creases between panels of width w: beyond, both bend as one plate
 STIFF_STRIP, SQUARE = 0.3, 1.4  # largest k w/G in strips; largest aspect ratio of a square panel
-FEW = 16  # a sheet with clamped edges and at most so many panels is off
+FEW = 16  # with at most this many panels, a sheet with clamped edges is inaccurate
 SKEW = 33.0  # degrees, smallest corner of a quadrilateral panel
 FOLDED = 0.05  # largest t/(L sin fold) of welds: above it they bow, but not in the model
 FLAT = 0.15  # largest t/(L sin fold) of creases
-LOCKING = 1.1  # times the stiffness between the locking angles: frequencies rise by 5 %
+LOCKING = 1.1  # stiffness, relative to between the locking angles: frequencies rise by 5 %
 SHUT = 100.0  # relative stiffness above which the panels at a crease move as one
 SMOOTH = 1e-3  # rad: a fold with a smaller angle counts as flat
 DIGITS = 6  # decimals in comparisons, so that rounding does not exceed limits

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 
-PER_LOG = 3.0  # a factor e of distance has divisions/3 arcs: triangles about as wide as long
+PER_LOG = 3.0  # divisions/3 arcs per factor e of distance make triangles about as wide as long
 ROOM = 2.0  # least length of a ray, divided by the radius
 
 

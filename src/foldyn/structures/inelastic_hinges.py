@@ -18,7 +18,7 @@ from foldyn.mechanics.sheet_term import FoldHinges
 from foldyn.mechanics.viscous import WIDTH, hinge_dofs
 from foldyn.structures.discretized import Discretized
 
-LEAST = 1e-9  # least stiffness of a crease divided by that of its panels
+LEAST = 1e-9  # least stiffness of a crease, relative to the stiffness of its panels
 
 
 class Remembering(NamedTuple):

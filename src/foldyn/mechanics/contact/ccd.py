@@ -26,7 +26,7 @@ from foldyn.mechanics.contact.planes import height
 from foldyn.mechanics.contact.search import farthest, fastest, list_pairs, place, use_all
 
 KEEP = 0.2  # share of each gap to keep
-NEAR = 0.01  # a gap has reached its goal if it exceeds it by at most this share
+NEAR = 0.01  # a gap has reached its goal if it is at most this share above it
 ADVANCES = 100  # largest number per pair
 LISTS = 40  # largest number of pair lists per motion
 HALVINGS = 40  # largest number of halvings if a hinge would pass 0 or 2 pi

@@ -151,7 +151,7 @@ def put_ties(tables, memory, parts, ties, loose, found):
                 continue
             k = found[kind]
             if k == len(pairs):
-                found[kind] = len(pairs) + 1  # no room
+                found[kind] = len(pairs) + 1  # tells that the list is full
                 return
             found[kind] += 1
             pairs[k, 0], pairs[k, 1], memory.d0[kind, k] = parts[m, 1], parts[m, 2], ties[m, 0]

@@ -23,15 +23,15 @@ from foldyn.statics.folding.energy import Aim, Evaluated, FoldEnergy, Shape, Sti
 
 LARGEST_TURN = 0.5  # rad, of a hinge in a step
 NEAR = 0.1  # rad, turn in a damped step below which Newton's method is tried
-CLOSER = 0.1  # factor on this turn after each failure
+CLOSER = 0.1  # factor on `NEAR` after each failure
 TRIES, MORE_DAMPED = 12, 3  # Newton matrices, and dampings tried for an indefinite one
-SHORTER = 0.3  # factor on the last turn: after a shorter step the matrix is kept
-CLOSE = 0.01  # of `least`: remaining turn accepted with a kept matrix
-DAMPING = 1e-4  # initial, over the mean of the matrix diagonal
+SHORTER = 0.3  # the matrix is kept if a step turns less than this share of the last turn
+CLOSE = 0.01  # with a kept matrix: largest turn that may remain, as a share of `least`
+DAMPING = 1e-4  # initial damping, relative to the mean of the matrix diagonal
 LEAST, MOST = 1e-14, 1e8
 LESS, MORE = 0.3, 5.0  # factors on the damping after a good and after a bad step
-FIRM, SOFT = 1e-12, 0.01  # damping of Newton's method: least, and per rad of the last turn
-ROUNDING = 1e-14  # of an energy
+FIRM, SOFT = 1e-12, 0.01  # damping of Newton's method: least, and increase per rad of last turn
+ROUNDING = 1e-14  # relative rounding error of an energy
 UNSTRAINED = 1e-24  # energy of strains at round-off
 
 

@@ -33,17 +33,17 @@ PAPER = Stiffness(bends=0.03, creases=5e-3, sides=0.1)  # panels bend, creases a
 THIN = Stiffness(bends=1e-3, creases=1e-3, sides=1.0)
 CLOSING = 10.0  # stiffness of `sides` that keeps closed creases within 180 degrees
 AJAR = math.radians(179.8)  # largest turn of creases that open from the folded state
-OPENED = 0.1  # of the opening wanted: a crease that opens by less counts as closed
-FREE_MARGIN = math.radians(1.0)  # for mountains and valleys without a target
+OPENED = 0.1  # a crease counts as closed if it opens by less than this share of what is wanted
+FREE_MARGIN = math.radians(1.0)  # margin of mountains and valleys without a target
 WEAKER = (0.1, 0.01, 0.001)  # factors on the springs, in turn, before they are released
-ENOUGH = 60  # iterations at steps before the last, where the state with springs is enough
-LESS = 0.3  # of the strain: the most that may remain with the weakest springs
-HELD = 0.3  # of the turns so far: a larger change by the release is rejected
+ENOUGH = 60  # iterations per step before the last step, at which springs need not be released
+LESS = 0.3  # largest share of the strain that may remain with the weakest springs
+HELD = 0.3  # largest change by the release, as a share of the turns so far
 TURNED = 1e-3  # rad, least turn that counts
 ISOMETRIC = 1e-9  # strain below which a state counts as isometric
 PLANE = 1e-6  # rad, bend below which a panel counts as plane
-SLIGHT = 0.01  # rad, bend of panels that are plane but for drawing errors
-CLOSES = 0.02  # of the size of the pattern: largest closing error of a folded state
+SLIGHT = 0.01  # rad, largest bend of panels that only drawing errors keep from being plane
+CLOSES = 0.02  # largest closing error of a folded state, relative to the size of the pattern
 FIRST_TURN = math.radians(8.0)
 PERTURBED = Stiffness(bends=30.0, creases=1.0, sides=0.0)  # bars hardly matter
 
