@@ -20,7 +20,7 @@ from foldyn.plots.readings import case_from_result, chosen_modes
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import rest_keys, side_by_side
 from foldyn.structures import Structure
-from foldyn.values import length, numbers
+from foldyn.values import length, listed, numbers
 
 _AMPLITUDE = 0.12  # largest displacement, relative to the sheet's size
 _STRETCH = 0.4  # largest relative displacement of a bar's ends, relative to its length
@@ -215,6 +215,8 @@ def plot_mac(
     InputError
         `mac` is not a matrix, has values out of range, or labels do not match it.
     """
+    if isinstance(mac, xr.Dataset):
+        raise InputError("mac: is a dataset; give the matrix of fd.mac(modes, other_modes)")
     values = numbers("mac", mac)
     if values.ndim != 2 or not values.size:
         raise InputError(f"mac: shape {values.shape}; give a matrix, one row per mode")
@@ -222,7 +224,8 @@ def plot_mac(
         raise InputError("mac: has values that are not between 0 and 1")
     labels = []
     for name, given, count in (("rows", rows, len(values)), ("columns", columns, values.shape[1])):
-        labels.append([str(k + 1) for k in range(count)] if given is None else list(given))
+        asked = range(1, count + 1) if given is None else listed(name, given, "labels")
+        labels.append([str(label) for label in asked])
         if len(labels[-1]) != count:
             raise InputError(f"{name}: {len(labels[-1])} labels for {count} modes; give one each")
     down, across = values.shape
