@@ -178,8 +178,8 @@ def _check(case: Case, method: str, initial: State | None) -> None:
     check_relaxing(case, "the exponent needs smooth forces")
     if any(part.alone for part in with_mass(suited(method, case), case).remembering):
         raise InputError(
-            "damping: two motions this close differ in the turns of damped creases of n5b8e by "
-            'round-off alone; take preset = "plate", or other damping than CreaseDamping'
+            "damping: in models of the scheme n5b8e, rounding hides how damped creases separate "
+            'in two close motions; take preset = "plate", or other damping than CreaseDamping'
         )
 
 

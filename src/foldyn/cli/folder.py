@@ -99,7 +99,7 @@ def write_stamp(
     folder : Path
     owner : Owner
     state : {"running", "stopped", "complete"}
-        "running", if the process no longer lives, means that the run was cut off.
+        "running" without a running process means that the run was cut off.
     results, outdated : sequence of str
         Files of this run; files of an earlier run, removed when this run saves its first file.
     """

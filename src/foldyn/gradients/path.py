@@ -126,7 +126,7 @@ class PathGradient(Differentiated):
     ----------
     case : Case
     arguments : mapping
-        Arguments of `fd.path`.
+        Arguments of `fd.trace`.
     """
 
     def __init__(self, case: Case, arguments: Mapping[str, Any]) -> None:

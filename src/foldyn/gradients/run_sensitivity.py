@@ -88,7 +88,7 @@ def sensitivity(
         with respect to variables of the result, by name.
     analysis : mapping, optional
         The analysis: its kind, "modes", "statics", "dynamics" or "frf", and arguments of
-        `fd.modes`, `fd.path`, `fd.simulate` or `fd.frf`. A case file contains its own analysis.
+        `fd.modes`, `fd.trace`, `fd.simulate` or `fd.frf`. A case file contains its own analysis.
     sizes : mapping, optional
         Sizes of parameters that are 0 where the gradient is taken: differences change a parameter
         by a thousandth of its size.

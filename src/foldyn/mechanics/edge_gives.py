@@ -241,7 +241,7 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
 
 @inner
 def balance_gives(own, u):
-    """Compute the gives' forces from the strains at u, and the gives in balance, to memory."""
+    """Store the forces of the strains at u on the gives, and the gives in balance with them."""
     pull, g = own.memory
     strained_gives(own.gives, u, pull)
     for k in range(g.size):

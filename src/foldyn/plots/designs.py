@@ -31,7 +31,7 @@ def plot_convergence(history: xr.Dataset) -> Figure:
     Parameters
     ----------
     history : xarray.Dataset
-        History of a `foldyn.Design`.
+        The `history` of a result of `foldyn.design`.
     """
     of_kind("history", history, xr.Dataset)
     charts = convergence_charts(history)

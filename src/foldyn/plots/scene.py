@@ -261,8 +261,8 @@ def _frame(axes: Axes3D, middle: Points, box: Points, basis: Points) -> None:
         axis.set_major_locator(FixedLocator(places.tolist()))
         axis.set_pane_color((0.975, 0.975, 0.975, 1.0))
         axis.line.set_color(style.LIGHT)
-        # The grid of three-dimensional axes has no public color; without this it would only be
-        # darker.
+        # Matplotlib has no public setting for this color; if the private one disappears, the grid
+        # is only darker.
         getattr(axis, "_axinfo", {}).get("grid", {}).update(color="#E2E2E2", linewidth=0.5)
     axes.tick_params(labelsize=style.NOTE, color=style.LIGHT, labelcolor=style.BLACK, pad=0)
     for name, pad in zip("xyz", _LABEL_PADS, strict=True):

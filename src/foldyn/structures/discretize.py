@@ -150,8 +150,8 @@ def discretize(
     check_welds(options.rigid, pattern)
     if len(pattern.welds) and options.scheme != "n5b8e":
         warn(
-            f"pattern: its welds ({len(pattern.welds)}) become hinges, which bend as the sheet "
-            'does only roughly: take preset = "n5b8e", or a shell',
+            f"pattern: its welds ({len(pattern.welds)}) become hinges, which model the bending of "
+            'the sheet only roughly: take preset = "n5b8e", or a shell',
             "facets.md#models-and-accuracy",
         )
     nodes = len(pattern.vertices) + len(pattern.faces)

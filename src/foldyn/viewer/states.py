@@ -47,7 +47,7 @@ class States(NamedTuple):
 
 
 def memory_acts(case: Case, result: xr.Dataset) -> bool:
-    """Whether creases have memory; dampers in series with panels only have it while time passes."""
+    """Whether creases have memory; dampers in series with panels need a motion or timed path."""
     passes = "time" in result.sizes or "elapsed" in result
     return any(passes or not isinstance(part.law, CreaseDampers) for part in case.remembering)
 
