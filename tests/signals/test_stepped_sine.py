@@ -104,7 +104,7 @@ def test_a_cubic_spring_shows_its_describing_function():
         ({"cycles": 1}, "cycles = 1"),
         ({"frequency": 20.0, "harmonics": 3}, "harmonics: 3 times 20 Hz"),
         ({"harmonics": 0}, "harmonics = 0"),
-        ({"time": TIME[::-1]}, "time: increasing"),
+        ({"time": TIME[::-1]}, "time: give one row"),
         ({"x": TIME[:-1]}, "but there are 333 times"),
         ({"x": np.full(333, np.inf)}, "x: 333 samples are NaN"),
     ],

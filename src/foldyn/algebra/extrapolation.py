@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 ORDER = 2.0  # order of the elements
-LEAST, MOST = 1.0, 3.0  # least and largest observed order that are close enough
+LEAST, MOST = 1.0, 3.0  # range of observed orders that are close enough to it
 SETTLED = 1e-3  # changes below this share of the value show no order
 
 

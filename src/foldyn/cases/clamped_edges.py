@@ -77,9 +77,9 @@ def _edges(structure: Discretized, support: Any, named: NDArray, place: str) -> 
 
 
 def straightened(options: Any, pattern: Pattern, supports: Iterable[Any]) -> dict[str, Any]:
-    """Options that a structure whose edges may bow needs for supports along edges.
+    """Option `straight` for supports that hold edges along their length.
 
-    The result has the option `straight` with all boundary edges held along their length, or is
+    The option lists all boundary edges that are held so. Where edges cannot bow, the result is
     empty.
     """
     if not getattr(options, "bowed", False):

@@ -162,7 +162,7 @@ def is_uniform(time: ArrayLike, rtol: float = _RELATIVE_SLACK) -> bool:
     step = (t[-1] - t[0]) / (t.size - 1)
     if step <= 0.0:
         return False
-    # Times are compared with the grid, not step by step: so rounding does not add up, drift shows.
+    # compared with a grid, not step by step: rounding does not add up, and a drift shows
     grid = t[0] + step * np.arange(t.size)
     slack = rtol * step + _ROUNDING_UNITS * np.finfo(np.float64).eps * np.abs(t).max()
     return bool(np.abs(t - grid).max() <= min(slack, 0.5 * step))

@@ -190,7 +190,7 @@ def _steady_part(
     """Times (n,) and samples (n, channels) of the part to fit."""
     t, samples = real_array("time", time), real_array("x", x)
     if t.ndim != 1 or t.size < 2 or (np.diff(t) <= 0.0).any():
-        raise InputError("time: increasing sample times in one row are needed")
+        raise InputError("time: give one row of increasing sample times")
     if samples.ndim == 0 or samples.shape[0] != t.size:
         raise InputError(f"x: shape {samples.shape}, but there are {t.size} times")
     # each sample stands for one interval: n samples are n dt long, not (n - 1) dt

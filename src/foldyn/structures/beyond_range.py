@@ -43,7 +43,7 @@ def doubt_range(pattern: Pattern, sheet: Sheet, options: ModelOptions, folds: ND
 
     folds : stiffness (nf,) of the creases alone, N m/rad.
     """
-    if options.calibration != "plate":  # a published model is used with its errors
+    if options.calibration != "plate":  # published models are taken as they are
         return
     for text in _doubts(pattern, sheet, options, folds):
         warn(text, "fidelity.md#beyond-the-range", ModelRangeWarning)

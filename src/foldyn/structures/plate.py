@@ -41,7 +41,7 @@ from foldyn.structures.sheet import Sheet
 COMPLIANCE = 0.12  # c Lf^2/A of panels with more than four corners, and at most welds
 TRIANGLE = (0.22, 0.6)  # c Lf^2/A of triangles without a free edge, and with free edges
 POLYGON = (0.77, 0.87, 0.91, 0.93)  # p of regular polygons of 5, 6, 7 and more corners (the shell)
-WELDED_TRIANGLE, WELDED_ALONE = 2.0 / 3.0, 0.19  # c Lf^2/A at a weld: of triangles, of quads with no crease
+WELDED_TRIANGLE, WELDED_ALONE = 2.0 / 3.0, 0.19  # c Lf^2/A at welds: triangles; quads, no crease
 Panel = tuple[NDArray, NDArray]  # stiffness of bends, compliance c of edges, for G = 1
 
 
