@@ -162,7 +162,7 @@ def test_without_a_package_or_a_card(monkeypatch):
     why = "not installed"
     if importlib.util.find_spec("numba_cuda") is not None:
         monkeypatch.setattr("numba.cuda.is_available", lambda: False)
-        why = "no GPU of NVIDIA"
+        why = "no NVIDIA GPU"
     with pytest.raises(InputError, match=why):
         fd.simulate(sheet(), 1e-3, method="rk4", device="gpu")
 

@@ -101,7 +101,7 @@ def poincare_section(
         times = _passages(stretch, plane, number("level", level), direction)
     times = times[times >= after]
     if not len(times):
-        warn(_missed(stretch, after, period, level), "long-motions.md#doublings-and-chaos")
+        warn(_missed(stretch, after, period, level), "long-motions.md#period-doubling-and-chaos")
     found = at_times(stretch, times)
     values = {"displacement": found.displacement, "velocity": found.velocity}
     along = {"time": variable(("time",), found.time, "s", "time")}

@@ -65,7 +65,7 @@ def info() -> str:
         f"optional part for camera tracking: OpenCV, {camera}",
         f"optional part for pattern files in DXF: {drawings}",
         f"optional part for sweeps on clusters: Dask, {clusters}",
-        f"GPU of NVIDIA's: {no_card() or card.name()}",
+        f"NVIDIA GPU: {no_card() or card.name()}",
         f"optional parts for inverse design: NLopt, {moving}; CMA-ES, {drawn}",
         *(
             f"linear solver from {solver.worthwhile:,} directions: {name}, "

@@ -51,7 +51,7 @@ def no_card() -> str:
 
     if not cuda.is_available():
         return (
-            "no GPU of NVIDIA's with a driver is found here (check with nvidia-smi); "
+            "no NVIDIA GPU with a driver is found here (check with nvidia-smi); "
             'device = "cpu" needs none'
         )
     version = tuple(cuda.driver.driver.get_version())
