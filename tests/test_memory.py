@@ -83,7 +83,7 @@ def test_half_of_the_memory_is_for_those_who_ask(monkeypatch):
             check("cells", "a pattern", 1.5 * ram_limit.GIB, "take fewer")
     assert str(told.value) == (
         "cells: a pattern needs about 1.5 GiB, more than half of the 2 GiB of this machine: take "
-        "fewer, or go on with --force"
+        "fewer, or continue with --force"
     )
     whole = r"3 GiB, more than the 2 GiB of this machine: take fewer$"
     with pytest.raises(InputError, match=whole):

@@ -79,7 +79,7 @@ def check_memory(field: str, what: str, needed: float, remedy: str) -> None:
     here = f"the {there / GIB:.3g} GiB of this machine"
     if needed <= there:
         part = "half" if _share.get() == HALF else f"the share {_share.get():.3g}"
-        here, remedy = f"{part} of {here}", f"{remedy}, or go on with --force"
+        here, remedy = f"{part} of {here}", f"{remedy}, or continue with --force"
     raise InputError(
         f": {what} needs about {needed / GIB:.3g} GiB, more than {here}: {remedy}", field
     )

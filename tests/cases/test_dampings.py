@@ -217,8 +217,8 @@ def test_modes_have_them():
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ((1, 0.1, 2, 0.3), r"z2 = 0.3: .* from 0.05 \(alpha alone\) to 0.2 \(beta alone\)"),
-        ((2, 0.1, 1, 0.01), r"z2 = 0.01: .* from 0.05 \(beta alone\) to 0.2 \(alpha alone\)"),
+        ((1, 0.1, 2, 0.3), r"z2 = 0.3: .* between 0.05 \(alpha alone\) and 0.2 \(beta alone\)"),
+        ((2, 0.1, 1, 0.01), r"z2 = 0.01: .* between 0.05 \(beta alone\) and 0.2 \(alpha alone\)"),
         ((1, 0.1, 1, 0.1), "f2 = 1: must differ from f1"),
         ((0, 0.1, 1, 0.1), "f1 = 0: must be greater than 0"),
         ((1, -0.1, 2, 0.1), "z1 = -0.1: must be at least 0"),

@@ -90,7 +90,7 @@ def test_files_that_are_not_there(workplace) -> None:
         ("case.toml/below", "cannot be written"),
         ("new/" + "x" * 300, "cannot be written"),
         ("", "is empty; name a folder"),
-        ("taken", "taken/result.nc is a folder, a file of this name is to be written; name"),
+        ("taken", "taken/result.nc is a folder where a file is to be written; name"),
     ],
 )
 def test_results_folders_that_cannot_be(workplace, miura, out, reason) -> None:

@@ -93,7 +93,7 @@ def test_the_table_is_aside_for_other_commands(workplace):
         (ASKED.replace('"mass"', '"max(mass"'), 'design.minimize = "max(mass": cannot be read'),
         (ASKED.replace(">= 1.0", "> 1.0"), "design.subject_to[0] = "),
         (ASKED.replace("sheet.thickness", "sheet.thicknes"), ".toml: sheet.thicknes: unknown key"),
-        (ASKED.replace("frequency[1]", "reaction[x]"), "design.subject_to[0]: reaction[x] is"),
+        (ASKED.replace("frequency[1]", "reaction[x]"), "design.subject_to[0]: reaction[x] needs"),
         (ASKED + '[design.guess]\n"sheet.thickness" = 7\n', "must be within its bounds"),
     ],
 )  # fmt: skip

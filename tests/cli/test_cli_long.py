@@ -64,13 +64,13 @@ def test_a_run_that_is_cut_off_goes_on(place, monkeypatch, capsys):
         assert ran("--checkpoint", "1e-9") == 130
     said = capsys.readouterr().err
     assert "keeps it up to t = " in said
-    assert "go on by --resume" in said
+    assert "continue it by --resume" in said
     results = place / "case-results"
     assert (results / "result-centroid.nc.unfinished").is_dir()
     assert ran() == 2
     said = capsys.readouterr().err
-    assert "keeps a motion that was cut off" in said
-    assert "go on with it by --resume, or --replace to begin anew" in said
+    assert "keeps an interrupted motion" in said
+    assert "continue it by --resume, or --replace to start again" in said
     assert ran("--resume") == 0
     assert sorted(name for name in os.listdir(results) if name[0] != ".") == FILES
     for name in FILES:

@@ -212,6 +212,6 @@ def test_a_fit_that_is_ended_keeps_its_evaluations_and_no_workers(tmp_path) -> N
     _, err = process.communicate()
     assert process.returncode == 128 + signal.SIGTERM
     assert "Traceback" not in err
-    named = f"{KEPT}fit-fit/evaluations; the same command goes on from there"
+    named = f"{KEPT}fit-fit/evaluations; the same command continues from there"
     assert err.splitlines()[-2:] == ["foldyn: interrupted", named]
     assert {*kept.rglob("*")} == there and {one.suffix for one in there} == {".npz"}

@@ -76,11 +76,11 @@ def anew(motion, given) -> None:
 
 
 def test_a_motion_whose_energies_do_not_balance_is_computed_anew(given):
-    why = 'anew with dormand_prince: with rk4.* is off by .* method = "dormand_prince" avoids'
+    why = 'again with dormand_prince: with rk4.* is off by .* method = "dormand_prince" avoids'
     with pytest.warns(FoldynWarning, match=why):
         motion = fd.simulate(**given, method="auto")
     assert motion.attrs["energy_error"] < 0.01
-    assert "computed anew: with rk4 the energy" in motion.attrs["method_reason"]
+    assert "computed again: with rk4 the energy" in motion.attrs["method_reason"]
     anew(motion, given)
     read = fd.simulate(**given, method="auto", resume=True)
     assert read.attrs["wall_seconds"] == motion.attrs["wall_seconds"]  # not computed again
@@ -94,7 +94,7 @@ def test_a_second_attempt_that_was_cut_off_goes_on(given):
         if len(reached) > 3 and 0.05 < now.time < 0.2 and min(reached[-3:]) < max(reached):
             raise KeyboardInterrupt
 
-    with pytest.warns(FoldynWarning, match="anew"), pytest.raises(MotionInterrupted):
+    with pytest.warns(FoldynWarning, match="computed again"), pytest.raises(MotionInterrupted):
         fd.simulate(**given, method="auto", progress=stop)
     anew(fd.simulate(**given, method="auto", resume=True), given)
 
@@ -102,7 +102,7 @@ def test_a_second_attempt_that_was_cut_off_goes_on(given):
 def test_a_lasting_motion_is_computed_anew_with_shorter_steps():
     """The errors of central differences do not grow; those of other explicit methods add up."""
     case = fd.Case(cell(), CELL_HELD)
-    why = "anew with steps of .*: with steps of .*; dt = .* avoids"
+    why = "again with steps of .*: with steps of .*; dt = .* avoids"
     with pytest.warns(FoldynWarning, match=why):
         motion = fd.simulate(case, 40.0, method="auto", initial=KICK, interval=0.1)
     assert motion.attrs["method"] == "central_difference"

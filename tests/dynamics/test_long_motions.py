@@ -140,7 +140,7 @@ def test_a_motion_goes_on_only_as_it_was_begun(begun, monkeypatch):
     ]:
         with pytest.raises(InputError, match=rf"was begun with .*{name}"):
             simulated("sheet", **{**begun, **changes}, resume=True)
-    with pytest.raises(InputError, match=r"up to t = 0\.\d+ s: go on with it by resume=True"):
+    with pytest.raises(InputError, match=r"up to t = 0\.\d+ s: continue it by resume=True"):
         simulated("sheet", **begun)
     with monkeypatch.context() as patch:
         patch.setattr("foldyn.dynamics.checkpoint.program", lambda *_: "another")
@@ -160,7 +160,7 @@ def test_a_finished_motion_is_only_read(kept):
 
 
 def test_ctrl_c_says_what_is_kept(kept):
-    said = r"keeps it up to t = 0\.\d+ s: go on by"
+    said = r"keeps it up to t = 0\.\d+ s: continue it by"
     with pytest.raises(MotionInterrupted, match=said) as stopped:
         cut_off(KeyboardInterrupt, **kept)
     whole = simulated("sheet", **SECOND)
@@ -205,7 +205,7 @@ def test_bad_arguments_are_refused_before_anything_is_computed(given, text, tmp_
     [
         ("velocity.f8", lambda raw: raw[:-100], r"samples .* are missing or have changed"),
         ("velocity.f8", lambda raw: raw[:9000] + b"else" + raw[9004:], ""),
-        (CHECKPOINT, lambda raw: raw[: len(raw) // 2], "remove that folder to begin anew"),
+        (CHECKPOINT, lambda raw: raw[: len(raw) // 2], "remove that folder to start again"),
     ],
 )
 def test_what_is_damaged_is_refused(name, change, said, begun, tmp_path):

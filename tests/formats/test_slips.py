@@ -101,7 +101,7 @@ def test_folded_patterns_cannot_be_mended(tmp_path):
     folded = fd.fold(off, {pair: 30 if letter == "V" else -30}, steps=1, initial="pattern").pattern
     write_pattern(folded, tmp_path / "x.fold")
     (doubt,) = diagnose(tmp_path / "x.fold").diagnosis.doubts
-    assert "fold it anew from its flat drawing, read with flat_foldable = true" in doubt
+    assert "fold it again from its flat drawing, read with flat_foldable = true" in doubt
     with pytest.raises(InputError, match="flat_foldable: pattern: is folded"):
         diagnose(tmp_path / "x.fold", flat_foldable=True)
 

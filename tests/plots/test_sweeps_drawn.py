@@ -118,7 +118,7 @@ def test_rows_that_failed_are_left_out(design):
 
 
 def test_indices_need_their_design_and_a_value_that_varies(plane, design):
-    with pytest.raises(InputError, match="is by grid"):
+    with pytest.raises(InputError, match='method is "grid"'):
         sobol_indices(plane, "value")
     with pytest.raises(InputError, match="does not vary"):
         sobol_indices(design.assign(value=1.0 + 0.0 * design["value"].assign_attrs(

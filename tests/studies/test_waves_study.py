@@ -115,7 +115,7 @@ def test_the_study_writes_its_page_and_goes_on(tmp_path, monkeypatch, capsys):
     with monkeypatch.context() as first:
         first.setattr("foldyn.cli.study.progress_bar", lambda *_, **__: Bar())
         assert main(command) == 130
-    kept = f"foldyn: kept what was computed: {tmp_path / 'out' / 'runs'}; the same command goes on"
+    kept = f"foldyn: kept what was computed: {tmp_path / 'out' / 'runs'}; the same command"
     assert kept in capsys.readouterr().err
     assert main(command) == 0
     assert "skipped 1 of 5 runs" in capsys.readouterr().out

@@ -80,7 +80,7 @@ class Formula(History):
     """Factors and derivatives at times; set by `waveforms`, which imports all histories."""
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Take the code of the first formula."""
+        """Set the code of a class with formulas to the code of its first formula."""
         super().__init_subclass__(**options)
         if "formulas" in vars(cls) and isinstance(cls.code, int):
             cls.code = cls.formulas[0].code

@@ -32,9 +32,9 @@ def add_design(commands: Any) -> None:
         "design",
         help="the best design of a case file, within bounds and constraints",
         description="Search for values of some keys of a case file that make a measure as small or "
-        "large as possible, as its table [design] asks for. Every evaluation is kept, so that a "
-        "search that was cut off goes on. The history, the case file with the best values, figures "
-        "and report.html go to a folder.",
+        "large as possible, as its table [design] asks for. Every evaluation is kept, so that "
+        "an interrupted search can be resumed. The history, the case file with the best values, "
+        "figures and report.html go to a folder.",
     )
     design.add_argument("case", help="case file (TOML) with a table [design]")
     design.add_argument(

@@ -37,7 +37,7 @@ def add_fit(commands: Any) -> None:
         description="Fit parameters of a case to measurements: a fit file names them all, or give "
         "a case file, the data and what to vary. Estimates with intervals, the case with the "
         "values found, figures and report.html go to a folder; so does every evaluation of the "
-        "model, so that a fit that was cut off goes on.",
+        "model, so that an interrupted fit can be resumed.",
     )
     fit.add_argument("file", help="fit file, or case file (TOML) or the name of a shipped case")
     fit.add_argument(

@@ -239,7 +239,7 @@ class Results:
         """List what was kept, for the end of a message."""
         if not self.kept:
             return ""
-        further = "; the same command goes on from there" if self.resumable else ""
+        further = "; the same command continues from there" if self.resumable else ""
         return f"\nfoldyn: kept what was computed: {', '.join(self.kept)}{further}"
 
     def _stamp(self, state: str) -> None:

@@ -64,7 +64,7 @@ def parser() -> argparse.ArgumentParser:
         description="Run a case file: figures, report.html and result.nc go to a folder.",
     )
     _add_common(run, "results")
-    flag(run, "--resume", "go on with a motion that was cut off, from its last checkpoint")
+    flag(run, "--resume", "continue an interrupted motion from its last checkpoint")
     run.add_argument(
         "--checkpoint",
         type=number,

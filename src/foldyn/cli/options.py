@@ -76,4 +76,4 @@ def add_switches(command: argparse.ArgumentParser, figures: bool = True) -> None
     if figures:
         flag(command, "--no-figures", "write data only: no figures and no report")
     flag(command, "--quiet", "no progress bar and no summary")
-    flag(command, "--force", "go on even if more than half of the memory is needed, as estimated")
+    flag(command, "--force", "run even if more than half of the memory is needed, as estimated")

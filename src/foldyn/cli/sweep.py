@@ -39,9 +39,9 @@ def add_sweep(commands: Any) -> None:
         "sweep",
         help="a case file at many values of its numbers, each measured",
         description="Compute a case file at many values of its keys, and measure each result. All "
-        "processors work on it; what is computed is kept point by point, so that a sweep that was "
-        "cut off goes on. One dataset, figures and report.html go to a folder. What is not given "
-        "is that of the table [sweep] of the file.",
+        "processors work on it; every computed point is kept, so that an interrupted sweep can "
+        "be resumed. One dataset, figures and report.html go to a folder. Options that are not "
+        "given come from the table [sweep] of the file.",
     )
     sweep.add_argument("case", help="case file (TOML), or the name of a shipped one")
     sweep.add_argument(

@@ -27,7 +27,7 @@ def add_view(commands: Any) -> None:
     command.add_argument("--port", type=integer, default=0, help="port (default: any that is free)")
     flag(command, "--no-browser", "print the address and open no browser")
     flag(command, "--quiet", "print nothing but the address")
-    flag(command, "--force", "go on even if more than half of the memory is needed, as estimated")
+    flag(command, "--force", "run even if more than half of the memory is needed, as estimated")
 
 
 def run_view(given: Namespace) -> None:

@@ -174,9 +174,9 @@ class Keeping:
         if not self.resume:
             on, anew = self.how
             raise InputError(
-                f"{self.folder}: keeps a motion that was cut off, up to "
-                f"t = {kept[_ABOUT]['reached']:.6g} s: go on with it by {on}, or {anew} to begin "
-                "anew"
+                f"{self.folder}: keeps an interrupted motion, up to "
+                f"t = {kept[_ABOUT]['reached']:.6g} s: continue it by {on}, or {anew} to start "
+                "again"
             )
         told = kept.pop(_ABOUT)
         self._compare(told["motion"])
@@ -185,7 +185,7 @@ class Keeping:
         if damaged := self.columns.damaged():
             raise InputError(
                 f"{damaged}: is damaged: samples that the checkpoint counts are missing or have "
-                f"changed; {self.how[1]} to begin anew"
+                f"changed; {self.how[1]} to start again"
             )
         self.begun, self._reached = True, told["reached"]
         return kept
@@ -234,7 +234,8 @@ class Keeping:
         """End of a message: what is stored and how to resume it; empty without a checkpoint."""
         if self._reached is None:
             return ""
-        return f"; {self.folder} keeps it up to t = {self._reached:.6g} s: go on by {self.how[0]}"
+        where = f"; {self.folder} keeps it up to t = {self._reached:.6g} s"
+        return f"{where}: continue it by {self.how[0]}"
 
     def remove(self) -> None:
         """Remove the checkpoint folder, once the result is in its file."""
@@ -266,7 +267,7 @@ class Keeping:
         except Exception:  # readers raise any kind of exception on damaged files
             raise InputError(
                 f"{path}: is damaged, or was made by another version of Foldyn; {self.how[1]} to "
-                "begin anew"
+                "start again"
             ) from None
         return kept
 
@@ -277,8 +278,8 @@ class Keeping:
             if now.get(name) != before.get(name):
                 raise InputError(
                     f"{self.folder}: was begun with {name} = {show(before.get(name))}, which is "
-                    f"{show(now.get(name))} now: a motion goes on as it was begun; restore it, or "
-                    f"{self.how[1]} to begin anew"
+                    f"{show(now.get(name))} now: a motion continues as it was begun; restore it, "
+                    f"or {self.how[1]} to start again"
                 )
 
     def _fail(self, error: OSError) -> NoReturn:

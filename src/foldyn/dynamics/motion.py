@@ -181,7 +181,7 @@ class Motion:
         other = self._better() if self._better else None
         if other is not None:
             off = f"with {self._unlike(other)[0]} the energy balance was off by more than"
-            other.reason = f"{self.reason}; computed anew: {off} {INACCURATE:.0%}"
+            other.reason = f"{self.reason}; computed again: {off} {INACCURATE:.0%}"
         return other
 
     def _unlike(self, other: Motion) -> tuple[str, str]:
@@ -194,7 +194,7 @@ class Motion:
         assert self._other is not None
         new, ask = self._other._unlike(self)
         text = (
-            f"the motion is computed anew with {new}: with {self._unlike(self._other)[0]}, the "
+            f"the motion is computed again with {new}: with {self._unlike(self._other)[0]}, the "
             f"choice of auto, the energy balance is off by {self.output.balance.relative:.1%} of "
             f"the energies at play; {ask} avoids the first attempt"
         )

@@ -129,7 +129,7 @@ def without_slips(made: Built, mend: bool, is_state: bool) -> Built:
         if is_state and isinstance(error, InputError):
             return made
         remedy = (
-            "fold it anew from its flat drawing, read with flat_foldable = true"
+            "fold it again from its flat drawing, read with flat_foldable = true"
             if isinstance(error, InputError)
             else f"{error}; a `tolerance` joins ends that miss each other"
         )

@@ -45,7 +45,7 @@ def from_xml(text: str, what: str) -> Element:
     except DefusedXmlException:
         raise InputError(
             f"is not {what} that can be read safely: it defines entities of entities, or names "
-            "other files; save it anew without them"
+            "other files; save it again without them"
         ) from None
     except (ParseError, ValueError, LookupError) as error:
         raise InputError(f"is not {what}: {shortened(str(error))}") from None

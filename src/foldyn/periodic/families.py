@@ -31,7 +31,7 @@ LEAST = 1e-12  # least size of a motion, relative to the sheet's length
 SMALL = 1e-3  # largest motion that counts as small, relative to the sheet's length
 # largest loss of accuracy of forces, in units of the rounding of positions divided by the motion
 LOST = 100.0
-SHARES = np.array([0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)])  # Gauss's
+SHARES = np.array([0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)])  # Gauss points, of a step
 WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
 

@@ -82,8 +82,8 @@ def trajectory_dataset(
     memory : array_like, shape (nt, b, 2), optional
         State of the branches of laws with memory, rad.
     continuations : mapping of str to (float, Continuation), optional
-        `continuation`: time (s) of the last sample, and the numbers that the method needs to go on
-        from it. `continued_from`: the same for the first sample.
+        `continuation`: time (s) of the last sample, and the numbers that the method needs to
+        continue from it. `continued_from`: the same for the first sample.
     origin : (float, Origin), optional
         Time (s) of the last sample, and the state in which the motion began; only needed if a term
         depends on that state.

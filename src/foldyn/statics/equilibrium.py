@@ -77,7 +77,7 @@ class Plates:
         return float(values[-1]) * self._motion if self else np.zeros_like(self._motion)
 
     def placed(self, body: Assembly, values: NDArray) -> Assembly:
-        """A body with its planes placed where they are in a state."""
+        """A body with its contact planes at their positions in a state."""
         return body.displaced(self.moved(values)) if self else body
 
     def force(self, contact: ContactTerm, q: NDArray) -> float:

@@ -209,7 +209,7 @@ def walk(
 
 
 def stopped(station: Station, attempt: Attempt) -> PathStoppedError:
-    """Error for a path, driven by the load factor, that cannot go on."""
+    """Error for a path, driven by the load factor, that cannot continue."""
     time = getattr(station.point.memory, "time", 0.0)
     after = f"after {time:.6g} s " if time else ""
     remedy = REMEDY_CREEP if time else REMEDY_LIMIT

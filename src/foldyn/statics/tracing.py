@@ -182,7 +182,7 @@ def trace(
     InputError
         An argument out of range; supports that leave a mechanism; nothing that loads the case.
     ComputationError
-        The path cannot go on; the exception's `partial` holds it up to its last point.
+        The path cannot continue; the exception's `partial` holds it up to its last point.
 
     Warns
     -----

@@ -44,8 +44,8 @@ def curved_pleat(
         Angle of the arc (degrees, between 0 and 180).
     dihedral : float
         180 degrees less twice the tilt of the rulings: the angle across a crease where it is at
-        right angles to them (degrees; 180 is flat). At the angle of the outermost chords it is
-        closed.
+        right angles to them (degrees; 180 is flat). The pleat is closed when this is the angle of
+        the outermost chords.
 
     Returns
     -------

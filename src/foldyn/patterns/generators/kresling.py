@@ -59,8 +59,8 @@ def kresling(
     height : float
         Height of a storey (m).
     twist : float
-        Turn of each ring against the one below (degrees, between -180 and 180 - 360/sides; at
-        these limits all slanted edges of a family meet on the axis).
+        Turn of each ring relative to the ring below (degrees, between -180 and 180 - 360/sides;
+        at these limits all slanted edges of a family meet on the axis).
     storeys : int
         Number of storeys, at least 1.
     alternating : bool

@@ -46,8 +46,8 @@ def miura(
     -------
     Pattern
         (2 cells[0] + 1)(2 cells[1] + 1) vertices and 4 cells[0] cells[1] faces, front to +z.
-        Families: "zigzag", the creases along x, and "straight", those along y, each of which is
-        valley and mountain by turns.
+        Families: "zigzag", the creases along x, and "straight", those along y, which alternate
+        between valley and mountain.
 
     Raises
     ------

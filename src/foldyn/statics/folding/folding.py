@@ -210,7 +210,7 @@ def fold(
         "all") or family, by size, and by pairs of vertices, valleys positive: {"zigzag": 90, (3,
         4): -60}. A sequence has one for each crease, valleys positive. A pattern with the same
         creases, such as another frame of a file, gives the angles of its state. Creases that are
-        left out, or None, are free: mountains and valleys fold their way as far as the others make
+        left out, or None, are free: mountains and valleys fold their way as far as the others move
         them; flat creases belong to the panels.
     fraction : float or str, optional
         Alternatively, 0.8 or "80%" of `pattern.fold_angles`, and of 180 degrees for mountains and
@@ -252,8 +252,8 @@ def fold(
     Notes
     -----
     A pattern of one degree of freedom with an angle for one crease is folded to round-off. Angles
-    that no state has all at once (180 degrees times a fraction, of a Miura-ori) are met as
-    closely as springs of equal stiffness per length allow.
+    that no state can have together (in a Miura-ori, the same fraction of 180 degrees everywhere)
+    are met as closely as springs of equal stiffness per length allow.
 
     Examples
     --------
