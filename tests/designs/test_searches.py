@@ -233,13 +233,13 @@ MODES = {"kind": "modes", "count": 3}
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
-        ({"minimize": None}, "minimize, maximize: give one of both"),
-        ({"maximize": "frequency[1]"}, "minimize, maximize: give one of both"),
+        ({"minimize": None}, "minimize, maximize: give one of the two"),
+        ({"maximize": "frequency[1]"}, "minimize, maximize: give one of the two"),
         ({"minimize": "3 + 4"}, "minimize.*has no measure"),
         ({"minimize": "frequency(1)"}, r"minimize = \"frequency\(1\)\": .*measures have brackets"),
         ({"minimize": "frequencies"}, "minimize: frequencies is an array; ask for one"),
         ({"minimize": "frequensy[1]"}, "no measure frequensy; did you mean 'frequency'"),
-        ({"minimize": "limit_load"}, "limit_load is of results of kind statics, not modes"),
+        ({"minimize": "limit_load"}, "limit_load needs a result of kind statics, not modes"),
         ({"subject_to": ["frequency[1]"]}, r"subject_to\[0\] = .*compares nothing"),
         ({"subject_to": ["mass = 3"]}, r"subject_to\[0\] = .*cannot be read; .*mass <= 0.1"),
         ({"subject_to": ["rigid_modes <= 0"]}, r"subject_to\[0\]: rigid_modes has no derivative"),

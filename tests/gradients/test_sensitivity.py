@@ -273,7 +273,7 @@ def test_measures_of_an_expression_take_their_own_arguments():
             {"panel_angle": 60.0},
             "velocity[5,x]",
             MODES,
-            "results of kind dynamics, not modes",
+            "a result of kind dynamics, not modes",
         ),
         (cell, {"panel_angle": 60.0}, "frequence[1]", MODES, "no measure frequence"),
         (cell, {"panel_angle": 60.0}, [], MODES, "measures: none"),
