@@ -231,6 +231,7 @@ READER = sources.config._env_reloader
         *((*tool, True) for tool in TOOLS),
         (READER, "old_environ", READER.old_environ | {"NUMBA_OPT": "other"}, True),
         (READER, "old_environ", READER.old_environ | {"NUMBA_CACHE_DIR": "other"}, False),
+        (READER, "old_environ", READER.old_environ | {"NUMBA_ENABLE_CUDASIM": "1"}, False),
     ],
 )
 def test_tools_and_their_variables_count(owner, name, value, counts, monkeypatch):

@@ -37,7 +37,8 @@ _STATEMENT = re.compile(r"^(?=[@\w])", re.MULTILINE)
 _DEFINES = re.compile(r"(?:def|class) +(\w+)|(\w+(?:, *\w+)*)(?: *:[^=\n]*)? *=(?!=)")
 _DECORATOR = re.compile(r"@(\w+)")
 _WORD = re.compile(r"[A-Za-z_]\w*")
-_NO_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")  # settings that do not affect the code
+# settings that do not affect the code; the simulator replaces kernels of GPUs alone
+_NO_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS", "NUMBA_ENABLE_CUDASIM")
 # these files store kernels, which does not affect their code; the rest of `jit` may change Numba
 _KEEPING, _COMPILING = ("kernel_cache.py", "sources.py"), PACKAGE / "jit"
 _COMPILERS = ("foldyn.jit.compiled", "foldyn.mechanics.term")  # modules with decorators of kernels
