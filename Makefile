@@ -66,6 +66,7 @@ demo: $(STAMP)  ## run the four shipped case studies; pages and figures in demo-
 	@find $(DEMO_OUT) -name '*.png' -o -name 'report.html' | sort | sed 's/^/  /'
 
 warm-up: $(STAMP)
+	@$(BIN)/python -m compileall -q -j 0 src  # where PYTHONDONTWRITEBYTECODE is set, none of many processes would keep it
 	@$(BIN)/foldyn warm-up  # first, so that no two workers compile the same
 
 test: warm-up  ## run the tests that a change can plausibly break
