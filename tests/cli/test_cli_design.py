@@ -56,6 +56,7 @@ def test_results_page_and_evaluations_stand_in_one_folder(workplace, monkeypatch
     assert later.drop_vars("seconds").equals(history.drop_vars("seconds"))
 
 
+@pytest.mark.matrix
 def test_creases_are_colored_by_what_they_matter(workplace):
     workplace.write(MODES_TEXT + CREASES)
     done = workplace.call("design", "case.toml", "--figures", "svg")

@@ -104,6 +104,7 @@ def test_figures_of_many_nodes_and_no_load(workplace, monkeypatch) -> None:
     assert not Path("r/load.png").exists()
 
 
+@pytest.mark.matrix
 def test_a_page_without_figures(workplace, edited) -> None:
     """It has what they show, as charts of the page; libraries it does without are not loaded."""
     workplace.write(edited(FEW))

@@ -41,6 +41,7 @@ def test_a_pattern_is_folded_by_a_fraction(workplace, flap) -> None:
         assert 180 - math.degrees(state.dihedrals[0]) == pytest.approx(angle, abs=1e-6)
 
 
+@pytest.mark.matrix
 def test_the_page_shows_the_way_and_a_film_only_where_it_is_asked_for(workplace, flap) -> None:
     told = workplace.call("fold", flap, "--to", "50%", "--steps", "2", "--film", "gif")
     assert told.new == ["flap-folded.fold", "flap-folded.gif", "flap-folded.html"]

@@ -80,6 +80,7 @@ def test_a_run_that_is_cut_off_goes_on(place, monkeypatch, capsys):
             np.testing.assert_array_equal(found[variable].values, wanted[variable].values)
 
 
+@pytest.mark.matrix
 def test_finished_results_are_not_computed_again(place, monkeypatch, capsys):
     with monkeypatch.context() as patch:
         cut(patch, FILES[1])

@@ -179,6 +179,7 @@ def test_what_is_refused_leaves_an_earlier_run_as_it_was(workplace) -> None:
     workplace.refused("run", "case.toml")  # which compares all files with what they were
 
 
+@pytest.mark.matrix
 def test_figures_of_a_loaded_path(workplace) -> None:
     workplace.write(CELL + '[output]\nnodes = [6, 7]\naxis = "x"\nshapes = [0, -1]\n')
     page = workplace.page(*PICTURES, "curve.png")
@@ -220,6 +221,7 @@ def test_figures_of_an_earlier_motion_go(workplace, tmp_path) -> None:
     assert {path.name for path in folder.iterdir()} == {"notes.txt", "result.nc", STAMP}
 
 
+@pytest.mark.matrix
 def test_a_single_point_is_drawn(workplace) -> None:
     workplace.write(changed(CELL, "analysis.load_factors = [1]"))
     done = workplace.good("run", "case.toml", "--out", "r", "--figures", "png")

@@ -13,6 +13,7 @@ STATICS = 'output =; loads[0].history =; analysis = { kind = "statics", steps = 
 AS_SHELL = ("--no-figures", "--model", "shell", "--divisions", "2")
 
 
+@pytest.mark.matrix
 def test_a_motion_with_all_figures(workplace, miura) -> None:
     workplace.write(changed(miura, SHELL))
     done = workplace.good("run", "case.toml", "--no-figures")

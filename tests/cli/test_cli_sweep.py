@@ -45,6 +45,7 @@ def test_results_page_and_points_stand_in_one_folder(sweep, workplace):
     assert "modes at 2 x 3 = 6 points" in done.out
 
 
+@pytest.mark.matrix
 def test_a_design_for_indices_has_them_on_its_page(sweep, workplace):
     vary = "--vary sheet.thickness=0.01:0.02 --vary sheet.density=1:2 --samples 8"
     done = sweep(f"{vary} --method saltelli --measure frequency[1] --processes 1")

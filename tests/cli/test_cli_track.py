@@ -82,6 +82,7 @@ def test_a_film_becomes_histories(inside, capsys):
         assert told in page
 
 
+@pytest.mark.matrix
 def test_photographs_with_loads(inside):
     given = ["track", "photo0.png", "photo3.png", "--model", "case.toml", "--loads", "0,0.5"]
     assert main([*given, "--out", "photos.nc", "--quiet", "--no-figures"]) == 0
@@ -152,6 +153,7 @@ def test_bad_input_gets_one_message_and_nothing_written(inside, capsys, argument
     assert sorted(inside.rglob("*")) == before
 
 
+@pytest.mark.matrix
 def test_more_than_half_of_the_memory_is_taken_when_forced(inside, monkeypatch, capsys):
     monkeypatch.setattr("foldyn.ram_limit.memory", lambda: 1.5 * PER_NODE * (25 + 16))
     command = ["track", "film.mkv", "--model", "case.toml", "--out", "forced.nc", "--no-figures"]

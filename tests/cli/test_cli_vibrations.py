@@ -117,6 +117,7 @@ def test_figures_of_modes(workplace) -> None:
     assert "seen along y" in page
 
 
+@pytest.mark.matrix
 def test_figures_of_a_response(workplace) -> None:
     finer = 'analysis.frequencies.count = 601; output.quantity = "mobility"'
     workplace.write(changed(RESPONSE, f"{TWO_RULES}; {finer}"))
@@ -140,6 +141,7 @@ def test_figures_of_a_response(workplace) -> None:
     assert rows[len(expected)][:2] == ["mass rule", "method"]
 
 
+@pytest.mark.matrix
 def test_a_response_to_a_moving_base(workplace) -> None:
     workplace.write(changed(RESPONSE, 'drive[0] = { base = "x" }'))
     page = workplace.page("structure.png", "laws.png", "response.png")  # circles are of forces
@@ -170,6 +172,7 @@ def test_a_free_sheet_has_rigid_modes(workplace) -> None:
     assert "0.0" not in [row[2] for row in cells_of(page)[1:7]]  # they have no damping ratio
 
 
+@pytest.mark.matrix
 def test_a_response_in_time(workplace) -> None:
     method = 'kind = "frf", method = "burst_random", averages = 2, duration = 20.0'
     grid = "window_rate = 0.2, frequencies = { first = 0.5, last = 1, count = 11 }"

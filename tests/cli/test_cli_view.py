@@ -33,6 +33,7 @@ def test_it_serves_the_page_until_it_is_ended(pattern):
     assert (status, err) == (143, "foldyn: interrupted\n")
 
 
+@pytest.mark.matrix
 def test_quiet_prints_the_address_alone(pattern):
     process = start(pattern, "view", "fold.fold", "--no-browser", "--quiet")
     assert process.stdout is not None

@@ -68,6 +68,7 @@ def test_signals_keep_what_was_computed_and_of_two_at_once_one_runs(tmp_path, ed
         assert "interrupted" in fd.load(folder / "result.nc").attrs["stopped_because"]
 
 
+@pytest.mark.matrix
 def test_a_kill_between_rules_leaves_no_old_result(workplace, tmp_path, edited) -> None:
     """Then the next run takes the folder over, and clears what the dead one left."""
     folder = tmp_path / "case-results"
@@ -130,6 +131,7 @@ def test_exit_status_of_an_interrupt_within_code_made_from_text(tmp_path) -> Non
     assert (status, err) == (143, "foldyn: interrupted\n")
 
 
+@pytest.mark.matrix
 def test_no_room_for_the_result(workplace, tmp_path, miura) -> None:
     """Neither HDF5 nor the interpreter falls over, and nothing cut stays."""
     workplace.run(miura, "--out", "before")  # compiles

@@ -98,8 +98,8 @@ def _tower(rng) -> fd.Pattern:
     )  # fmt: skip
 
 
-QUICK = (7, 27)  # towers, of either kind, with a plane, and in touch most of the time
-MORE = (36, 9, 18)  # the other patterns
+QUICK = 7  # a tower with a plane, in touch most of the time
+MORE = (36, 9, 18, 27)  # the other patterns, and such a tower with an implicit method
 
 
 def crumpled(seed: int):
@@ -122,10 +122,9 @@ def check(seed: int) -> bool:
     return float(run.contact.max()) > 0.0
 
 
-@pytest.mark.parametrize("seed", QUICK)
-def test_nothing_crosses(seed):
+def test_nothing_crosses():
     pytest.importorskip("ipctk")
-    assert check(seed)
+    assert check(QUICK)
 
 
 @pytest.mark.matrix

@@ -168,6 +168,7 @@ def test_a_kernel_depends_on_what_it_names(package, path, old, new, same):
     assert package("alone") != before
 
 
+@pytest.mark.matrix
 def test_a_message_compiles_nothing_anew(tmp_path):
     copy = copy_package(tmp_path)
     where = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}

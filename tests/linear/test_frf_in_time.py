@@ -206,6 +206,7 @@ def test_folds_turned_part_of_the_way():
     struck(case, state=fd.initial_state(path), load_factor=0.5)
 
 
+@pytest.mark.matrix
 def test_damping_of_the_state():
     """K0 in the state about which it moves, also where steps of a sine start elsewhere."""
     loaded = miura_case([fd.Force([7], (0.004, 0, 0))])

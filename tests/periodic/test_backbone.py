@@ -78,16 +78,20 @@ def test_resonance_without_damping_is_refused():
         fd.backbone(case, amplitudes=(0.01, 0.1), damped=True)
 
 
-def test_damped_backbone_follows_the_peaks_of_response_curves(resonant):
+def test_damped_backbone_is_that_of_the_scalar_equation(resonant):
     assert resonant.frequency.values == pytest.approx(
         exact_frequency(resonant.amplitude.values), rel=1e-5
     )
+    assert resonant.stable.values.all()
+
+
+@pytest.mark.matrix
+def test_damped_backbone_follows_the_peaks_of_response_curves(resonant):
     curve = fd.response_curve(
         oscillator(0.1), (0.22, 0.28), harmonics=9, longest_step=0.03, branches=0, steps=16
     )
     here = np.interp(0.1 / 0.5, resonant.level.values, resonant.amplitude.values)
     assert curve.amplitude.values.max() == pytest.approx(here, rel=5e-3)
-    assert resonant.stable.values.all()
 
 
 def test_in_phase_resonance_force_and_displacement_are_a_quarter_apart(resonant):

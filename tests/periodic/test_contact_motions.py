@@ -43,6 +43,7 @@ def test_what_does_not_reach_the_plane_does_not_feel_it():
     assert near.floquet.values == pytest.approx(free.floquet.values, abs=1e-12)
 
 
+@pytest.mark.matrix
 def test_harmonics_converge_to_what_shooting_finds(found):
     shot = fd.periodic_motion(bouncing(), method="shooting", steps=96, guess=found[-1])
     errors = [np.abs(height(one) - height(shot)).max() for one in found]

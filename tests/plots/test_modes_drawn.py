@@ -152,6 +152,7 @@ def test_what_modes_do_is_told_with_its_share(cantilever):
         assert float(first.split()[5]) == pytest.approx(100 * ratio, rel=1e-2)
 
 
+@pytest.mark.matrix
 def test_a_film_is_a_period_without_a_seam(case, modes, tmp_path, monkeypatch):
     positions = []
     monkeypatch.setattr(DrawnSheet, "move", lambda _, points: positions.append(points))

@@ -92,6 +92,7 @@ def test_what_a_figure_cannot_show_is_refused(wrong, monkeypatch, tmp_path):
                 draw(wrong, **more)
 
 
+@pytest.mark.matrix
 def test_a_result_stands_for_its_case(case, trajectory):
     for draw in (
         plots.draw_structure, plots.plot_laws, lambda given: plots.plot_load_history(given, 1.0),

@@ -52,6 +52,7 @@ def test_static_displacement_of_case_1():
     assert np.abs(u[[0, 1], 1]).max() < 1e-5
 
 
+@pytest.mark.matrix
 def test_static_displacement_of_case_2():
     """x displacements 0.0271, 0.0103, 0.0225 m of vertices 6, 8, 7 at full load."""
     s = shell(MIURA, SHEET, divisions=16)

@@ -158,6 +158,7 @@ def test_opensees_computes_what_is_stored(tmp_path):
     assert independent.read_stored(tmp_path / "again.csv") == stored
 
 
+@pytest.mark.matrix
 def test_tables_of_the_page_are_those_of_the_results():
     script = runpy.run_path(str(DOCS / "fidelity_tables.py"))
     page = (DOCS / "fidelity.md").read_text("utf-8")

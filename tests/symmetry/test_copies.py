@@ -35,6 +35,7 @@ QUICK = [
     *(Combination("generalized_alpha", "plate", extra) for extra in EXTRAS),
     *(Combination(one, "plate", "air") for one in ("rk4", "central_difference")),
 ]
+SLOW = Combination("generalized_alpha", SHELL)
 ALL = [
     Combination(analysis, model, extra)
     for extra in ("", *EXTRAS)
@@ -131,7 +132,13 @@ def reactions(result) -> np.ndarray:
     return out
 
 
-@pytest.mark.parametrize("seed", range(len(QUICK)))
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(seed, marks=pytest.mark.matrix) if one == SLOW else seed
+        for seed, one in enumerate(QUICK)
+    ],
+)
 def test_copies_move_alike(seed):
     check(seed, draw(seed, QUICK))
 
