@@ -289,8 +289,8 @@ CHECKS = (
 
 
 LONG = (
-    air_deployment, contact_tower, design_miura, hardening_miura, jumping_resonance, kresling_chaos,
-    shaken_miura,
+    air_deployment, contact_tower, design_miura, jumping_resonance, kresling_chaos, hardening_miura,
+    shaken_miura, sweep,
 )  # fmt: skip
 SHORT = [check for check in CHECKS if check not in LONG]
 
@@ -298,7 +298,7 @@ SHORT = [check for check in CHECKS if check not in LONG]
 @pytest.mark.filterwarnings("ignore::foldyn.errors.CrossingWarning")
 @pytest.mark.filterwarnings("ignore:.* creases stay closed that were to open")  # of the crane
 @pytest.mark.parametrize(
-    "check", [*beyond(SHORT, 1), *beyond(LONG, 4)], ids=lambda check: check.__name__
+    "check", [*beyond(SHORT, 2), *beyond(LONG, 5)], ids=lambda check: check.__name__
 )
 def test_example(check, tmp_path, monkeypatch, capsys):
     """Of films a few pictures; plots have tests of their own."""

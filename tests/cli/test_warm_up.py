@@ -10,6 +10,7 @@ import pytest
 
 from foldyn.cli.first_uses import STAGES, use
 from foldyn.dynamics import METHODS
+from pairwise import FEW
 
 ALONE = """
 from foldyn.cli.first_uses import use
@@ -37,7 +38,7 @@ import reference
 for stage in STAGES:
     for name in stage:
         use(name)
-warm, others = {*asked}, list(reference.cases(""))[::25]
+warm, others = {*asked}, list(reference.cases(""))[::int(sys.argv[2])]
 for name, compute in others:
     compute()
 print(len(warm), len(others), *asked - warm, sep="\\n")
@@ -73,8 +74,9 @@ def test_names_are_unique() -> None:
 @pytest.mark.matrix
 def test_other_cases_ask_for_no_kernel_that_is_not_compiled() -> None:
     """Whichever of them are on disk: after `warm-up`, a part of the references asks for none."""
-    command = [sys.executable, "-W", "ignore", "-c", ASKED + THEN, str(BENCHMARKS)]
+    each = "75" if FEW else "25"
+    command = [sys.executable, "-W", "ignore", "-c", ASKED + THEN, str(BENCHMARKS), each]
     told = subprocess.run(command, capture_output=True, text=True, check=True)
     compiled, others, *more = told.stdout.splitlines()
-    assert int(compiled) > 100 and int(others) > 20
+    assert int(compiled) > 100 and int(others) > (7 if FEW else 20)
     assert not more

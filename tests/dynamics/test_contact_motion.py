@@ -216,7 +216,7 @@ SLIDING = [
 @pytest.mark.filterwarnings("ignore:contact. at rest panels are nearer")
 @pytest.mark.parametrize(
     ("kind", "method", "duration", "dt", "near", "lost", "error"),
-    [*beyond(SLIDING, 1), *beyond(RUBBING, 2)],
+    [*beyond(SLIDING, 3), *beyond(RUBBING, 3)],
 )
 def test_a_strip_slides_above_the_angle_of_friction(kind, method, duration, dt, near, lost, error):
     """A slope of 20 degrees; friction of 0.3 holds up to 16.7. On a panel it passes inner sides."""

@@ -88,7 +88,7 @@ KINDS = {  # name of the case, its arguments, and what of the methods
 RUNS = [(kind, method) for kind, (methods, _) in KINDS.items() for method in methods]
 
 
-@pytest.mark.parametrize(("kind", "method"), beyond(RUNS[::-1], 2))
+@pytest.mark.parametrize(("kind", "method"), beyond(RUNS[::-1], 4))
 def test_a_run_that_is_killed_again_and_again_gives_the_same_bits(tmp_path, kind, method):
     options = {"method": method, **KINDS[kind][1]}
     name = "sheet" if kind in ("steps", "fixed") else kind

@@ -107,7 +107,7 @@ def test_random_pulses_on_a_moving_oscillator(method):
     ("kind", "method"),
     [
         *(("bars", name) for name in METHODS),
-        *beyond([("shell", name) for name in SHELLS], 2),
+        *beyond([("shell", name) for name in SHELLS], 3),
     ],
 )
 def test_the_impulse_arrives_on_a_free_sheet(kind, method):

@@ -16,6 +16,7 @@ from foldyn.dynamics import methods
 from foldyn.dynamics.methods import ExplicitEngine, threads_of
 from foldyn.dynamics.system import pack
 from foldyn.errors import InstabilityError, PenetrationError
+from pairwise import beyond
 
 METHODS = ("rk4", "central_difference")
 # of the largest value of each variable, after some steps: forces are summed in another order
@@ -71,8 +72,7 @@ def half_steps(what, method, steps, every):
     return {"duration": steps * dt, "dt": dt, "every_steps": every}
 
 
-@pytest.mark.matrix
-@pytest.mark.parametrize(("kind", "method"), [*zip(KINDS, cycle(METHODS), strict=False)])
+@pytest.mark.parametrize(("kind", "method"), beyond(zip(KINDS, cycle(METHODS), strict=False), 3))
 def test_threads_share_a_motion(monkeypatch, method, kind):
     what = KINDS[kind]()
     given = half_steps(what, method, 200, 7)
@@ -95,8 +95,7 @@ def closing(contact: fd.Contact | None = None, dihedral: float = 1.6) -> tuple[f
     return fd.Case(s, supports, [weight], slowed, contact=contact), fd.State(velocity=v)
 
 
-@pytest.mark.matrix
-@pytest.mark.parametrize(("method", "threads"), zip(METHODS, (2, 3), strict=True))
+@pytest.mark.parametrize(("method", "threads"), beyond([("central_difference", 3), ("rk4", 2)]))
 def test_threads_share_what_touches(monkeypatch, method, threads):
     what, start = closing()
     given = half_steps(what, method, 60, 30) | {"initial": start}
@@ -166,8 +165,7 @@ def test_a_load_that_is_not_finite_stops_all_threads(monkeypatch, method, what):
             on(monkeypatch, threads, what.altered(loads=[blow]), method, duration=0.1)
 
 
-@pytest.mark.matrix
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", beyond(METHODS[::-1]))
 def test_a_motion_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path, method):
     look_often(monkeypatch)
     what, start = closing()

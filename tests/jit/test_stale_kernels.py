@@ -17,6 +17,7 @@ from jit_lab import ask, copy_package, edit, environment
 from foldyn.jit import sources
 from foldyn.jit.kernel_cache import Kept
 from foldyn.jit.sources import PACKAGE, digest, imports, made_from, read
+from pairwise import beyond
 
 FILES = [  # kernels for GPUs are not kept, and import what is optional
     path for path in sorted(PACKAGE.rglob("*.py")) if path.parent.name != "gpu"
@@ -315,11 +316,11 @@ def results(package: Path, *words: str, **variables: str) -> dict[str, tuple[str
     return {word: (bits, float(largest)) for word, bits, largest in lines}
 
 
-@pytest.mark.matrix
-def test_compiled_and_loaded_kernels_give_the_same_bits(tmp_path):
+@pytest.mark.parametrize("last", beyond(["bars-forces-enhanced", "bars-rk4-enhanced"]))
+def test_compiled_and_loaded_kernels_give_the_same_bits(tmp_path, last):
     """Alone in its process, or after others."""
     package = copy_package(tmp_path, kernels=True)
-    before, last = "bars-dormand_prince-enhanced", "bars-rk4-enhanced"
+    before = "bars-dormand_prince-enhanced"
     loaded = results(package, before, last)
     kept = str(tmp_path / "kept")
     assert results(package, last, NUMBA_CACHE_DIR=kept)[last] == loaded[last]
