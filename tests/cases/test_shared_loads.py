@@ -10,6 +10,7 @@ import pytest
 import foldyn as fd
 from case_texts import HELD_MIURA_TEXT
 from foldyn.errors import FoldynWarning, InputError
+from pairwise import beyond
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 MIURA = fd.patterns.miura(cells=(2, 1), a=1.0, b=1.3, panel_angle=60, dihedral=60)
@@ -106,11 +107,14 @@ LOADS = [
     ('creases = "valley"\nmoment = 1e-3', fd.CreaseMoment("valley", 1e-3)),
     ("creases = [0, 3]\nmoment = [1e-3, -2e-3]", fd.CreaseMoment([0, 3], [1e-3, -2e-3])),
 ]
+SHELL = 'kind = "shell"\ndivisions = 2\nfold_law = "linear"'
 
 
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
-@pytest.mark.parametrize("model", ["", 'kind = "shell"\ndivisions = 2\nfold_law = "linear"'])
-@pytest.mark.parametrize(("text", "load"), LOADS)
+@pytest.mark.parametrize(
+    ("model", "text", "load"),
+    [*(("", *row) for row in LOADS), *beyond([(SHELL, *row) for row in LOADS], 4)],
+)
 def test_case_files_and_results_hold_them(text, load, model, read, kept) -> None:
     case_file = read(CASE.format(model=model, load=text))
     assert case_file.case().loads == (load,)

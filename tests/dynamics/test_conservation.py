@@ -99,6 +99,7 @@ def damped(mass, beta):
 
 
 @cache
+@cache
 def end(mass, beta, duration, method, n):
     """Displacements after so many steps."""
     given = {"dt": duration / n, "every_steps": n} | equal_steps(method)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -228,8 +229,13 @@ def test_the_balance_closes_also_where_moments_jump(model, law):
         assert motion.attrs["energy_error"] < 1e-11
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    ("model", "law"),
+    [
+        *zip(MODELS, LAWS, strict=True),
+        *beyond(row for row in product(MODELS, LAWS) if row not in zip(MODELS, LAWS, strict=True)),
+    ],
+)
 def test_with_memory_it_tends_to_the_motion_of_other_methods_with_order_two(model, law):
     """Dofs without mass do not ring, which would show in the states of the creases."""
     case, steps = moved(model, law), [100, 200, 400]

@@ -108,8 +108,14 @@ def test_what_the_user_samples_goes_on_too(tmp_path):
     same(found, simulated("sheet", **options))
 
 
-@pytest.mark.parametrize("method", ["rk4", "dormand_prince", "newmark"])
-@pytest.mark.parametrize("kept", [{"interval": 0.004}, {"every_steps": 1}])
+@pytest.mark.parametrize(
+    ("method", "kept"),
+    [
+        ("rk4", {"interval": 0.004}), ("dormand_prince", {"every_steps": 1}),
+        ("newmark", {"interval": 0.004}),
+        *beyond([("rk4", {"every_steps": 1}), ("dormand_prince", {"interval": 0.004})]),
+    ],
+)  # fmt: skip
 def test_samples_that_memory_does_not_hold_are_the_same(tmp_path, monkeypatch, method, kept):
     """Room for some sixteen; the file is written and read in pieces as well."""
     options = {"duration": 0.8, **kept, "method": method}

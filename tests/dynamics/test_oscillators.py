@@ -11,6 +11,7 @@ from scipy import special
 
 import foldyn as fd
 from foldyn.dynamics import METHODS
+from pairwise import beyond
 
 OMEGA = 4.0
 K = 8.0  # N/m
@@ -57,8 +58,13 @@ def test_rk4_loses_energy_with_the_fifth_power_of_the_step():
     np.testing.assert_allclose(lost[-1], exact, rtol=0.02)
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize(("alpha", "beta"), [(0.3, 0.0), (0.0, 0.02), (0.3, 0.02)])
+@pytest.mark.parametrize(
+    ("alpha", "beta", "method"),
+    [
+        *((0.3, 0.02, method) for method in METHODS),
+        *beyond([(*one, method) for one in ((0.3, 0.0), (0.0, 0.02)) for method in METHODS], 4),
+    ],
+)
 def test_damped_motion(alpha, beta, method):
     """The damping ratio is alpha / 2w + beta w / 2; the order holds with damping too."""
     case = spring(OMEGA, alpha=alpha, beta=beta)

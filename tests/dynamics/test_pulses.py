@@ -20,6 +20,7 @@ from pairwise import beyond
 OMEGA = 4.0
 SPRING, PERIOD = spring(OMEGA), 2.0 * np.pi / OMEGA
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive or method.implicit]
+SOME = [*ADAPTIVE[:2], *beyond(ADAPTIVE[2:])]
 SHELLS = [name for name, method in METHODS.items() if method.massless]
 # With the default tolerance there are 127 steps in a period, whose relative error is then
 # (2 pi/127)^2/12: over 20 rad the phase is off by 4e-3
@@ -92,7 +93,7 @@ def test_random_pulses_on_an_oscillator_at_rest(method):
             assert error(motion, exact) < (GLOBAL if method in ADAPTIVE else 1.5e-2), history
 
 
-@pytest.mark.parametrize("method", ADAPTIVE)
+@pytest.mark.parametrize("method", SOME)
 def test_random_pulses_on_a_moving_oscillator(method):
     """The same for pulses that arrive while it swings: superposition holds."""
     swing = fd.State(velocity=[[0, 0, 0], [0.3, 0, 0]])
@@ -127,7 +128,7 @@ def test_the_impulse_arrives_on_a_free_sheet(kind, method):
             assert apart(momentum, impulse * np.array([1e-4, 0.0, 2e-4])) < 1e-2, shape
 
 
-@pytest.mark.parametrize("method", ADAPTIVE)
+@pytest.mark.parametrize("method", SOME)
 def test_supports_and_folds_that_move_for_a_moment(method):
     """A support that goes forth and back, and a fold that is actuated and let go, are seen."""
     s = fold(mass="circumcenter")

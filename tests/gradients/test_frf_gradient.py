@@ -12,6 +12,7 @@ from differences import Design
 
 import foldyn as fd
 from foldyn.errors import InputError
+from pairwise import beyond
 
 AT = ["response[4,z,3]", "response[5,x,7]", "peak_height[4,z]", "peak_frequency[4,z]"]
 FREQUENCIES = np.arange(1.0, 8.0, 0.25)
@@ -59,7 +60,7 @@ def check(design: Design) -> None:
         assert (wrong <= 1e-6 * np.abs(expected) + rounding).all(), name
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [*list(CASES)[::2], *beyond(list(CASES)[1::2], 2)])
 def test_gradients_are_those_of_the_response(name: str) -> None:
     build, values, analysis = CASES[name]
     check(Design(build, values, AT, analysis))
