@@ -148,7 +148,7 @@ def refusals() -> dict[tuple[str, str], str]:
             settings = [Setting()]
             if column in METHODS:
                 settings.append(Setting("consistent", moves=True))
-            said = [tried(column, make, setting) for setting in settings]
+            said = (tried(column, make, setting) for setting in settings)
             found[name, column] = next(filter(None, said), "")
     return found
 

@@ -12,7 +12,6 @@ import foldyn as fd
 from case_texts import changed
 from foldyn.cli.main import main
 from foldyn.dynamics import prepare
-from foldyn.structures import MASS_RULES
 from foldyn.studies import find_case, shipped_cases
 
 PAPER_RULES = ["equi_inertial", "panel", "centroid", "circumcenter", "consistent"]
@@ -38,7 +37,7 @@ def test_a_case_file_becomes_a_result_that_runs_again_from_itself(workplace, miu
 
 
 def test_a_list_of_mass_rules_gives_a_file_each(workplace, edited) -> None:
-    rules = list(MASS_RULES)
+    rules = ["panel", "circumcenter", "consistent"]
     done = workplace.run(edited(f"model.mass = {rules}"))
     assert done.status == 0
     assert done.new == ["case-results", *sorted(f"case-results/result-{r}.nc" for r in rules)]
@@ -125,7 +124,9 @@ def test_the_shipped_cases_are_what_they_say(workplace) -> None:
     assert forces[0] == [((0, 1), (-1e-3, 0.0, 0.0))]
 
 
-@pytest.mark.parametrize("name", ["herkal/case1", "herkal/case3.toml"])
+@pytest.mark.parametrize(
+    "name", ["herkal/case1", pytest.param("herkal/case3.toml", marks=pytest.mark.matrix)]
+)
 def test_a_shipped_case_runs_by_its_name(workplace, name) -> None:
     text = find_case(name).read_text(encoding="utf-8")
     assert text.count("duration = 10.0") == 1

@@ -80,6 +80,7 @@ interval = 0.129
 """
 
 
+@pytest.mark.matrix
 def test_steps_too_coarse_for_their_order_widen_the_interval_further(tmp_path) -> None:
     """27 steps a period: half of them tell too little, and the interval ended before the truth."""
     case_file = fd.read_case(fit_cases.write(tmp_path, EGGBOX))

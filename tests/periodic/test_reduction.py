@@ -66,6 +66,7 @@ def test_moving_bases_carry_the_sheet_along():
     assert apart(one, whole) < 5e-3
 
 
+@pytest.mark.matrix
 def test_curves_and_backbones_take_few_modes():
     whole = fd.backbone(cell(), amplitudes=(1e-4, 0.02), harmonics=5)
     few = fd.backbone(cell(), amplitudes=(1e-4, 0.02), harmonics=5, modes=3)

@@ -30,6 +30,7 @@ def test_shell_and_reduced_model_side_by_side(names):
     assert np.abs(reduced / shell - 1.0).max() < 0.5
 
 
+@pytest.mark.matrix
 def test_the_table_of_frequencies(names):
     rows = re.findall(r"^\| (\d+) \| ([\d., ]+) \| ([\d., ]+) \|$", PAGE, re.M)
     assert [int(row[0]) for row in rows] == [8, 16]

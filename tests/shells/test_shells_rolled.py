@@ -134,6 +134,7 @@ def elastica(load, length):
     return curve(start)[2:]
 
 
+@pytest.mark.matrix
 def test_cantilever_under_end_shear():
     errors, cells = [], np.array([8, 16, 32])
     for nx in cells:

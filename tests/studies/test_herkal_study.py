@@ -241,6 +241,7 @@ def small(tmp_path_factory):
     return Study(plan, study.folder)
 
 
+@pytest.mark.matrix
 def test_table_from_stored_runs(small):
     row = small.table()["case1"]
     assert row["panel"] == 0.0 and best(row) == "panel"
