@@ -88,7 +88,7 @@ def test_damped_backbone_is_that_of_the_scalar_equation(resonant):
 @pytest.mark.matrix
 def test_damped_backbone_follows_the_peaks_of_response_curves(resonant):
     curve = fd.response_curve(
-        oscillator(0.1), (0.22, 0.28), harmonics=9, longest_step=0.03, branches=0, steps=16
+        oscillator(0.1), (0.22, 0.28), harmonics=9, longest_step=0.06, branches=0, steps=16
     )
     here = np.interp(0.1 / 0.5, resonant.level.values, resonant.amplitude.values)
     assert curve.amplitude.values.max() == pytest.approx(here, rel=5e-3)

@@ -137,8 +137,8 @@ def _beside(curve, of, value):
 @pytest.fixture(scope="module")
 def forked():
     return fd.response_curve(
-        oscillator(force=8.0, alpha=0.2), frequencies=(0.18, 0.23), harmonics=13, longest_step=0.3,
-        steps=48,
+        oscillator(force=8.0, alpha=0.2), frequencies=(0.18, 0.23), harmonics=9, longest_step=0.3,
+        steps=32,
     )  # fmt: skip
 
 
