@@ -226,6 +226,7 @@ def test_the_numbers_of_the_statics_page_are_what_its_script_computes():
     assert f"bends hold {bends[0]:.0f} % and {bends[1]:.0f} %" in page
 
 
+@pytest.mark.matrix
 def test_the_page_on_long_motions_finds_jumps_chaos_and_basins():
     with redirect_stdout(io.StringIO()):
         names = executed(*blocks("long-motions.md", "python"))

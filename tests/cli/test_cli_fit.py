@@ -65,6 +65,7 @@ def test_a_fit_file_from_reading_to_report(fold) -> None:
         assert told in page
 
 
+@pytest.mark.matrix
 def test_the_same_from_the_command_line(fold) -> None:
     done = fold.call(
         "fit", "case.toml", "forces.csv", "--vary", "sheet.length_scale_ratio=2:0.5:4",

@@ -110,6 +110,7 @@ def test_gaps_of_tracks_are_filled_for_the_picture():
     np.testing.assert_allclose(found[:, 2, 0], [2.0, 7.0 / 3.0, 8.0 / 3.0], rtol=1e-6)
 
 
+@pytest.mark.matrix
 def test_without_a_model_there_are_pixels(inside):
     given = ["track", "film.mkv", "--scale", "1.7e-4", "--out", "pixels.nc", "--quiet"]
     assert main(given) == 0

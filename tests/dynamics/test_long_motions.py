@@ -293,6 +293,7 @@ def test_sigkill_at_random_moments_with_a_second_process(tmp_path):
     same(fd.load(file), whole)
 
 
+@pytest.mark.matrix
 def test_a_full_disk_keeps_the_last_checkpoint_and_says_so(tmp_path):
     """No file may be larger than some number of bytes, as where there is no room."""
     options = {**LONG, "store": str(tmp_path / "run.nc"), "duration": 50.0}

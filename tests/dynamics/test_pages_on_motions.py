@@ -19,6 +19,7 @@ def names_of(page: str) -> dict:
     return names
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore::foldyn.errors.StretchWarning")
 def test_the_tower_of_the_contact_page():
     names = names_of("contact.md")

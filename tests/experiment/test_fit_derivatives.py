@@ -137,6 +137,7 @@ def test_derivatives_within_the_bounds(tmp_path) -> None:
         np.testing.assert_allclose(one, free, 0.0, 1e-5 * np.abs(free).max())
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings(SAME_STEPS)
 def test_what_has_no_neighbors_is_run_again(tmp_path) -> None:
     """As explicit motions are; what is held out needs no derivative at all."""

@@ -74,6 +74,7 @@ def test_the_force_of_supports_is_the_slope_of_the_energy():
     assert found["gradient_drop"].values[0] == pytest.approx(-upper, rel=1e-8)
 
 
+@pytest.mark.matrix
 def test_snap_through():
     values = {"height": 0.06, "twist": 30.0, "thickness": 2.4e-4, "stiffness": STIFFNESS}
     measures = ["limit_load", "load_at[8,z,-0.01]", "barrier", "barrier_back"]

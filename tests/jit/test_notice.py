@@ -70,6 +70,7 @@ foldyn.notice.PER_KERNEL = 1.0
 """
 
 
+@pytest.mark.matrix
 def test_a_kernel_that_is_compiled_tells_how_many_are_missing(tmp_path):
     """The probe, the history and the law that it calls, and what these call; later nothing."""
     package = copy_package(tmp_path)

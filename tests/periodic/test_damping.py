@@ -59,6 +59,7 @@ def test_large_motions_come_back_in_simulated_ones(name):
         assert apart < 1e-5 * np.abs(one[name].values).max()
 
 
+@pytest.mark.matrix
 def test_curves_and_damped_backbones_have_it_and_say_about_which_state():
     case = shaken("modes at the start", force=1e-5)
     curve = fd.response_curve(case, (0.95 * F1, 1.05 * F1), harmonics=3)

@@ -119,6 +119,7 @@ def test_the_frame_holds_a_free_flight(flight, tmp_path):
         assert_white_rim(frame)
 
 
+@pytest.mark.matrix
 def test_a_free_flight_leaves_the_path_of_its_center(flight, case, trajectory, tmp_path):
     free, motion = flight
     drawn = frames(animate(free, motion, path=tmp_path / "a.gif", frames=3))

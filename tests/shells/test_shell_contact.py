@@ -182,6 +182,7 @@ def test_a_shell_slides_above_the_angle_of_friction():
     assert run.attrs["energy_error"] < 1e-3
 
 
+@pytest.mark.matrix
 def test_a_shell_sticks_below_the_angle_of_friction():
     case = lying(15.0, 0.3, alpha=200.0)
     run = fd.simulate(case, 0.2, method="generalized_alpha", dt=2e-4, interval=2e-3)

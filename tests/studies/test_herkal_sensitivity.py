@@ -235,6 +235,7 @@ def test_page_of_the_sensitivity(stored, tmp_path):
     assert sensitivity_page.sections(Variations("", [], []), None, tolerance()) == []
 
 
+@pytest.mark.matrix
 def test_the_command_varies_and_goes_on(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(runs, "CASES", ("case1",))
     monkeypatch.setattr(studies, "QUICK", studies.StudyPlan(SHORT))

@@ -378,6 +378,7 @@ def test_command_refuses_bad_input(tmp_path, capsys):
     assert stop.value.code == 2
 
 
+@pytest.mark.matrix
 def test_the_specimen_is_left_out_without_opencv(tmp_path, monkeypatch, capsys):
     """It is an optional part: the case studies do not need it."""
 

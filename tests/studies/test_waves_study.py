@@ -54,6 +54,7 @@ def impacts():
     return found
 
 
+@pytest.mark.matrix
 def test_a_rarefaction_overtakes_the_compression(impacts):
     """Abstract of Yasuda et al., Sci. Adv. 5, eaau2835, 2019; not where all is linear."""
     hit = kresling.overtaking(impacts[1.0])
