@@ -11,6 +11,7 @@ from foldyn.experiment import Look, Placing, Sensor, Tracking, track_photos
 from foldyn.experiment.rendering.picture import Studio
 
 DIHEDRALS = (75.0, 68.0, 62.0)
+PLACED = Tracking(placing=Placing(metres_per_pixel=SCALE, distance=DISTANCE))
 
 
 @pytest.fixture(scope="module")
@@ -31,8 +32,7 @@ def test_every_node_is_recognized_in_every_photograph(photos):
     true = camera().project(states[:, :25])
     step = np.hypot(*(true[2] - true[0]).T).max()
     assert step > 25.0  # pixels: too far for a search around the last place
-    tracking = Tracking(placing=Placing(metres_per_pixel=SCALE, distance=DISTANCE))
-    ds = track_photos(paths, model(), tracking=tracking, loads=[0.0, 0.1, 0.2])
+    ds = track_photos(paths, model(), tracking=PLACED, loads=[0.0, 0.1, 0.2])
     error = np.hypot(*np.moveaxis(ds["position_px"].values - true, -1, 0))
     assert np.isfinite(error).mean() > 0.85
     assert np.nanmax(error) < 2.0
@@ -47,7 +47,7 @@ def test_every_node_is_recognized_in_every_photograph(photos):
 @pytest.mark.matrix
 def test_the_region_of_interest_shifts_nothing(photos):
     paths, states = photos
-    ds = track_photos(paths[:2], model(), roi=(10, 20, 560, 590))
+    ds = track_photos(paths[:2], model(), tracking=PLACED, roi=(10, 20, 560, 590))
     true = camera().project(states[:2, :25])
     assert np.nanmax(np.hypot(*np.moveaxis(ds["position_px"].values - true, -1, 0))) < 2.0
     moved = ds["displacement"].values - (states[:2, :25] - model().rest[:25])
