@@ -20,7 +20,7 @@ from foldyn.cases.clamped_edges import supported_points
 from foldyn.cases.contact import Contact
 from foldyn.cases.damping import Damping, Rayleigh, dampings
 from foldyn.cases.history import CONSTANT, History, as_history, factor
-from foldyn.cases.loads import LOADS, Gravity, Load
+from foldyn.cases.loads import LOADS, Force, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
 from foldyn.cases.state import State
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
@@ -141,6 +141,7 @@ class Case(Loaded, Damped):
             raise InputError(f"contact = {show(self.contact)}: must be a Contact")
         if self.air is not None and not isinstance(self.air, Air):
             raise InputError(f"air = {show(self.air)}: must be an Air")
+        self._check_linear()
         self._check_selections()
         _ = self.base_terms, self.actuation_terms  # check the supports and the creases
         if self.constraints:
@@ -150,6 +151,20 @@ class Case(Loaded, Damped):
             if isinstance(load, Gravity):
                 with within(f"{place}: gravity needs the mass of the structure: "):
                     _ = self.mass
+
+    def _check_linear(self) -> None:
+        """Refuse what a linear model with nodes at vertices only leaves out."""
+        if not self.structure.linear:
+            return
+        others = {place: load for place, load in self._loads() if not isinstance(load, Force)}
+        given = {**others, "contact": self.contact, "air": self.air}
+        for place, part in given.items():
+            if part is not None:
+                raise InputError(
+                    f"{place}: {type(part).__name__} acts on models whose panels move far or have "
+                    f"nodes of their own, not on {self.structure.linear}, which take Force, "
+                    "supports, springs and masses at vertices; take fd.shell or fd.discretize"
+                )
 
     def _check_selections(self) -> None:
         """Refuse nodes and creases that do not exist; report all of them together."""
@@ -191,7 +206,7 @@ class Case(Loaded, Damped):
     @cached_property
     def elastic_body(self) -> Assembly:
         """`body` without contact, for vibrations, damping and critical steps."""
-        return self.structure.body.with_terms(*self.terms)
+        return self.structure.held(self.held_edges).with_terms(*self.terms)
 
     def elastic_body_at(self, time: float | None) -> Assembly:
         """`elastic_body` with the rest angles at a time (s); None: as changed by constant loads."""

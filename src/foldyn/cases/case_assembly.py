@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.clamped_edges import Straight, supported_points
+from foldyn.cases.clamped_edges import Straight, held_edges, supported_points
 from foldyn.cases.connectors import Dashpot
 from foldyn.cases.constraints import Constraints, equations_of, values_of
 from foldyn.cases.damping import CreaseDamping, Damping, ModalDamping, Rayleigh, StrainDamping
@@ -76,6 +76,12 @@ class Supported:
             for axis in support.axes or "":
                 mask[nodes, AXES.index(axis)] = True
         return mask
+
+    @cached_property
+    def held_edges(self) -> dict[int, NDArray[np.float64]]:
+        """Edges of the pattern that are held along their whole length, and directions (h, 3)."""
+        supports = [support for _, support in self._supports(Fix, Impose)]
+        return held_edges(self.structure, supports, self.fixed)
 
     @cached_property
     def constraints(self) -> Constraints:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.cases.directions import AXES, unit_vector
 from foldyn.cases.selection import edges_between, resolve_nodes
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
@@ -74,6 +75,34 @@ def _edges(structure: Discretized, support: Any, named: NDArray, place: str) -> 
             f"{place}.along",
         )
     return edges
+
+
+def held_edges(
+    structure: Any, supports: Iterable[Any], fixed: NDArray[np.bool_]
+) -> dict[int, NDArray[np.float64]]:
+    """Edges, as numbered in `pattern.lines`, that are held along, and in which directions (h, 3).
+
+    fixed : dofs (n, 3) that are supported in all; both ends of a clamped edge hold it.
+    """
+    if structure.pattern is None:
+        return {}
+    number, found = edge_lookup(structure.pattern.lines), {}
+    for support in supports:
+        if not getattr(support, "along", False):
+            continue
+        axes = getattr(support, "axes", None) or getattr(support, "axis", None)
+        held = (
+            np.eye(3)[[AXES.index(axis) for axis in axes]]
+            if axes
+            else unit_vector(support.direction)[None]
+        )
+        for edge in edges_between(structure, resolve_nodes(structure, support.nodes, "nodes")):
+            found.setdefault(number[edge_of(int(edge[0]), int(edge[-1]))], []).append(held)
+    for low, high in structure.options.clamped if hasattr(structure.options, "clamped") else ():
+        both = fixed[low] & fixed[high]
+        if both.any():
+            found.setdefault(number[low, high], []).append(np.eye(3)[both])
+    return {edge: np.concatenate(held) for edge, held in found.items()}
 
 
 def straightened(options: Any, pattern: Pattern, supports: Iterable[Any]) -> dict[str, Any]:

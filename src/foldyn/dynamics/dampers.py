@@ -95,6 +95,11 @@ def dampers(case: Case, quasi_static: bool = False) -> list[Term]:
         block = dashpot.coefficient * (along.T @ along)
         blocks = blocks_of_ends(ends, np.tile(block, (len(ends), 1, 1)))
         constant = constant + assembled(pairs_of_ends(ends), blocks, body.size)
+    turns, hinged = body.sheet.crease_turns, case.crease_damping
+    if turns is not None and hinged.any():
+        hinges = body.sheet.fold_hinges()
+        own = (hinged * hinges.length)[turns.fold] * turns.share
+        constant = sparse.csr_array(constant + turns.rows.T @ (turns.rows * own[:, None]))
     ends = np.concatenate(pairs)
     terms: list[Term] = [DampingMatrix(constant)] if constant.nnz else []
     elements = _elements(case, body, nodes, ends, strength, quasi_static)
@@ -112,6 +117,8 @@ def _elements(
 ) -> Viscous:  # fmt: skip
     """Axial dashpots between pairs (p, 2) of nodes, damped creases, and strain damping."""
     damping = case.crease_damping
+    if body.sheet.crease_turns is not None:
+        damping = np.zeros_like(damping)
     hinges = body.sheet.fold_hinges() if damping.any() else no_fold_hinges()
     unknown = np.setdiff1d(np.flatnonzero(damping), hinges.fold)
     if unknown.size:

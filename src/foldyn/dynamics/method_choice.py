@@ -22,6 +22,7 @@ from foldyn.dynamics.inertia import is_lumped
 from foldyn.dynamics.methods import METHODS, lacking
 from foldyn.dynamics.modal_damping import ModalRows
 from foldyn.dynamics.timing import DEFAULT_FRACTION, histories
+from foldyn.errors import InputError
 from foldyn.mechanics.following import following_force
 
 AUTO = "auto"
@@ -58,6 +59,8 @@ def choose(
     tolerance is None. interval is the time between samples (s), 0.0 if steps are counted instead.
     modal is the modal damping of the motion.
     """
+    if case.structure.linear:
+        raise InputError(f": {lacking(METHODS[ACCURATE], case)}; take another model", "structure")
     if case.air is not None and case.air.added_mass and not case.structure.massless:
         return Choice(ACCURATE, "explicit: the added mass of the air moves with the panels")
     drag = case.air is not None and case.air.drag

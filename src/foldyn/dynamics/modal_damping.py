@@ -128,10 +128,12 @@ def about(case: Case, start: Origin | None) -> tuple[NDArray, Assembly]:
 
 
 def mass_of(case: Case) -> sparse.csr_array:
-    """Mass (m, m) of all dofs of a case: the nodal mass, with zeros for other dofs."""
-    mass = sparse.csr_array(sparse.kron(case.mass, sparse.eye_array(3), format="csr"))
+    """Mass (m, m) of all dofs: the nodal mass, zero for other dofs, or the mass of the sheet."""
+    own = case.elastic_body.sheet.mass
+    nodal = case.mass if own is None else sparse.diags_array(case.point_masses)
+    mass = sparse.csr_array(sparse.kron(nodal, sparse.eye_array(3), format="csr"))
     mass.resize((case.elastic_body.size, case.elastic_body.size))
-    return mass
+    return mass if own is None else sparse.csr_array(mass + own)
 
 
 def moving_mass(case: Case, displacement: NDArray) -> sparse.csr_array:

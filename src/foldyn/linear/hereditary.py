@@ -90,7 +90,9 @@ def branches_of(
     gradient = sparse.csr_array((gradient.data, gradient.indices, gradient.indptr))
     size = inner.mass.shape[0]
     gradient.resize((gradient.shape[0], size))
-    gradient = sparse.vstack([gradient, inner.turns], format="csr")
+    turns = case.elastic_body.sheet.crease_turns
+    uneven, fold, part_of = (inner.turns, inner.fold, inner.share) if turns is None else turns
+    gradient = sparse.vstack([gradient, uneven], format="csr")
     if ties := case.constraints:
         gradient = sparse.csr_array(gradient @ ties.extended(size))
     most = max(len(part.branches) for part in parts)
@@ -106,12 +108,13 @@ def branches_of(
         rows = [branch.rate for branch in branches]
         rate.append(np.stack([*rows, *[np.ones(len(stiffness))] * missing], axis=1))
     relaxed, share, rate, viscous = map(np.concatenate, (relaxed, share, rate, viscous))
+    even = 0.0 if turns is not None else 1.0  # hinges whose turns are all in `uneven`
     return Branches(
         sparse.csr_array(gradient[:, free]),
-        np.concatenate([relaxed, relaxed[inner.fold] * inner.share]),
-        np.concatenate([share, share[inner.fold] * inner.share[:, None]]),
-        np.concatenate([rate, rate[inner.fold]]),
-        np.concatenate([viscous, viscous[inner.fold] * inner.share]),
+        np.concatenate([even * relaxed, relaxed[fold] * part_of]),
+        np.concatenate([even * share, share[fold] * part_of[:, None]]),
+        np.concatenate([rate, rate[fold]]),
+        np.concatenate([even * viscous, viscous[fold] * part_of]),
     )
 
 

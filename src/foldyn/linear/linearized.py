@@ -357,10 +357,7 @@ def _tied(matrix: Mass, ties: Constraints, free: NDArray) -> sparse.csc_array | 
 
 def _inertia(case: Case, whole: NDArray, inner: Amplitudes) -> NDArray:
     """Forces (m, 3) on the unknowns, for accelerations (m, 3) of the whole."""
-    load = whole.copy()
-    load[: case.structure.nodes.size] *= np.repeat(case.nodal_mass, 3)[:, None]
-    if len(inner.dofs):
-        load += inner.mass @ whole
+    load = inner.massed(mass_of(case)) @ whole
     return np.stack([case.constraints.force(column) for column in load.T], axis=1)
 
 

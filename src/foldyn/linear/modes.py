@@ -248,8 +248,11 @@ def _air(linear: Linearized, shapes: NDArray) -> dict[str, Any]:
 def unit_translations(linear: Linearized) -> NDArray:
     """Unit translations (nf, 3) of the free dofs along x, y, z.
 
-    If constraints do not allow these, the closest allowed motions, weighted by mass.
+    If constraints do not allow these, or parts between nodes move with the supports, the closest
+    allowed motions, weighted by mass.
     """
+    if linear.case.elastic_body.sheet.mass is not None:
+        return factorize(sparse.csc_array(linear.mass)).solve(linear.inertia)
     on_nodes = linear.free < linear.displacement.size
     if not linear.case.constraints:
         return (on_nodes[:, None] & (linear.free[:, None] % 3 == np.arange(3))).astype(float)

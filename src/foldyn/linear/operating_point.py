@@ -67,6 +67,8 @@ def operating_point(
         The state is not an equilibrium, or the case has steady loads, which do not act at rest.
     """
     case.check_movable()
+    if state is not None and case.structure.linear:
+        raise InputError(f": {case.structure.linear} are linear about the rest state only", "state")
     if state is None:
         point = _judge(case, np.zeros_like(case.structure.nodes), 0.0, "rest")
         if any(getattr(load, "history", None) == STEADY for load in case.loads):

@@ -80,6 +80,14 @@ def no_fold_hinges() -> FoldHinges:
     return FoldHinges(none, nodes, np.zeros((0, 4, 3)), hidden, 0.0, empty, empty, empty, none)
 
 
+class CreaseTurns(NamedTuple):
+    """Turns of creases that vary along them, as sums of Legendre polynomials, r of them."""
+
+    rows: sparse.csr_array  # (r, m) amplitudes of the dofs, rad/m
+    fold: NDArray  # (r,) index of the fold
+    share: NDArray  # (r,) mean square of the polynomial along the fold
+
+
 class Blocks(Protocol):
     """A tangent as 3x3 blocks, for the matrix of an implicit step.
 
@@ -142,6 +150,10 @@ class SheetTerm(Term):
         Turn per unit of a hidden dof, rad/m.
     offsets : int
         Number of folds with compliant panels, nf, or of dofs in balance; or 0.
+    mass : (m, m) or None
+        Mass of a linear sheet on all of its dofs, kg; None if nodes alone have mass.
+    crease_turns : CreaseTurns or None
+        Turns of the creases of a linear sheet.
     """
 
     model: Any
@@ -150,6 +162,8 @@ class SheetTerm(Term):
     hidden: NDArray = np.zeros(0, np.int64)
     per_hidden: float = 0.0
     offsets: int = 0
+    mass: sparse.csr_array | None = None
+    crease_turns: CreaseTurns | None = None
     shared = True
 
     # ------------------------------------------------------------------ mechanics

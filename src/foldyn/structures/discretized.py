@@ -112,6 +112,8 @@ class Discretized:
         Parts of the strain energy, with descriptions.
     plates : tuple of Plate
         The rigid panels; three corners of each determine all its nodes.
+    linear : str
+        Plural name of a model for small displacements about rest; empty for other models.
     massless : str
         Description of the massless dofs, such as "the rotations of a shell"; empty if none.
     fill : Fill
@@ -143,6 +145,7 @@ class Discretized:
     hinge_kinds: Any  # tuple of HingeKind, each model's own property
     bar_law: Any  # BarLaw or None
     membranes: Sequence[Any]
+    linear: ClassVar[str] = ""
     massless: ClassVar[str] = ""
     clamped_nodes: Sequence[NDArray] = ()
     bowed_edges: Collection[Edge] = ()
@@ -229,6 +232,14 @@ class Discretized:
     def condensed(self) -> Discretized | None:
         """The structure without massless dofs, if it can condense them; otherwise None."""
         return None
+
+    def held(self, edges: Mapping[int, NDArray]) -> Assembly:
+        """Model for solvers if supports hold edges along their whole length.
+
+        edges : mapping of edge, as numbered in `pattern.lines`, to the directions held (h, 3). Only
+            models whose edges bow without nodes on them depend on it.
+        """
+        return self.body
 
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """Additions to the structure if panels swell: if they would stretch and curl when free.

@@ -1,0 +1,273 @@
+"""Superelements of a whole pattern: their common unknowns, stiffness and mass.
+
+The unknowns, from which each panel takes the amplitudes of its shapes, are
+
+- displacements of the vertices (3 v + axis),
+- a vector along x, y, z for each edge and each of its functions,
+- turns of the sheet on both sides of each edge, first of the panel that runs along the edge from
+  its lower to its higher vertex; positive where the sheet lifts toward the front of the panel,
+- vibrations of each panel with its edges held.
+
+Supports, clamps, welds and rigid panels leave some of these, or combinations of them, as dofs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.patterns import Pattern
+from foldyn.patterns.topology import edge_lookup
+from foldyn.superelements.library import Group
+from foldyn.superelements.panel import BOW, INNER, TURN, VERTEX, edge_frame
+from foldyn.superelements.shapes import ACROSS, ALONG, Level
+
+FUNCTION = np.array([ACROSS.index(shape) for shape in ALONG])
+"""Index in `ACROSS` of each shape along an edge."""
+HELD = 1e-9  # part of a unit vector below which supports hold a direction
+
+
+class Unknowns(NamedTuple):
+    """Indices of the unknowns of a pattern; each method takes numbers or arrays."""
+
+    vertices: int
+    edges: int
+    panels: int
+    level: Level
+
+    @property
+    def functions(self) -> int:
+        """Number of functions of each edge, in any direction."""
+        return int(max(self.level.across, *(FUNCTION[: self.level.along] + 1)))
+
+    @property
+    def size(self) -> int:
+        """Number of all unknowns."""
+        return self.inner(self.panels, 0)
+
+    def bow(self, edge: Any, function: Any) -> Any:
+        """First of the three unknowns of a function of an edge."""
+        return 3 * (self.vertices + edge * self.functions + function)
+
+    def turn(self, edge: Any, side: Any, number: Any) -> Any:
+        """A turn of a side of an edge."""
+        return self.bow(self.edges, 0) + (2 * edge + side) * self.level.turns + number
+
+    def inner(self, panel: Any, mode: Any) -> Any:
+        """A vibration of a panel."""
+        return self.turn(self.edges, 0, 0) + panel * self.level.inner + mode
+
+
+class Whole:
+    """Superelements of a pattern on all of their unknowns, m of them.
+
+    Parameters
+    ----------
+    pattern : Pattern
+    groups : sequence of Group
+    level : Level
+    """
+
+    def __init__(self, pattern: Pattern, groups: list[Group], level: Level) -> None:
+        self._pattern, self._groups, self.level = pattern, groups, level
+        self.edges = pattern.lines
+        x, faces = pattern.vertices, pattern.faces
+        self.unknowns = Unknowns(len(x), len(self.edges), len(faces), level)
+        self._along = x[self.edges[:, 1]] - x[self.edges[:, 0]]
+
+    @cached_property
+    def _parts(self) -> list[tuple[NDArray, sparse.csr_array]]:
+        """Shapes (c,) of each group that the level has, and their amplitudes as unknowns.
+
+        The rows of the matrix (p c, m) are amplitudes of panel after panel.
+        """
+        return [self._placed(group) for group in self._groups]
+
+    def _placed(self, group: Group) -> tuple[NDArray, sparse.csr_array]:
+        """See `_parts`."""
+        kind, level, own = group.panel.kind, self.level, self.unknowns
+        most = {VERTEX: 3, TURN: level.turns, INNER: level.inner}
+        counts = np.array(
+            [level.on_edge[at % 3] if what == BOW else most[what] for what, at, _ in kind.tolist()]
+        )
+        kept = np.flatnonzero(kind[:, 2] < counts)
+        p = len(group.faces)
+        edge, backwards = self._edges_of(group.faces)
+        frames = self._edge_frames(group, edge, backwards)
+        row = len(kept) * np.arange(p)
+        rows, columns, values = [], [], []
+        for i, (what, where, shape) in enumerate(kind[kept].tolist()):
+            if what == VERTEX:
+                first, vector = 3 * group.faces[:, where], group.frames[:, shape]
+            elif what == BOW:
+                e, axis = divmod(where, 3)
+                degree = (ALONG if axis == 0 else ACROSS)[shape][1]
+                function = FUNCTION[shape] if axis == 0 else shape
+                first = own.bow(edge[:, e], function)
+                sign = np.where(backwards[:, e], (-1.0) ** degree, 1.0)
+                vector = sign[:, None] * frames[:, e, axis]
+            elif what == TURN:
+                first = own.turn(edge[:, where], backwards[:, where].astype(int), shape)
+                vector = np.where(backwards[:, where], (-1.0) ** shape, 1.0)[:, None]
+            else:
+                first, vector = own.inner(group.number, shape), np.ones((p, 1))
+            for d in range(vector.shape[1]):
+                rows.append(row + i), columns.append(first + d), values.append(vector[:, d])
+        entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+        shape = (p * len(kept), own.size)
+        return kept, sparse.csr_array(sparse.coo_array(entries, shape=shape))
+
+    def _edges_of(self, faces: NDArray) -> tuple[NDArray, NDArray]:
+        """Edges (p, k) of panels (p, k), and whether they run from higher to lower vertices."""
+        number = edge_lookup(self.edges)
+        ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)
+        low_high = np.sort(ends, axis=2).reshape(-1, 2).tolist()
+        found = np.array([number[low, high] for low, high in low_high]).reshape(faces.shape)
+        return found, ends[:, :, 0] > ends[:, :, 1]
+
+    def _edge_frames(self, group: Group, edge: NDArray, backwards: NDArray) -> NDArray:
+        """Directions (p, k, 3, 3) along edges, across them in the plane, and normal to both."""
+        x = self._pattern.vertices[group.faces]
+        area = np.cross(x, np.roll(x, -1, axis=1)).sum(axis=1)
+        along = np.where(backwards[:, :, None], -1.0, 1.0) * self._along[edge]
+        return edge_frame(along, area[:, None])
+
+    def matrices(self, compared: bool = False) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """Stiffness and mass (m, m) of all panels, or of the panels to compare with."""
+        size = self.unknowns.size
+        total = [sparse.csr_array((size, size)) for _ in range(2)]
+        for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
+            panel = group.compared if compared else group.panel
+            count = len(group.number)
+            for k, own in enumerate((panel.stiffness, panel.mass)):
+                blocks = np.tile(own[np.ix_(kept, kept)], (count, 1, 1))
+                diagonal = sparse.bsr_array((blocks, np.arange(count), np.arange(count + 1)))
+                total[k] = sparse.csr_array(total[k] + placed.T @ (diagonal.tocsr() @ placed))
+        return total[0], total[1]
+
+    def turns_of(self, edges: NDArray) -> sparse.csr_array:
+        """Turns (k * turns, m) of both sides of edges (k,) relative to each other."""
+        own, count = self.unknowns, self.level.turns
+        first = own.turn(edges[:, None], 0, np.arange(count)).ravel()
+        row = np.tile(np.arange(len(first)), 2)
+        column = np.concatenate([first, first + count])
+        return sparse.csr_array((np.ones(len(row)), (row, column)), (len(first), own.size))
+
+    # ------------------------------------------------------------------ supports
+    @cached_property
+    def _across(self) -> NDArray:
+        """Directions (e, 3, 3) along each edge, and two across it."""
+        return edge_frame(self._along, np.eye(3)[np.argmin(np.abs(self._along), axis=1)])
+
+    def dofs(
+        self, held: Mapping[int, NDArray], clamped: NDArray, rigid: Collection[int]
+    ) -> sparse.csr_array:
+        """Unknowns (m, d) as combinations of dofs; the first dofs are those of the vertices.
+
+        Parameters
+        ----------
+        held : mapping of edge to (h, 3)
+            Directions in which supports hold an edge along its whole length.
+        clamped : (k,)
+            Edges whose tangent is held.
+        rigid : collection of int
+            Rigid panels.
+        """
+        own, level, columns = self.unknowns, self.level, _Columns()
+        columns.add(np.arange(3 * own.vertices)[:, None])
+        sides, turned = self._sides(rigid)
+        straight = {int(edge): np.eye(3) for edge in np.flatnonzero((turned >= 0).any(axis=1))}
+        self._add_bows(columns, {**held, **straight})
+        sides[clamped] = False
+        welds = len(self._pattern.creases) + len(self._pattern.boundary)  # the first of them
+        number = np.arange(level.turns)
+        edge, side = np.nonzero(sides[:welds])
+        columns.add(own.turn(edge[:, None], side[:, None], number).reshape(-1, 1))
+        edge = np.arange(welds, own.edges)[:, None]
+        both = np.stack([own.turn(edge, side, number) for side in range(2)], axis=-1)
+        columns.add(both.reshape(-1, 2), np.array([1.0, -1.0]))
+        panels = np.setdiff1d(np.arange(own.panels), list(rigid))
+        columns.add(own.inner(panels[:, None], np.arange(level.inner)).reshape(-1, 1))
+        for edge, side in np.argwhere(turned >= 0).tolist():
+            dofs, factors = self._facet_turn(int(turned[edge, side]), edge, side)
+            columns.put(np.full(len(dofs), own.turn(edge, side, 0)), dofs, factors)
+        return columns.matrix(own.size)
+
+    def _sides(self, rigid: Collection[int]) -> tuple[NDArray, NDArray]:
+        """Whether each side (e, 2) of an edge has a panel that bends, and its rigid panel or -1."""
+        bends, turned = (
+            np.zeros((self.unknowns.edges, 2), bool),
+            np.full((self.unknowns.edges, 2), -1),
+        )
+        for group in self._groups:
+            edge, backwards = self._edges_of(group.faces)
+            stiff = np.isin(group.number, list(rigid))
+            bends[edge, backwards.astype(int)] = ~stiff[:, None]
+            turned[edge, backwards.astype(int)] = np.where(stiff, group.number, -1)[:, None]
+        return bends, turned
+
+    def _facet_turn(self, panel: int, edge: int, side: int) -> tuple[NDArray, NDArray]:
+        """Dofs (9,) of vertices and factors (9,), 1/m, of the turn of a panel about an edge."""
+        x, face = self._pattern.vertices, np.array(self._pattern.faces[panel])
+        a, b = self.edges[edge][::-1] if side else self.edges[edge]
+        along = (x[b] - x[a]) / np.linalg.norm(x[b] - x[a])
+        away = x[face] - x[a]
+        height = np.linalg.norm(away - np.outer(away @ along, along), axis=1)
+        c = face[height.argmax()]
+        foot = float((x[c] - x[a]) @ along / np.linalg.norm(x[b] - x[a]))
+        up = self._pattern.face_normals[panel] / height.max()
+        dofs = 3 * np.array([c, a, b])[:, None] + np.arange(3)
+        return dofs.ravel(), np.outer(np.array([1.0, foot - 1.0, -foot]), up).ravel()
+
+    def _add_bows(self, columns: _Columns, held: Mapping[int, NDArray]) -> None:
+        """Add the displacements of edges that no support holds."""
+        own, along = self.unknowns, np.zeros(self.unknowns.functions, bool)
+        along[FUNCTION[: self.level.along]] = True
+        across = np.arange(own.functions) < self.level.across
+        taken = np.stack([along, across, across], axis=1)  # directions of each function
+        loose = np.setdiff1d(np.arange(own.edges), list(held))
+        function, direction = np.nonzero(taken)
+        row = own.bow(loose[:, None, None], function[:, None]) + np.arange(3)
+        columns.add(row.reshape(-1, 3), self._across[loose][:, direction].reshape(-1, 3))
+        for edge, directions in held.items():
+            for function, own_directions in enumerate(taken):
+                free = _left(self._across[edge][own_directions], directions)
+                columns.add(np.tile(own.bow(edge, function) + np.arange(3), (len(free), 1)), free)
+
+
+class _Columns:
+    """Columns of a matrix."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._parts: list[tuple[NDArray, NDArray, NDArray]] = []
+
+    def add(self, rows: NDArray, values: NDArray | float = 1.0) -> None:
+        """Add a column for each row of `rows` (c, r), with `values` in these rows."""
+        number = np.repeat(self.count + np.arange(len(rows)), rows.shape[1])
+        self.put(rows.ravel(), number, np.broadcast_to(values, rows.shape).ravel())
+        self.count += len(rows)
+
+    def put(self, rows: NDArray, columns: NDArray, values: NDArray) -> None:
+        """Put entries (k,) into columns."""
+        self._parts.append((rows, columns, values))
+
+    def matrix(self, rows: int) -> sparse.csr_array:
+        """The matrix (rows, count), without zeros."""
+        row, column, value = (np.concatenate(part) for part in zip(*self._parts, strict=True))
+        there = value != 0.0
+        entries = (value[there], (row[there], column[there]))
+        return sparse.csr_array(sparse.coo_array(entries, shape=(rows, self.count)))
+
+
+def _left(vectors: NDArray, held: NDArray) -> NDArray:
+    """Orthonormal vectors (k, 3) in the span of `vectors` (n, 3), normal to directions (h, 3)."""
+    if not len(vectors):
+        return vectors
+    _, size, basis = np.linalg.svd(held @ vectors.T)
+    return basis[int((size > HELD).sum()) :] @ vectors

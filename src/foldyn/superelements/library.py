@@ -1,0 +1,89 @@
+"""Condensed panels by shape: congruent panels of one sheet are condensed once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.patterns import Pattern
+from foldyn.structures.graded import Grading
+from foldyn.structures.sheet import Sheet
+from foldyn.superelements.panel import CondensedPanel, condense, extrapolated
+
+ROOM = 256  # condensed panels kept in memory, each about 0.5 MB
+ALIKE = 8  # decimals of coordinates, relative to the size of the pattern, for congruent panels
+
+
+class Meshes(NamedTuple):
+    """Meshes on which panels are condensed, coarse to fine.
+
+    With several meshes the condensed panels are extrapolated from the two finest, and compared with
+    the panels extrapolated from the first and the one before the finest.
+    """
+
+    graded: tuple[Grading, ...]
+    divisions: tuple[int, ...]
+
+
+class Group(NamedTuple):
+    """Congruent panels, p of them, with k corners each.
+
+    The first corner of each panel is the one from which the shape is described.
+    """
+
+    panel: CondensedPanel
+    compared: CondensedPanel  # the same from coarser meshes
+    faces: NDArray  # (p, k) vertices
+    frames: NDArray  # (p, 3, 3) axes of the panels' frames, in rows
+    number: NDArray  # (p,) indices in the pattern
+
+
+@lru_cache(maxsize=ROOM)
+def _condensed(
+    corners: tuple[tuple[float, ...], ...], sheet: Sheet, meshes: Meshes
+) -> tuple[CondensedPanel, CondensedPanel]:
+    """A panel, and the same from coarser meshes."""
+    made = [condense(np.array(corners), sheet, graded) for graded in meshes.graded]
+    if len(made) == 1:
+        return made[0], made[0]
+    (coarse, middle, fine), (first, second, third) = made, meshes.divisions
+    best = extrapolated(middle, fine, third / second)
+    return best, extrapolated(coarse, middle, second / first).aligned(best)
+
+
+def groups(pattern: Pattern, sheets: Sequence[Sheet], meshes: Meshes) -> list[Group]:
+    """The condensed panels of a pattern, grouped by congruence; `sheets` of all panels."""
+    found: dict[tuple, list[tuple[int, NDArray, NDArray]]] = {}
+    for number, (face, sheet) in enumerate(zip(pattern.faces, sheets, strict=True)):
+        corners, turned, frame = _described(pattern.vertices[list(face)], pattern.size)
+        found.setdefault((corners, sheet), []).append((number, np.roll(face, -turned), frame))
+    out = []
+    for (corners, sheet), members in found.items():
+        scaled = tuple(tuple(float(x * pattern.size) for x in corner) for corner in corners)
+        numbers, faces, frames = zip(*members, strict=True)
+        panels = _condensed(scaled, sheet, meshes)
+        out.append(Group(*panels, np.array(faces), np.array(frames), np.array(numbers)))
+    return out
+
+
+def _described(x: NDArray, size: float) -> tuple[tuple[tuple[float, ...], ...], int, NDArray]:
+    """Corners (k, 3) over `size` in the frame of one corner, the first of all in sorted order.
+
+    Also returns the number of corners before that corner, and the frame (3, 3).
+    """
+    described = []
+    for turned in range(len(x)):
+        corners = np.roll(x, -turned, axis=0)
+        away = corners - corners[0]
+        first = away[1] / np.linalg.norm(away[1])
+        area = np.cross(away, np.roll(away, -1, axis=0)).sum(axis=0)
+        normal = area - (area @ first) * first
+        normal = normal / np.linalg.norm(normal)
+        frame = np.stack([first, np.cross(normal, first), normal])
+        places = np.round(away @ frame.T / size, ALIKE) + 0.0  # no negative zeros
+        described.append((tuple(map(tuple, places.tolist())), turned, frame))
+    return min(described, key=lambda one: one[0])

@@ -1,0 +1,257 @@
+"""A panel as a small shell, condensed onto shapes of its edges (Craig and Bampton, AIAA J. 1968).
+
+The unknowns of the mesh are displacements u of its nodes and turns psi of the sheet about the sides
+of its triangles. A side of a triangle is rotated relative to the plane of the corners by
+
+    beta = phi - psi,    phi = n . (u_c - (1 - s) u_a - s u_b) / h,
+
+with phi the turn of that plane about the side from a to b, c the third corner, h its height and s
+its foot on the side; the triangle across the side has -psi. With the side strains e, the energy is
+
+    1/2 sum over triangles of e' C_m e + beta' C_b beta,
+
+as in `foldyn.shells` for small displacements. Displacements and turns psi on the edges of the panel
+are sums of shapes; the inside is in balance, plus vibrations with all edges held. Creases, clamps
+and welds, which connect the turns of edges, are not part of a panel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from foldyn.algebra.superlu import factorize
+from foldyn.mechanics.triangle import triangle_stiffness
+from foldyn.patterns import Pattern
+from foldyn.shells.mesh import shell_mesh
+from foldyn.shells.shell import STIFF
+from foldyn.structures.graded import Grading
+from foldyn.structures.sheet import Sheet
+from foldyn.superelements.shapes import HIGHEST, bows, turns
+
+VERTEX, BOW, TURN, INNER = range(4)
+
+
+@dataclass(frozen=True, eq=False)
+class CondensedPanel:
+    """Stiffness and mass of a panel for the amplitudes of its shapes, c of them.
+
+    Attributes
+    ----------
+    stiffness, mass : (c, c)
+        N/m and kg; turns are in rad.
+    kind : (c, 3)
+        Kind of each shape: (VERTEX, corner, axis), (BOW, 3 edge + axis, number), (TURN, edge,
+        number) or (INNER, 0, mode).
+    """
+
+    stiffness: NDArray
+    mass: NDArray
+    kind: NDArray
+
+    def aligned(self, other: CondensedPanel) -> CondensedPanel:
+        """The panel with its inner modes turned to those of the same panel on another mesh."""
+        inner = self.kind[:, 0] == INNER
+        common = self.mass[np.ix_(~inner, inner)].T @ other.mass[np.ix_(~inner, inner)]
+        left, _, right = np.linalg.svd(common)
+        turned = np.eye(len(inner))
+        turned[np.ix_(inner, inner)] = left @ right
+        return replace(
+            self, stiffness=turned.T @ self.stiffness @ turned, mass=turned.T @ self.mass @ turned
+        )
+
+
+def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> CondensedPanel:
+    """The limit of fine meshes, from two meshes; errors fall with the square of the mesh size.
+
+    ratio : mesh size of `coarse` / mesh size of `fine`.
+    """
+    coarse, weight = coarse.aligned(fine), 1.0 / (ratio**2 - 1.0)
+    return replace(
+        fine,
+        stiffness=fine.stiffness + weight * (fine.stiffness - coarse.stiffness),
+        mass=fine.mass + weight * (fine.mass - coarse.mass),
+    )
+
+
+def condense(corners: NDArray, sheet: Sheet, graded: Grading) -> CondensedPanel:
+    """Condense a panel with corners (k, 3), m, onto the shapes of the highest level."""
+    mesh = _Mesh(corners, sheet, graded)
+    shapes, kind, held = _edge_shapes(mesh, graded.radius)
+    inside = np.setdiff1d(np.arange(mesh.size), held)
+    stiffness, mass = mesh.stiffness, mesh.mass
+    own = sparse.csc_array(stiffness[inside][:, inside])
+    factors, count = factorize(own), HIGHEST.inner
+    full = np.zeros((mesh.size, shapes.shape[1] + count))
+    full[:, :-count] = shapes
+    full[inside, :-count] = -factors.solve(stiffness[inside][:, held] @ shapes[held])
+    full[inside, -count:] = _held_modes(
+        own, sparse.csc_array(mass[inside][:, inside]), factors, count
+    )
+    reduced, carried = mesh.stiffness_of(full), full.T @ (mass @ full)
+    kind = np.concatenate([kind, [(INNER, 0, k) for k in range(count)]])
+    return CondensedPanel(0.5 * (reduced + reduced.T), 0.5 * (carried + carried.T), kind)
+
+
+class _Mesh:
+    """Triangles of a panel with corners (k, 3), and the rows of side strains and rotations."""
+
+    def __init__(self, corners: NDArray, sheet: Sheet, graded: Grading) -> None:
+        face = tuple(range(len(corners)))
+        mesh = shell_mesh(Pattern(corners, [face]), 0, graded)
+        self.nodes, self.triangles, self.corners = mesh.nodes, mesh.triangles, len(corners)
+        points, ends = mesh.edge_points, [(k, (k + 1) % len(corners)) for k in face]
+        self.edges = [
+            np.array(points[a, b] if a < b else points[b, a][::-1], np.int64) for a, b in ends
+        ]
+        tri, x = self.triangles, self.nodes[self.triangles]
+        nu, n, nt = sheet.poissons_ratio, len(self.nodes), len(tri)
+        stretching = sheet.youngs_modulus * sheet.thickness / (1.0 - nu**2)
+        membrane, bending = triangle_stiffness(x, nu, stretching, sheet.bending_modulus)
+        membrane[(tri < len(corners)).any(axis=1)] *= STIFF
+        self._elastic = membrane, bending
+        side = np.roll(x, -1, axis=1) - x
+        length2 = np.einsum("tki,tki->tk", side, side)
+        normal = np.cross(side[:, 0], side[:, 1])
+        twice = np.linalg.norm(normal, axis=1)
+        self._corner_mass = 0.5 * twice * np.asarray(sheet.areal_density) / 12.0
+        self.sides, number, sign = _sides(tri)
+        self.size = 3 * n + len(self.sides)
+        rows, a, b, c = (
+            np.arange(3 * nt).reshape(nt, 3),
+            tri,
+            *(np.roll(tri, -k, 1) for k in (1, 2)),
+        )
+        per_length = side / length2[:, :, None]
+        self._strains = _rows(self.size, 3 * nt, [(rows, b, per_length), (rows, a, -per_length)])
+        foot = np.einsum("tki,tki->tk", np.roll(x, -2, axis=1) - x, side) / length2
+        up = (normal / twice[:, None])[:, None] * (np.sqrt(length2) / twice[:, None])[:, :, None]
+        phi = [
+            (rows, c, up),
+            (rows, a, (foot - 1.0)[:, :, None] * up),
+            (rows, b, -foot[:, :, None] * up),
+        ]
+        psi = (rows.ravel(), 3 * n + number.ravel(), -sign.ravel())
+        self._rotations = _rows(self.size, 3 * nt, phi, psi)
+
+    @property
+    def stiffness(self) -> sparse.csc_array:
+        """Stiffness (m, m) of all unknowns."""
+        parts = zip((self._strains, self._rotations), self._elastic, strict=True)
+        return sparse.csc_array(sum(rows.T @ (_diagonal(own) @ rows) for rows, own in parts))
+
+    def stiffness_of(self, shapes: NDArray) -> NDArray:
+        """Stiffness of shapes (m, c), summed over triangles: far smaller rounding errors."""
+        out = np.zeros((shapes.shape[1], shapes.shape[1]))
+        for rows, own in zip((self._strains, self._rotations), self._elastic, strict=True):
+            strain = rows @ shapes
+            out += strain.T @ (_diagonal(own) @ strain)
+        return out
+
+    @property
+    def mass(self) -> sparse.csr_array:
+        """Consistent mass (m, m) of all unknowns; turns have none."""
+        tri, n = self.triangles, len(self.nodes)
+        row, column = np.repeat(tri, 3, axis=1).ravel(), np.tile(tri, (1, 3)).ravel()
+        entry = self._corner_mass[:, None] * np.array([2.0, 1, 1, 1, 2, 1, 1, 1, 2])
+        nodal = sparse.coo_array((entry.ravel(), (row, column)), shape=(n, n)).tocsr()
+        whole = sparse.csr_array(sparse.kron(nodal, sparse.eye_array(3), format="csr"))
+        whole.resize((self.size, self.size))
+        return whole
+
+
+def _diagonal(blocks: NDArray) -> sparse.bsr_array:
+    """Block diagonal matrix of blocks (n, 3, 3)."""
+    return sparse.bsr_array((blocks, np.arange(len(blocks)), np.arange(len(blocks) + 1)))
+
+
+def _rows(
+    size: int, count: int, parts: list[tuple[NDArray, NDArray, NDArray]], more: tuple | None = None
+) -> sparse.csr_array:
+    """Matrix (count, size) with vectors (..., 3) in rows (...) at nodes (...); `more` entries."""
+    row = [np.repeat(rows.ravel(), 3) for rows, _, _ in parts]
+    column = [(3 * nodes.ravel()[:, None] + np.arange(3)).ravel() for _, nodes, _ in parts]
+    value = [vectors.ravel() for _, _, vectors in parts]
+    if more is not None:
+        for entries, own in zip((row, column, value), more, strict=True):
+            entries.append(own)
+    entries = (np.concatenate(value), (np.concatenate(row), np.concatenate(column)))
+    return sparse.csr_array(sparse.coo_array(entries, shape=(count, size)))
+
+
+def _sides(tri: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Sides (s, 2), the number (nt, 3) of each triangle's sides, and signs (nt, 3).
+
+    The sign is 1 in the first of the triangles at a side.
+    """
+    pairs = np.stack([tri, np.roll(tri, -1, axis=1)], axis=2)
+    sides, number = np.unique(np.sort(pairs, axis=2).reshape(-1, 2), axis=0, return_inverse=True)
+    number = number.reshape(tri.shape)
+    first = np.full(len(sides), tri.size)
+    np.minimum.at(first, number.ravel(), np.arange(tri.size))
+    return sides, number, np.where(first[number] == np.arange(tri.size).reshape(-1, 3), 1.0, -1.0)
+
+
+def _edge_shapes(mesh: _Mesh, cut_off: float) -> tuple[NDArray, NDArray, NDArray]:
+    """Shapes (m, c) on the edges, their kinds (c, 3), and the unknowns (b,) that they determine."""
+    n, columns, kinds, held = len(mesh.nodes), [], [], []
+    number = {(int(a), int(b)): i for i, (a, b) in enumerate(mesh.sides)}
+    corners = mesh.nodes[: mesh.corners]
+    up = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+    lengths = [
+        float(np.linalg.norm(mesh.nodes[own[-1]] - mesh.nodes[own[0]])) for own in mesh.edges
+    ]
+    places = [
+        np.linalg.norm(mesh.nodes[own] - mesh.nodes[own[0]], axis=1) / length
+        for own, length in zip(mesh.edges, lengths, strict=True)
+    ]
+
+    def put(rows: NDArray, values: NDArray, kind: tuple[int, int, int]) -> None:
+        columns.append(np.zeros(mesh.size))
+        columns[-1][rows] = values
+        kinds.append(kind)
+
+    for corner in range(mesh.corners):
+        hat = np.zeros(n)
+        hat[mesh.edges[corner]] = 1.0 - places[corner]
+        hat[mesh.edges[corner - 1]] = places[corner - 1]
+        for axis in range(3):
+            put(3 * np.arange(n) + axis, hat, (VERTEX, corner, axis))
+    for edge, own in enumerate(mesh.edges):
+        dofs = 3 * own[:, None] + np.arange(3)
+        held.append(dofs.ravel())
+        frame = edge_frame(mesh.nodes[own[-1]] - mesh.nodes[own[0]], up)
+        for axis in range(3):
+            for shape, values in enumerate(bows(places[edge], cut_off / lengths[edge], axis).T):
+                put(dofs, values[:, None] * frame[axis], (BOW, 3 * edge + axis, shape))
+    for edge, own in enumerate(mesh.edges):
+        pairs = np.sort(np.stack([own[:-1], own[1:]], axis=1), axis=1)
+        sides = 3 * n + np.array([number[int(a), int(b)] for a, b in pairs])
+        held.append(sides)
+        middle = 0.5 * (places[edge][1:] + places[edge][:-1])
+        for shape, values in enumerate(turns(middle, HIGHEST.turns).T):
+            put(sides, values, (TURN, edge, shape))
+    return np.stack(columns, axis=1), np.array(kinds), np.unique(np.concatenate(held))
+
+
+def edge_frame(along: NDArray, up: NDArray) -> NDArray[np.float64]:
+    """Unit vectors (..., 3, 3) along edges, across them in the plane normal to `up`, and normal."""
+    along = along / np.linalg.norm(along, axis=-1, keepdims=True)
+    across = np.cross(up, along)
+    across = across / np.linalg.norm(across, axis=-1, keepdims=True)
+    return np.stack([along, across, np.cross(along, across)], axis=-2)
+
+
+def _held_modes(
+    stiffness: sparse.csc_array, mass: sparse.csc_array, factors: object, count: int
+) -> NDArray:
+    """The lowest vibrations (i, count), of unit modal mass, of a panel with its edges held."""
+    inverse = LinearOperator(stiffness.shape, factors.solve, dtype=float)  # type: ignore[attr-defined]
+    start = np.random.default_rng(0).standard_normal(stiffness.shape[0])
+    values, modes = eigsh(stiffness, count, M=mass, sigma=0.0, OPinv=inverse, v0=start)
+    modes = modes[:, np.argsort(values)]
+    return modes / np.sqrt(np.einsum("ik,ik->k", modes, mass @ modes))

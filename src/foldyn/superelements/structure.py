@@ -1,0 +1,318 @@
+"""`Superelements`: a pattern as condensed panels, for linear analyses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.algebra.solvers import Fill
+from foldyn.errors import InputError
+from foldyn.materials import EnhancedLinear, HingeLaw, Superlinear, hinge_law
+from foldyn.materials.inelastic_law import memory_of
+from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.sheet_term import NO_DOF, CreaseTurns, FoldHinges
+from foldyn.patterns import Pattern
+from foldyn.patterns.pattern import Patterned
+from foldyn.patterns.topology import Edge, edge_lookup
+from foldyn.structures import Sheet
+from foldyn.structures.beyond_range import doubt_units
+from foldyn.structures.calibration import (
+    PerCrease,
+    check_sheet,
+    fold_rest,
+    fold_stiffness,
+    per_crease,
+)
+from foldyn.structures.clamps import boundary_edges
+from foldyn.structures.discretize import checked_kinds
+from foldyn.structures.discretized import Discretized, HingeKind, read_only
+from foldyn.structures.graded import grading
+from foldyn.structures.mass import MASS_RULES
+from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
+from foldyn.superelements.assembly import Whole
+from foldyn.superelements.library import Meshes, groups
+from foldyn.superelements.shapes import LEVELS
+from foldyn.superelements.term import GROUPS, SuperelementsTerm
+from foldyn.values import length, whole
+
+EXTRAPOLATED = (8, 16, 24)
+"""Divisions of the meshes from which panels are extrapolated."""
+
+
+@dataclass(frozen=True)
+class SuperelementsOptions:
+    """Arguments of `superelements` other than pattern and sheet."""
+
+    level: int = 5
+    divisions: int | None = None
+    fold_law: str | HingeLaw = EnhancedLinear()
+    crease_stiffness: PerCrease = None
+    crease_rest: PerCrease = None
+    clamped: tuple[Edge, ...] = ()
+    rigid: str | tuple[int, ...] | None = None
+    vertex_radius: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("crease_stiffness", "crease_rest"):
+            object.__setattr__(self, name, per_crease(name, getattr(self, name)))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Superelements(Discretized):
+    """A pattern as condensed panels; made by `superelements`.
+
+    Attributes
+    ----------
+    nodes : (n, 3)
+        The pattern's vertices, m.
+    triangles, triangle_panel : (nt, 3), (nt,)
+        Triangles between corners of panels, for pictures and selections.
+    folds : (nf, 4)
+        Hinge rows of the creases.
+    fold_stiffness, fold_rest : (nf,)
+        Stiffness of the whole creases, N m/rad, and rest dihedrals, rad, in the order of
+        `pattern.creases`.
+    pattern, sheet, options
+        Input from which it was made.
+    meshes : Meshes
+        How the panels are meshed.
+    """
+
+    nodes: NDArray
+    triangles: NDArray
+    triangle_panel: NDArray
+    folds: NDArray
+    fold_stiffness: NDArray
+    fold_rest: NDArray
+    pattern: Pattern
+    sheet: Sheet
+    options: SuperelementsOptions
+    meshes: Meshes
+
+    kind: ClassVar[str] = "superelements"
+    linear: ClassVar[str] = "superelements"
+    energy_groups: ClassVar[Mapping[str, str]] = GROUPS
+    bar_law: ClassVar[None] = None
+    fill: ClassVar[Fill] = Fill(5900.0, 1450, "level", "take a lower one")
+
+    def __repr__(self) -> str:
+        """One line with the counts."""
+        return (
+            f"<Superelements: {len(self.pattern.faces)} panels, {len(self.fold_stiffness)} folds, "
+            f"level {self.options.level}, {self.body.size} dofs>"
+        )
+
+    def at_level(self, level: int) -> Superelements:
+        """The same with panels of another level."""
+        return replace(self, options=replace(self.options, level=level)).marked()
+
+    @cached_property
+    def bars(self) -> NDArray:
+        """Edges of the pattern."""
+        return read_only(self.pattern.lines.copy())
+
+    @cached_property
+    def centers(self) -> NDArray:
+        """No panel has a center node."""
+        return np.full(len(self.pattern.faces), -1)
+
+    @property
+    def hinge_kinds(self) -> tuple[HingeKind, ...]:
+        """The folds, with their law."""
+        ends = self.pattern.creases
+        return (HingeKind("fold", self.fold_law, ends, self.fold_stiffness, self.fold_rest),)
+
+    @cached_property
+    def mass(self) -> sparse.csr_array:
+        """Nodal mass matrix (n, n), kg: the mass of the panels, distributed to their corners.
+
+        Linear analyses use the mass of all dofs instead, `body.sheet.mass`.
+        """
+        return MASS_RULES["consistent"](self.surface)
+
+    @cached_property
+    def whole(self) -> Whole:
+        """The condensed panels on all of their unknowns."""
+        kinds, kind = self.sheet.kinds(len(self.pattern.faces))
+        made = groups(self.pattern, [kinds[k] for k in kind], self.meshes)
+        return Whole(self.pattern, made, LEVELS[self.options.level - 1])
+
+    @cached_property
+    def body(self) -> Assembly:
+        """Model for solvers, with edges that no support holds."""
+        return self.held({})
+
+    def held(self, edges: Mapping[int, NDArray], compared: bool = False) -> Assembly:
+        """Model for solvers if supports hold edges; see `Discretized`.
+
+        compared : whether to take panels from coarser meshes; the dofs are the same.
+        """
+        pattern, made, count = self.pattern, self.whole, len(self.pattern.creases)
+        number = edge_lookup(pattern.lines)
+        clamped = np.array([number[edge] for edge in self.options.clamped], np.int64)
+        dofs = made.dofs(edges, clamped, rigid_panels(self.options.rigid, len(pattern.faces)))
+        degree = np.tile(np.arange(made.level.turns), count)
+        turns = CreaseTurns(
+            sparse.csr_array(made.turns_of(np.arange(count)) @ dofs),
+            np.repeat(np.arange(count), made.level.turns),
+            1.0 / (2 * degree + 1),
+        )
+        panels, mass = (sparse.csr_array(dofs.T @ own @ dofs) for own in made.matrices(compared))
+        return Assembly(
+            SuperelementsTerm(panels, mass, turns, self._slope, self._fold_hinges, self.nodes)
+        )
+
+    @property
+    def _fold_hinges(self) -> FoldHinges:
+        count = len(self.folds)
+        return FoldHinges(
+            fold=np.arange(count),
+            nodes=self.folds,
+            corners=self.nodes[self.folds],
+            hidden=np.full((count, 2), NO_DOF),
+            per_hidden=0.0,
+            rest=self.fold_rest,
+            stiffness=self.fold_stiffness,
+            softness=np.zeros(count),
+            row=np.arange(count),
+        )
+
+    @property
+    def _slope(self) -> NDArray:
+        """Stiffness of the folds at rest, N m/rad."""
+        law = _elastic(self.fold_law)
+        return self.fold_stiffness * law.slope(self.pattern.dihedrals, self.fold_rest)
+
+
+def _elastic(law: HingeLaw) -> HingeLaw:
+    """The law without its memory."""
+    memory = memory_of(law)
+    return law if memory is None else memory.elastic
+
+
+def _check_law(given: str | HingeLaw) -> None:
+    """Refuse a law of creases without a slope at rest."""
+    law = hinge_law(given, "fold_law")
+    if isinstance(_elastic(law), Superlinear):
+        raise InputError(
+            f' = {law.name!r}: has no slope at rest, which superelements need; take "linear" or '
+            '"enhanced"',
+            "fold_law",
+        )
+
+
+def superelements(
+    pattern: Pattern | Patterned,
+    sheet: Sheet,
+    *,
+    level: int = 5,
+    divisions: int | None = None,
+    fold_law: str | HingeLaw = EnhancedLinear(),
+    crease_stiffness: PerCrease = None,
+    crease_rest: PerCrease = None,
+    clamped: str | Sequence[Sequence[int]] = (),
+    rigid: str | Sequence[int] | None = None,
+    vertex_radius: float | None = None,
+) -> Superelements:
+    """Discretize a pattern as superelements: linear analyses with the accuracy of a shell.
+
+    Each panel is a small shell, condensed onto shapes of its edges and a few vibrations with the
+    edges held (Craig and Bampton, AIAA J. 6, 1968). Congruent panels are condensed once. The
+    structure is linear about the rest state: modes, frequency responses and small static loads.
+
+    Parameters
+    ----------
+    pattern : Pattern
+    sheet : Sheet
+        The sheet, with its density; its length-scale ratio determines the stiffness of creases.
+    level : int, default 5
+        Number of shapes, 1 to 5; each level contains the lower ones. Level 5 is within 1 % of a
+        shell on the same mesh.
+    divisions : int, optional
+        Pieces of every edge, a multiple of 4. By default panels are extrapolated from meshes of 8,
+        16 and 24 divisions, to the limit of fine meshes.
+    fold_law, crease_stiffness, crease_rest, clamped, rigid
+        As in `shell`. Creases have the slope of the law at rest.
+    vertex_radius : float, optional
+        Distance from every vertex (m) within which panels do not stretch; by default the largest
+        thickness of the sheet.
+
+    Returns
+    -------
+    Superelements
+
+    Raises
+    ------
+    InputError
+        An argument out of range; a panel that cannot be meshed; thick panels.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
+    >>> sheet = fd.Sheet(1e9, 0.3, thickness=0.01, density=1000.0)
+    >>> fd.superelements(pattern, sheet, level=1)
+    <Superelements: 2 panels, 1 folds, level 1, 107 dofs>
+    """
+    pattern, sheet = checked_kinds(pattern, sheet)
+    doubt_units(pattern, sheet)
+    level = whole("level", level, least=1, most=len(LEVELS))
+    if divisions is not None:
+        divisions = whole("divisions", divisions, least=4)
+    _check_law(fold_law)
+    check_sheet(sheet, pattern)
+    if sheet.density is None:
+        raise InputError("sheet: density is missing: give it (kg/m3), the panels' mass needs it")
+    if pattern.boards is not None:
+        raise InputError(
+            "pattern: has thick panels, which superelements do not support; give the thin pattern, "
+            "or take the shell, fd.shell"
+        )
+    radius = (
+        float(np.max(sheet.values("thickness", len(pattern.faces))))
+        if vertex_radius is None
+        else length("vertex_radius", vertex_radius)
+    )
+    plates = checked_panels(rigid, len(pattern.faces))
+    check_welds(plates, pattern)
+    options = SuperelementsOptions(
+        level, divisions, fold_law, crease_stiffness, crease_rest,
+        boundary_edges(clamped, pattern, "clamped"), plates, vertex_radius,
+    )  # fmt: skip
+    pieces = EXTRAPOLATED if divisions is None else (divisions,)
+    fans = [(face[0], *face[k : k + 2]) for face in pattern.faces for k in range(1, len(face) - 1)]
+    panel = [number for number, face in enumerate(pattern.faces) for _ in face[2:]]
+    folds = _folds(pattern)
+    made = Superelements(
+        nodes=pattern.vertices,
+        triangles=np.array(fans, np.int64),
+        triangle_panel=np.array(panel),
+        folds=folds,
+        fold_stiffness=fold_stiffness(options.crease_stiffness, pattern, sheet),
+        fold_rest=fold_rest(options.crease_rest, folds, pattern.vertices, pattern),
+        pattern=pattern,
+        sheet=sheet,
+        options=options,
+        meshes=Meshes(tuple(grading(pattern, n, radius) for n in pieces), pieces),
+    )
+    _ = made.plates  # refuse rigid panels that are not flat
+    return made.marked()
+
+
+def _folds(pattern: Pattern) -> NDArray:
+    """Hinge rows (nf, 4) of the creases: axis j, k, then the next corners i, l of both panels."""
+    rows = []
+    for (low, high), (one, two) in zip(
+        pattern.creases.tolist(), pattern.crease_faces.tolist(), strict=True
+    ):
+        wings = []
+        for face, second in ((pattern.faces[one], high), (pattern.faces[two], low)):
+            wings.append(face[(face.index(second) + 1) % len(face)])
+        rows.append((low, high, *wings))
+    return np.array(rows, np.int64).reshape(-1, 4)

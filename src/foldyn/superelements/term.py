@@ -1,0 +1,153 @@
+"""Superelements as solvers see them: a linear sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.errors import InputError
+from foldyn.jit.compiled import inner_scalar
+from foldyn.jit.context import Context, numbers_at
+from foldyn.mechanics.sheet_term import Blocks, CreaseTurns, FoldHinges, SheetTerm
+from foldyn.mechanics.term import ENERGIES, FORCES, CompiledTerm, Folds, energies, forces
+from foldyn.mechanics.threads import Team, team
+
+GROUPS: Mapping[str, str] = {
+    "strain_panels": "strain energy of the panels",
+    "strain_folds": "strain energy of the folds",
+}
+
+
+class _Matrix(NamedTuple):
+    indptr: NDArray
+    indices: NDArray
+    data: NDArray  # N/m
+
+
+class _Context(NamedTuple):
+    panels: _Matrix
+    folds: _Matrix
+
+
+class _Scratch(NamedTuple):
+    """See `SheetTerm.scratches`; the kernels need none."""
+
+    angle: NDArray
+    fold_angle: NDArray
+    own: NDArray
+    team: Team
+
+
+@inner_scalar
+def _pull(matrix, q, i):
+    """Force on a dof."""
+    force = 0.0
+    for k in range(matrix.indptr[i], matrix.indptr[i + 1]):
+        force += matrix.data[k] * q[matrix.indices[k]]
+    return force
+
+
+@forces
+def _forces(own, u, v, t, force, powers):
+    size = own.panels.indptr.size - 1
+    q, out = numbers_at(u, size), numbers_at(force, size)
+    for i in range(size):
+        out[i] = _pull(own.panels, q, i) + _pull(own.folds, q, i)
+
+
+@energies
+def _energies(own, u, out):
+    size = own.panels.indptr.size - 1
+    q, energy = numbers_at(u, size), numbers_at(out, 2)
+    energy[0] = energy[1] = 0.0
+    for i in range(size):
+        energy[0] += 0.5 * _pull(own.panels, q, i) * q[i]
+        energy[1] += 0.5 * _pull(own.folds, q, i) * q[i]
+
+
+class SuperelementsTerm(SheetTerm):
+    """Condensed panels and creases about rest; see `mechanics.sheet_term.SheetTerm`.
+
+    Parameters
+    ----------
+    panels, mass : (m, m)
+        Stiffness and mass of the panels.
+    turns : CreaseTurns
+    slope : (nf,)
+        Stiffness of the folds at rest, N m/rad.
+    folds : FoldHinges
+        One for each fold.
+    nodes : (n, 3)
+        Vertices, m.
+    """
+
+    energy_groups = GROUPS
+    mass: sparse.csr_array
+    crease_turns: CreaseTurns
+
+    def __init__(
+        self, panels: sparse.csr_array, mass: sparse.csr_array, turns: CreaseTurns, slope: NDArray,
+        folds: FoldHinges, nodes: NDArray,
+    ) -> None:  # fmt: skip
+        self.mass, self.crease_turns, self._fold_hinges, self._panels = mass, turns, folds, panels
+        resisted = turns.rows * (slope[turns.fold] * turns.share)[:, None]
+        self._folds = sparse.csr_array(turns.rows.T @ resisted)
+        self._stiffness = sparse.csr_array(panels + self._folds)
+        self._extent = float(np.linalg.norm(np.ptp(nodes, axis=0)))
+        self.model = None
+        self.size = panels.shape[0]
+        self.rows = -(-self.size // 3)
+        self.hidden = np.arange(nodes.size, self.size)
+
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
+        """See `Term`."""
+        own = _Context(
+            *(
+                _Matrix(m.indptr.astype(np.int64), m.indices.astype(np.int64), m.data)
+                for m in (self._panels, self._folds)
+            )
+        )
+        return CompiledTerm(Context(own), {FORCES: _forces, ENERGIES: _energies})
+
+    def scratches(self, threads: int) -> Sequence[_Scratch]:
+        """See `SheetTerm`."""
+        none = np.zeros(0)
+        return [_Scratch(none, none, np.array([0, self.rows]), team(1)[0])]
+
+    def blocks(self) -> Blocks:
+        """See `SheetTerm`; implicit motions refuse superelements before they ask for blocks."""
+        raise InputError("superelements have no blocks for implicit motions")
+
+    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
+        """See `SheetTerm`; a copy, because other terms add to it."""
+        return self._stiffness.copy()
+
+    @property
+    def folds(self) -> Folds:
+        """See `SheetTerm`; none can be actuated."""
+        return Folds(np.zeros(0), np.zeros((0, 4)), np.zeros(0))
+
+    def turn(self, q: NDArray, other: NDArray) -> float:
+        """See `SheetTerm`."""
+        return float(np.abs(self.crease_turns.rows @ (q - other)).max(initial=0.0))
+
+    def scale(self) -> NDArray:
+        """See `SheetTerm`."""
+        return abs(self._stiffness).sum(axis=1) * self._extent
+
+    def longest(self) -> float:
+        """See `SheetTerm`."""
+        return self._extent
+
+    def fold_hinges(self) -> FoldHinges:
+        """See `SheetTerm`; one for each fold, with the turns of `crease_turns`."""
+        return self._fold_hinges
+
+    @property
+    def rest_angles(self) -> NDArray:
+        """See `SheetTerm`."""
+        return self._fold_hinges.rest
