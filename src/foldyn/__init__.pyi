@@ -112,6 +112,11 @@ from foldyn.results import (
     load as load,
     save as save,
 )
+from foldyn.condensation import (
+    Superelements as Superelements,
+    SuperelementsOptions as SuperelementsOptions,
+    superelements as superelements,
+)
 from foldyn.shells import Shell as Shell, ShellOptions as ShellOptions, shell as shell
 from foldyn.statics import (
     Folding as Folding,

@@ -8,7 +8,7 @@ from typing import Any
 
 from foldyn.analyses.motion import MASSLESS_METHODS
 from foldyn.analyses.vibration import STATES
-from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
+from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.errors import InputError, warn
 from foldyn.structures import PRESETS, ModelOptions
 from foldyn.values import choice
@@ -179,8 +179,8 @@ def remodeled(
         shared = set(MODELS[kind].keys) - {"mass"}
         creases = {} if "fold_law" in given else _fold_law_of(given.get("preset"))
         given = {**creases, **{key: value for key, value in given.items() if key in shared}}
-    if kind != now and kind == SHELL:
-        changed["analysis"] = _of_a_shell(document["analysis"])
+    if kind != now and kind != BARS_AND_HINGES:
+        changed["analysis"] = _without_bends(document["analysis"])
     finer = {} if divisions is None else {"divisions": divisions}
     changed["model"] = {**given, "kind": kind, **finer}
     return changed
@@ -195,8 +195,8 @@ def _fold_law_of(preset: str | None) -> Document:
     return {"fold_law": {"kind": values.pop("name"), **values}}
 
 
-def _of_a_shell(analysis: Mapping[str, Any]) -> dict[str, Any]:
-    """The table [analysis] without keys that have no meaning for a shell."""
+def _without_bends(analysis: Mapping[str, Any]) -> dict[str, Any]:
+    """The table [analysis] without keys that have meaning only for bars and hinges."""
     left = {"secant", "internal"}
     key, usual = ("method", "auto") if analysis["kind"] == "dynamics" else ("integrator", "rk4")
     if analysis.get(key, usual) not in ("auto", *MASSLESS_METHODS):

@@ -15,7 +15,7 @@ from foldyn.analyses.sections import AnalysisSection, CaseSchema, Count, Positiv
 from foldyn.analyses.vibration import Secant
 from foldyn.arguments import Placed
 from foldyn.cases import Case
-from foldyn.cases.models import SHELL
+from foldyn.cases.models import BARS_AND_HINGES
 from foldyn.errors import InputError
 from foldyn.linear import Fidelity, fidelity
 from foldyn.linear.compared import legend, percent
@@ -52,11 +52,11 @@ class FidelitySchema(CaseSchema):
     output: FidelityOutput = FidelityOutput()
 
     def agree(self) -> None:
-        """Refuse the shell."""
-        if self.model.kind == SHELL:
+        """Refuse other models than bars and hinges."""
+        if self.model.kind != BARS_AND_HINGES:
             raise InputError(
-                f" = {show(SHELL)}: bars and hinges are compared with the shell, which is made "
-                "from them; leave out kind and what only a shell has",
+                f" = {show(self.model.kind)}: bars and hinges are compared with the shell, which "
+                "is made from them; leave out kind and the keys of that model",
                 "model.kind",
             )
 

@@ -17,6 +17,7 @@ from foldyn.analyses.vibration import About, Internal, Secant, VibrationSchema, 
 from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.linear import character, mac, modes, pair_modes
+from foldyn.linear.compared import size
 from foldyn.linear.internal_modes import check_internal
 from foldyn.report.album import Album, ByRule, by_mass_rule, listed
 from foldyn.report.sections import Heading, Picture, Table, Text, cell
@@ -104,6 +105,9 @@ class ModesAnalysis(Analysis):
             if chosen.any()
         ]
         reach = f", {elastic[0]:.4g} to {elastic[-1]:.4g} Hz" if len(elastic) else ""
+        if len(elastic) and "frequency_error" in result:
+            off = (result["frequency_error"].values[~rigid & ~unstable] / elastic).max()
+            reach += f" (each within {size(float(off))})"
         among = f" ({', '.join(special)})" if special else ""
         return (
             f"  {name}: {counted(result.sizes['mode'], 'mode')}{among}{reach}, "
@@ -206,7 +210,9 @@ def _compared(results: ByRule, same: Mapping[str, NDArray]) -> Table:
 
 
 def _table(modes: xarray.Dataset, names: xarray.Dataset, remark: str) -> Table:
-    header = ["mode", "frequency (Hz)", "damping (%)", "what it does", "share (%)"]
+    header = ["mode", "frequency (Hz)"]
+    estimated = "frequency_error" in modes
+    header += [*(["error (Hz)"] if estimated else []), "damping (%)", "what it does", "share (%)"]
     header += [f"{'effective mass ' if axis == 'x' else ''}{axis} (%)" for axis in "xyz"]
     free = np.asarray(modes.attrs["free_mass"], dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -216,6 +222,7 @@ def _table(modes: xarray.Dataset, names: xarray.Dataset, remark: str) -> Table:
         row: list[Any] = [
             number,
             _frequency(modes, k),
+            *([cell(modes["frequency_error"].values[k])] if estimated else []),
             cell(100.0 * modes["damping_ratio"].values[k]),
         ]
         row += [str(names["name"].values[k]), round(100.0 * float(names["share"][k].max()))]
@@ -279,6 +286,11 @@ def _notes(modes: xarray.Dataset, case: Case) -> str:
         notes.append(
             f"The sheet is in a fluid of {case.air.density:.4g} kg/m3, which has {share.min():.2g} "
             f"to {share.max():.2g} % of the modal mass."
+        )
+    if "frequency_error" in modes:
+        notes.append(
+            "The panels are superelements. The errors of the frequencies are estimates of the "
+            "largest difference to a shell on a fine mesh, from other levels and meshes."
         )
     if "internal" in modes.attrs:
         share = modes["internal_share"].values

@@ -23,7 +23,7 @@ from foldyn.analyses.sections import (
 from foldyn.analyses.start import MotionStart
 from foldyn.arguments import Check
 from foldyn.cases import Case
-from foldyn.cases.models import SHELL
+from foldyn.cases.models import SHELL, SUPERELEMENTS
 from foldyn.dynamics import METHODS, Keeping, prepare, simulate
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.timing import check_room, check_samples
@@ -99,6 +99,12 @@ class MotionSchema(CaseSchema):
         """Refuse a method that does not suit the model."""
         if self.model.kind == SHELL:
             check_massless(self, "method", (AUTO, *MASSLESS_METHODS))
+        if self.model.kind == SUPERELEMENTS:
+            raise InputError(
+                f" = {show(SUPERELEMENTS)}: is for linear analyses, and a motion is not; take "
+                '"bars_and_hinges" or "shell"',
+                "model.kind",
+            )
 
 
 def check_massless(schema: Any, key: str, fit: Sequence[str] = MASSLESS_METHODS) -> None:

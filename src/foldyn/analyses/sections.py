@@ -23,6 +23,8 @@ from foldyn.cases.masses import MASS
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import Nodes, check_nodes
 from foldyn.cases.supports import SUPPORT
+from foldyn.condensation import superelements
+from foldyn.condensation.shapes import LEVELS
 from foldyn.errors import InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.plots import ANIMATIONS
@@ -159,20 +161,21 @@ Animation = Annotated[str | None, one_of(ANIMATIONS)]
 
 
 class ModelSection(Section):
-    """[model]: arguments of `discretize` or `shell`, with their defaults.
+    """[model]: arguments of `discretize`, `shell` or `superelements`, with their defaults.
 
     Parameters
     ----------
-    kind : {"bars_and_hinges", "shell"}
+    kind : {"bars_and_hinges", "shell", "superelements"}
         Kind of model.
     mass : str or sequence of str
         Mass rule; a list compares several.
     """
 
-    like = (discretize, shell)
+    like = (discretize, shell, superelements)
     kind: Annotated[str, one_of(MODELS)] = BARS_AND_HINGES
     preset: Annotated[str | None, one_of(PRESETS)] = None
     scheme: Annotated[str | None, one_of(SCHEMES)] = None
+    level: Annotated[int | None, Check(whole_number, most=len(LEVELS))] = None
     divisions: Count | None = None
     mass: Annotated[str | Sequence[str] | None, Check(_masses, words=RULES)] = None
     bar_law: BarLaw = None
@@ -202,7 +205,7 @@ class ModelSection(Section):
             owner = next(kind for kind, other in MODELS.items() if strange[0] in other.keys)
             raise InputError(
                 f": only for model.kind = {show(owner)}; {model.name} "
-                f"{'have' if self.kind == BARS_AND_HINGES else 'has'} no {', '.join(strange)}: "
+                f"{'has' if model.name.startswith('a ') else 'have'} no {', '.join(strange)}: "
                 f"leave {'it' if len(strange) == 1 else 'them'} out",
                 strange[0],
             )

@@ -15,7 +15,7 @@ from foldyn.analyses.start import StoredStart
 from foldyn.arguments import Check
 from foldyn.cases import Impose
 from foldyn.cases.loads import LOAD
-from foldyn.cases.models import SHELL
+from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.supports import SUPPORT
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
 from foldyn.linear.internal_modes import MOST
@@ -47,13 +47,14 @@ class VibrationSchema(CaseSchema):
 
     def agree(self) -> None:
         """Refuse options that the model does not have, and contradictory states."""
-        if self.model.kind == SHELL and "secant" in self.analysis.stated:
+        other = self.model.kind != BARS_AND_HINGES
+        if other and "secant" in self.analysis.stated:
             raise InputError(
-                f" = {show(self.analysis.secant)}: is for superlinear bends, and a shell has none; "
-                "leave it out",
+                f" = {show(self.analysis.secant)}: is for superlinear bends, which "
+                f"{MODELS[self.model.kind].name} cannot have; leave it out",
                 "analysis.secant",
             )
-        if self.model.kind == SHELL and getattr(self.analysis, "internal", 0):
+        if other and getattr(self.analysis, "internal", 0):
             raise InputError(
                 f" = {show(self.analysis.internal)}: is for the panels of bars and hinges; leave "
                 "it out",

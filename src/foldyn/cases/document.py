@@ -27,7 +27,7 @@ from foldyn.cases.histories import HISTORIES, History, Table
 from foldyn.cases.history import STEADY, as_history
 from foldyn.cases.loads import LOAD, Load
 from foldyn.cases.masses import MASS
-from foldyn.cases.models import BARS_AND_HINGES, MODELS
+from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
 from foldyn.cases.supports import SUPPORT
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS, HingeLaw
@@ -339,7 +339,8 @@ def _structure(sections: Mapping[str, Any]) -> Any:
         pattern = _stored_pattern(sections["pattern"])
         sheet = read(Sheet, "sheet", sections["sheet"])
         kind = model.pop("kind", BARS_AND_HINGES)
-        least = len(pattern.vertices) + len(pattern.edges) * (model.get("divisions", 1) - 1)
+        pieces = model.get("divisions", 1) if kind == SHELL else 1
+        least = len(pattern.vertices) + len(pattern.edges) * (pieces - 1)
         _check_whole(least <= len(nodes), nodes, f"at least {least} nodes")  # before it is meshed
         structure = MODELS[kind].make(pattern, sheet, **model)
         shape = structure.nodes.shape

@@ -1,4 +1,4 @@
-"""The models of a sheet: bars and hinges, and the shell."""
+"""The models of a sheet: bars and hinges, the shell, and superelements."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from inspect import signature
 from typing import Any
 
+from foldyn.condensation import Superelements, SuperelementsOptions, superelements
 from foldyn.shells import Shell, ShellOptions, shell
 from foldyn.shells.shell import MASSES
 from foldyn.structures import MASS_RULES, Structure, discretize
 from foldyn.structures.presets import resolved
 
-BARS_AND_HINGES, SHELL = Structure.kind, Shell.kind
+BARS_AND_HINGES, SHELL, SUPERELEMENTS = Structure.kind, Shell.kind, Superelements.kind
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,12 @@ def _of_shells(welds: bool = False, **given: Any) -> ShellOptions:
     return ShellOptions(**given)
 
 
+def _of_superelements(welds: bool = False, **given: Any) -> SuperelementsOptions:
+    return SuperelementsOptions(**given)
+
+
 MODELS: Mapping[str, Model] = {
     BARS_AND_HINGES: Model(discretize, resolved, MASS_RULES, "bars and hinges"),
     SHELL: Model(shell, _of_shells, MASSES, "a shell"),
+    SUPERELEMENTS: Model(superelements, _of_superelements, ("consistent",), "superelements"),
 }

@@ -213,17 +213,20 @@ def _add_case(command: argparse.ArgumentParser, results: str) -> None:
 
 
 def _add_common(command: argparse.ArgumentParser, results: str, film: bool = True) -> None:
-    """Add the arguments of commands on case files of either model."""
+    """Add the arguments of commands on case files of any model."""
     _add_case(command, results)
     if film:
         add_film(command)
     command.add_argument(
         "--model",
-        metavar="bars_and_hinges|shell",
+        metavar="bars_and_hinges|shell|superelements",
         help="model instead of that of the file; results go to NAME-MODEL-" + results,
     )
     command.add_argument(
-        "--divisions", type=integer, metavar="N", help="pieces of every edge of a shell (16)"
+        "--divisions",
+        type=integer,
+        metavar="N",
+        help="pieces of every edge of a shell (16), or of the panels of superelements",
     )
 
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 PARTS: Mapping[str, tuple[str, ...]] = {
     "bars_and_hinges": ("nodes", "bars", "folds", "bends"),
     "shell": ("nodes", "triangles", "folds"),
+    "superelements": ("nodes", "folds"),
 }
 """Parts that the introduction counts, for each model."""
 FILES = ["structure", "laws", *(name for kind in ANALYSES.values() for name in kind.files)]

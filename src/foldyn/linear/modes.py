@@ -20,9 +20,11 @@ from scipy.linalg import eigh
 from foldyn.algebra.eigen import EPS, Pencil, Spectrum, lowest
 from foldyn.algebra.superlu import factorize
 from foldyn.cases import Case, State
+from foldyn.condensation import Superelements
 from foldyn.dynamics.modal_damping import mass_of
 from foldyn.errors import StretchWarning, warn
 from foldyn.linear.hereditary import Branches, damped_mode
+from foldyn.linear.level_error import frequency_errors, other_level
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
 from foldyn.ram_limit import check_memory
 from foldyn.results import modes_dataset
@@ -89,8 +91,10 @@ def modes(
         shape in the space of rigid motions), `damping_ratio` (phi' C phi / (2 omega), nan if the
         frequency is 0 or nan), `participation`, `effective_mass`, and `displacement` of the state;
         in air also `air_share`, the fluid's share of the modal mass (`free_mass`, `participation`
-        and `effective_mass` include the fluid); with internal amplitudes also `internal_share`,
-        their share of the strain energy, as shapes at nodes do not show them. Attributes:
+        and `effective_mass` include the fluid); of superelements also `frequency_error` (Hz), an
+        estimate of the largest error relative to a shell on a fine mesh; with internal amplitudes
+        also `internal_share`, their share of the strain energy, as shapes at nodes do not show
+        them. Attributes:
         `free_mass` (kg along x, y, z), `complete` (number of lowest modes verified to be complete),
         `soft_hinges`, `residual` of the state, `rounding` (bound on the relative rounding error of
         the eigenvalues) and facts about the computation.
@@ -129,8 +133,12 @@ class Found(NamedTuple):
 def spectrum_of(
     case: Case, count: int = 6, state: State | str | None = None, secant: float | None = None, *,
     load_factor: float = 1.0, internal: int = 0, verify: bool = True, solver: str = "auto",
+    errors: bool = True,
 ) -> Found:  # fmt: skip
-    """Modes, with the linearized system and its spectrum; arguments as in `modes`."""
+    """Modes, with the linearized system and its spectrum; other arguments as in `modes`.
+
+    errors : whether to estimate the errors of frequencies, for models that can.
+    """
     of_kind("case", case, Case)
     count = whole("count", count, least=1)
     check_memory(
@@ -163,7 +171,13 @@ def spectrum_of(
         "rounding": _rounding(pencil, spectrum),
         "wall_seconds": time.perf_counter() - began,
     }
-    result = modes_dataset(case, _variables(linear, spectrum, space, along), statistics)
+    variables = _variables(linear, spectrum, space, along)
+    if errors and isinstance(case.structure, Superelements):
+        compared = case.altered(structure=other_level(case.structure))
+        other = spectrum_of(compared, count, verify=False, solver=solver, errors=False).spectrum
+        estimate = frequency_errors(linear, spectrum.values, spectrum.shapes, other.values)
+        variables["frequency_error"] = np.where(variables["rigid"], 0.0, estimate)
+    result = modes_dataset(case, variables, statistics)
     return Found(linear, spectrum, result)
 
 

@@ -129,11 +129,12 @@ MODES: Mapping[str, Quantity] = {
     "effective_mass": Quantity("kg", "effective mass", ("axis",)),
 }
 INTERNAL: Mapping[str, Quantity] = {
+    "frequency_error": Quantity("Hz", "estimate of the largest error of the frequency"),
     "air_share": Quantity("1", "share of the air in the modal mass"),
     "internal_share": Quantity("1", "share of the strain energy in internal amplitudes of panels"),
     "between_shape": Quantity("m", "mode shape between nodes", ("between", "axis")),
 }
-"""Further variables of modes if panels have internal amplitudes. The dimension `between` counts the
+"""Further variables of modes, of some models or in air. The dimension `between` counts the
 middles of edges and spokes, panel by panel."""
 RESPONSES: Mapping[str, Quantity] = {
     "receptance": Quantity("m/N", "displacement per force", PLACE),

@@ -12,6 +12,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.algebra.solvers import Fill
+from foldyn.condensation.assembly import Whole
+from foldyn.condensation.library import Meshes, groups
+from foldyn.condensation.shapes import LEVELS
+from foldyn.condensation.term import GROUPS, SuperelementsTerm
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, Superlinear, hinge_law
 from foldyn.materials.inelastic_law import memory_of
@@ -35,11 +39,7 @@ from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.graded import grading
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
-from foldyn.superelements.assembly import Whole
-from foldyn.superelements.library import Meshes, groups
-from foldyn.superelements.shapes import LEVELS
-from foldyn.superelements.term import GROUPS, SuperelementsTerm
-from foldyn.values import length, whole
+from foldyn.values import choice, length, whole
 
 EXTRAPOLATED = (8, 16, 24)
 """Divisions of the meshes from which panels are extrapolated."""
@@ -51,6 +51,7 @@ class SuperelementsOptions:
 
     level: int = 5
     divisions: int | None = None
+    mass: str = "consistent"
     fold_law: str | HingeLaw = EnhancedLinear()
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
@@ -148,8 +149,12 @@ class Superelements(Discretized):
         """Model for solvers, with edges that no support holds."""
         return self.held({})
 
-    def held(self, edges: Mapping[int, NDArray], compared: bool = False) -> Assembly:
-        """Model for solvers if supports hold edges; see `Discretized`.
+    def held(self, edges: Mapping[int, NDArray]) -> Assembly:
+        """Model for solvers if supports hold edges; see `Discretized`."""
+        return Assembly(self.term(edges))
+
+    def term(self, edges: Mapping[int, NDArray], compared: bool = False) -> SuperelementsTerm:
+        """The sheet if supports hold edges, as in `held`.
 
         compared : whether to take panels from coarser meshes; the dofs are the same.
         """
@@ -164,9 +169,7 @@ class Superelements(Discretized):
             1.0 / (2 * degree + 1),
         )
         panels, mass = (sparse.csr_array(dofs.T @ own @ dofs) for own in made.matrices(compared))
-        return Assembly(
-            SuperelementsTerm(panels, mass, turns, self._slope, self._fold_hinges, self.nodes)
-        )
+        return SuperelementsTerm(panels, mass, turns, self._slope, self._fold_hinges, self.nodes)
 
     @property
     def _fold_hinges(self) -> FoldHinges:
@@ -213,6 +216,7 @@ def superelements(
     *,
     level: int = 5,
     divisions: int | None = None,
+    mass: str = "consistent",
     fold_law: str | HingeLaw = EnhancedLinear(),
     crease_stiffness: PerCrease = None,
     crease_rest: PerCrease = None,
@@ -237,6 +241,8 @@ def superelements(
     divisions : int, optional
         Pieces of every edge, a multiple of 4. By default panels are extrapolated from meshes of 8,
         16 and 24 divisions, to the limit of fine meshes.
+    mass : "consistent"
+        The mass of the shells; there is no other rule.
     fold_law, crease_stiffness, crease_rest, clamped, rigid
         As in `shell`. Creases have the slope of the law at rest.
     vertex_radius : float, optional
@@ -282,8 +288,8 @@ def superelements(
     plates = checked_panels(rigid, len(pattern.faces))
     check_welds(plates, pattern)
     options = SuperelementsOptions(
-        level, divisions, fold_law, crease_stiffness, crease_rest,
-        boundary_edges(clamped, pattern, "clamped"), plates, vertex_radius,
+        level, divisions, choice("mass", mass, ("consistent",)), fold_law, crease_stiffness,
+        crease_rest, boundary_edges(clamped, pattern, "clamped"), plates, vertex_radius,
     )  # fmt: skip
     pieces = EXTRAPOLATED if divisions is None else (divisions,)
     fans = [(face[0], *face[k : k + 2]) for face in pattern.faces for k in range(1, len(face) - 1)]

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.condensation.panel import CondensedPanel, condense, extrapolated
 from foldyn.patterns import Pattern
 from foldyn.structures.graded import Grading
 from foldyn.structures.sheet import Sheet
-from foldyn.superelements.panel import CondensedPanel, condense, extrapolated
 
 ROOM = 256  # condensed panels kept in memory, each about 0.5 MB
 ALIKE = 8  # decimals of coordinates, relative to the size of the pattern, for congruent panels
@@ -47,12 +47,13 @@ def _condensed(
     corners: tuple[tuple[float, ...], ...], sheet: Sheet, meshes: Meshes
 ) -> tuple[CondensedPanel, CondensedPanel]:
     """A panel, and the same from coarser meshes."""
-    made = [condense(np.array(corners), sheet, graded) for graded in meshes.graded]
-    if len(made) == 1:
-        return made[0], made[0]
-    (coarse, middle, fine), (first, second, third) = made, meshes.divisions
-    best = extrapolated(middle, fine, third / second)
-    return best, extrapolated(coarse, middle, second / first).aligned(best)
+    *others, finest = meshes.graded
+    fine = condense(np.array(corners), sheet, finest)
+    if not others:
+        return fine, fine
+    coarse, middle = (condense(np.array(corners), sheet, graded, fine) for graded in others)
+    first, second, third = meshes.divisions
+    return extrapolated(middle, fine, third / second), extrapolated(coarse, middle, second / first)
 
 
 def groups(pattern: Pattern, sheets: Sequence[Sheet], meshes: Meshes) -> list[Group]:

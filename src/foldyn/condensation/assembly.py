@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.condensation.library import Group
+from foldyn.condensation.panel import BOW, INNER, TURN, VERTEX, edge_frame
+from foldyn.condensation.shapes import ACROSS, ALONG, Level
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import edge_lookup
-from foldyn.superelements.library import Group
-from foldyn.superelements.panel import BOW, INNER, TURN, VERTEX, edge_frame
-from foldyn.superelements.shapes import ACROSS, ALONG, Level
 
 FUNCTION = np.array([ACROSS.index(shape) for shape in ALONG])
 """Index in `ACROSS` of each shape along an edge."""
@@ -117,7 +117,9 @@ class Whole:
             else:
                 first, vector = own.inner(group.number, shape), np.ones((p, 1))
             for d in range(vector.shape[1]):
-                rows.append(row + i), columns.append(first + d), values.append(vector[:, d])
+                rows.append(row + i)
+                columns.append(first + d)
+                values.append(vector[:, d])
         entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
         shape = (p * len(kept), own.size)
         return kept, sparse.csr_array(sparse.coo_array(entries, shape=shape))

@@ -22,18 +22,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.interpolate import LinearNDInterpolator
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from foldyn.algebra.superlu import factorize
+from foldyn.condensation.shapes import HIGHEST, bows, turns
 from foldyn.mechanics.triangle import triangle_stiffness
 from foldyn.patterns import Pattern
 from foldyn.shells.mesh import shell_mesh
 from foldyn.shells.shell import STIFF
 from foldyn.structures.graded import Grading
 from foldyn.structures.sheet import Sheet
-from foldyn.superelements.shapes import HIGHEST, bows, turns
 
 VERTEX, BOW, TURN, INNER = range(4)
+SPARE = 4  # inner modes of a mesh among which those of another mesh are sought
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,22 +49,14 @@ class CondensedPanel:
     kind : (c, 3)
         Kind of each shape: (VERTEX, corner, axis), (BOW, 3 edge + axis, number), (TURN, edge,
         number) or (INNER, 0, mode).
+    inner : LinearNDInterpolator
+        Displacements (p, 3 q) of the inner modes at points (p, 2) of the panel's plane.
     """
 
     stiffness: NDArray
     mass: NDArray
     kind: NDArray
-
-    def aligned(self, other: CondensedPanel) -> CondensedPanel:
-        """The panel with its inner modes turned to those of the same panel on another mesh."""
-        inner = self.kind[:, 0] == INNER
-        common = self.mass[np.ix_(~inner, inner)].T @ other.mass[np.ix_(~inner, inner)]
-        left, _, right = np.linalg.svd(common)
-        turned = np.eye(len(inner))
-        turned[np.ix_(inner, inner)] = left @ right
-        return replace(
-            self, stiffness=turned.T @ self.stiffness @ turned, mass=turned.T @ self.mass @ turned
-        )
+    inner: LinearNDInterpolator
 
 
 def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> CondensedPanel:
@@ -70,7 +64,7 @@ def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> 
 
     ratio : mesh size of `coarse` / mesh size of `fine`.
     """
-    coarse, weight = coarse.aligned(fine), 1.0 / (ratio**2 - 1.0)
+    weight = 1.0 / (ratio**2 - 1.0)
     return replace(
         fine,
         stiffness=fine.stiffness + weight * (fine.stiffness - coarse.stiffness),
@@ -78,8 +72,14 @@ def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> 
     )
 
 
-def condense(corners: NDArray, sheet: Sheet, graded: Grading) -> CondensedPanel:
-    """Condense a panel with corners (k, 3), m, onto the shapes of the highest level."""
+def condense(
+    corners: NDArray, sheet: Sheet, graded: Grading, like: CondensedPanel | None = None
+) -> CondensedPanel:
+    """Condense a panel with corners (k, 3), m, onto the shapes of the highest level.
+
+    corners : in a frame whose third axis is nearly normal to the panel.
+    like : the panel on another mesh, whose inner modes are reproduced.
+    """
     mesh = _Mesh(corners, sheet, graded)
     shapes, kind, held = _edge_shapes(mesh, graded.radius)
     inside = np.setdiff1d(np.arange(mesh.size), held)
@@ -89,12 +89,26 @@ def condense(corners: NDArray, sheet: Sheet, graded: Grading) -> CondensedPanel:
     full = np.zeros((mesh.size, shapes.shape[1] + count))
     full[:, :-count] = shapes
     full[inside, :-count] = -factors.solve(stiffness[inside][:, held] @ shapes[held])
-    full[inside, -count:] = _held_modes(
-        own, sparse.csc_array(mass[inside][:, inside]), factors, count
+    inner, on_nodes = np.zeros((mesh.size, count + SPARE)), slice(3 * len(mesh.nodes))
+    inner[inside] = _held_modes(
+        own, sparse.csc_array(mass[inside][:, inside]), factors, inner.shape[1]
     )
+    turned = np.eye(len(inner.T), count)
+    if like is not None:
+        theirs = like.inner(mesh.nodes[:, :2]).reshape(-1, count)
+        common = inner[on_nodes].T @ (mass[on_nodes, on_nodes] @ np.nan_to_num(theirs))
+        left, _, right = np.linalg.svd(common, full_matrices=False)
+        turned = left @ right
+    full[:, -count:] = inner @ turned
     reduced, carried = mesh.stiffness_of(full), full.T @ (mass @ full)
-    kind = np.concatenate([kind, [(INNER, 0, k) for k in range(count)]])
-    return CondensedPanel(0.5 * (reduced + reduced.T), 0.5 * (carried + carried.T), kind)
+    return CondensedPanel(
+        0.5 * (reduced + reduced.T),
+        0.5 * (carried + carried.T),
+        np.concatenate([kind, [(INNER, 0, k) for k in range(count)]]),
+        LinearNDInterpolator(
+            mesh.nodes[:, :2], full[on_nodes, -count:].reshape(len(mesh.nodes), -1)
+        ),
+    )
 
 
 class _Mesh:
