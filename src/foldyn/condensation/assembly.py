@@ -152,6 +152,15 @@ class Whole:
                 total[k] = sparse.csr_array(total[k] + placed.T @ (diagonal.tocsr() @ placed))
         return total[0], total[1]
 
+    @property
+    def rotated(self) -> NDArray[np.float64]:
+        """Unknowns (m, 3) other than displacements, in rotations by 1 rad about x, y, z."""
+        along = self._along / np.linalg.norm(self._along, axis=1)[:, None]
+        out, edge = np.zeros((self.unknowns.size, 3)), np.arange(self.unknowns.edges)
+        for side, sign in ((0, 1.0), (1, -1.0)):
+            out[self.unknowns.turn(edge, side, 0)] = sign * along
+        return out
+
     def turns_of(self, edges: NDArray) -> sparse.csr_array:
         """Turns (k * turns, m) of both sides of edges (k,) relative to each other."""
         own, count = self.unknowns, self.level.turns

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -42,37 +43,45 @@ class Group(NamedTuple):
     number: NDArray  # (p,) indices in the pattern
 
 
+@dataclass(frozen=True)
+class _Shape:
+    """A shape of panels, the same for coordinates that differ in the last digits."""
+
+    places: tuple[tuple[float, ...], ...]  # rounded
+    size: float
+    corners: NDArray = field(compare=False)  # (k, 3), m
+
+
 @lru_cache(maxsize=ROOM)
 def _condensed(
-    corners: tuple[tuple[float, ...], ...], sheet: Sheet, meshes: Meshes
+    shape: _Shape, sheet: Sheet, meshes: Meshes
 ) -> tuple[CondensedPanel, CondensedPanel]:
     """A panel, and the same from coarser meshes."""
     *others, finest = meshes.graded
-    fine = condense(np.array(corners), sheet, finest)
+    fine = condense(shape.corners, sheet, finest)
     if not others:
         return fine, fine
-    coarse, middle = (condense(np.array(corners), sheet, graded, fine) for graded in others)
+    coarse, middle = (condense(shape.corners, sheet, graded, fine) for graded in others)
     first, second, third = meshes.divisions
     return extrapolated(middle, fine, third / second), extrapolated(coarse, middle, second / first)
 
 
 def groups(pattern: Pattern, sheets: Sequence[Sheet], meshes: Meshes) -> list[Group]:
     """The condensed panels of a pattern, grouped by congruence; `sheets` of all panels."""
-    found: dict[tuple, list[tuple[int, NDArray, NDArray]]] = {}
+    found: dict[tuple[_Shape, Sheet], list[tuple[int, NDArray, NDArray]]] = {}
     for number, (face, sheet) in enumerate(zip(pattern.faces, sheets, strict=True)):
-        corners, turned, frame = _described(pattern.vertices[list(face)], pattern.size)
-        found.setdefault((corners, sheet), []).append((number, np.roll(face, -turned), frame))
+        shape, turned, frame = _described(pattern.vertices[list(face)], pattern.size)
+        found.setdefault((shape, sheet), []).append((number, np.roll(face, -turned), frame))
     out = []
-    for (corners, sheet), members in found.items():
-        scaled = tuple(tuple(float(x * pattern.size) for x in corner) for corner in corners)
+    for (shape, sheet), members in found.items():
         numbers, faces, frames = zip(*members, strict=True)
-        panels = _condensed(scaled, sheet, meshes)
+        panels = _condensed(shape, sheet, meshes)
         out.append(Group(*panels, np.array(faces), np.array(frames), np.array(numbers)))
     return out
 
 
-def _described(x: NDArray, size: float) -> tuple[tuple[tuple[float, ...], ...], int, NDArray]:
-    """Corners (k, 3) over `size` in the frame of one corner, the first of all in sorted order.
+def _described(x: NDArray, size: float) -> tuple[_Shape, int, NDArray]:
+    """Shape in the frame of one corner, the first of all in sorted order.
 
     Also returns the number of corners before that corner, and the frame (3, 3).
     """
@@ -85,6 +94,7 @@ def _described(x: NDArray, size: float) -> tuple[tuple[tuple[float, ...], ...], 
         normal = area - (area @ first) * first
         normal = normal / np.linalg.norm(normal)
         frame = np.stack([first, np.cross(normal, first), normal])
-        places = np.round(away @ frame.T / size, ALIKE) + 0.0  # no negative zeros
-        described.append((tuple(map(tuple, places.tolist())), turned, frame))
-    return min(described, key=lambda one: one[0])
+        own = away @ frame.T
+        places = np.round(own / size, ALIKE) + 0.0  # no negative zeros
+        described.append((_Shape(tuple(map(tuple, places.tolist())), size, own), turned, frame))
+    return min(described, key=lambda one: one[0].places)

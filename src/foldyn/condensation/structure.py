@@ -169,7 +169,11 @@ class Superelements(Discretized):
             1.0 / (2 * degree + 1),
         )
         panels, mass = (sparse.csr_array(dofs.T @ own @ dofs) for own in made.matrices(compared))
-        return SuperelementsTerm(panels, mass, turns, self._slope, self._fold_hinges, self.nodes)
+        parts = dofs.power(2).sum(axis=0)  # unknowns of each dof: two turns at welds, otherwise one
+        rotated = (dofs.T @ made.rotated / parts[:, None])[self.nodes.size :]
+        return SuperelementsTerm(
+            panels, mass, turns, self._slope, self._fold_hinges, self.nodes, rotated
+        )
 
     @property
     def _fold_hinges(self) -> FoldHinges:

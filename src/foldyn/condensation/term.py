@@ -83,6 +83,8 @@ class SuperelementsTerm(SheetTerm):
         One for each fold.
     nodes : (n, 3)
         Vertices, m.
+    rotated : (h, 3)
+        See `SheetTerm`.
     """
 
     energy_groups = GROUPS
@@ -91,9 +93,10 @@ class SuperelementsTerm(SheetTerm):
 
     def __init__(
         self, panels: sparse.csr_array, mass: sparse.csr_array, turns: CreaseTurns, slope: NDArray,
-        folds: FoldHinges, nodes: NDArray,
+        folds: FoldHinges, nodes: NDArray, rotated: NDArray,
     ) -> None:  # fmt: skip
         self.mass, self.crease_turns, self._fold_hinges, self._panels = mass, turns, folds, panels
+        self.rotated = rotated
         resisted = turns.rows * (slope[turns.fold] * turns.share)[:, None]
         self._folds = sparse.csr_array(turns.rows.T @ resisted)
         self._stiffness = sparse.csr_array(panels + self._folds)

@@ -28,7 +28,7 @@ from foldyn.errors import InputError, warn
 from foldyn.materials import Superlinear
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import following_tangent, joined
-from foldyn.statics.rigid import free_rigid_motions
+from foldyn.statics.rigid import free_rigid_motions, of_all_dofs
 
 # a superlinear hinge with a slope below this share of k is at rest up to rounding: 4e-7 rad from
 # rest, which the tolerance of statics leaves undetermined
@@ -241,10 +241,11 @@ def _rigid(
     pencil: Pencil, spectrum: Spectrum, case: Case, state: NDArray, free: NDArray
 ) -> NDArray:
     """Whether each mode (k,) is a rigid motion with almost no stiffness."""
-    motions = free_rigid_motions(case.structure.nodes + state, case.constraints)
+    x = case.structure.nodes + state
+    motions = of_all_dofs(case.elastic_body, x, free_rigid_motions(x, case.constraints))
     space = np.zeros((pencil.size, motions.shape[1]))
-    nodal = free < len(motions)
-    space[nodal] = motions[free[nodal]]
+    known = free < len(motions)
+    space[known] = motions[free[known]]
     if not space.shape[1]:
         return np.zeros(len(spectrum.values), bool)
     carried = pencil.mass @ space

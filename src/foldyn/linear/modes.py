@@ -28,7 +28,7 @@ from foldyn.linear.level_error import frequency_errors, other_level
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
 from foldyn.ram_limit import check_memory
 from foldyn.results import modes_dataset
-from foldyn.statics.rigid import free_rigid_motions, rigid_motions
+from foldyn.statics.rigid import free_rigid_motions, of_all_dofs, rigid_motions
 from foldyn.statics.stability import oriented
 from foldyn.structures.stretching import most, remedy, stretching
 from foldyn.values import of_kind, whole
@@ -344,10 +344,9 @@ def rigid_space(linear: Linearized) -> NDArray:
     chosen = np.linalg.lstsq(plain, allowed, rcond=None)[0]
     basis, _ = np.linalg.qr(chosen)
     motions = plain @ (basis @ basis.T)
-    on_nodes = linear.free[linear.free < x.size]
-    # rotations of a shell are relative to its panels: they stay 0
-    still = np.zeros((len(linear.free) - len(on_nodes), motions.shape[1]))
-    return _orthonormal(linear, np.vstack([motions[on_nodes], still]))
+    whole = np.zeros((linear.inner.mass.shape[0], motions.shape[1]))
+    whole[: linear.case.elastic_body.size] = of_all_dofs(linear.case.elastic_body, x, motions)
+    return _orthonormal(linear, whole[linear.free])
 
 
 def _orthonormal(linear: Linearized, motions: NDArray) -> NDArray:

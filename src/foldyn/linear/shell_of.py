@@ -12,6 +12,7 @@ from foldyn.cases import Case, Rayleigh
 from foldyn.errors import InputError, warn, within
 from foldyn.patterns import Pattern
 from foldyn.shells import Shell, ShellOptions, shell
+from foldyn.structures import Structure
 from foldyn.structures.discretized import Discretized
 from foldyn.values import of_kind, show, whole
 
@@ -35,10 +36,10 @@ def check_reduced(case: Any) -> None:
     """
     of_kind("case", case, Case)
     structure = case.structure
-    if structure.kind == Shell.kind:
+    if structure.kind != Structure.kind:
         raise InputError(
-            ": is a shell, and bars and hinges are compared with the shell; make its structure "
-            'with fd.discretize (in a case file model.kind = "bars_and_hinges")',
+            f": its model is {structure.kind}, and bars and hinges are compared with the shell; "
+            'make its structure with fd.discretize (in a case file model.kind = "bars_and_hinges")',
             "case",
         )
     if structure.pattern is None or not structure.as_made:

@@ -154,6 +154,9 @@ class SheetTerm(Term):
         Mass of a linear sheet on all of its dofs, kg; None if nodes alone have mass.
     crease_turns : CreaseTurns or None
         Turns of the creases of a linear sheet.
+    rotated : ndarray or None
+        Hidden dofs (h, 3) in rotations of the whole by 1 rad about x, y, z; None if they are
+        relative to their panels, and stay zero.
     """
 
     model: Any
@@ -164,6 +167,7 @@ class SheetTerm(Term):
     offsets: int = 0
     mass: sparse.csr_array | None = None
     crease_turns: CreaseTurns | None = None
+    rotated: NDArray | None = None
     shared = True
 
     # ------------------------------------------------------------------ mechanics

@@ -16,6 +16,7 @@ from scipy.linalg import qr
 from foldyn.cases import Case
 from foldyn.cases.constraints import Constraints
 from foldyn.errors import InputError
+from foldyn.mechanics.assembly import Assembly
 
 FREE = 1e-9  # motion of held dofs that counts as zero, relative to the size of the rigid motion
 AXES = "xyz"
@@ -28,13 +29,27 @@ def rigid_motions(x: NDArray) -> NDArray:
     Rotations are small, about the mean point, and divided by the size of the body, so that all six
     motions are of similar size.
     """
-    arm = x - x.mean(axis=0)
-    size = float(np.sqrt((arm**2).sum() / max(len(x), 1))) or 1.0
+    arm, size = x - x.mean(axis=0), _radius(x)
     motions = np.zeros((len(x), 3, 6))
     for axis in range(3):
         motions[:, axis, axis] = 1.0
         motions[:, :, 3 + axis] = np.cross(np.eye(3)[axis], arm / size)
     return motions.reshape(-1, 6)
+
+
+def _radius(x: NDArray) -> float:
+    """Root mean square distance (m) of points from their mean."""
+    return float(np.sqrt(((x - x.mean(axis=0)) ** 2).sum() / max(len(x), 1))) or 1.0
+
+
+def of_all_dofs(body: Assembly, x: NDArray, motions: NDArray) -> NDArray:
+    """Rigid motions (m, r) of all dofs, from those (3n, r) of nodes at x (n, 3)."""
+    out = np.zeros((body.size, motions.shape[1]))
+    out[: x.size] = motions
+    if body.sheet.rotated is not None:
+        parts = np.linalg.lstsq(rigid_motions(x), motions, rcond=None)[0]
+        out[body.hidden] = body.sheet.rotated @ parts[3:] / _radius(x)
+    return out
 
 
 def free_rigid_motions(

@@ -1,0 +1,287 @@
+"""Superelements against shells on the same mesh, and their estimates of errors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.condensation.shapes import LEVELS
+from foldyn.errors import InputError
+
+SHEET = fd.Sheet(1e9, 0.3, 0.01, 1000.0)
+PATTERN = fd.patterns.miura(cells=(1, 1), panel_angle=55, dihedral=100)
+TIP = int(np.argmax(PATTERN.vertices[:, 0]))
+HELD = [fd.Fix("xmin", along=True)]
+MESH = 8
+
+
+def both(pattern=PATTERN, sheet=SHEET, level=5, **options):
+    """Superelements, and the shell whose panels they condense."""
+    radius = float(np.max(sheet.values("thickness", len(pattern.faces))))
+    return (
+        fd.superelements(pattern, sheet, level=level, divisions=MESH, **options),
+        fd.shell(
+            pattern, sheet, divisions=MESH, mass="consistent", vertex_radius=radius, **options
+        ),
+    )
+
+
+def frequencies(structure, supports=HELD, count=8, **parts):
+    return fd.modes(fd.Case(structure, supports, **parts), count, verify=False)["frequency"].values
+
+
+@pytest.mark.parametrize("supports", [HELD, [fd.Fix("xmin")], []], ids=["along", "nodes", "free"])
+def test_levels_fall_toward_the_shell(supports):
+    shell = frequencies(both()[1], supports, 12)
+    found = [frequencies(both(level=k)[0], supports, 12) for k in range(1, len(LEVELS) + 1)]
+    elastic = shell > 0.01
+    assert elastic.sum() == (12 if supports else 6)
+    off = np.array(found)[:, elastic] / shell[elastic] - 1.0
+    assert (off > -1e-4).all()  # more shapes only soften
+    assert (np.diff(off, axis=0) < 1e-6).all()
+    assert off[0].max() < 0.12 and off[2].max() < 0.02 and off[4].max() < 0.006
+
+
+def test_a_free_sheet_has_six_rigid_modes_and_its_mass():
+    structure = both()[0]
+    modes = fd.modes(fd.Case(structure), 7)
+    assert modes["rigid"].values.tolist() == 6 * [True] + [False]
+    assert modes["frequency_error"].values[:6].tolist() == 6 * [0.0]
+    np.testing.assert_allclose(modes["effective_mass"].sum("mode"), structure.total_mass, rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        lambda s: fd.Case(s, HELD, masses=[fd.PointMass([TIP], 20.0)]),
+        lambda s: fd.Case(s, [*HELD, fd.Spring(300.0, nodes=[TIP])]),
+        lambda s: fd.Case(s, [*HELD, fd.Link([5, 7], "z")]),
+    ],
+    ids=["mass", "spring", "link"],
+)
+def test_parts_at_vertices(case):
+    own, shell = (fd.modes(case(s), 5)["frequency"].values for s in both())
+    np.testing.assert_allclose(own, shell, rtol=3e-3)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"clamped": "xmin"}, {"rigid": [1]}, {"crease_stiffness": 40.0}, {"fold_law": "linear"}],
+    ids=lambda one: next(iter(one)),
+)
+def test_options_mean_what_they_mean_for_shells(options):
+    own, shell = (frequencies(s, count=6) for s in both(**options))
+    np.testing.assert_allclose(own, shell, rtol=4e-3)
+
+
+def test_panels_of_different_sheets():
+    sheet = replace(SHEET, panels=[fd.PanelSheet([0, 3], thickness=0.02, youngs_modulus=2e9)])
+    own, shell = (frequencies(s, count=6) for s in both(sheet=sheet))
+    np.testing.assert_allclose(own, shell, rtol=6e-3)
+
+
+def test_a_weld_continues_the_sheet():
+    grid = np.array([[i, j, 0.0] for j in (0.0, 1.0) for i in (0.0, 0.8, 2.0)])
+    faces = [(0, 1, 4, 3), (1, 2, 5, 4)]
+    welded = fd.Pattern(grid, faces, welds=[(1, 4)])
+    single = fd.Pattern(grid[[0, 2, 5, 3]], [(0, 1, 2, 3)])
+    held = [fd.Fix("xmin", along=True)]
+    own, shell = (frequencies(s, held, 4) for s in both(welded, clamped="xmin"))
+    np.testing.assert_allclose(own, shell, rtol=5e-3)
+    whole = frequencies(both(single, clamped="xmin")[0], held, 4)
+    np.testing.assert_allclose(own, whole, rtol=0.03)
+
+
+def test_oblique_supports_hold_like_turned_ones():
+    c, s = np.cos(0.7), np.sin(0.7)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    left = np.flatnonzero(PATTERN.vertices[:, 0] < 1e-9).tolist()
+    plain = fd.superelements(PATTERN, SHEET, level=2, divisions=MESH)
+    turned = fd.Pattern(PATTERN.vertices @ turn.T, PATTERN.faces)
+    oblique = fd.superelements(turned, SHEET, level=2, divisions=MESH)
+    straight = [fd.Fix(left, "xz", along=True), fd.Fix(left[:1], "y")]
+    along = [fd.Fix(left, direction=tuple(turn[:, 0]), along=True), fd.Fix(left, "z", along=True)]
+    along.append(fd.Fix(left[:1], direction=tuple(turn[:, 1])))
+    np.testing.assert_allclose(frequencies(plain, straight), frequencies(oblique, along), rtol=1e-7)
+
+
+@pytest.mark.parametrize("stiffer", [1.0, 30.0, 1000.0])
+def test_damping_of_creases(stiffer):
+    stiffness = stiffer * fd.superelements(PATTERN, SHEET).fold_stiffness
+    damping = fd.CreaseDamping(1e-3 * float(stiffness.max()))
+    own, shell = (
+        fd.modes(fd.Case(s, HELD, damping=damping), 5)["damping_ratio"].values
+        for s in both(crease_stiffness=stiffness.tolist())
+    )
+    np.testing.assert_allclose(own, shell, rtol=0.02)
+
+
+@pytest.mark.parametrize("method", ["direct", "modal"])
+def test_responses_with_creases_that_relax(method):
+    push = fd.Force([TIP], (0.0, 0.0, 1.0))
+    law = fd.Prony([0.4], [0.1])
+    own, shell = (
+        fd.frf(
+            fd.Case(s, HELD, damping=fd.Rayleigh(alpha=0.3)), drive=[push],
+            frequencies=[0.3, 0.7, 1.1], method=method,
+        )["receptance"].values[:, TIP]
+        for s in both(fold_law=law)
+    )  # fmt: skip
+    np.testing.assert_allclose(own, shell, atol=6e-3 * np.abs(shell).max())
+
+
+def test_participation_includes_parts_that_move_with_supports():
+    own, shell = (fd.modes(fd.Case(s, HELD), 3) for s in both())
+    np.testing.assert_allclose(own["effective_mass"], shell["effective_mass"], rtol=0.03, atol=0.05)
+
+
+def test_small_static_loads():
+    own, shell = (
+        fd.trace(
+            fd.Case(s, HELD, [fd.Force([TIP], (0.0, 0.0, 1.0))]), "newton", load_factors=[1e-3]
+        )["displacement"].values[-1, TIP]
+        for s in both()
+    )
+    np.testing.assert_allclose(own, shell, atol=2e-3 * np.abs(shell).max())
+
+
+@pytest.mark.parametrize(
+    ("pattern", "thickness"),
+    [
+        (PATTERN, 0.003),
+        (fd.patterns.kresling(sides=6, height=1.5, twist=30), 0.025),
+        (fd.patterns.miura(cells=(1, 1), dihedral=176), 0.01),
+    ],
+    ids=["thin", "tower", "nearly flat"],
+)
+def test_errors_bound_the_difference_to_fine_shells(pattern, thickness):
+    sheet, supports = replace(SHEET, thickness=thickness), [fd.Fix("zmin")]
+    meshes = (8, 12, 16)
+    shells = [
+        frequencies(
+            fd.shell(pattern, sheet, divisions=n, mass="consistent", vertex_radius=thickness),
+            supports,
+        )
+        for n in meshes
+    ]
+    limit = shells[2] + (shells[2] - shells[1]) / ((meshes[2] / meshes[1]) ** 2 - 1.0)
+    for level in (3, 5):
+        made = fd.superelements(pattern, sheet, level=level)
+        modes = fd.modes(fd.Case(made, supports), 8)
+        off = np.abs(modes["frequency"].values - limit)
+        assert (off < modes["frequency_error"].values).all()
+        assert (modes["frequency_error"] < 0.05 * modes["frequency"]).all()
+        if level == 5:
+            assert (off < 0.01 * limit).all()
+
+
+def test_congruent_panels_are_condensed_once():
+    sheet = fd.superelements(fd.patterns.miura(cells=(2, 2)), SHEET, level=1)
+    assert len(sheet.whole._groups) == 1
+
+
+MOVES_FAR = {
+    "contact": {"contact": fd.Contact()},
+    "air": {"air": fd.Air()},
+    r"loads\[0\]: Gravity": {"loads": [fd.Gravity("-z")]},
+    r"loads\[0\]: Pressure": {"loads": [fd.Pressure(1.0)]},
+    r"loads\[0\]: Actuate": {"loads": [fd.Actuate("all", 170.0)]},
+    r"loads\[0\]: Temperature": {"loads": [fd.Temperature(10.0, 1e-5)]},
+    "StrainDamping": {"damping": fd.StrainDamping(1e-3)},
+}
+
+
+@pytest.mark.parametrize("named", MOVES_FAR)
+def test_what_superelements_leave_out_is_refused(named):
+    structure = fd.superelements(PATTERN, SHEET, level=1, divisions=4)
+    with pytest.raises(InputError, match=named):
+        fd.Case(structure, HELD, **MOVES_FAR[named])
+
+
+@pytest.mark.parametrize(
+    "analysis",
+    [
+        lambda c: fd.simulate(c, 0.1),
+        lambda c: fd.simulate(c, 0.1, method="newmark"),
+        lambda c: fd.critical_step(c),
+        lambda c: fd.modes(c, state="equilibrium"),
+        lambda c: fd.fidelity(c),
+        lambda c: fd.lyapunov_exponent(c, 1.0),
+    ],
+)
+def test_analyses_of_what_moves_far_are_refused(analysis):
+    structure = fd.superelements(PATTERN, SHEET, level=1, divisions=4)
+    with pytest.raises(InputError, match=r"superelements|linear"):
+        analysis(fd.Case(structure, HELD))
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        ({"level": 6}, "level = 6"),
+        ({"divisions": 6}, "divisions = 6.*multiple of 4"),
+        ({"fold_law": "superlinear"}, "no slope at rest"),
+        ({"mass": "centroid"}, "mass"),
+        ({"vertex_radius": 0.4}, "vertex_radius = 0.4"),
+        ({"rigid": [9]}, "panel 9"),
+    ],
+)
+def test_wrong_options_are_named(options, named):
+    with pytest.raises(InputError, match=named):
+        fd.superelements(PATTERN, SHEET, **options)
+
+
+def test_sheets_without_density_are_refused():
+    with pytest.raises(InputError, match="density"):
+        fd.superelements(PATTERN, replace(SHEET, density=None))
+
+
+CASE = """
+[pattern]
+kind = "miura"
+cells = [1, 1]
+[sheet]
+youngs_modulus = 1e9
+poissons_ratio = 0.3
+thickness = 0.01
+density = 1000.0
+[model]
+kind = "superelements"
+level = 2
+[[supports]]
+nodes = "xmin"
+along = true
+[analysis]
+kind = "modes"
+count = 3
+"""
+
+
+def test_a_case_file_gives_modes_that_can_be_run_again(tmp_path):
+    path = tmp_path / "sheet.toml"
+    path.write_text(CASE, encoding="utf-8")
+    found = fd.read_case(path).run()
+    fd.save(found, tmp_path / "modes.nc")
+    again = fd.modes(fd.case_of(fd.load(tmp_path / "modes.nc")), 3)
+    np.testing.assert_array_equal(again["frequency"], found["frequency"])
+    np.testing.assert_array_equal(again["frequency_error"], found["frequency_error"])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ('kind = "modes"\ncount = 3', 'kind = "dynamics"\nduration = 1.0', "model.kind"),
+        ("level = 2", 'scheme = "n4b5"', "model.scheme"),
+        ("level = 2", "level = 9", "model.level"),
+        ("count = 3", "count = 3\nsecant = 1.0", "analysis.secant"),
+        ('kind = "superelements"\n', "", "model.level"),
+    ],
+)
+def test_wrong_case_files_are_refused(tmp_path, old, new, named):
+    path = tmp_path / "sheet.toml"
+    path.write_text(CASE.replace(old, new), encoding="utf-8")
+    with pytest.raises(InputError, match=named):
+        fd.read_case(path)
