@@ -11,7 +11,7 @@ import numpy as np
 from foldyn.cases import Case, Rayleigh
 from foldyn.errors import InputError, warn, within
 from foldyn.patterns import Pattern
-from foldyn.shells import Shell, ShellOptions, shell
+from foldyn.shells import ShellOptions, shell
 from foldyn.structures import Structure
 from foldyn.structures.discretized import Discretized
 from foldyn.values import of_kind, show, whole
