@@ -26,7 +26,7 @@ from foldyn.errors import FoldynWarning, InputError
 
 POINTS = np.array([[0, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0]], dtype=float)
 STRUCTURE = SimpleNamespace(
-    nodes=POINTS, pattern=SimpleNamespace(vertices=POINTS), plates=(), clamped_nodes=()
+    nodes=POINTS, pattern=SimpleNamespace(vertices=POINTS), plates=(), clamped_nodes=(), linear=""
 )
 
 

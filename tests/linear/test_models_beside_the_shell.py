@@ -343,7 +343,7 @@ CENTER = r"nodes: node {} is the center of panel {}"
         (lambda c: c.structure, r"case: got Structure, give a Case"),
         (
             lambda c: fd.Case(fd.shell(c.structure.pattern, SHEET, divisions=3)),
-            r"case: is a shell, .*",
+            r"case: its model is shell, .*",
         ),
         (
             lambda c: fd.Case(heavier(c)),
