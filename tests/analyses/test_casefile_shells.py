@@ -10,7 +10,6 @@ import foldyn as fd
 from case_texts import FOLD_TEXT, changed, rows
 from foldyn.analyses import read_case
 from foldyn.analyses.motion import MASSLESS_METHODS
-from foldyn.cases.models import MODELS
 from foldyn.dynamics import METHODS
 from foldyn.errors import InputError
 
@@ -53,7 +52,7 @@ def filed(tmp_path):
 
 def test_one_file_gives_both_models_and_they_bend_alike(filed):
     moved = {}
-    for kind in MODELS:
+    for kind in ("bars_and_hinges", "shell"):
         case_file = read_case(filed(f'model.kind = "{kind}"'))
         path = fd.trace(case_file.case(), **case_file.analysis.arguments)
         moved[kind] = path.displacement.sel(node=case_file.output.nodes, axis="x").values[-1]
@@ -137,7 +136,7 @@ loads =; model.kind = "shell"; drive = [{ nodes = [0, 1], force = [-0.001, 0, 0]
 loads =; model.kind = "shell"; analysis.steps =; analysis.kind = "modes"; analysis.internal = 3 |
     analysis.internal = 3: is for the panels of bars and hinges; leave it out
 loads =; model.kind = "shell"; analysis.steps =; analysis.kind = "modes"; analysis.secant = 1 |
-    analysis.secant = 1.0: is for superlinear bends, and a shell has none; leave it out
+    analysis.secant = 1.0: is for superlinear bends, which a shell cannot have; leave it out
 model.kind = "shell"; supports[0].nodes = [4, 6] | supports[0].nodes: 6 is no vertex of the
     pattern, which has 0 to 5; a case file names nodes of a shell by vertex, whatever its
     divisions

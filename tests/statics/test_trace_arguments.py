@@ -102,7 +102,7 @@ def test_start_with_nodes_on_top_of_each_other():
     case = compression()
     u = np.zeros_like(case.structure.nodes)
     u[30] = case.structure.nodes[31] - case.structure.nodes[30]
-    with pytest.raises(InputError, match="initial: the neighboring nodes 30 and 31 fall"):
+    with pytest.raises(InputError, match="initial: the neighboring nodes 30 and 31 coincide"):
         trace(case, load_factors=[0.0], initial=fd.State(u))
 
 
