@@ -9,7 +9,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.condensation.shapes import LEVELS
-from foldyn.errors import InputError
+from foldyn.errors import InputError, ModelRangeWarning
 
 SHEET = fd.Sheet(1e9, 0.3, 0.01, 1000.0)
 PATTERN = fd.patterns.miura(cells=(1, 1), panel_angle=55, dihedral=100)
@@ -148,6 +148,13 @@ def test_small_static_loads():
     np.testing.assert_allclose(own, shell, atol=2e-3 * np.abs(shell).max())
 
 
+def test_large_turns_are_warned_of():
+    case = fd.Case(both(level=2)[0], HELD, [fd.Force([TIP], (0.0, 0.0, 1.0))])
+    small = fd.trace(case, "newton", load_factors=[1.0])["displacement"].values[-1, TIP, 2]
+    with pytest.warns(ModelRangeWarning, match=r"panels turn by .* degrees at point 0"):
+        fd.trace(case, "newton", load_factors=[0.2 / small])
+
+
 @pytest.mark.parametrize(
     ("pattern", "thickness"),
     [
@@ -210,6 +217,10 @@ def test_what_superelements_leave_out_is_refused(named):
         lambda c: fd.modes(c, state="equilibrium"),
         lambda c: fd.fidelity(c),
         lambda c: fd.lyapunov_exponent(c, 1.0),
+        lambda c: fd.UnitCell(c),
+        lambda c: fd.sensitivity(
+            lambda x: c, {"x": 1.0}, measures="frequency[1]", analysis={"kind": "modes"}
+        ),
     ],
 )
 def test_analyses_of_what_moves_far_are_refused(analysis):

@@ -88,6 +88,7 @@ class SuperelementsTerm(SheetTerm):
     """
 
     energy_groups = GROUPS
+    undifferentiated = "superelements"
     mass: sparse.csr_array
     crease_turns: CreaseTurns
 

@@ -270,7 +270,9 @@ def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, N
 def _check_acts(structure: Discretized, name: str) -> None:
     """Refuse an array of numbers that has no effect in a structure."""
     if not isinstance(structure, Structure):
-        raise InputError(": a shell has no such arrays; give a function that builds it", name)
+        raise InputError(
+            ": only bars and hinges have such arrays; give a function that builds the case", name
+        )
     if name == "node_mass" and not is_lumped(structure.mass):
         raise InputError(
             f": the mass rule {show(structure.options.mass)} couples nodes; take a rule that lumps "

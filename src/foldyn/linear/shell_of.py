@@ -38,8 +38,8 @@ def check_reduced(case: Any) -> None:
     structure = case.structure
     if structure.kind != Structure.kind:
         raise InputError(
-            f": its model is {structure.kind}, and bars and hinges are compared with the shell; "
-            'make its structure with fd.discretize (in a case file model.kind = "bars_and_hinges")',
+            f": its model is {structure.kind}, and the shell is made from bars and hinges; make "
+            'its structure with fd.discretize (in a case file model.kind = "bars_and_hinges")',
             "case",
         )
     if structure.pattern is None or not structure.as_made:

@@ -114,7 +114,12 @@ class UnitCell:
     copies: Copies = field(init=False)
 
     def __post_init__(self) -> None:
-        pattern = of_kind("case", self.case, Case).structure.pattern
+        structure = of_kind("case", self.case, Case).structure
+        if structure.linear:
+            raise InputError(
+                f": waves do not support {structure.linear}; take fd.discretize or fd.shell", "case"
+            )
+        pattern = structure.pattern
         if pattern is None:
             raise InputError(": its structure has no pattern that could repeat", "case")
         tolerance = number("tolerance", self.tolerance, above=0.0, below=NEAR_MISS)

@@ -18,7 +18,14 @@ import xarray
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.errors import ComputationError, CrossingWarning, MotionInterrupted, StretchWarning, warn
+from foldyn.errors import (
+    ComputationError,
+    CrossingWarning,
+    ModelRangeWarning,
+    MotionInterrupted,
+    StretchWarning,
+    warn,
+)
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.results import path_dataset
 from foldyn.results.crossings import crossings_of
@@ -27,10 +34,11 @@ from foldyn.statics.newton import Solver
 from foldyn.statics.path_methods import METHODS
 from foldyn.statics.stepping import REMEDY_COLLISION, REMEDY_LOCKED, PathStoppedError, Point, Walk
 from foldyn.structures.beyond_range import kept_apart, locks
-from foldyn.structures.mesh import hinge_angles, lengths
+from foldyn.structures.mesh import double_areas, hinge_angles, lengths
 from foldyn.structures.stretching import remedy, stretch
 
 MOST_STRETCH = 2.0  # stretch of a bar: no sheet can be followed beyond it
+LINEAR = 5.0  # degrees by which panels of a linear model may turn: its strains are off by 0.4 %
 CLOSED = 179.0  # degrees from flat beyond which a fold counts as closed
 MOST_LISTED = 20  # most stability changes listed in the attribute
 
@@ -232,6 +240,8 @@ def _dataset(
         warn(crossings.text(when, len(points)), "results.md#panels-that-cross", CrossingWarning)
     if message := _stretch_warning(problem, points, energies, displacement):
         warn(message, "models.md#where-panels-stretch", StretchWarning)
+    if message := _turn_warning(problem, points, displacement):
+        warn(message, "superelements.md#what-it-takes", ModelRangeWarning)
     intervals = {}
     if any(point.interval for point in points):  # some critical points could not be located
         intervals["interval"] = [p.interval or (p.factor, p.factor) for p in points]
@@ -282,6 +292,25 @@ def _stretch_warning(
         f"panels that stretch hold {found.share:.0%} of the strain energy where that is largest, "
         f"at point {found.at} (load factor {points[found.at].factor:.6g}), "
         f"{remedy(problem.structure)}"
+    )
+
+
+def _turn_warning(problem: OrigamiProblem, points: Sequence[Point], displacement: NDArray) -> str:
+    """Warning if panels of a linear model turn far; empty otherwise."""
+    structure = problem.structure
+    if not structure.linear:
+        return ""
+    normals = [double_areas(structure.nodes + u, structure.triangles) for u in (0.0, *displacement)]
+    rest, *moved = (n / np.linalg.norm(n, axis=1, keepdims=True) for n in normals)
+    apart = np.array([np.linalg.norm(normal - rest, axis=1).max() for normal in moved])
+    turns = np.degrees(2.0 * np.arcsin(0.5 * apart))
+    at = int(np.argmax(turns > LINEAR))
+    if turns[at] <= LINEAR:
+        return ""
+    return (
+        f"panels turn by {turns[at]:.2g} degrees at point {at} (load factor "
+        f"{points[at].factor:.6g}), and {structure.linear} are linear: reduce the loads, or take "
+        "bars and hinges or the shell"
     )
 
 
