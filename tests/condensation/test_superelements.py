@@ -133,6 +133,18 @@ def test_responses_with_creases_that_relax(method):
     np.testing.assert_allclose(own, shell, atol=6e-3 * np.abs(shell).max())
 
 
+def test_responses_say_how_far_they_hold():
+    case = fd.Case(fd.superelements(PATTERN, SHEET, level=1), HELD, damping=fd.Rayleigh(alpha=1.0))
+    modes = fd.modes(case, 10)
+    doubtful = modes["frequency"].values[modes["frequency_error"] > 0.05 * modes["frequency"]]
+    push = [fd.Force([TIP], (0.0, 0.0, 1.0))]
+    low = 0.5 * float(doubtful[0])
+    assert fd.frf(case, drive=push, frequencies=[low]).attrs["holds_to"] == low
+    with pytest.warns(ModelRangeWarning, match="hold up to"):
+        high = fd.frf(case, frequencies=[2.0 * float(doubtful[0])], drive=push)
+    assert high.attrs["holds_to"] == pytest.approx(float(doubtful[0]))
+
+
 def test_participation_includes_parts_that_move_with_supports():
     own, shell = (fd.modes(fd.Case(s, HELD), 3) for s in both())
     np.testing.assert_allclose(own["effective_mass"], shell["effective_mass"], rtol=0.03, atol=0.05)

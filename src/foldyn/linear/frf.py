@@ -13,12 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.algebra.eigen import SHIFT, Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
+from foldyn.condensation import Superelements
 from foldyn.dynamics.progress import Reporter
-from foldyn.errors import InputError, StretchWarning, warn
+from foldyn.errors import InputError, ModelRangeWarning, StretchWarning, warn
 from foldyn.linear.excitation import NAMED, Answer, absolute, drive_of
 from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
+from foldyn.linear.modes import DOUBTFUL, range_of_superelements
 from foldyn.linear.time_domain import Rig, SteppedSine, reported, stepped_sine
 from foldyn.linear.transients import BurstRandom, Impulse, burst_random, impulse
 from foldyn.ram_limit import check_memory
@@ -126,7 +128,8 @@ def frf(
         w t): a lag is a negative phase; nan if there is no response. `displacement` of the state,
         and `drive`, the amplitudes of the drive. `coherence` (burst_random), `unsteadiness`
         (stepped_sine) or `swing` (harmonic). Attributes hold the method, its options and facts
-        about the run.
+        about the run, for superelements also `holds_to` (Hz), up to which modes are estimated to be
+        within 5 %.
 
     Raises
     ------
@@ -141,6 +144,8 @@ def frf(
     FoldynWarning
         The state is not an equilibrium, or is unstable; hinges have no slope; a resonance without
         damping; a motion that has not decayed or settled.
+    ModelRangeWarning
+        Frequencies lie above the range of the model.
 
     Notes
     -----
@@ -192,6 +197,8 @@ def frf(
             _warn_of_stretch(system, frequency, answer.response)
             response, displacement = absolute(system, driven, answer.response), system.displacement
             own = {"soft_hinges": system.soft, "internal": system.internal or None}
+            if isinstance(case.structure, Superelements):
+                own["holds_to"] = _range(case, float(frequency.max()))
         else:
             rig = Rig(case, state, load_factor, driven, chosen)
             answer = way.compute(rig, frequency, chosen, report)
@@ -212,6 +219,20 @@ def frf(
     return frf_dataset(
         case, frequency, driven.quantity, response, displacement, driven.vector, facts, answer.more
     )
+
+
+def _range(case: Case, top: float) -> float:
+    """Frequency (Hz), at most `top`, up to which superelements hold; warns if it is lower."""
+    holds = range_of_superelements(case, top)
+    if holds < top:
+        warn(
+            f"the response is estimated to hold up to {holds:.4g} Hz: above, frequencies of modes "
+            f"are doubtful by more than {DOUBTFUL:.0%}, or not estimated; take a higher level or "
+            "lower frequencies",
+            "superelements.md#errors",
+            ModelRangeWarning,
+        )
+    return holds
 
 
 def _warn_of_instability(system: Linearized) -> None:

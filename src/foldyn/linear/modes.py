@@ -37,6 +37,8 @@ COPIES = 4  # copies of the shapes in memory, while they are found and stored
 RIGID = 1.0 - 1e-6  # share in the space of rigid motions above which a shape counts as rigid
 ROUNDING = 1e3 * EPS  # forces on a rigid motion r below this, relative to |K| |r|, count as zero
 TURN = 2.0 * np.pi
+COUNTS = (10, 40)  # numbers of modes whose errors are estimated for a frequency response
+DOUBTFUL = 0.05  # relative error of a frequency up to which a response is said to hold
 TWINS = 1e-8  # eigenvalues with a smaller relative difference count as one
 INDEPENDENT = 1e-6  # least remainder after orthogonalization, relative to a motion's size
 
@@ -179,6 +181,21 @@ def spectrum_of(
         variables["frequency_error"] = np.where(variables["rigid"], 0.0, estimate)
     result = modes_dataset(case, variables, statistics)
     return Found(linear, spectrum, result)
+
+
+def range_of_superelements(case: Case, top: float) -> float:
+    """Frequency (Hz) up to which modes are estimated to be within `DOUBTFUL`; at most `top`.
+
+    Not more than the last of `COUNTS` modes are estimated.
+    """
+    frequency = np.zeros(1)
+    for count in COUNTS:
+        found = spectrum_of(case, count, verify=False).result
+        frequency, error = found["frequency"].values, found["frequency_error"].values
+        doubtful = frequency[error > DOUBTFUL * frequency]
+        if doubtful.size or frequency[-1] >= top:
+            return min(float(np.append(doubtful, top)[0]), top)
+    return float(frequency[-1])
 
 
 def _variables(
