@@ -150,6 +150,17 @@ def test_participation_includes_parts_that_move_with_supports():
     np.testing.assert_allclose(own["effective_mass"], shell["effective_mass"], rtol=0.03, atol=0.05)
 
 
+def test_shapes_between_vertices():
+    own, shell = (fd.modes(fd.Case(s, HELD), 5) for s in both())
+    nodes = both()[1].nodes
+    away = np.linalg.norm(nodes - own["between_position"].values[:, None], axis=2)
+    found = away.min(axis=1) < 1e-9  # middles of edges, and of panels
+    assert found.sum() == len(PATTERN.lines) + len(PATTERN.faces)
+    for mine, theirs in zip(own["between_shape"], shell["shape"], strict=True):
+        a, b = mine.values[found].ravel(), theirs.values[away.argmin(axis=1)[found]].ravel()
+        np.testing.assert_allclose(a, np.sign(a @ b) * b, atol=0.01 * np.abs(b).max())
+
+
 def test_small_static_loads():
     own, shell = (
         fd.trace(

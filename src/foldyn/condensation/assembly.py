@@ -23,12 +23,13 @@ from scipy import sparse
 
 from foldyn.condensation.library import Group
 from foldyn.condensation.panel import BOW, INNER, TURN, VERTEX, edge_frame
-from foldyn.condensation.shapes import ACROSS, ALONG, Level
+from foldyn.condensation.shapes import ACROSS, ALONG, Level, bows
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import edge_lookup
 
 FUNCTION = np.array([ACROSS.index(shape) for shape in ALONG])
 """Index in `ACROSS` of each shape along an edge."""
+PLACES = (0.25, 0.5, 0.75)  # of points on edges for pictures and comparisons
 HELD = 1e-9  # part of a unit vector below which supports hold a direction
 
 
@@ -151,6 +152,40 @@ class Whole:
                 diagonal = sparse.bsr_array((blocks, np.arange(count), np.arange(count + 1)))
                 total[k] = sparse.csr_array(total[k] + placed.T @ (diagonal.tocsr() @ placed))
         return total[0], total[1]
+
+    def between(self, cut_off: float) -> tuple[NDArray, sparse.csr_array]:
+        """Points (q, 3) on edges and at the means of panels' corners, and their motions (3 q, m).
+
+        cut_off : distance (m) from vertices below which places on edges are not stretched.
+        """
+        own, x, ends = self.unknowns, self._pattern.vertices, self.edges
+        axis, edge = np.arange(3), np.arange(own.edges)
+        length = np.linalg.norm(self._along, axis=1)
+        points, columns = [], _Columns()
+        for place in PLACES:
+            points.append((1.0 - place) * x[ends[:, 0]] + place * x[ends[:, 1]])
+            values = np.stack([bows(np.array([place]), cut_off / of, 1)[0] for of in length])
+            vertices = [3 * ends[:, k, None, None] + axis for k in range(2)]
+            bowed = [own.bow(edge, k)[:, None, None] + axis for k in range(own.functions)]
+            rows = np.concatenate([*vertices, *bowed], axis=1)  # (e, 2 + functions, 3)
+            weight = np.concatenate(
+                [np.tile([1.0 - place, place], (own.edges, 1)), values[:, : own.functions]], axis=1
+            )
+            weights = np.broadcast_to(weight[:, :, None], rows.shape)
+            columns.add(np.moveaxis(rows, 2, 1).reshape(-1, rows.shape[1]),
+                        np.moveaxis(weights, 2, 1).reshape(-1, rows.shape[1]))  # fmt: skip
+        on_edges = columns.matrix(own.size).T
+        centers = sparse.csr_array((3 * own.panels, own.size))
+        for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
+            local = np.einsum("pad,ac->pdc", group.frames, group.panel.center[:, kept])
+            number = np.arange(len(local))
+            blocks = sparse.bsr_array((local, number, np.append(number, len(local))))
+            rows = (3 * group.number[:, None] + axis).ravel()
+            entries = (np.ones(len(rows)), (rows, np.arange(len(rows))))
+            put = sparse.csr_array(entries, shape=(3 * own.panels, len(rows)))
+            centers = centers + put @ (blocks.tocsr() @ placed)
+        points.append(np.array([x[list(face)].mean(axis=0) for face in self._pattern.faces]))
+        return np.concatenate(points), sparse.csr_array(sparse.vstack([on_edges, centers]))
 
     @property
     def rotated(self) -> NDArray[np.float64]:

@@ -51,12 +51,15 @@ class CondensedPanel:
         number) or (INNER, 0, mode).
     inner : LinearNDInterpolator
         Displacements (p, 3 q) of the inner modes at points (p, 2) of the panel's plane.
+    center : (3, c)
+        Displacement of the mean of the corners, in the panel's frame.
     """
 
     stiffness: NDArray
     mass: NDArray
     kind: NDArray
     inner: LinearNDInterpolator
+    center: NDArray
 
 
 def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> CondensedPanel:
@@ -101,6 +104,7 @@ def condense(
         turned = left @ right
     full[:, -count:] = inner @ turned
     reduced, carried = mesh.stiffness_of(full), full.T @ (mass @ full)
+    middle = np.linalg.norm(mesh.nodes - mesh.nodes[: mesh.corners].mean(axis=0), axis=1).argmin()
     return CondensedPanel(
         0.5 * (reduced + reduced.T),
         0.5 * (carried + carried.T),
@@ -108,6 +112,7 @@ def condense(
         LinearNDInterpolator(
             mesh.nodes[:, :2], full[on_nodes, -count:].reshape(len(mesh.nodes), -1)
         ),
+        full[3 * middle + np.arange(3)],
     )
 
 

@@ -158,10 +158,7 @@ class Superelements(Discretized):
 
         compared : whether to take panels from coarser meshes; the dofs are the same.
         """
-        pattern, made, count = self.pattern, self.whole, len(self.pattern.creases)
-        number = edge_lookup(pattern.lines)
-        clamped = np.array([number[edge] for edge in self.options.clamped], np.int64)
-        dofs = made.dofs(edges, clamped, rigid_panels(self.options.rigid, len(pattern.faces)))
+        made, count, dofs = self.whole, len(self.pattern.creases), self._dofs(edges)
         degree = np.tile(np.arange(made.level.turns), count)
         turns = CreaseTurns(
             sparse.csr_array(made.turns_of(np.arange(count)) @ dofs),
@@ -174,6 +171,21 @@ class Superelements(Discretized):
         return SuperelementsTerm(
             panels, mass, turns, self._slope, self._fold_hinges, self.nodes, rotated
         )
+
+    def _dofs(self, edges: Mapping[int, NDArray]) -> sparse.csr_array:
+        """Unknowns of `whole` as combinations of dofs."""
+        number = edge_lookup(self.pattern.lines)
+        clamped = np.array([number[edge] for edge in self.options.clamped], np.int64)
+        rigid = rigid_panels(self.options.rigid, len(self.pattern.faces))
+        return self.whole.dofs(edges, clamped, rigid)
+
+    def between(self, edges: Mapping[int, NDArray]) -> tuple[NDArray, sparse.csr_array]:
+        """Points (q, 3) on edges and in panels, and their displacements (3 q, m) for the dofs.
+
+        edges : edges that supports hold, as in `held`.
+        """
+        points, motions = self.whole.between(self.meshes.graded[-1].radius)
+        return points, sparse.csr_array(motions @ self._dofs(edges))
 
     @property
     def _fold_hinges(self) -> FoldHinges:

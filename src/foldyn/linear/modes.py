@@ -94,10 +94,11 @@ def modes(
         frequency is 0 or nan), `participation`, `effective_mass`, and `displacement` of the state;
         in air also `air_share`, the fluid's share of the modal mass (`free_mass`, `participation`
         and `effective_mass` include the fluid); of superelements also `frequency_error` (Hz), an
-        estimate of the largest error relative to a shell on a fine mesh; with internal amplitudes
-        also `internal_share`, their share of the strain energy, as shapes at nodes do not show
-        them. Attributes:
-        `free_mass` (kg along x, y, z), `complete` (number of lowest modes verified to be complete),
+        estimate of the largest error relative to a shell on a fine mesh, and `between_shape` at
+        `between_position`, points on edges and in panels; with internal amplitudes also
+        `internal_share`, their share of the strain energy, as shapes at nodes do not show them.
+        Attributes: `free_mass` (kg along x, y, z), `complete` (number of lowest modes verified to
+        be complete),
         `soft_hinges`, `residual` of the state, `rounding` (bound on the relative rounding error of
         the eigenvalues) and facts about the computation.
 
@@ -217,6 +218,7 @@ def _variables(
     return {
         **(_internal(linear, values, shapes) if linear.internal else {}),
         **(_air(linear, shapes) if linear.added is not None else {}),
+        **_between(linear, shapes),
         "frequency": omega / (2.0 * np.pi),
         "eigenvalue": values,
         "shape": full.reshape(-1, *linear.displacement.shape),
@@ -266,6 +268,19 @@ def _internal(linear: Linearized, values: NDArray, shapes: NDArray) -> dict[str,
     return {
         "internal_share": share,
         "between_shape": linear.between(shapes).T.reshape(shapes.shape[1], *points.shape),
+        "between_position": points,
+    }
+
+
+def _between(linear: Linearized, shapes: NDArray) -> dict[str, Any]:
+    """Shapes (nf, k) on edges and in panels, if these are superelements."""
+    structure = linear.case.structure
+    if not isinstance(structure, Superelements):
+        return {}
+    points, motions = structure.between(linear.case.held_edges)
+    found = motions @ linear.whole(shapes)
+    return {
+        "between_shape": found.T.reshape(shapes.shape[1], *points.shape),
         "between_position": points,
     }
 
