@@ -161,14 +161,33 @@ def test_shapes_between_vertices():
         np.testing.assert_allclose(a, np.sign(a @ b) * b, atol=0.01 * np.abs(b).max())
 
 
-def test_small_static_loads():
+@pytest.mark.parametrize(
+    "load",
+    [
+        fd.Force([TIP], (0.0, 0.0, 1e-3)),
+        fd.Gravity((1e-5, 2e-5, -3e-5)),
+        fd.Pressure(1e-3),
+        fd.Pressure(1e-3, panels=[2]),
+    ],
+    ids=["force", "gravity", "pressure", "one panel"],
+)
+@pytest.mark.filterwarnings("ignore:the pressure acts on panels with free edges")
+def test_small_static_loads(load):
     own, shell = (
         fd.trace(
-            fd.Case(s, HELD, [fd.Force([TIP], (0.0, 0.0, 1.0))]), "newton", load_factors=[1e-3]
-        )["displacement"].values[-1, TIP]
+            fd.Case(s, HELD, [load], masses=[fd.PointMass([TIP], 5.0)]), "newton",
+            load_factors=[1.0],
+        )["displacement"].values[-1, : len(PATTERN.vertices)]
         for s in both()
-    )
+    )  # fmt: skip
     np.testing.assert_allclose(own, shell, atol=2e-3 * np.abs(shell).max())
+
+
+def test_forces_on_panels_add_up():
+    structure = both(level=2)[0]
+    density = np.array([[1.0, 0.0, 2.0], [0.0, 3.0, 0.0], [0.0, 0.0, 0.0], [-1.0, 1.0, 1.0]])
+    forces = structure.spread(density, {})[: structure.nodes.size].reshape(-1, 3).sum(axis=0)
+    np.testing.assert_allclose(forces, PATTERN.face_areas @ density, atol=1e-9)
 
 
 def test_large_turns_are_warned_of():
@@ -216,8 +235,8 @@ def test_congruent_panels_are_condensed_once():
 MOVES_FAR = {
     "contact": {"contact": fd.Contact()},
     "air": {"air": fd.Air()},
-    r"loads\[0\]: Gravity": {"loads": [fd.Gravity("-z")]},
-    r"loads\[0\]: Pressure": {"loads": [fd.Pressure(1.0)]},
+    r"loads\[0\]: LineLoad": {"loads": [fd.LineLoad([(0, 1)], (0.0, 0.0, 1.0))]},
+    r"loads\[0\]: TotalForce": {"loads": [fd.TotalForce((0.0, 0.0, 1.0), panels=[0])]},
     r"loads\[0\]: Actuate": {"loads": [fd.Actuate("all", 170.0)]},
     r"loads\[0\]: Temperature": {"loads": [fd.Temperature(10.0, 1e-5)]},
     "StrainDamping": {"damping": fd.StrainDamping(1e-3)},
@@ -241,6 +260,9 @@ def test_what_superelements_leave_out_is_refused(named):
         lambda c: fd.fidelity(c),
         lambda c: fd.lyapunov_exponent(c, 1.0),
         lambda c: fd.UnitCell(c),
+        lambda c: fd.trace(
+            c.altered(loads=[fd.Force([TIP], (1.0, 0.0, 0.0))]), "newton", inertia_relief=True
+        ),
         lambda c: fd.sensitivity(
             lambda x: c, {"x": 1.0}, measures="frequency[1]", analysis={"kind": "modes"}
         ),

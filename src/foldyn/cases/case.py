@@ -22,6 +22,7 @@ from foldyn.cases.damping import Damping, Rayleigh, dampings
 from foldyn.cases.history import CONSTANT, History, as_history, factor
 from foldyn.cases.loads import LOADS, Force, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
+from foldyn.cases.region_loads import Pressure
 from foldyn.cases.state import State
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
 from foldyn.errors import Faults, FoldynWarning, InputError, within
@@ -156,14 +157,14 @@ class Case(Loaded, Damped):
         """Refuse what a linear model with nodes at vertices only leaves out."""
         if not self.structure.linear:
             return
-        others = {place: load for place, load in self._loads() if not isinstance(load, Force)}
+        taken = Force, Gravity, Pressure
+        others = {place: load for place, load in self._loads() if not isinstance(load, taken)}
         given = {**others, "contact": self.contact, "air": self.air}
         for place, part in given.items():
             if part is not None:
                 raise InputError(
-                    f"{place}: {type(part).__name__} acts on models whose panels move far or have "
-                    f"nodes of their own, not on {self.structure.linear}, which take Force, "
-                    "supports, springs and masses at vertices; take fd.shell or fd.discretize"
+                    f"{place}: {type(part).__name__} is not supported by {self.structure.linear}, "
+                    "which take Force, Gravity and Pressure; take fd.shell or fd.discretize"
                 )
 
     def _check_selections(self) -> None:

@@ -19,7 +19,7 @@ from foldyn.cases.history import History
 from foldyn.cases.loads import Gravity, Load
 from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
 from foldyn.errors import Faults, InputError
-from foldyn.mechanics.following import Following
+from foldyn.mechanics.following import Following, pushes
 from foldyn.mechanics.term import Term
 from foldyn.structures.discretized import Discretized, read_only
 from foldyn.structures.swelling import Swelling
@@ -195,6 +195,8 @@ class Loaded:
     structure: Discretized
     loads: Sequence[Load]
     nodal_mass: Any
+    point_masses: Any
+    held_edges: Any
 
     @cached_property
     def actuation_terms(self) -> Terms:
@@ -247,15 +249,24 @@ class Loaded:
         for place, load in loads:
             forces = load.forces(self.structure, place)
             if isinstance(load, Gravity):
-                forces = load.weight(self.nodal_mass)
+                linear = self.structure.linear  # see `_following`
+                forces = load.weight(self.point_masses if linear else self.nodal_mass)
             if forces is not None:
                 yield forces, load.history
 
     @cached_property
     def following_terms(self) -> tuple[tuple[Following, History], ...]:
         """Displacement-dependent forces of each load that has any, with the load's history."""
-        found = ((load.following(self.structure, place), load) for place, load in self._loads())
+        found = ((self._following(load, place), load) for place, load in self._loads())
         return tuple((part, load.history) for part, load in found if part is not None)
+
+    def _following(self, load: Load, place: str) -> Following | None:
+        """Displacement-dependent forces, or in a linear model the forces on all of its dofs."""
+        density = load.density(self.structure, place) if self.structure.linear else None
+        if density is None:
+            return load.following(self.structure, place)
+        forces = self.structure.spread(density, self.held_edges)
+        return pushes(np.arange(len(forces)), forces)
 
     @cached_property
     def swellings(self) -> tuple[tuple[Swelling, History], ...]:
@@ -312,6 +323,16 @@ class SomeLoads(Loaded):
     def nodal_mass(self) -> NDArray[np.float64]:
         """Mass (n,) that moves with each node in the case, kg."""
         return self.case.nodal_mass
+
+    @property
+    def point_masses(self) -> NDArray[np.float64]:
+        """Sum (n,) of the point masses on each node, kg."""
+        return self.case.point_masses
+
+    @property
+    def held_edges(self) -> dict[int, NDArray[np.float64]]:
+        """Edges that are held along their whole length; see `Supported`."""
+        return self.case.held_edges
 
     @property
     def loads(self) -> Sequence[Load]:

@@ -59,6 +59,10 @@ class Load(Part):
         """Displacement-dependent forces at factor 1; None if there are none."""
         return None
 
+    def density(self, structure: Discretized, place: str) -> NDArray[np.float64] | None:
+        """Force per area (np, 3), N/m2, on the panels of a linear model at rest; None if none."""
+        return None
+
     def swelling(self, structure: Discretized, place: str) -> Swelling | None:
         """Free stretching and curling of panels at factor 1; None if there is none."""
         return None

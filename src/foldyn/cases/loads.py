@@ -212,6 +212,11 @@ class Gravity(Load):
 
     apart = "acts on the whole structure"
 
+    def density(self, structure: Discretized, place: str) -> NDArray[np.float64]:
+        """See `Load`."""
+        mass = structure.sheet.values("areal_density", len(structure.pattern.faces))
+        return self.weight(mass)
+
     def weight(self, mass: NDArray[np.float64]) -> NDArray[np.float64]:
         """Forces (n, 3), N, on nodes with masses (n,), kg."""
         return mass[:, None] * np.array(self.acceleration)

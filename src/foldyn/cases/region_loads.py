@@ -214,6 +214,15 @@ class Pressure(Load):
         pressure = np.full(len(chosen), self.pressure)
         return pressures(structure.nodes, structure.triangles[chosen], pressure)
 
+    def density(self, structure: Discretized, place: str) -> NDArray[np.float64]:
+        """See `Load`."""
+        pattern, density = structure.pattern, np.zeros((len(structure.pattern.faces), 3))
+        chosen = np.unique(
+            structure.triangle_panel[resolve_panels(structure, self.panels, f"{place}.panels")]
+        )
+        density[chosen] = self.pressure * pattern.face_normals[chosen]
+        return density
+
     def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse a pressure on panels whose nodes are all held."""
         nodes = np.unique(self.following(structure, place).triangles)

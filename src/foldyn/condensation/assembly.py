@@ -187,6 +187,22 @@ class Whole:
         points.append(np.array([x[list(face)].mean(axis=0) for face in self._pattern.faces]))
         return np.concatenate(points), sparse.csr_array(sparse.vstack([on_edges, centers]))
 
+    def spread(self, density: NDArray) -> NDArray[np.float64]:
+        """Forces (m,), N, on the unknowns due to forces on panels (np, 3), N/m2.
+
+        They follow from the inertia forces of a translation, which are evenly spread, too.
+        """
+        out = np.zeros(self.unknowns.size)
+        for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
+            what, _, axis = group.panel.kind[kept].T
+            moved = (what == VERTEX)[:, None] & (axis[:, None] == np.arange(3))
+            inertia = group.panel.mass[np.ix_(kept, kept)] @ moved
+            area = self._pattern.face_areas[group.number[0]]
+            per_area = inertia * area / (moved[:, 0] @ inertia[:, 0])
+            own = np.einsum("pad,pd->pa", group.frames, density[group.number])
+            out += placed.T @ (own @ per_area.T).ravel()
+        return out
+
     @property
     def rotated(self) -> NDArray[np.float64]:
         """Unknowns (m, 3) other than displacements, in rotations by 1 rad about x, y, z."""

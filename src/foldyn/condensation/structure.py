@@ -179,6 +179,10 @@ class Superelements(Discretized):
         rigid = rigid_panels(self.options.rigid, len(self.pattern.faces))
         return self.whole.dofs(edges, clamped, rigid)
 
+    def spread(self, density: NDArray, edges: Mapping[int, NDArray]) -> NDArray[np.float64]:
+        """See `Discretized`."""
+        return self._dofs(edges).T @ self.whole.spread(density)
+
     def between(self, edges: Mapping[int, NDArray]) -> tuple[NDArray, sparse.csr_array]:
         """Points (q, 3) on edges and in panels, and their displacements (3 q, m) for the dofs.
 

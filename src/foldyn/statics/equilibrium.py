@@ -173,6 +173,8 @@ class OrigamiProblem:
         refuse_wind(case, "statics")
         if inertia_relief:
             refuse_air(case, "inertia relief")
+            if case.structure.linear:
+                raise InputError(f": {case.structure.linear} need supports", "inertia_relief")
         self.memories, self._plates = Memories(case, flow, timed), Plates(case)
         self.case, structure = case, case.structure
         self.structure, self._adaptive = structure, adaptive_load

@@ -241,6 +241,13 @@ class Discretized:
         """
         return self.body
 
+    def spread(self, density: NDArray, edges: Mapping[int, NDArray]) -> NDArray:
+        """Forces (m,), N, on all dofs of a linear model due to forces on panels (np, 3), N/m2.
+
+        edges : edges that supports hold, as in `held`.
+        """
+        raise NotImplementedError
+
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """Additions to the structure if panels swell: if they would stretch and curl when free.
 
