@@ -18,11 +18,11 @@ and welds, which connect the turns of edges, are not part of a panel.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.interpolate import LinearNDInterpolator
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from foldyn.algebra.superlu import factorize
@@ -33,6 +33,9 @@ from foldyn.shells.mesh import shell_mesh
 from foldyn.shells.shell import STIFF
 from foldyn.structures.graded import Grading
 from foldyn.structures.sheet import Sheet
+
+if TYPE_CHECKING:
+    from scipy.interpolate import LinearNDInterpolator
 
 VERTEX, BOW, TURN, INNER = range(4)
 SPARE = 4  # inner modes of a mesh among which those of another mesh are sought
@@ -83,6 +86,8 @@ def condense(
     corners : in a frame whose third axis is nearly normal to the panel.
     like : the panel on another mesh, whose inner modes are reproduced.
     """
+    from scipy.interpolate import LinearNDInterpolator  # loads slowly: not for other models
+
     mesh = _Mesh(corners, sheet, graded)
     shapes, kind, held = _edge_shapes(mesh, graded.radius)
     inside = np.setdiff1d(np.arange(mesh.size), held)

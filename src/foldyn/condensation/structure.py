@@ -284,7 +284,7 @@ def superelements(
     >>> pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
     >>> sheet = fd.Sheet(1e9, 0.3, thickness=0.01, density=1000.0)
     >>> fd.superelements(pattern, sheet, level=1)
-    <Superelements: 2 panels, 1 folds, level 1, 107 dofs>
+    <Superelements: 2 panels, 1 folds, level 1, 114 dofs>
     """
     pattern, sheet = checked_kinds(pattern, sheet)
     doubt_units(pattern, sheet)
