@@ -29,6 +29,7 @@ MOTION = f'{FOLD}[initial]\nvelocity = [0, 0, 1]\n[analysis]\nkind = "dynamics"\
 KIND = f'{FOLD}[analysis]\nkind = "fidelity"\ncount = 2\ndivisions = [2, 4]\n'
 
 
+@pytest.mark.matrix
 def test_a_motion_beside_the_shell(workplace) -> None:
     workplace.write(MOTION)
     done = workplace.call(
@@ -61,6 +62,7 @@ def test_a_motion_beside_the_shell(workplace) -> None:
     assert page.count("<img") == 3
 
 
+@pytest.mark.matrix
 def test_a_case_file_of_this_kind(workplace) -> None:
     workplace.write(KIND + 'models = ["plate"]\n')
     done = workplace.good("run", "case.toml", "--no-figures")

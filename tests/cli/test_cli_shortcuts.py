@@ -139,6 +139,7 @@ def test_flags_stand_above_what_the_file_says(read, tmp_path) -> None:
     assert len(found.analysis.arguments["frequencies"]) == 31
 
 
+@pytest.mark.matrix
 def test_a_state_from_a_result(workplace, miura) -> None:
     workplace.write(changed(miura, STATICS), "slow.toml")
     assert workplace.call("run", "slow.toml", "--no-figures").status == 0
@@ -149,6 +150,7 @@ def test_a_state_from_a_result(workplace, miura) -> None:
     np.testing.assert_array_equal(about.values, path.values[-1])
 
 
+@pytest.mark.matrix
 def test_the_bands_of_the_cell_of_a_motion_and_the_table_of_its_gaps(workplace, miura) -> None:
     workplace.write(changed(miura, 'model = { mass = "panel" }; damping ='))
     path = ("--path", "X-M-G", "--points", "9", "--count", "5")

@@ -89,6 +89,7 @@ def test_shapes_between_the_nodes():
     np.testing.assert_allclose(first * np.sign((first * other).sum()), other, atol=0.02 * size)
 
 
+@pytest.mark.matrix
 def test_points_between_the_nodes_move_with_rigid_motions():
     case = miura()
     found = fd.modes(case, 6, internal=3)
@@ -101,6 +102,7 @@ def test_points_between_the_nodes_move_with_rigid_motions():
 # ---------------------------------------------------------------------------- matrices
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("internal", [1, 3])
 def test_matrices(internal):
     case = miura()
@@ -195,6 +197,7 @@ def test_rigid_motions_are_modes():
     assert (found.internal_share.values < 1.0).all()
 
 
+@pytest.mark.matrix
 def test_more_amplitudes_lower_all_frequencies():
     """More shapes of one plate, with its own mass: Rayleigh and Ritz."""
     case = miura()
@@ -225,6 +228,7 @@ def test_a_turned_state():
     np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.matrix
 def test_other_numbers_and_a_mirror_image():
     pattern = fd.patterns.miura(cells=(1, 1), panel_angle=60, dihedral=80)
     order = np.random.default_rng(2).permutation(len(pattern.vertices))

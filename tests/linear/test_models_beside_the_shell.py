@@ -84,6 +84,7 @@ def test_errors_are_those_of_the_study(support, miura):
             assert mine == pytest.approx((row.over_plate, row.error, row.mac), abs=1e-4)
 
 
+@pytest.mark.matrix
 def test_displacements_are_those_of_the_study(miura):
     """Case study 2 of docs/fidelity.md: 23.9 mm, -28 % and +0.6 % beside 8 and 16 divisions."""
     result = miura[1].result
@@ -123,6 +124,7 @@ def test_warnings_of_the_case_are_not_repeated(recwarn):
     assert "small loads" in str(found)
 
 
+@pytest.mark.matrix
 def test_numbers_stand_beside_their_units(quick):
     text = str(quick[1])
     assert max(map(len, text.splitlines())) <= 79
@@ -400,6 +402,7 @@ def test_a_model_that_cannot_move_is_refused():
     assert rows[0].mac == 0.0  # nothing moves where both have nodes
 
 
+@pytest.mark.matrix
 def test_only_comparisons_are_shown(quick):
     case, found = quick
     with pytest.raises(InputError, match=r"result: is a result of the kind modes; give one of"):

@@ -96,6 +96,7 @@ def test_limits_of_internal_amplitudes(name, near):
     assert np.mean([abs(row.error) < 0.01 for row in low]) >= 0.98
 
 
+@pytest.mark.matrix
 def test_stored_first_modes_are_what_the_code_gives():
     case, true = documented()[0], true_of(0)
     (stored,) = [m for m in read(RESULTS / "documented_internal.csv") if m.case == case.name]
@@ -116,6 +117,7 @@ def test_sets_are_large_enough():
     assert [c.name for c in drawn(seed=1)] != names["drawn"]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("number", [0, 47, *beyond([19, 34])])
 def test_stored_results_are_what_the_code_gives(number):
     case = documented()[number]
