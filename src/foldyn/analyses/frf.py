@@ -84,6 +84,7 @@ class FrfSection(*(method.options for method in METHODS.values()), AnalysisSecti
     secant: Secant = None
     internal: Internal = 0
     amplitude: Positive = 1.0
+    check_model: bool = True
 
     def agree(self) -> None:
         """Refuse options that do not fit the method."""
@@ -196,7 +197,7 @@ class FrfAnalysis(Analysis):
         section = schema.analysis
         given: dict[str, Any] = {
             key: getattr(section, key)
-            for key in ("frequencies", "method", "secant", "internal", "amplitude")
+            for key in ("frequencies", "method", "secant", "internal", "amplitude", "check_model")
         }
         given["state"] = None if section.state == "rest" else section.state
         return cls({**given, **section.options(), "drive": schema.drive})

@@ -20,7 +20,7 @@ from foldyn.arguments import Unit, brief
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.mac import pairs
-from foldyn.linear.modes import modes
+from foldyn.linear.modes import elastic, modes
 from foldyn.linear.shell_of import with_structure
 from foldyn.structures.discretized import Discretized
 
@@ -125,14 +125,6 @@ class Reference:
         return MeshModes(self.case.structure, self.frequency, self.shape, self.found).at(nodes)
 
 
-def elastic(
-    found: xarray.Dataset, count: int | None = None, shape: str = "shape"
-) -> tuple[NDArray, NDArray]:
-    """Frequencies (k,), Hz, and shapes (k, n, 3) of the modes with stiffness."""
-    kept = np.flatnonzero(found["eigenvalue"].values > 0.0)[:count]
-    return found["frequency"].values[kept], found[shape].values[kept]
-
-
 def modes_at_rest(
     case: Case, count: int, secant: float | None = None, internal: int = 0
 ) -> xarray.Dataset:
@@ -144,7 +136,7 @@ def modes_at_rest(
     while True:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
-            found = modes(case, asked, secant=secant, internal=internal)
+            found = modes(case, asked, secant=secant, internal=internal, check_model=False)
         missing = count - int((found["eigenvalue"].values > 0.0).sum())
         most = int(found.attrs["free_dofs"])  # includes internal amplitudes
         if missing <= 0 or asked == most:

@@ -84,18 +84,22 @@ def shell_of(case: Case, divisions: int, vertex_radius: float | None = None) -> 
     The first nodes of the shell are the vertices, so that supports, loads and masses apply to both.
     """
     structure = case.structure
-    own = {item.name for item in fields(structure.options)} - MESH
-    shared = {
-        item.name: getattr(structure.options, item.name)
-        for item in fields(ShellOptions)
-        if item.name in own
-    }
     with within("shell: "):
         mesh = shell(
             structure.pattern, structure.sheet, divisions=divisions, mass="consistent",
-            vertex_radius=vertex_radius, **shared,
+            vertex_radius=vertex_radius, **shared_options(structure, ShellOptions),
         )  # fmt: skip
     return with_structure(case, mesh)
+
+
+def shared_options(structure: Discretized, options: type) -> dict[str, Any]:
+    """Options of bars and hinges that another model takes, too: creases, clamps, rigid panels."""
+    own = {item.name for item in fields(structure.options)} - MESH
+    return {
+        item.name: getattr(structure.options, item.name)
+        for item in fields(options)
+        if item.name in own
+    }
 
 
 def with_structure(case: Case, structure: Discretized) -> Case:

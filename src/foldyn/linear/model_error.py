@@ -1,0 +1,146 @@
+"""Errors of bars and hinges at rest: their modes beside those of superelements.
+
+Superelements of a low level on one mesh are within 2 % of a fine shell, and take a fraction of a
+second. Modes of both are paired by their shapes at the nodes that the models share.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from foldyn.cases import Case, Rayleigh
+from foldyn.condensation import SuperelementsOptions, superelements
+from foldyn.condensation.library import different
+from foldyn.condensation.structure import Superelements
+from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning, warn
+from foldyn.linear.mac import pairs
+from foldyn.linear.shell_of import check_reduced, shared_options
+from foldyn.structures import Structure
+
+LEVEL, DIVISIONS = 2, 12
+"""The superelements to compare with."""
+PANELS, SHAPES = 200, 20
+"""Most panels, and most different ones, that are compared: a comparison takes 2 to 4 s."""
+SPARE = 10  # additional modes of superelements among which partners are sought
+LEAST = 0.5  # least MAC of a partner
+SAME_PLACE = 1e-6  # largest distance of a matching node, relative to the pattern's size
+DOUBTFUL = 0.05  # relative error above which a mode is told of
+BELOW = 0.9  # modes below this share of the highest frequency that have no partner are missing
+
+
+def beside(case: Case) -> Case | str:
+    """The case with superelements, without loads; or why it is not compared with them.
+
+    Empty for other models than bars and hinges, and for structures without a pattern.
+    """
+    structure = case.structure
+    if structure.kind != Structure.kind or structure.pattern is None:
+        return ""
+    pattern = structure.pattern
+    if len(pattern.faces) > PANELS:
+        return f"{len(pattern.faces)} panels, more than {PANELS}"
+    try:
+        check_reduced(case)
+        shapes = different(pattern, structure.sheet)
+        if shapes > SHAPES:
+            return f"{shapes} different panels, more than {SHAPES}"
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FoldynWarning)
+            other = superelements(
+                pattern, structure.sheet, level=LEVEL, divisions=DIVISIONS,
+                **shared_options(structure, SuperelementsOptions),
+            )  # fmt: skip
+            return replace(case, structure=other, damping=Rayleigh(), loads=(), contact=None)
+    except InputError as error:
+        return str(error)
+
+
+class Judged(NamedTuple):
+    """Modes of a model, k of them, beside those of superelements.
+
+    Attributes
+    ----------
+    frequency : (k,)
+        Frequency of the partner, Hz; nan for rigid and unstable modes, and without a partner.
+    error : (k,)
+        Relative error of the frequency; nan without a partner.
+    lost : (m,)
+        Frequencies, Hz, of superelements' modes that no mode of the model resembles.
+    """
+
+    frequency: NDArray[np.float64]
+    error: NDArray[np.float64]
+    lost: NDArray[np.float64]
+
+    def doubts(self, elastic: NDArray) -> str:
+        """What is wrong with the modes, of which some (k,) are elastic; empty if nothing."""
+        off = np.abs(np.nan_to_num(self.error)) > DOUBTFUL
+        alone = np.flatnonzero(elastic & np.isnan(self.error)) + 1
+        told = []
+        if off.any():
+            worst = np.nanargmax(np.abs(self.error))
+            some = np.flatnonzero(off) + 1
+            told.append(
+                f"{_modes(some)} differ{'s' * (len(some) == 1)} by more than {DOUBTFUL:.0%} from "
+                f"superelements (mode {worst + 1}: {self.error[worst]:+.0%})"
+            )
+        if len(alone):
+            told.append(f"{_modes(alone)} resemble{'s' * (len(alone) == 1)} none of theirs")
+        if len(self.lost):
+            listed = ", ".join(f"{each:.4g}" for each in self.lost[:3])
+            more = ", ..." if len(self.lost) > 3 else ""
+            told.append(f"modes of theirs at {listed}{more} Hz are missing")
+        return "; ".join(told)
+
+
+def judged(
+    case: Case, frequency: NDArray, shape: NDArray, other: Case, true: NDArray, shapes: NDArray
+) -> Judged:
+    """Pair modes of a case with those of superelements.
+
+    frequency, shape : (k,), (k, n, 3) all modes of the case, with nan or 0 Hz for those that are
+    not elastic.
+    other, true, shapes : the case with superelements, and its elastic modes (j,), (j, n', 3) at
+    vertices and then between them.
+    """
+    structure, reference = case.structure, other.structure
+    assert isinstance(reference, Superelements)
+    points = np.concatenate([reference.nodes, reference.between(other.held_edges)[0]])
+    apart, place = cKDTree(points).query(structure.nodes)
+    shared = np.flatnonzero(apart < SAME_PLACE * structure.pattern.size)
+    elastic = np.flatnonzero(frequency > 0.0)
+    found = pairs(
+        frequency[elastic], shape[elastic][:, shared],
+        true, shapes[:, place[shared]], np.ones(len(shared)),
+    )  # fmt: skip
+    alike = found.mac >= LEAST
+    first, second = elastic[found.first[alike]], found.second[alike]
+    partner = np.full(len(frequency), np.nan)
+    partner[first] = true[second]
+    top = BELOW * frequency[elastic].max(initial=0.0)
+    lost = np.setdiff1d(np.flatnonzero(true < top), second)
+    return Judged(partner, frequency / partner - 1.0, true[lost])
+
+
+def warn_of(own: Judged, elastic: NDArray) -> None:
+    """Warn about modes, some (k,) of them elastic, that are far off, alone, or missing."""
+    doubts = own.doubts(elastic)
+    if doubts:
+        warn(
+            f"{doubts}: take superelements (fd.superelements, --model superelements)",
+            "superelements.md#bars-and-hinges-beside-them",
+            ModelRangeWarning,
+        )
+
+
+def _modes(numbers: NDArray) -> str:
+    """Modes by number, as "mode 3", "modes 1, 2" or "modes 4 to 9"."""
+    if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
+        return f"modes {numbers[0]} to {numbers[-1]}"
+    return f"mode{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers.tolist()))}"
