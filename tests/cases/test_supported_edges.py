@@ -193,5 +193,7 @@ def test_stored_cases_keep_it(kept):
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 def test_models_that_stand_beside_the_own_one_hold_it_too():
     case = fd.Case(fd.discretize(FOLD, SHEET, preset="plate", membrane="bars"), [ALONG])
-    result = fd.fidelity(case, count=2, divisions=(2, 4), models=["n5b8e", "bars"])
+    result = fd.fidelity(
+        case, count=2, reference="shell", divisions=(2, 4), models=["n5b8e", "bars"]
+    )
     assert np.abs(result.result["error"].values).max() < 0.2

@@ -171,7 +171,9 @@ def test_a_panel_that_touches_a_clamp_has_no_limit(radius, divisions):
         ends = sorted({node for edge in edges for node in edge})
         structure = fd.discretize(cell, sheet, preset="n5b8e", clamped=edges)
         case = fd.Case(structure, [fd.Fix(ends, along=True)])
-        return fd.fidelity(case, 1, divisions=divisions, models=[], vertex_radius=radius)
+        return fd.fidelity(
+            case, 1, reference="shell", divisions=divisions, models=[], vertex_radius=radius
+        )
 
     touching, whole = told([(1, 2)]), told([(0, 1), (1, 2)])
     assert touching.result.attrs["touched_clamp"] == 1

@@ -1,4 +1,4 @@
-"""`Fidelity`: the result of a comparison with the shell, mode by mode, and its advice."""
+"""`Fidelity`: models beside superelements or the shell, mode by mode, and advice."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray
 
+from foldyn.cases.models import SUPERELEMENTS
 from foldyn.errors import InputError
 from foldyn.linear.reference import LEAST, NO_LIMIT
 from foldyn.values import choice
@@ -23,7 +24,7 @@ OWN = "own"
 """Name of the case's own model."""
 GOOD, LARGEST = 0.02, 0.10  # largest errors: of a model worth keeping, and of a usable model
 MESH = 0.02  # larger mesh errors are mentioned
-SHELL = " (--model shell on the command line, fd.shell)"
+BETTER = "take superelements (--model superelements on the command line, fd.superelements)"
 SCOPE = (
     "Only small vibrations about rest and small loads were compared: motions and loads that turn "
     "creases far are not covered."
@@ -31,7 +32,7 @@ SCOPE = (
 
 
 class Reach(NamedTuple):
-    """Range in which a model follows the shell: the lowest modes with errors of at most 10 %.
+    """Range in which a model follows the reference: the lowest modes with errors of at most 10 %.
 
     Attributes
     ----------
@@ -50,6 +51,11 @@ class Reach(NamedTuple):
 def advice(result: xarray.Dataset) -> str:
     """Advice in sentences from a comparison; see `foldyn.fidelity`."""
     return " ".join(_sentences(result))
+
+
+def against(result: xarray.Dataset) -> str:
+    """What the models are compared with, in sentences."""
+    return SUPERELEMENTS if result.attrs["reference"] == SUPERELEMENTS else "the shell"
 
 
 def percent(value: float) -> str:
@@ -74,9 +80,9 @@ def _sentences(result: xarray.Dataset) -> Iterator[str]:
         yield from _vibrations(result, below, best)
     else:
         yield (
-            f"The lowest mode of the shell, {frequency[0]:.4g} Hz, lies above {limit:.4g} Hz, 0.6 "
-            "of the plate frequency: panels vibrate as plates there, which bars and hinges do not. "
-            f"Take the shell{SHELL}."
+            f"The lowest mode of {against(result)}, {frequency[0]:.4g} Hz, lies above {limit:.4g} "
+            "Hz, 0.6 of the plate frequency: panels vibrate as plates there, which bars and hinges "
+            f"do not: {BETTER}."
         )
     if "deflection" in result:
         yield _statics(result, best)
@@ -89,8 +95,8 @@ def _vibrations(result: xarray.Dataset, below: int, best: Reach) -> Iterator[str
     frequency, limit = result["frequency"].values, float(result.attrs["limit"])
     if not best.count:
         yield (
-            f"No model has the lowest mode, {frequency[0]:.4g} Hz, within {size(LARGEST)} of the "
-            f"shell: take the shell{SHELL}."
+            f"No model has the lowest mode, {frequency[0]:.4g} Hz, within {size(LARGEST)} of "
+            f"{against(result)}: {BETTER}."
         )
     else:
         top, whole = float(frequency[best.count - 1]), best.count == below
@@ -101,13 +107,13 @@ def _vibrations(result: xarray.Dataset, below: int, best: Reach) -> Iterator[str
             upto += ", the highest mode compared"
         ratio = float(result["cost_ratio"].sel(model=best.model))
         yield (
-            f"{_called(result, best.model)} is within {size(best.worst)} of the shell up to "
-            f"{upto}, at 1/{ratio:.0f} of its cost{'' if best.model == OWN else ': use it'}."
+            f"{_called(result, best.model)} is within {size(best.worst)} of {against(result)} up "
+            f"to {upto}, at 1/{ratio:.0f} of its cost{'' if best.model == OWN else ': use it'}."
         )
         if not whole:
             yield (
-                f"The next mode, {frequency[best.count]:.4g} Hz, {_missed(result, best)}: take the "
-                f"shell from there{SHELL}."
+                f"The next mode, {frequency[best.count]:.4g} Hz, {_missed(result, best)}: from "
+                f"there {BETTER}."
             )
     if best.model != OWN:
         yield from _own(result, below)
@@ -140,12 +146,12 @@ def _statics(result: xarray.Dataset, best: Reach) -> str:
         for model, error in told.items()
     )
     mesh = np.isnan(result["deflection_mesh_error"])
-    uncertain = "; the shell's have not converged" if mesh else ""
+    uncertain = "; those of the shell have not converged" if mesh else ""
     return f"Displacements under its forces, if those are small: {', '.join(texts)}{uncertain}."
 
 
 def reach(result: xarray.Dataset, model: str, below: int) -> Reach:
-    """Range in which a model follows the shell among the lowest modes."""
+    """Range in which a model follows the reference among the lowest modes."""
     error = np.abs(result["error"].sel(model=model).values[:below])
     bad = np.flatnonzero(error > LARGEST)
     count = int(bad[0]) if len(bad) else below
@@ -153,7 +159,7 @@ def reach(result: xarray.Dataset, model: str, below: int) -> Reach:
 
 
 def _mesh(result: xarray.Dataset, below: int) -> Iterator[str]:
-    """Errors of the shell itself."""
+    """Errors of the reference itself."""
     if "touched_clamp" in result.attrs:
         yield (
             f"No mesh of the shell converges: {NO_LIMIT.format(result.attrs['touched_clamp'])}. "
@@ -161,6 +167,13 @@ def _mesh(result: xarray.Dataset, below: int) -> Iterator[str]:
         )
         return
     error = np.abs(result["mesh_error"].values[: below or None])
+    if result.attrs["reference"] == SUPERELEMENTS:
+        if error.max() > MESH:
+            yield (
+                f"The superelements are themselves up to {size(float(error.max()))} off, by their "
+                "own estimate."
+            )
+        return
     unsettled = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(error)))
     if unsettled:
         yield (
@@ -185,16 +198,16 @@ def _called(result: xarray.Dataset, model: str) -> str:
 
 
 class ComparedMode(NamedTuple):
-    """A mode of the shell and its partner in a model.
+    """A mode of the reference, superelements or the shell, and its partner in a model.
 
     Attributes
     ----------
     mode : int
-        Number of the elastic mode of the shell, from 1.
+        Number of the elastic mode of the reference, from 1.
     shell : float
-        Frequency of the mode, Hz, extrapolated in mesh size.
+        Frequency of the mode, Hz, for the limit of fine meshes.
     mesh_error : float
-        Relative error of the frequency on the finest mesh, compared with `shell`.
+        Relative error of the frequency on the finest mesh, or as superelements estimate it.
     below : bool
         Whether the mode lies below 0.6 of the plate frequency.
     error : float
@@ -214,7 +227,7 @@ class ComparedMode(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fidelity:
-    """A comparison of models with the shell, from `foldyn.fidelity`.
+    """A comparison of models with superelements or the shell, from `foldyn.fidelity`.
 
     Parameters
     ----------
@@ -270,7 +283,7 @@ class Fidelity:
         return advice(self.result)
 
     def table(self, model: str = OWN) -> tuple[ComparedMode, ...]:
-        """Modes of the shell, each paired with a mode of the model."""
+        """Modes of the reference, each paired with a mode of the model."""
         one = self.result.sel(model=choice("model", model, self.models))
         names = ("mode", "frequency", "mesh_error", "error", "mac")
         columns = (one[name].values.tolist() for name in names)
@@ -301,7 +314,8 @@ def legend(found: Fidelity) -> list[str]:
         lines.append(f"* above 0.6 of the plate frequency, {found.limit:.4g} Hz")
     if "vertex_radius" in found.result.attrs:
         radius = found.result.attrs["vertex_radius"]
-        lines.append(f"shell: graded toward vertices, within {radius:g} m of which it is stiff")
+        name = found.result.attrs["reference"]
+        lines.append(f"{name}: graded toward vertices, within {radius:g} m of which it is stiff")
     return lines
 
 
@@ -309,7 +323,9 @@ def _columns(found: Fidelity, models: tuple[str, ...]) -> str:
     """Modes and errors of some models."""
     result = found.result.sel(model=list(models))
     tables = [found.table(model) for model in models]
-    rows = [["mode", "shell", *(text for model in models for text in (model, "MAC"))]]
+    rows = [
+        ["mode", result.attrs["reference"], *(text for model in models for text in (model, "MAC"))]
+    ]
     for every in zip(*tables, strict=True):
         first = every[0]
         row = [f"{first.mode}{'' if first.below else ' *'}", f"{first.shell:.4g} Hz"]

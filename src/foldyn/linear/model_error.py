@@ -7,20 +7,17 @@ second. Modes of both are paired by their shapes at the nodes that the models sh
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-from foldyn.cases import Case, Rayleigh
-from foldyn.condensation import SuperelementsOptions, superelements
+from foldyn.cases import Case
 from foldyn.condensation.library import different
 from foldyn.condensation.structure import Superelements
 from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning, warn
-from foldyn.linear.mac import pairs
-from foldyn.linear.shell_of import check_reduced, shared_options
+from foldyn.linear.mac import pairs, same_places
+from foldyn.linear.shell_of import check_reduced, superelements_of
 from foldyn.structures import Structure
 
 LEVEL, DIVISIONS = 2, 12
@@ -29,7 +26,6 @@ PANELS, SHAPES = 200, 20
 """Most panels, and most different ones, that are compared: a comparison takes 2 to 4 s."""
 SPARE = 10  # additional modes of superelements among which partners are sought
 LEAST = 0.5  # least MAC of a partner
-SAME_PLACE = 1e-6  # largest distance of a matching node, relative to the pattern's size
 DOUBTFUL = 0.05  # relative error above which a mode is told of
 BELOW = 0.9  # modes below this share of the highest frequency that have no partner are missing
 
@@ -52,11 +48,8 @@ def beside(case: Case) -> Case | str:
             return f"{shapes} different panels, more than {SHAPES}"
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
-            other = superelements(
-                pattern, structure.sheet, level=LEVEL, divisions=DIVISIONS,
-                **shared_options(structure, SuperelementsOptions),
-            )  # fmt: skip
-            return replace(case, structure=other, damping=Rayleigh(), loads=(), contact=None)
+            bare = case.altered(loads=(), contact=None)
+            return superelements_of(bare, level=LEVEL, divisions=DIVISIONS)
     except InputError as error:
         return str(error)
 
@@ -112,12 +105,11 @@ def judged(
     structure, reference = case.structure, other.structure
     assert isinstance(reference, Superelements)
     points = np.concatenate([reference.nodes, reference.between(other.held_edges)[0]])
-    apart, place = cKDTree(points).query(structure.nodes)
-    shared = np.flatnonzero(apart < SAME_PLACE * structure.pattern.size)
+    shared, place = same_places(points, structure.nodes, structure.pattern.size)
     elastic = np.flatnonzero(frequency > 0.0)
     found = pairs(
         frequency[elastic], shape[elastic][:, shared],
-        true, shapes[:, place[shared]], np.ones(len(shared)),
+        true, shapes[:, place], np.ones(len(shared)),
     )  # fmt: skip
     alike = found.mac >= LEAST
     first, second = elastic[found.first[alike]], found.second[alike]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from foldyn.cases import Case, Rayleigh
+from foldyn.condensation import SuperelementsOptions, superelements
 from foldyn.errors import InputError, warn, within
 from foldyn.patterns import Pattern
 from foldyn.shells import ShellOptions, shell
@@ -21,8 +22,8 @@ MOST_TRIANGLES = 15_000
 """Most triangles of a default shell: its modes take ten to twenty seconds."""
 GRADED = (8, 12)
 """Divisions of the two finer meshes with a vertex radius; the coarsest mesh has 4."""
-MESH = {"divisions", "mass", "vertex_radius"}
-"""Options of a shell that bars and hinges lack."""
+MESH = {"divisions", "level", "mass", "vertex_radius"}
+"""Options of shells and superelements that bars and hinges lack."""
 
 
 def check_reduced(case: Any) -> None:
@@ -90,6 +91,17 @@ def shell_of(case: Case, divisions: int, vertex_radius: float | None = None) -> 
             vertex_radius=vertex_radius, **shared_options(structure, ShellOptions),
         )  # fmt: skip
     return with_structure(case, mesh)
+
+
+def superelements_of(case: Case, **options: Any) -> Case:
+    """The case with superelements; other arguments as in `superelements`."""
+    structure = case.structure
+    with within("superelements: "):
+        other = superelements(
+            structure.pattern, structure.sheet, **options,
+            **shared_options(structure, SuperelementsOptions),
+        )  # fmt: skip
+    return with_structure(case, other)
 
 
 def shared_options(structure: Discretized, options: type) -> dict[str, Any]:

@@ -187,20 +187,21 @@ GAPS: Mapping[str, Quantity] = {
 }
 """Further variables of bands along the dimension `gap`."""
 FIDELITY: Mapping[str, Quantity] = {
-    "frequency": Quantity("Hz", "frequency of the shell, extrapolated from its meshes", ("mode",)),
+    "frequency": Quantity("Hz", "frequency of the reference", ("mode",)),
     "mesh_error": Quantity("1", "error of the finest mesh (nan: not converged)", ("mode",)),
     "error": Quantity("1", "error of a frequency (infinite: lost)", ("mode", "model")),
-    "mac": Quantity("1", "MAC with the mode of the shell", ("mode", "model")),
+    "mac": Quantity("1", "MAC with the mode of the reference", ("mode", "model")),
     "options": Quantity(text="arguments of discretize", dims=("model",)),
     "soft_hinges": Quantity(text="hinges without stiffness at rest", dims=("model",)),
-    "seconds": Quantity("s", "time for the modes of the shell"),
+    "seconds": Quantity("s", "time for the modes of the reference"),
     "model_seconds": Quantity("s", "time for the modes of a model", ("model",)),
-    "cost_ratio": Quantity("1", "time for the shell divided by time for a model", ("model",)),
-    "deflection": Quantity("m", "displacement of the shell along small loads, extrapolated"),
+    "cost_ratio": Quantity("1", "time for the reference divided by time for a model", ("model",)),
+    "deflection": Quantity("m", "displacement of the reference along small loads"),
     "deflection_mesh_error": Quantity("1", "error of the finest mesh (nan: not converged)"),
     "deflection_error": Quantity("1", "error of the displacement (infinite: soft)", ("model",)),
 }
-"""Variables of a comparison of models with the shell; the last three only if there are forces."""
+"""Variables of a comparison of models with superelements or the shell; the last three only if there
+are forces."""
 
 
 def variables(
