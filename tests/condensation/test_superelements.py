@@ -267,7 +267,6 @@ def test_what_superelements_leave_out_is_refused(named):
         lambda c: fd.modes(c, state="equilibrium"),
         lambda c: fd.fidelity(c),
         lambda c: fd.lyapunov_exponent(c, 1.0),
-        lambda c: fd.UnitCell(c),
         lambda c: fd.trace(
             c.altered(loads=[fd.Force([TIP], (1.0, 0.0, 0.0))]), "newton", inertia_relief=True
         ),

@@ -19,8 +19,9 @@ from foldyn.errors import InputError, ModelRangeWarning, StretchWarning, warn
 from foldyn.linear.excitation import NAMED, Answer, absolute, drive_of
 from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
+from foldyn.linear.level_error import DOUBTFUL
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
-from foldyn.linear.modes import DOUBTFUL, range_of_superelements
+from foldyn.linear.modes import range_of_superelements
 from foldyn.linear.time_domain import Rig, SteppedSine, reported, stepped_sine
 from foldyn.linear.transients import BurstRandom, Impulse, burst_random, impulse
 from foldyn.ram_limit import check_memory
