@@ -297,6 +297,12 @@ def test_wrong_options_are_named(options, named):
         fd.superelements(PATTERN, SHEET, **options)
 
 
+def test_meshes_with_fewer_points_than_shapes_are_refused():
+    structure = fd.superelements(PATTERN, replace(SHEET, thickness=0.05), divisions=4)
+    with pytest.raises(InputError, match="divisions = 4: edges have 9 points"):
+        fd.modes(fd.Case(structure, HELD))
+
+
 def test_sheets_without_density_are_refused():
     with pytest.raises(InputError, match="density"):
         fd.superelements(PATTERN, replace(SHEET, density=None))

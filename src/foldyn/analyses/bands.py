@@ -495,7 +495,7 @@ def _notes(result: xarray.Dataset) -> str:
         error = np.nanmax(result["frequency_error"] / result["frequency"].where(lambda f: f > 0.0))
         notes.append(
             "The panels are superelements. Frequencies are estimated to be within "
-            f"{error:.2g} of a shell's on a fine mesh, and within 5 % up to "
+            f"{100.0 * error:.2g} % of a shell's on a fine mesh, and within 5 % up to "
             f"{result.attrs['holds_to']:.4g} Hz."
         )
     residual = float(np.max(result["residual"].values))

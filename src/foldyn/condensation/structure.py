@@ -142,9 +142,16 @@ class Superelements(Discretized):
     @cached_property
     def whole(self) -> Whole:
         """The condensed panels on all of their unknowns."""
+        level, arcs = LEVELS[self.options.level - 1], min(one.arcs for one in self.meshes.graded)
+        if level.across >= 2 * arcs:
+            raise InputError(
+                f" = {self.options.divisions}: edges have {2 * arcs - 1} points, and a level to "
+                f"compute or compare with has {level.across} shapes; take more",
+                "divisions",
+            )
         kinds, kind = self.sheet.kinds(len(self.pattern.faces))
         made = groups(self.pattern, [kinds[k] for k in kind], self.meshes)
-        return Whole(self.pattern, made, LEVELS[self.options.level - 1])
+        return Whole(self.pattern, made, level)
 
     @cached_property
     def body(self) -> Assembly:

@@ -68,8 +68,8 @@ class UnitCell:
     Parameters
     ----------
     case : Case
-        Case whose structure is made by `discretize` or `shell`. Creases between cells have the
-        stiffness and law of other creases, and letters from their dihedrals.
+        Case whose structure is made by `discretize`, `shell` or `superelements`. Creases between
+        cells have the stiffness and law of other creases, and letters from their dihedrals.
     vectors : sequence of sequences of float, shape (d, 3), optional
         One or two translations (m) from a cell to the next: a chain or a sheet.
     screw : Screw, optional
