@@ -174,8 +174,8 @@ def test_damping_and_attenuation_fit_the_bands():
 def test_errors_of_bands():
     own = fd.superelements(PANEL, SHEET, level=3, divisions=8)
     cell = fd.UnitCell(fd.Case(own), STEPS)
-    bands = fd.bands(cell, PHASES, count=3)
-    off = np.sort(bands["frequency"]) - frequencies(cell.with_structure(own.at_level(5)), count=3)
+    bands, best = fd.bands(cell, PHASES, count=3), cell.with_structure(own.at_level(5))
+    off = np.sort(bands["frequency"]) - frequencies(best, count=3)
     error = bands["frequency_error"].values
     assert (np.sort(error) >= np.sort(off)).all() and (off > -1e-6).all()
     assert (error[bands["frequency"].values == 0.0] == 0.0).all()
@@ -184,7 +184,7 @@ def test_errors_of_bands():
 
 def test_bands_tell_up_to_where_they_hold():
     with pytest.warns(ModelRangeWarning, match="hold up to"):
-        bands = fd.bands(small(level=1), PHASES[1:], count=8)
+        bands = fd.bands(small(SIDE, screw=RING), [(1.0,)], count=8)
     doubtful = bands["frequency_error"] > 0.05 * bands["frequency"]
     assert bands.attrs["holds_to"] == bands["frequency"].values[doubtful].min()
 
@@ -218,7 +218,7 @@ divisions = 4
 [analysis]
 kind = "bands"
 path = "G-X"
-points = 3
+points = 2
 count = 4
 """
 
@@ -227,6 +227,6 @@ def test_a_case_file_gives_bands(tmp_path):
     path = tmp_path / "sheet.toml"
     path.write_text(CASE, encoding="utf-8")
     found = fd.read_case(path).run()
-    known = frequencies(small(), [(0.0, 0.0), (0.5 * np.pi, 0.0), (np.pi, 0.0)], 4)
+    known = frequencies(small(), [(0.0, 0.0), (np.pi, 0.0)], 4)
     np.testing.assert_allclose(np.sort(found["frequency"]), known, rtol=1e-9, atol=1e-6)
     assert found["frequency_error"].shape == known.shape and found.attrs["holds_to"] > 0.0

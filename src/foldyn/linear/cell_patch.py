@@ -65,7 +65,7 @@ class Patch:
     unit, step : (n,), (n, d)
         For each node, the node of cell 0 of which it is a copy, and R.
     hidden_unit, hidden_step : (h,), (h, d)
-        The same for the hidden dofs; -1 if the patch lacks the hidden dof of cell 0.
+        The same for the hidden dofs, all those that are not of nodes; -1 if the patch lacks the hidden dof of cell 0.
     own_unit, own_step : (k,), (k, d)
         The same for the nodes of the cell's own structure.
     first : (m,)
@@ -289,7 +289,9 @@ def node_sites(
 
 
 def hidden_sites(case: Case, unit: NDArray, step: NDArray, panels: Sequence[Panel]) -> list[Site]:
-    """Sites of the hidden dofs of a patch: rotations about sides, and gives of edges.
+    """Sites of the dofs of a patch that are not of nodes.
+
+    They are rotations about sides, gives of edges, or of superelements those of edges and panels.
 
     unit, step : for each node, the node of cell 0 of which it is a copy (n,), and R (n, d).
     """
