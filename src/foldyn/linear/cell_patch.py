@@ -65,7 +65,8 @@ class Patch:
     unit, step : (n,), (n, d)
         For each node, the node of cell 0 of which it is a copy, and R.
     hidden_unit, hidden_step : (h,), (h, d)
-        The same for the hidden dofs, all those that are not of nodes; -1 if the patch lacks the hidden dof of cell 0.
+        The same for the hidden dofs, all those that are not of nodes; -1 if the patch lacks the
+        hidden dof of cell 0.
     own_unit, own_step : (k,), (k, d)
         The same for the nodes of the cell's own structure.
     first : (m,)
