@@ -171,6 +171,19 @@ def test_damping_and_attenuation_fit_the_bands():
     assert (np.abs(waves - 1.0).min(axis=1) < 1e-5).all()
 
 
+@pytest.mark.matrix
+def test_damped_creases_damp_and_attenuate_as_in_shells():
+    options = {"divisions": 4, "mass": "consistent", "vertex_radius": SHEET.thickness}
+    found = []
+    for make in (fd.superelements, fd.shell):
+        case = fd.Case(make(SIDE, SHEET, **options), damping=fd.CreaseDamping(1e-4))
+        cell = fd.UnitCell(case, screw=RING)
+        damped = fd.linear.damped_bands(cell, [(1.3,)], count=4)
+        decay = fd.linear.attenuation(cell, [350.0, 800.0])["attenuation"]
+        found.append(np.concatenate([np.ravel(damped["rate"]), decay]))
+    np.testing.assert_allclose(*found, rtol=0.015)
+
+
 def test_errors_of_bands():
     own = fd.superelements(PANEL, SHEET, level=3, divisions=8)
     cell = fd.UnitCell(fd.Case(own), STEPS)
