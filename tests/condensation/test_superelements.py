@@ -277,7 +277,6 @@ def test_what_superelements_leave_out_is_refused(named):
         lambda c: fd.modes(c, state="equilibrium"),
         lambda c: fd.fidelity(c),
         lambda c: fd.lyapunov_exponent(c, 1.0),
-        lambda c: fd.UnitCell(c),
         lambda c: fd.trace(
             c.altered(loads=[fd.Force([TIP], (1.0, 0.0, 0.0))]), "newton", inertia_relief=True
         ),
@@ -306,6 +305,12 @@ def test_analyses_of_what_moves_far_are_refused(analysis):
 def test_wrong_options_are_named(options, named):
     with pytest.raises(InputError, match=named):
         fd.superelements(PATTERN, SHEET, **options)
+
+
+def test_meshes_with_fewer_points_than_shapes_are_refused():
+    structure = fd.superelements(PATTERN, replace(SHEET, thickness=0.05), divisions=4)
+    with pytest.raises(InputError, match="divisions = 4: edges have 9 points"):
+        fd.modes(fd.Case(structure, HELD))
 
 
 def test_sheets_without_density_are_refused():

@@ -433,6 +433,8 @@ def _joined(
     if vary is not None:
         along["state"] = coordinate(vary)
     facts = {name: first.attrs[name] for name in ("ticks", "tick_labels", "tracked")}
+    if "holds_to" in first.attrs:
+        facts["holds_to"] = min(one.attrs["holds_to"] for one in found)
     facts["wall_seconds"] = sum(one.attrs["wall_seconds"] for one in found)
     return bands_dataset(case, values, gaps, along, facts)
 
@@ -488,6 +490,13 @@ def _notes(result: xarray.Dataset) -> str:
         notes.append(
             "Full gaps are those at all wave vectors of the path. The greatest and least "
             "frequencies of bands may lie off it: analysis.zone computes the whole zone."
+        )
+    if "holds_to" in result.attrs:
+        error = np.nanmax(result["frequency_error"] / result["frequency"].where(lambda f: f > 0.0))
+        notes.append(
+            "The panels are superelements. Frequencies are estimated to be within "
+            f"{100.0 * error:.2g} % of a shell's on a fine mesh, and within 5 % up to "
+            f"{result.attrs['holds_to']:.4g} Hz."
         )
     residual = float(np.max(result["residual"].values))
     if residual > 1e-6:

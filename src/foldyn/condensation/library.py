@@ -15,7 +15,7 @@ from foldyn.patterns import Pattern
 from foldyn.structures.graded import Grading
 from foldyn.structures.sheet import Sheet
 
-ROOM = 256  # condensed panels kept in memory, each about 0.5 MB
+ROOM = 256  # condensed panels kept in memory, each about 2 MB
 ALIKE = 8  # decimals of coordinates, relative to the size of the pattern, for congruent panels
 
 

@@ -8,7 +8,7 @@ definite.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -19,8 +19,10 @@ from scipy import linalg
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from foldyn.cases import State
-from foldyn.errors import InputError, warn
+from foldyn.condensation import Superelements
+from foldyn.errors import InputError, ModelRangeWarning, warn
 from foldyn.linear.bloch import Bloch, null_space
+from foldyn.linear.level_error import DOUBTFUL, band_errors, first_doubtful
 from foldyn.linear.linearized import warn_beyond
 from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
 from foldyn.linear.unit_cell import UnitCell, checked_phases
@@ -94,7 +96,10 @@ def bands(
         z). Coordinate `wave_vector` (phase, period), rad, and the coordinates and attributes of
         the phases (`distance`; `ticks`, `tick_labels`, `grid`). For the state: `vectors` (period,
         axis), m, and `angles` (period), rad, from a cell to the next, `axes` and `points` (m) of
-        screws, and `displacement`. Like other results, the dataset contains its case.
+        screws, and `displacement`. Of superelements also `frequency_error` (Hz), an estimate of the
+        largest error relative to a shell on a fine mesh, and the attribute `holds_to` (Hz), up to
+        which frequencies are estimated to be within 5 %. Like other results, the dataset contains
+        its case.
 
     Raises
     ------
@@ -105,6 +110,8 @@ def bands(
     -----
     FoldynWarning
         The state is not an equilibrium, or unstable; hinges have no slope.
+    ModelRangeWarning
+        Bands lie above the range of the model.
 
     Notes
     -----
@@ -145,6 +152,11 @@ def bands(
         "frequency": (("phase", "band"), frequency, {"units": "Hz"}),
         "eigenvalue": (("phase", "band"), values, {"units": "rad2/s2"}),
     }
+    holds_to = None
+    if isinstance(cell.case.structure, Superelements):
+        errors = band_errors(linear, given, found)
+        data["frequency_error"] = (("phase", "band"), errors, {"units": "Hz"})
+        holds_to = _range(frequency, errors)
     each = list(zip(given, found, strict=True))
     if asked[0]:
         slopes = np.array([slopes_of(linear.bloch, phase, waves) for phase, waves in each])
@@ -155,16 +167,30 @@ def bands(
         shapes = np.array([linear.expanded(waves.shapes, phase) for phase, waves in each])
         data["shape"] = (("phase", "band", "node", "axis"), shapes, {"units": "m"})
     if asked[2]:
-        shares = np.array([polarizations(linear.nodes, waves) for waves in found])
+        shares = polarizations(linear, given, found)
         data["polarization"] = (("phase", "band", "axis"), shares, {"units": "1"})
     facts = {
         "count": count,
         "tracked": int(asked[3]),
         "secant": secant,
         "residual": linear.residual,
+        "holds_to": holds_to,
         "wall_seconds": time.perf_counter() - began,
     }
     return _dataset("bands", linear, phases, given, data, facts)
+
+
+def _range(frequency: NDArray, errors: NDArray) -> float:
+    """Frequency (Hz) up to which bands hold; warns if it is below the highest of theirs."""
+    holds, top = first_doubtful(frequency, errors), float(frequency.max())
+    if holds <= top:
+        warn(
+            f"the bands are estimated to hold up to {holds:.4g} Hz: frequencies from there on are "
+            f"doubtful by more than {DOUBTFUL:.0%}; take a higher level or fewer bands",
+            "superelements.md#errors",
+            ModelRangeWarning,
+        )
+    return min(holds, top)
 
 
 def _dataset(
@@ -183,11 +209,30 @@ def _dataset(
     return result.assign_attrs({key: told[key] for key in OF_PHASES if key in told})
 
 
-def polarizations(nodes: int, waves: Waves) -> NDArray[np.float64]:
-    """Shares (k, 3) of motions along x, y, z in the kinetic energy of waves, for `nodes` nodes."""
-    energy = (waves.shapes.conj() * waves.momentum)[: 3 * nodes]
-    shares = np.real(energy).reshape(nodes, 3, -1).sum(axis=0).T
-    return shares / shares.sum(axis=1, keepdims=True)
+def polarizations(
+    linear: LinearizedCell, phases: NDArray, waves: Sequence[Waves]
+) -> NDArray[np.float64]:
+    """Shares (n, k, 3) of motions along x, y, z in the kinetic energy of waves at phases (n, d)."""
+    patch, size = linear.patch, 3 * linear.nodes
+    case, structure = patch.case, patch.case.structure
+    panels, added = [], 0.0
+    if isinstance(structure, Superelements):
+        base = [min(patch.step[list(face)].tolist()) for face in structure.pattern.faces]
+        own = np.flatnonzero([not any(step) for step in base])  # panels of cell 0
+        panels = [
+            (linear.reach.gathered(amplitudes), masses)
+            for amplitudes, masses in structure.along_axes(case.held_edges, own)
+        ]
+        added = np.repeat(case.point_masses[patch.own_nodes], 3)[:, None]
+    out = []
+    for phase, (_, shapes, momentum) in zip(phases, waves, strict=True):
+        pushed = added * shapes[:size] if panels else momentum[:size]
+        energy = np.real(shapes[:size].conj() * pushed).reshape(linear.nodes, 3, -1).sum(axis=0)
+        for amplitudes, masses in panels:
+            moved = amplitudes.sparse_at(linear.bloch.factors(phase)) @ shapes
+            energy += [np.real(moved.conj() * (mass @ moved)).sum(axis=0) for mass in masses]
+        out.append((energy / energy.sum(axis=0)).T)
+    return np.array(out)
 
 
 def damped_bands(

@@ -20,9 +20,10 @@ from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning, StretchW
 from foldyn.linear.excitation import NAMED, Answer, absolute, drive_of
 from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
+from foldyn.linear.level_error import DOUBTFUL
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
 from foldyn.linear.model_error import beside
-from foldyn.linear.modes import DOUBTFUL, trusted
+from foldyn.linear.modes import trusted
 from foldyn.linear.time_domain import Rig, SteppedSine, reported, stepped_sine
 from foldyn.linear.transients import BurstRandom, Impulse, burst_random, impulse
 from foldyn.ram_limit import check_memory

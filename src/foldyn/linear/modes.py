@@ -25,7 +25,7 @@ from foldyn.condensation import Superelements
 from foldyn.dynamics.modal_damping import mass_of
 from foldyn.errors import FoldynWarning, StretchWarning, warn
 from foldyn.linear.hereditary import Branches, damped_mode
-from foldyn.linear.level_error import frequency_errors, other_level
+from foldyn.linear.level_error import coarse_changes, first_doubtful, frequency_errors, other_level
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
 from foldyn.linear.model_error import SPARE, Judged, beside, judged, warn_of
 from foldyn.ram_limit import check_memory
@@ -40,7 +40,6 @@ RIGID = 1.0 - 1e-6  # share in the space of rigid motions above which a shape co
 ROUNDING = 1e3 * EPS  # forces on a rigid motion r below this, relative to |K| |r|, count as zero
 TURN = 2.0 * np.pi
 COUNTS = (10, 40)  # numbers of modes whose errors are estimated for a frequency response
-DOUBTFUL = 0.05  # relative error of a frequency up to which a response is said to hold
 TWINS = 1e-8  # eigenvalues with a smaller relative difference count as one
 INDEPENDENT = 1e-6  # least remainder after orthogonalization, relative to a motion's size
 
@@ -197,7 +196,9 @@ def spectrum_of(
     if errors and isinstance(case.structure, Superelements):
         compared = case.altered(structure=other_level(case.structure))
         other = spectrum_of(compared, count, verify=False, solver=solver, errors=False).spectrum
-        estimate = frequency_errors(linear, spectrum.values, spectrum.shapes, other.values)
+        motion = linear.whole(spectrum.shapes)
+        changes = (motion.T @ (part @ motion) for part in coarse_changes(case))
+        estimate = frequency_errors(case, spectrum.values, other.values, changes)
         variables["frequency_error"] = np.where(variables["rigid"], 0.0, estimate)
     result = modes_dataset(case, variables, statistics)
     return Found(linear, spectrum, result)
@@ -222,11 +223,10 @@ def trusted(
             error = found["frequency_error"].values[elastic] / frequency
         else:
             error = found["model_error"].values[elastic]
-        wrong = frequency[~(np.abs(error) <= DOUBTFUL)]
-        ends = np.concatenate([wrong, np.ravel(found.attrs.get("missing_frequencies", ())), [top]])
-        holds = min(float(ends.min()), top)
-        reached = many < count or not frequency.size or frequency[-1] >= top
-        if wrong.size or reached or holds < top:
+        missing = np.ravel(found.attrs.get("missing_frequencies", ()))
+        wrong = first_doubtful(frequency, np.abs(np.nan_to_num(error, nan=np.inf)) * frequency)
+        holds = min(wrong, float(missing.min(initial=np.inf)), top)
+        if holds < top or many < count or not frequency.size or frequency[-1] >= top:
             break
         holds = float(frequency[-1])
     return holds, frequency, error

@@ -152,6 +152,9 @@ ESTIMATES: Mapping[str, Quantity] = {
 """and those that the method adds."""
 BANDS: Mapping[str, Quantity] = {
     "frequency": Quantity("Hz", "frequency", ("phase", "band")),
+    "frequency_error": Quantity(
+        "Hz", "estimate of the largest error of the frequency", ("phase", "band")
+    ),
     "eigenvalue": Quantity(
         "rad2/s2", "square of the angular frequency (negative: unstable)", ("phase", "band")
     ),
