@@ -101,3 +101,25 @@ def test_modes_that_resemble_nothing_have_no_error():
     )
     assert np.isnan(own.error).any() and len(own.lost) > 0
     assert "resemble" in own.doubts(np.ones(3, bool)) and "missing" in own.doubts(np.ones(3, bool))
+
+
+def test_bands_far_off_are_told():
+    """Those of the gallery's cell, whose gap lies near 500 Hz and with the model near 330 Hz."""
+    sheet = fd.Sheet(3e9, 0.3, thickness=2.4e-4, density=1200.0, length_scale_ratio=10.0)
+    pattern = fd.patterns.miura(a=0.03, b=0.03, panel_angle=60, dihedral=60)
+    cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet)))
+    with pytest.warns(ModelRangeWarning, match=r"bands .*differ by more than 5% from superel"):
+        found = fd.bands(cell, cell.path("G-X", 9), count=6)
+    error = found["model_error"].values
+    chosen = np.flatnonzero(np.isfinite(error).any(axis=1))
+    assert len(chosen) == 8
+    fine = cell.with_case(fd.Case(fd.superelements(pattern, sheet, level=3)))
+    some = chosen[-3:]
+    true = fd.bands(fine, found["wave_vector"].values[some], count=6, track=False)
+    own = found["frequency"].values[some]
+    rank = own.argsort(axis=1)
+    ratio = np.take_along_axis(own, rank, axis=1) / true["frequency"].values
+    stated = 1.0 + np.take_along_axis(error[some], rank, axis=1)
+    np.testing.assert_allclose(stated, ratio, rtol=0.02)
+    assert ratio.min() < 0.7  # the gap is told of
+    assert "model_error" not in fd.bands(cell, [[1.0, 0.0]], count=1, check_model=False)

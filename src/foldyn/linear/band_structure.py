@@ -8,6 +8,7 @@ definite.
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
@@ -18,13 +19,14 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from foldyn.cases import State
+from foldyn.cases import Case, State
 from foldyn.condensation import Superelements
-from foldyn.errors import InputError, ModelRangeWarning, warn
+from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning, warn
 from foldyn.linear.bloch import Bloch, null_space
 from foldyn.linear.level_error import DOUBTFUL, band_errors, first_doubtful
 from foldyn.linear.linearized import warn_beyond
 from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
+from foldyn.linear.model_error import beside, errors_of_bands, warn_of_bands
 from foldyn.linear.unit_cell import UnitCell, checked_phases
 from foldyn.linear.wave_solver import Waves, WaveSolver, check_count, slopes_of, tracked
 from foldyn.results.dataset import result_dataset
@@ -38,6 +40,7 @@ SHIFT = 1e-4  # shift, relative to the square root of the stiffness-to-mass scal
 NOISE = 1e-3  # values of s below this, relative to the shift, count as zero
 DENSE = 200  # dofs up to which all eigenvalues are computed
 SPARE = 4  # eigenvalues computed in addition to the count
+COMPARED = 8  # phases at which bars and hinges are compared with superelements
 ALL = "all"
 """Name of the direction of full gaps, which are gaps at every phase."""
 
@@ -54,6 +57,7 @@ def bands(
     secant: float | None = None,
     load_factor: float = 1.0,
     track: bool = True,
+    check_model: bool = True,
 ) -> xarray.Dataset:
     """Frequencies of Bloch waves: the bands of a repeated case.
 
@@ -84,6 +88,9 @@ def bands(
     track : bool
         Whether bands follow the shapes of their waves from phase to phase (MAC), through
         crossings; otherwise they are sorted by frequency.
+    check_model : bool
+        Whether to compare bars and hinges at rest with superelements, at some of the phases, where
+        that takes a few seconds at most.
 
     Returns
     -------
@@ -98,7 +105,9 @@ def bands(
         axis), m, and `angles` (period), rad, from a cell to the next, `axes` and `points` (m) of
         screws, and `displacement`. Of superelements also `frequency_error` (Hz), an estimate of the
         largest error relative to a shell on a fine mesh, and the attribute `holds_to` (Hz), up to
-        which frequencies are estimated to be within 5 %. Like other results, the dataset contains
+        which frequencies are estimated to be within 5 %. Of bars and hinges at rest `model_error`,
+        the relative error by comparison with superelements of a low level, in order of frequency,
+        at eight phases; nan elsewhere. Like other results, the dataset contains
         its case.
 
     Raises
@@ -147,12 +156,18 @@ def bands(
         )
     with np.errstate(invalid="ignore"):
         frequency = np.sqrt(values) / TURN
-    warn_beyond(cell.case.structure, np.nan_to_num(frequency).max(axis=0), "band")
     data: dict[str, Any] = {
         "frequency": (("phase", "band"), frequency, {"units": "Hz"}),
         "eigenvalue": (("phase", "band"), values, {"units": "rad2/s2"}),
     }
     holds_to = None
+    reference = beside(cell.case) if check_model and state is None and secant is None else None
+    if isinstance(reference, Case):
+        errors = _model_errors(cell.with_case(reference), given, frequency)
+        data["model_error"] = (("phase", "band"), errors, {"units": "1"})
+        warn_of_bands(errors)
+    else:
+        warn_beyond(cell.case.structure, np.nan_to_num(frequency).max(axis=0), "band")
     if isinstance(cell.case.structure, Superelements):
         errors = band_errors(linear, given, found)
         data["frequency_error"] = (("phase", "band"), errors, {"units": "Hz"})
@@ -175,9 +190,23 @@ def bands(
         "secant": secant,
         "residual": linear.residual,
         "holds_to": holds_to,
+        "not_compared": (reference if isinstance(reference, str) else "") or None,
         "wall_seconds": time.perf_counter() - began,
     }
     return _dataset("bands", linear, phases, given, data, facts)
+
+
+def _model_errors(reference: UnitCell, phases: NDArray, frequency: NDArray) -> NDArray[np.float64]:
+    """Relative errors (n, k) of bands, by comparison with a cell of superelements; see `bands`."""
+    chosen = np.unique(np.linspace(0, len(phases) - 1, COMPARED).round().astype(int))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        linear = linearize_cell(reference, None, None, 1.0)
+        found = WaveSolver(linear.bloch, frequency.shape[1]).at(phases[chosen])
+    true = np.sqrt(np.array([each.values for each in found]).clip(min=0.0)) / TURN
+    out = np.full(frequency.shape, np.nan)
+    out[chosen] = errors_of_bands(frequency[chosen], true)
+    return out
 
 
 def _range(frequency: NDArray, errors: NDArray) -> float:

@@ -72,7 +72,8 @@ def band_errors(
     """Bounds (n, k), Hz, of the errors of bands at phases (n, d); 0 for a frequency of 0."""
     case = linear.cell.case
     assert isinstance(case.structure, Superelements)
-    compared = linearize_cell(linear.cell.with_structure(other_level(case.structure))).bloch
+    leveled = case.altered(structure=other_level(case.structure))
+    compared = linearize_cell(linear.cell.with_case(leveled)).bloch
     others = WaveSolver(compared, len(waves[0].values)).at(phases)
     changes = [linear.reach.hops(part) for part in coarse_changes(linear.patch.case)]
     out = np.zeros((len(phases), len(waves[0].values)))

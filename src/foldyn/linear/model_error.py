@@ -27,6 +27,8 @@ PANELS, SHAPES = 200, 20
 SPARE = 10  # additional modes of superelements among which partners are sought
 LEAST = 0.5  # least MAC of a partner
 DOUBTFUL = 0.05  # relative error above which a mode is told of
+SLOW = 1e-3  # frequencies of bands below this, relative to the highest, are not compared
+REMEDY = "take superelements (fd.superelements, --model superelements)"
 BELOW = 0.9  # modes below this share of the highest frequency that have no partner are missing
 
 
@@ -73,23 +75,43 @@ class Judged(NamedTuple):
 
     def doubts(self, elastic: NDArray) -> str:
         """What is wrong with the modes, of which some (k,) are elastic; empty if nothing."""
-        off = np.abs(np.nan_to_num(self.error)) > DOUBTFUL
         alone = np.flatnonzero(elastic & np.isnan(self.error)) + 1
-        told = []
-        if off.any():
-            worst = np.nanargmax(np.abs(self.error))
-            some = np.flatnonzero(off) + 1
-            told.append(
-                f"{_modes(some)} differ{'s' * (len(some) == 1)} by more than {DOUBTFUL:.0%} from "
-                f"superelements (mode {worst + 1}: {self.error[worst]:+.0%})"
-            )
+        far = _far_off("mode", np.nan_to_num(self.error))
+        told = [far] if far else []
         if len(alone):
-            told.append(f"{_modes(alone)} resemble{'s' * (len(alone) == 1)} none of theirs")
+            told.append(
+                f"{_numbered('mode', alone)} resemble{'s' * (len(alone) == 1)} no mode of "
+                "superelements"
+            )
         if len(self.lost):
             listed = ", ".join(f"{each:.4g}" for each in self.lost[:3])
             more = ", ..." if len(self.lost) > 3 else ""
-            told.append(f"modes of theirs at {listed}{more} Hz are missing")
+            told.append(f"modes of superelements at {listed}{more} Hz are missing")
         return "; ".join(told)
+
+
+def errors_of_bands(own: NDArray, true: NDArray) -> NDArray[np.float64]:
+    """Relative errors (n, k) of frequencies of bands at n phases, each in order of frequency.
+
+    nan where the frequency is nearly zero, as of acoustic waves at long wavelengths, or undefined.
+    """
+    rank = own.argsort(axis=1).argsort(axis=1)
+    other = np.take_along_axis(np.sort(true, axis=1), rank, axis=1)
+    near_zero = np.minimum(own, other) < SLOW * np.nanmax(true)
+    return np.where(near_zero, np.nan, own / np.where(near_zero, 1.0, other) - 1.0)
+
+
+def warn_of_bands(errors: NDArray) -> None:
+    """Warn about bands whose frequencies, with errors (n, k) at n phases, are far off."""
+    worst = np.abs(np.nan_to_num(errors)).argmax(axis=0)
+    largest = np.nan_to_num(errors[worst, np.arange(len(worst))])
+    told = _far_off("band", largest)
+    if told:
+        warn(
+            f"{told} at some wave vectors: {REMEDY}",
+            "superelements.md#bars-and-hinges-beside-them",
+            ModelRangeWarning,
+        )
 
 
 def judged(
@@ -125,14 +147,26 @@ def warn_of(own: Judged, elastic: NDArray) -> None:
     doubts = own.doubts(elastic)
     if doubts:
         warn(
-            f"{doubts}: take superelements (fd.superelements, --model superelements)",
+            f"{doubts}: {REMEDY}",
             "superelements.md#bars-and-hinges-beside-them",
             ModelRangeWarning,
         )
 
 
-def _modes(numbers: NDArray) -> str:
-    """Modes by number, as "mode 3", "modes 1, 2" or "modes 4 to 9"."""
+def _far_off(name: str, errors: NDArray) -> str:
+    """Which modes or bands have errors (k,) that are too large, and the worst; empty if none."""
+    off = np.flatnonzero(np.abs(errors) > DOUBTFUL)
+    if not len(off):
+        return ""
+    worst = np.abs(errors).argmax()
+    return (
+        f"{_numbered(name, off + 1)} differ{'s' * (len(off) == 1)} by more than {DOUBTFUL:.0%} "
+        f"from superelements ({name} {worst + 1}: {errors[worst]:+.0%})"
+    )
+
+
+def _numbered(name: str, numbers: NDArray) -> str:
+    """Modes or bands by number, as "mode 3", "modes 1, 2" or "modes 4 to 9"."""
     if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
-        return f"modes {numbers[0]} to {numbers[-1]}"
-    return f"mode{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers.tolist()))}"
+        return f"{name}s {numbers[0]} to {numbers[-1]}"
+    return f"{name}{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers.tolist()))}"

@@ -29,7 +29,6 @@ from foldyn.patterns.screw import Screw, motion_between, translation
 from foldyn.patterns.tiling import half_edges
 from foldyn.patterns.tiling import periods as translations_of
 from foldyn.ram_limit import check_memory
-from foldyn.structures.discretized import Discretized
 from foldyn.values import number, numbers, of_kind, show, whole
 
 NEAR_MISS = 0.05  # a vertex this close to a partner, relative to the pattern's size, is reported
@@ -139,10 +138,10 @@ class UnitCell:
             f"{' and '.join(ways)}>"
         )
 
-    def with_structure(self, structure: Discretized) -> UnitCell:
-        """The cell with another structure of the same pattern."""
+    def with_case(self, case: Case) -> UnitCell:
+        """The cell with another case of the same pattern."""
         out = copy(self)
-        object.__setattr__(out, "case", self.case.altered(structure=structure))
+        object.__setattr__(out, "case", case)
         return out
 
     def _found(self, pattern: Pattern, near: float) -> tuple[tuple[Screw, ...], list[tuple]]:

@@ -155,6 +155,9 @@ BANDS: Mapping[str, Quantity] = {
     "frequency_error": Quantity(
         "Hz", "estimate of the largest error of the frequency", ("phase", "band")
     ),
+    "model_error": Quantity(
+        "1", "error of the frequency, by comparison with superelements", ("phase", "band")
+    ),
     "eigenvalue": Quantity(
         "rad2/s2", "square of the angular frequency (negative: unstable)", ("phase", "band")
     ),
