@@ -19,7 +19,7 @@ from foldyn.algebra.superlu import SingularTangentError
 from foldyn.cases import Case
 from foldyn.dynamics.audit import INACCURATE
 from foldyn.dynamics.inertia import is_lumped
-from foldyn.dynamics.methods import METHODS, lacking
+from foldyn.dynamics.methods import METHODS
 from foldyn.dynamics.modal_damping import ModalRows
 from foldyn.dynamics.timing import DEFAULT_FRACTION, histories
 from foldyn.mechanics.following import following_force
@@ -58,14 +58,15 @@ def choose(
     tolerance is None. interval is the time between samples (s), 0.0 if steps are counted instead.
     modal is the modal damping of the motion.
     """
-    if case.air is not None and case.air.added_mass and not case.structure.massless:
+    if case.air is not None and case.air.added_mass:
         return Choice(ACCURATE, "explicit: the added mass of the air moves with the panels")
     drag = case.air is not None and case.air.drag
     conserved = not (case.damped or drag or case.remembering or any(histories(case)))
     implicit = "energy_momentum" if conserved else "generalized_alpha"
-    if case.contact is not None and not lacking(METHODS[ACCURATE], case):
+    massless = case.structure.massless
+    if case.contact is not None and not (massless and case.structure.divisions):
         return Choice(ACCURATE, "explicit: its error resolves impacts")
-    if massless := case.structure.massless:
+    if massless:
         return Choice("generalized_alpha", f"implicit: {massless} have no mass")
     if (case.mass.diagonal() <= 0.0)[~case.constraints.determined.all(axis=1)].any():
         return Choice(implicit, "implicit: nodes without mass have no acceleration")

@@ -466,7 +466,8 @@ class Motion:
             plan = plan._replace(end=plan.start + length, interval=length)
         sampler = Sampler(self.case, {}, *self.start, plan.start)
         # packed anew, with a memory of its own, as this motion may continue
-        packed = pack(self.case, apart(plan, self.critical), self.origin)
+        hidden = self.method.hidden_inertia(self.case)
+        packed = pack(self.case, apart(plan, self.critical), self.origin, hidden=hidden)
         motion = Motion(
             self.case, self.method, plan, self.critical, True, self._initial, self.origin, packed,
             sampler,

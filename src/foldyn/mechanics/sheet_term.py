@@ -49,7 +49,6 @@ class FoldHinges(NamedTuple):
     stiffness: NDArray  # (k,) N m/rad
     softness: NDArray  # (k,) rad/(N m), softness of the adjacent panels
     row: NDArray  # (k,) row of each hinge in `SheetTerm.series`
-    beside: NDArray | float = np.inf  # (k,) N m/rad, adjacent panels with edge angles in balance
 
     @property
     def length(self) -> NDArray:
@@ -65,7 +64,7 @@ class FoldHinges(NamedTuple):
     @property
     def remembers(self) -> NDArray:
         """Whether each hinge (k,) turns by more than its crease, so that dampers need a memory."""
-        return (self.softness > 0.0) | np.isfinite(self.beside)
+        return self.softness > 0.0
 
     @property
     def hidden_turn(self) -> NDArray:
@@ -141,7 +140,7 @@ class SheetTerm(Term):
     per_hidden : float
         Turn per unit of a hidden dof, rad/m.
     offsets : int
-        Number of folds with compliant panels, nf, or of dofs in balance; or 0.
+        Number of folds with compliant panels: nf or 0.
     """
 
     model: Any
@@ -233,8 +232,7 @@ class SheetTerm(Term):
     def rest_angles(self) -> NDArray:
         """Rest angles (nr,), rad, that loads may change, folds first.
 
-        The last `offsets` entries are not rest angles but offsets of the folds' dihedrals, or
-        forces on dofs in balance, N.
+        The last `offsets` entries are not rest angles but offsets of the folds' dihedrals.
         """
         return np.zeros(0)
 
@@ -269,9 +267,8 @@ class SheetTerm(Term):
         """For all actuated hinges: the share of the crease in a small turn, and offsets.
 
         Columns of the offsets (., 4): the angle added to the dihedral (rad); the moment of memory
-        branches (N m); the offset and the total moment at the last accepted step. Rows of dofs in
-        balance follow: force (N), dof (m), and both at that step. In a sheet from `actuated` they
-        change in place.
+        branches (N m); the offset and the total moment at the last accepted step. In a sheet from
+        `actuated` they change in place.
         """
         count = len(self.turned()[0])
         return np.ones(count), np.zeros((count, 4))

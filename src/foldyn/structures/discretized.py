@@ -225,11 +225,6 @@ class Discretized:
         """The structure with another mesh, if it has a mesh."""
         raise NotImplementedError
 
-    @property
-    def condensed(self) -> Discretized | None:
-        """The structure without massless dofs, if it can condense them; otherwise None."""
-        return None
-
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """Additions to the structure if panels swell: if they would stretch and curl when free.
 

@@ -152,7 +152,7 @@ def _gives(x: NDArray, parts: list[tuple], edges: list[Edge]) -> EdgeGives:
         out.per_length2[p, :b] = 1.0 / length**2
         out.across[p, :b, :k] = columns[:b] * length[:, None]
         out.stiffness[p, :k, :k] = columns[b:]
-    return out.ordered()
+    return out
 
 
 def _sides(
