@@ -260,6 +260,12 @@ def suited(name: str, case: Case) -> Integrator:
     return method
 
 
+def suiting(method: Integrator, case: Case) -> Case:
+    """The case; for an explicit method, its structure with the dofs that such methods take."""
+    structure = case.structure if method.implicit else case.structure.for_explicit
+    return case if structure is case.structure else case.altered(structure=structure)
+
+
 def lacking(method: Integrator, case: Case) -> str:
     """Reason why a method does not suit a case; empty if it does."""
     if method.implicit and case.air is not None and case.air.added_mass:
@@ -296,4 +302,4 @@ def critical_step(case: Case, method: str = "rk4", *, state: State | None = None
     if state is not None:
         shape = case.structure.nodes.shape
         place = of_kind("state", state, State).of_nodes("displacement", shape, "state")
-    return chosen.critical_step(case, place)
+    return chosen.critical_step(suiting(chosen, case), place)

@@ -106,6 +106,7 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     and dofs without mass with the inertia that explicit methods give them.
     """
     case = of_kind("case", case, Case)
+    case = case.altered(structure=case.structure.for_explicit)
     return float(np.sqrt(max(_largest_quotient(case, _tangent(case, u)), 0.0)))
 
 
@@ -119,6 +120,9 @@ def hidden_inertia(case: Case) -> NDArray:
     the largest frequency of the nodes while these dofs are held. w^2 is rounded, in relation to a
     number that depends smoothly on the case: equal cases with other rounding errors have the same
     inertia, and derivatives do not depend on how an eigenvalue was found.
+
+    So that dampers of creases do not shorten the step, the sum of their coefficients in the row,
+    divided by w, adds to it: a damped crease then follows its damper with a delay of 1 / w.
     """
     hidden = case.body.hidden
     if not len(hidden):
@@ -132,7 +136,10 @@ def hidden_inertia(case: Case) -> NDArray:
         scale = float((local[free] / mass[free]).max())
         nodal = _quotient_of(case, stiffness, np.asarray(case.free_dofs), case.free_mass)
         rounded = round(_PER_OCTAVE * math.log2(nodal / scale)) / _PER_OCTAVE
-        _known[case] = own / (scale * 2.0**rounded)
+        damping = abs(damping_matrix(case, case.body.dofs(_state(case, None))))
+        damped = np.asarray(damping[hidden][:, hidden].sum(axis=1)).ravel()
+        square = scale * 2.0**rounded
+        _known[case] = own / square + damped / math.sqrt(square)
     return _known[case]
 
 

@@ -35,7 +35,8 @@ class FoldHinges(NamedTuple):
 
     The bends of hinge models have the same form, each like a fold of one hinge.
 
-    The fold angle of a hinge is its dihedral minus `per_hidden` times its hidden dofs. If panels
+    The fold angle of a hinge is its dihedral minus `per_hidden` times its hidden dofs; of one that
+    has a hidden dof twice, the dihedral at rest takes the place of the dihedral. If panels
     are compliant without such dofs, a moment on the crease alone turns the dihedral by `softness`
     times the moment before the hinge resists (`materials.series`).
     """
@@ -60,6 +61,11 @@ class FoldHinges(NamedTuple):
         """Ratio (k,) of each hinge's length to the length of its whole fold."""
         length = self.length
         return length / np.bincount(self.fold, length)[self.fold]
+
+    @property
+    def alone(self) -> NDArray:
+        """Whether each hinge (k,) turns by a hidden dof alone."""
+        return (self.hidden[:, 0] == self.hidden[:, 1]) & (self.hidden[:, 0] != NO_DOF)
 
     @property
     def remembers(self) -> NDArray:

@@ -86,8 +86,37 @@ class BarsPlatesTerm(SheetTerm):
         return plates_pattern(self.model, (bars.indptr, bars.indices))
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """See `SheetTerm`."""
-        return self._assembled(q, floor, partial(self._bars.tangent, q[: self._nodal]))
+        """See `SheetTerm`; with the dofs of explicit methods, right where these are in balance."""
+        bars = partial(self._bars.tangent, q[: self._nodal])
+        if not len(self.model.unmoved):
+            return self._assembled(q, floor, bars)
+        whole = self._assembled(q, floor, bars)
+        spread = self._spread(turned_plates(self.model, self._split(q)[0]).gradient)
+        return sparse.csr_array(spread.T @ whole @ spread)
+
+    def _spread(self, gradient: NDArray) -> sparse.csr_array:
+        """Rates (m, m) of displacements and rotations by the dofs of explicit methods.
+
+        gradient : (nh, 12) of the dihedrals, 1/m.
+        """
+        model, turns = self.model, self.model.fold_rotations
+        both, rotations = (turns >= 0).all(axis=1), model.rotations
+        own = sparse.lil_array((rotations, rotations))
+        own.setdiag(1.0)
+        share = np.where(both, 0.5, 1.0)
+        fold, side = np.nonzero(turns >= 0)
+        row, first = turns[fold, side], turns.max(axis=1)
+        first[both] = turns[both, 0]
+        own[row, row] = 0.0
+        own[row, first[fold]] = -share[fold]
+        two = both[fold]
+        own[row[two], turns[fold[two], 1]] = np.where(side[two] == 0, 1.0, -1.0)
+        columns = 3 * model.hinges[fold][:, :, None] + np.arange(3)
+        entries = gradient[fold] * (share[fold] / model.per_reach)[:, None]
+        places = (np.repeat(row, 12), columns.ravel())
+        nodal = sparse.coo_array((entries.ravel(), places), shape=(rotations, self._nodal))
+        still = sparse.eye_array(self._nodal)
+        return sparse.csr_array(sparse.block_array([[still, None], [nodal, own]]))
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
         """See `SheetTerm`."""
@@ -184,9 +213,10 @@ class BarsPlatesTerm(SheetTerm):
     def plate_energies(self, q: NDArray, turn: NDArray) -> NDArray:
         """See `SheetTerm`."""
         model, (displacement, rotation) = self.model, self._split(q)
-        from_rest = turned_plates(model, displacement).angle
+        scratch = turned_plates(model, displacement, rotation)
+        from_rest = scratch.angle
         from_rest[len(model.fold_rest) :] -= model.bend_rest
-        turned = np.append(from_rest, (self.per_hidden * rotation)[::-1])  # number -1 comes last
+        turned = np.append(from_rest, (self.per_hidden * scratch.x)[::-1])  # number -1 comes last
         angle, size = turned[model.angle], np.diff(model.start)
         angle = angle - turn if turn.size else angle
         plate = np.repeat(np.arange(len(size)), size**2)
@@ -244,11 +274,14 @@ class BarsPlatesTerm(SheetTerm):
     def fold_hinges(self) -> FoldHinges:
         """See `SheetTerm`: one hinge per fold."""
         nodes = self.model.hinges[: len(self.model.fold_rest)]
-        turns = self.model.fold_rotations
+        turns, per_hidden = self.model.fold_rotations, self.model.per_reach
+        if len(self.model.unmoved):  # one dof is the turn of the fold
+            first = np.where(turns[:, 0] >= 0, turns[:, 0], turns[:, 1])
+            turns, per_hidden = np.stack([first, first], axis=1), -0.5 * per_hidden
         hidden = np.where(turns >= 0, self._nodal + turns, NO_DOF)
         corners = self.model.bars.rest[nodes]
         return FoldHinges(
-            np.arange(len(nodes)), nodes, corners, hidden, self.model.per_reach,
+            np.arange(len(nodes)), nodes, corners, hidden, per_hidden,
             self.model.fold_rest, self.model.fold_stiffness, np.zeros(len(nodes)),
             np.arange(len(nodes)),
         )  # fmt: skip

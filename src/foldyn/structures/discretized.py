@@ -225,6 +225,11 @@ class Discretized:
         """The structure with another mesh, if it has a mesh."""
         raise NotImplementedError
 
+    @property
+    def for_explicit(self) -> Discretized:
+        """The structure with the dofs that explicit methods take."""
+        return self
+
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """Additions to the structure if panels swell: if they would stretch and curl when free.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, ClassVar
 
@@ -27,6 +27,7 @@ from foldyn.mechanics.clamps import RIDES, ClampsTerm
 from foldyn.mechanics.edge_gives import EdgeGives, EdgeGivesTerm
 from foldyn.mechanics.following import Following, joined, moments, pushes, tensions
 from foldyn.mechanics.membranes import MembranesTerm
+from foldyn.mechanics.plates import handed_over
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm
@@ -118,6 +119,8 @@ class Structure(Discretized):
         Coupling of the bars of panels, for `membrane = "panel"`, which does not use `bar_area`.
     edge_gives : EdgeGives or None
         How edges give way near their ends, in the plane of panels; for the scheme n5b8e.
+    by_folds : bool
+        Whether the dofs of edge angles are those of explicit methods; see `mechanics.plates`.
     pattern, sheet, options
         Input from which the structure was made.
     """
@@ -145,6 +148,7 @@ class Structure(Discretized):
     edge_plates: EdgePlates | None = None
     membranes: tuple[PanelKind, ...] = ()
     edge_gives: EdgeGives | None = None
+    by_folds: bool = False
 
     def __repr__(self) -> str:
         """One line with the counts."""
@@ -239,9 +243,17 @@ class Structure(Discretized):
         model = plates_model(
             self.nodes, self.bars, self.bar_stiffness, self.bar_law, self.folds,
             self.fold_stiffness, self.fold_rest, self.fold_law, self.bends, self.bend_rest, plates,
-            self.clamps,
+            self.clamps, self.by_folds,
         )  # fmt: skip
         return BarsPlatesTerm(model, (self.fold_law, self.bend_law))
+
+    @cached_property
+    def for_explicit(self) -> Structure:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """See `Discretized`."""
+        if not self.massless or self.by_folds:
+            return self
+        other = replace(self, by_folds=True)
+        return other.marked() if self.as_made else other
 
     def _rows(self, group: int, hinges: NDArray) -> NDArray:
         """Rows in `model.hinges` of the folds (group 0) or bends (1), which may be interleaved."""
@@ -294,7 +306,10 @@ class Structure(Discretized):
             sheet = self.body.sheet
             moment, on_edges, own = self._curled(self.edge_plates, curvature)
             if np.any(curvature):
+                turning, on_edges = handed_over(sheet.model, on_edges)
                 parts += [moment, pushes(sheet.hidden[: len(on_edges)], on_edges)]
+                if turning.any():
+                    parts.append(moments(self.nodes[self.folds], self.folds, turning))
             free = free_angles(self.edge_plates, own)
             forces = joined((part, 0) for part in parts)
             turns = np.zeros(len(sheet.rest_angles))
