@@ -147,7 +147,7 @@ ARRAYS = {  # that count, with a star where forces are linear, with a minus wher
     "plates that lock": f"{OF_PLATES} *fold_rest fold_parameters {OF_BARS}",
     "plates of a user's law": f"{OF_PLATES} fold_rest",
     "plates by folds": f"{BY_FOLDS} *fold_rest *fold_parameters wings",
-    "one side by folds": "bars.rest per_reach *fold_stiffness *stiffness *unmoved *fold_rest *fold_parameters",
+    "one side by folds": f"{BY_FOLDS} *fold_rest *fold_parameters".replace(" *bend_rest", ""),
     "locked by folds": f"{OF_PLATES} unmoved *fold_rest fold_parameters {OF_BARS}",
     "shell by folds": f"{BY_FOLDS} *fold_rest *fold_parameters",
     "damped folds": "*coefficient hidden_turn",

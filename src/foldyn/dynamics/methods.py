@@ -28,6 +28,7 @@ from foldyn.dynamics.stability import (
     MARGIN,
     Growth,
     damper_rate,
+    explicit,
     hidden_inertia,
     largest_frequency,
     stability_limit,
@@ -262,8 +263,7 @@ def suited(name: str, case: Case) -> Integrator:
 
 def suiting(method: Integrator, case: Case) -> Case:
     """The case; for an explicit method, its structure with the dofs that such methods take."""
-    structure = case.structure if method.implicit else case.structure.for_explicit
-    return case if structure is case.structure else case.altered(structure=structure)
+    return case if method.implicit else explicit(case)
 
 
 def lacking(method: Integrator, case: Case) -> str:

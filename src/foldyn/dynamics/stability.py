@@ -105,9 +105,14 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     stiffness at rest, would lower the result. Laws with memory count with their instant stiffness,
     and dofs without mass with the inertia that explicit methods give them.
     """
-    case = of_kind("case", case, Case)
-    case = case.altered(structure=case.structure.for_explicit)
+    case = explicit(of_kind("case", case, Case))
     return float(np.sqrt(max(_largest_quotient(case, _tangent(case, u)), 0.0)))
+
+
+def explicit(case: Case) -> Case:
+    """The case; its structure with the dofs that explicit methods take."""
+    structure = case.structure.for_explicit
+    return case if structure is case.structure else case.altered(structure=structure)
 
 
 _known: WeakKeyDictionary[Case, NDArray] = WeakKeyDictionary()

@@ -45,7 +45,7 @@ from foldyn.mechanics.term import (
     nodal,
 )
 
-SCRATCH = ("strain", "along")  # arrays of `EdgeGives` for one panel at a time
+SCRATCH = ("strain", "along", "given", "pull")  # arrays of `EdgeGives` for one panel at a time
 
 
 class EdgeGives(NamedTuple):
@@ -63,6 +63,8 @@ class EdgeGives(NamedTuple):
     stiffness: NDArray  # (p, k, k) K, N/m
     strain: NDArray  # (b,) scratch of one panel
     along: NDArray  # (b, 3) vectors of this panel's bars, m
+    given: NDArray  # (k,) this panel's gives, m
+    pull: NDArray  # (k,) forces on them, N
 
     @property
     def matrix(self) -> sparse.csc_array:
@@ -136,6 +138,38 @@ def add_given(gives, p, g, share, out):
 
 
 @inner
+def add_panel(gives, u, p, g, force, pull):
+    """Add the forces of panel p on its nodes and its gives, in one pass: see the three above."""
+    count = gives.given.size
+    for k in range(count):
+        gives.given[k], gives.pull[k] = g[gives.number[p, k]], 0.0
+    for i in range(gives.strain.size):
+        a, b = gives.nodes[p, gives.ends[p, i, 0]], gives.nodes[p, gives.ends[p, i, 1]]
+        per, vector = gives.per_length2[p, i], gives.vector
+        x, y, z = u[b, 0] - u[a, 0], u[b, 1] - u[a, 1], u[b, 2] - u[a, 2]
+        one, two, three = vector[p, i, 0], vector[p, i, 1], vector[p, i, 2]
+        excess = x * (2.0 * one + x) + y * (2.0 * two + y) + z * (2.0 * three + z)
+        strain, tension = 0.5 * per * excess, 0.0
+        for k in range(count):
+            across = gives.across[p, i, k]
+            tension += across * gives.given[k]
+            gives.pull[k] += across * strain
+        tension *= per
+        x, y, z = tension * (one + x), tension * (two + y), tension * (three + z)
+        force[b, 0] += x
+        force[b, 1] += y
+        force[b, 2] += z
+        force[a, 0] -= x
+        force[a, 1] -= y
+        force[a, 2] -= z
+    for k in range(count):
+        total = gives.pull[k]
+        for j in range(count):
+            total += gives.stiffness[p, k, j] * gives.given[j]
+        pull[gives.number[p, k]] += total
+
+
+@inner
 def strained_gives(gives, u, pull):
     """Forces (g,), N, that the strains at u exert on the gives."""
     pull[:] = 0.0
@@ -157,10 +191,7 @@ def _forces(own, u, v, t, force, powers):
     first, end = own.first, own.first + own.gives.count
     g, pull = flat(moved)[first:end], flat(out)[first:end]
     for p in range(own.gives.nodes.shape[0]):
-        strain_panel(own.gives, moved, p)
-        add_pulls(own.gives, p, g, 1.0, out)
-        add_strained(own.gives, p, 1.0, pull)
-        add_given(own.gives, p, g, 1.0, pull)
+        add_panel(own.gives, moved, p, g, out, pull)
 
 
 @energies

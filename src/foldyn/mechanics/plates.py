@@ -33,10 +33,10 @@ from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment, hinge_slope
 from foldyn.mechanics.bars_hinges import bars_hinges_kernels
-from foldyn.mechanics.dihedral import gradient_at
+from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.discrete_gradient import discrete_gradient, mean_moment, put_motion
-from foldyn.mechanics.force import ForceScratch, force_scratch
-from foldyn.mechanics.model import BarsHinges
+from foldyn.mechanics.force import ForceScratch, force_scratch, whole_lanes
+from foldyn.mechanics.model import BLOCK, BarsHinges
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
@@ -93,6 +93,8 @@ class PlatesScratch(NamedTuple):
     """Scratch of one evaluation; nh = nf + nb."""
 
     bars: ForceScratch
+    points: NDArray  # (12 * BLOCK,) of a block of hinges
+    found: NDArray  # (13 * BLOCK,) gradients and, in the last row, angles
     angle: NDArray  # (nh,) dihedrals, rad
     gradient: NDArray  # (nh, 12)
     moment: NDArray  # (nh,) N m
@@ -108,23 +110,47 @@ def plates_scratch(model: BarsPlates) -> PlatesScratch:
     nh, nf = len(model.hinges), len(model.fold_rest)
     most = int(np.diff(model.start).max(initial=0))
     return PlatesScratch(
-        force_scratch(model.bars), np.zeros(nh), np.zeros((nh, 12)), np.zeros(nh),
-        np.zeros(nf), np.zeros(model.rotations), np.zeros(most), np.array([0, model.rows]),
-        team(1)[0],
+        force_scratch(model.bars), np.ones(12 * BLOCK), np.zeros(13 * BLOCK), np.zeros(nh),
+        np.zeros((nh, 12)), np.zeros(nh), np.zeros(nf), np.zeros(model.rotations),
+        np.zeros(most), np.array([0, model.rows]), team(1)[0],
     )  # fmt: skip
 
 
 @kernel
 def turn_hinges(model, u, scratch):
-    """Dihedrals and their gradients at displacements u."""
-    p = np.empty((4, 3))
-    for e in range(model.hinges.shape[0]):
-        put_points(model, u, e, p)
-        found = gradient_at(p)
-        scratch.angle[e] = found[0]
-        for c in range(12):
-            scratch.gradient[e, c] = found[1 + c]
-        carry(model, e, scratch.gradient)
+    """Dihedrals and their gradients at displacements u, in blocks of hinges."""
+    x, g, p, rest = scratch.points, scratch.found, np.empty((4, 3)), model.bars.rest
+    for first in range(0, model.hinges.shape[0], BLOCK):
+        m = min(BLOCK, model.hinges.shape[0] - first)
+        for v in range(4):
+            for q in range(m):
+                node, at = model.hinges[first + q, v], 3 * v * BLOCK + q
+                x[at] = rest[node, 0] + u[node, 0]
+                x[at + BLOCK] = rest[node, 1] + u[node, 1]
+                x[at + 2 * BLOCK] = rest[node, 2] + u[node, 2]
+        for q in range(m):
+            if rides(model, first + q):
+                put_points(model, u, first + q, p)
+                for c in range(12):
+                    x[c * BLOCK + q] = flat(p)[c]
+        for q in range(whole_lanes(m)):
+            (
+                g[12 * BLOCK + q],
+                g[q], g[BLOCK + q], g[2 * BLOCK + q],
+                g[3 * BLOCK + q], g[4 * BLOCK + q], g[5 * BLOCK + q],
+                g[6 * BLOCK + q], g[7 * BLOCK + q], g[8 * BLOCK + q],
+                g[9 * BLOCK + q], g[10 * BLOCK + q], g[11 * BLOCK + q],
+            ) = dihedral_gradient(
+                x[q], x[BLOCK + q], x[2 * BLOCK + q],
+                x[3 * BLOCK + q], x[4 * BLOCK + q], x[5 * BLOCK + q],
+                x[6 * BLOCK + q], x[7 * BLOCK + q], x[8 * BLOCK + q],
+                x[9 * BLOCK + q], x[10 * BLOCK + q], x[11 * BLOCK + q],
+            )  # fmt: skip
+        for q in range(m):
+            scratch.angle[first + q] = g[12 * BLOCK + q]
+            for c in range(12):
+                scratch.gradient[first + q, c] = g[c * BLOCK + q]
+            carry(model, first + q, scratch.gradient)
 
 
 @inner_scalar
