@@ -184,3 +184,20 @@ def test_inertia_is_that_of_a_copy():
     other = fd.discretize(larger, sheet, preset="n5b8e").for_explicit
     held = fd.Case(other, [fd.Fix(np.flatnonzero(made.fixed.all(axis=1)).tolist())])
     np.testing.assert_allclose(hidden_inertia(held), 27.0 * hidden_inertia(made), rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", EXPLICIT)
+def test_a_motion_goes_on_from_the_last_sample_of_another(method):
+    """With dofs that samples do not hold; not so the next implicit one, which balances them."""
+    load = fd.Force("xmax", (0, 0, 2e-4), fd.HalfSine(0.05))
+    made = fd.Case(structure("condensed"), HELD, [load], fd.CreaseDamping(1e-3))
+    given = {"method": method, "interval": 2e-3}
+    whole = fd.simulate(made, 8e-3, **given)
+    half = fd.simulate(made, 4e-3, **given)
+    state = fd.initial_state(half)
+    rest = fd.simulate(made, 4e-3, **given, initial=state, start=4e-3)
+    close = 1e-6 if method == "dormand_prince" else 1e-11
+    assert apart(rest.displacement.values[-1], whole.displacement.values[-1]) < close
+    assert np.array_equal(fd.initial_state(rest, 0).continuation.values, state.continuation.values)
+    other = fd.simulate(made, 4e-3, method="newmark", interval=2e-3, initial=state, start=4e-3)
+    assert apart(other.displacement.values[-1], whole.displacement.values[-1]) < 0.05

@@ -298,6 +298,9 @@ def begin(
             moving.ravel()[body.hidden] = following(body, there)(speed.ravel())
         if continued is not None and len(continued.values) > inward.size:
             inward.ravel()[body.hidden] = continued.values[body.hidden]
+            if len(mass.hidden):
+                speed = continued.values[inward.size :]
+                moving.ravel()[body.hidden] = speed[body.hidden]
     if memory is not None:
         there = by.inward(u)
         there.ravel()[body.hidden] = inward.ravel()[body.hidden]

@@ -91,6 +91,13 @@ class ExplicitEngine(Engine):
         arguments = [(equation.recording(out), *case) for equation in self._equations]
         return run_together(self._loop, [own.team for own in self._threads], arguments)[0]
 
+    def continuation(self) -> NDArray:
+        """Displacement and velocity, if these include dofs that samples do not hold; else (0,)."""
+        state = self._state
+        if not len(self._packed.body.hidden):
+            return np.zeros(0)
+        return np.concatenate([state.u.ravel(), state.v.ravel()])
+
     def accelerate(self) -> None:
         """Recompute the current acceleration, for methods that store it."""
         state, handle = self._state, self._equations[0].handle
