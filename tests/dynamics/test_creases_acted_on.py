@@ -122,7 +122,8 @@ RESISTING = {
     + beyond([(kind, method) for kind in RESISTING for method in EXPLICIT if method != "rk4"]),
 )
 def test_creases_that_remember_or_are_damped_move_as_with_edge_angles_as_dofs(method, kind):
-    """A damped crease is late by the inverse of the largest frequency, here 1/5000 s.
+    """A damped crease is late by the inverse of the largest frequency, here 1/5000 s; one that
+    begins to yield swings a little.
 
     generalized_alpha is of order 1 where dofs without mass are damped: it is extrapolated.
     """
@@ -130,12 +131,13 @@ def test_creases_that_remember_or_are_damped_move_as_with_edge_angles_as_dofs(me
     made = case([moment(SMOOTH), heat(SMOOTH)], law, damping=damping)
     found = fd.simulate(made, 0.3, method=method, interval=0.05)
     one, other = by_edges(made, 0.3)
+    close = {"plastic": 5e-4}.get(kind, 5e-5) if damping is SMALL else 5e-3
     for name in ("displacement", "dissipated", "work"):
         wanted = other[name].values
         if damping is not SMALL:
             wanted = 2.0 * wanted - one[name].values
-        assert apart(found[name].values, wanted) < (5e-5 if damping is SMALL else 5e-3)
-    assert balance(found) < (1e-6 if damping is SMALL else 5e-6)
+        assert apart(found[name].values, wanted) < close
+    assert balance(found) < (2e-6 if damping is SMALL else 5e-6)
 
 
 @pytest.mark.parametrize("damping", [1e-4, 0.05, 5.0])
@@ -186,12 +188,15 @@ MIURA = fd.patterns.miura()
     ),
 )
 def test_edge_angles_jump_beside_damped_creases(method, error, jump):
-    """But for the turn of these; if they did not, they would ring from step to step."""
+    """But for the turn of these; if they did not, they would ring from step to step.
+
+    In explicit motions they swing about the same place, which energies show.
+    """
     held, damping = fd.Fix(list(MIURA.faces[0])), fd.CreaseDamping(0.5, [2, 3])
     made = fd.Case(model(pattern=MIURA), [held], [jump], damping=damping)
     found = fd.simulate(made, 0.2, method=method, dt=2e-4, interval=0.05)
     other = fd.simulate(made, 0.2, method=DP, interval=0.05, tolerance=1e-7)
-    assert differences(other, found) < error
+    assert apart(other, found) < error
     assert balance(found) < 1e-3
 
 
