@@ -35,6 +35,7 @@ _DENSE = 60  # dofs below which a dense eigensolver is faster and safer
 Growth = Callable[[NDArray, NDArray, float], NDArray]
 _FRACTIONS = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 400)])
 _RATES = np.linspace(0.0, 1.0, 5)[:, None]
+_LEAST = 0.0  # least octaves of this eigenvalue above the local one, which ties would lower
 _PER_OCTAVE = 2  # values per octave that the largest eigenvalue is rounded to, see `hidden_inertia`
 ROUNDING = 1e-7  # tolerance for a factor of 1, as rigid motions have double eigenvalues
 
@@ -124,7 +125,8 @@ def hidden_inertia(case: Case) -> NDArray:
     It is the sum of the absolute stiffnesses in the row of each dof at rest, divided by w^2, with w
     the largest frequency of the nodes while these dofs are held. w^2 is rounded, in relation to a
     number that depends smoothly on the case: equal cases with other rounding errors have the same
-    inertia, and derivatives do not depend on how an eigenvalue was found.
+    inertia, and derivatives do not depend on how an eigenvalue was found. Ties that leave only slow
+    motions do not make it larger.
 
     So that dampers of creases do not shorten the step, the sum of their coefficients in the row,
     divided by w, adds to it: a damped crease then follows its damper with a delay of 1 / w.
@@ -140,7 +142,7 @@ def hidden_inertia(case: Case) -> NDArray:
         local = stiffness.diagonal()[: 3 * len(mass)].reshape(-1, 3).sum(axis=1)
         scale = float((local[free] / mass[free]).max())
         nodal = _quotient_of(case, stiffness, np.asarray(case.free_dofs), case.free_mass)
-        rounded = round(_PER_OCTAVE * math.log2(nodal / scale)) / _PER_OCTAVE
+        rounded = max(round(_PER_OCTAVE * math.log2(nodal / scale)) / _PER_OCTAVE, _LEAST)
         damping = abs(damping_matrix(case, case.body.dofs(_state(case, None))))
         damped = np.asarray(damping[hidden][:, hidden].sum(axis=1)).ravel()
         square = scale * 2.0**rounded
