@@ -19,7 +19,7 @@ from foldyn.dynamics.checkpoint import KEY, Keeping, identity, identity_digest
 from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.failures import failure, smaller_step
 from foldyn.dynamics.initial import begin
-from foldyn.dynamics.methods import ExplicitEngine, ImplicitEngine, Integrator
+from foldyn.dynamics.methods import METHODS, ExplicitEngine, ImplicitEngine, Integrator
 from foldyn.dynamics.motion_state import MotionState, Outcome, Samples, StepPlan
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
@@ -87,12 +87,19 @@ class Motion:
     @property
     def beginning(self) -> MotionState:
         """A new copy of the initial state of the integrators."""
-        return begin(self.case, *self._initial, self.plan, self.packed)
+        return begin(self.case, *self._initial[:3], self._continued, self.plan, self.packed)
+
+    @property
+    def _continued(self) -> Continuation | None:
+        """What the motion goes on from, if a method of the same kind has stored it."""
+        given = self._initial[3]
+        kind = given and METHODS.get(given.method)
+        return given if kind and kind.implicit == self.method.implicit else None
 
     @property
     def continues(self) -> bool:
         """Whether the motion may continue an earlier one, with data beyond its state."""
-        return self._initial[3] is not None
+        return self._continued is not None
 
     @property
     def expected_samples(self) -> int:
@@ -356,7 +363,7 @@ class Motion:
         return replace(self.origin, flow=flow, looked=looked)
 
     def _continuations(self) -> dict[str, tuple[float, Continuation]]:
-        """Data that an implicit method continued from, and data to continue from its last sample.
+        """Data beyond states that the motion continued from, and to continue from its last sample.
 
         With contact a motion always starts afresh: the state that ties nodes to planes is not
         stored.
@@ -365,13 +372,13 @@ class Motion:
         if self.case.contact is not None:
             return found
         stopped = not self.stored or self.packed.callbacks.error is not None
-        if isinstance(engine, ImplicitEngine) and not stopped:
-            if self._initial[3] and engine.continues:
-                found["continued_from"] = self.output.time(0), self._initial[3]
-            last = self.output.time(self.stored - 1)
-            if float(self.state.tally.time) == last:
-                end = Continuation(self.method.name, engine.continuation())
-                found["continuation"] = last, end
+        if isinstance(engine, ImplicitEngine | ExplicitEngine) and not stopped:
+            explicit = isinstance(engine, ExplicitEngine)
+            if self._continued and (explicit or engine.continues):
+                found["continued_from"] = self.output.time(0), self._continued
+            last, values = self.output.time(self.stored - 1), engine.continuation()
+            if len(values) and float(self.state.tally.time) == last:
+                found["continuation"] = last, Continuation(self.method.name, values)
         return found
 
     def _identity(self) -> dict[str, Any]:
@@ -466,7 +473,8 @@ class Motion:
             plan = plan._replace(end=plan.start + length, interval=length)
         sampler = Sampler(self.case, {}, *self.start, plan.start)
         # packed anew, with a memory of its own, as this motion may continue
-        packed = pack(self.case, apart(plan, self.critical), self.origin)
+        hidden = self.method.hidden_inertia(self.case)
+        packed = pack(self.case, apart(plan, self.critical), self.origin, hidden=hidden)
         motion = Motion(
             self.case, self.method, plan, self.critical, True, self._initial, self.origin, packed,
             sampler,
