@@ -171,6 +171,11 @@ DATA: Calls = {
         "fold_law": "enhanced", "crease_stiffness": 0.5, "crease_rest": 90.0,
         "clamped": [(0, 1)], "rigid": [0], "vertex_radius": 0.05,
     }),
+    "superelements": (fd.superelements, {
+        "pattern": pattern(), "sheet": sheet(), "level": 1, "divisions": 4, "mass": "consistent",
+        "fold_law": "enhanced", "crease_stiffness": 0.5, "crease_rest": 90.0,
+        "clamped": [(0, 1)], "rigid": [0], "vertex_radius": 0.05,
+    }),
 }  # fmt: skip
 
 PATTERNS: Calls = {

@@ -22,9 +22,9 @@ from foldyn.patterns import GENERATORS
 from pairwise import beyond
 from public_calls import DATA, PATTERNS, case, pattern, sheet, solved
 
-MADE = {"Structure", "Shell", "Folding", "Fidelity", "View"}
+MADE = {"Structure", "Shell", "Superelements", "Folding", "Fidelity", "View"}
 """Made by functions."""
-KEPT = {"ModelOptions", "ShellOptions", "Measure"}
+KEPT = {"ModelOptions", "ShellOptions", "SuperelementsOptions", "Measure"}
 """Checked by the functions that take them."""
 OWN = {"BarLaw", "HingeLaw", "CustomBarLaw", "CustomHingeLaw"}
 """For laws of users, which are functions."""

@@ -45,6 +45,14 @@ def test_levels_fall_toward_the_shell(supports):
     assert off[0].max() < 0.12 and off[2].max() < 0.02 and off[4].max() < 0.006
 
 
+def test_panels_vibrate_between_held_vertices():
+    tower = fd.patterns.kresling(sides=5, height=0.9, twist=35)
+    sheet = replace(SHEET, thickness=0.02)
+    every = np.arange(len(tower.vertices)).tolist()
+    own, shell = (frequencies(s, [fd.Fix(every)], 4) for s in both(tower, sheet))
+    np.testing.assert_allclose(own, shell, rtol=5e-3)
+
+
 def test_a_free_sheet_has_six_rigid_modes_and_its_mass():
     structure = both()[0]
     modes = fd.modes(fd.Case(structure), 7)

@@ -236,8 +236,8 @@ class Case(Loaded, Damped):
                     )
 
     def check_movable(self) -> None:
-        """Refuse supports that hold every dof."""
-        if not len(self.free_dofs):
+        """Refuse supports that hold every dof; superelements also move between held nodes."""
+        if not len(self.free_dofs) and not self.structure.linear:
             raise InputError(
                 "supports: hold every node along x, y and z, so that nothing can move: free one"
             )

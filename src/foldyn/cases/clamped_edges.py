@@ -82,9 +82,11 @@ def held_edges(
 ) -> dict[int, NDArray[np.float64]]:
     """Edges, as numbered in `pattern.lines`, that are held along, and in which directions (h, 3).
 
+    Empty for models that have nodes along edges, or edges that do not bow.
+
     fixed : dofs (n, 3) that are supported in all; both ends of a clamped edge hold it.
     """
-    if structure.pattern is None:
+    if not structure.linear:
         return {}
     number, found = edge_lookup(structure.pattern.lines), {}
     for support in supports:
@@ -98,7 +100,7 @@ def held_edges(
         )
         for edge in edges_between(structure, resolve_nodes(structure, support.nodes, "nodes")):
             found.setdefault(number[edge_of(int(edge[0]), int(edge[-1]))], []).append(held)
-    for low, high in structure.options.clamped if hasattr(structure.options, "clamped") else ():
+    for low, high in structure.options.clamped:
         both = fixed[low] & fixed[high]
         if both.any():
             found.setdefault(number[low, high], []).append(np.eye(3)[both])

@@ -8,6 +8,7 @@ from inspect import signature
 from typing import Any
 
 from foldyn.condensation import Superelements, SuperelementsOptions, superelements
+from foldyn.condensation.structure import MASSES as SUPERELEMENT_MASSES
 from foldyn.shells import Shell, ShellOptions, shell
 from foldyn.shells.shell import MASSES
 from foldyn.structures import MASS_RULES, Structure, discretize
@@ -55,5 +56,5 @@ def _of_superelements(welds: bool = False, **given: Any) -> SuperelementsOptions
 MODELS: Mapping[str, Model] = {
     BARS_AND_HINGES: Model(discretize, resolved, MASS_RULES, "bars and hinges"),
     SHELL: Model(shell, _of_shells, MASSES, "a shell"),
-    SUPERELEMENTS: Model(superelements, _of_superelements, ("consistent",), "superelements"),
+    SUPERELEMENTS: Model(superelements, _of_superelements, SUPERELEMENT_MASSES, "superelements"),
 }

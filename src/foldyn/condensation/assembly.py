@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.condensation.library import Group
-from foldyn.condensation.panel import BOW, INNER, TURN, VERTEX, edge_frame
+from foldyn.condensation.panel import BOW, INNER, TURN, VERTEX, block_diagonal, edge_frame
 from foldyn.condensation.shapes import ACROSS, ALONG, Level, bows
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import edge_lookup
@@ -149,8 +149,8 @@ class Whole:
             count = len(group.number)
             for k, own in enumerate((panel.stiffness, panel.mass)):
                 blocks = np.tile(own[np.ix_(kept, kept)], (count, 1, 1))
-                diagonal = sparse.bsr_array((blocks, np.arange(count), np.arange(count + 1)))
-                total[k] = sparse.csr_array(total[k] + placed.T @ (diagonal.tocsr() @ placed))
+                summed = placed.T @ (block_diagonal(blocks).tocsr() @ placed)
+                total[k] = sparse.csr_array(total[k] + summed)
         return total[0], total[1]
 
     def between(self, cut_off: float) -> tuple[NDArray, sparse.csr_array]:
@@ -178,12 +178,10 @@ class Whole:
         centers = sparse.csr_array((3 * own.panels, own.size))
         for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
             local = np.einsum("pad,ac->pdc", group.frames, group.panel.center[:, kept])
-            number = np.arange(len(local))
-            blocks = sparse.bsr_array((local, number, np.append(number, len(local))))
             rows = (3 * group.number[:, None] + axis).ravel()
             entries = (np.ones(len(rows)), (rows, np.arange(len(rows))))
             put = sparse.csr_array(entries, shape=(3 * own.panels, len(rows)))
-            centers = centers + put @ (blocks.tocsr() @ placed)
+            centers = centers + put @ (block_diagonal(local).tocsr() @ placed)
         points.append(np.array([x[list(face)].mean(axis=0) for face in self._pattern.faces]))
         return np.concatenate(points), sparse.csr_array(sparse.vstack([on_edges, centers]))
 

@@ -18,21 +18,27 @@ and welds, which connect the turns of edges, are not part of a panel.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.interpolate import LinearNDInterpolator
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from foldyn.algebra.superlu import factorize
 from foldyn.condensation.shapes import HIGHEST, bows, turns
+from foldyn.mechanics.block_matrix import of_elements
 from foldyn.mechanics.triangle import triangle_stiffness
 from foldyn.patterns import Pattern
-from foldyn.shells.mesh import shell_mesh
+from foldyn.patterns.topology import around
+from foldyn.shells.mesh import shell_mesh, side_between
 from foldyn.shells.shell import STIFF
 from foldyn.structures.graded import Grading
+from foldyn.structures.panel_plate import TRIANGLE_MASS
 from foldyn.structures.sheet import Sheet
+
+if TYPE_CHECKING:
+    from scipy.interpolate import LinearNDInterpolator
 
 VERTEX, BOW, TURN, INNER = range(4)
 SPARE = 4  # inner modes of a mesh among which those of another mesh are sought
@@ -83,6 +89,8 @@ def condense(
     corners : in a frame whose third axis is nearly normal to the panel.
     like : the panel on another mesh, whose inner modes are reproduced.
     """
+    from scipy.interpolate import LinearNDInterpolator  # loads slowly: not for other models
+
     mesh = _Mesh(corners, sheet, graded)
     shapes, kind, held = _edge_shapes(mesh, graded.radius)
     inside = np.setdiff1d(np.arange(mesh.size), held)
@@ -123,10 +131,8 @@ class _Mesh:
         face = tuple(range(len(corners)))
         mesh = shell_mesh(Pattern(corners, [face]), 0, graded)
         self.nodes, self.triangles, self.corners = mesh.nodes, mesh.triangles, len(corners)
-        points, ends = mesh.edge_points, [(k, (k + 1) % len(corners)) for k in face]
-        self.edges = [
-            np.array(points[a, b] if a < b else points[b, a][::-1], np.int64) for a, b in ends
-        ]
+        points = mesh.edge_points
+        self.edges = [np.array(side_between(points, a, b), np.int64) for a, b in around(face)]
         tri, x = self.triangles, self.nodes[self.triangles]
         nu, n, nt = sheet.poissons_ratio, len(self.nodes), len(tri)
         stretching = sheet.youngs_modulus * sheet.thickness / (1.0 - nu**2)
@@ -137,7 +143,7 @@ class _Mesh:
         length2 = np.einsum("tki,tki->tk", side, side)
         normal = np.cross(side[:, 0], side[:, 1])
         twice = np.linalg.norm(normal, axis=1)
-        self._corner_mass = 0.5 * twice * np.asarray(sheet.areal_density) / 12.0
+        self._triangle_mass = 0.5 * twice * sheet.areal_density
         self.sides, number, sign = _sides(tri)
         self.size = 3 * n + len(self.sides)
         rows, a, b, c = (
@@ -161,30 +167,28 @@ class _Mesh:
     def stiffness(self) -> sparse.csc_array:
         """Stiffness (m, m) of all unknowns."""
         parts = zip((self._strains, self._rotations), self._elastic, strict=True)
-        return sparse.csc_array(sum(rows.T @ (_diagonal(own) @ rows) for rows, own in parts))
+        return sparse.csc_array(sum(rows.T @ (block_diagonal(own) @ rows) for rows, own in parts))
 
     def stiffness_of(self, shapes: NDArray) -> NDArray:
         """Stiffness of shapes (m, c), summed over triangles: far smaller rounding errors."""
         out = np.zeros((shapes.shape[1], shapes.shape[1]))
         for rows, own in zip((self._strains, self._rotations), self._elastic, strict=True):
             strain = rows @ shapes
-            out += strain.T @ (_diagonal(own) @ strain)
+            out += strain.T @ (block_diagonal(own) @ strain)
         return out
 
     @property
     def mass(self) -> sparse.csr_array:
         """Consistent mass (m, m) of all unknowns; turns have none."""
-        tri, n = self.triangles, len(self.nodes)
-        row, column = np.repeat(tri, 3, axis=1).ravel(), np.tile(tri, (1, 3)).ravel()
-        entry = self._corner_mass[:, None] * np.array([2.0, 1, 1, 1, 2, 1, 1, 1, 2])
-        nodal = sparse.coo_array((entry.ravel(), (row, column)), shape=(n, n)).tocsr()
+        matrices = self._triangle_mass[:, None, None] * TRIANGLE_MASS
+        nodal = of_elements(self.triangles, matrices, len(self.nodes))
         whole = sparse.csr_array(sparse.kron(nodal, sparse.eye_array(3), format="csr"))
         whole.resize((self.size, self.size))
         return whole
 
 
-def _diagonal(blocks: NDArray) -> sparse.bsr_array:
-    """Block diagonal matrix of blocks (n, 3, 3)."""
+def block_diagonal(blocks: NDArray) -> sparse.bsr_array:
+    """Block diagonal matrix of blocks (n, a, b)."""
     return sparse.bsr_array((blocks, np.arange(len(blocks)), np.arange(len(blocks) + 1)))
 
 

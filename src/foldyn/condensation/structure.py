@@ -24,14 +24,15 @@ from foldyn.mechanics.sheet_term import NO_DOF, CreaseTurns, FoldHinges
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned
 from foldyn.patterns.topology import Edge, edge_lookup
+from foldyn.shells.shell import LEAST, PER_DOUBLING
 from foldyn.structures import Sheet
 from foldyn.structures.beyond_range import doubt_units
 from foldyn.structures.calibration import (
     PerCrease,
+    check_creases,
     check_sheet,
     fold_rest,
     fold_stiffness,
-    per_crease,
 )
 from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.discretize import checked_kinds
@@ -41,6 +42,7 @@ from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
 from foldyn.values import choice, length, whole
 
+MASSES = ("consistent",)  # mass rules
 EXTRAPOLATED = (8, 16, 24)
 """Divisions of the meshes from which panels are extrapolated."""
 
@@ -59,9 +61,7 @@ class SuperelementsOptions:
     rigid: str | tuple[int, ...] | None = None
     vertex_radius: float | None = None
 
-    def __post_init__(self) -> None:
-        for name in ("crease_stiffness", "crease_rest"):
-            object.__setattr__(self, name, per_crease(name, getattr(self, name)))
+    __post_init__ = check_creases
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,7 +100,7 @@ class Superelements(Discretized):
     linear: ClassVar[str] = "superelements"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
     bar_law: ClassVar[None] = None
-    fill: ClassVar[Fill] = Fill(5900.0, 1450, "level", "take a lower one")
+    fill: ClassVar[Fill] = Fill(PER_DOUBLING, LEAST, "level", "take a lower one")
 
     def __repr__(self) -> str:
         """One line with the counts."""
@@ -284,7 +284,7 @@ def superelements(
     >>> pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
     >>> sheet = fd.Sheet(1e9, 0.3, thickness=0.01, density=1000.0)
     >>> fd.superelements(pattern, sheet, level=1)
-    <Superelements: 2 panels, 1 folds, level 1, 107 dofs>
+    <Superelements: 2 panels, 1 folds, level 1, 114 dofs>
     """
     pattern, sheet = checked_kinds(pattern, sheet)
     doubt_units(pattern, sheet)
@@ -308,7 +308,7 @@ def superelements(
     plates = checked_panels(rigid, len(pattern.faces))
     check_welds(plates, pattern)
     options = SuperelementsOptions(
-        level, divisions, choice("mass", mass, ("consistent",)), fold_law, crease_stiffness,
+        level, divisions, choice("mass", mass, MASSES), fold_law, crease_stiffness,
         crease_rest, boundary_edges(clamped, pattern, "clamped"), plates, vertex_radius,
     )  # fmt: skip
     pieces = EXTRAPOLATED if divisions is None else (divisions,)

@@ -16,6 +16,7 @@ from scipy.linalg import eigh
 
 from foldyn.condensation import Superelements
 from foldyn.condensation.shapes import LEVELS
+from foldyn.condensation.term import SuperelementsTerm
 from foldyn.linear.linearized import Linearized
 
 LOWER = 3  # level with which the highest one is compared
@@ -50,10 +51,10 @@ def frequency_errors(
 
 def _on_coarse_meshes(linear: Linearized, values: NDArray, shapes: NDArray) -> NDArray:
     """Eigenvalues (k,) with panels from coarser meshes, in the space of these modes."""
-    case = linear.case
-    structure = case.structure
-    assert isinstance(structure, Superelements)
-    own, other = (structure.term(case.held_edges, compared) for compared in (False, True))
+    case, own = linear.case, linear.case.elastic_body.sheet
+    assert isinstance(case.structure, Superelements)
+    assert isinstance(own, SuperelementsTerm)
+    other = case.structure.term(case.held_edges, compared=True)
     motion = linear.whole(shapes)
     change = other.tangent(motion[:, 0]) - own.tangent(motion[:, 0])
     stiffness = np.diag(values) + motion.T @ (change @ motion)

@@ -147,8 +147,9 @@ def in_series(
 
     theta, rest : dihedrals (rad); arrays that broadcast with the shares.
     """
-    arrays = np.broadcast_arrays(*(np.asarray(each, float) for each in (theta, rest, share)))
-    flat, at_rest, part = (np.ascontiguousarray(each.ravel()) for each in arrays)
+    # copies: read-only arrays would compile the table again
+    arrays = [np.array(each, float, order="C") for each in np.broadcast_arrays(theta, rest, share)]
+    flat, at_rest, part = (each.ravel() for each in arrays)
     parameters = np.ascontiguousarray(law.parameters(at_rest))
     address = np.array(law.addresses or (0, 0, 0), np.int64)
     energy, moment = _table(law.code, flat, at_rest, parameters, part, address)

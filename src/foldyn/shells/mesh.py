@@ -94,7 +94,7 @@ def shell_mesh(pattern: Pattern, divisions: int, graded: Grading | None = None) 
         edges[low, high] = points.line(low, high, graded.places(length) if graded else even)
     triangles, panels = [], []
     for number, face in enumerate(pattern.faces):
-        sides = [_side(edges, a, b) for a, b in around(face)]
+        sides = [side_between(edges, a, b) for a, b in around(face)]
         if graded:
             pieces = _graded(points, sides, graded)
         elif len(face) == 3:
@@ -111,7 +111,7 @@ def shell_mesh(pattern: Pattern, divisions: int, graded: Grading | None = None) 
     return ShellMesh(nodes, rows, panel, edges)
 
 
-def _side(edges: dict[Edge, list[int]], a: int, b: int) -> list[int]:
+def side_between(edges: dict[Edge, list[int]], a: int, b: int) -> list[int]:
     """Nodes from vertex a to vertex b."""
     return edges[a, b] if a < b else edges[b, a][::-1]
 

@@ -35,10 +35,10 @@ from foldyn.structures import Sheet
 from foldyn.structures.beyond_range import doubt_locking, doubt_units
 from foldyn.structures.calibration import (
     PerCrease,
+    check_creases,
     check_sheet,
     fold_rest,
     fold_stiffness,
-    per_crease,
 )
 from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.discretize import checked_kinds
@@ -74,9 +74,7 @@ class ShellOptions:
     rigid: str | tuple[int, ...] | None = None
     vertex_radius: float | None = None
 
-    def __post_init__(self) -> None:
-        for name in ("crease_stiffness", "crease_rest"):
-            object.__setattr__(self, name, per_crease(name, getattr(self, name)))
+    __post_init__ = check_creases
 
 
 @dataclass(frozen=True, eq=False, repr=False)

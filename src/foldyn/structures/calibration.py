@@ -224,6 +224,12 @@ def _check_scale(sheet: Sheet, low: float, high: float) -> None:
 PerCrease = float | Sequence[float] | Mapping[str, float] | None
 
 
+def check_creases(options: Any) -> None:
+    """Check the values for creases of a frozen data class of options, and set them in place."""
+    for name in ("crease_stiffness", "crease_rest"):
+        object.__setattr__(options, name, per_crease(name, getattr(options, name)))
+
+
 def per_crease(name: str, value: Any) -> Any:
     """Return values for creases as a number, a tuple, or a new dict by word; None unchanged.
 
