@@ -71,7 +71,7 @@ class Adjoint(ABC):
         Keys: the arrays of the terms (`pullback.arrays_of_body`), the fields of `ByMotion`, and
         "start.displacement" and "start.velocity".
         """
-        if len(self._packed.body.hidden) and not self._motion.continues:
+        if len(self._packed.body.hidden) and not self._motion.continued:
             self._begin_hidden(by_u, by_v)
         self._evaluate(self._plan.start)
         moved, outward = self._system.moved, self._packed.numbering.outward

@@ -258,7 +258,7 @@ def _refuse(motion: Any) -> None:
             "no tolerance",
             "dt",
         )
-    if motion.continues:
+    if motion.continued:
         raise InputError(
             ": goes on from the end of another motion, whose acceleration has no derivative; give "
             "its displacement and velocity alone, fd.State(displacement, velocity)",

@@ -24,6 +24,7 @@ from foldyn.dynamics.motion_state import MotionState, Outcome, Samples, StepPlan
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
+from foldyn.dynamics.softening import swings_told
 from foldyn.dynamics.stability import MARGIN, limit_below
 from foldyn.dynamics.system import PackedCase, pack, place, scratch
 from foldyn.dynamics.timing import apart, check_room, check_samples, expected_samples, steps_taken
@@ -87,19 +88,14 @@ class Motion:
     @property
     def beginning(self) -> MotionState:
         """A new copy of the initial state of the integrators."""
-        return begin(self.case, *self._initial[:3], self._continued, self.plan, self.packed)
+        return begin(self.case, *self._initial[:3], self.continued, self.plan, self.packed)
 
     @property
-    def _continued(self) -> Continuation | None:
+    def continued(self) -> Continuation | None:
         """What the motion goes on from, if a method of the same kind has stored it."""
         given = self._initial[3]
         kind = given and METHODS.get(given.method)
         return given if kind and kind.implicit == self.method.implicit else None
-
-    @property
-    def continues(self) -> bool:
-        """Whether the motion may continue an earlier one, with data beyond its state."""
-        return self._continued is not None
 
     @property
     def expected_samples(self) -> int:
@@ -218,7 +214,7 @@ class Motion:
         if resists_turns(self.case, self.packed):
             seen, scale = self.output.evenly_spaced(self.stored, LOOKS), self.output.balance.scale
             given = self.case, self.packed, self.origin.displacement
-            if text := turns_told(*given, *seen, scale):
+            if text := turns_told(*given, *seen[:2], scale):
                 warn(text, "damping.md#rayleigh")
 
     def integrate(
@@ -373,9 +369,8 @@ class Motion:
             return found
         stopped = not self.stored or self.packed.callbacks.error is not None
         if isinstance(engine, ImplicitEngine | ExplicitEngine) and not stopped:
-            explicit = isinstance(engine, ExplicitEngine)
-            if self._continued and (explicit or engine.continues):
-                found["continued_from"] = self.output.time(0), self._continued
+            if self.continued and getattr(engine, "continues", True):
+                found["continued_from"] = self.output.time(0), self.continued
             last, values = self.output.time(self.stored - 1), engine.continuation()
             if len(values) and float(self.state.tally.time) == last:
                 found["continuation"] = last, Continuation(self.method.name, values)
@@ -457,7 +452,8 @@ class Motion:
         """Warning about the accuracy of the motion; empty if there is none."""
         self.off()
         size, remedy = float(self.state.tally.farthest), smaller_step(self)
-        return doubts(self.output.balance, self._rounding, self.plan, size, remedy)
+        text = doubts(self.output.balance, self._rounding, self.plan, size, remedy)
+        return text or swings_told(self.case, self.output, self.stored)
 
     def _look_between(self) -> None:
         """Measure energies between the first two samples, since all may be at rest at samples."""

@@ -26,8 +26,8 @@ from foldyn.cases import Case, Rayleigh
 from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.hereditary import instant_stiffness
 from foldyn.dynamics.inertia import is_lumped
-from foldyn.errors import ComputationError, InputError
-from foldyn.mechanics import angles
+from foldyn.dynamics.softening import check_lost, lost_stiffness
+from foldyn.errors import ComputationError
 from foldyn.values import of_kind
 
 MARGIN = 0.9  # critical step relative to the stability limit, to allow for stiffening
@@ -38,7 +38,6 @@ _FRACTIONS = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 400)])
 _RATES = np.linspace(0.0, 1.0, 5)[:, None]
 _LEAST = 0.0  # least octaves of this eigenvalue above the local one, which ties would lower
 _PER_OCTAVE = 2  # values per octave that the largest eigenvalue is rounded to, see `hidden_inertia`
-SOFTEST = 1e4  # largest stiffness of a crease at rest relative to the least with its panels
 ROUNDING = 1e-7  # tolerance for a factor of 1, as rigid motions have double eigenvalues
 
 
@@ -142,8 +141,8 @@ def hidden_inertia(case: Case) -> NDArray:
     if case not in _known:
         stiffness = _tangent(case, None)
         whole = np.asarray(abs(stiffness[hidden][:, hidden]).sum(axis=1)).ravel()
-        own = whole - _softening(case)
-        _check_softening(case, whole / own)
+        own = whole - lost_stiffness(case)
+        check_lost(case, whole / own)
         mass, free = case.mass.diagonal(), ~case.fixed.all(axis=1)
         free &= mass > 0.0
         local = stiffness.diagonal()[: 3 * len(mass)].reshape(-1, 3).sum(axis=1)
@@ -155,37 +154,6 @@ def hidden_inertia(case: Case) -> NDArray:
         square = scale * 2.0**rounded
         _known[case] = own / square + damped / math.sqrt(square)
     return _known[case]
-
-
-def _softening(case: Case) -> NDArray:
-    """Stiffness (h,), N/m, that creases have at rest, and that their law may take from them."""
-    hidden, hinges = case.body.hidden, case.body.sheet.fold_hinges()
-    out, there = np.zeros(len(hidden)), hinges.alone
-    if not there.any():
-        return out
-    law, corners = case.structure.fold_law, hinges.corners.reshape(-1, 3)
-    angle = angles(corners, np.arange(len(corners), dtype=np.uint32).reshape(-1, 4))
-    slope = np.maximum(law.slope(angle, hinges.rest), 1.0)
-    for part in case.remembering:
-        if part.kind == "fold":
-            slope += sum(branch.relaxed + branch.share for branch in part.branches)
-    slope -= law.least_slope(hinges.rest, hinges.stiffness, hinges.length)
-    turn = hinges.hidden_turn.sum(axis=1)
-    own = np.searchsorted(hidden, hinges.hidden[there, 0])
-    out[own] = (hinges.stiffness * slope * turn**2)[there]
-    return out
-
-
-def _check_softening(case: Case, ratio: NDArray) -> None:
-    """Refuse creases that may lose so much of their stiffness that steps would be far shorter."""
-    if (worst := ratio.max()) > SOFTEST:
-        raise InputError(
-            f": creases with {case.structure.fold_law.name!r} may lose their stiffness, "
-            f"{worst:.2g} times that of the panels beside them ({SOFTEST:.0g} at most): steps "
-            f"would be {math.sqrt(worst):.2g} times shorter; take an implicit method, such as "
-            '"generalized_alpha", or softer creases',
-            "method",
-        )
 
 
 def frequency_bound(case: Case, u: ArrayLike | None = None) -> float:
