@@ -273,8 +273,7 @@ def test_gradients_have_the_damping_or_refuse_it(kind, measure, analysis):
 ALONE = {"stiffness at rest": fd.Rayleigh(beta=BETA), "modes at rest": fd.ModalDamping(RATIO)}
 SWUNG = PATTERN.vertices[0] - PATTERN.vertices[2]
 AWAY = (SWUNG / np.linalg.norm(SWUNG)).tolist()  # from the crease
-SLOW = [(kind, "n5b8e") for kind in ("strain rates", "stiffness at rest")]  # steps of 1 us
-SWING = in_turn(("plate", "n5b8e", "merlin2"), 1, without=SLOW)
+SWING = in_turn(("plate", "n5b8e", "merlin2"), 1, without=[("strain rates", "n5b8e")])
 
 
 def swing(kind: str, model: str, **changes: Any) -> fd.Case:

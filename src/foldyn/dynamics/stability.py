@@ -132,8 +132,9 @@ def hidden_inertia(case: Case) -> NDArray:
     A crease counts with the least stiffness that its law leaves it, after yielding, say: it turns
     as fast as its panels let it then, and a crease that is stiff at rest has a shorter step.
 
-    So that dampers of creases do not shorten the step, the sum of their coefficients in the row,
-    divided by w, adds to it: a damped crease then follows its damper with a delay of 1 / w.
+    So that damping of these dofs, by creases or by beta K, does not shorten the step, the sum of
+    its coefficients in the row, divided by w, adds to it: what is damped then follows its damper
+    with a delay of 1 / w.
     """
     hidden = case.body.hidden
     if not len(hidden):
@@ -151,6 +152,7 @@ def hidden_inertia(case: Case) -> NDArray:
         rounded = max(round(_PER_OCTAVE * math.log2(nodal / scale)) / _PER_OCTAVE, _LEAST)
         damping = abs(damping_matrix(case, case.body.dofs(_state(case, None))))
         damped = np.asarray(damping[hidden][:, hidden].sum(axis=1)).ravel()
+        damped += case.rayleigh.beta * whole
         square = scale * 2.0**rounded
         _known[case] = own / square + damped / math.sqrt(square)
     return _known[case]
