@@ -346,7 +346,7 @@ class Motion:
         """State at the last sample, with everything needed to continue from there."""
         last = self.output.written(self.stored)
         u, v, memory = (a[-1].copy() for a in (last.displacement, last.velocity, last.memory))
-        _, continuation = self._continuations().get("continuation", (0.0, None))
+        _, continuation = self.continuations().get("continuation", (0.0, None))
         return State(u, v, memory if memory.size else None, continuation, self.reached)
 
     @property
@@ -358,7 +358,7 @@ class Motion:
         flow, looked = (self._flow, self._looked_at(steps)) if acts else (None, 0)
         return replace(self.origin, flow=flow, looked=looked)
 
-    def _continuations(self) -> dict[str, tuple[float, Continuation]]:
+    def continuations(self) -> dict[str, tuple[float, Continuation]]:
         """Data beyond states that the motion continued from, and to continue from its last sample.
 
         With contact a motion always starts afresh: the state that ties nodes to planes is not
@@ -524,7 +524,7 @@ class Motion:
         result = trajectory_dataset(
             self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
             self._statistics(), sampled, out.memory if self._branches else None,
-            self._continuations(), self.reached and (float(self.state.tally.time), self.reached),
+            self.continuations(), self.reached and (float(self.state.tally.time), self.reached),
         )  # fmt: skip
         if self._keeping is not None:
             result.attrs[KEY] = identity_digest(self._identity())
