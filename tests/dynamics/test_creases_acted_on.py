@@ -12,6 +12,7 @@ from moving_sheets import EXPLICIT, SHEET
 from scipy.spatial.transform import Rotation
 
 import foldyn as fd
+from foldyn.dynamics import stability
 from foldyn.errors import FoldynWarning
 from foldyn.structures.mesh import hinge_angles
 from pairwise import beyond, in_pairs
@@ -25,6 +26,7 @@ ALPHA, DP = "generalized_alpha", "dormand_prince"
 HELD = [fd.Fix([0, 1, 2, 3], "xyz")]
 PRONY = fd.Prony(0.5, 0.1, law="linear")
 EYRING = fd.Eyring(1e-2, 1e-1, law="linear")
+SWINGS = pytest.mark.filterwarnings("ignore:creases .* inertia")
 pytestmark = pytest.mark.filterwarnings("ignore::foldyn.errors.StretchWarning")
 
 
@@ -113,6 +115,25 @@ RESISTING = {
     "damped prony": (PRONY, fd.CreaseDamping(0.05)),
     "damped eyring": (EYRING, fd.CreaseDamping(0.05)),
 }
+NEAR = {  # of displacements; of work and losses
+    "prony": (2e-5, 1e-5), "plastic": (3e-5, 1e-3), "eyring": (2e-5, 1e-5), "weak": (5e-5, 3e-5),
+    "strong": (5e-5, 4e-3),
+}  # fmt: skip
+LATE = (4e-3, 2e-3)  # by 1/w = 1/4600 s, in a motion of 0.3 s
+
+
+def resisting(kind):
+    """A case, and its motion without inertia of edge angles.
+
+    generalized_alpha is of order 1 where dofs without mass are damped: it is extrapolated.
+    """
+    law, damping = RESISTING[kind]
+    made = case([moment(SMOOTH), heat(SMOOTH)], law, damping=damping)
+    one, other = by_edges(made, 0.3)
+    return made, {
+        name: other[name].values + (damping is not SMALL) * (other[name].values - one[name].values)
+        for name in ("displacement", "dissipated", "work")
+    }
 
 
 @pytest.mark.parametrize(
@@ -121,25 +142,44 @@ RESISTING = {
     + beyond([(kind, "rk4") for kind in list(RESISTING)[1::2]], 2)
     + beyond([(kind, method) for kind in RESISTING for method in EXPLICIT if method != "rk4"]),
 )
-def test_creases_that_remember_or_are_damped_move_as_with_edge_angles_as_dofs(method, kind):
-    """A damped crease is late by the inverse of the largest frequency, here 1/5000 s; one that
-    begins to yield swings a little.
-
-    generalized_alpha is of order 1 where dofs without mass are damped: it is extrapolated.
+def test_creases_that_remember_or_are_damped_move_as_with_edge_angles_without_mass(method, kind):
+    """A damped crease is late by the inverse of the largest frequency w; one that begins to yield
+    swings a little: `test_their_inertia_is_all_that_sets_them_apart`.
     """
-    law, damping = RESISTING[kind]
-    made = case([moment(SMOOTH), heat(SMOOTH)], law, damping=damping)
+    made, wanted = resisting(kind)
     found = fd.simulate(made, 0.3, method=method, interval=0.05)
-    one, other = by_edges(made, 0.3)
-    close = {"plastic": 5e-4}.get(kind, 5e-5) if damping is SMALL else 5e-3
-    for name in ("displacement", "dissipated", "work"):
-        wanted = other[name].values
-        if damping is not SMALL:
-            wanted = 2.0 * wanted - one[name].values
-        assert apart(found[name].values, wanted) < close
-    assert balance(found) < (2e-6 if damping is SMALL else 5e-6)
+    moved, taken = NEAR.get(kind, LATE)
+    for name, values in wanted.items():
+        assert apart(found[name].values, values) < (moved if name == "displacement" else taken)
+    jerky = kind == "plastic" and method == "central_difference"
+    assert balance(found) < (2e-4 if jerky else 2e-6)
 
 
+@pytest.mark.parametrize(
+    ("kind", "order"),
+    [
+        ("plastic", 1),
+        *beyond([
+            ("strong", 1), ("prony", 2), ("eyring", 2), ("nonlinear", 1), ("damped eyring", 1),
+        ]),
+    ],
+)  # fmt: skip
+def test_their_inertia_is_all_that_sets_them_apart(kind, order, monkeypatch):
+    """A larger frequency w takes it away: by 1/w where creases are damped or begin to yield."""
+    made, wanted = resisting(kind)
+    errors, frequencies = [], []
+    for octaves in (0.0, 6.0):  # of w^2 above its least value
+        monkeypatch.setattr(stability, "_LEAST", octaves)
+        made = made.altered(loads=made.loads)  # as inertias are stored with their case
+        found = fd.simulate(made, 0.3, method="rk4", interval=0.05)
+        errors.append([apart(found[name].values, wanted[name]) for name in wanted])
+        frequencies.append(fd.dynamics.largest_frequency(made))
+    higher = frequencies[1] / frequencies[0]
+    assert higher > 3.0
+    assert (np.array(errors[1]) < 1.5 * np.array(errors[0]) / higher**order + 4e-6).all()
+
+
+@SWINGS
 @pytest.mark.parametrize("damping", [1e-4, 0.05, 5.0])
 def test_damped_creases_are_of_order_two(damping):
     """At least, as with all memory; the balance too."""
@@ -150,6 +190,7 @@ def test_damped_creases_are_of_order_two(damping):
     assert balance(runs[1]) < 1e-6
 
 
+@SWINGS
 @pytest.mark.parametrize(
     ("method", "kind"), beyond(product(EXPLICIT, ["strong", "damped eyring"]), 3)
 )
@@ -163,6 +204,7 @@ def test_a_state_holds_what_damped_creases_remember(method, kind):
     assert apart(rest.displacement.values[-1], whole.displacement.values[-1]) < 1e-6
 
 
+@SWINGS
 @pytest.mark.matrix
 def test_dampers_take_what_jumps():
     """The moment of a damped crease that jumps turns it at a finite rate."""
@@ -181,6 +223,7 @@ JUMPS = (
 MIURA = fd.patterns.miura()
 
 
+@SWINGS
 @pytest.mark.parametrize(
     ("method", "error", "jump"),
     beyond(

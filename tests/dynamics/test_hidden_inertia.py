@@ -157,6 +157,7 @@ def test_kinetic_energy_includes_rotations_that_follow_the_nodes():
     assert found == pytest.approx(own + nodal, rel=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:creases are damped")
 @pytest.mark.parametrize("method", EXPLICIT)
 def test_a_motion_goes_on_from_a_checkpoint_bit_for_bit(method, tmp_path):
     made = fd.Case(structure("condensed"), HELD, damping=fd.CreaseDamping(1e-4))

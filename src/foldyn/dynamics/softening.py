@@ -26,7 +26,7 @@ from foldyn.mechanics import angles
 
 SOFTEST = 1e4  # largest stiffness of a crease at rest, relative to the least one with its panels
 LOOKS = 200  # number of samples at which swings are sought
-SWINGING = 1e-3  # energy of swings, relative to the energies at play, at which motions are doubtful
+SWINGING = 2e-3  # energy of swings, relative to the energies at play, at which motions are doubtful
 
 
 def lost_stiffness(case: Case) -> NDArray:
@@ -63,21 +63,27 @@ def check_lost(case: Case, ratio: NDArray) -> None:
 
 
 def swings_told(case: Case, output: Output, stored: int) -> str:
-    """Warning about a motion in which creases that lose stiffness swing; empty if they do not.
+    """Warning about an explicit motion that creases with an inertia do not follow; empty if none.
+
+    It concerns creases that lose stiffness or are damped.
 
     stored : number of samples.
     """
-    scale = output.balance.scale
-    if not (lost_stiffness(case).any() and scale > 0.0):
+    scale, hidden = output.balance.scale, len(case.body.hidden)
+    if not (hidden and scale > 0.0 and case.body.sheet.fold_hinges().alone.any()):
+        return ""
+    softens = bool(lost_stiffness(case).any())
+    if not (softens or case.crease_damping.any()):
         return ""
     _, velocity, energy = output.evenly_spaced(stored, LOOKS)
     nodal = [0.5 * np.vdot(v, case.mass @ v) for v in velocity]
     share = float((energy[:, KINETIC] - nodal).max()) / scale
     if not share > SWINGING:
         return ""
+    law = case.structure.fold_law.name
+    why = f"creases of the law {law!r} lose stiffness" if softens else "creases are damped"
     return (
-        f"creases of the law {case.structure.fold_law.name!r} lose stiffness faster than edge "
-        f"angles can follow in explicit motions: {min(share, 1.0):.1%} of the energies at play is "
-        "in their swings, and the motion may be off by some percent; take "
-        'method = "generalized_alpha", or loads without jumps'
+        f"{why} faster than they turn in explicit motions, where their turns have an inertia: "
+        f"{min(share, 1.0):.1%} of the energies at play is in them, and the motion may be off by "
+        'some percent; take method = "generalized_alpha", or slower loads without jumps'
     )
