@@ -76,12 +76,16 @@ def test_a_damped_motion_ends_where_statics_ends(load, law):
     in_pairs([[moment()], [heat(SMOOTH), moment(SMOOTH)]], ["linear", CURVED], EXPLICIT),
 )
 def test_motions_are_those_with_edge_angles_without_mass(method, law, loads):
-    """But for what their inertia changes, which is little even in a sheet this soft."""
+    """But for what their inertia changes: 1e-5 in a sheet this soft, whatever the steps.
+
+    A load that jumps sets edge angles swinging, which energies show.
+    """
     made, central = case(loads, law), method == "central_difference"
     close = {"tolerance": 1e-8} if method == DP else {}
     found = fd.simulate(made, 0.3, method=method, interval=0.05, **close)
-    errors = [differences(other, found) for other in by_edges(made, 0.3, (2e-4, 1e-4))]
-    assert max(errors) < 5e-5
+    for other in by_edges(made, 0.3, (2e-4, 1e-4)):
+        assert apart(other, found) < 2e-5
+        assert differences(other, found) < (2e-5 if len(loads) == 2 else 5e-5)
     assert balance(found) < (2e-5 if central else 1e-6)
 
 
@@ -96,11 +100,14 @@ def test_runge_kutta_keeps_its_order():
 
 
 def test_work_of_forces_that_jump():
-    """Edge angles without mass jump with them; with an inertia they are set swinging."""
+    """Edge angles without mass jump with them; with an inertia they are set swinging.
+
+    The balance of energies is as good as the tolerance lets it be for swings that last.
+    """
     made = case([moment(fd.Pulse(0.2))])
-    found = fd.simulate(made, 0.4, method=DP, interval=0.1, tolerance=1e-8)
+    found = fd.simulate(made, 0.4, method=DP, interval=0.1, tolerance=1e-10)
     other = fd.simulate(made, 0.4, method=ALPHA, dt=1e-4, interval=0.1)
-    assert balance(found) < 1e-5
+    assert balance(found) < 1e-7
     assert apart(found, other) < 1e-5
 
 
@@ -152,7 +159,7 @@ def test_creases_that_remember_or_are_damped_move_as_with_edge_angles_without_ma
     for name, values in wanted.items():
         assert apart(found[name].values, values) < (moved if name == "displacement" else taken)
     jerky = kind == "plastic" and method == "central_difference"
-    assert balance(found) < (2e-4 if jerky else 2e-6)
+    assert balance(found) < (2e-4 if jerky else 1e-6)
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ SOFTEST = 1e4  # largest stiffness of a crease at rest, relative to the least on
 LOOKS = 200  # number of samples at which swings are sought
 # Energy in turns of creases, relative to the energies at play, above which a motion is doubtful:
 YIELDING = 5e-4  # of creases that lose stiffness: losses are off by about its root
-DAMPED = 2e-3  # of damped creases
+DAMPED = 2e-3  # if there are damped creases, which are late
 
 
 def lost_stiffness(case: Case) -> NDArray:
@@ -74,13 +74,13 @@ def swings_told(case: Case, output: Output, stored: int) -> str:
     scale, hidden = output.balance.scale, len(case.body.hidden)
     if not (hidden and scale > 0.0 and case.body.sheet.fold_hinges().alone.any()):
         return ""
-    softens = bool(lost_stiffness(case).any())
-    if not (softens or case.crease_damping.any()):
+    softens, damped = lost_stiffness(case).any(), case.crease_damping.any()
+    if not (softens or damped):
         return ""
     _, velocity, energy = output.evenly_spaced(stored, LOOKS)
     nodal = [0.5 * np.vdot(v, case.mass @ v) for v in velocity]
     share = float((energy[:, KINETIC] - nodal).max()) / scale
-    if not share > (YIELDING if softens else DAMPED):
+    if not share > (DAMPED if damped else YIELDING):
         return ""
     law = case.structure.fold_law.name
     why = f"creases of the law {law!r} lose stiffness" if softens else "creases are damped"
