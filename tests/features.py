@@ -104,14 +104,10 @@ FEATURES: Mapping[str, Make] = {
 
 REASONS: Mapping[str, tuple[str, str]] = {
     "a": (
-        "rotations of a shell have no mass",
-        "the rotations of a shell have no mass, and the method needs accelerations of all dofs",
-    ),
-    "b": (
         "contacts stick or slide",
         "contacts stick or slide, so that no linear law describes small motions",
     ),
-    "c": (
+    "b": (
         "creep",
         "load factors that the method finds may turn back, so that no step has a time in which "
         "creases creep",

@@ -9,7 +9,6 @@ from casefile_checks import check
 import foldyn as fd
 from case_texts import FOLD_TEXT, changed, rows
 from foldyn.analyses import read_case
-from foldyn.analyses.motion import MASSLESS_METHODS
 from foldyn.dynamics import METHODS
 from foldyn.errors import InputError
 
@@ -87,22 +86,17 @@ def test_defaults_of_a_shell(filed):
     assert plain.masses == ["consistent"]
 
 
-def test_integrators_of_shells_are_those_of_the_registry(filed):
-    massless = tuple(name for name, method in METHODS.items() if method.massless)
-    assert massless == MASSLESS_METHODS
-    for method in (*MASSLESS_METHODS, "auto"):
+def test_shells_move_by_all_methods(filed):
+    for method in (*METHODS, "auto"):
         path = filed(f'{SHELL}; {MOTION}; analysis.method = "{method}"')
         assert read_case(path).analysis.arguments["method"] == method
 
 
-def test_a_shell_of_rigid_panels_moves_by_explicit_methods_too(filed):
-    """It has no rotations; where some panels bend, the solver refuses by name."""
+@pytest.mark.parametrize("rigid", ['"all"', "[0]"])
+def test_a_shell_of_rigid_panels_moves_by_explicit_methods_too(filed, rigid):
     few = 'model.divisions = 2; analysis.duration = 0.05; analysis.method = "rk4"'
-    whole = read_case(filed(f'{SHELL}; {MOTION}; {few}; model.rigid = "all"'))
-    assert whole.run().attrs["method"] == "rk4"
-    some = read_case(filed(f"{SHELL}; {MOTION}; {few}; model.rigid = [0]"))
-    with pytest.raises(InputError, match=r"analysis\.method = 'rk4': the rotations of a shell"):
-        some.run()
+    made = read_case(filed(f"{SHELL}; {MOTION}; {few}; model.rigid = {rigid}"))
+    assert made.run().attrs["method"] == "rk4"
 
 
 def test_integrators_of_simulated_responses(filed):
@@ -127,12 +121,6 @@ model.kind = "shell"; model.mass = ["lumped", "panel"]; analysis.steps =; analys
 model.kind =; model.mass = "lumped" | model.mass = "lumped": only for model.kind = "shell"; choose
     one of equi_inertial
 model.kind = "shell"; model.divisions = 0 | model.divisions = 0: must be at least 1
-model.kind = "shell"; analysis = { kind = "dynamics", duration = 1.0, method = "rk4" } |
-    analysis.method = "rk4": needs mass everywhere, and the rotations of a shell have none; choose
-    one of auto, newmark, generalized_alpha, energy_momentum, or leave it out
-loads =; model.kind = "shell"; drive = [{ nodes = [0, 1], force = [-0.001, 0, 0] }]; analysis = {
-    kind = "frf", method = "impulse", frequencies = [0.1, 0.2], integrator = "rk4" } |
-    analysis.integrator = "rk4": needs mass everywhere
 loads =; model.kind = "shell"; analysis.steps =; analysis.kind = "modes"; analysis.internal = 3 |
     analysis.internal = 3: is for the panels of bars and hinges; leave it out
 loads =; model.kind = "shell"; analysis.steps =; analysis.kind = "modes"; analysis.secant = 1 |

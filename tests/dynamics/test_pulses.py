@@ -21,7 +21,7 @@ OMEGA = 4.0
 SPRING, PERIOD = spring(OMEGA), 2.0 * np.pi / OMEGA
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive or method.implicit]
 SOME = [*ADAPTIVE[:2], *beyond(ADAPTIVE[2:])]
-SHELLS = [name for name, method in METHODS.items() if method.massless]
+SHELLS = [name for name, method in METHODS.items() if method.implicit]
 # With the default tolerance there are 127 steps in a period, whose relative error is then
 # (2 pi/127)^2/12: over 20 rad the phase is off by 4e-3
 GLOBAL = 5e-3

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 from measured import order
@@ -11,6 +13,7 @@ from scipy.integrate import RK45
 
 import foldyn as fd
 from foldyn.dynamics import dormand_prince
+from foldyn.errors import FoldynWarning
 
 OMEGA = 4.0
 SPRING, START = spring(OMEGA), released(0.1)
@@ -186,11 +189,14 @@ def test_coefficients_are_those_of_scipy_and_fulfil_their_conditions():
 @pytest.mark.parametrize("law", ["superlinear", fd.Plastic(2e-3, 0.01)], ids=["", "yields"])
 @pytest.mark.parametrize("preset", ["plate", "n5b8e"])
 def test_moments_that_jump_do_the_work_that_is_stored_and_lost(preset, law):
-    """Also in a sample at the jump."""
+    """Also in a sample at the jump, which sets creases of n5b8e swinging, as a warning says."""
+    tolerance = 1e-10 if preset == "n5b8e" else 1e-7
+    told = pytest.warns(FoldynWarning, match="their turns have an inertia")
     made = fold(120, preset=preset, crease_stiffness=0.2, fold_law=law)
     jump = fd.CreaseMoment("all", 0.05, fd.Pulse(0.1))
     case = fd.Case(made, [fd.Fix([0, 1, 2, 3])], [jump], damping=fd.Rayleigh(0.1))
-    motion = fd.simulate(case, 0.2, method=DP, interval=0.05, tolerance=1e-7)
+    with told if preset == "n5b8e" else nullcontext():
+        motion = fd.simulate(case, 0.2, method=DP, interval=0.05, tolerance=tolerance)
     assert motion.attrs["energy_error"] < 3e-6
 
 

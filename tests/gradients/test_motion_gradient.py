@@ -181,3 +181,29 @@ def test_a_size_of_zero_has_no_derivative():
     still = fd.Case(cell().structure, [fd.Fix("xmin")])
     with pytest.raises(InputError, match="is 0, where a size has no derivative"):
         fd.sensitivity(still, ["fold_stiffness"], measures="largest_displacement", analysis=MOTION)
+
+
+@pytest.mark.parametrize("method", ["rk4", "central_difference"])
+@pytest.mark.parametrize("model", ["n5b8e", "shell"])
+def test_gradients_through_dofs_that_have_an_inertia_of_their_own(model, method):
+    """Also of one that begins in balance: it moves with the nodes."""
+    pattern = fd.patterns.miura()
+    speed = np.zeros((len(pattern.vertices), 3))
+    speed[[7, 8], 2] = 0.4
+
+    def build(youngs: float, damping: float) -> fd.Case:
+        sheet, options = fd.Sheet(youngs, 0.25, 0.03, 400.0), {"crease_stiffness": 0.5}
+        if model == "shell":
+            made = fd.shell(pattern, sheet, divisions=1, mass="consistent", **options)
+        else:
+            made = fd.discretize(pattern, sheet, preset="n5b8e", **options)
+        push = fd.Force("xmax", (0.1, 0.1, 0.3), fd.HalfSine(0.3))
+        return fd.Case(made, [fd.Fix("xmin")], [push], fd.CreaseDamping(damping))
+
+    made = build(1e5, 2e-3).structure
+    velocity = np.zeros(made.nodes.shape)
+    velocity[: len(speed)] = speed
+    motion = {**MOTION, "method": method, "duration": 0.2, "initial": fd.State(None, velocity)}
+    values = {"youngs": 1e5, "damping": 2e-3}
+    errors = Design(build, values, ["displacement[8,z]", "mean_square[7,z]"], motion).errors()
+    assert max(errors.values()) < 1e-5, errors  # the damping changes little

@@ -17,9 +17,7 @@ from foldyn.mechanics.threads import ThreadPart, team
 MODELS = {
     "MembranesTerm": "membranes",
     "EdgeGivesTerm": "gives",
-    "BalancedGivesTerm": "gives",
     "BarsPlatesTerm": "model",
-    "CondensedPlatesTerm": "model",
     "ShellTerm": "model",
     "SpringsTerm": "springs",
     "ClampsTerm": "clamps",
@@ -42,10 +40,6 @@ class Lone(NamedTuple):
 
     def changed(self, name: str, array: NDArray) -> Lone:
         """The same with another array."""
-        if name == "push":
-            sheet = self.term._with(self.model)
-            sheet._push[:] = array
-            return self._replace(term=sheet)
         if isinstance(self.term, DampingRows):
             return self._replace(term=DampingRows(array))
         if isinstance(self.term, DampingMatrix):

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from foldyn.analyses.motion import MASSLESS_METHODS
 from foldyn.analyses.vibration import STATES
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
+from foldyn.dynamics import METHODS
 from foldyn.errors import InputError, warn
 from foldyn.structures import PRESETS, ModelOptions
 from foldyn.values import choice
@@ -199,6 +199,7 @@ def _without_bends(analysis: Mapping[str, Any]) -> dict[str, Any]:
     """The table [analysis] without keys that have meaning only for bars and hinges."""
     left = {"secant", "internal"}
     key, usual = ("method", "auto") if analysis["kind"] == "dynamics" else ("integrator", "rk4")
-    if analysis.get(key, usual) not in ("auto", *MASSLESS_METHODS):
+    method = METHODS.get(analysis.get(key, usual))
+    if method is not None and not method.implicit:
         left |= {key, "dt", "force"}
     return {key: value for key, value in analysis.items() if key not in left}

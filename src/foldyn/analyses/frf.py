@@ -17,14 +17,12 @@ from numpy.typing import NDArray
 from foldyn import plots
 from foldyn.analyses.bars import share_bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, movable
-from foldyn.analyses.motion import check_massless
 from foldyn.analyses.sections import AnalysisSection, Positive, ShownSection, one_of
 from foldyn.analyses.vibration import About, Internal, Secant, VibrationSchema, about, bar_closed
 from foldyn.arguments import Check, arguments
 from foldyn.cases import BaseMotion, Case, Force
 from foldyn.cases.decode import PartOf
 from foldyn.cases.directions import DIRECTIONS
-from foldyn.cases.models import SHELL
 from foldyn.dynamics import Progress
 from foldyn.errors import InputError
 from foldyn.linear import Peak, frf, peaks_of
@@ -163,10 +161,8 @@ class FrfSchema(VibrationSchema):
     output: FrfOutput = FrfOutput()
 
     def agree(self) -> None:
-        """Refuse integrators that cannot move a shell, and further drives with a moving base."""
+        """Refuse further drives with a moving base."""
         super().agree()
-        if self.model.kind == SHELL:
-            check_massless(self, "integrator")
         bases = [i for i, one in enumerate(self.drive) if isinstance(one, BaseMotion)]
         if bases and len(self.drive) > 1:
             raise InputError(

@@ -23,7 +23,7 @@ from foldyn.analyses.sections import (
 from foldyn.analyses.start import MotionStart
 from foldyn.arguments import Check
 from foldyn.cases import Case
-from foldyn.cases.models import SHELL, SUPERELEMENTS
+from foldyn.cases.models import SUPERELEMENTS
 from foldyn.dynamics import METHODS, Keeping, prepare, simulate
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.timing import check_room, check_samples
@@ -49,8 +49,6 @@ SAMPLING = ("every_steps", "interval")
 """Keys of [output] that are arguments of `simulate`."""
 SAMPLES = 2000
 """Default number of samples of a motion."""
-MASSLESS_METHODS = tuple(name for name, method in METHODS.items() if method.massless)
-"""Integrators that allow massless dofs, such as the rotations of a shell."""
 
 
 class MotionSection(AnalysisSection):
@@ -96,26 +94,13 @@ class MotionSchema(CaseSchema):
     output: MotionOutput = MotionOutput()
 
     def agree(self) -> None:
-        """Refuse a method that does not suit the model."""
-        if self.model.kind == SHELL:
-            check_massless(self, "method", (AUTO, *MASSLESS_METHODS))
+        """Refuse linear models."""
         if self.model.kind == SUPERELEMENTS:
             raise InputError(
                 f" = {show(SUPERELEMENTS)}: is for linear analyses, and a motion is not; take "
                 '"bars_and_hinges" or "shell"',
                 "model.kind",
             )
-
-
-def check_massless(schema: Any, key: str, fit: Sequence[str] = MASSLESS_METHODS) -> None:
-    """Refuse, for a shell with flexible panels, an integrator that needs mass at every dof."""
-    method = getattr(schema.analysis, key, None)
-    if schema.model.rigid is None and method is not None and method not in fit:
-        raise InputError(
-            f" = {show(method)}: needs mass everywhere, and the rotations of a shell have none; "
-            f"choose one of {', '.join(fit)}, or leave it out",
-            f"analysis.{key}",
-        )
 
 
 class MotionAnalysis(Analysis):

@@ -16,7 +16,7 @@ from foldyn.attractors.run import PER_PERIOD, check_relaxing, divisor, step_of
 from foldyn.cases import Case, State
 from foldyn.dynamics import METHODS, Motion, prepare
 from foldyn.dynamics.failures import failure
-from foldyn.dynamics.methods import suited, with_mass
+from foldyn.dynamics.methods import suited
 from foldyn.dynamics.motion_state import Outcome
 from foldyn.dynamics.progress import Progress, Reporter
 from foldyn.errors import ComputationError, InputError, MotionInterrupted, told_once
@@ -176,11 +176,7 @@ def _check(case: Case, method: str, initial: State | None) -> None:
             ": the exponent needs a constant mass; give added_mass = false", "air.added_mass"
         )
     check_relaxing(case, "the exponent needs smooth forces")
-    if any(part.alone for part in with_mass(suited(method, case), case).remembering):
-        raise InputError(
-            "damping: in models of the scheme n5b8e, rounding hides how damped creases separate "
-            'in two close motions; take preset = "plate", or other damping than CreaseDamping'
-        )
+    suited(method, case)
 
 
 class Pair:
@@ -256,7 +252,9 @@ class Pair:
         """Values (rows, 3), as stored, with motions that ties forbid set to zero."""
         x = self._numbering.outward(values)
         x[self._ties.determined] = 0.0
-        return self._numbering.inward(self._ties.displacement(x.ravel()).reshape(x.shape))
+        out = self._numbering.inward(self._ties.displacement(x.ravel()).reshape(x.shape))
+        out[len(x) :] = values[len(x) :]  # dofs beside those of nodes are free
+        return out
 
     def _look(self, motion: Motion) -> None:
         """Raise an error if energies do not balance, or the step has become too long."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case, State
 from foldyn.dynamics import METHODS, prepare
-from foldyn.dynamics.methods import suited, with_mass
+from foldyn.dynamics.methods import suited, suiting
 from foldyn.dynamics.modal_damping import modal_rows
 from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.timing import DEFAULT_FRACTION
@@ -80,7 +80,7 @@ class Run:
 def step_of(case: Case, method: str, state: State | None, longest: float) -> float:
     """Step (s) of a fixed-step method: half the critical step about a state, at most `longest`."""
     shape, chosen = case.structure.nodes.shape, suited(method, case)
-    case, at = with_mass(chosen, case), state or State()
+    case, at = suiting(chosen, case), state or State()
     modal = modal_rows(case, at.origin_of(shape))
     critical = chosen.critical_step(case, at.of_nodes("displacement", shape), modal)
     return min(DEFAULT_FRACTION * critical, longest)

@@ -252,8 +252,7 @@ class Case(Loaded, Damped):
         if array.shape != shape:
             raise InputError(
                 f"initial: memory of shape {array.shape}: the case has {shape}, branches and "
-                "variables; take the state of a result of the same case, or one without memory "
-                "(damped creases of n5b8e have branches in explicit methods alone)"
+                "variables; take the state of a result of the same case, or one without memory"
             )
         return array
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from foldyn.mechanics import angles
 from foldyn.mechanics.following import joined
@@ -18,12 +17,9 @@ IN_PLANE, BENDING = ("strain_membrane", "strain_bars"), ("strain_bending", "stra
 
 
 def heat_of(
-    structure: Discretized, parts: Sequence[tuple[Swelling, int]], histories: int, offset: NDArray
+    structure: Discretized, parts: Sequence[tuple[Swelling, int]], histories: int
 ) -> Heat | None:
-    """Heat of swellings, each given with the number of its history; None without swellings.
-
-    offset : (., 4) offsets of a sheet that keeps dofs in balance; see `SheetTerm.series`.
-    """
+    """Heat of swellings, each given with the number of its history; None without swellings."""
     if not parts:
         return None
     loads = joined((own.forces, row) for own, row in parts)
@@ -49,7 +45,5 @@ def heat_of(
         volume=volume,
         code=code,
         addresses=np.array(addresses or (0, 0, 0), np.int64),
-        inner=np.array([own.inner for own, _ in parts], float),
-        offset=offset,
         seen=np.array([np.nan, 0.0]),
     )

@@ -271,7 +271,8 @@ class CreaseMoment(Load):
         pieces = structure.body.sheet.fold_hinges()
         chosen = np.isin(pieces.fold, creases)
         part = (each[pieces.fold] * pieces.share)[chosen]
-        turning = moments(pieces.corners[chosen], pieces.nodes[chosen], part)
+        nodal = np.where(pieces.alone[chosen], 0.0, part)
+        turning = moments(pieces.corners[chosen], pieces.nodes[chosen], nodal)
         hidden, back = pieces.hidden[chosen], -part[:, None] * pieces.hidden_turn[chosen]
         there = hidden != NO_DOF
         return joined([(turning, 0), (pushes(hidden[there], back[there]), 0)])

@@ -16,7 +16,7 @@ from foldyn.values import choice, numbers
 @brief
 @dataclass(frozen=True, eq=False)
 class Continuation:
-    """Data, in addition to a state, with which an implicit method continues without a break.
+    """Data, in addition to a state, with which a method continues without a break.
 
     Parameters
     ----------

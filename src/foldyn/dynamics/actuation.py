@@ -4,8 +4,7 @@ The rest angle of a hinge is its start value plus the contributions of all actua
 with a history of its own. For the energy audit an actuated hinge has the power k (dW/d rest)
 d rest/dt, with k the stiffness and W the energy of the law per unit stiffness. Crease moments turn
 the adjacent panels by offsets (`materials.series`), which may jump with the moments: the work of an
-offset is its mean moment over a step times its change. Forces on dofs in balance may also jump, and
-these dofs jump with them.
+offset is its mean moment over a step times its change.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ class Actuators(NamedTuple):
     """
 
     folds: Folds  # all hinges that can be actuated
-    hinge: NDArray  # (a,) row in `folds`; further rows are offsets of dofs in balance
+    hinge: NDArray  # (a,) row in `folds`
     lowest: NDArray  # (a,) lowest node of each hinge; actuators are sorted by it
     is_offset: NDArray  # (a,) bool
     start: NDArray  # (a,) value without contributions, rad
@@ -153,11 +152,6 @@ def offset_work(actuators, angle, first, last, accepted):
         if not actuators.is_offset[k]:
             continue
         e = actuators.hinge[k]
-        if e >= rest_angle.size:  # the force on a dof in balance
-            work += 0.5 * (offset[e, 2] + offset[e, 0]) * (offset[e, 1] - offset[e, 3])
-            if accepted:
-                offset[e, 2], offset[e, 3] = offset[e, 0], offset[e, 1]
-            continue
         moment = offset[e, 1] + stiffness[e] * series_moment(
             actuators.code[k], angle[e] + offset[e, 0], rest_angle[e],
             p[e, 0], p[e, 1], p[e, 2], p[e, 3], actuators.share[e], actuators.address[k],

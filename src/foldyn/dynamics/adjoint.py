@@ -7,19 +7,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.inertia import substitute
 from foldyn.dynamics.system import carried, scratch
 from foldyn.mechanics.pullback import Pullback, arrays_of_body, pull_all, refuse_lacking
 
+APART = 1e-5  # distance of a difference along the velocity, relative to the longest bar
+
 
 class ByMotion(NamedTuple):
-    """Gradients with respect to loads, support motion, mass and alpha."""
+    """Gradients with respect to loads, support motion, mass, inertia of hidden dofs, and alpha."""
 
     loads: NDArray  # (l,) with respect to `System.loads`
     moved: NDArray  # (s,) with respect to `System.moved`
     mass: NDArray  # (entries,) with respect to the entries of the nodal mass matrix
+    hidden: NDArray  # (rows - n, 3) with respect to `Inertia.hidden`
     alpha: NDArray  # (1,)
 
 
@@ -38,8 +43,9 @@ class Adjoint(ABC):
         self._plan, self._pullback = motion.plan, Pullback(packed.body)
         self._imposed = packed.numbering.inward(motion.case.imposed)
         self._scratch = scratch(packed.system)
-        sizes = len(self._system.loads.dof), len(self._system.moved.dof), len(self._mass.data), 1
-        self._by = ByMotion(*map(np.zeros, sizes))
+        self._motion = motion
+        sizes = len(self._system.loads.dof), len(self._system.moved.dof), len(self._mass.data)
+        self._by = ByMotion(*map(np.zeros, (*sizes, self._mass.hidden.shape, 1)))
         self._rows = np.repeat(np.arange(len(self._mass.indptr) - 1), np.diff(self._mass.indptr))
         self._weight, self._product, self._rate = np.zeros((3, packed.system.rows, 3))
 
@@ -62,9 +68,11 @@ class Adjoint(ABC):
     def gradient(self, by_u: NDArray, by_v: NDArray) -> dict[str, NDArray]:
         """Complete the gradient, from the derivatives with respect to the initial state.
 
-        Keys: the arrays of the terms (`pullback.arrays_of_body`), the fields "loads", "moved",
-        "mass" and "alpha" of `ByMotion`, and "start.displacement" and "start.velocity".
+        Keys: the arrays of the terms (`pullback.arrays_of_body`), the fields of `ByMotion`, and
+        "start.displacement" and "start.velocity".
         """
+        if len(self._packed.body.hidden) and not self._motion.continued:
+            self._begin_hidden(by_u, by_v)
         self._evaluate(self._plan.start)
         moved, outward = self._system.moved, self._packed.numbering.outward
         # a base moves from its initial displacement
@@ -75,6 +83,33 @@ class Adjoint(ABC):
         terms = {name: -out for name, out in self._pullback.gradient.items()}
         start = {"start.displacement": outward(by_u), "start.velocity": outward(by_v)}
         return terms | self._by._asdict() | start
+
+    def _begin_hidden(self, by_u: NDArray, by_v: NDArray) -> None:
+        """Propagate derivatives by hidden dofs at the start, which are in balance there.
+
+        If they have an inertia, their velocities follow those of nodes, and these change with the
+        state as the stiffness does along the velocity.
+        """
+        begun, body, t = self._motion.beginning, self._packed.body, self._plan.start
+        hidden, (u, v) = body.hidden, self._whole(t, begun.u, begun.v)
+        tangent = sparse.csr_array(body.tangent(u.ravel()[: body.size]))
+        solve = splu(sparse.csc_array(tangent[hidden][:, hidden])).solve
+        weight, still = np.zeros_like(u), np.zeros_like(u)
+        if len(self._mass.hidden) and v.any():
+            weight.ravel()[hidden] = solve(by_v.ravel()[hidden])
+            by_v.ravel()[: body.size] -= tangent @ weight.ravel()[: body.size]
+            apart = APART * self._packed.body.sheet.longest() / np.abs(v).max()
+            for sign in (1.0, -1.0):
+                self._forget()
+                self._pull(u + sign * apart * v, still, sign * weight / (2.0 * apart))
+                self._add_supports()
+                by_u -= self._product
+        weight[:] = 0.0
+        weight.ravel()[hidden] = solve(by_u.ravel()[hidden])
+        self._forget()
+        self._pull(u, still, weight)
+        self._add_supports()
+        by_u -= self._product
 
     # ------------------------------------------------------------------ for steps in Python
     def _whole(self, t: float, q: NDArray, w: NDArray) -> tuple[NDArray, NDArray]:
@@ -102,9 +137,12 @@ class Adjoint(ABC):
     def _add_mass(self, push: NDArray, a: NDArray, w: NDArray) -> None:
         """Add the derivatives of -push . M (a + alpha w) with respect to the mass and alpha."""
         mass, alpha = self._mass, self._system.alpha
-        pushed = push[self._rows]
+        pushed, first = push[self._rows], len(w) - len(mass.hidden)
+        self._by.hidden[:] -= (push * (a + alpha * w))[first:]
+        own = (mass.hidden * push[first:] * w[first:]).sum()
         self._by.mass[:] -= np.einsum("ea,ea->e", pushed, (a + alpha * w)[mass.indices])
-        self._by.alpha[0] -= mass.data @ np.einsum("ea,ea->e", pushed, w[mass.indices])
+        own += mass.data @ np.einsum("ea,ea->e", pushed, w[mass.indices])
+        self._by.alpha[0] -= own
 
     def _push(self, by_a: NDArray) -> NDArray:
         """Return M^-1 by_a (n, 3): minus the derivatives with respect to b, as a = -M^-1 b."""

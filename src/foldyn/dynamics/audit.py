@@ -28,6 +28,7 @@ BEGUN = 1e-6  # motions below this share of the longest bar are not judged unbou
 
 AIR = "air"
 AUDITED = ("kinetic", "dissipated", "work")
+KINETIC = -3  # its column in a table of energies
 
 
 def audited(groups: Iterable[str], air: bool) -> tuple[str, ...]:

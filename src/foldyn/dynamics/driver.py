@@ -25,7 +25,7 @@ from foldyn.dynamics.initial import (
     warn_of_unstable_damping,
 )
 from foldyn.dynamics.method_choice import AUTO, Choice, choose
-from foldyn.dynamics.methods import METHODS, Integrator, method_of, suited, with_mass
+from foldyn.dynamics.methods import METHODS, Integrator, method_of, suited, suiting
 from foldyn.dynamics.modal_damping import modal_rows
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.motion_state import StepPlan
@@ -195,8 +195,6 @@ def prepare(
         method = "rk4" if method == AUTO else method
         check_gpu(method)
     integrator = method_of("rk4") if method == AUTO else suited(method, case)
-    if method != AUTO:
-        case = with_mass(integrator, case)
     duration = number("duration", duration, above=0.0)
     force = flag("force", force)
     case.check_movable()
@@ -214,6 +212,7 @@ def prepare(
             IMPLICIT_TOLERANCE, modal,
         )  # fmt: skip
         integrator = suited(chosen.method, case)
+    given, case = case, suiting(integrator, case)
     integrator = _with_radius(integrator, spectral_radius)
     if not integrator.implicit or not is_lumped(case.mass):
         check_mass(case.mass, case.constraints.determined)
@@ -251,7 +250,8 @@ def prepare(
             'method = "generalized_alpha"',
             "integrators.md#steps",
         )
-    packed = pack(case, timing.apart(plan, critical), origin, modal)
+    hidden = integrator.hidden_inertia(case)
+    packed = pack(case, timing.apart(plan, critical), origin, modal, hidden)
     if device == "gpu":
         check_taken(case, packed)
     sampler = Sampler(case, {} if sample is None else sample, u, v, plan.start)
@@ -261,7 +261,7 @@ def prepare(
         if chosen.better == chosen.method:
             dt, every_steps, interval = plan.dt / FINER, plan.every * FINER, None
         better = partial(
-            prepare, case, duration, chosen.better, dt, every_steps, interval, initial, force,
+            prepare, given, duration, chosen.better, dt, every_steps, interval, initial, force,
             tolerance, start, None, sample, kept,
         )  # fmt: skip
     return Motion(

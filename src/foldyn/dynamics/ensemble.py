@@ -28,7 +28,7 @@ from foldyn.errors import ComputationError, InputError, StretchWarning, listed, 
 from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.mechanics.lanes import WIDTH
 from foldyn.results.dataset import origin_variables, result_dataset
-from foldyn.results.quantities import MOTION, energies_of, variable, variables
+from foldyn.results.quantities import CONTINUATIONS, MOTION, energies_of, variable, variables
 from foldyn.structures.stretching import most, remedy, stretch
 from foldyn.values import choice, flag, of_kind, show, whole
 
@@ -164,7 +164,8 @@ def simulate_many(
     if reason:
         facts["device_reason"] = reason
     outcome = [ended.get(k, "done") for k in range(len(motions))]
-    return _dataset(case, out, outcome, _origins(motions, out.time), facts)
+    beyond = _origins(motions, out.time) | _continuations(motions)
+    return _dataset(case, out, outcome, beyond, facts)
 
 
 def _origins(motions: Sequence[Motion], times: NDArray) -> dict[str, Any]:
@@ -179,6 +180,18 @@ def _origins(motions: Sequence[Motion], times: NDArray) -> dict[str, Any]:
         name: (("model", *dims), np.stack([own[name][1] for own in found]), about)
         for name, (dims, _, about) in (found[0] if len(found) == len(motions) else {}).items()
     }
+
+
+def _continuations(motions: Sequence[Motion]) -> dict[str, Any]:
+    """What samples do not hold of each motion at its end; nan for motions that ended early."""
+    name, ends = "continuation", [motion.continuations().get("continuation") for motion in motions]
+    at, one = next((end for end in ends if end), (0.0, None))
+    if one is None:
+        return {}
+    none = np.full(one.values.shape, np.nan)
+    values = np.stack([end[1].values if end else none for end in ends])
+    dims, numbers, text = variable(("model", "continued"), values, "", CONTINUATIONS[name])
+    return {name: (dims, numbers, text | {"method": one.method, "time": at})}
 
 
 def device_for(
@@ -325,7 +338,7 @@ def _warn(motions: Sequence[Motion], ended: Mapping[int, str], out: Samples) -> 
 
 
 def _dataset(
-    case: Case, out: Samples, outcome: list[str], origins: dict, facts: dict
+    case: Case, out: Samples, outcome: list[str], beyond: dict, facts: dict
 ) -> xarray.Dataset:
     """The dataset that `simulate_many` returns."""
     known = {**MOTION, **energies_of(case)}
@@ -338,7 +351,7 @@ def _dataset(
     if out.memory.size:
         values["memory"] = out.memory
     timed = variables(known, "time", values).items()
-    data = origins | {name: (("model", *dims), *about) for name, (dims, *about) in timed}
+    data = beyond | {name: (("model", *dims), *about) for name, (dims, *about) in timed}
     data["outcome"] = variable(("model",), np.array(outcome), "", "what became of the motion")
     along = {"time": variable(("time",), out.time, "s", "time")}
     along["model"] = variable(("model",), np.arange(len(outcome)), "", "model")

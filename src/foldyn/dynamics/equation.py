@@ -130,10 +130,7 @@ def _acceleration(m, q, w, t, out, powers):
         power_air += found[2]
     kinetic = 0.0
     if m.drag > 0.0:
-        if m.kinetic != 0:
-            kinetic = value_at(m.kinetic, (m, v))
-        else:
-            kinetic = lumped_energy(mass.diagonal, v, m.own)
+        kinetic = value_at(m.kinetic, (m, v)) if m.kinetic != 0 else lumped_energy(mass, v, m.own)
     accelerated, relative = flat(rows_at(out, rows))[first:last], flat(rows_at(w, rows))[first:last]
     if m.solve != 0:
         run_at(m.solve, (m, out))

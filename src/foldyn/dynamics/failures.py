@@ -12,7 +12,6 @@ from foldyn.dynamics.methods import Integrator
 from foldyn.dynamics.motion_state import MotionState, Outcome, StepPlan
 from foldyn.dynamics.system import PackedCase
 from foldyn.errors import InstabilityError, PenetrationError
-from foldyn.structures.bars_plates import CondensedPlatesTerm
 from foldyn.structures.beyond_range import kept_apart
 
 SWING = 0.5  # turn (rad) of a hinge per step, too large for any law
@@ -108,12 +107,7 @@ def _reason(motion: Failed, code: int) -> str:
         if motion.case.contact is not None:
             why = 'panels meet too hard for an implicit method: use method = "dormand_prince"'
         return f"no equilibrium was found at the end of a step, however small the step: {why}"
-    case, reason = motion.case, "a load is not finite"
-    if case.remembering and isinstance(case.body.sheet, CondensedPlatesTerm):
-        reason += (
-            ', or panels find no balance next to creases with memory (use method = "newmark", '
-            "or a crease_stiffness closer to the stiffness of panels)"
-        )
+    reason = "a load is not finite"
     if plan.steps and not method.implicit:
         reason = (
             f"the step of {plan.dt:.3g} s is too large (critical at the start: "

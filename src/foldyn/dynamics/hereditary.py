@@ -9,8 +9,6 @@ from scipy import sparse
 from foldyn.cases import Case
 from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.inelastic import HingeMemory
-from foldyn.mechanics.inelastic_balance import BalancedMemory
-from foldyn.structures.bars_plates import CondensedPlatesTerm
 from foldyn.structures.inelastic_hinges import memory
 
 
@@ -30,9 +28,6 @@ def with_memory(case: Case, body: Assembly, by: Numbering) -> Assembly:
     hinges = {"fold": body.sheet.fold_hinges, "bend": body.sheet.bend_hinges}
     row = np.concatenate([hinges[part.kind]().row for part in parts])
     own = state.own._replace(dofs=by.dofs(state.own.dofs), row=row)
-    if isinstance(body.sheet, CondensedPlatesTerm):
-        body = body.on(body.sheet.remembering(own))
-        return body.with_terms(BalancedMemory(own, state.settles, body.sheet))
     return body.with_terms(HingeMemory(own, state.settles, body.sheet))
 
 

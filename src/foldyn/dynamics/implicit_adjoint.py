@@ -34,8 +34,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from foldyn.dynamics.adjoint import Adjoint
 from foldyn.dynamics.implicit.engine import ImplicitEngine
@@ -182,21 +180,6 @@ class ImplicitAdjoint(Adjoint):
                 if taken.begins:
                     self._back_to_begin(taken.start, by_u, by_v)
 
-    def gradient(self, by_u: NDArray, by_v: NDArray) -> dict[str, NDArray]:
-        """Complete the gradient; massless dofs start in balance. See `Adjoint.gradient`."""
-        body = self._packed.body
-        if len(hidden := body.hidden):
-            start = next(self._steps.back(0, 1)).start
-            u, _ = self._whole(*start[:3])
-            tangent = sparse.csr_array(body.tangent(u.ravel()[: body.size]))
-            block, weight = sparse.csc_array(tangent[hidden][:, hidden]), np.zeros_like(u)
-            weight.ravel()[hidden] = splu(block).solve(by_u.ravel()[hidden])
-            self._forget()
-            self._pull(u, np.zeros_like(u), weight)
-            self._add_supports()
-            by_u -= self._product
-        return super().gradient(by_u, by_v)
-
     # ------------------------------------------------------------------ a step
     def _back(self, taken: Taken, by_u: NDArray, by_v: NDArray) -> None:
         """Step backward from the end of one step to its start; see the module docstring."""
@@ -275,7 +258,7 @@ def _refuse(motion: Any) -> None:
             "no tolerance",
             "dt",
         )
-    if motion.continues:
+    if motion.continued:
         raise InputError(
             ": goes on from the end of another motion, whose acceleration has no derivative; give "
             "its displacement and velocity alone, fd.State(displacement, velocity)",

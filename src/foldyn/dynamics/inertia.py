@@ -4,6 +4,9 @@ A lumped matrix only needs divisions. A consistent matrix is factored once per d
 supported nodes (axes with equal supports share the factors) and solved by sparse triangular
 substitution. With constraints, v = Z v_free, the matrix Z' M Z of the free dofs of all axes is
 factored, whether M is lumped or not, and a = Z (Z' M Z)^-1 Z' r.
+
+For explicit methods the dofs beside those of nodes, such as edge angles, have an inertia of their
+own (`dynamics.hidden_inertia`). For other methods they have none.
 """
 
 from __future__ import annotations
@@ -31,6 +34,7 @@ class Inertia(NamedTuple):
     indptr: NDArray
     indices: NDArray
     data: NDArray
+    hidden: NDArray  # (rows - n, 3) inertia of the dofs after the nodes, kg; (0, 3) if massless
     ties: Ties
     factor_of_axis: NDArray  # (3,) index of the factor for each axis
     start: NDArray  # (factors + 1,) first row of each factor in the arrays below
@@ -62,8 +66,13 @@ def is_lumped(mass: sparse.csr_array) -> bool:
     return mass.count_nonzero() == np.count_nonzero(mass.diagonal())
 
 
-def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties) -> Inertia:
-    """Prepare the nodal mass matrix (n, n) for the supports `fixed` (n, 3)."""
+def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties, hidden: NDArray) -> Inertia:
+    """Prepare the nodal mass matrix (n, n) for the supports `fixed` (n, 3).
+
+    hidden : inertia of further dofs (h,), kg, which the last rows hold; (0,) if they have none.
+    """
+    rows = np.ones((-(-len(hidden) // 3), 3))  # padding has the inertia 1
+    rows.ravel()[: len(hidden)] = hidden
     mass = sparse.csr_array(mass)
     mass.sort_indices()
     diagonal = mass.diagonal()
@@ -76,6 +85,7 @@ def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties) -> Inertia:
         factors = [_factor(sparse.csr_array(tied + massless), ties.free)]
     elif lumped:
         inverse = np.where(fixed, 0.0, 1.0 / np.where(diagonal > 0.0, diagonal, 1.0)[:, None])
+        inverse[len(inverse) - len(rows) :] = 1.0 / rows
         factor_of_axis, factors = np.zeros(3, np.int64), []
     else:
         inverse = np.zeros((0, 3))
@@ -89,6 +99,7 @@ def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties) -> Inertia:
         mass.indptr.astype(np.int64),
         mass.indices.astype(np.int64),
         mass.data.astype(float),
+        rows,
         ties,
         factor_of_axis.ravel(),
         *_join(factors),
@@ -153,6 +164,10 @@ def times_mass(m, v, out):
             j, value = m.indices[p], m.data[p]
             for c in range(3):
                 out[i, c] += value * v[j, c]
+    first = v.shape[0] - m.hidden.shape[0]
+    for i in range(m.hidden.shape[0]):
+        for c in range(3):
+            out[first + i, c] = m.hidden[i, c] * v[first + i, c]
 
 
 @kernel
@@ -186,6 +201,7 @@ def _substitute(m, k, x):
 @inner
 def solve_mass(m, r, a, scratch, member, members):
     """Solve without constraints; the threads of a team share the axes."""
+    first = a.shape[0] - m.hidden.shape[0]
     for c in range(member, 3, members):
         for i in range(a.shape[0]):
             a[i, c] = 0.0
@@ -195,6 +211,8 @@ def solve_mass(m, r, a, scratch, member, members):
         _substitute(m, k, scratch)
         for i in range(m.start[k], m.start[k + 1]):
             a[m.nodes[i], c] = scratch[m.column_order[i]]
+        for i in range(m.hidden.shape[0]):
+            a[first + i, c] = r[first + i, c] / m.hidden[i, c]
 
 
 @inner
@@ -210,6 +228,9 @@ def solve_tied(m, r, a, scratch):
     for i in range(m.nodes.size):
         a[m.nodes[i]] = scratch[m.column_order[i]]
     follow_masters(m.ties, a)
+    first, hidden = a.size - m.hidden.size, flat(m.hidden)
+    for i in range(hidden.size):
+        a[first + i] = r[first + i] / hidden[i]
 
 
 @summing
@@ -231,16 +252,27 @@ def moving_energy(mass, factor):
 
 
 @inner_scalar
-def lumped_energy(diagonal, v, own):
-    """Kinetic energy (J) for a diagonal matrix (n,)."""
-    return 0.5 * _lumped_sum(diagonal[own[0] : own[1]], v[own[0] : own[1]])
+def _hidden_energy(m, v, own):
+    """Kinetic energy (J) of dofs beside those of nodes."""
+    first, total = v.shape[0] - m.hidden.shape[0], 0.0
+    for i in range(max(own[0], first), own[1]):
+        for c in range(3):
+            total += m.hidden[i - first, c] * v[i, c] * v[i, c]
+    return 0.5 * total
+
+
+@inner_scalar
+def lumped_energy(m, v, own):
+    """Kinetic energy (J) for a diagonal matrix (n, n)."""
+    nodal = 0.5 * _lumped_sum(m.diagonal[own[0] : own[1]], v[own[0] : own[1]])
+    return nodal + _hidden_energy(m, v, own)
 
 
 @inner_scalar
 def kinetic_energy(m, v, own):
-    """Kinetic energy v M v / 2 (J) of the nodes own[0] to own[1] - 1; v (n, 3)."""
+    """Kinetic energy v M v / 2 (J) of the rows own[0] to own[1] - 1; v (n, 3)."""
     if m.lumped:
-        return lumped_energy(m.diagonal, v, own)
+        return lumped_energy(m, v, own)
     total = 0.0
     for i in range(own[0], own[1]):
         for c in range(3):
@@ -248,4 +280,4 @@ def kinetic_energy(m, v, own):
             for p in range(m.indptr[i], m.indptr[i + 1]):
                 product += m.data[p] * v[m.indices[p], c]
             total += v[i, c] * product
-    return 0.5 * total
+    return 0.5 * total + _hidden_energy(m, v, own)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from foldyn.algebra.solvers import factorized
 from foldyn.algebra.superlu import SingularTangentError
@@ -22,6 +23,7 @@ from foldyn.dynamics.motion_state import TALLY, MotionState, StepPlan
 from foldyn.dynamics.system import PackedCase, carry_supports, place, scratch
 from foldyn.dynamics.timing import histories
 from foldyn.errors import InputError, ModelRangeWarning, warn
+from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import following_force
 from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.results.contents import check_variable
@@ -236,6 +238,14 @@ def warn_of_standing_in_wind(case: Case, v: NDArray) -> None:
         )
 
 
+def following(body: Assembly, q: NDArray) -> Callable[[NDArray], NDArray]:
+    """Function from a motion (m,) of nodes about q (m,) to that of the hidden dofs in balance."""
+    rows = sparse.csr_array(body.tangent(q))[body.hidden]
+    first = body.size - len(body.hidden)
+    solve = splu(sparse.csc_array(rows[:, first:])).solve
+    return lambda motion: -solve(rows[:, :first] @ motion[:first])
+
+
 def begin(
     case: Case, u: NDArray, v: NDArray, remembered: NDArray | str | None,
     continued: Continuation | None, plan: StepPlan, packed: PackedCase,
@@ -273,7 +283,7 @@ def begin(
     tally.work = -moving_energy(system.moved_mass, s.factor)
     first = min(1.0, FIRST * plan.tolerance**0.2) * plan.dt
     tally.time, tally.wanted, tally.error, tally.shortest = plan.start, first, 1e-4, np.inf
-    inward, memory = by.inward(q), body.find(HingeMemory)
+    inward, moving, memory = by.inward(q), by.inward(w), body.find(HingeMemory)
     if system.turns:
         turn(system.actuators, s.factor)
         system.actuators.offset[:, 2] = system.actuators.offset[:, 0]
@@ -283,15 +293,21 @@ def begin(
         resists = memory if memory is not None and memory.resists(remembered) else None
         there = body.dofs(by.inward(u)[: len(u)], push, resists)
         inward.ravel()[body.hidden] = there[body.hidden]
+        if len(mass.hidden):  # and so do their velocities
+            speed = by.inward(v)
+            moving.ravel()[body.hidden] = following(body, there)(speed.ravel())
         if continued is not None and len(continued.values) > inward.size:
             inward.ravel()[body.hidden] = continued.values[body.hidden]
+            if len(mass.hidden):
+                speed = continued.values[inward.size :]
+                moving.ravel()[body.hidden] = speed[body.hidden]
     if memory is not None:
         there = by.inward(u)
         there.ravel()[body.hidden] = inward.ravel()[body.hidden]
         memory.start(there, remembered)
     return MotionState(
         u=inward,
-        v=by.inward(w),
+        v=moving,
         carry=np.zeros_like(inward),
         tally=tally,
         angle=body.angles(by.inward(u)),

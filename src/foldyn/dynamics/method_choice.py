@@ -61,14 +61,15 @@ def choose(
     """
     if case.structure.linear:
         raise InputError(f": {lacking(METHODS[ACCURATE], case)}; take another model", "structure")
-    if case.air is not None and case.air.added_mass and not case.structure.massless:
+    if case.air is not None and case.air.added_mass:
         return Choice(ACCURATE, "explicit: the added mass of the air moves with the panels")
     drag = case.air is not None and case.air.drag
     conserved = not (case.damped or drag or case.remembering or any(histories(case)))
     implicit = "energy_momentum" if conserved else "generalized_alpha"
-    if case.contact is not None and not lacking(METHODS[ACCURATE], case):
+    massless = case.structure.massless
+    if case.contact is not None and not (massless and case.structure.divisions):
         return Choice(ACCURATE, "explicit: its error resolves impacts")
-    if massless := case.structure.massless:
+    if massless:
         return Choice("generalized_alpha", f"implicit: {massless} have no mass")
     if (case.mass.diagonal() <= 0.0)[~case.constraints.determined.all(axis=1)].any():
         return Choice(implicit, "implicit: nodes without mass have no acceleration")

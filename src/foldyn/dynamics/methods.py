@@ -28,8 +28,9 @@ from foldyn.dynamics.stability import (
     MARGIN,
     Growth,
     damper_rate,
+    explicit,
+    hidden_inertia,
     largest_frequency,
-    massive,
     stability_limit,
 )
 from foldyn.dynamics.system import PackedCase, scratches
@@ -90,6 +91,13 @@ class ExplicitEngine(Engine):
         arguments = [(equation.recording(out), *case) for equation in self._equations]
         return run_together(self._loop, [own.team for own in self._threads], arguments)[0]
 
+    def continuation(self) -> NDArray:
+        """Displacement and velocity, if these include dofs that samples do not hold; else (0,)."""
+        state = self._state
+        if not len(self._packed.body.hidden):
+            return np.zeros(0)
+        return np.concatenate([state.u.ravel(), state.v.ravel()])
+
     def accelerate(self) -> None:
         """Recompute the current acceleration, for methods that store it."""
         state, handle = self._state, self._equations[0].handle
@@ -148,8 +156,6 @@ class Integrator:
         Whether the method always controls its steps by their error.
     scheme : callable, optional
         For an implicit method: creates its `Scheme` from a case and the state of the motion.
-    massless : bool
-        Whether the method supports massless dofs, such as the edge rotations of a shell.
     looks : tuple of float
         Fractions of a step, from 0 to 1, at which the method evaluates the loads.
     tableau : Tableau, optional
@@ -164,7 +170,6 @@ class Integrator:
     evaluations: int = 0
     adaptive: bool = False
     scheme: Callable[..., Any] | None = None
-    massless: bool = False
     looks: tuple[float, ...] = (0.0, 1.0)
     tableau: Tableau | None = None
 
@@ -196,6 +201,10 @@ class Integrator:
         further = () if self.tableau is None else (self.tableau.coefficients,)
         return ExplicitEngine(self.loop, packed, state, plan, threads, self.adaptive, further)
 
+    def hidden_inertia(self, case: Case) -> NDArray:
+        """Inertia (h,), kg, that the method gives to dofs without mass; (0,) for none."""
+        return np.zeros(0) if self.implicit else hidden_inertia(case)
+
     def critical_step(
         self, case: Case, u: ArrayLike | None = None, modal: ModalRows | None = None
     ) -> float:
@@ -223,8 +232,8 @@ def runge_kutta(method: Tableau) -> Integrator:
     )  # fmt: skip
 
 
-def _implicit(name: str, module: Any, scheme: Callable[..., Any], **traits: Any) -> Integrator:
-    return Integrator(name, module.ORDER, module.residual, scheme=scheme, **traits)
+def _implicit(name: str, module: Any, scheme: Callable[..., Any]) -> Integrator:
+    return Integrator(name, module.ORDER, module.residual, scheme=scheme)
 
 
 METHODS: Mapping[str, Integrator] = {
@@ -233,13 +242,9 @@ METHODS: Mapping[str, Integrator] = {
         runge_kutta(RK4),
         _explicit(central_difference, 1),
         _explicit(dormand_prince, 6, adaptive=True),
-        _implicit("newmark", generalized_alpha, generalized_alpha.newmark, massless=True),
-        _implicit(
-            "generalized_alpha", generalized_alpha, generalized_alpha.scheme(), massless=True
-        ),
-        _implicit(
-            "energy_momentum", energy_momentum, energy_momentum.EnergyMomentum, massless=True
-        ),
+        _implicit("newmark", generalized_alpha, generalized_alpha.newmark),
+        _implicit("generalized_alpha", generalized_alpha, generalized_alpha.scheme()),
+        _implicit("energy_momentum", energy_momentum, energy_momentum.EnergyMomentum),
     )
 }
 
@@ -263,9 +268,9 @@ def suited(name: str, case: Case) -> Integrator:
     return method
 
 
-def with_mass(method: Integrator, case: Case) -> Case:
-    """The case itself; without its massless dofs if the method needs mass."""
-    return case if method.massless else massive(case)
+def suiting(method: Integrator, case: Case) -> Case:
+    """The case; for an explicit method, its structure with the dofs that such methods take."""
+    return case if method.implicit else explicit(case)
 
 
 def lacking(method: Integrator, case: Case) -> str:
@@ -275,8 +280,6 @@ def lacking(method: Integrator, case: Case) -> str:
         return f"{structure.linear} serve linear analyses, such as modes and frequency responses"
     if method.implicit and case.air is not None and case.air.added_mass:
         return "only explicit methods take the added mass of air (leave it out: added_mass = false)"
-    if structure.massless and structure.condensed is None and not method.massless:
-        return f"{structure.massless} have no mass, which this method needs"
     return ""
 
 
@@ -309,4 +312,4 @@ def critical_step(case: Case, method: str = "rk4", *, state: State | None = None
     if state is not None:
         shape = case.structure.nodes.shape
         place = of_kind("state", state, State).of_nodes("displacement", shape, "state")
-    return chosen.critical_step(with_mass(chosen, case), place)
+    return chosen.critical_step(suiting(chosen, case), place)

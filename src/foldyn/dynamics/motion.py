@@ -19,11 +19,12 @@ from foldyn.dynamics.checkpoint import KEY, Keeping, identity, identity_digest
 from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.failures import failure, smaller_step
 from foldyn.dynamics.initial import begin
-from foldyn.dynamics.methods import ExplicitEngine, ImplicitEngine, Integrator
+from foldyn.dynamics.methods import METHODS, ExplicitEngine, ImplicitEngine, Integrator
 from foldyn.dynamics.motion_state import MotionState, Outcome, Samples, StepPlan
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
+from foldyn.dynamics.softening import swings_told
 from foldyn.dynamics.stability import MARGIN, limit_below
 from foldyn.dynamics.system import PackedCase, pack, place, scratch
 from foldyn.dynamics.timing import apart, check_room, check_samples, expected_samples, steps_taken
@@ -87,12 +88,14 @@ class Motion:
     @property
     def beginning(self) -> MotionState:
         """A new copy of the initial state of the integrators."""
-        return begin(self.case, *self._initial, self.plan, self.packed)
+        return begin(self.case, *self._initial[:3], self.continued, self.plan, self.packed)
 
     @property
-    def continues(self) -> bool:
-        """Whether the motion may continue an earlier one, with data beyond its state."""
-        return self._initial[3] is not None
+    def continued(self) -> Continuation | None:
+        """What the motion goes on from, if a method of the same kind has stored it."""
+        given = self._initial[3]
+        kind = given and METHODS.get(given.method)
+        return given if kind and kind.implicit == self.method.implicit else None
 
     @property
     def expected_samples(self) -> int:
@@ -211,7 +214,7 @@ class Motion:
         if resists_turns(self.case, self.packed):
             seen, scale = self.output.evenly_spaced(self.stored, LOOKS), self.output.balance.scale
             given = self.case, self.packed, self.origin.displacement
-            if text := turns_told(*given, *seen, scale):
+            if text := turns_told(*given, *seen[:2], scale):
                 warn(text, "damping.md#rayleigh")
 
     def integrate(
@@ -343,7 +346,7 @@ class Motion:
         """State at the last sample, with everything needed to continue from there."""
         last = self.output.written(self.stored)
         u, v, memory = (a[-1].copy() for a in (last.displacement, last.velocity, last.memory))
-        _, continuation = self._continuations().get("continuation", (0.0, None))
+        _, continuation = self.continuations().get("continuation", (0.0, None))
         return State(u, v, memory if memory.size else None, continuation, self.reached)
 
     @property
@@ -355,8 +358,8 @@ class Motion:
         flow, looked = (self._flow, self._looked_at(steps)) if acts else (None, 0)
         return replace(self.origin, flow=flow, looked=looked)
 
-    def _continuations(self) -> dict[str, tuple[float, Continuation]]:
-        """Data that an implicit method continued from, and data to continue from its last sample.
+    def continuations(self) -> dict[str, tuple[float, Continuation]]:
+        """Data beyond states that the motion continued from, and to continue from its last sample.
 
         With contact a motion always starts afresh: the state that ties nodes to planes is not
         stored.
@@ -365,13 +368,12 @@ class Motion:
         if self.case.contact is not None:
             return found
         stopped = not self.stored or self.packed.callbacks.error is not None
-        if isinstance(engine, ImplicitEngine) and not stopped:
-            if self._initial[3] and engine.continues:
-                found["continued_from"] = self.output.time(0), self._initial[3]
-            last = self.output.time(self.stored - 1)
-            if float(self.state.tally.time) == last:
-                end = Continuation(self.method.name, engine.continuation())
-                found["continuation"] = last, end
+        if isinstance(engine, ImplicitEngine | ExplicitEngine) and not stopped:
+            if self.continued and getattr(engine, "continues", True):
+                found["continued_from"] = self.output.time(0), self.continued
+            last, values = self.output.time(self.stored - 1), engine.continuation()
+            if len(values) and float(self.state.tally.time) == last:
+                found["continuation"] = last, Continuation(self.method.name, values)
         return found
 
     def _identity(self) -> dict[str, Any]:
@@ -450,7 +452,8 @@ class Motion:
         """Warning about the accuracy of the motion; empty if there is none."""
         self.off()
         size, remedy = float(self.state.tally.farthest), smaller_step(self)
-        return doubts(self.output.balance, self._rounding, self.plan, size, remedy)
+        text = doubts(self.output.balance, self._rounding, self.plan, size, remedy)
+        return text or swings_told(self.case, self.output, self.stored)
 
     def _look_between(self) -> None:
         """Measure energies between the first two samples, since all may be at rest at samples."""
@@ -466,7 +469,8 @@ class Motion:
             plan = plan._replace(end=plan.start + length, interval=length)
         sampler = Sampler(self.case, {}, *self.start, plan.start)
         # packed anew, with a memory of its own, as this motion may continue
-        packed = pack(self.case, apart(plan, self.critical), self.origin)
+        hidden = self.method.hidden_inertia(self.case)
+        packed = pack(self.case, apart(plan, self.critical), self.origin, hidden=hidden)
         motion = Motion(
             self.case, self.method, plan, self.critical, True, self._initial, self.origin, packed,
             sampler,
@@ -520,7 +524,7 @@ class Motion:
         result = trajectory_dataset(
             self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
             self._statistics(), sampled, out.memory if self._branches else None,
-            self._continuations(), self.reached and (float(self.state.tally.time), self.reached),
+            self.continuations(), self.reached and (float(self.state.tally.time), self.reached),
         )  # fmt: skip
         if self._keeping is not None:
             result.attrs[KEY] = identity_digest(self._identity())

@@ -181,15 +181,18 @@ class Output:
         columns = self._on_disk(stored)
         return self.written(stored).displacement if columns is None else columns["displacement"]
 
-    def evenly_spaced(self, stored: int, most: int) -> tuple[NDArray, NDArray]:
-        """Displacement and velocity (k, n, 3) at up to `most` samples from first to last."""
+    def evenly_spaced(self, stored: int, most: int) -> tuple[NDArray, NDArray, NDArray]:
+        """Displacement, velocity (k, n, 3) and energies (k, columns), as audited, at some samples.
+
+        most : number of samples, from the first to the last, at most.
+        """
         picks = np.unique(np.linspace(0, stored - 1, min(most, stored)).astype(np.int64))
         columns, out = self._on_disk(stored), self.written(stored)
-        pair: Any = (out.displacement, out.velocity)
+        found: Any = (out.displacement, out.velocity, out.energy)
         if columns is not None:
-            pair = columns["displacement"], columns["velocity"]
-        moved, moving = (np.array([each[k] for k in picks.tolist()]) for each in pair)
-        return moved, moving
+            found = columns["displacement"], columns["velocity"], columns["energy"]
+        moved, moving, energy = (np.array([each[k] for k in picks.tolist()]) for each in found)
+        return moved, moving, energy
 
     def time(self, sample: int) -> float:
         """Time (s) of a sample."""

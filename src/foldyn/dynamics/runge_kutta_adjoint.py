@@ -126,6 +126,8 @@ def pull_steps(
                         for c in range(3):
                             by = rise[3 * j + c] + alpha * speed[3 * j + c]
                             out.mass[e] -= y[i, c] * by
+                for i in range(count - mass.hidden.size, count):
+                    both[i] -= yn[i] * (rise[i] + alpha * speed[i])
             pulled_back(pulls, u, v, t, y, product, rate)
             for e in range(loads.dof.size):
                 out.loads[e] += yn[loads.dof[e]] * scratch.factor[loads.row[e], 0]
@@ -155,6 +157,8 @@ def pull_steps(
             for e in range(mass.indptr[i], mass.indptr[i + 1]):
                 if mass.indices[e] == i:
                     out.mass[e] += both[3 * i] + both[3 * i + 1] + both[3 * i + 2]
+    for i in range(mass.hidden.size):
+        flat(out.hidden)[i] += both[count - mass.hidden.size + i]
 
 
 class RungeKuttaAdjoint(Adjoint):
@@ -186,6 +190,12 @@ class RungeKuttaAdjoint(Adjoint):
         self._memory, self._none = np.zeros((7, *shape[2:])), np.empty((0, *shape))
         self._by_slope = np.zeros((count, 2, *shape[2:]))
         self._stages = np.empty((steps_at_once(count, system.rows), *shape))
+        self._begun: list[tuple[NDArray, NDArray]] = []
+        if len(packed.body.hidden):  # samples lack the hidden dofs
+            begun, every = motion.beginning, self._plan.every
+            for k in range(len(self._times)):
+                self._begun.append((begun.u.copy(), begun.v.copy()))
+                self._retrace(begun.u, begun.v, k * every, every, self._none)
 
     def backward(self, first: int, last: int, by_u: NDArray, by_v: NDArray) -> None:
         """Step backward from step `last` to step `first`, which has a sample; see `Adjoint`."""
@@ -193,6 +203,9 @@ class RungeKuttaAdjoint(Adjoint):
 
     def _state(self, k: int) -> tuple[NDArray, NDArray]:
         """State (n, 3) at sample k without support motion, as steps use it."""
+        if self._begun:
+            u, v = self._begun[k]
+            return u.copy(), v.copy()
         self._evaluate(self._times[k])
         moved, factor = self._system.moved, self._scratch.factor
         u, v = (self._packed.numbering.inward(each[k]) for each in self._states)

@@ -4,11 +4,17 @@ A step is stable if no free vibration of a damped linear system grows. Each vibr
 s^2 + c s + k = 0, with the quotients c = phi* C phi and k = phi* K phi of its complex shape phi,
 phi* M phi = 1, and a method depends on nothing but c and k. So a step is stable if it is stable for
 all k between 0 and the largest eigenvalue, and for all possible sums c of the damping parts.
+
+Explicit methods give dofs without mass an inertia (`hidden_inertia`): as little as keeps their own
+vibrations below the largest frequency that nodes have while these dofs are held. As no inertia
+makes the largest frequency of all dofs smaller than that, a larger one would gain little.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +26,7 @@ from foldyn.cases import Case, Rayleigh
 from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.hereditary import instant_stiffness
 from foldyn.dynamics.inertia import is_lumped
+from foldyn.dynamics.softening import check_lost, lost_stiffness
 from foldyn.errors import ComputationError
 from foldyn.values import of_kind
 
@@ -29,6 +36,8 @@ _DENSE = 60  # dofs below which a dense eigensolver is faster and safer
 Growth = Callable[[NDArray, NDArray, float], NDArray]
 _FRACTIONS = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 400)])
 _RATES = np.linspace(0.0, 1.0, 5)[:, None]
+_LEAST = 0.0  # least octaves of this eigenvalue above the local one, which ties would lower
+_PER_OCTAVE = 2  # values per octave that the largest eigenvalue is rounded to, see `hidden_inertia`
 ROUNDING = 1e-7  # tolerance for a factor of 1, as rigid motions have double eigenvalues
 
 
@@ -95,16 +104,58 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     """Largest angular frequency (rad/s) of a case about displacement u (n, 3), rest by default.
 
     Hinges count with at least their nominal stiffness; otherwise superlinear bends, which have no
-    stiffness at rest, would lower the result. Laws with memory count with their instant stiffness.
+    stiffness at rest, would lower the result. Laws with memory count with their instant stiffness,
+    and dofs without mass with the inertia that explicit methods give them.
     """
-    case = massive(of_kind("case", case, Case))
+    case = explicit(of_kind("case", case, Case))
     return float(np.sqrt(max(_largest_quotient(case, _tangent(case, u)), 0.0)))
 
 
-def massive(case: Case) -> Case:
-    """The case without its massless dofs, if its structure can condense them."""
-    other = case.structure.condensed
-    return case if other is None else case.altered(structure=other)
+def explicit(case: Case) -> Case:
+    """The case; its structure with the dofs that explicit methods take."""
+    structure = case.structure.for_explicit
+    return case if structure is case.structure else case.altered(structure=structure)
+
+
+_known: WeakKeyDictionary[Case, NDArray] = WeakKeyDictionary()
+
+
+def hidden_inertia(case: Case) -> NDArray:
+    """Inertia (h,), kg, of the dofs without mass, for explicit methods.
+
+    It is the sum of the absolute stiffnesses in the row of each dof at rest, divided by w^2, with w
+    the largest frequency of the nodes while these dofs are held. w^2 is rounded, in relation to a
+    number that depends smoothly on the case: equal cases with other rounding errors have the same
+    inertia, and derivatives do not depend on how an eigenvalue was found. Ties that leave only slow
+    motions do not make it larger.
+
+    A crease counts with the least stiffness that its law leaves it, after yielding, say: it turns
+    as fast as its panels let it then, and a crease that is stiff at rest has a shorter step.
+
+    So that damping of these dofs, by creases or by beta K, does not shorten the step, the sum of
+    its coefficients in the row, divided by w, adds to it: what is damped then follows its damper
+    with a delay of 1 / w.
+    """
+    hidden = case.body.hidden
+    if not len(hidden):
+        return np.zeros(0)
+    if case not in _known:
+        stiffness = _tangent(case, None)
+        whole = np.asarray(abs(stiffness[hidden][:, hidden]).sum(axis=1)).ravel()
+        own = whole - lost_stiffness(case)
+        check_lost(case, whole / own)
+        mass, free = case.mass.diagonal(), ~case.fixed.all(axis=1)
+        free &= mass > 0.0
+        local = stiffness.diagonal()[: 3 * len(mass)].reshape(-1, 3).sum(axis=1)
+        scale = float((local[free] / mass[free]).max())
+        nodal = _quotient_of(case, stiffness, np.asarray(case.free_dofs), case.free_mass)
+        rounded = max(round(_PER_OCTAVE * math.log2(nodal / scale)) / _PER_OCTAVE, _LEAST)
+        damping = abs(damping_matrix(case, case.body.dofs(_state(case, None))))
+        damped = np.asarray(damping[hidden][:, hidden].sum(axis=1)).ravel()
+        damped += case.rayleigh.beta * whole
+        square = scale * 2.0**rounded
+        _known[case] = own / square + damped / math.sqrt(square)
+    return _known[case]
 
 
 def frequency_bound(case: Case, u: ArrayLike | None = None) -> float:
@@ -115,9 +166,9 @@ def frequency_bound(case: Case, u: ArrayLike | None = None) -> float:
     """
     if not is_lumped(case.free_mass):
         return np.inf
-    free, k = np.asarray(case.free_dofs), case.constraints.matrix(_tangent(case, u))
+    (free, mass), k = _moving(case), case.constraints.matrix(_tangent(case, u))
     root = np.zeros(k.shape[0])
-    root[free] = 1.0 / np.sqrt(case.free_mass.diagonal())
+    root[free] = 1.0 / np.sqrt(mass.diagonal())
     return float(np.sqrt((root * (abs(k) @ root)).max()))
 
 
@@ -130,8 +181,9 @@ def damper_rate(case: Case, u: ArrayLike | None = None) -> float:
 
 def _tangent(case: Case, u: ArrayLike | None) -> sparse.csr_array:
     """Stiffness about u (n, 3) that limits the step."""
-    tangent = case.elastic_body.tangent(_state(case, u), 1.0)
-    added = instant_stiffness(case, _state(case, u))
+    state = _state(case, u)
+    tangent = case.elastic_body.tangent(case.elastic_body.dofs(state), 1.0)
+    added = instant_stiffness(case, state)
     return tangent if added is None else sparse.csr_array(tangent + added)
 
 
@@ -140,13 +192,28 @@ def _state(case: Case, u: ArrayLike | None) -> NDArray:
 
 
 def _largest_quotient(case: Case, matrix: sparse.csr_array) -> float:
-    """Largest eigenvalue, relative to the mass, of a matrix (m, m) on the free dofs."""
-    free = np.asarray(case.free_dofs)
+    """Largest eigenvalue, relative to the mass, of a matrix (m, m) on all dofs that move."""
+    return _quotient_of(case, matrix, *_moving(case))
+
+
+def _moving(case: Case) -> tuple[NDArray, sparse.csr_array]:
+    """All dofs that move in explicit methods, and their mass."""
+    own, free, mass = hidden_inertia(case), np.asarray(case.free_dofs), case.free_mass
+    if not len(own):
+        return free, mass
+    free = np.concatenate([free, case.body.hidden])
+    return free, sparse.csr_array(sparse.block_diag([mass, sparse.diags_array(own)]))
+
+
+def _quotient_of(
+    case: Case, matrix: sparse.csr_array, free: NDArray, mass: sparse.csr_array
+) -> float:
+    """Largest eigenvalue, relative to the mass (f, f), of a matrix (m, m) on the free dofs."""
     k = sparse.csr_array(case.constraints.matrix(matrix)[free][:, free])
     if not k.count_nonzero():
         return 0.0
     try:
-        return _largest_eigenvalue(k, case.free_mass)
+        return _largest_eigenvalue(k, mass)
     except (RuntimeError, np.linalg.LinAlgError, SingularTangentError) as error:
         raise ComputationError(
             f"the largest frequency, which the critical step needs, cannot be computed: {error}"

@@ -40,6 +40,7 @@ from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.following import Following, joined
 from foldyn.mechanics.heat import Heat
 
+NO_INERTIA = np.zeros(0)
 ROUNDING = 1e-14  # motions of other nodes below this share of support motion are zero
 
 
@@ -123,12 +124,14 @@ class PackedCase(NamedTuple):
 
 
 def pack(
-    case: Case, span: float, start: Origin | None = None, modal: ModalRows | None = None
-) -> PackedCase:
+    case: Case, span: float, start: Origin | None = None, modal: ModalRows | None = None,
+    hidden: NDArray = NO_INERTIA,
+) -> PackedCase:  # fmt: skip
     """Pack a case into arrays; `span` (s) is a time in which loads hardly change.
 
     start : origin of the motion, the reference state of damping; rest by default.
     modal : modal damping of a motion from `start`, if known.
+    hidden : inertia (h,), kg, of the dofs without mass, if the method gives them one.
     """
     histories: list[History] = []
     forces, supports = (*case.load_terms, *case.following_terms), case.imposed_terms
@@ -141,7 +144,7 @@ def pack(
     body, by = _driven(case, histories).with_terms(*terms).renumbered()
     nodal = by.matrix(case.mass)
     ties = ties_of(case.constraints, by)
-    mass = inertia(nodal, by.held(case.fixed), ties)
+    mass = inertia(nodal, by.held(case.fixed), ties, hidden)
     moves = [
         (carry_supports(mass, by.inward(shape)), history)
         for shape, history in (*case.imposed_terms, *case.base_terms)
@@ -177,7 +180,7 @@ def pack(
     place = start and start.displacement
     added = added_mass(case, place, by.rank, by.rows, len(body.hinges), histories)
     heated = [(own, histories.index(history)) for own, history in case.swellings]
-    heat = heat_of(case.structure, heated, len(histories), body.sheet.series()[1])
+    heat = heat_of(case.structure, heated, len(histories))
     if heat is not None:
         heat = heat._replace(loads=heat.loads.placed(by.rank))
     return PackedCase(body, system, mass, callbacks, by, modal, added, heat)

@@ -13,7 +13,7 @@ from foldyn.dynamics.adjoint import Adjoint, refuse
 from foldyn.dynamics.central_difference_adjoint import CentralDifferenceAdjoint
 from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.implicit_adjoint import ImplicitAdjoint, Retraced
-from foldyn.dynamics.methods import with_mass
+from foldyn.dynamics.methods import suiting
 from foldyn.dynamics.runge_kutta_adjoint import RungeKuttaAdjoint, segment
 from foldyn.dynamics.system import pack
 from foldyn.gradients.parameters import Differentiated, Gradient, check_known, numbers_of_motion
@@ -58,9 +58,10 @@ class MotionGradient(Differentiated):
 
     def numbers(self, case: Case) -> Arrays:
         """Numbers of a case with respect to which gradients are taken."""
-        packed = self._motion.packed
-        made = with_mass(self._motion.method, case)
-        other = pack(made, packed.system.waves.span, self._motion.origin)
+        packed, method = self._motion.packed, self._motion.method
+        case = suiting(method, case)
+        hidden = method.hidden_inertia(case)
+        other = pack(case, packed.system.waves.span, self._motion.origin, hidden=hidden)
         return numbers_of_motion(other, self._motion.start)
 
     def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:

@@ -159,7 +159,7 @@ def motions(
     """
     case, state, lasting = motion.case, one.arguments.get("initial"), ("initial", "sample")
     lacks = (
-        motion.method.name not in ALONG, not motion.plan.steps, motion.continues, case.contact,
+        motion.method.name not in ALONG, not motion.plan.steps, motion.continued, case.contact,
         case.air, case.remembering, motion.packed.system.turns, motion.device != "cpu",
     )  # fmt: skip
     if any(lacks):

@@ -112,6 +112,7 @@ def numbers_of_motion(packed: PackedCase, start: tuple[NDArray, NDArray]) -> Arr
         "loads": system.loads.value,
         "moved": system.moved.value,
         "mass": mass.data,
+        "hidden": mass.hidden,
         "alpha": np.array([system.alpha]),
         "start.displacement": start[0],
         "start.velocity": start[1],

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from foldyn.jit.switches import by_code, switch
-from foldyn.materials import crease_damper, eyring, plastic, prony
+from foldyn.materials import eyring, plastic, prony
 
 MEMORY_LAWS = (prony.Prony, plastic.Plastic, eyring.Eyring)
-_BRANCHES = by_code(
-    {law.__name__: law.formulas for law in MEMORY_LAWS}
-    | {"the damper of creases": (crease_damper.FORMULAS,)}
-)
+_BRANCHES = by_code({law.__name__: law.formulas for law in MEMORY_LAWS})
 _ARGUMENTS = "p, before, after, dt, one, other"
 
 

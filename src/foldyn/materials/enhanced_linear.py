@@ -196,6 +196,10 @@ class EnhancedLinear(HingeLaw):
             _relieve_each(writable(rest), table)
         return table
 
+    def least_slope(self, rest: NDArray, stiffness: NDArray, length: NDArray) -> NDArray:
+        """That between theta1 and theta2; see `HingeLaw`."""
+        return np.ones(len(rest))
+
     def reach(self, theta: NDArray, rest: NDArray, parameters: NDArray) -> NDArray:
         """Distance to the nearest of theta1, theta2 and the closed angles; see `HingeLaw`."""
         kinks = (0.0, *self.linear_between, TWO_PI)

@@ -21,6 +21,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.arguments import Check
@@ -109,3 +110,7 @@ class Eyring(MemoryLaw):
         barrier = self.barrier_moment * length / stiffness
         table = columns(len(barrier), barrier, self.rate)
         return (Branch(CODE, table, -1.0, 1.0, 2.0 * self.rate / barrier),)
+
+    def lost_slope(self, stiffness: NDArray, length: NDArray) -> NDArray:
+        """All: it creeps the faster, the larger the moment; see `MemoryLaw`."""
+        return np.ones(len(stiffness))

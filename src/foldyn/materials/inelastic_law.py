@@ -68,6 +68,15 @@ class MemoryLaw(HingeLaw):
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
         """Branches of the law for hinges with stiffnesses (n,), N m/rad, and lengths (n,), m."""
 
+    def lost_slope(self, stiffness: NDArray, length: NDArray) -> NDArray:
+        """Slope / k (n,) that yielding or creep takes from the elastic law; see `branches`."""
+        return np.zeros(len(stiffness))
+
+    def least_slope(self, rest: NDArray, stiffness: NDArray, length: NDArray) -> NDArray:
+        """Least slope that is left after yielding or long times; see `HingeLaw`."""
+        elastic = self.elastic.least_slope(rest, stiffness, length)
+        return np.maximum(elastic - self.lost_slope(stiffness, length), 0.0)
+
     code: Any = property(attrgetter("elastic.code"))
     addresses: Any = property(attrgetter("elastic.addresses"))
     linear_between: Any = property(attrgetter("elastic.linear_between"))

@@ -20,6 +20,7 @@ from foldyn.arguments import Checked
 from foldyn.errors import InputError
 
 PARAMETERS = 4
+ANGLES = 722  # number of dihedrals at which the least slope of a law is sought
 CALLED = -1  # code of laws whose functions are called at their addresses
 
 
@@ -117,6 +118,16 @@ class HingeLaw(Law):
     def reach(self, theta: NDArray, rest: NDArray, parameters: NDArray) -> NDArray:
         """Distance (rad) from each dihedral (n,) to the nearest kink or pole; inf if smooth."""
         return np.full(len(theta), np.inf)
+
+    def least_slope(self, rest: NDArray, stiffness: NDArray, length: NDArray) -> NDArray:
+        """Least slope / k (n,), at least 0, that the moments of hinges can have at any dihedral.
+
+        rest, stiffness, length : of n hinges: rad, N m/rad and m.
+        """
+        least = self.slope(rest, rest)
+        for theta in np.linspace(0.0, 2.0 * math.pi, ANGLES)[1:-1]:
+            least = np.fmin(least, self.slope(theta, rest))
+        return np.maximum(least, 0.0)
 
     def energy(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
         """Energy / k (rad^2) at dihedral `theta` with rest dihedral `rest` (rad)."""

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from foldyn.jit.compiled import inner_scalar
 from foldyn.materials.formulas import BarFormulas, HingeFormulas
 from foldyn.materials.law import BarLaw, HingeLaw
@@ -64,3 +67,7 @@ class LinearHinge(HingeLaw):
     formulas = (HingeFormulas(CODE, hinge_energy, hinge_moment, hinge_slope),)
     linear_between = (-math.inf, math.inf)
     name: str = "linear"
+
+    def least_slope(self, rest: NDArray, stiffness: NDArray, length: NDArray) -> NDArray:
+        """See `HingeLaw`."""
+        return np.ones(len(rest))

@@ -102,3 +102,7 @@ class Plastic(MemoryLaw):
         values = (per * x for x in (self.yield_moment, self.isotropic, self.kinematic))
         table = columns(len(per), *values)
         return (Branch(CODE, table, 0.0, 0.0, np.ones(len(per))),)
+
+    def lost_slope(self, stiffness: NDArray, length: NDArray) -> NDArray:
+        """See `MemoryLaw`."""
+        return stiffness / (stiffness + length * (self.isotropic + self.kinematic))

@@ -6,16 +6,12 @@ to the panel's energy
 
     E^T A g + 1/2 g^T K g.
 
-Gives do not rotate with the sheet and have no mass: they are hidden dofs or, for methods that need
-mass, in balance, K g = -A^T E, with K factorized once.
+Gives do not rotate with the sheet and have no mass: they are hidden dofs.
 
 For the pullback (`mechanics.pullback`), let r be the rates of E for nodal velocities equal to the
 weights, and h the weights of the gives:
 
     w . F = r^T A g + h^T A^T E + h^T K g.
-
-For gives in balance, the same derivatives hold with h = -K^-1 A^T r, which is how the gives
-themselves change, because K is symmetric.
 """
 
 from __future__ import annotations
@@ -28,7 +24,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from foldyn.jit.compiled import Addressed, inner
+from foldyn.jit.compiled import inner
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.block_matrix import of_elements, pairs_within
@@ -49,7 +45,7 @@ from foldyn.mechanics.term import (
     nodal,
 )
 
-SCRATCH = ("strain", "along")  # arrays of `EdgeGives` for one panel at a time
+SCRATCH = ("strain", "along", "given", "pull")  # arrays of `EdgeGives` for one panel at a time
 
 
 class EdgeGives(NamedTuple):
@@ -67,6 +63,8 @@ class EdgeGives(NamedTuple):
     stiffness: NDArray  # (p, k, k) K, N/m
     strain: NDArray  # (b,) scratch of one panel
     along: NDArray  # (b, 3) vectors of this panel's bars, m
+    given: NDArray  # (k,) this panel's gives, m
+    pull: NDArray  # (k,) forces on them, N
 
     @property
     def matrix(self) -> sparse.csc_array:
@@ -94,50 +92,6 @@ class EdgeGives(NamedTuple):
         pull = np.einsum("pbk,pb->pk", self.across, strain).ravel()
         pull = np.bincount(self.number.ravel(), pull, minlength=self.count)
         return -splu(self.matrix).solve(pull)
-
-    def ordered(self) -> EdgeGives:
-        """Copy with the gives numbered so that the factor of the matrix is sparse."""
-        rank = _factorized(self.matrix, "MMD_AT_PLUS_A").perm_c
-        edge = np.empty_like(self.edge)
-        edge[rank] = self.edge
-        return self._replace(edge=edge, number=rank[self.number].astype(np.int64))
-
-    def factor(self) -> Factor:
-        """Factor of the matrix, for gives numbered by `ordered`."""
-        found = _factorized(self.matrix, "NATURAL")
-        assert np.array_equal(found.perm_c, np.arange(self.count))
-        lower = sparse.csc_array(sparse.tril(found.L, -1))
-        entries = lower.indptr.astype(np.int64), lower.indices.astype(np.int64), lower.data
-        return Factor(*entries, 1.0 / found.U.diagonal())
-
-
-class Factor(NamedTuple):
-    """A symmetric matrix L D L^T: columns of L below its diagonal of ones, and 1 / D."""
-
-    start: NDArray  # (g + 1,)
-    row: NDArray
-    value: NDArray
-    per_pivot: NDArray  # (g,)
-
-
-NO_FACTOR = Factor(np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
-
-
-def _factorized(matrix: sparse.csc_array, order: str) -> Any:
-    return splu(matrix, order, 0.0, options={"SymmetricMode": True})
-
-
-@inner
-def solve_factor(factor, x):
-    """Solve with a factor, in place."""
-    for j in range(x.size):
-        for k in range(factor.start[j], factor.start[j + 1]):
-            x[factor.row[k]] -= factor.value[k] * x[j]
-    for j in range(x.size - 1, -1, -1):
-        total = factor.per_pivot[j] * x[j]
-        for k in range(factor.start[j], factor.start[j + 1]):
-            total -= factor.value[k] * x[factor.row[k]]
-        x[j] = total
 
 
 @inner
@@ -184,6 +138,38 @@ def add_given(gives, p, g, share, out):
 
 
 @inner
+def add_panel(gives, u, p, g, force, pull):
+    """Add the forces of panel p on its nodes and its gives, in one pass: see the three above."""
+    count = gives.given.size
+    for k in range(count):
+        gives.given[k], gives.pull[k] = g[gives.number[p, k]], 0.0
+    for i in range(gives.strain.size):
+        a, b = gives.nodes[p, gives.ends[p, i, 0]], gives.nodes[p, gives.ends[p, i, 1]]
+        per, vector = gives.per_length2[p, i], gives.vector
+        x, y, z = u[b, 0] - u[a, 0], u[b, 1] - u[a, 1], u[b, 2] - u[a, 2]
+        one, two, three = vector[p, i, 0], vector[p, i, 1], vector[p, i, 2]
+        excess = x * (2.0 * one + x) + y * (2.0 * two + y) + z * (2.0 * three + z)
+        strain, tension = 0.5 * per * excess, 0.0
+        for k in range(count):
+            across = gives.across[p, i, k]
+            tension += across * gives.given[k]
+            gives.pull[k] += across * strain
+        tension *= per
+        x, y, z = tension * (one + x), tension * (two + y), tension * (three + z)
+        force[b, 0] += x
+        force[b, 1] += y
+        force[b, 2] += z
+        force[a, 0] -= x
+        force[a, 1] -= y
+        force[a, 2] -= z
+    for k in range(count):
+        total = gives.pull[k]
+        for j in range(count):
+            total += gives.stiffness[p, k, j] * gives.given[j]
+        pull[gives.number[p, k]] += total
+
+
+@inner
 def strained_gives(gives, u, pull):
     """Forces (g,), N, that the strains at u exert on the gives."""
     pull[:] = 0.0
@@ -197,7 +183,6 @@ class _Context(NamedTuple):
     rows: int
     first: int  # dof of the first give
     memory: NDArray  # (2, g)
-    factor: Factor
 
 
 @forces
@@ -206,10 +191,7 @@ def _forces(own, u, v, t, force, powers):
     first, end = own.first, own.first + own.gives.count
     g, pull = flat(moved)[first:end], flat(out)[first:end]
     for p in range(own.gives.nodes.shape[0]):
-        strain_panel(own.gives, moved, p)
-        add_pulls(own.gives, p, g, 1.0, out)
-        add_strained(own.gives, p, 1.0, pull)
-        add_given(own.gives, p, g, 1.0, pull)
+        add_panel(own.gives, moved, p, g, out, pull)
 
 
 @energies
@@ -239,40 +221,11 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
             add_given(own.gives, p, g, 0.5, pull)
 
 
-@inner
-def balance_gives(own, u):
-    """Store the forces of the strains at u on the gives, and the gives in balance with them."""
-    pull, g = own.memory
-    strained_gives(own.gives, u, pull)
-    for k in range(g.size):
-        g[k] = -pull[k]
-    solve_factor(own.factor, g)
-
-
-@forces
-def _balanced_forces(own, u, v, t, force, powers):
-    moved, out, g = rows_at(u, own.rows), rows_at(force, own.rows), own.memory[1]
-    balance_gives(own, moved)
-    for p in range(own.gives.nodes.shape[0]):
-        strain_panel(own.gives, moved, p)
-        add_pulls(own.gives, p, g, 1.0, out)
-
-
-@energies
-def _balanced_energies(own, u, out):
-    pull, g = own.memory
-    balance_gives(own, rows_at(u, own.rows))
-    for k in range(g.size):
-        numbers_at(out, GROUP + 1)[GROUP] += 0.5 * pull[k] * g[k]
-
-
 class _Backward(NamedTuple):
     gives: EdgeGives
     out: EdgeGives  # gradients
     rows: int
     first: int  # dof of the first give
-    memory: NDArray  # (3, g)
-    factor: Factor
 
 
 @inner
@@ -319,39 +272,6 @@ def _pullback(own, u, v, t, weight, product, rate):
         pull_panel(own.gives, p, weights, g, h, own.out, out, by_g)
 
 
-@pullback
-def _balanced_pullback(own, u, v, t, weight, product, rate):
-    gives = own.gives
-    moved, weights, out = (
-        rows_at(u, own.rows), rows_at(weight, own.rows), rows_at(product, own.rows)
-    )  # fmt: skip
-    g, h, none = own.memory
-    strained_gives(gives, moved, g)
-    h[:] = 0.0
-    for p in range(gives.nodes.shape[0]):
-        strain_panel(gives, moved, p)
-        for i in range(gives.strain.size):  # rates of the strains, in place of the strains
-            a, b = gives.nodes[p, gives.ends[p, i, 0]], gives.nodes[p, gives.ends[p, i, 1]]
-            growth = 0.0
-            for c in range(3):
-                growth += (weights[b, c] - weights[a, c]) * gives.along[i, c]
-            gives.strain[i] = gives.per_length2[p, i] * growth
-        add_strained(gives, p, 1.0, h)
-    for k in range(g.size):
-        g[k], h[k] = -g[k], -h[k]
-    solve_factor(own.factor, g)
-    solve_factor(own.factor, h)
-    for p in range(gives.nodes.shape[0]):
-        strain_panel(gives, moved, p)
-        pull_panel(gives, p, weights, g, h, own.out, out, none)
-
-
-def _pulled(kernel: Addressed, gives: EdgeGives, rows: int, first: int, factor: Factor) -> Pulled:
-    out = zeros_for(gives, *SCRATCH)
-    own = _Backward(gives, out, rows, first, np.zeros((3, gives.count)), factor)
-    return Pulled(Context(own), kernel, arrays_of(out, *SCRATCH).numbers)
-
-
 class EdgeGivesTerm(Term):
     """Gives as hidden dofs; their energy counts as energy of the sheet's bars.
 
@@ -372,7 +292,7 @@ class EdgeGivesTerm(Term):
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         memory = np.zeros((2, self.gives.count))
-        own = Context(_Context(self.gives, self.rows, self.first, memory, NO_FACTOR))
+        own = Context(_Context(self.gives, self.rows, self.first, memory))
         return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     def arrays(self) -> Arrays:
@@ -381,7 +301,9 @@ class EdgeGivesTerm(Term):
 
     def pulled(self) -> Pulled:
         """Pullback of the term's forces; see `Term`."""
-        return _pulled(_pullback, self.gives, self.rows, self.first, NO_FACTOR)
+        out = zeros_for(self.gives, *SCRATCH)
+        own = Context(_Backward(self.gives, out, self.rows, self.first))
+        return Pulled(own, _pullback, arrays_of(out, *SCRATCH).numbers)
 
     @cached_property
     def _dofs(self) -> NDArray:
@@ -423,60 +345,6 @@ class EdgeGivesTerm(Term):
         """The term with nodes in memory order; see `Term`."""
         gives = self.gives._replace(nodes=ranks(order)[self.gives.nodes])
         return type(self)(gives, self.rows, self.first)
-
-
-class BalancedGivesTerm(EdgeGivesTerm):
-    """Gives in balance at every displacement, for methods that need mass."""
-
-    owns_hidden: ClassVar[bool] = False
-
-    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
-        """Context and kernels for a thread; see `Term`."""
-        memory, factor = np.zeros((2, self.gives.count)), self.gives.factor()
-        own = Context(_Context(self.gives, self.rows, 3 * self.rows, memory, factor))
-        return CompiledTerm(own, {FORCES: _balanced_forces, ENERGIES: _balanced_energies})
-
-    def pulled(self) -> Pulled:
-        """Pullback of the term's forces; see `Term`."""
-        kernel, factor = _balanced_pullback, self.gives.factor()
-        return _pulled(kernel, self.gives, self.rows, 3 * self.rows, factor)
-
-    @cached_property
-    def places(self) -> tuple[NDArray, NDArray]:
-        """Rows and columns of all dofs, which are all coupled; see `Term`."""
-        size = 3 * self.rows
-        return np.repeat(np.arange(size), size), np.tile(np.arange(size), size)
-
-    def _gives(self, q: NDArray) -> NDArray:
-        return self.gives.balanced(self.gives.strains(nodal(q)))
-
-    def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
-        """Tangent entries (k,), N/m; see `Term`."""
-        return self._condensed(q, self._gives(q)).ravel()
-
-    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """Tangent; `places` would need more room than the matrix. See `Term`."""
-        return sparse.csr_array(self._condensed(q, self._gives(q)))
-
-    def mean_entries(self, q0: NDArray, q1: NDArray, way: Way, floor: float) -> NDArray:
-        """See `Term`."""
-        return Term.mean_entries(self, q0, q1, way, floor)
-
-    def _condensed(self, q: NDArray, g: NDArray) -> NDArray:
-        """Tangent of the displacements with gives g in balance."""
-        full = EdgeGivesTerm(self.gives, self.rows, self.first)
-        u, size = nodal(q), 3 * self.rows
-        blocks = panel_tangents(self.gives, u, u, g)
-        whole = of_elements(full._dofs, blocks, self.first + self.gives.count).tocsc()
-        across, own = (part.toarray() for part in (whole[self.first :, :size], self.gives.matrix))
-        return whole[:size, :size].toarray() - across.T @ np.linalg.solve(own, across)
-
-    def unstrained(self, q: NDArray) -> Unstrained:
-        """The model without strain at q; see `Term`."""
-        loose = self._condensed(q, np.zeros(self.gives.count))
-        return Unstrained(
-            sparse.csr_array(loose), sparse.csr_array(loose.shape), lambda motion: 0.0
-        )
 
 
 def panel_tangents(gives: EdgeGives, u0: NDArray, u1: NDArray, g: NDArray) -> NDArray:

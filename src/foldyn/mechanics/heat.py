@@ -39,8 +39,6 @@ class Heat(NamedTuple):
     volume: NDArray  # (b,) volume of bars times Young's modulus, J
     code: int  # law of the bars
     addresses: NDArray  # (3,) of the law's energy, stress and slope
-    inner: NDArray  # (s, r) forces on dofs in balance, N
-    offset: NDArray  # (., 4) see `SheetTerm.series`; dofs in balance are the last r rows
     seen: NDArray  # (2,) heat correction at the start of a motion, and its largest change since, J
 
 
@@ -102,11 +100,6 @@ def add_heat(heat, u, factor, out):
     for e in range(loads.push.size):
         push = loads.push[e] * factor[loads.push_row[e], 0]
         out[bending] -= push * u[loads.hidden[e]]
-    first = heat.offset.shape[0] - heat.inner.shape[1]
-    for s in range(heat.inner.shape[0]):
-        for k in range(heat.inner.shape[1]):
-            push = heat.inner[s, k] * factor[heat.row[s], 0]
-            out[bending] -= push * heat.offset[first + k, 1]
 
 
 @addressed()

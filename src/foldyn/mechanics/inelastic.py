@@ -19,7 +19,6 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.branch_switch import mean_moment, update
-from foldyn.materials.crease_damper import CODE as DAMPER
 from foldyn.mechanics.dihedral import add_hessian
 from foldyn.mechanics.discrete_gradient import discrete_gradient
 from foldyn.mechanics.sheet_term import SheetTerm
@@ -294,8 +293,6 @@ def _step_error(term, scale):
     own = term.own
     h, wrong = own.elapsed[0], 0.0
     for e in range(own.rest.size):
-        if own.code[own.first[e]] == DAMPER:  # a damper's rates are rounding errors in short steps
-            continue
         begin, turn = own.angle[e], own.turned[e] - own.angle[e]
         scale = max(scale, own.arm[e] * max(abs(begin), abs(own.turned[e])))
         first, last = h * own.rate[e, 0], h * own.rate[e, 1]

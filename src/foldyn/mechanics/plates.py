@@ -10,6 +10,15 @@ image at rest. The last point of this hinge is no node but rides on the ends of 
 Rotations are massless dofs in addition to the displacements u (n, 3). The dofs x (r,) of rotations
 are lengths, too (m), so that norms over all dofs do not depend on the unit of length: beta is x
 times `per_reach`.
+
+Explicit methods give these dofs an inertia. For them the dofs z of the two rotations beside a fold
+are y and d,
+
+    x_1 = (turn - y) / 2 + d,    x_2 = (turn - y) / 2 - d,
+
+with `turn` the turn of the dihedral from its value without displacements, over `per_reach`; of a
+single rotation, x = turn - y. Then `per_reach` y is the turn of the fold itself: what makes a
+crease stiff, or damps it, acts on one dof alone, and does not make the others heavy.
 """
 
 from __future__ import annotations
@@ -24,10 +33,10 @@ from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment, hinge_slope
 from foldyn.mechanics.bars_hinges import bars_hinges_kernels
-from foldyn.mechanics.dihedral import gradient_at
+from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.discrete_gradient import discrete_gradient, mean_moment, put_motion
-from foldyn.mechanics.force import ForceScratch, force_scratch
-from foldyn.mechanics.model import BarsHinges
+from foldyn.mechanics.force import ForceScratch, force_scratch, whole_lanes
+from foldyn.mechanics.model import BLOCK, BarsHinges
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
@@ -55,6 +64,9 @@ class BarsPlates(NamedTuple):
     hinges: NDArray  # (nf + nb, 4) of the folds, then of the bends
     wings: NDArray  # (c, 3) virtual wings of clamped edges, from the edge's middle, m
     fold_rotations: NDArray  # (nf, 2) rotations on both sides of each fold, or -1
+    unmoved: (
+        NDArray  # (nf,) dihedrals without displacements, rad, if dofs are turns of folds; or (0,)
+    )
     fold_stiffness: NDArray  # (nf,) N m/rad
     fold_rest: NDArray  # (nf,) rad
     fold_parameters: NDArray  # (nf, 4)
@@ -81,11 +93,13 @@ class PlatesScratch(NamedTuple):
     """Scratch of one evaluation; nh = nf + nb."""
 
     bars: ForceScratch
+    points: NDArray  # (12 * BLOCK,) of a block of hinges
+    found: NDArray  # (13 * BLOCK,) gradients and, in the last row, angles
     angle: NDArray  # (nh,) dihedrals, rad
     gradient: NDArray  # (nh, 12)
     moment: NDArray  # (nh,) N m
     fold_angle: NDArray  # (nf,) rad
-    slope: NDArray  # (nf,) slope of the folds' law
+    x: NDArray  # (r,) rotations, m
     turn: NDArray  # (the most angles of a plate,) rad
     own: NDArray  # (2,) first and last + 1 of the rows
     team: Team
@@ -96,22 +110,47 @@ def plates_scratch(model: BarsPlates) -> PlatesScratch:
     nh, nf = len(model.hinges), len(model.fold_rest)
     most = int(np.diff(model.start).max(initial=0))
     return PlatesScratch(
-        force_scratch(model.bars), np.zeros(nh), np.zeros((nh, 12)), np.zeros(nh),
-        np.zeros(nf), np.zeros(nf), np.zeros(most), np.array([0, model.rows]), team(1)[0],
+        force_scratch(model.bars), np.ones(12 * BLOCK), np.zeros(13 * BLOCK), np.zeros(nh),
+        np.zeros((nh, 12)), np.zeros(nh), np.zeros(nf), np.zeros(model.rotations),
+        np.zeros(most), np.array([0, model.rows]), team(1)[0],
     )  # fmt: skip
 
 
 @kernel
 def turn_hinges(model, u, scratch):
-    """Dihedrals and their gradients at displacements u."""
-    p = np.empty((4, 3))
-    for e in range(model.hinges.shape[0]):
-        put_points(model, u, e, p)
-        found = gradient_at(p)
-        scratch.angle[e] = found[0]
-        for c in range(12):
-            scratch.gradient[e, c] = found[1 + c]
-        carry(model, e, scratch.gradient)
+    """Dihedrals and their gradients at displacements u, in blocks of hinges."""
+    x, g, p, rest = scratch.points, scratch.found, np.empty((4, 3)), model.bars.rest
+    for first in range(0, model.hinges.shape[0], BLOCK):
+        m = min(BLOCK, model.hinges.shape[0] - first)
+        for v in range(4):
+            for q in range(m):
+                node, at = model.hinges[first + q, v], 3 * v * BLOCK + q
+                x[at] = rest[node, 0] + u[node, 0]
+                x[at + BLOCK] = rest[node, 1] + u[node, 1]
+                x[at + 2 * BLOCK] = rest[node, 2] + u[node, 2]
+        for q in range(m):
+            if rides(model, first + q):
+                put_points(model, u, first + q, p)
+                for c in range(12):
+                    x[c * BLOCK + q] = flat(p)[c]
+        for q in range(whole_lanes(m)):
+            (
+                g[12 * BLOCK + q],
+                g[q], g[BLOCK + q], g[2 * BLOCK + q],
+                g[3 * BLOCK + q], g[4 * BLOCK + q], g[5 * BLOCK + q],
+                g[6 * BLOCK + q], g[7 * BLOCK + q], g[8 * BLOCK + q],
+                g[9 * BLOCK + q], g[10 * BLOCK + q], g[11 * BLOCK + q],
+            ) = dihedral_gradient(
+                x[q], x[BLOCK + q], x[2 * BLOCK + q],
+                x[3 * BLOCK + q], x[4 * BLOCK + q], x[5 * BLOCK + q],
+                x[6 * BLOCK + q], x[7 * BLOCK + q], x[8 * BLOCK + q],
+                x[9 * BLOCK + q], x[10 * BLOCK + q], x[11 * BLOCK + q],
+            )  # fmt: skip
+        for q in range(m):
+            scratch.angle[first + q] = g[12 * BLOCK + q]
+            for c in range(12):
+                scratch.gradient[first + q, c] = g[c * BLOCK + q]
+            carry(model, first + q, scratch.gradient)
 
 
 @inner_scalar
@@ -155,6 +194,53 @@ def carry(model, h, gradient):
             gradient[h, 3 + c] += gradient[h, 9 + c]
 
 
+@inner
+def put_rotations(model, z, share, angle, out):
+    """Put rotations (r,) into `out`, for dofs z and dihedrals `angle`; or rates, with share 0.
+
+    share : factor of the dihedrals without displacements.
+    """
+    for k in range(out.size):
+        out[k] = z[k]
+    for f in range(model.unmoved.size):
+        one, other = model.fold_rotations[f]
+        turn = (angle[f] - share * model.unmoved[f]) / model.per_reach
+        if one >= 0 and other >= 0:
+            half = 0.5 * (turn - z[one])
+            out[one], out[other] = half + z[other], half - z[other]
+        elif one >= 0 or other >= 0:
+            only = max(one, other)
+            out[only] = turn - z[only]
+
+
+@inner
+def hand_over(model, couple, moment):
+    """Turn forces on rotations into those on dofs, in place; the rest adds to moments of hinges."""
+    for f in range(model.unmoved.size):
+        one, other = model.fold_rotations[f]
+        if one >= 0 and other >= 0:
+            half, apart = 0.5 * (couple[one] + couple[other]), couple[one] - couple[other]
+            couple[one], couple[other] = -half, apart
+            moment[f] += half / model.per_reach
+        elif one >= 0 or other >= 0:
+            only = max(one, other)
+            moment[f] += couple[only] / model.per_reach
+            couple[only] = -couple[only]
+
+
+@kernel
+def _hand_over(model, couple, moment):
+    hand_over(model, couple, moment)
+
+
+def handed_over(model: BarsPlates, push: NDArray) -> tuple[NDArray, NDArray]:
+    """Moments (nf,), N m, on folds, and forces (k,), N, on dofs, of forces (k,) on rotations."""
+    moment, handed = np.zeros(len(model.fold_rest)), np.zeros(model.rotations)
+    handed[: len(push)] = push
+    _hand_over(Context(model), handed, moment)
+    return moment, handed[: len(push)]
+
+
 @kernel
 def turn_folds(model, x, scratch):
     """Angles of the folds with rotations x."""
@@ -164,13 +250,19 @@ def turn_folds(model, x, scratch):
         scratch.fold_angle[f] = scratch.angle[f] - model.per_reach * both
 
 
-def turned_plates(model: BarsPlates, u: NDArray, x: NDArray | None = None) -> PlatesScratch:
-    """Dihedrals and their gradients at displacements u (n, 3); angles of folds if x is given."""
+@kernel
+def _turn_folds_by(model, z, scratch):
+    put_rotations(model, z, 1.0, scratch.angle, scratch.x)
+    turn_folds(model, scratch.x, scratch)
+
+
+def turned_plates(model: BarsPlates, u: NDArray, z: NDArray | None = None) -> PlatesScratch:
+    """Dihedrals and gradients at displacements u (n, 3); rotations and angles of folds for z."""
     scratch = plates_scratch(model)
     own, room = Context(model), Context(scratch)  # as in `_forces`: one version of each kernel
     turn_hinges(own, u, room)
-    if x is not None:
-        turn_folds(own, x, room)
+    if z is not None:
+        _turn_folds_by(own, z, room)
     return scratch
 
 
@@ -233,13 +325,14 @@ def put_bar_forces(bars, u, force):
 
 
 @inner
-def plates_energy(model, bars, u, x, scratch, out):
+def plates_energy(model, bars, u, z, scratch, out):
     """Energies (J) of bars, folds and bends, to out (3,)."""
     out[0], out[1], out[2] = 0.0, 0.0, 0.0
     if bars.kernels[1] != 0:
         run_at(bars.kernels[1], (bars.context, u, out))
     turn_hinges(model, u, scratch)
-    turn_folds(model, x, scratch)
+    put_rotations(model, z, 1.0, scratch.angle, scratch.x)
+    turn_folds(model, scratch.x, scratch)
     p = model.fold_parameters
     for f in range(model.fold_rest.size):
         w = hinge_energy(
@@ -248,7 +341,7 @@ def plates_energy(model, bars, u, x, scratch, out):
         )  # fmt: skip
         out[1] += model.fold_stiffness[f] * w
     for plate in range(model.start.size - 1):
-        turn_plate(model, x, scratch, plate)
+        turn_plate(model, scratch.x, scratch, plate)
         count = model.start[plate + 1] - model.start[plate]
         for k in range(count):
             for m in range(count):
@@ -257,11 +350,13 @@ def plates_energy(model, bars, u, x, scratch, out):
 
 
 @inner
-def plates_force(model, bars, u, x, force, couple, scratch):
+def plates_force(model, bars, u, z, force, couple, scratch):
     """Internal forces on nodes (n, 3), and on the dofs of rotations (r,), N."""
     put_bar_forces(bars, u, force)
     turn_hinges(model, u, scratch)
-    turn_moments(model, x, couple, scratch)
+    put_rotations(model, z, 1.0, scratch.angle, scratch.x)
+    turn_moments(model, scratch.x, couple, scratch)
+    hand_over(model, couple, scratch.moment)
     add_hinge_moments(model, scratch, force)
 
 
@@ -277,7 +372,7 @@ def add_hinge_moments(model, scratch, force):
 
 @inner
 def turn_moments(model, x, couple, scratch):
-    """Moments of all hinges, and forces (r,) on the dofs of rotations, at known dihedrals."""
+    """Moments of all hinges, and forces (r,) on rotations, at known dihedrals."""
     turn_folds(model, x, scratch)
     couple[:] = 0.0
     scratch.moment[:] = 0.0

@@ -8,6 +8,9 @@ dihedrals theta, the angles phi of folds, which have the moments M, and the angl
 Each dihedral has a moment, which is the factor of theta', and a second moment, `back`, which is the
 factor of changes of theta: M_phi phi' from folds, K^T phi' from plates. The nodes of the hinge get
 moment g' + back g, with g the gradient of the dihedral.
+
+If dofs are turns of folds (`mechanics.plates`), rotations and their rates depend on dihedrals:
+forces on rotations add to moments, and derivatives by rotations to second moments.
 """
 
 from __future__ import annotations
@@ -31,8 +34,10 @@ from foldyn.mechanics.dihedral import rates_at
 from foldyn.mechanics.plates import (
     BarsPlates,
     PlatesScratch,
+    hand_over,
     plates_scratch,
     put_points,
+    put_rotations,
     ride,
     rides,
     turn_folds,
@@ -55,6 +60,9 @@ class Back(NamedTuple):
     moment: NDArray  # (nh,) `back` above
     turned: NDArray  # (the most angles of a plate,) rates of its angles
     resisted: NDArray  # (the most angles of a plate,) K^T times `turned`
+    rotating: NDArray  # (r,) rates of the rotations, m
+    couple: NDArray  # (r,) forces on the rotations, N
+    by_x: NDArray  # (r,) derivatives by the rotations
 
 
 def back_of(model: BarsPlates) -> Back:
@@ -65,7 +73,7 @@ def back_of(model: BarsPlates) -> Back:
     points, moves, by = np.zeros((3, 4, 3))
     return Back(
         out, pullback_scratch(model.nodes), points, moves, by, np.zeros(nh), np.zeros((nh, 12)),
-        np.zeros(nh), np.zeros(most), np.zeros(most),
+        np.zeros(nh), np.zeros(most), np.zeros(most), *np.zeros((3, model.rotations)),
     )  # fmt: skip
 
 
@@ -116,6 +124,7 @@ def pull_folds(model, x, y, scratch, back, by_x):
         for rotation in model.fold_rotations[f]:
             if rotation >= 0:
                 by_x[rotation] -= model.per_reach * back.moment[f]
+                back.couple[rotation] -= model.per_reach * scratch.moment[f]
                 out.per_reach[0] -= back.moment[f] * x[rotation] + scratch.moment[f] * y[rotation]
         out.fold_stiffness[f] += moment * rate
         rate *= stiffness
@@ -143,6 +152,7 @@ def pull_plate(model, x, y, scratch, back, by_x, p):
         if h >= 0:
             scratch.moment[h] += moment
         else:
+            back.couple[-1 - h] += model.per_reach * moment
             out.per_reach[0] += moment * y[-1 - h]
     for k in range(count):
         h = model.angle[model.start[p] + k]
@@ -185,6 +195,17 @@ def pull_turns(model, x, y, scratch, back, product, by_x):
     pull_folds(model, x, y, scratch, back, by_x)
     for p in range(model.start.size - 1):
         pull_plate(model, x, y, scratch, back, by_x, p)
+    for f in range(model.unmoved.size):
+        for rotation in model.fold_rotations[f]:
+            if rotation >= 0:
+                share = 0.5 if model.fold_rotations[f].min() >= 0 else 1.0
+                by, turn = share * by_x[rotation] / model.per_reach, scratch.angle[f]
+                back.out.unmoved[f] -= by
+                turned = by * (turn - model.unmoved[f])
+                turned += share * back.couple[rotation] / model.per_reach * back.rate[f]
+                back.out.per_reach[0] -= turned / model.per_reach
+    hand_over(model, back.couple, scratch.moment)
+    hand_over(model, by_x, back.moment)
     pull_hinges(model, scratch, back, product)
 
 
@@ -199,11 +220,18 @@ class _Context(NamedTuple):
 def _pullback(own, u, v, t, weight, product, rate):
     model, moved, weights = own.model, rows_at(u, own.rows), rows_at(weight, own.rows)
     n, r = model.bars.rest.shape[0], model.rotations
-    (here, x), (w, y) = parted_rows(moved, n, r), parted_rows(weights, n, r)
-    out, by_x = parted_rows(rows_at(product, own.rows), n, r)
+    (here, z), (w, h) = parted_rows(moved, n, r), parted_rows(weights, n, r)
+    out, by_z = parted_rows(rows_at(product, own.rows), n, r)
+    x, y, by_x, couple = own.scratch.x, own.back.rotating, own.back.by_x, own.back.couple
     pull_bars_hinges(model.bars, here, w, own.back.bars, own.back.out.bars, out)
     rate_hinges(model, here, w, own.scratch, own.back)
+    put_rotations(model, z, 1.0, own.scratch.angle, x)
+    put_rotations(model, h, 0.0, own.back.rate, y)
+    for k in range(r):
+        by_x[k], couple[k] = 0.0, 0.0
     pull_turns(model, x, y, own.scratch, own.back, out, by_x)
+    for k in range(r):
+        by_z[k] += by_x[k]
 
 
 def plates_pulled(model: BarsPlates) -> Pulled:

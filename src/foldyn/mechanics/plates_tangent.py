@@ -249,16 +249,16 @@ def _add_bends(model, pattern, u, scratch, data):
 
 
 def add_plates_tangent(
-    model: BarsPlates, pattern: PlatesPattern, u: NDArray, x: NDArray, floor: float, data: NDArray
+    model: BarsPlates, pattern: PlatesPattern, u: NDArray, z: NDArray, floor: float, data: NDArray
 ) -> None:
-    """Add the tangent of folds and plates at displacements u (n, 3) and rotations x (r,).
+    """Add the tangent, by rotations, of folds and plates at displacements u (n, 3) and dofs z (r,).
 
     floor : least slope of the folds' law per unit stiffness; smaller slopes are raised to it.
     """
-    turned = turned_plates(model, u, x)
+    turned = turned_plates(model, u, z)
     own, scratch = Context(model), Context(turned)
     _add_folds(own, pattern, u, scratch, floor, data)
     wide = 3 * int(np.diff(pattern.begin).max(initial=0))
     bend = np.empty((int(np.diff(model.start).max(initial=0)), wide))
-    _add_plates(own, pattern, x, scratch, bend, np.empty(wide), np.empty((wide, wide)), data)
+    _add_plates(own, pattern, turned.x, scratch, bend, np.empty(wide), np.empty((wide, wide)), data)
     _add_bends(own, pattern, u, scratch, data)

@@ -35,9 +35,10 @@ class FoldHinges(NamedTuple):
 
     The bends of hinge models have the same form, each like a fold of one hinge.
 
-    The fold angle of a hinge is its dihedral minus `per_hidden` times its hidden dofs. If panels
-    are compliant without such dofs, a moment Q on the crease alone acts like Q on the hinge, with
-    the law taken at the dihedral plus `softness` times Q (`materials.series`).
+    The fold angle of a hinge is its dihedral minus `per_hidden` times its hidden dofs; of one that
+    has a hidden dof twice, the dihedral at rest takes the place of the dihedral. If panels
+    are compliant without such dofs, a moment on the crease alone turns the dihedral by `softness`
+    times the moment before the hinge resists (`materials.series`).
     """
 
     fold: NDArray  # (k,) index of the fold
@@ -49,7 +50,6 @@ class FoldHinges(NamedTuple):
     stiffness: NDArray  # (k,) N m/rad
     softness: NDArray  # (k,) rad/(N m), softness of the adjacent panels
     row: NDArray  # (k,) row of each hinge in `SheetTerm.series`
-    beside: NDArray | float = np.inf  # (k,) N m/rad, adjacent panels with edge angles in balance
 
     @property
     def length(self) -> NDArray:
@@ -63,9 +63,14 @@ class FoldHinges(NamedTuple):
         return length / np.bincount(self.fold, length)[self.fold]
 
     @property
+    def alone(self) -> NDArray:
+        """Whether each hinge (k,) turns by a hidden dof alone."""
+        return (self.hidden[:, 0] == self.hidden[:, 1]) & (self.hidden[:, 0] != NO_DOF)
+
+    @property
     def remembers(self) -> NDArray:
         """Whether each hinge (k,) turns by more than its crease, so that dampers need a memory."""
-        return (self.softness > 0.0) | np.isfinite(self.beside)
+        return self.softness > 0.0
 
     @property
     def hidden_turn(self) -> NDArray:
@@ -149,7 +154,7 @@ class SheetTerm(Term):
     per_hidden : float
         Turn per unit of a hidden dof, rad/m.
     offsets : int
-        Number of folds with compliant panels, nf, or of dofs in balance; or 0.
+        Number of folds with compliant panels: nf or 0.
     mass : (m, m) or None
         Mass of a linear sheet on all of its dofs, kg; None if nodes alone have mass.
     crease_turns : CreaseTurns or None
@@ -251,8 +256,7 @@ class SheetTerm(Term):
     def rest_angles(self) -> NDArray:
         """Rest angles (nr,), rad, that loads may change, folds first.
 
-        The last `offsets` entries are not rest angles but offsets of the folds' dihedrals, or
-        forces on dofs in balance, N.
+        The last `offsets` entries are not rest angles but offsets of the folds' dihedrals.
         """
         return np.zeros(0)
 
@@ -287,9 +291,8 @@ class SheetTerm(Term):
         """For all actuated hinges: the share of the crease in a small turn, and offsets.
 
         Columns of the offsets (., 4): the angle added to the dihedral (rad); the moment of memory
-        branches (N m); the offset and the total moment at the last accepted step. Rows of dofs in
-        balance follow: force (N), dof (m), and both at that step. In a sheet from `actuated` they
-        change in place.
+        branches (N m); the offset and the total moment at the last accepted step. In a sheet from
+        `actuated` they change in place.
         """
         count = len(self.turned()[0])
         return np.ones(count), np.zeros((count, 4))

@@ -83,11 +83,14 @@ def viscous(
 def hinge_dofs(hinges: NDArray, hidden: NDArray) -> NDArray:
     """Dofs (h, 14) of hinges, rows of nodes (h, 4), with two hidden dofs (h, 2).
 
-    Dof 0 replaces NO_DOF, with a turn of 0 (`FoldHinges.hidden_turn`).
+    Dof 0 replaces NO_DOF, with a turn of 0 (`FoldHinges.hidden_turn`). A hinge with one hidden dof
+    twice turns by this dof alone, which then stands for its nodal dofs.
     """
     dofs = np.zeros((len(hinges), WIDTH), np.int64)
     dofs[:, :12] = (3 * hinges[:, :, None] + np.arange(3)).reshape(-1, 12)
     dofs[:, 12:] = np.where(hidden == NO_DOF, 0, hidden)
+    alone = (hidden[:, 0] == hidden[:, 1]) & (hidden[:, 0] != NO_DOF)
+    dofs[alone, :12] = hidden[alone, :1]
     return dofs
 
 
@@ -106,21 +109,22 @@ def hinge_gradient(x, dofs, hidden_turn, moved, out):
     """Angle (rad) of a hinge at flat displacements, and its gradient into `out` (14,).
 
     A wing that repeats the first axis node is virtual, as in a clamp: it follows the mean of both
-    axis nodes.
+    axis nodes. A hinge whose axis repeats a dof turns by hidden dofs alone.
 
     x : (4, 3) rest positions of the hinge's nodes, m; dofs, hidden_turn : see `Viscous`.
     """
     ride = 3 if dofs[9] == dofs[0] else 9
+    s = 0.0 if dofs[0] == dofs[1] else 1.0
     found = dihedral_gradient(
-        x[0, 0] + moved[dofs[0]], x[0, 1] + moved[dofs[1]], x[0, 2] + moved[dofs[2]],
-        x[1, 0] + moved[dofs[3]], x[1, 1] + moved[dofs[4]], x[1, 2] + moved[dofs[5]],
-        x[2, 0] + moved[dofs[6]], x[2, 1] + moved[dofs[7]], x[2, 2] + moved[dofs[8]],
-        x[3, 0] + 0.5 * (moved[dofs[9]] + moved[dofs[ride]]),
-        x[3, 1] + 0.5 * (moved[dofs[10]] + moved[dofs[ride + 1]]),
-        x[3, 2] + 0.5 * (moved[dofs[11]] + moved[dofs[ride + 2]]),
+        x[0, 0] + s * moved[dofs[0]], x[0, 1] + s * moved[dofs[1]], x[0, 2] + s * moved[dofs[2]],
+        x[1, 0] + s * moved[dofs[3]], x[1, 1] + s * moved[dofs[4]], x[1, 2] + s * moved[dofs[5]],
+        x[2, 0] + s * moved[dofs[6]], x[2, 1] + s * moved[dofs[7]], x[2, 2] + s * moved[dofs[8]],
+        x[3, 0] + s * 0.5 * (moved[dofs[9]] + moved[dofs[ride]]),
+        x[3, 1] + s * 0.5 * (moved[dofs[10]] + moved[dofs[ride + 1]]),
+        x[3, 2] + s * 0.5 * (moved[dofs[11]] + moved[dofs[ride + 2]]),
     )  # fmt: skip
     for c in range(12):
-        out[c] = found[1 + c]
+        out[c] = s * found[1 + c]
     if ride == 3:
         for c in range(3):
             out[9 + c] *= 0.5
@@ -203,6 +207,10 @@ def _turn_gradient(elements, moved, e, z, points, out):
         for c in range(3):
             out[3 + c] = (z[3 + c] - z[c] - g[3 + c] * along) / length
             out[c] = -out[3 + c]
+        return
+    if dofs[0] == dofs[1]:
+        for c in range(12):
+            out[c] = 0.0
         return
     ride = 3 if dofs[9] == dofs[0] else 9
     for c in range(3):

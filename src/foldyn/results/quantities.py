@@ -65,7 +65,7 @@ CONTINUATIONS: Mapping[str, str] = {
     "continuation": "further state of the method, to continue from the last sample",
     "continued_from": "further state of the method from another motion, at the first sample",
 }
-"""Further variables of motions by implicit methods, along the dimension `continued`."""
+"""Further variables of motions whose samples do not hold all dofs, along `continued`."""
 ORIGIN: Mapping[str, Quantity] = {
     "origin": Quantity("m", "displacement of the state that damping refers to", PLACE),
     "origin_time": Quantity("s", "time of that state; nan: it is under the constant loads alone"),

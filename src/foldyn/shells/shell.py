@@ -17,7 +17,7 @@ from foldyn.materials import EnhancedLinear, HingeLaw, LinearBar, LinearHinge, h
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import joined, moments, pushes
 from foldyn.mechanics.membranes import Membranes, MembranesTerm
-from foldyn.mechanics.plates import BarsPlates
+from foldyn.mechanics.plates import BarsPlates, handed_over
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned
 from foldyn.patterns.topology import Edge
@@ -97,6 +97,8 @@ class Shell(Discretized):
         Input from which the shell was made.
     graded : Grading or None
         How the mesh is refined about the vertices.
+    by_folds : bool
+        Whether the dofs of rotations are those of explicit methods; see `mechanics.plates`.
     """
 
     nodes: NDArray
@@ -109,6 +111,7 @@ class Shell(Discretized):
     sheet: Sheet
     options: ShellOptions
     graded: Grading | None = None
+    by_folds: bool = False
 
     def __repr__(self) -> str:
         """One line with the counts."""
@@ -158,6 +161,14 @@ class Shell(Discretized):
         sheet = ShellTerm(self.model, laws, self.sides.piece_crease, self._scale)
         return Assembly(sheet, *(MembranesTerm(own, sheet.rows) for _, own in self.membranes))
 
+    @cached_property
+    def for_explicit(self) -> Shell:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """See `Discretized`."""
+        if not self.massless or self.by_folds:
+            return self
+        other = replace(self, by_folds=True)
+        return other.marked() if self.as_made else other
+
     @property
     def rotations(self) -> int:
         """Number of rotations, which are dofs in addition to the displacements."""
@@ -180,12 +191,14 @@ class Shell(Discretized):
         on_hinge = plates.angle >= 0
         turning = np.bincount(plates.angle[on_hinge], moment[on_hinge], len(hinges))
         hidden = np.bincount(-1 - plates.angle[~on_hinge], moment[~on_hinge], self.rotations)
+        turned, hidden = handed_over(self.model, self.model.per_reach * hidden)
+        turning[: len(turned)] += turned
         rows = np.where(hinges < len(self.nodes), hinges, -1)
         points = np.concatenate([self.nodes, self.sides.wings])
         parts = (
             *parts,
             moments(points[hinges], rows, turning),
-            pushes(self.nodes.size + np.arange(self.rotations), self.model.per_reach * hidden),
+            pushes(self.nodes.size + np.arange(self.rotations), hidden),
         )
         # the last angle of a side gives it the whole rotation
         last = np.append(side[1:] != side[:-1], True)
@@ -273,7 +286,7 @@ class Shell(Discretized):
         model = plates_model(
             self.nodes, self.bars, np.ones(len(self.bars)), LinearBar(), folds,
             (self.fold_stiffness / whole)[crease] * length, self.piece_rest, self.fold_law, bends,
-            hinge_angles(self.nodes, bends), self._plates[0], clamps[:, :3],
+            hinge_angles(self.nodes, bends), self._plates[0], clamps[:, :3], self.by_folds,
         )  # fmt: skip
         return model._replace(bars=model.bars._replace(bar_runs=model.bars.bar_runs[:0]))
 

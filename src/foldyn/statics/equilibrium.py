@@ -203,7 +203,7 @@ class OrigamiProblem:
         self._moves = np.append(moves, self._plates.held)
         angles = body.sheet.rest_angles.shape
         heated = [(own, k) for k, kind in enumerate((steady, growing)) for own, _ in kind.swellings]
-        self.heat = heat_of(structure, heated, 2, body.sheet.series()[1])
+        self.heat = heat_of(structure, heated, 2)
         self.actuation = Actuation(
             body, _total(growing.rest_terms, angles), _total(steady.rest_terms, angles)
         )
@@ -396,8 +396,7 @@ class OrigamiProblem:
         q, body = self.dofs(u), self.body(u, factor)
         out = body.energies(q)
         if self.heat is not None:
-            heat = self.heat._replace(offset=body.sheet.series()[1])
-            add_heat(heat, q, _factors(1.0, factor), out)
+            add_heat(self.heat, q, _factors(1.0, factor), out)
         return out
 
     def working(self, u: NDArray, factor: float) -> NDArray:

@@ -1,12 +1,8 @@
-"""Bars, folds and plates as solvers see them: the scheme n5b8e.
-
-Edge angles are dofs; for explicit methods they are kept in balance instead.
-"""
+"""Bars, folds and plates as solvers see them: the scheme n5b8e, with edge angles as dofs."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from copy import copy
 from functools import cached_property, partial
 from typing import Any, ClassVar, Self
 
@@ -17,25 +13,14 @@ from scipy.sparse.linalg import splu
 
 from foldyn import mechanics
 from foldyn.errors import InputError
-from foldyn.jit.context import Context
 from foldyn.materials import HingeLaw, LinearHinge, Superlinear
-from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.clamps import RIDES
-from foldyn.mechanics.inelastic import MemoryHinges
-from foldyn.mechanics.inelastic_balance import evaluation
 from foldyn.mechanics.plates import (
     BarsPlates,
     PlatesScratch,
     plates_kernels,
     plates_scratch,
     turned_plates,
-)
-from foldyn.mechanics.plates_condensed import (
-    CondensedScratch,
-    condensed_kernels,
-    condensed_plates,
-    condensed_pulled,
-    condensed_scratch,
 )
 from foldyn.mechanics.plates_pullback import plates_pulled
 from foldyn.mechanics.plates_tangent import PlatesPattern, add_plates_tangent, plates_pattern
@@ -100,14 +85,38 @@ class BarsPlatesTerm(SheetTerm):
         bars = self._bars.sparsity
         return plates_pattern(self.model, (bars.indptr, bars.indices))
 
-    @property
-    def linear_folds(self) -> bool:
-        """Whether the law of the folds is linear."""
-        return isinstance(self._laws[0], LinearHinge)
-
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """See `SheetTerm`."""
-        return self._assembled(q, floor, partial(self._bars.tangent, q[: self._nodal]))
+        """See `SheetTerm`; with the dofs of explicit methods, right where these are in balance."""
+        bars = partial(self._bars.tangent, q[: self._nodal])
+        if not len(self.model.unmoved):
+            return self._assembled(q, floor, bars)
+        whole = self._assembled(q, floor, bars)
+        spread = self._spread(turned_plates(self.model, self._split(q)[0]).gradient)
+        return sparse.csr_array(spread.T @ whole @ spread)
+
+    def _spread(self, gradient: NDArray) -> sparse.csr_array:
+        """Rates (m, m) of displacements and rotations by the dofs of explicit methods.
+
+        gradient : (nh, 12) of the dihedrals, 1/m.
+        """
+        model, turns = self.model, self.model.fold_rotations
+        both, rotations = (turns >= 0).all(axis=1), model.rotations
+        own = sparse.lil_array((rotations, rotations))
+        own.setdiag(1.0)
+        share = np.where(both, 0.5, 1.0)
+        fold, side = np.nonzero(turns >= 0)
+        row, first = turns[fold, side], turns.max(axis=1)
+        first[both] = turns[both, 0]
+        own[row, row] = 0.0
+        own[row, first[fold]] = -share[fold]
+        two = both[fold]
+        own[row[two], turns[fold[two], 1]] = np.where(side[two] == 0, 1.0, -1.0)
+        columns = 3 * model.hinges[fold][:, :, None] + np.arange(3)
+        entries = gradient[fold] * (share[fold] / model.per_reach)[:, None]
+        places = (np.repeat(row, 12), columns.ravel())
+        nodal = sparse.coo_array((entries.ravel(), places), shape=(rotations, self._nodal))
+        still = sparse.eye_array(self._nodal)
+        return sparse.csr_array(sparse.block_array([[still, None], [nodal, own]]))
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
         """See `SheetTerm`."""
@@ -204,9 +213,10 @@ class BarsPlatesTerm(SheetTerm):
     def plate_energies(self, q: NDArray, turn: NDArray) -> NDArray:
         """See `SheetTerm`."""
         model, (displacement, rotation) = self.model, self._split(q)
-        from_rest = turned_plates(model, displacement).angle
+        scratch = turned_plates(model, displacement, rotation)
+        from_rest = scratch.angle
         from_rest[len(model.fold_rest) :] -= model.bend_rest
-        turned = np.append(from_rest, (self.per_hidden * rotation)[::-1])  # number -1 comes last
+        turned = np.append(from_rest, (self.per_hidden * scratch.x)[::-1])  # number -1 comes last
         angle, size = turned[model.angle], np.diff(model.start)
         angle = angle - turn if turn.size else angle
         plate = np.repeat(np.arange(len(size)), size**2)
@@ -264,11 +274,14 @@ class BarsPlatesTerm(SheetTerm):
     def fold_hinges(self) -> FoldHinges:
         """See `SheetTerm`: one hinge per fold."""
         nodes = self.model.hinges[: len(self.model.fold_rest)]
-        turns = self.model.fold_rotations
+        turns, per_hidden = self.model.fold_rotations, self.model.per_reach
+        if len(self.model.unmoved):  # one dof is the turn of the fold
+            first = np.where(turns[:, 0] >= 0, turns[:, 0], turns[:, 1])
+            turns, per_hidden = np.stack([first, first], axis=1), -0.5 * per_hidden
         hidden = np.where(turns >= 0, self._nodal + turns, NO_DOF)
         corners = self.model.bars.rest[nodes]
         return FoldHinges(
-            np.arange(len(nodes)), nodes, corners, hidden, self.model.per_reach,
+            np.arange(len(nodes)), nodes, corners, hidden, per_hidden,
             self.model.fold_rest, self.model.fold_stiffness, np.zeros(len(nodes)),
             np.arange(len(nodes)),
         )  # fmt: skip
@@ -327,125 +340,6 @@ def positions(model: BarsPlates) -> NDArray:
         model.hinges[model.rotation_hinge, :2]
     ].mean(axis=1)
     return points
-
-
-class CondensedPlatesTerm(BarsPlatesTerm):
-    """Bars, folds and plates with displacements as the only dofs; see `SheetTerm`."""
-
-    undifferentiated = "creases that yield, creep, relax or, beside panels that give way, damp"
-    _held: Context  # keeps the branches of the folds alive
-
-    def __init__(
-        self, model: BarsPlates, laws: tuple[HingeLaw, HingeLaw], like: BarsPlatesTerm | None = None
-    ) -> None:
-        super().__init__(model, laws, like)
-        self._full = BarsPlatesTerm(model, laws, like)  # the same model with edge angles
-        self.condensed = condensed_plates(model, self.linear_folds)
-        self.size, self.rows, self.hidden = self._nodal, model.nodes, np.zeros(0, np.int64)
-        self.offsets = model.rotations
-
-    def _with(self, model: BarsPlates) -> Self:
-        """Copy with another model and the same forces on edge angles; see `BarsPlatesTerm`."""
-        other = super()._with(model)
-        other.condensed.offset[:] = self.condensed.offset
-        return other
-
-    def _whole(self, q: NDArray) -> NDArray:
-        """All dofs at displacements q, with edge angles in balance."""
-        push = np.append(np.zeros(self.size), self._push)
-        return Assembly(self._full).dofs(np.ravel(q)[: self.size], push)
-
-    def compiled(self, part: Any, kept: CondensedScratch, group: int) -> CompiledTerm:
-        """Context and kernels for a thread; see `Term`."""
-        return condensed_kernels(self.condensed, kept)
-
-    def arrays(self) -> Arrays | None:
-        """Arrays that the term's forces depend on; see `Term`."""
-        if self.condensed.memory.any():
-            return None
-        found = super().arrays()
-        return found._replace(numbers={**found.numbers, "push": self._push})
-
-    def pulled(self) -> Pulled | None:
-        """Pullback of the term's forces; see `Term`."""
-        return None if self.condensed.memory.any() else condensed_pulled(self.condensed)
-
-    def scratches(self, threads: int) -> list[CondensedScratch]:
-        """Scratch for each thread; see `SheetTerm`."""
-        return [condensed_scratch(self.condensed)]
-
-    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """Tangent (m, m), N/m; see `SheetTerm`."""
-        return balanced(self._full.tangent(self._whole(q), floor), self._full.hidden)
-
-    def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
-        """Matrix for a Newton step at q; see `SheetTerm`."""
-        return self.tangent(q)
-
-    def blocks(self) -> SparseBlocks:
-        """Tangent blocks, all of them full; see `SheetTerm`."""
-        full = sparse.csr_array(np.ones((self.size, self.size)))
-        return SparseBlocks(full, self.rows, np.repeat(self.model.bars.rest, 3, axis=0))
-
-    def fold_hinges(self) -> FoldHinges:
-        """Hinges of the folds, without edge angles, as these are no dofs; see `SheetTerm`."""
-        found = super().fold_hinges()
-        plates, turns = self.condensed, self.model.fold_rotations
-        side = plates.band[plates.rank, -1] / self.per_hidden**2
-        there, each = turns >= 0, np.full(turns.shape, np.inf)
-        each[there] = side[turns[there]]
-        give = (1.0 / each).sum(axis=1)
-        beside = np.divide(1.0, give, out=np.full(len(give), np.inf), where=give > 0.0)
-        return found._replace(hidden=np.full_like(found.hidden, NO_DOF), beside=beside)
-
-    def remembering(self, own: MemoryHinges) -> Self:
-        """A copy of the sheet whose balance of edge angles includes the folds' memory branches."""
-        other, folds = copy(self), len(self.model.fold_rest)
-        other._held, memory = evaluation(own, self.condensed.offset, folds)
-        other.condensed = self.condensed._replace(memory=memory)
-        return other
-
-    # ------------------------------------------------------------------ forces on edge angles
-    @property
-    def _push(self) -> NDArray:
-        """Forces (r,), N, on the edge angles."""
-        return self.condensed.offset[len(self.model.fold_rest) :, 0]
-
-    @property
-    def rest_angles(self) -> NDArray:
-        """Rest angles of folds and bends, then forces on edge angles; see `SheetTerm`."""
-        return np.append(super().rest_angles, self._push)
-
-    def offsets_under(self, moments: NDArray) -> NDArray:
-        """Forces on the adjacent edge angles due to moments of creases; see `SheetTerm`."""
-        beside = self.model.fold_rotations
-        there, both = beside >= 0, np.repeat(moments[:, None], 2, axis=1)
-        return -self.per_hidden * np.bincount(beside[there], both[there], minlength=self.offsets)
-
-    def folded(self, rest: NDArray) -> Self:
-        """The sheet with other rest angles (nr,), rad; see `SheetTerm`."""
-        angles, push = np.split(rest, [len(rest) - self.offsets])
-        other = super().folded(angles)
-        other._push[:] = push
-        return other
-
-    def actuated(self, numbers: NDArray) -> tuple[Self, NDArray, NDArray]:
-        """A copy with rest angles that change in place; see `SheetTerm`."""
-        folds, bends = len(self.model.fold_rest), len(self.model.bend_rest)
-        sheet, _, which = super().actuated(numbers)
-        return sheet, np.where(numbers < folds, numbers, numbers - bends), which
-
-    def series(self) -> tuple[NDArray, NDArray]:
-        """Crease shares and offsets of actuated hinges; see `SheetTerm`."""
-        return np.ones(len(self.condensed.offset)), self.condensed.offset
-
-    # ------------------------------------------------------------------ other bodies
-    def unstrained(self, q: NDArray) -> Unstrained | None:
-        """See `SheetTerm`."""
-        found, hidden = self._full.unstrained(self._whole(q)), self._full.hidden
-        return found and Unstrained(
-            balanced(found.tangent, hidden), balanced(found.hinges, hidden), found.stretch
-        )
 
 
 def balanced(matrix: sparse.csr_array, hidden: NDArray) -> sparse.csr_array:

@@ -229,9 +229,9 @@ class Discretized:
         raise NotImplementedError
 
     @property
-    def condensed(self) -> Discretized | None:
-        """The structure without massless dofs, if it can condense them; otherwise None."""
-        return None
+    def for_explicit(self) -> Discretized:
+        """The structure with the dofs that explicit methods take."""
+        return self
 
     def held(self, edges: Mapping[int, NDArray]) -> Assembly:
         """Model for solvers if supports hold edges along their whole length.

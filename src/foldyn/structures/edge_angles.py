@@ -223,11 +223,12 @@ def straight_creases(nodes: NDArray, hinges: NDArray, pattern: Pattern, sheet: S
 def plates_model(
     nodes: NDArray, bars: NDArray, bar_stiffness: NDArray, bar_law: BarLaw, folds: NDArray,
     fold_stiffness: NDArray, fold_rest: NDArray, fold_law: HingeLaw, bends: NDArray,
-    bend_rest: NDArray, plates: EdgePlates, clamps: NDArray,
+    bend_rest: NDArray, plates: EdgePlates, clamps: NDArray, by_folds: bool,
 ) -> BarsPlates:  # fmt: skip
     """Model arrays: bars with the stiffness E A / L, folds, and the result of `edge_plates`.
 
     clamps : (c, 3) nodes of the triangles at clamped edges.
+    by_folds : whether the dofs beside a fold are those of explicit methods.
     """
     length, middle = lengths(nodes, bars), nodes[clamps[:, :2]].mean(axis=1)
     wings = np.array([opposite(corners) for corners in nodes[clamps]]).reshape(-1, 3) - middle
@@ -237,6 +238,7 @@ def plates_model(
         per_reach=1.0 / float(np.sqrt((length**2).mean())),
         hinges=np.concatenate([folds, bends, clamps[:, [0, 1, 2, 0]]]).astype(np.int64),
         wings=wings,
+        unmoved=hinge_angles(nodes, folds) if by_folds else np.zeros(0),
         fold_stiffness=np.array(fold_stiffness, float),
         fold_rest=np.array(fold_rest, float),
         fold_parameters=fold_law.parameters(fold_rest).reshape(-1, 4),

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.materials.crease_damper import damper_branch
 from foldyn.materials.inelastic_law import VARIABLES, Branch, MemoryLaw, memory_of
 from foldyn.materials.law import PARAMETERS
 from foldyn.materials.prony import CODE as MAXWELL
@@ -40,17 +39,9 @@ class Remembering(NamedTuple):
     @property
     def stiffness(self) -> NDArray:
         """Stiffness (k,), N m/rad, to which the parameters of branches are relative."""
-        if self.alone:
-            return np.where(np.isfinite(self.hinges.beside), self.hinges.beside, 0.0)
         stiffness, softness = self.hinges.stiffness, self.hinges.softness
         least = np.divide(LEAST, softness, out=np.zeros_like(softness), where=softness > 0.0)
         return np.maximum(stiffness, least)
-
-    @property
-    def alone(self) -> bool:
-        """Whether the hinges are dampers without stiffness, between edge angles in balance."""
-        alone = isinstance(self.law, CreaseDampers)
-        return alone and bool(np.isfinite(self.hinges.beside).any())
 
     @property
     def branches(self) -> tuple[Branch, ...]:
@@ -59,8 +50,6 @@ class Remembering(NamedTuple):
         Yielding or creeping elements are in series with the crease, and so with the panels.
         Relaxing elements are parallel to the crease, and in series with part of the panels.
         """
-        if self.alone:
-            return (damper_branch(self.stiffness, self.damping),)
         stiffness = self.stiffness
         own = self.law.branches(stiffness, self.hinges.length)
         share = 1.0 - self.hinges.softness * stiffness
@@ -94,9 +83,8 @@ def remembering(
         if damping is not None and kind == "fold":
             dampers = np.where(hinges.remembers, damping[hinges.fold] * hinges.length, 0.0)
         if law is not None:
-            within = law.relaxes and not np.isfinite(hinges.beside).any()
-            out.append(Remembering(kind, law, hinges, dampers if within else 0.0 * dampers))
-        if dampers.any() and (law is None or not within):
+            out.append(Remembering(kind, law, hinges, dampers if law.relaxes else 0.0 * dampers))
+        if dampers.any() and (law is None or not law.relaxes):
             out.append(Remembering(kind, CreaseDampers(), hinges, dampers))
     return tuple(out)
 

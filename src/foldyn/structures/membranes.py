@@ -140,7 +140,7 @@ def _gives(x: NDArray, parts: list[tuple], edges: list[Edge]) -> EdgeGives:
         np.zeros((size, bars, 2), np.int64), np.zeros((size, bars, 3)), np.zeros((size, bars)),
         np.zeros((size, most), np.int64),
         np.zeros((size, bars, most)), np.zeros((size, most, most)), np.zeros(bars),
-        np.zeros((bars, 3)),
+        np.zeros((bars, 3)), np.zeros(most), np.zeros(most),
     )  # fmt: skip
     for p, (_, nodes, ends, number, columns) in enumerate(parts):
         b, k = len(ends), len(number)
@@ -152,7 +152,7 @@ def _gives(x: NDArray, parts: list[tuple], edges: list[Edge]) -> EdgeGives:
         out.per_length2[p, :b] = 1.0 / length**2
         out.across[p, :b, :k] = columns[:b] * length[:, None]
         out.stiffness[p, :k, :k] = columns[b:]
-    return out.ordered()
+    return out
 
 
 def _sides(

@@ -24,13 +24,14 @@ from foldyn.materials import (
 )
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.clamps import RIDES, ClampsTerm
-from foldyn.mechanics.edge_gives import BalancedGivesTerm, EdgeGives, EdgeGivesTerm
+from foldyn.mechanics.edge_gives import EdgeGives, EdgeGivesTerm
 from foldyn.mechanics.following import Following, joined, moments, pushes, tensions
 from foldyn.mechanics.membranes import MembranesTerm
+from foldyn.mechanics.plates import handed_over
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm
-from foldyn.structures.bars_plates import BarsPlatesTerm, CondensedPlatesTerm, balanced
+from foldyn.structures.bars_plates import BarsPlatesTerm, balanced
 from foldyn.structures.calibration import PerCrease, per_crease
 from foldyn.structures.clamps import clamps
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
@@ -118,8 +119,8 @@ class Structure(Discretized):
         Coupling of the bars of panels, for `membrane = "panel"`, which does not use `bar_area`.
     edge_gives : EdgeGives or None
         How edges give way near their ends, in the plane of panels; for the scheme n5b8e.
-    without_edge_angles : bool
-        Whether edge angles and gives are kept in balance instead of being dofs.
+    by_folds : bool
+        Whether the dofs of edge angles are those of explicit methods; see `mechanics.plates`.
     pattern, sheet, options
         Input from which the structure was made.
     """
@@ -147,7 +148,7 @@ class Structure(Discretized):
     edge_plates: EdgePlates | None = None
     membranes: tuple[PanelKind, ...] = ()
     edge_gives: EdgeGives | None = None
-    without_edge_angles: bool = False
+    by_folds: bool = False
 
     def __repr__(self) -> str:
         """One line with the counts."""
@@ -220,16 +221,14 @@ class Structure(Discretized):
         )
         if self.edge_gives is None:
             return body
-        kind = BalancedGivesTerm if self.without_edge_angles else EdgeGivesTerm
         plates = self.edge_plates
         first = self.nodes.size + (0 if plates is None else len(plates.rotation_hinge))
-        return body.with_terms(kind(self.edge_gives, sheet.rows, first))
+        return body.with_terms(EdgeGivesTerm(self.edge_gives, sheet.rows, first))
 
     @property
     def massless(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Description of the massless dofs; empty if there are none."""
-        there = self.edge_plates is not None and not self.without_edge_angles
-        return "the edge angles of the scheme n5b8e" if there else ""
+        return "" if self.edge_plates is None else "the edge angles of the scheme n5b8e"
 
     @property
     def _axes(self) -> list[list[int]]:
@@ -237,24 +236,23 @@ class Structure(Discretized):
         return np.concatenate([self.folds, self.bends])[:, :2].tolist()
 
     def _plates_term(self, plates: EdgePlates) -> BarsPlatesTerm:
-        if self.edge_gives is not None and not self.without_edge_angles:  # unlike dofs of plates
+        if self.edge_gives is not None:  # unlike dofs of plates
             hinge = {frozenset(axis): k for k, axis in enumerate(self._axes)}
             gives = [hinge[frozenset(edge)] for edge in self.edge_gives.edge.tolist()]
             plates = plates._replace(rotation_hinge=np.append(plates.rotation_hinge, gives))
         model = plates_model(
             self.nodes, self.bars, self.bar_stiffness, self.bar_law, self.folds,
             self.fold_stiffness, self.fold_rest, self.fold_law, self.bends, self.bend_rest, plates,
-            self.clamps,
+            self.clamps, self.by_folds,
         )  # fmt: skip
-        kind = CondensedPlatesTerm if self.without_edge_angles else BarsPlatesTerm
-        return kind(model, (self.fold_law, self.bend_law))
+        return BarsPlatesTerm(model, (self.fold_law, self.bend_law))
 
     @cached_property
-    def condensed(self) -> Structure | None:
-        """The structure without massless dofs; None if it has none; see `Discretized`."""
-        if not self.massless:
-            return None
-        other = replace(self, without_edge_angles=True)
+    def for_explicit(self) -> Structure:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """See `Discretized`."""
+        if not self.massless or self.by_folds:
+            return self
+        other = replace(self, by_folds=True)
         return other.marked() if self.as_made else other
 
     def _rows(self, group: int, hinges: NDArray) -> NDArray:
@@ -306,17 +304,16 @@ class Structure(Discretized):
             parts = [tensions(self.nodes, self.bars, -self.bar_stiffness * stress)]
         if self.edge_plates is not None:
             sheet = self.body.sheet
-            turns, inner = np.zeros(len(sheet.rest_angles)), none
             moment, on_edges, own = self._curled(self.edge_plates, curvature)
             if np.any(curvature):
-                parts.append(moment)
-                if not self.without_edge_angles:
-                    parts.append(pushes(sheet.hidden[: len(on_edges)], on_edges))
-            if self.without_edge_angles:
-                turns[len(turns) - sheet.offsets :] = inner = on_edges
+                turning, on_edges = handed_over(sheet.model, on_edges)
+                parts += [moment, pushes(sheet.hidden[: len(on_edges)], on_edges)]
+                if turning.any():
+                    parts.append(moments(self.nodes[self.folds], self.folds, turning))
             free = free_angles(self.edge_plates, own)
             forces = joined((part, 0) for part in parts)
-            return Swelling(turns, forces, (longer, free), (push, own), stress, inner)
+            turns = np.zeros(len(sheet.rest_angles))
+            return Swelling(turns, forces, (longer, free), (push, own), stress)
         of_hinges, of_clamps = self._chords
         turn, own = none, none
         if len(self.clamps):

@@ -36,7 +36,6 @@ class Swelling(NamedTuple):
     free: tuple[NDArray, NDArray]  # Green strains (s,), angles (q,) rad
     push: tuple[NDArray, NDArray]  # forces of `free`: (s,) J, (q,) N m
     stress: NDArray = np.zeros(0)  # (nb,) stress of single bars, divided by Young's modulus
-    inner: NDArray = np.zeros(0)  # (r,) forces on dofs in balance, N
 
 
 def chord_turns(corners: NDArray) -> NDArray:

@@ -1,4 +1,4 @@
-"""What acts on creases: edge angles in balance with it (n5b8e), and turns of their own alone."""
+"""What acts on creases: edge angles beside them (n5b8e), and turns of their own alone."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from moving_sheets import EXPLICIT, SHEET
 from scipy.spatial.transform import Rotation
 
 import foldyn as fd
-from foldyn.dynamics.driver import prepare
+from foldyn.dynamics import stability
 from foldyn.errors import FoldynWarning
 from foldyn.structures.mesh import hinge_angles
 from pairwise import beyond, in_pairs
@@ -26,6 +26,7 @@ ALPHA, DP = "generalized_alpha", "dormand_prince"
 HELD = [fd.Fix([0, 1, 2, 3], "xyz")]
 PRONY = fd.Prony(0.5, 0.1, law="linear")
 EYRING = fd.Eyring(1e-2, 1e-1, law="linear")
+SWINGS = pytest.mark.filterwarnings("ignore:creases .* inertia")
 pytestmark = pytest.mark.filterwarnings("ignore::foldyn.errors.StretchWarning")
 
 
@@ -57,7 +58,7 @@ def differences(one, other):
 
 
 def by_edges(made, duration, steps=(1e-4, 5e-5), method=ALPHA):
-    """The motion with edge angles as dofs."""
+    """The motion in which edge angles have no mass."""
     return [fd.simulate(made, duration, method=method, dt=dt, interval=0.05) for dt in steps]
 
 
@@ -76,20 +77,23 @@ def test_a_damped_motion_ends_where_statics_ends(load, law):
     ("loads", "law", "method"),
     in_pairs([[moment()], [heat(SMOOTH), moment(SMOOTH)]], ["linear", CURVED], EXPLICIT),
 )
-def test_motions_are_those_with_edge_angles_as_dofs(method, law, loads):
-    """By generalized_alpha, whose error of order 2 is all that is left; energies too."""
+def test_motions_are_those_with_edge_angles_without_mass(method, law, loads):
+    """But for what their inertia changes: 1e-5 in a sheet this soft, whatever the steps.
+
+    A load that jumps sets edge angles swinging, which energies show.
+    """
     made, central = case(loads, law), method == "central_difference"
     close = {"tolerance": 1e-8} if method == DP else {}
     found = fd.simulate(made, 0.3, method=method, interval=0.05, **close)
-    errors = [differences(other, found) for other in by_edges(made, 0.3, (2e-4, 1e-4))]
-    assert errors[1] < (2e-5 if central else 2e-6)
-    assert central or errors[0] / errors[1] > 3.0
+    for other in by_edges(made, 0.3, (2e-4, 1e-4)):
+        assert apart(other, found) < 2e-5
+        assert differences(other, found) < (2e-5 if len(loads) == 2 else 5e-5)
     assert balance(found) < (2e-5 if central else 1e-6)
 
 
 def test_runge_kutta_keeps_its_order():
     """In displacements; and in the balance, where forces are constant."""
-    steps = (2e-4, 1e-4, 2.5e-5)
+    steps = (8e-5, 4e-5, 1e-5)
     runs = by_edges(case([moment(fd.HalfSine(0.4))]), 0.2, steps, "rk4")
     errors = [apart(run, runs[-1]) for run in runs[:-1]]
     assert np.log2(errors[0] / errors[1]) > 3.8
@@ -99,12 +103,15 @@ def test_runge_kutta_keeps_its_order():
 
 @pytest.mark.matrix
 def test_work_of_forces_that_jump():
-    """Edge angles jump with them, and take the mean of both forces along."""
+    """Edge angles without mass jump with them; with an inertia they are set swinging.
+
+    The balance of energies is as good as the tolerance lets it be for swings that last.
+    """
     made = case([moment(fd.Pulse(0.2))])
-    found = fd.simulate(made, 0.4, method=DP, interval=0.1, tolerance=1e-8)
+    found = fd.simulate(made, 0.4, method=DP, interval=0.1, tolerance=1e-10)
     other = fd.simulate(made, 0.4, method=ALPHA, dt=1e-4, interval=0.1)
-    assert balance(found) < 1e-8
-    assert differences(other, found) < 1e-5
+    assert balance(found) < 1e-7
+    assert apart(found, other) < 1e-5
 
 
 SMALL = fd.Rayleigh(0.1)
@@ -118,6 +125,25 @@ RESISTING = {
     "damped prony": (PRONY, fd.CreaseDamping(0.05)),
     "damped eyring": (EYRING, fd.CreaseDamping(0.05)),
 }
+NEAR = {  # of displacements; of work and losses
+    "prony": (2e-5, 1e-5), "plastic": (3e-5, 1e-3), "eyring": (2e-5, 1e-5), "weak": (5e-5, 3e-5),
+    "strong": (5e-5, 4e-3),
+}  # fmt: skip
+LATE = (4e-3, 2e-3)  # by 1/w = 1/4600 s, in a motion of 0.3 s
+
+
+def resisting(kind):
+    """A case, and its motion without inertia of edge angles.
+
+    generalized_alpha is of order 1 where dofs without mass are damped: it is extrapolated.
+    """
+    law, damping = RESISTING[kind]
+    made = case([moment(SMOOTH), heat(SMOOTH)], law, damping=damping)
+    one, other = by_edges(made, 0.3)
+    return made, {
+        name: other[name].values + (damping is not SMALL) * (other[name].values - one[name].values)
+        for name in ("displacement", "dissipated", "work")
+    }
 
 
 @pytest.mark.matrix
@@ -127,31 +153,56 @@ RESISTING = {
     + beyond([(kind, "rk4") for kind in list(RESISTING)[1::2]], 2)
     + beyond([(kind, method) for kind in RESISTING for method in EXPLICIT if method != "rk4"]),
 )
-def test_creases_that_remember_or_are_damped_move_as_with_edge_angles_as_dofs(method, kind):
-    """generalized_alpha is of order 1 where dofs without mass are damped: it is extrapolated."""
-    law, damping = RESISTING[kind]
-    made = case([moment(SMOOTH), heat(SMOOTH)], law, damping=damping)
+def test_creases_that_remember_or_are_damped_move_as_with_edge_angles_without_mass(method, kind):
+    """A damped crease is late by the inverse of the largest frequency w; one that begins to yield
+    swings a little: `test_their_inertia_is_all_that_sets_them_apart`.
+    """
+    made, wanted = resisting(kind)
     found = fd.simulate(made, 0.3, method=method, interval=0.05)
-    one, other = by_edges(made, 0.3)
-    for name in ("displacement", "dissipated", "work"):
-        wanted = other[name].values
-        if damping is not SMALL:
-            wanted = 2.0 * wanted - one[name].values
-        assert apart(found[name].values, wanted) < (1e-5 if damping is SMALL else 2e-5)
-    assert balance(found) < (1e-6 if damping is SMALL else 5e-6)
+    moved, taken = NEAR.get(kind, LATE)
+    for name, values in wanted.items():
+        assert apart(found[name].values, values) < (moved if name == "displacement" else taken)
+    jerky = kind == "plastic" and method == "central_difference"
+    assert balance(found) < (2e-4 if jerky else 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "order"),
+    [
+        ("plastic", 1),
+        *beyond([
+            ("strong", 1), ("prony", 2), ("eyring", 2), ("nonlinear", 1), ("damped eyring", 1),
+        ]),
+    ],
+)  # fmt: skip
+def test_their_inertia_is_all_that_sets_them_apart(kind, order, monkeypatch):
+    """A larger frequency w takes it away: by 1/w where creases are damped or begin to yield."""
+    made, wanted = resisting(kind)
+    errors, frequencies = [], []
+    for octaves in (0.0, 6.0):  # of w^2 above its least value
+        monkeypatch.setattr(stability, "_LEAST", octaves)
+        made = made.altered(loads=made.loads)  # as inertias are stored with their case
+        found = fd.simulate(made, 0.3, method="rk4", interval=0.05)
+        errors.append([apart(found[name].values, wanted[name]) for name in wanted])
+        frequencies.append(fd.dynamics.largest_frequency(made))
+    higher = frequencies[1] / frequencies[0]
+    assert higher > 3.0
+    assert (np.array(errors[1]) < 1.5 * np.array(errors[0]) / higher**order + 4e-6).all()
 
 
 @pytest.mark.matrix
+@SWINGS
 @pytest.mark.parametrize("damping", [1e-4, 0.05, 5.0])
 def test_damped_creases_are_of_order_two(damping):
-    """As with all memory, by whatever method; the balance too."""
+    """At least, as with all memory; the balance too."""
     made = case([moment(SMOOTH)], damping=fd.CreaseDamping(damping))
-    runs = by_edges(made, 0.2, (4e-4, 2e-4, 2.5e-5), "rk4")
+    runs = by_edges(made, 0.2, (4e-5, 2e-5, 2.5e-6), "rk4")
     errors = [differences(run, runs[-1]) for run in runs[:-1]]
-    assert np.log2(errors[0] / errors[1]) > 1.7
+    assert errors[1] < 1e-11 or np.log2(errors[0] / errors[1]) > 1.7
     assert balance(runs[1]) < 1e-6
 
 
+@SWINGS
 @pytest.mark.parametrize(
     ("method", "kind"), beyond(product(EXPLICIT, ["strong", "damped eyring"]), 3)
 )
@@ -165,6 +216,7 @@ def test_a_state_holds_what_damped_creases_remember(method, kind):
     assert apart(rest.displacement.values[-1], whole.displacement.values[-1]) < 1e-6
 
 
+@SWINGS
 @pytest.mark.matrix
 def test_dampers_take_what_jumps():
     """The moment of a damped crease that jumps turns it at a finite rate."""
@@ -183,6 +235,7 @@ JUMPS = (
 MIURA = fd.patterns.miura()
 
 
+@SWINGS
 @pytest.mark.parametrize(
     ("method", "error", "jump"),
     beyond(
@@ -190,40 +243,16 @@ MIURA = fd.patterns.miura()
     ),
 )
 def test_edge_angles_jump_beside_damped_creases(method, error, jump):
-    """But for the turn of these; if they did not, they would ring from step to step."""
+    """But for the turn of these; if they did not, they would ring from step to step.
+
+    In explicit motions they swing about the same place, which energies show.
+    """
     held, damping = fd.Fix(list(MIURA.faces[0])), fd.CreaseDamping(0.5, [2, 3])
     made = fd.Case(model(pattern=MIURA), [held], [jump], damping=damping)
     found = fd.simulate(made, 0.2, method=method, dt=2e-4, interval=0.05)
     other = fd.simulate(made, 0.2, method=DP, interval=0.05, tolerance=1e-7)
-    assert differences(other, found) < error
+    assert apart(other, found) < error
     assert balance(found) < 1e-3
-
-
-def test_edge_angles_without_a_balance_find_the_next_one():
-    """As in a step that is tried again. What yields, whose slope jumps, has one nearly always."""
-    stiff = model(k=10.0, law=fd.Plastic(5e-3), pattern=MIURA)
-    made = fd.Case(stiff, [fd.Fix(list(MIURA.faces[0]))], [moment()])
-    body, other = (prepare(made, 0.1, "rk4").packed.body for _ in range(2))
-    rng, none = np.random.default_rng(0), 0
-    wild = np.where(made.fixed, 0.0, rng.normal(size=(400, *made.fixed.shape)))
-    for q in wild * 10.0 ** rng.uniform(-3.0, -0.5, (400, 1, 1)):
-        none += bool(np.isnan(body.internal(q.ravel())).any())
-    assert none < 20
-    assert np.isnan(body.internal(np.full(made.fixed.size, np.nan))).any()
-    small = 1e-3 * wild[0].ravel()
-    np.testing.assert_allclose(body.internal(small), other.internal(small), atol=1e-9)
-
-
-def test_edges_without_balance_are_told_of():
-    """Creases 10,000 times as stiff as panels that yield: Newton's iteration zigzags."""
-    pattern = fd.patterns.miura(cells=(1, 1), b=1.1, panel_angle=65, dihedral=100)
-    law = fd.Plastic(yield_moment=1.0, isotropic=0.5)
-    s = model("n5b8e", 2e4, law, pattern, fd.Sheet(1e6, 0.3, 0.03, 1000.0))
-    pushed = fd.CreaseMoment(creases=[1], moment=2.0, history=fd.HalfSine(0.2))
-    made = fd.Case(s, [fd.Fix([0, 1, 2])], [pushed])
-    with pytest.raises(fd.errors.InstabilityError, match=r'no balance.*use method = "newmark"'):
-        fd.simulate(made, 0.3, method="rk4", interval=0.02)
-    assert fd.simulate(made, 0.3, method="newmark", interval=0.02).dissipated[-1] > 0.0
 
 
 # ------------------------------------------------------------------ the turn of a crease alone
