@@ -235,6 +235,15 @@ def test_errors_bound_the_difference_to_fine_shells(pattern, thickness):
             assert (off < 0.01 * limit).all()
 
 
+def test_no_motion_has_a_negative_mass():
+    """Turns of a hexagon, of hardly any mass, would get one in the limit of fine meshes."""
+    angle = np.arange(6) * np.pi / 3.0
+    hexagon = fd.Pattern(0.04 * np.column_stack([np.cos(angle), np.sin(angle)]), [range(6)])
+    sheet = fd.Sheet(youngs_modulus=2e9, poissons_ratio=0.35, thickness=3e-4, density=1200.0)
+    _, mass = fd.superelements(hexagon, sheet).whole.matrices(False)
+    assert np.linalg.eigvalsh(mass.toarray())[0] > -1e-15
+
+
 def test_congruent_panels_are_condensed_once():
     sheet = fd.superelements(fd.patterns.miura(cells=(2, 2)), SHEET, level=1)
     assert len(sheet.whole._groups) == 1
