@@ -104,7 +104,7 @@ class FidelityAnalysis(Analysis):
         """See `Analysis`."""
         (first, result), *_ = results.items()
         found = Fidelity(result)
-        yield Heading("Which model")
+        yield Heading("How far models follow the shell")
         yield Text(found.advice)
         yield from album.figure(
             "fidelity",
@@ -137,7 +137,7 @@ class _Steps:
 
 
 def _models(found: Fidelity) -> Table:
-    """Table with a row for each model: its options, its errors, its cost."""
+    """Table with a row for each model: its options, its errors."""
     result, below = found.result, found.result["frequency"].values < found.limit
     forces = "deflection" in result
     header = ["model", "options", "median (%)", "largest (%)", "lost"]
@@ -152,11 +152,11 @@ def _models(found: Fidelity) -> Table:
         row.append(int(np.isinf(error).sum()))
         if forces:
             row.append(_told(float(one["deflection_error"]), "soft"))
-        rows.append([*row, 1e3 * float(one["model_seconds"]), f"1/{float(one['cost_ratio']):.0f}"])
+        rows.append(row)
     # this table shows no modes
     words = [line for line in legend(found) if not line.startswith("*")]
     return Table(
-        [*header, "time (ms)", "of the shell's"],
+        header,
         rows,
         f"Errors against the shell of the {int(below.sum())} modes below 0.6 of the plate "
         f"frequency, {found.limit:.4g} Hz; lost modes do not count in median and largest. "
@@ -225,8 +225,4 @@ def _notes(found: Fidelity) -> str:
         notes.append(
             f"Superlinear hinges have the slope of an oscillation by {facts['secant']:g} degrees."
         )
-    notes.append(
-        "Times are medians of modal analyses for as many modes of each, measured in this run; "
-        f"the shell's takes {float(found.result['seconds']):.3g} s."
-    )
     return "\n\n".join(notes)

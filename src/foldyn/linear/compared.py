@@ -14,6 +14,7 @@ import xarray
 
 from foldyn.errors import InputError
 from foldyn.linear.reference import LEAST, NO_LIMIT
+from foldyn.structures.beyond_range import LINEAR
 from foldyn.values import choice
 
 ABREAST, WIDE = 4, 79  # in plain text: models side by side, and characters per line
@@ -21,30 +22,12 @@ ABREAST, WIDE = 4, 79  # in plain text: models side by side, and characters per 
 __all__ = ["OWN", "ComparedMode", "Fidelity"]
 OWN = "own"
 """Name of the case's own model."""
-GOOD, LARGEST = 0.02, 0.10  # largest errors: of a model worth keeping, and of a usable model
+LARGEST = 0.10  # largest error of a usable model
 MESH = 0.02  # larger mesh errors are mentioned
-SHELL = " (--model shell on the command line, fd.shell)"
 SCOPE = (
-    "Only small vibrations about rest and small loads were compared: motions and loads that turn "
-    "creases far are not covered."
+    f"In linear analyses {LINEAR}: they come within 1 % of the shell. Motions and loads that turn "
+    "creases far were not compared."
 )
-
-
-class Reach(NamedTuple):
-    """Range in which a model follows the shell: the lowest modes with errors of at most 10 %.
-
-    Attributes
-    ----------
-    model : str
-    count : int
-        Number of modes in the range.
-    worst : float
-        Largest error among these modes; infinite if there are none.
-    """
-
-    model: str
-    count: int
-    worst: float
 
 
 def advice(result: xarray.Dataset) -> str:
@@ -66,90 +49,49 @@ def _sentences(result: xarray.Dataset) -> Iterator[str]:
     """Sentences of the advice, in order."""
     frequency, limit = result["frequency"].values, float(result.attrs["limit"])
     below = int((frequency < limit).sum())
-    reaches = [reach(result, model, below) for model in result["model"].values.tolist()]
-    own, best = reaches[0], min(reaches, key=lambda one: (-one.count, one.worst))
-    if own.count == best.count and own.worst <= max(GOOD, best.worst):
-        best = own
+    names = result["model"].values.tolist()
     if below:
-        yield from _vibrations(result, below, best)
+        reached = "; ".join(f"{name} {_reached(result, name, below)}" for name in names)
+        yield f"Within {size(LARGEST)} of the shell, from the lowest mode on: {reached}."
     else:
         yield (
             f"The lowest mode of the shell, {frequency[0]:.4g} Hz, lies above {limit:.4g} Hz, 0.6 "
-            "of the plate frequency: panels vibrate as plates there, which bars and hinges do not. "
-            f"Take the shell{SHELL}."
+            "of the plate frequency: panels vibrate as plates there, which bars and hinges do not."
+        )
+    soft = int(result["soft_hinges"].sel(model=OWN))
+    if soft:
+        yield (
+            f"{soft} hinges of the case's own model are superlinear and have no stiffness at rest: "
+            "take linear bends, or judge it with a secant amplitude (secant = 1, in degrees)."
         )
     if "deflection" in result:
-        yield _statics(result, best)
+        yield _statics(result, names)
     yield from _mesh(result, below)
     yield SCOPE
 
 
-def _vibrations(result: xarray.Dataset, below: int, best: Reach) -> Iterator[str]:
-    """Sentences on the modes below the limit, for the recommended model."""
-    frequency, limit = result["frequency"].values, float(result.attrs["limit"])
-    if not best.count:
-        yield (
-            f"No model has the lowest mode, {frequency[0]:.4g} Hz, within {size(LARGEST)} of the "
-            f"shell: take the shell{SHELL}."
-        )
-    else:
-        top, whole = float(frequency[best.count - 1]), best.count == below
-        upto = f"{top:.4g} Hz"
-        if whole and below < len(frequency):
-            upto = f"{limit:.4g} Hz, 0.6 of the plate frequency"
-        elif whole:
-            upto += ", the highest mode compared"
-        ratio = float(result["cost_ratio"].sel(model=best.model))
-        yield (
-            f"{_called(result, best.model)} is within {size(best.worst)} of the shell up to "
-            f"{upto}, at 1/{ratio:.0f} of its cost{'' if best.model == OWN else ': use it'}."
-        )
-        if not whole:
-            yield (
-                f"The next mode, {frequency[best.count]:.4g} Hz, {_missed(result, best)}: take the "
-                f"shell from there{SHELL}."
-            )
-    if best.model != OWN:
-        yield from _own(result, below)
+def _reached(result: xarray.Dataset, model: str, below: int) -> str:
+    """How far a model follows the shell among the modes below the limit."""
+    frequency = result["frequency"].values
+    error = np.abs(result["error"].sel(model=model).values[:below])
+    bad = np.flatnonzero(error > LARGEST)
+    count = int(bad[0]) if len(bad) else below
+    if not count:
+        return "in no mode"
+    end = result.attrs["limit"] if below == count < len(frequency) else frequency[count - 1]
+    return f"up to {float(end):.4g} Hz ({size(float(error[:count].max()))} at most)"
 
 
-def _own(result: xarray.Dataset, below: int) -> Iterator[str]:
-    """Errors of the case's own model below the limit."""
-    error = np.abs(result["error"].sel(model=OWN).values[:below])
-    lost = int(np.isinf(error).sum())
-    parts = []
-    if lost < below:
-        parts.append(f"is off by up to {size(float(error[np.isfinite(error)].max()))}")
-    if lost:
-        parts.append(f"has no partner of {lost} of {below} modes")
-    yield f"{_called(result, OWN)} {' and '.join(parts)} there."
-    soft = int(result["soft_hinges"].sel(model=OWN))
-    if soft:
-        yield (
-            f"{soft} of its hinges are superlinear and have no stiffness at rest: take linear "
-            "bends, or judge it with a secant amplitude (secant = 1, in degrees)."
-        )
-
-
-def _statics(result: xarray.Dataset, best: Reach) -> str:
-    """Displacements of the recommended model, and of the case's own."""
-    errors = result["deflection_error"]
-    told = {one: float(errors.sel(model=one)) for one in dict.fromkeys([best.model, OWN])}
+def _statics(result: xarray.Dataset, names: list[str]) -> str:
+    """Displacements of the models."""
+    errors = {name: float(result["deflection_error"].sel(model=name)) for name in names}
     texts = (
         f"{percent(error)} ({model})" if np.isfinite(error) else f"no stiffness at all ({model})"
-        for model, error in told.items()
+        for model, error in errors.items()
     )
     mesh = np.isnan(result["deflection_mesh_error"])
     uncertain = "; the shell's have not converged" if mesh else ""
     return f"Displacements under its forces, if those are small: {', '.join(texts)}{uncertain}."
-
-
-def reach(result: xarray.Dataset, model: str, below: int) -> Reach:
-    """Range in which a model follows the shell among the lowest modes."""
-    error = np.abs(result["error"].sel(model=model).values[:below])
-    bad = np.flatnonzero(error > LARGEST)
-    count = int(bad[0]) if len(bad) else below
-    return Reach(model, count, float(error[:count].max()) if count else float("inf"))
 
 
 def _mesh(result: xarray.Dataset, below: int) -> Iterator[str]:
@@ -172,16 +114,6 @@ def _mesh(result: xarray.Dataset, below: int) -> Iterator[str]:
             f"The finer mesh of the shell is itself about {size(float(error.max()))} off its "
             "limit: compare again with finer divisions."
         )
-
-
-def _missed(result: xarray.Dataset, best: Reach) -> str:
-    error = float(result["error"].sel(model=best.model).values[best.count])
-    return "has no partner in it" if np.isinf(error) else f"is off by {size(error)} in it"
-
-
-def _called(result: xarray.Dataset, model: str) -> str:
-    name = "case's own model" if model == OWN else f'model "{model}"'
-    return f"The {name} ({result['options'].sel(model=model).item()})"
 
 
 class ComparedMode(NamedTuple):
@@ -266,7 +198,7 @@ class Fidelity:
 
     @property
     def advice(self) -> str:
-        """The model to use, up to which frequency, and the limits of the comparison."""
+        """How far each model follows the shell, and the limits of the comparison."""
         return advice(self.result)
 
     def table(self, model: str = OWN) -> tuple[ComparedMode, ...]:
@@ -322,8 +254,6 @@ def _columns(found: Fidelity, models: tuple[str, ...]) -> str:
         for error in result["deflection_error"].values.tolist():
             row += [percent(error) if math.isfinite(error) else "soft", ""]
         rows.append(row)
-    ratios = (text for ratio in result["cost_ratio"].values for text in (f"1/{ratio:.0f}", ""))
-    rows.append(["cost", f"{result['seconds'].item():.2g} s", *ratios])
     wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for first, *others in rows:

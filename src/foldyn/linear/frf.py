@@ -28,7 +28,7 @@ from foldyn.results import frf_dataset
 from foldyn.results.quantities import RESPONSES, variable
 from foldyn.signals import convert_response
 from foldyn.structures.stretching import most, remedy, stretching
-from foldyn.values import choice, number, numbers, of_kind, suggest, whole
+from foldyn.values import choice, number, numbers, of_kind, suggest
 
 
 class ResponseMethod(NamedTuple):
@@ -78,7 +78,6 @@ def frf(
     secant: float | None = None,
     amplitude: float = 1.0,
     load_factor: float = 1.0,
-    internal: int = 0,
     progress: bool | Reporter | None = None,
     **options: Any,
 ) -> xarray.Dataset:
@@ -110,8 +109,6 @@ def frf(
         Factor on the drive, for structures whose response depends on the amplitude.
     load_factor : float
         Load factor of actuated folds in a given state.
-    internal : int
-        For "direct" and "modal": internal amplitudes of each panel, as in `modes`.
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress`, in simulated time for methods that simulate
         motions, in frequencies for the others.
@@ -179,24 +176,15 @@ def frf(
             "of the drive instead",
             "secant",
         )
-    internal = whole("internal", internal)
-    if internal and way.by_amplitude:
-        raise InputError(
-            f" = {internal!r}: internal amplitudes are for small vibrations, and the method "
-            f'{method} is for finite ones; take method = "direct" or "modal", or leave it out',
-            "internal",
-        )
     began = time.perf_counter()
     with reported(progress) as report:
         if way.linear:
-            system = linearize(
-                case, state, secant=way.secant or secant, load_factor=load_factor, internal=internal
-            )
+            system = linearize(case, state, secant=way.secant or secant, load_factor=load_factor)
             _warn_of_instability(system)
             answer = way.compute(system, driven, frequency, chosen, report)
             _warn_of_stretch(system, frequency, answer.response)
             response, displacement = absolute(system, driven, answer.response), system.displacement
-            own = {"soft_hinges": system.soft, "internal": system.internal or None}
+            own: dict[str, Any] = {"soft_hinges": system.soft}
             if isinstance(case.structure, Superelements):
                 own["holds_to"] = _range(case, float(frequency.max()))
         else:
@@ -204,7 +192,7 @@ def frf(
             answer = way.compute(rig, frequency, chosen, report)
             response, displacement = answer.response, rig.state
             own = {"integrator": rig.integrator, "dt": chosen.dt}
-    warn_beyond(case.structure, frequency, internal=None if way.by_amplitude else internal)
+    warn_beyond(case.structure, frequency, linear=not way.by_amplitude)
     facts = {
         "method": method,
         **driven.facts(),
@@ -263,7 +251,7 @@ def _warn_of_stretch(system: Linearized, frequency: NDArray, response: NDArray) 
         listed = ", ".join(f"{f:.4g}" for f in frequency[peaks[told]][:NAMED])
         warn(
             f"panels that stretch hold more than {limit:.0%} of the strain energy of the response "
-            f"at {listed} Hz ({share.max():.0%} at most), {remedy(structure)}",
+            f"at {listed} Hz ({share.max():.0%} at most), {remedy(structure, linear=True)}",
             "models.md#where-panels-stretch",
             StretchWarning,
         )

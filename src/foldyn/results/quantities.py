@@ -131,7 +131,6 @@ MODES: Mapping[str, Quantity] = {
 INTERNAL: Mapping[str, Quantity] = {
     "frequency_error": Quantity("Hz", "estimate of the largest error of the frequency"),
     "air_share": Quantity("1", "share of the air in the modal mass"),
-    "internal_share": Quantity("1", "share of the strain energy in internal amplitudes of panels"),
     "between_shape": Quantity("m", "mode shape between nodes", ("between", "axis")),
 }
 """Further variables of modes, of some models or in air. The dimension `between` counts the
@@ -192,9 +191,6 @@ FIDELITY: Mapping[str, Quantity] = {
     "mac": Quantity("1", "MAC with the mode of the shell", ("mode", "model")),
     "options": Quantity(text="arguments of discretize", dims=("model",)),
     "soft_hinges": Quantity(text="hinges without stiffness at rest", dims=("model",)),
-    "seconds": Quantity("s", "time for the modes of the shell"),
-    "model_seconds": Quantity("s", "time for the modes of a model", ("model",)),
-    "cost_ratio": Quantity("1", "time for the shell divided by time for a model", ("model",)),
     "deflection": Quantity("m", "displacement of the shell along small loads, extrapolated"),
     "deflection_mesh_error": Quantity("1", "error of the finest mesh (nan: not converged)"),
     "deflection_error": Quantity("1", "error of the displacement (infinite: soft)", ("model",)),
