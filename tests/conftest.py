@@ -6,6 +6,7 @@ import os
 import re
 import signal
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,9 @@ from hypothesis import settings
 
 from browsers import browser  # noqa: F401 - a fixture
 from case_fixtures import kept, read  # noqa: F401 - fixtures
+from foldyn.linear import model_error
 
+PANELS = model_error.PANELS
 REPOSITORY = Path(__file__).resolve().parents[1]
 
 # no doctests in them, and pytest cannot collect several modules of one name
@@ -39,6 +42,20 @@ def shared() -> Path:
     if not folder.is_dir():
         pytest.skip("needs ../shared")
     return folder
+
+
+@pytest.fixture(scope="session", autouse=True)
+def uncompared() -> Iterator[None]:
+    """Bars and hinges are not compared with superelements, which takes half a second each time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(model_error, "PANELS", -1)
+        yield
+
+
+@pytest.fixture
+def compared(monkeypatch) -> None:
+    """Bars and hinges are compared with superelements, as by default."""
+    monkeypatch.setattr(model_error, "PANELS", PANELS)
 
 
 def pytest_terminal_summary(terminalreporter) -> None:

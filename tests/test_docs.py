@@ -70,6 +70,7 @@ def tutorial(tmp_path_factory):
     return names, printed.getvalue(), folder
 
 
+@pytest.mark.matrix
 def test_the_tutorial_prints_what_it_shows(tutorial):
     _, printed, folder = tutorial
     page = (DOCS / "tutorial.md").read_text("utf-8")
@@ -78,6 +79,7 @@ def test_the_tutorial_prints_what_it_shows(tutorial):
     assert all((folder / f"{name}.pdf").stat().st_size > 1000 for name in ("modes", "tip"))
 
 
+@pytest.mark.matrix
 def test_the_case_file_of_the_tutorial_is_its_python_case(tutorial):
     names, _, folder = tutorial
     (block,) = blocks("tutorial.md", "toml")
@@ -177,6 +179,7 @@ def test_the_response_of_the_case_file_page_can_be_computed(tmp_path):
     assert case_file.output.quantity == "mobility"
 
 
+@pytest.mark.matrix
 def test_the_bands_of_the_case_file_page_are_those_of_its_states(tmp_path):
     *_, repeated = blocks("case-file.md", "toml")
     bare = re.sub(r"^\[\[supports\]\]\n(.+\n)*", "", without_loads(), flags=re.M)
@@ -186,6 +189,7 @@ def test_the_bands_of_the_case_file_page_are_those_of_its_states(tmp_path):
     assert found.sizes["band"] == 5
 
 
+@pytest.mark.matrix
 def test_compress_release_vibrate_of_the_statics_page():
     names = executed(blocks("statics.md", "python")[-1])
     path, motion = names["path"], names["motion"]
@@ -195,6 +199,7 @@ def test_compress_release_vibrate_of_the_statics_page():
     assert top.min() < -0.002  # it springs back beyond its height
 
 
+@pytest.mark.matrix
 def test_the_page_on_waves_in_chains_follows_an_impact(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = executed(*blocks("wave-chains.md", "python"))
@@ -270,6 +275,7 @@ def test_sections_are_found():
     assert {("analysis", "duration"), ("analysis", "load_factors")} <= set(sections())
 
 
+@pytest.mark.matrix
 def test_inertia_table_is_what_the_code_gives_and_knows_the_rhombus():
     script = runpy.run_path(str(DOCS / "inertia_table.py"))
     page = (DOCS / "mass.md").read_text("utf-8")

@@ -68,6 +68,7 @@ def test_a_case_file_says_all_of_it(path):
     assert case.total_mass == pytest.approx(case.structure.total_mass + 0.5)
 
 
+@pytest.mark.matrix
 def test_its_result_rebuilds_the_case_and_its_page_is_written(path, tmp_path):
     case_file = fd.read_case(path)
     result = case_file.run()

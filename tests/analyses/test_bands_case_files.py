@@ -47,6 +47,7 @@ def cell_at(dihedral: float) -> fd.UnitCell:
     return fd.UnitCell(fd.Case(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0))))
 
 
+@pytest.mark.matrix
 def test_states_have_the_bands_of_their_cells(found):
     assert found["state"].values.tolist() == [60, 100]
     assert found["state"].attrs["units"] == "degrees"
@@ -62,6 +63,7 @@ def test_states_have_the_bands_of_their_cells(found):
         np.testing.assert_allclose(here["vectors"], cell.vectors)
 
 
+@pytest.mark.matrix
 def test_figures_show_each_state(tmp_path, found, monkeypatch):
     drawn = []
     monkeypatch.setattr(plots, "plot_bands", lambda bands: drawn.append(bands) or Figure())
@@ -116,6 +118,7 @@ def test_waves_decay_where_no_band_is_and_there_alone(found):
     assert checked > 10
 
 
+@pytest.mark.matrix
 def test_stretched_periods_are_those_of_the_state(tmp_path):
     """A factor of 1 changes nothing, and others stretch the shifts from cell to cell."""
     few = {"zone": None, "attenuation": None, "points": 5}
@@ -196,6 +199,7 @@ def test_bands_have_no_derivatives(tmp_path):
         fd.sensitivity(tmp_path / "case.toml", {"sheet.thickness": 0.01}, measures="band_gap[4]")
 
 
+@pytest.mark.matrix
 def test_the_viewer_shows_one_state(tmp_path):
     document = tomllib.loads(BANDS_TEXT)
     assert next(iter(offered(document))) == "bands"
@@ -223,6 +227,7 @@ def test_files_of_other_kinds_are_cells_without_supports_and_loads(tmp_path):
     np.testing.assert_array_equal(read.run()["frequency"], own["frequency"])
 
 
+@pytest.mark.matrix
 def test_a_stored_state_that_does_not_repeat_is_named(tmp_path):
     """One corner that is pushed up moves no other one."""
     cell = cell_at(60.0)

@@ -38,6 +38,7 @@ load_factors = [1.0]
 """
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("kind", ["bars_and_hinges", "shell"])
 def test_a_case_file_with_all_of_them(read, tmp_path, kind) -> None:
     case_file = read(changed(FILE, f'model.kind = "{kind}"'))

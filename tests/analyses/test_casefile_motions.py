@@ -102,6 +102,7 @@ def test_a_rigid_start_may_not_move_imposed_nodes(read, short) -> None:
         read(f"{text}[initial]\nvelocity = [1, 2, 3]\n")
 
 
+@pytest.mark.matrix
 def test_a_start_from_a_result(read, short, tmp_path) -> None:
     found = read(f"{short}[initial]\nfile = 'runs/first.nc'\nat = -2\n")
     missing = r'case2\.toml: initial\.file = "runs/first\.nc": .*no such'

@@ -57,6 +57,7 @@ def written(folder, analysis, mass='"panel"'):
     return path
 
 
+@pytest.mark.matrix
 def test_a_case_file_computes_what_the_function_does(tmp_path):
     file = read_case(written(tmp_path, CURVE))
     found = file.run()
@@ -65,6 +66,7 @@ def test_a_case_file_computes_what_the_function_does(tmp_path):
     assert found.amplitude.values == pytest.approx(own.amplitude.values)
 
 
+@pytest.mark.matrix
 def test_the_command_takes_any_kind_and_writes_a_page(tmp_path):
     path, folder = written(tmp_path, MOTION, '["panel", "centroid"]'), tmp_path / "out"
     flags = ["--frequencies", "0.3", "0.4", "--harmonics", "3", "--branches", "0", "--quiet"]

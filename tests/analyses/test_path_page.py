@@ -47,6 +47,7 @@ def write(tmp_path, text):
     return path, page.read_text("utf-8")
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the path loses stability")
 def test_loads_that_are_constant_are_named(tmp_path):
     loads = "[[loads]]\nnodes = [0, 1]\nforce = [-1e-3, 0, 0]\n[[loads]]\ngravity = [0, 0, -9.81]\n"
@@ -56,6 +57,7 @@ def test_loads_that_are_constant_are_named(tmp_path):
     assert "all loads and imposed displacements, except load 1 (in full throughout)." in page
 
 
+@pytest.mark.matrix
 def test_there_and_back(tmp_path):
     """Energies over a displacement that returns are drawn over the way."""
     moved = '[[supports]]\nnodes = [0, 1]\naxis = "x"\ndisplacement = -0.1\n'
@@ -68,6 +70,7 @@ def test_there_and_back(tmp_path):
     assert not (tmp_path / "landscape.png").exists()  # the force falls on the way back alone
 
 
+@pytest.mark.matrix
 def test_a_path_through_two_states_shows_its_landscape(tmp_path):
     case_file = read_case(fd.studies.find_case("gallery/kresling"))
     path = case_file.run()

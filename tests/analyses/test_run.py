@@ -22,6 +22,7 @@ def test_a_motion_starts_as_the_file_says(read) -> None:
     np.testing.assert_array_equal(found.velocity.isel(time=0), given)
 
 
+@pytest.mark.matrix
 def test_settings_of_a_path_count(read) -> None:
     """A largest turn that is smaller gives more points."""
     text = FOLD + PUSH + '[analysis]\nkind = "statics"\nmethod = "arc_length"\n'

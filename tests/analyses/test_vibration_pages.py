@@ -56,6 +56,7 @@ def test_which_modes_are_shown(write):
     assert shown_modes(found, 2) == [3, 4]
 
 
+@pytest.mark.matrix
 def test_a_film_of_a_large_sheet_shows_fewer_modes(write, monkeypatch):
     monkeypatch.setattr("foldyn.analyses.modes.MOST_TRIANGLES", 70)  # 32 in a mode
     _, page = write(
@@ -64,6 +65,7 @@ def test_a_film_of_a_large_sheet_shows_fewer_modes(write, monkeypatch):
     assert "The same modes (the first 2) in motion" in page
 
 
+@pytest.mark.matrix
 def test_the_direction_is_that_of_the_drive_and_nodes_are_told(write):
     grid = "frequencies = { first = 0, last = 2, count = 21 }\n"
     output = f"[output]\nnodes = {list(range(3, 15))}\n"
@@ -74,6 +76,7 @@ def test_the_direction_is_that_of_the_drive_and_nodes_are_told(write):
     assert f"Foldyn {fd.__version__}" in page and "alpha 0.5 1/s, beta 0 s" in page
 
 
+@pytest.mark.matrix
 def test_a_drive_backward_is_read_backward(write):
     """The response of a driven point along its drive has a positive real mobility."""
     grid = "frequencies = { first = 0.1, last = 2, count = 39 }\n"
@@ -88,6 +91,7 @@ def test_a_drive_backward_is_read_backward(write):
     assert peaks_of(found, 13, axis="-z") == peaks_of(found, 13, axis="z") != ()
 
 
+@pytest.mark.matrix
 def test_what_the_picture_marks_is_in_the_table(write):
     """A peak of 1 % of the highest one, which a logarithmic axis shows as well."""
     found, _ = write(PUSH + '[analysis]\nkind = "frf"\nfrequencies = [0.5, 1, 2]\nsecant = 1\n')
@@ -107,6 +111,7 @@ def test_what_the_picture_marks_is_in_the_table(write):
     assert [round(x, 1) for line in marked for x in line.get_xdata()] == [3.0, 6.0]
 
 
+@pytest.mark.matrix
 def test_numbers_that_are_missing_are_explained(write):
     """A curve that ends above the half-power points tells no damping."""
     only, _ = write('[analysis]\nkind = "modes"\ncount = 1\nsecant = 1\n')
@@ -121,6 +126,7 @@ def test_numbers_that_are_missing_are_explained(write):
     assert "circle_fit" not in page  # what a programmer would do about it
 
 
+@pytest.mark.matrix
 def test_a_response_that_depends_on_its_amplitude(write):
     grid = "frequencies = { first = 0.1, last = 1, count = 10 }\n"
     found, page = write(

@@ -40,6 +40,7 @@ def found(cell):
     return basins(cell, np.linspace(-1.9, 1.9, 20))
 
 
+@pytest.mark.matrix
 def test_basins_of_a_symmetric_cell_are_symmetric(cell, found):
     label = found.basin.values
     assert set(np.unique(label)) == {0, 1}
@@ -77,6 +78,7 @@ def test_the_boundary_is_the_stable_manifold_of_the_saddle(cell):
     assert ends[2, 0] == ends[1, 0] and ends[3, 0] == ends[0, 0]  # mirrored
 
 
+@pytest.mark.matrix
 def test_a_finer_grid_moves_the_boundary_by_less_than_a_cell(cell, found):
     fine = basins(cell, np.linspace(-1.9, 1.9, 39)).basin.values
     coarse = found.basin.values
@@ -145,6 +147,7 @@ def test_a_kresling_tower_falls_to_either_side_of_its_barrier():
     np.testing.assert_allclose(down, [0.0, 0.03105], atol=2e-4)
 
 
+@pytest.mark.matrix
 def test_a_grid_that_was_cut_off_goes_on(tmp_path, monkeypatch):
     s = fd.discretize(
         fd.patterns.simple_fold(1.0, 1.0, dihedral=60), fd.Sheet(1e6, 0.25, 0.1, density=1.0)

@@ -29,6 +29,7 @@ def swing(case, frequency):
     return 0.5 * np.ptp(motion.displacement.values[-65:, 0, 2])
 
 
+@pytest.mark.matrix
 def test_steps_of_the_frequency_and_of_the_size_take_a_gust_along():
     options = {"sweep": "up", "settle": 2, "record": 4}
     found = fd.bifurcation_diagram(gusty(2.0, push=0.2), RISE, frequencies=[2.0, 3.0], **options)
@@ -43,6 +44,7 @@ def test_steps_of_the_frequency_and_of_the_size_take_a_gust_along():
     assert alone.amplitude.values[0, 1] > 1.5 * alone.amplitude.values[0, 0]
 
 
+@pytest.mark.matrix
 def test_a_gust_glides_and_sets_the_period():
     case = gusty(2.0)
     found = fd.swept_sine(case, RISE, frequencies=(2.0, 2.2), duration=5.0, sweep="up", settle=2)

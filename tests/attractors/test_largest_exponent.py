@@ -76,6 +76,7 @@ def test_the_exponent_converges_to_the_published_value(ueda):
     assert float(found.exponent) == pytest.approx(SPROTT, abs=0.004)
 
 
+@pytest.mark.matrix
 def test_tied_nodes_stay_tied():
     """Two masses that are linked move as one of twice the mass."""
     pattern = fd.patterns.simple_fold(1.0, 1.0, dihedral=60)

@@ -73,6 +73,7 @@ def test_states_between_samples_are_those_of_a_cubic():
     assert 12.0 < errors[0] / errors[1] < 20.0 and errors[1] < 1e-5
 
 
+@pytest.mark.matrix
 def test_sections_keep_the_case_and_can_be_stored(tmp_path):
     s = fd.discretize(
         fd.patterns.simple_fold(1.0, 1.0, dihedral=60), fd.Sheet(1e6, 0.25, 0.01, density=1.0)

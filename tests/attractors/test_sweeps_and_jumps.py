@@ -50,6 +50,7 @@ def test_the_cell_is_duffings_oscillator():
         assert force == pytest.approx(x**3 - x, abs=1e-5)
 
 
+@pytest.mark.matrix
 def test_a_stepped_sine_jumps_at_the_folds(hardening):
     found = fd.bifurcation_diagram(
         hardening, X, frequencies=np.arange(1.04, 1.42, 0.06) / TURN, settle=120, record=4, dt=DT
@@ -73,6 +74,7 @@ def test_a_stepped_sine_jumps_at_the_folds(hardening):
     assert found.amplitude.attrs["units"] == "1" and found.frequency.attrs["units"] == "Hz"
 
 
+@pytest.mark.matrix
 def test_points_that_a_long_step_kicked_off_are_replaced(hardening):
     """The sweep down in steps of 0.02 rad/s falls at 1.12, where slow steps stay, barely."""
     omega = np.array([1.1, 1.12, 1.14, 1.2, 1.32])
@@ -85,6 +87,7 @@ def test_points_that_a_long_step_kicked_off_are_replaced(hardening):
     assert sizes[0] < 0.4 < sizes[1]
 
 
+@pytest.mark.matrix
 def test_a_swept_sine_jumps_past_the_folds(hardening):
     found = fd.swept_sine(
         hardening, X, frequencies=np.array([1.0, 1.4]) / TURN, duration=1500 * TURN, dt=DT
@@ -105,6 +108,7 @@ def test_a_glide_begins_as_the_harmonics_that_it_replaces():
         np.testing.assert_allclose(line.chirp(1.0)(own)(t), own(2.0 * t), rtol=0, atol=1e-5)
 
 
+@pytest.mark.matrix
 def test_a_sharp_resonance_without_folds_has_no_jumps():
     case = duffing(1.0, 0.02, 0.01, cubic=False)
     omega = np.array([0.9, 0.96, 0.99, 1.0, 1.02, 1.1])
@@ -124,6 +128,7 @@ def test_a_sharp_resonance_without_folds_has_no_jumps():
     assert exact.max() > 10.0 * exact.min()
 
 
+@pytest.mark.matrix
 def test_levels_of_the_drive_scale_a_linear_motion():
     case = duffing(1.0, 0.2, 0.1, omega=0.8, cubic=False)
     found = fd.bifurcation_diagram(case, X, amplitudes=[0.5, 1.0, 3.0], settle=60, record=4)
@@ -177,6 +182,7 @@ def test_a_kresling_tower_doubles_its_period():
     assert found.periods.values.tolist() == [[1, 1, 2, 2, 2, 4]]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("most", "points"), [(3, [3, 0]), (5, [4, 1])])
 def test_points_found_are_kept_when_it_is_interrupted(most, points):
     def stop(state):
@@ -210,6 +216,7 @@ def test_an_interrupt_before_the_first_point_keeps_nothing():
         )
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the energy balance")
 def test_a_sweep_whose_motion_fails_keeps_its_points():
     """Bars stiffen as the force grows, until steps of 0.7 s are too long for them."""
@@ -302,6 +309,7 @@ def test_what_cannot_be_swept_is_refused(hardening):
             call()
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("cubic", "alpha", "force", "ends"),
     [(False, 0.03, 0.01, (0.85, 1.15)), (True, 0.1, 0.04, (0.95, 1.2))],
@@ -316,6 +324,7 @@ def test_a_swept_sine_has_no_jumps_where_curves_are_but_steep(cubic, alpha, forc
     assert np.abs(np.log(change)).max() > 0.2  # within a hundredth of the frequency
 
 
+@pytest.mark.matrix
 def test_steps_from_a_sweep_begin_with_what_creases_remember_there(monkeypatch):
     """A crease that has yielded in the sweep has a permanent turn where motions are held."""
     drive = fd.Force([WING], (0, 0, 2e-3), fd.Harmonic(0.7))

@@ -127,6 +127,7 @@ def vortex_rings(pattern, n):
     return 0.5 * (found + found.T)
 
 
+@pytest.mark.matrix
 def test_a_folded_sheet_has_the_mass_of_another_method():
     """Constant doublets and collocation, with an error that falls like the size of the rings."""
     pattern = miura(cells=(1, 1))

@@ -93,6 +93,7 @@ duration = 0.1
 SHELL = '[model]\nkind = "shell"\ndivisions = 2\n'
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("model", ["", SHELL], ids=["bars and hinges", "shell"])
 def test_in_a_path_the_load_factor_moves_planes(read, model):
     found = read(model + LIFTED_TEXT).run()

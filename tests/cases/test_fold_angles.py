@@ -113,6 +113,7 @@ def test_from_a_table_and_back(key):
     assert len(load.table()) == 2
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("model", ["", 'kind = "shell"\ndivisions = 2'])
 def test_from_a_case_file_to_a_result_and_back(model, read, kept):
     case_file = read(f"""{FOLD_TEXT}[model]

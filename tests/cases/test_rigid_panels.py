@@ -56,6 +56,7 @@ def test_a_panel_on_a_crease_is_a_pendulum(model) -> None:
     assert found.soft_hinges == 0
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize(
     "method", [pytest.param("rk4", marks=pytest.mark.matrix), "newmark", "energy_momentum"]

@@ -33,6 +33,7 @@ def shell(request):
     return fd.shell(MIURA, SHEET, divisions=4, vertex_radius=request.param)
 
 
+@pytest.mark.matrix
 def test_a_shell_is_held_on_the_whole_edge(shell):
     case = fd.Case(shell, [ALONG])
     held = on_edges(shell, np.flatnonzero(fd.Case(shell, [fd.Fix("xmin")]).fixed.all(axis=1)))
@@ -94,6 +95,7 @@ def test_edges_of_bars_and_hinges_must_be_straight(name):
     assert np.array_equal(one.fixed, other.fixed)
 
 
+@pytest.mark.matrix
 def test_a_shell_and_bars_and_hinges_agree():
     shell = fd.shell(MIURA, SHEET, divisions=8, mass="consistent", vertex_radius=1e-3)
     reduced = fd.discretize(MIURA, SHEET, **MODELS["both"], straight="xmin")
@@ -191,5 +193,7 @@ def test_stored_cases_keep_it(kept):
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 def test_models_that_stand_beside_the_own_one_hold_it_too():
     case = fd.Case(fd.discretize(FOLD, SHEET, preset="plate", membrane="bars"), [ALONG])
-    result = fd.fidelity(case, count=2, divisions=(2, 4), models=["n5b8e", "bars"])
+    result = fd.fidelity(
+        case, count=2, reference="shell", divisions=(2, 4), models=["n5b8e", "bars"]
+    )
     assert np.abs(result.result["error"].values).max() < 0.2

@@ -104,6 +104,7 @@ def test_panels_that_may_not_expand_store_what_they_may_not() -> None:
         assert float(path.work[-1]) == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 def test_warm_panels_among_cold_ones_balance() -> None:
     """Work is stored energy: by one panel that expands, one that curls, and a force."""
@@ -218,6 +219,7 @@ def test_one_warm_panel_of_two_bends_the_strip_nowhere_else() -> None:
     assert np.count_nonzero(bends) == 4
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("model", "method"),
     [

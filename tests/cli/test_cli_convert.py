@@ -93,6 +93,7 @@ def result(workplace):
     return workplace, motion
 
 
+@pytest.mark.matrix
 def test_a_result_with_its_states(result) -> None:
     workplace, motion = result
     count = motion.sizes["time"]

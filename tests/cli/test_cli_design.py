@@ -27,6 +27,7 @@ max_evaluations = 4
 """
 
 
+@pytest.mark.matrix
 def test_results_page_and_evaluations_stand_in_one_folder(workplace, monkeypatch):
     workplace.write(MODES_TEXT + ASKED)
     done = workplace.call("design", "case.toml", "--figures", "png")
@@ -66,6 +67,7 @@ def test_creases_are_colored_by_what_they_matter(workplace):
     assert "by model.crease_stiffness of each crease" in page
 
 
+@pytest.mark.matrix
 def test_no_feasible_design_is_said(workplace):
     workplace.write(MODES_TEXT + ASKED.replace(">= 1.0", ">= 300.0"))
     done = workplace.call("design", "case.toml")

@@ -59,6 +59,7 @@ def test_panel_through_panel(workplace) -> None:
     assert np.degrees(folds[0]) > 300.0  # the mountain (300 degrees at rest) was closing
 
 
+@pytest.mark.matrix
 def test_rules_that_are_done_are_kept_beside_the_one_that_fails(workplace, edited) -> None:
     # 7e-4 s is below the critical step of panel and beyond the stability limit of consistent
     step = (

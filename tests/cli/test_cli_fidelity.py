@@ -26,13 +26,24 @@ force = [0, 0, 1e-4]
 history = {{ kind = "half_sine", duration = 0.05 }}
 """
 MOTION = f'{FOLD}[initial]\nvelocity = [0, 0, 1]\n[analysis]\nkind = "dynamics"\nduration = 0.1\n'
-KIND = f'{FOLD}[analysis]\nkind = "fidelity"\ncount = 2\ndivisions = [2, 4]\n'
+KIND = f'{FOLD}[analysis]\nkind = "fidelity"\ncount = 2\nreference = "shell"\ndivisions = [2, 4]\n'
 
 
+@pytest.mark.matrix
 def test_a_motion_beside_the_shell(workplace) -> None:
     workplace.write(MOTION)
     done = workplace.call(
-        "fidelity", "case.toml", "--count", "3", "--divisions", "3", "6", "--figures", "png"
+        "fidelity",
+        "case.toml",
+        "--count",
+        "3",
+        "--reference",
+        "shell",
+        "--divisions",
+        "3",
+        "6",
+        "--figures",
+        "png",
     )
     assert done.status == 0
     assert done.err.splitlines() == [
@@ -62,6 +73,7 @@ def test_a_motion_beside_the_shell(workplace) -> None:
     assert page.count("<img") == 3
 
 
+@pytest.mark.matrix
 def test_a_case_file_of_this_kind(workplace) -> None:
     workplace.write(KIND + 'models = ["plate"]\n')
     done = workplace.good("run", "case.toml", "--no-figures")
@@ -70,7 +82,9 @@ def test_a_case_file_of_this_kind(workplace) -> None:
     case_file = fd.read_case("case.toml")
     again = case_file.run()
     np.testing.assert_allclose(again["error"], stored["error"], rtol=1e-9)
-    plain = fd.fidelity(case_file.case(), 2, divisions=(2, 4), models=["plate"]).result
+    plain = fd.fidelity(
+        case_file.case(), 2, reference="shell", divisions=(2, 4), models=["plate"]
+    ).result
     np.testing.assert_array_equal(plain["error"], again["error"].sel(model=["own", "plate"]))
     more = case_file.run(count=1, models=[])
     assert more["model"].values.tolist() == ["own", "own (consistent)"]
@@ -80,13 +94,14 @@ def test_a_case_file_of_this_kind(workplace) -> None:
 def test_flags_stand_in_for_the_file(workplace) -> None:
     workplace.write(KIND)
     read = read_as(workplace.folder / "case.toml", "fidelity", {"count": 5, "models": ["plate"]})
-    given = {"count": 5, "divisions": (2, 4), "models": ["plate"]}
+    given = {"count": 5, "reference": "shell", "divisions": (2, 4), "models": ["plate"]}
     assert read.analysis.arguments == {**given, "secant": None, "vertex_radius": None}
     assert read.masses == ["mixed_voronoi"]
 
 
 def test_a_response_without_its_drive(workplace) -> None:
-    response = "loads =; supports = [{ nodes = [0, 1] }]; analysis.divisions =; analysis.count =; "
+    response = "loads =; supports = [{ nodes = [0, 1] }]; analysis.divisions =; "
+    response += "analysis.reference =; analysis.count =; "
     response += 'drive = [{ nodes = [4, 5], force = [0, 0, 1] }]; analysis.kind = "frf"; '
     workplace.write(changed(KIND, response + "analysis.frequencies = [1.0]"))
     with pytest.warns(FoldynWarning, match=r"leaves out \[drive\]"):
@@ -95,8 +110,8 @@ def test_a_response_without_its_drive(workplace) -> None:
 
 
 BAD = """
-model = { kind = "shell" } | model.kind = "shell": bars and hinges are compared with the shell
-sheet.density = | sheet.density: missing; a comparison with the shell needs it
+model = { kind = "shell" } | model.kind = "shell": bars and hinges are compared with this
+sheet.density = | sheet.density: missing; a comparison of frequencies needs it
 analysis.divisions = [4]: give two numbers, as in (6, 12)
 analysis.divisions = [4, 2]: the second mesh must be the finer
 analysis.count = 0: must be at least 1

@@ -26,6 +26,7 @@ FEW = "output.interval = 0.02"
 PICTURES = ("structure.png", "laws.png", "load.png", "motion.png", "energies.png")
 
 
+@pytest.mark.matrix
 def test_figures_of_a_tiny_case(workplace, edited) -> None:
     output = 'output = { interval = 0.02, nodes = [7], axis = "x", max_frequency = 20.0 }'
     rules = 'model.mass = ["panel", "circumcenter"]'

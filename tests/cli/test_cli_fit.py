@@ -45,6 +45,7 @@ def fold(workplace):
     return workplace
 
 
+@pytest.mark.matrix
 def test_a_fit_file_from_reading_to_report(fold) -> None:
     done = fold.call("fit", "fit.toml")
     assert done.status == 0, done.err
@@ -79,6 +80,7 @@ def test_the_same_from_the_command_line(fold) -> None:
     assert "out/report.html" not in done.new
 
 
+@pytest.mark.matrix
 def test_frequencies_from_the_command_line(workplace) -> None:
     """The misfit stands beside the intervals."""
     workplace.write(MODES_TEXT)

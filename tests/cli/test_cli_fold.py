@@ -51,6 +51,7 @@ def test_the_page_shows_the_way_and_a_film_only_where_it_is_asked_for(workplace,
     assert Path("flap-folded.gif").read_bytes().startswith(b"GIF")
 
 
+@pytest.mark.matrix
 def test_the_way_is_a_result_that_can_be_converted(workplace, flap) -> None:
     told = workplace.call("fold", flap, "--to", "50%", "--steps", "4", "--out", "way.nc")
     assert (told.status, told.new) == (0, ["way.html", "way.nc"])

@@ -57,6 +57,7 @@ def ran(*given: str) -> int:
     return main(["run", "case.toml", "--quiet", "--no-figures", *given])
 
 
+@pytest.mark.matrix
 def test_a_run_that_is_cut_off_goes_on(place, monkeypatch, capsys):
     assert ran("--out", "whole") == 0
     with monkeypatch.context() as patch:
@@ -92,6 +93,7 @@ def test_finished_results_are_not_computed_again(place, monkeypatch, capsys):
     assert (place / "case-results" / "report.html").is_file()
 
 
+@pytest.mark.matrix
 def test_another_case_is_refused_or_replaces(place, monkeypatch, capsys):
     with monkeypatch.context() as patch:
         cut(patch, FILES[0])
@@ -106,6 +108,7 @@ def test_another_case_is_refused_or_replaces(place, monkeypatch, capsys):
     assert not list((place / "case-results").glob("*.unfinished"))
 
 
+@pytest.mark.matrix
 def test_a_result_that_a_script_writes_is_refused_before_anything_runs(place, capsys):
     results = place / "case-results"
     results.mkdir()

@@ -108,6 +108,7 @@ def test_a_path_that_loses_stability_says_so_once(workplace) -> None:
     assert f"newton: 11 points, {unstable} of them unstable, to the load factor 1," in done.out
 
 
+@pytest.mark.matrix
 def test_a_path_that_cannot_go_on_is_kept_with_the_remedy(workplace) -> None:
     reason = workplace.run(TOWER).failure("case-results/result.nc")
     assert reason.startswith("foldyn: case.toml: no equilibrium was found beyond the load factor 3")
@@ -235,6 +236,7 @@ def test_points_that_a_path_does_not_have(workplace) -> None:
     assert reason == "foldyn: case.toml: figures: points: 7; there are points 0 to 2"
 
 
+@pytest.mark.matrix
 def test_a_path_goes_on_from_a_stored_one(workplace) -> None:
     """A second state is found from a guess near it: the tower pressed down stays there."""
     down = "supports[1].displacement = -0.0312; analysis.steps = 8"
@@ -250,6 +252,7 @@ def test_a_path_goes_on_from_a_stored_one(workplace) -> None:
     assert path.negative_eigenvalues.values.tolist() == [0]
 
 
+@pytest.mark.matrix
 def test_compress_release_vibrate_as_two_case_files(workplace) -> None:
     workplace.write(changed(PRESSED, "analysis.steps = 2"), "pressed.toml")
     assert workplace.call("run", "pressed.toml", "--no-figures").status == 0

@@ -36,6 +36,7 @@ def test_a_case_file_becomes_a_result_that_runs_again_from_itself(workplace, miu
         np.testing.assert_array_equal(again[name], result[name])
 
 
+@pytest.mark.matrix
 def test_a_list_of_mass_rules_gives_a_file_each(workplace, edited) -> None:
     rules = ["panel", "circumcenter", "consistent"]
     done = workplace.run(edited(f"model.mass = {rules}"))
@@ -53,6 +54,7 @@ def test_out_names_the_folder(workplace, miura) -> None:
     assert workplace.run(miura, "--out", "a/b").new == ["a", "a/b", "a/b/result.nc"]
 
 
+@pytest.mark.matrix
 def test_a_second_run_replaces_the_first(workplace, miura, edited) -> None:
     workplace.run(miura)
     (workplace.folder / "case-results" / "notes.txt").write_text("mine")
@@ -68,6 +70,7 @@ def test_quiet_says_nothing(workplace, miura) -> None:
     assert "case-results/result.nc" in done.new
 
 
+@pytest.mark.matrix
 def test_names_beyond_ascii(workplace, miura) -> None:
     workplace.write(miura, "Fälle/Miura – 折り紙.toml")
     out = str(Path("Ergebnisse µ") / "ü")
@@ -100,6 +103,7 @@ def test_a_load_on_supports_in_part_warns_and_runs(workplace, edited) -> None:
     assert line.startswith("foldyn: warning: case.toml: loads[0]: the force [0.01, 0.0, 0.0] acts")
 
 
+@pytest.mark.matrix
 def test_the_shipped_cases_are_what_they_say(workplace) -> None:
     studied = [f"herkal/case{k}" for k in (1, 2, 3, 4)]
     motions = {"gallery/deployment", "gallery/tumbling", "herkal/specimen-release", *studied}
@@ -124,6 +128,7 @@ def test_the_shipped_cases_are_what_they_say(workplace) -> None:
     assert forces[0] == [((0, 1), (-1e-3, 0.0, 0.0))]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     "name", ["herkal/case1", pytest.param("herkal/case3.toml", marks=pytest.mark.matrix)]
 )
@@ -138,6 +143,7 @@ def test_a_shipped_case_runs_by_its_name(workplace, name) -> None:
     assert (named.status, named.err) == (2, "foldyn: --out taken: is a file; name a folder\n")
 
 
+@pytest.mark.matrix
 def test_the_module_runs_as_a_command(tmp_path, miura) -> None:
     (tmp_path / "case.toml").write_text(miura)
     status, _, err = ended(start(tmp_path, "run", "case.toml", "--no-figures"))
@@ -145,6 +151,7 @@ def test_the_module_runs_as_a_command(tmp_path, miura) -> None:
     assert fd.load(tmp_path / "case-results" / "result.nc").sizes["time"] == 11
 
 
+@pytest.mark.matrix
 def test_a_motion_goes_on_from_a_stored_one(workplace, miura) -> None:
     free = changed(miura, "supports =; loads =; analysis.dt = 2.5e-4")
     workplace.write(changed(free, "initial.spin = [3, -2, 5]"), "first.toml")

@@ -27,6 +27,7 @@ def test_a_motion_with_all_figures(workplace, miura) -> None:
     assert isinstance(again, fd.Shell) and again.options.divisions == 2
 
 
+@pytest.mark.matrix
 def test_a_path_and_its_energies(workplace, miura) -> None:
     workplace.write(changed(miura, f"{SHELL}; {STATICS}"))
     page = workplace.page("structure.png", "laws.png", "curve.png", "energies.png", "shapes.png")
@@ -34,6 +35,7 @@ def test_a_path_and_its_energies(workplace, miura) -> None:
     assert ">bending (%)<" in page and "bends" not in page
 
 
+@pytest.mark.matrix
 def test_a_file_of_bars_and_hinges_as_a_shell(workplace, miura) -> None:
     workplace.write(changed(miura, STATICS))
     shell = workplace.good("run", "case.toml", *AS_SHELL[:-1], "4")
@@ -49,6 +51,7 @@ def test_a_file_of_bars_and_hinges_as_a_shell(workplace, miura) -> None:
     assert moved[0] != moved[1]
 
 
+@pytest.mark.matrix
 def test_modes_and_responses_as_those_of_a_shell(workplace, miura) -> None:
     workplace.write(miura)
     done = workplace.call("modes", "case.toml", *AS_SHELL, "--count", "2")

@@ -70,7 +70,7 @@ def test_the_response_of_a_motion_to_its_forces(workplace, miura) -> None:
 def test_about_the_equilibrium_loads_act(read, miura) -> None:
     text = changed(miura, f"supports[1] = {MOVED}; {GRAVITY}")
     found = read(text, "modes", state="equilibrium")
-    given = {"count": 6, "state": "equilibrium", "secant": None}
+    given = {"count": 6, "state": "equilibrium", "secant": None, "check_model": True}
     assert found.analysis.arguments == given
     case = found.case()
     assert case.supports == (Fix([0, 1, 2]), Impose([8], "z", 0.1))  # without histories
@@ -122,7 +122,7 @@ def test_a_path_and_what_its_figures_show(read, miura) -> None:
 
 def test_flags_stand_above_what_the_file_says(read, tmp_path) -> None:
     modes = changed(MODES_TEXT, "analysis.secant = 1.0; analysis.count = 3")
-    given = {"count": 3, "state": None, "secant": 1.0}
+    given = {"count": 3, "state": None, "secant": 1.0, "check_model": True}
     assert read(modes, "modes").analysis.arguments == given
     assert read(modes, "modes", count=5).analysis.arguments["count"] == 5
     stored = modes + '[initial]\nfile = "a.nc"\n'
@@ -138,6 +138,7 @@ def test_flags_stand_above_what_the_file_says(read, tmp_path) -> None:
     assert len(found.analysis.arguments["frequencies"]) == 31
 
 
+@pytest.mark.matrix
 def test_a_state_from_a_result(workplace, miura) -> None:
     workplace.write(changed(miura, STATICS), "slow.toml")
     assert workplace.call("run", "slow.toml", "--no-figures").status == 0
@@ -148,6 +149,7 @@ def test_a_state_from_a_result(workplace, miura) -> None:
     np.testing.assert_array_equal(about.values, path.values[-1])
 
 
+@pytest.mark.matrix
 def test_the_bands_of_the_cell_of_a_motion_and_the_table_of_its_gaps(workplace, miura) -> None:
     workplace.write(changed(miura, 'model = { mass = "panel" }; damping ='))
     path = ("--path", "X-M-G", "--points", "9", "--count", "5")

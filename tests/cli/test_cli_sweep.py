@@ -23,6 +23,7 @@ def sweep(workplace):
     return call
 
 
+@pytest.mark.matrix
 def test_results_page_and_points_stand_in_one_folder(sweep, workplace):
     vary = f"{THICK} --vary pattern.dihedral=60:120:3 --measure frequencies"
     done = sweep(f"{vary} --processes 1 --figures png")

@@ -57,6 +57,7 @@ def inside(folder, monkeypatch):
     return folder
 
 
+@pytest.mark.matrix
 def test_a_film_becomes_histories(inside, capsys):
     command = "track film.mkv --model case.toml --out a/run.nc --figures png"
     assert main(command.split()) == 0

@@ -77,6 +77,7 @@ def test_a_response_becomes_a_result_that_is_that_of_python(workplace) -> None:
     assert stored.attrs["drive_force"] == pytest.approx(0.01)
 
 
+@pytest.mark.matrix
 def test_a_case_file_about_a_stored_equilibrium(workplace) -> None:
     """The state of a path that loads end, and the equilibrium found anew, have the same modes."""
     for name, edits in {
@@ -94,6 +95,7 @@ def test_a_case_file_about_a_stored_equilibrium(workplace) -> None:
     assert np.abs(found / rest - 1.0).max() > 1e-3  # the load matters
 
 
+@pytest.mark.matrix
 def test_figures_of_modes(workplace) -> None:
     workplace.write(changed(MODES, f'{TWO_RULES}; output = {{ shapes = [1, 3], axis = "y" }}'))
     pictures = ("structure.png", "laws.png", "modes.png", "mac.png")
@@ -149,6 +151,7 @@ def test_a_response_to_a_moving_base(workplace) -> None:
     assert "transmissibility" in fd.load("r/result.nc")
 
 
+@pytest.mark.matrix
 def test_soft_hinges_are_told_of_once_and_in_the_report(workplace) -> None:
     herkal = f'model = {{ preset = "herkal" }}; {TWO_RULES}; output.shapes = [1]'
     workplace.write(changed(MODES, herkal))
@@ -209,6 +212,7 @@ def test_what_is_refused_gets_one_message(workplace, text, edits, message) -> No
     assert workplace.refused("run", "case.toml").startswith(f"case.toml: {message}")
 
 
+@pytest.mark.matrix
 def test_an_equilibrium_that_is_not_found_is_a_failure(workplace) -> None:
     """Status 1, and the points of the search are not kept as if they were modes."""
     heavy = LOADED.replace("0.01", "-1e3")

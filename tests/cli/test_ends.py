@@ -144,6 +144,7 @@ def test_no_room_for_the_result(workplace, tmp_path, miura) -> None:
     assert not (tmp_path / "case-results").exists()
 
 
+@pytest.mark.matrix
 def test_a_disk_that_is_full(tmp_path, miura) -> None:
     """A real one, of 24 kB: the result goes to the temporary folder, and is named."""
     small = ["unshare", "-rm", "sh", "-c", 'mount -t tmpfs -o size=24k none small && exec "$@"', ""]

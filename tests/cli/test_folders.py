@@ -39,6 +39,7 @@ def test_results_of_rules_that_are_no_longer_asked_for_go(workplace, edited, miu
     assert names == {STAMP, "result.nc"}
 
 
+@pytest.mark.matrix
 def test_an_interruption_leaves_old_or_new_and_no_mixture(workplace, edited, monkeypatch) -> None:
     workplace.run(edited(RULES))
     before = {name: Path(name).read_bytes() for name in OLD}
@@ -64,6 +65,7 @@ def test_an_interruption_leaves_old_or_new_and_no_mixture(workplace, edited, mon
     assert (stamped()["state"], stamped()["results"]) == ("stopped", ["result-panel.nc"])
 
 
+@pytest.mark.matrix
 def test_others_are_refused_by_name(workplace, miura) -> None:
     workplace.write(miura)
     workplace.write(miura, "other.toml")
@@ -117,6 +119,7 @@ def test_a_stamp_does_not_reach_beyond_its_folder(workplace, miura) -> None:
     assert Path("notes.txt").read_text() == "mine"
 
 
+@pytest.mark.matrix
 def test_results_without_a_stamp_that_would_stay_beside_new_ones(workplace, edited, miura) -> None:
     workplace.run(edited(RULES))
     Path("case-results", STAMP).unlink()

@@ -55,6 +55,7 @@ def test_what_is_there_is_not_compiled_again(workplace, monkeypatch) -> None:
     assert told.out.startswith("all kernels are ready (")
 
 
+@pytest.mark.matrix
 def test_a_run_compiles_its_own_method_alone() -> None:
     """Loaded or compiled: no other method's loop is there."""
     told = subprocess.run(

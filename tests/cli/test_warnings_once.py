@@ -60,6 +60,7 @@ def test_studies_take_their_models_on_purpose(tmp_path):
     assert done.warnings == ("the damping",)
 
 
+@pytest.mark.matrix
 def test_shipped_cases_say_on_their_page_what_their_model_lacks(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["run", "gallery/kresling", "--out", "page"]) == 0

@@ -34,6 +34,7 @@ def frequencies(structure, supports=HELD, count=8, **parts):
     return fd.modes(fd.Case(structure, supports, **parts), count, verify=False)["frequency"].values
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("supports", [HELD, [fd.Fix("xmin")], []], ids=["along", "nodes", "free"])
 def test_levels_fall_toward_the_shell(supports):
     shell = frequencies(both()[1], supports, 12)
@@ -46,6 +47,7 @@ def test_levels_fall_toward_the_shell(supports):
     assert off[0].max() < 0.12 and off[2].max() < 0.02 and off[4].max() < 0.006
 
 
+@pytest.mark.matrix
 def test_panels_vibrate_between_held_vertices():
     tower = fd.patterns.kresling(sides=5, height=0.9, twist=35)
     sheet = replace(SHEET, thickness=0.02)
@@ -62,6 +64,7 @@ def test_a_free_sheet_has_six_rigid_modes_and_its_mass():
     np.testing.assert_allclose(modes["effective_mass"].sum("mode"), structure.total_mass, rtol=1e-8)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     "case",
     [
@@ -92,6 +95,7 @@ def test_panels_of_different_sheets():
     np.testing.assert_allclose(own, shell, rtol=6e-3)
 
 
+@pytest.mark.matrix
 def test_a_weld_continues_the_sheet():
     grid = np.array([[i, j, 0.0] for j in (0.0, 1.0) for i in (0.0, 0.8, 2.0)])
     faces = [(0, 1, 4, 3), (1, 2, 5, 4)]
@@ -117,6 +121,7 @@ def test_oblique_supports_hold_like_turned_ones():
     np.testing.assert_allclose(frequencies(plain, straight), frequencies(oblique, along), rtol=1e-7)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("stiffer", [1.0, 30.0, 1000.0])
 def test_damping_of_creases(stiffer):
     stiffness = stiffer * fd.superelements(PATTERN, SHEET).fold_stiffness
@@ -179,6 +184,7 @@ def test_a_base_moves_all_that_stands_on_it():
     np.testing.assert_allclose(found, moved, atol=1e-8 * np.abs(moved).max())
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["direct", "modal"])
 def test_responses_with_creases_that_relax(method):
     push = fd.Force([TIP], (0.0, 0.0, 1.0))
@@ -193,6 +199,7 @@ def test_responses_with_creases_that_relax(method):
     np.testing.assert_allclose(own, shell, atol=6e-3 * np.abs(shell).max())
 
 
+@pytest.mark.matrix
 def test_responses_say_how_far_they_hold():
     case = fd.Case(fd.superelements(PATTERN, SHEET, level=1), HELD, damping=fd.Rayleigh(alpha=1.0))
     modes = fd.modes(case, 10)
@@ -210,6 +217,7 @@ def test_participation_includes_parts_that_move_with_supports():
     np.testing.assert_allclose(own["effective_mass"], shell["effective_mass"], rtol=0.03, atol=0.05)
 
 
+@pytest.mark.matrix
 def test_shapes_between_vertices():
     own, shell = (fd.modes(fd.Case(s, HELD), 5) for s in both())
     nodes = both()[1].nodes
@@ -257,6 +265,7 @@ def test_large_turns_are_warned_of():
         fd.trace(case, "newton", load_factors=[0.2 / small])
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("pattern", "thickness"),
     [
@@ -296,6 +305,7 @@ def test_no_motion_has_a_negative_mass():
     assert np.linalg.eigvalsh(mass.toarray())[0] > -1e-15
 
 
+@pytest.mark.matrix
 def test_congruent_panels_are_condensed_once():
     sheet = fd.superelements(fd.patterns.miura(cells=(2, 2)), SHEET, level=1)
     assert len(sheet.whole._groups) == 1
@@ -328,7 +338,6 @@ def test_what_superelements_leave_out_is_refused(named):
         lambda c: fd.modes(c, state="equilibrium"),
         lambda c: fd.fidelity(c),
         lambda c: fd.lyapunov_exponent(c, 1.0),
-        lambda c: fd.UnitCell(c),
         lambda c: fd.trace(
             c.altered(loads=[fd.Force([TIP], (1.0, 0.0, 0.0))]), "newton", inertia_relief=True
         ),
@@ -359,6 +368,12 @@ def test_wrong_options_are_named(options, named):
         fd.superelements(PATTERN, SHEET, **options)
 
 
+def test_meshes_with_fewer_points_than_shapes_are_refused():
+    structure = fd.superelements(PATTERN, replace(SHEET, thickness=0.05), divisions=4)
+    with pytest.raises(InputError, match="divisions = 4: edges have 9 points"):
+        fd.modes(fd.Case(structure, HELD))
+
+
 def test_sheets_without_density_are_refused():
     with pytest.raises(InputError, match="density"):
         fd.superelements(PATTERN, replace(SHEET, density=None))
@@ -385,6 +400,7 @@ count = 3
 """
 
 
+@pytest.mark.matrix
 def test_a_case_file_gives_modes_that_can_be_run_again(tmp_path):
     path = tmp_path / "sheet.toml"
     path.write_text(CASE, encoding="utf-8")

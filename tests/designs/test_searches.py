@@ -269,6 +269,7 @@ def test_bad_input_is_refused_before_anything_is_computed(changes, why):
         fd.design(**{**given, **changes})
 
 
+@pytest.mark.matrix
 def test_a_real_case_without_gradients():
     pytest.importorskip("cma")
     found = fd.design(
@@ -281,6 +282,7 @@ def test_a_real_case_without_gradients():
     assert found.objective == (frequency - 5.0) ** 2
 
 
+@pytest.mark.matrix
 def test_a_real_case_with_exact_gradients():
     wanted = float(fd.modes(build(0.013), count=3)["frequency"][0])
     found = fd.design(

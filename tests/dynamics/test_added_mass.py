@@ -64,6 +64,7 @@ def last_place(turned=None, shift=0.0, first=0, held=None):
     return motion.displacement.values[-1] @ turned
 
 
+@pytest.mark.matrix
 def test_a_sheet_that_folds_moves_alike_wherever_it_stands():
     """Rounding must not choose the triangle under an element on the line between two."""
     turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
@@ -110,6 +111,7 @@ def test_a_pressed_plate_accelerates_with_the_added_mass(method):
     assert_allclose(motion.kinetic[-1], 0.5 * (force * span) ** 2 / mass, rtol=1e-4)
 
 
+@pytest.mark.matrix
 def test_small_vibrations_have_the_frequencies_of_modes_in_the_fluid():
     held = [fd.Fix(nodes="xmin", axes="xyz")]
     case = fd.Case(folded(), held, air=fd.Air(density=50.0, drag=False))
@@ -128,6 +130,7 @@ def test_small_vibrations_have_the_frequencies_of_modes_in_the_fluid():
     assert_allclose(amplitude / amplitude[0], exact, atol=2e-3)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", EXPLICIT)
 def test_a_sheet_that_folds_gets_new_flows_whose_energies_are_audited(method):
     case = fd.Case(
@@ -141,6 +144,7 @@ def test_a_sheet_that_folds_gets_new_flows_whose_energies_are_audited(method):
     assert motion.attrs["flow_energy"] < 1e-3 * float(motion.work[-1])
 
 
+@pytest.mark.matrix
 def test_new_flows_converge(monkeypatch):
     """Two panels that close on dense gas: half as much turn between two flows, less error."""
     pattern = fd.patterns.simple_fold(a=SIDE, b=SIDE, dihedral=120)

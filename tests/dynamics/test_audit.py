@@ -100,6 +100,7 @@ def swinging():
     return case, 1.0 / float(spine.frequency[-1]), {"initial": start}
 
 
+@pytest.mark.matrix
 def test_samples_at_rest_instants_are_measured_by_the_motion_between_them():
     case, period, start = swinging()
     with warnings.catch_warnings():

@@ -101,6 +101,7 @@ def test_a_thick_miura_bounces_between_planes():
     assert motion.attrs["energy_error"] < 2e-5
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["dormand_prince", "newmark", *beyond(["energy_momentum"])])
 def test_boards_come_to_rest_on_the_floor(method):
     """With their weight on it, their middles half a thickness less what that compresses above."""
@@ -118,6 +119,7 @@ def test_boards_come_to_rest_on_the_floor(method):
     assert (height < 0.5 * T).all()
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("angle", "alpha"), [(20.0, 0.0), (10.0, 50.0)])
 def test_a_board_slides_on_a_slope_and_sticks_on_a_gentle_one(angle, alpha):
     """It slides as g (sin a - mu cos a) says, and stays where it has come to rest."""

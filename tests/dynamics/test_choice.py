@@ -75,6 +75,7 @@ def anew(motion, given) -> None:
     assert np.array_equal(motion.displacement, alone.displacement)
 
 
+@pytest.mark.matrix
 def test_a_motion_whose_energies_do_not_balance_is_computed_anew(given):
     why = 'again with dormand_prince: with rk4.* is off by .* method = "dormand_prince" avoids'
     with pytest.warns(FoldynWarning, match=why):
@@ -86,6 +87,7 @@ def test_a_motion_whose_energies_do_not_balance_is_computed_anew(given):
     assert read.attrs["wall_seconds"] == motion.attrs["wall_seconds"]  # not computed again
 
 
+@pytest.mark.matrix
 def test_a_second_attempt_that_was_cut_off_goes_on(given):
     reached = []
 
@@ -99,6 +101,7 @@ def test_a_second_attempt_that_was_cut_off_goes_on(given):
     anew(fd.simulate(**given, method="auto", resume=True), given)
 
 
+@pytest.mark.matrix
 def test_a_lasting_motion_is_computed_anew_with_shorter_steps():
     """The errors of central differences do not grow; those of other explicit methods add up."""
     case = fd.Case(cell(), CELL_HELD)

@@ -77,6 +77,7 @@ REBOUNDS = [
 ]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("method", "counts", "fine", "least"), REBOUNDS)
 def test_a_rebound_converges_with_the_order_of_the_method(method, counts, fine, least):
     explicit = method in EXPLICIT
@@ -90,6 +91,7 @@ def test_a_rebound_converges_with_the_order_of_the_method(method, counts, fine, 
     assert abs(run.velocity.values[-1, two_sheets()[1], 2].mean()) < 1.95
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("method", "options"),
     [*((method, {}) for method in EXPLICIT), *beyond([(ALPHA, {"dt": 5e-5})])],
@@ -164,6 +166,7 @@ def test_an_impact_too_violent_for_the_step_is_told():
         fd.simulate(tower(80.0, fd.Contact()), 0.03, method=ALPHA, dt=1e-4, interval=1e-4)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("force", [80.0, *beyond([38.0, 50.0])])
 def test_the_tower_snaps_bounces_and_rests(force):
     pytest.importorskip("ipctk")
@@ -230,6 +233,7 @@ def test_a_strip_slides_above_the_angle_of_friction(kind, method, duration, dt, 
     assert run.attrs["energy_error"] < error
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:contact. at rest panels are nearer")
 @pytest.mark.parametrize(
     ("kind", "method", "duration", "dt", "still", "most"),
@@ -255,6 +259,7 @@ def test_without_friction_a_sheet_slides_as_it_falls():
     assert distance == pytest.approx(0.5 * G * np.sin(np.radians(20.0)) * 0.01, rel=1e-9)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("method", "dt", "error"), [("rk4", None, 1e-3), (ALPHA, 1e-5, 1e-3), (CONSERVING, 4e-5, 1e-9)]
 )
@@ -328,6 +333,7 @@ def test_a_relaxing_fold_falls_on_a_plane_and_its_energies_balance():
     assert fallen.displacement.values[1] == pytest.approx(without.displacement.values[-1], abs=1e-9)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("method", "dt"), [("dormand_prince", None), (CONSERVING, 1e-4)])
 def test_sheets_that_collide_askew_keep_both_momenta_and_lose_what_friction_takes(method, dt):
     given, upper, across = {"speed": (1.0, 0.5, -2.0), "dt": dt}, two_sheets()[1], []

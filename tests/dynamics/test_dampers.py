@@ -63,6 +63,7 @@ def pair(c: float) -> fd.Case:
     return fd.Case(structure, [fd.Dashpot(c, between=(0, 1))])
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", METHODS)
 def test_a_tumbling_pair_keeps_its_momenta(method):
     """The axial dashpot follows the line between the masses: it damps the stretch, not the turn."""
@@ -90,6 +91,7 @@ def test_a_pair_that_only_turns_loses_nothing():
     assert float(motion.dissipated[-1]) < 1e-9 * float(motion.kinetic[0])
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["rk4", "newmark", "energy_momentum"])
 @pytest.mark.parametrize("ground", [True, False])
 def test_a_moving_base(ground, method):

@@ -61,6 +61,7 @@ def by_edges(made, duration, steps=(1e-4, 5e-5), method=ALPHA):
     return [fd.simulate(made, duration, method=method, dt=dt, interval=0.05) for dt in steps]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("law", ["linear", CURVED])
 @pytest.mark.parametrize("load", [moment, heat])
 def test_a_damped_motion_ends_where_statics_ends(load, law):
@@ -70,6 +71,7 @@ def test_a_damped_motion_ends_where_statics_ends(load, law):
     assert apart(end, path) < 1e-6
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("loads", "law", "method"),
     in_pairs([[moment()], [heat(SMOOTH), moment(SMOOTH)]], ["linear", CURVED], EXPLICIT),
@@ -95,6 +97,7 @@ def test_runge_kutta_keeps_its_order():
     assert np.log2(errors[0] / errors[1]) > 3.7
 
 
+@pytest.mark.matrix
 def test_work_of_forces_that_jump():
     """Edge angles jump with them, and take the mean of both forces along."""
     made = case([moment(fd.Pulse(0.2))])
@@ -117,6 +120,7 @@ RESISTING = {
 }
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("kind", "method"),
     [(kind, "rk4") for kind in list(RESISTING)[::2]]
@@ -137,6 +141,7 @@ def test_creases_that_remember_or_are_damped_move_as_with_edge_angles_as_dofs(me
     assert balance(found) < (1e-6 if damping is SMALL else 5e-6)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("damping", [1e-4, 0.05, 5.0])
 def test_damped_creases_are_of_order_two(damping):
     """As with all memory, by whatever method; the balance too."""

@@ -120,6 +120,7 @@ def test_a_clamped_sheet_on_springs_keeps_its_energy(model, dt):
     assert np.ptp(total) < 1e-9 * max(total[0], 1.0)
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the energy balance")  # of the other method
 @pytest.mark.parametrize("bend_law", ["linear", "superlinear"])
 def test_snap_through_keeps_its_energy(bend_law):
@@ -172,6 +173,7 @@ def test_the_balance_closes_with_everything_that_acts(model, options):
     assert motion.attrs["energy_error"] < 1e-9
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("model", MODELS)
 def test_it_is_of_order_two_and_tends_to_the_motion_of_other_methods(model):
     case, steps = everything(model), [50, 100, 200]
@@ -187,6 +189,7 @@ def test_it_is_of_order_two_and_tends_to_the_motion_of_other_methods(model):
     assert errors[-1] < 5e-5
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("model", ["n5b8e", "shell"])
 def test_dofs_without_mass_do_not_ring(model):
     """What they store beyond their balance: nothing with a linear law, little with another."""
@@ -229,6 +232,7 @@ def test_the_balance_closes_also_where_moments_jump(model, law):
         assert motion.attrs["energy_error"] < 1e-11
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("model", "law"),
     [
@@ -280,6 +284,7 @@ def test_a_moment_that_has_grown_may_jump(method, error):
     assert motion.attrs["energy_error"] < error
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("law", LAWS)
 def test_contact_and_memory_go_together(law):
     """A sheet that falls on the ground and is folded there."""

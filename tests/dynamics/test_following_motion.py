@@ -203,6 +203,7 @@ def test_a_state_of_a_path_takes_the_loads_by_its_factor() -> None:
         assert linearize(case, state).residual > 0.01
 
 
+@pytest.mark.matrix
 def test_frequency_responses_about_a_loaded_state_agree_with_motions() -> None:
     """The direct one takes the stiffness of the loads, the stepped sine their forces."""
     s, held = held_leaf(bars, SOFT)

@@ -28,6 +28,7 @@ def end(motion):
     return {name: motion[name].values[-1] for name in ("displacement", "velocity")}
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("damping", "air", "method", "dt"),
     [
@@ -102,6 +103,7 @@ def test_motions_of_one_case_side_by_side_begin_each_with_its_own(damping, air):
         assert np.abs(apart).max() < 1e-2 * swing  # the method begins anew
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("damping", [STIFF, MODAL])
 def test_stepped_sines_keep_the_state_about_which_they_are_damped(damping):
     case = fd.Case(S, HELD, [PUSH], [damping, fd.Rayleigh(0.1 * OMEGA)][: 1 + (damping is MODAL)])

@@ -98,6 +98,7 @@ def springs() -> SpringsTerm:
     return fd.Case(sheet().structure, [HELD, fd.Spring(1.0, nodes=[8])]).body.term(SpringsTerm)
 
 
+@pytest.mark.matrix
 def test_the_device_is_named_in_a_case_file_and_on_the_command_line(tmp_path, monkeypatch, capsys):
     file = tmp_path / "case.toml"
     file.write_text(MOTION)

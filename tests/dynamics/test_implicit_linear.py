@@ -35,6 +35,7 @@ def moved(*x: float) -> fd.State:
     return fd.State(np.outer([0.0, *x], [1.0, 0.0, 0.0]))
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the energy balance")  # numerical damping is told
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_a_step_a_thousand_times_the_critical_one(method):

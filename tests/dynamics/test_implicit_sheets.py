@@ -19,6 +19,7 @@ from foldyn.errors import FoldynWarning
 from foldyn.studies import find_case
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_case_2_converges_to_the_motion_of_rk4(method):
     """As shipped: superlinear bends, locking folds, a half-sine pulse.
@@ -117,6 +118,7 @@ def test_the_band_of_a_shell_is_two_lines_of_nodes_wide(name, across):
     assert matrix.solver == "banded"  # no wider than that: nothing else is counted as an entry
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["rk4", "newmark", "energy_momentum"])
 def test_damping_by_the_stiffness_at_the_start(method):
     """A stiffening spring stretched by a force, and shaken a little there.

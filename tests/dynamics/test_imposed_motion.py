@@ -51,6 +51,7 @@ def test_oscillator_on_a_shaken_base(method):
     assert order(steps, errors) == pytest.approx(METHODS[method].order, abs=0.15)
 
 
+@pytest.mark.matrix
 @MASSES
 def test_base_motion_is_gravity_in_the_moving_frame(mass):
     """u = b(t) + what a body force -M b'' makes on resting supports, to the integrator's order."""

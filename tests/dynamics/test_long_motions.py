@@ -100,6 +100,7 @@ def test_a_run_that_is_killed_again_and_again_gives_the_same_bits(tmp_path, kind
     assert os.listdir(tmp_path) == ["run.nc"]
 
 
+@pytest.mark.matrix
 def test_what_the_user_samples_goes_on_too(tmp_path):
     tip = fd.Quantity("m s", "something", ("axis",), lambda u, v, t: u[7] * t)
     options = {**SECOND, "sample": {"tip": tip}}
@@ -108,6 +109,7 @@ def test_what_the_user_samples_goes_on_too(tmp_path):
     same(found, simulated("sheet", **options))
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("method", "kept"),
     [
@@ -134,6 +136,7 @@ def test_samples_that_memory_does_not_hold_are_the_same(tmp_path, monkeypatch, m
 THROWN = fd.State(velocity=0.1 * np.outer(np.arange(13) == 8, [0.0, 0.0, 1.0]))
 
 
+@pytest.mark.matrix
 def test_a_motion_goes_on_only_as_it_was_begun(begun, monkeypatch):
     for changes, name in [
         ({"changes": {"thickness": 0.02}}, r"sheet\.thickness = 0\.01, which is 0\.02 now"),
@@ -155,6 +158,7 @@ def test_a_motion_goes_on_only_as_it_was_begun(begun, monkeypatch):
     same(simulated("sheet", **begun, resume=True), simulated("sheet", **SECOND))
 
 
+@pytest.mark.matrix
 def test_a_finished_motion_is_only_read(kept):
     first, looked = simulated("sheet", **kept, resume=True), []
     again = simulated("sheet", **kept, resume=True, progress=looked.append)

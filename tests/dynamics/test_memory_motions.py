@@ -155,6 +155,7 @@ def test_creases_that_begin_and_cease_to_yield_are_of_order_2(method):
 
 
 # ------------------------------------------------------------------ steps chosen by their error
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", LAWS)
 def test_motions_come_to_those_of_small_equal_steps(name):
     """As the tolerance goes down, with the balance of energy; states of branches too."""
@@ -210,6 +211,7 @@ def test_refused_steps_leave_no_trace(name):
         np.testing.assert_array_equal(again[part], ended[part])
 
 
+@pytest.mark.matrix
 def test_refused_steps_of_an_implicit_method_leave_no_trace():
     """Steps chosen by their error end near those of small equal ones."""
     fine = fd.simulate(pushed(PRONY), 2.0, method=ALPHA, dt=2.0**-11, interval=1.0)
@@ -218,6 +220,7 @@ def test_refused_steps_of_an_implicit_method_leave_no_trace():
     assert opened(chosen)[-1] == pytest.approx(opened(fine)[-1], rel=1e-4)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     "law", [None, fd.Prony(0.5, 0.01), fd.Plastic(1e-3, 0.01), fd.Eyring(0.01, 0.1)]
 )

@@ -66,6 +66,7 @@ def test_strong_damping_converges_as_fast(method):
     assert iterations[1] < 1.3 * iterations[0]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("model", "count"), [("bars", 30), ("shell", 66)])
 def test_ratios_of_rayleigh(model, count):
     """With Rayleigh's own ratios of all modes it is Rayleigh's matrix: the same motion."""
@@ -107,6 +108,7 @@ def test_translations_are_not_damped(model, mass):
     assert modal.rate == pytest.approx((2 * np.array(RATIOS) * frequency).max())
 
 
+@pytest.mark.matrix
 def test_a_moving_base():
     """The simulated response to a base motion is that of the linear analysis."""
     case = sheet("bars", damping=fd.ModalDamping(0.1))

@@ -58,6 +58,7 @@ def test_rk4_loses_energy_with_the_fifth_power_of_the_step():
     np.testing.assert_allclose(lost[-1], exact, rtol=0.02)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("alpha", "beta", "method"),
     [

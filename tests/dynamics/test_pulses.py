@@ -93,6 +93,7 @@ def test_random_pulses_on_an_oscillator_at_rest(method):
             assert error(motion, exact) < (GLOBAL if method in ADAPTIVE else 1.5e-2), history
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", SOME)
 def test_random_pulses_on_a_moving_oscillator(method):
     """The same for pulses that arrive while it swings: superposition holds."""
@@ -104,6 +105,7 @@ def test_random_pulses_on_a_moving_oscillator(method):
         assert error(motion, exact) < 2.0 * GLOBAL, history
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("kind", "method"),
     [
@@ -128,6 +130,7 @@ def test_the_impulse_arrives_on_a_free_sheet(kind, method):
             assert apart(momentum, impulse * np.array([1e-4, 0.0, 2e-4])) < 1e-2, shape
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", SOME)
 def test_supports_and_folds_that_move_for_a_moment(method):
     """A support that goes forth and back, and a fold that is actuated and let go, are seen."""
@@ -162,6 +165,7 @@ def test_steps_end_at_knots():
     assert fd.Harmonic(3.0).knots() == ()
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", [*IMPLICIT[:1], *beyond(IMPLICIT[1:])])
 def test_periods_that_fit_the_steps_are_not_lost(method):
     """A hum whose period divides every step that would be tried first, from rest."""

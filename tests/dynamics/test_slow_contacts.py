@@ -39,6 +39,7 @@ def pressed(mass: str):
     return pack(fd.Case(s, damping=fd.Rayleigh(alpha=ALPHA), contact=contact), 1e-4)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("mass", ["centroid", "consistent"])
 def test_accelerations_are_those_of_the_mass_with_the_inertia_of_contacts(mass):
     packed = pressed(mass)

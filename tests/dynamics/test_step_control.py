@@ -80,6 +80,7 @@ def test_samples_in_seconds(method, interval, options, near):
         assert steps >= len(t) - 1
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("options", [{"method": DP}, {"method": "newmark", "tolerance": 1e-7}])
 def test_samples_by_steps(options):
     """Each so many accepted steps, the room for them growing as needed."""

@@ -109,6 +109,7 @@ def test_two_sheets_that_are_linked_are_one(method, mass) -> None:
     np.testing.assert_array_equal(v[:, 6:8], v[:, 1:3])
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["rk4", "energy_momentum"])
 def test_links_conserve_momentum(method) -> None:
     """Two free sheets, linked at a corner: nothing but the link acts between them."""

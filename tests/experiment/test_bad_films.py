@@ -51,6 +51,7 @@ def test_regions_outside_the_picture(sharp, roi):
         open_film(sharp.path, roi)
 
 
+@pytest.mark.matrix
 def test_a_rate_is_positive(sharp):
     with pytest.raises(InputError, match="--rate"):
         open_film(sharp.path, rate=0.0)
@@ -67,6 +68,7 @@ def test_pictures_without_corners(kind):
         find_corners(picture)
 
 
+@pytest.mark.matrix
 def test_a_model_that_is_not_there(tmp_path):
     picture = np.full((300, 300), 40, np.uint8)
     for k, (u, v) in enumerate([(40, 50), (150, 40), (60, 200), (190, 170), (220, 240)]):
@@ -115,6 +117,7 @@ def copied(sharp, path, frames: int):
     return path
 
 
+@pytest.mark.matrix
 def test_a_film_that_breaks_off_is_tracked_and_named(sharp, tmp_path):
     whole = copied(sharp, tmp_path / "whole.mkv", 12)
     half = tmp_path / "half.mkv"
@@ -130,6 +133,7 @@ def test_one_frame_shows_no_motion(sharp, tmp_path):
         track_film(str(copied(sharp, tmp_path / "one.mkv", 1)))
 
 
+@pytest.mark.matrix
 def test_photographs_have_one_size(sharp, tmp_path):
     picture = sharp.film.frame(0)
     for name, part in (("a.png", picture), ("b.png", picture[:500])):

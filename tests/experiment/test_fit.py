@@ -40,6 +40,7 @@ def histories(path, nodes, noise=0.0, **known) -> TimeHistory:
     return TimeHistory(nodes=nodes, time=TIME, values=values, **known)
 
 
+@pytest.mark.matrix
 def test_exact_forces_give_the_parameters_exactly(pressed) -> None:
     theta = Parameter("model.fold_law.theta2", 280.0, 240.0, 299.0)
     found = fd.fit(pressed, [forces(pressed)], parameters=[RATIO, theta])
@@ -58,6 +59,7 @@ def test_a_tie_follows_its_parameter(pressed) -> None:
     assert document["sheet"]["length_scale_ratio"] == ratio
 
 
+@pytest.mark.matrix
 def test_intervals_follow_the_noise(pressed) -> None:
     small = fd.fit(pressed, [forces(pressed, 1e-5, sigma=1e-5)], parameters=[RATIO])
     large = fd.fit(pressed, [forces(pressed, 1e-4, sigma=1e-4)], parameters=[RATIO])
@@ -103,6 +105,7 @@ def test_a_parameter_at_its_bound_is_said_to_be_there(pressed) -> None:
     assert "at its bound" in found.estimates[0].note
 
 
+@pytest.mark.matrix
 def test_damping_from_a_history_scored_on_held_out_nodes(swung) -> None:
     fitted = histories(swung, [0], 1e-5, sigma=1e-5, name="edge")
     kept = histories(swung, [2, 3], 1e-5, sigma=1e-5, name="ridge", held_out=True)
@@ -115,6 +118,7 @@ def test_damping_from_a_history_scored_on_held_out_nodes(swung) -> None:
     assert found.freedom == len(TIME) - 1
 
 
+@pytest.mark.matrix
 def test_held_out_data_do_not_move_the_fit(swung) -> None:
     fitted = histories(swung, [0], 1e-5)
     wrong = TimeHistory(nodes=[2], time=TIME, values=np.sin(9.0 * TIME), held_out=True)
@@ -123,6 +127,7 @@ def test_held_out_data_do_not_move_the_fit(swung) -> None:
     assert both.scores[1].rms > 0.1
 
 
+@pytest.mark.matrix
 def test_a_case_of_statics_and_one_of_dynamics_together(pressed, swung) -> None:
     known = histories(swung, [0], 1e-5, sigma=1e-5, case=swung)
     found = fd.fit(pressed, [forces(pressed, 1e-5, sigma=1e-5), known], parameters=[RATIO, ALPHA])
@@ -131,6 +136,7 @@ def test_a_case_of_statics_and_one_of_dynamics_together(pressed, swung) -> None:
     assert len(found.problem.runs) == 2
 
 
+@pytest.mark.matrix
 def test_each_measurement_may_change_the_case(pressed) -> None:
     """Two specimens of one paper, the other with twice the thickness."""
     blank = ForceDisplacement(displacement=MOVED, force=np.zeros(8), sigma=1e-5)
@@ -153,6 +159,7 @@ def test_shapes_under_a_force_give_a_stiffness(tmp_path) -> None:
     assert found.estimates[0].value == pytest.approx(1e6, rel=1e-4)
 
 
+@pytest.mark.matrix
 def test_searches_from_several_starts_agree(pressed) -> None:
     found = fd.fit(pressed, [forces(pressed, 1e-5)], parameters=[RATIO], searches=4, seed=2)
     assert len(found.descents) == found.agreeing == 4
@@ -162,6 +169,7 @@ def test_searches_from_several_starts_agree(pressed) -> None:
     )
 
 
+@pytest.mark.matrix
 def test_a_fit_goes_on_where_it_was_cut_off(pressed, tmp_path) -> None:
     data = [forces(pressed, 1e-5)]
     seen: list[int] = []
@@ -186,6 +194,7 @@ def test_a_fit_goes_on_where_it_was_cut_off(pressed, tmp_path) -> None:
     assert third.evaluations == found.evaluations
 
 
+@pytest.mark.matrix
 def test_damaged_evaluations_are_computed_again(pressed, tmp_path) -> None:
     data = [forces(pressed)]
     first = fd.fit(pressed, data, parameters=[RATIO], folder=tmp_path)
@@ -207,6 +216,7 @@ def test_damaged_evaluations_are_computed_again(pressed, tmp_path) -> None:
     assert course[-1].found == 0
 
 
+@pytest.mark.matrix
 def test_kept_evaluations_of_another_model_are_not_used(pressed, tmp_path) -> None:
     data = [forces(pressed)]
     fd.fit(pressed, data, parameters=[RATIO], folder=tmp_path)
@@ -245,6 +255,7 @@ def test_a_model_that_fails_at_every_start(swung) -> None:
         fd.fit(swung, [bad], parameters=[Parameter("loads[0].force[0]", 50.0, 40.0, 60.0)])
 
 
+@pytest.mark.matrix
 def test_results_as_files(pressed, tmp_path) -> None:
     found = fd.fit(
         pressed, [forces(pressed, 1e-5)], parameters=[RATIO, Parameter("sheet.density", 2.0)]
@@ -284,6 +295,7 @@ PRONY = 'fold_law = { kind = "prony", ratios = [0.6], times = [0.15] }'
 PLASTIC = 'fold_law = { kind = "plastic", yield_moment = 2e-3, kinematic = 0.01, law = "linear" }'
 
 
+@pytest.mark.matrix
 def test_a_relaxation_is_found_in_a_motion(tmp_path):
     """Ratio and time of a branch from the history of one node, exact and within its noise."""
     path = write(tmp_path, SWUNG.replace(ELASTIC, PRONY))
@@ -316,6 +328,7 @@ def cyclic(path, displacement):
     return ForceDisplacement(displacement=displacement, force=force)
 
 
+@pytest.mark.matrix
 def test_a_cyclic_test_gives_yield_moment_and_hardening(tmp_path):
     path = write(tmp_path, PRESSED.replace(ELASTIC, PLASTIC))
     way = np.array([0.0, 0.1, 0.2, 0.3, 0.2, 0.1, 0.0, 0.1, 0.2, 0.3])

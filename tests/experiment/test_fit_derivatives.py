@@ -101,6 +101,7 @@ def difference(made, values, k, step):
     return total
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("kind", DATA)
 def test_derivatives_are_those_of_whole_predictions(tmp_path, kind, monkeypatch) -> None:
     monkeypatch.setattr(Alpha, "tolerance", 1e-14)  # whole motions, to the rounding of differences
@@ -158,6 +159,7 @@ def test_what_has_no_neighbors_is_run_again(tmp_path) -> None:
     assert fd.fit(pressed, [forces, aside], parameters=[ratio]).quotients == ()
 
 
+@pytest.mark.matrix
 def test_optimum_and_intervals_are_those_of_difference_quotients(tmp_path, monkeypatch) -> None:
     text, data, _ = DATA["shapes"]
     path = write(tmp_path, text)

@@ -38,6 +38,7 @@ def refined(path, **changes):
     return fit_cases.write(path.parent, text, "refined.toml")
 
 
+@pytest.mark.matrix
 def test_an_interval_reaches_the_truth_though_the_step_is_coarse(swung, seen) -> None:
     with pytest.warns(FoldynWarning, match=r"damping\.alpha: the time step is too coarse") as told:
         found = fd.fit(swung, [seen], parameters=[ALPHA])
@@ -101,6 +102,7 @@ def test_steps_too_coarse_for_their_order_widen_the_interval_further(tmp_path) -
     assert one.value + one.discretization - 2.0 * one.standard_error > 0.2  # without the doubt
 
 
+@pytest.mark.matrix
 def test_fine_steps_leave_the_interval_to_the_noise(swung, seen) -> None:
     fine = refined(swung, interval="interval = 0.004")
     with warnings.catch_warnings():
@@ -130,6 +132,7 @@ def test_step_and_sampling_are_halved(swung, seen, sampling, step, kept) -> None
     assert {key: said["output"].get(key) for key in kept} == pytest.approx(kept)
 
 
+@pytest.mark.matrix
 def test_an_interval_reaches_the_truth_though_the_mesh_is_coarse(tmp_path) -> None:
     """With elements of a quarter of an edge the third frequency is 8 % low."""
     text = HELD_FOLD_TEXT + '[model]\nkind = "shell"\ndivisions = 4\n'

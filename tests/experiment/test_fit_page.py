@@ -72,6 +72,7 @@ def test_the_page_says_what_was_found_and_what_was_not(fitted, tmp_path) -> None
     assert page.count("data:image/png") == 5
 
 
+@pytest.mark.matrix
 def test_the_page_shows_the_model_and_charts(fitted, tmp_path) -> None:
     """Without figures: a path and a motion, with what was measured as dots beside them."""
     page = write_fit(fitted, tmp_path).read_text("utf-8")

@@ -28,6 +28,7 @@ def test_standard_errors_are_those_of_linear_regression() -> None:
     assert found.freedom == 10
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("confidence", [0.5, 0.95])
 def test_intervals_contain_the_truth_as_often_as_they_say(confidence) -> None:
     jacobian, draw = 100.0 * line(6), np.random.default_rng(5)

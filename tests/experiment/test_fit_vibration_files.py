@@ -121,6 +121,7 @@ def test_a_fit_file_says_what_was_measured(folder, results) -> None:
     np.testing.assert_allclose(held.values[:, 0], exact.sel(node=6, axis="x").values)
 
 
+@pytest.mark.matrix
 def test_from_the_fit_file_to_the_page(folder) -> None:
     edit(folder, 'file = "frf.csv"\nnodes = [8]', 'file = "frf.nc"\nnodes = [8]\nsigma = 0.05')
     plan = read_fit(folder / "fit.toml")
@@ -138,6 +139,7 @@ def test_from_the_fit_file_to_the_page(folder) -> None:
         assert title in page
 
 
+@pytest.mark.matrix
 def test_results_are_measurements_too(folder, results) -> None:
     one = recognize(folder / "modes.nc")
     assert isinstance(one, NaturalFrequencies)

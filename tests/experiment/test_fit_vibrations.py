@@ -122,6 +122,7 @@ def test_noisy_data_give_the_parameters_and_intervals_that_contain_them(
     assert least < np.sqrt(np.mean(np.square(misfits))) < 1.5
 
 
+@pytest.mark.matrix
 def test_all_kinds_together(folder, modes, response) -> None:
     data = [
         frequencies(modes, 2e-3, sigma=1e-3),
@@ -135,6 +136,7 @@ def test_all_kinds_together(folder, modes, response) -> None:
     assert [score.unit for score in found.scores] == ["Hz", "", "m/N"]
 
 
+@pytest.mark.matrix
 def test_sign_and_size_of_shapes_do_not_matter(folder, modes) -> None:
     one = shapes(modes, noise=0.02, sigma=0.02)
     scaled = one.values * np.array([-3.0, 0.1, 7.0, -1.0])[:, None, None]
@@ -156,6 +158,7 @@ def test_what_is_left_of_shapes_is_what_their_mac_lacks(folder, modes) -> None:
     np.testing.assert_allclose(left / whole, 1.0 - np.diag(alike), rtol=1e-9)
 
 
+@pytest.mark.matrix
 def test_shapes_find_modes_of_which_the_lowest_was_missed(folder) -> None:
     """In their order the two frequencies would belong to the first and second mode."""
     soft = folder / "soft.toml"

@@ -15,6 +15,7 @@ from foldyn.experiment import Look, film_of, refine, write_film
 from foldyn.experiment.rendering.picture import two_colors
 
 
+@pytest.mark.matrix
 def test_the_same_seed_gives_the_same_film():
     first, again, other = (
         make_film(2, seed=seed, read_noise=1.0, exposure=1e-3).frame(1) for seed in (5, 5, 6)
@@ -23,6 +24,7 @@ def test_the_same_seed_gives_the_same_film():
     assert (first != other).mean() > 0.3
 
 
+@pytest.mark.matrix
 def test_corners_are_where_the_truth_says():
     film = make_film(1)
     true = film.truth()["position_px"].values[0, FRONT]
@@ -43,6 +45,7 @@ def test_corners_are_where_the_truth_says():
     assert np.nanmedian(np.abs(ways[0] - ways[2])) < 0.03
 
 
+@pytest.mark.matrix
 def test_blur_spreads_edges_about_the_middle_of_the_exposure():
     sharp, blurred = make_film(3), make_film(3, exposure=1 / 480, samples=16)
     a, b = sharp.frame(2).astype(float), blurred.frame(2).astype(float)
@@ -51,12 +54,14 @@ def test_blur_spreads_edges_about_the_middle_of_the_exposure():
     assert np.abs(np.diff(b, axis=0)).max() < np.abs(np.diff(a, axis=0)).max()
 
 
+@pytest.mark.matrix
 def test_noise_has_the_given_size():
     film = make_film(2, read_noise=2.0)
     background = film.frame(0)[:20, :20].astype(float)
     assert background.std() == pytest.approx(2.0, rel=0.15)
 
 
+@pytest.mark.matrix
 def test_dropped_frames_repeat_the_last_one():
     film = make_film(4, dropped=(2,), read_noise=1.0)
     pictures = list(film.frames())
@@ -65,6 +70,7 @@ def test_dropped_frames_repeat_the_last_one():
     assert film.truth()["dropped"].values.tolist() == [False, False, True, False]
 
 
+@pytest.mark.matrix
 def test_panels_hide_what_is_behind_them():
     film = make_film(1)
     film.frame(0)

@@ -12,6 +12,7 @@ from foldyn.experiment.tracking.corners import find_corners
 from foldyn.experiment.tracking.follow import follow
 
 
+@pytest.mark.matrix
 def test_nodes_keep_their_identity_and_their_place(sharp, tracked):
     error = errors(tracked, sharp.truth)[:, FRONT]
     known = np.isfinite(error)
@@ -65,6 +66,7 @@ def test_times_and_quality(sharp, tracked):
     assert (tracked["longest_gap"].values[share == 79 / 80] == 1).all()
 
 
+@pytest.mark.matrix
 def test_without_a_model_corners_are_followed(sharp):
     ds = track_film(str(sharp.path))
     assert (ds["node_of_point"] == -1).all()
@@ -83,6 +85,7 @@ def test_the_region_of_interest_shifts_nothing(sharp, tracked):
     assert np.sqrt(np.nanmean(error**2)) < 0.25
 
 
+@pytest.mark.matrix
 def test_a_covered_corner_is_lost_and_found_again():
     film = make_film(24)
     film_frames = [picture.copy() for picture in film.frames()]

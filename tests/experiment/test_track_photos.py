@@ -54,6 +54,7 @@ def test_the_region_of_interest_shifts_nothing(photos):
     assert np.sqrt(np.nanmean(moved[..., 0] ** 2)) < 4e-4
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("count", [0, 1])
 def test_one_photograph_alone_is_refused(photos, count):
     with pytest.raises(InputError, match="one photograph alone"):

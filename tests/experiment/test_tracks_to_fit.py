@@ -196,6 +196,7 @@ def test_stiffness_from_the_table_of_photographs(photographed):
     assert found["sheet.length_scale_ratio"].value == pytest.approx(RATIO, rel=0.02)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("ending", ["nc", "csv"])
 def test_what_tracks_cannot_say(filmed, photographed, ending):
     film, photos = filmed.with_name(f"film.{ending}"), photographed.with_name(f"photos.{ending}")

@@ -95,6 +95,7 @@ def test_one_way_formats(tmp_path, monkeypatch):
         write_pattern(simple_fold(), tmp_path / "x.one")
 
 
+@pytest.mark.matrix
 def test_libraries_of_drawings_are_loaded_where_they_are_needed(tmp_path):
     """Meshes are read without them, and nothing of them is loaded at the start of the command."""
     simple = tmp_path / "x.fold"

@@ -107,6 +107,7 @@ def agrees(design: Design, closely: float = 1e-5) -> None:
         assert not wrong, (name, wrong)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("tied", "which"), few([*product((None, "equilibrium"), PRESETS)], EXACT))
 def test_modes(tied: str, which: tuple[str | None, str]) -> None:
     state, preset = which
@@ -118,6 +119,7 @@ def test_modes(tied: str, which: tuple[str | None, str]) -> None:
     agrees(design)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("tied", "preset"), few(PRESETS, EXACT))
 def test_equilibria(tied: str, preset: str) -> None:
     build, values = drawn(tied, preset, 32)
@@ -125,6 +127,7 @@ def test_equilibria(tied: str, preset: str) -> None:
     agrees(Design(build, values | {"force": 0.9}, RESTING, analysis))
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("tied", "method"), few(("newmark", "rk4"), EXACT[:2]))
 def test_motions(tied: str, method: str) -> None:
     build, values = drawn(tied, "merlin2" if method == "rk4" else "plate", 33)
@@ -142,6 +145,7 @@ def test_motions(tied: str, method: str) -> None:
     agrees(design)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("tied", "which"), few([*product((13, 201), (None, "equilibrium"))], EXACT[1:])
 )

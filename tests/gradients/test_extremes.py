@@ -24,6 +24,7 @@ def tower(stiffness: Any, thickness: float = 0.018, force: float = 0.04) -> fd.C
     return fd.Case(made, [fd.Fix("zmin")], [fd.Force("zmax", (0, 0, -force))])
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("measure", ["largest_displacement", "strain"])
 def test_what_nodes_reach_at_once_has_a_derivative_where_they_stay_alike(measure: str) -> None:
     with pytest.raises(InputError, match=TOP):
@@ -60,6 +61,7 @@ def test_a_sample_that_repeats_the_highest_displacement() -> None:
     assert found["gradient_height"].item() == pytest.approx(1.0, rel=1e-9)
 
 
+@pytest.mark.matrix
 def test_the_strain_of_a_bar_that_hardly_stretches() -> None:
     """The shape changes it by far less than it changes the places of the bar's ends."""
 
@@ -85,6 +87,7 @@ def near(gap: float, size: float = 1.0, tilt: float = 0.0) -> fd.Case:
     return fd.Case(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0)), [fd.Fix([0, 1, 3])])
 
 
+@pytest.mark.matrix
 def test_panels_that_all_but_touch() -> None:
     """Differences of the distance itself would pass through 0."""
     found = fd.sensitivity(
@@ -96,6 +99,7 @@ def test_panels_that_all_but_touch() -> None:
     assert found["gradient_size"].item() == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.matrix
 def test_panels_that_are_as_close_at_two_places() -> None:
     about = {"kind": "modes", "count": 3}
     found = fd.sensitivity(near, {"gap": 0.2, "size": 1.3}, measures="clearance", analysis=about)
@@ -123,6 +127,7 @@ def test_lengths_to_which_bars_are_cut_are_no_part_of_some_measures() -> None:
     )
 
 
+@pytest.mark.matrix
 def test_strain_energy_of_edges_that_lag_behind() -> None:
     pattern = fd.patterns.miura(dihedral=110)
 

@@ -60,12 +60,14 @@ def check(design: Design) -> None:
         assert (wrong <= 1e-6 * np.abs(expected) + rounding).all(), name
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", [*list(CASES)[::2], *beyond(list(CASES)[1::2], 2)])
 def test_gradients_are_those_of_the_response(name: str) -> None:
     build, values, analysis = CASES[name]
     check(Design(build, values, AT, analysis))
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("analysis", [PUSH, SHAKE], ids=["force", "base"])
 def test_arrays_of_a_case(analysis: dict[str, Any]) -> None:
     made = case(mass="mixed_voronoi")
@@ -79,12 +81,14 @@ def test_arrays_of_a_case(analysis: dict[str, Any]) -> None:
     check(Design(build, values, AT[:3:2], analysis))
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", ["pushed", "shaken", "damped there"])
 def test_remainders_fall_with_the_second_order(name: str) -> None:
     build, values, analysis = CASES[name]
     assert (Design(build, values, AT[:3], analysis).order(len(name)) > 1.9).all()
 
 
+@pytest.mark.matrix
 def test_a_magnitude_of_all_axes_and_an_own_number() -> None:
     """The mean square over all frequencies, as a function of the result with its derivative."""
 

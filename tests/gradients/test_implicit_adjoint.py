@@ -122,6 +122,7 @@ def measures_of(name: str) -> list[str]:
     return given.get(name, TIP)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("name", "method"), [(name, METHODS[k % 2]) for k, name in enumerate(CASES)]
 )
@@ -131,6 +132,7 @@ def test_gradients_are_those_of_the_motion(name: str, method: str) -> None:
     assert max(errors.values()) < 1e-8, errors
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("build", "more"), [(shaken, {"way": 0.05}), (linked, {})])
 @pytest.mark.parametrize("method", ["rk4", "central_difference"])
 def test_explicit_methods_go_through_a_consistent_mass(
@@ -143,6 +145,7 @@ def test_explicit_methods_go_through_a_consistent_mass(
     assert max(errors.values()) < 1e-7, errors
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", ["jump", "dampers", "lumped", "linked"])
 def test_central_differences(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(central_difference_adjoint, "ROOM", 5e4)  # segments of some hundred steps
@@ -152,6 +155,7 @@ def test_central_differences(name: str, monkeypatch: pytest.MonkeyPatch) -> None
     assert max(errors.values()) < 1e-6, errors
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", ARRAYS)
 def test_arrays_of_a_case(name: str) -> None:
     made, names = ARRAYS[name]
@@ -166,6 +170,7 @@ def test_arrays_of_a_case(name: str) -> None:
     assert max(errors.values()) < 1e-8, errors
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", ["bars", "dampers", "plates", "base"])
 def test_remainders_fall_with_the_second_order(name: str) -> None:
     build, values = CASES[name]
@@ -173,6 +178,7 @@ def test_remainders_fall_with_the_second_order(name: str) -> None:
     assert (design.order(len(name)) > 1.9).all()
 
 
+@pytest.mark.matrix
 def test_a_start_with_velocity_and_segments_that_are_taken_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -201,6 +207,7 @@ def test_steps_taken_again_are_those_of_the_motion_to_the_bit() -> None:
             assert np.array_equal(motion.packed.numbering.outward(one.end.q), sample)
 
 
+@pytest.mark.matrix
 def test_gradient_of_what_was_computed_with_the_usual_tolerance(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

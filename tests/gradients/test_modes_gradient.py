@@ -30,6 +30,7 @@ def build(preset: Any) -> Any:
     return lambda **given: cell(preset=preset, **options, **given)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize(
     ("measures", "closely"),
@@ -53,6 +54,7 @@ def test_gradients_by_the_shape_of_panels(preset):
     assert max(design.errors().values()) < 1e-6
 
 
+@pytest.mark.matrix
 def test_how_near_panels_are_at_rest():
     def folded(dihedral: float, panel_angle: float) -> fd.Case:
         pattern = fd.patterns.miura((2, 1), panel_angle=panel_angle, dihedral=dihedral)
@@ -118,6 +120,7 @@ def test_rayleigh_damping_of_a_mode():
 
 
 # ------------------------------------------------------------------ states under load
+@pytest.mark.matrix
 def test_modes_about_an_equilibrium_feel_its_change():
     def loaded(force: float, stiffness: float) -> fd.Case:
         made = cell(stiffness=stiffness)
@@ -169,6 +172,7 @@ def test_bends_near_a_kink_of_their_law(preset, law, force):
 
 
 # ------------------------------------------------------------------ dofs without mass
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the rest state is no equilibrium")
 @pytest.mark.parametrize("model", ["n5b8e", "shell"])
 @pytest.mark.parametrize("analysis", ["modes", "frf"])

@@ -40,6 +40,7 @@ def built(preset: Any, **fixed: Any) -> Any:
     return lambda **given: cell(preset=preset, **fixed, **given)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("preset", PRESETS)
 def test_gradients_agree_with_differences(preset):
     stiffness = np.random.default_rng(5).uniform(0.4, 0.6, 4)
@@ -59,6 +60,7 @@ def test_gradients_by_what_the_sheet_is_made_of(mass):
     assert max(errors.values()) < 1e-6, errors
 
 
+@pytest.mark.matrix
 def test_supports_that_move_and_damping_of_the_stiffness():
     values = {"lift": 0.03, "youngs": 1e5, "beta": 1e-5}
     build = built("merlin2", mass="mixed_voronoi")
@@ -68,6 +70,7 @@ def test_supports_that_move_and_damping_of_the_stiffness():
     assert base["gradient_lift"].values[0] == pytest.approx(1.0, rel=1e-9)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("seed", [11, 12])
 def test_the_remainder_falls_with_the_second_order(seed):
     values = {"force": 0.4, "alpha": 0.5, "stiffness": np.full(4, 0.5), "youngs": 1e5}
@@ -83,6 +86,7 @@ def test_a_linear_motion_is_proportional_to_its_force():
     assert slope == pytest.approx(value / 1e-7, rel=1e-5)
 
 
+@pytest.mark.matrix
 def test_few_kept_states_change_nothing(monkeypatch):
     """However steps are taken again, the gradient is the same to rounding."""
     values = {"force": 0.4, "stiffness": 0.5}
@@ -96,6 +100,7 @@ def test_few_kept_states_change_nothing(monkeypatch):
         )
 
 
+@pytest.mark.matrix
 def test_all_arrays_of_a_structure_at_once():
     case = cell(preset="merlin2", mass="mixed_voronoi")
     names = ["fold_stiffness", "fold_rest", "bend_stiffness", "bend_rest", "bar_area", "node_mass"]

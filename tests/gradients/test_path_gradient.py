@@ -45,6 +45,7 @@ PRESSED = {"kind": "statics", "load_factors": [0.0, 0.5, 1.0]}
 MOVED = {"kind": "statics", "method": "displacement", "steps": 4}
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("preset", ["merlin2", "plate", "n5b8e"])
 def test_equilibria_under_given_forces(preset):
     values = {"force": 2.0, "stiffness": STIFFNESS, "spring": 900.0}
@@ -55,6 +56,7 @@ def test_equilibria_under_given_forces(preset):
     assert max(design.errors().values()) < 1e-6
 
 
+@pytest.mark.matrix
 def test_equilibria_where_supports_move():
     values = {"drop": 0.01, "stiffness": STIFFNESS, "height": 0.06, "twist": 30.0}
     measures = ["displacement[8,x]", "strain_energy", "clearance"]
@@ -83,6 +85,7 @@ def test_snap_through():
     assert max(design.errors().values()) < 1e-7
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the path loses stability")
 @pytest.mark.parametrize("seed", [21, 22])
 def test_the_remainder_falls_with_the_second_order(seed):

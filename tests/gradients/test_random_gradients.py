@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.generalized_alpha import Alpha
 from foldyn.errors import ComputationError, FoldynWarning, InputError
+from pairwise import beyond
 
 # states that are no equilibria, soft hinges, coarse steps: not what this is about
 pytestmark = pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
@@ -110,7 +111,7 @@ def check(seed: int) -> None:
     )
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", [*range(8), *beyond(range(8, 20), 2)])
 def test_gradients_are_those_of_differences(seed):
     check(seed)
 

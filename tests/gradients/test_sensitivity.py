@@ -65,6 +65,7 @@ def test_expressions_follow_the_chain_rule():
     assert dr == pytest.approx(-d2 / f1 + f2 * d1 / f1**2 + 2.0 * m * dm, rel=1e-12)
 
 
+@pytest.mark.matrix
 def test_a_case_file_is_changed_by_its_keys(tmp_path):
     (tmp_path / "cell.toml").write_text(CASE)
     values = {"pattern.panel_angle": 61.0, "sheet.thickness": 0.02}
@@ -126,6 +127,7 @@ def test_stiffnesses_of_creases_are_told_apart_at_once():
     assert sorted(entry[entry >= 0].tolist()) == [0, 1, 2, 3]
 
 
+@pytest.mark.matrix
 def test_thicknesses_of_panels_share_edges_and_are_changed_one_by_one():
     design = Parameters(cell, {"thickness": np.linspace(0.015, 0.02, 4)}, {})
     slope = design.slopes(numbers_of)["thickness"]

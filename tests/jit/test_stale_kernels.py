@@ -244,6 +244,7 @@ def test_tools_and_their_variables_count(owner, name, value, counts, monkeypatch
     assert (digest.__wrapped__(*source) != before) == counts
 
 
+@pytest.mark.matrix
 def test_all_that_compiles_is_compiled_in_one_place():
     decorators = {"jit", "njit", "cfunc", "vectorize", "guvectorize", "stencil", "prange"}
     for path in FILES:

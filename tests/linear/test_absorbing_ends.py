@@ -73,6 +73,7 @@ def reflected():
     return found
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:panels that stretch hold")
 def test_an_absorbing_end_sends_hardly_anything_back(reflected):
     """At 0.3 rad per cell; the error of the impedance grows with the square of the phase."""

@@ -180,6 +180,7 @@ MOVED = ("plate", "shell", "n5b8e", "herkal", *BESIDE)
 IN_TIME = [(kind, MOVED[i % len(MOVED)], METHODS[(i + i // 3) % 3]) for i, kind in enumerate(KINDS)]
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:damping. .* resist", "ignore:.* of the motion is left")
 @pytest.mark.parametrize(
     ("kind", "model", "method"),

@@ -41,6 +41,7 @@ def test_supercells_do_so_where_a_cell_is_one_panel():
     assert_alike(squares(), squares(3), (3, 1))
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("mass", RULES)
 def test_supercells_do_so_in_prestressed_states(mass):
     stretch = np.array([[1.01, 0.004, 0.0], [0.0, 0.99, 0.0], [0.0, 0.0, 1.0]])
@@ -64,6 +65,7 @@ def bending(along, across, height, curvature):
     return [of_twist(twist), translation(across)]
 
 
+@pytest.mark.matrix
 def test_supercells_do_so_on_bent_sheets():
     """Translations that become rotations."""
     cells, states = (miura(), miura((2, 1))), []
@@ -158,6 +160,7 @@ def riding(storeys):
     return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET), links))
 
 
+@pytest.mark.matrix
 def test_links_repeat():
     assert_alike(riding(1), riding(2), (2,))
     assert_alike(zipper(1), zipper(2), (2,))

@@ -85,6 +85,7 @@ def tapped():
     )
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:panels that stretch hold")
 def test_the_spectrum_of_a_small_motion_peaks_on_the_bands(tapped):
     found = wave_spectrum(tapped, cell())

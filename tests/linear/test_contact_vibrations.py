@@ -39,6 +39,7 @@ def test_sheets_apart_vibrate_as_without_contact():
         np.testing.assert_array_equal(a.receptance, b.receptance)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
 def test_a_small_motion_is_the_sum_of_the_modes(mass):
     """In time, from the state with a small velocity: the difference falls with its square."""

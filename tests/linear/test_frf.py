@@ -32,6 +32,7 @@ def test_a_chain_of_two_masses(method):
     np.testing.assert_array_equal(partly.receptance, found.receptance)
 
 
+@pytest.mark.matrix
 def test_peaks_recover_frequency_and_damping():
     """From the response through the estimators: poles known in closed form."""
     found = frf(chain(**DAMPING), PUSH, frequencies=np.arange(0.5, 5, 0.02))
@@ -144,6 +145,7 @@ def test_a_shell():
     assert np.abs(peak.natural_frequency / natural - 1.0).min() < 1e-3
 
 
+@pytest.mark.matrix
 def test_a_shell_struck():
     """By an implicit method, since explicit ones need mass everywhere."""
     drive, f = fd.Force([7], (1e-4, 0, 0)), np.arange(0.2, 2.01, 0.2)
@@ -244,6 +246,7 @@ def test_mobility_and_accelerance():
         convert(frf(chain(alpha=0.4), fd.BaseMotion("x"), frequencies=F), "mobility")
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("method", "options"), [("direct", {}), ("burst_random", {"seed": 3, "averages": 2})]
 )

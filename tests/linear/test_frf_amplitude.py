@@ -43,6 +43,7 @@ def backbone(amplitudes, span, method="harmonic", **options):
     return np.array(found).T
 
 
+@pytest.mark.matrix
 def test_the_peak_moves_as_the_sixth_root_of_the_amplitude():
     frequency, displacement = backbone([1e-5, 4e-5, 16e-5], WIDE)
     slope = np.diff(np.log(frequency)) / np.diff(np.log(displacement))
@@ -52,6 +53,7 @@ def test_the_peak_moves_as_the_sixth_root_of_the_amplitude():
     np.testing.assert_allclose(by_force, 1 / 7, atol=0.004)
 
 
+@pytest.mark.matrix
 def test_simulated_motions_follow_the_same_law():
     frequency, displacement = backbone([1e-5, 8e-5], FEW, method="stepped_sine", settled=1e-3)
     slope = np.diff(np.log(frequency)) / np.diff(np.log(displacement))
@@ -171,6 +173,7 @@ def test_a_simulated_motion_of_the_specimen_agrees():
     assert largest_error(weak.receptance, moved.receptance.values) > 0.05
 
 
+@pytest.mark.matrix
 def test_the_specimen_as_published_about_its_relaxed_equilibrium():
     """Its bends are bent there: a small motion has slopes, and the peaks hardly move with it."""
     case, f = specimen(15.8, rest="as_published"), np.arange(2, 22.1, 0.25)

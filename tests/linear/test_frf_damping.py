@@ -133,6 +133,7 @@ def test_creases_on_a_fold(model, method):
     assert largest_error(found.receptance.values[:, 4] @ normal, exact) < 3e-3
 
 
+@pytest.mark.matrix
 def test_in_time():
     """The burst of an impulse with all kinds of damping: the linear response."""
     dashpots = [fd.Dashpot(0.02, nodes=[7], direction="x"), fd.Dashpot(0.01, between=(1, 7))]

@@ -59,6 +59,7 @@ def test_the_response_of_the_matrices(method, integrator):
         assert error_of(method, dt=0.005, **TIMED[method]) < 3e-5
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["impulse", "burst_random"])
 def test_the_error_falls_with_the_sampling(method):
     """With the fourth power: the drive is the cubic spline through its samples."""
@@ -167,6 +168,7 @@ def test_transmissibility_from_motions(method):
     assert largest_error(found.transmissibility.values, exact) < 3e-5
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("mass", ["circumcenter", "consistent"])
 def test_transmissibility_of_a_miura_cell(mass):
     case, f = miura_case(mass=mass, alpha=2.0, beta=1e-3), np.arange(0.25, 3.01, 0.25)

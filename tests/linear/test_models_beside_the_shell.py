@@ -11,7 +11,7 @@ import pytest
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import fidelity as compare_models
-from foldyn.linear.compared import SCOPE, legend, percent
+from foldyn.linear.compared import SCOPE, legend, percent, reach
 from foldyn.linear.fidelity import MODELS, comparison, forces_alone, rest_forces, small_loads
 from foldyn.linear.shell_of import meshes, shell_of, triangle_count
 from foldyn.results import fidelity_dataset
@@ -53,14 +53,14 @@ def miura():
     """Case study 2 with linear bends and its load."""
     structure = fd.discretize(fd.patterns.miura(**UNIT), SHEET, **STANDARD)
     case = fd.Case(structure, FOLDING, [fd.Force([7], (0.01, 0, 0), fd.HalfSine(0.5))])
-    return case, fd.fidelity(case, count=8)
+    return case, fd.fidelity(case, count=8, reference="shell")
 
 
 @pytest.fixture(scope="module")
 def quick():
     """A fold on a coarse mesh, all models."""
     case = held(fd.Force([4, 5], (0, 0, 1e-4)), bend_law="superlinear")
-    return case, fd.fidelity(case, 5, divisions=(3, 6))
+    return case, fd.fidelity(case, 5, reference="shell", divisions=(3, 6))
 
 
 @pytest.mark.parametrize("support", beyond(SUPPORTS))
@@ -70,7 +70,7 @@ def test_errors_are_those_of_the_study(support, miura):
     (stored,) = [m for m in read(RESULTS / "documented.csv") if m.case == name]
     found = miura[1]
     if support == "free":
-        found = fd.fidelity(fd.Case(miura[0].structure), count=8)
+        found = fd.fidelity(fd.Case(miura[0].structure), count=8, reference="shell")
         assert found.result.attrs["rigid"] == 6
     kept = {"own": "standard, mixed_voronoi", "plate": "plate, consistent",
             "n5b8e": "n5b8e, condensed"}  # fmt: skip
@@ -84,6 +84,7 @@ def test_errors_are_those_of_the_study(support, miura):
             assert mine == pytest.approx((row.over_plate, row.error, row.mac), abs=1e-4)
 
 
+@pytest.mark.matrix
 def test_displacements_are_those_of_the_study(miura):
     """Case study 2 of docs/fidelity.md: 23.9 mm, -28 % and +0.6 % beside 8 and 16 divisions."""
     result = miura[1].result
@@ -106,7 +107,9 @@ def test_the_models_of_case_study_2(miura):
     assert max(m.mac for m in plate if not m.below) < 0.82
     assert all(m.mac > 0.9 and 0.0 < m.error < 0.2 for m in edges[3:7])
     assert any(math.isinf(m.error) and m.mac < 0.5 for m in plate)  # a plate's mode, lost
-    assert "; n5b8e up to 3.835 Hz (1.5 % at most)." in found.advice
+    assert found.result["cost_ratio"].min() > 10.0
+    assert 'The model "n5b8e" (scheme = "n5b8e", calibration = "plate"' in found.advice
+    assert "within 1.5 % of the shell up to 3.835 Hz, 0.6 of the plate frequency" in found.advice
     assert found.advice.endswith(SCOPE)
     assert repr(found) == "<Fidelity of own, plate, n5b8e: 8 modes, 3 below 3.835 Hz>"
     assert fd.case_of(found.result).loads == case.loads
@@ -116,11 +119,12 @@ def test_warnings_of_the_case_are_not_repeated(recwarn):
     partly = [fd.Fix([0, 1, 2, 3]), fd.Impose([4], "z", 0.1)]
     case = fd.Case(fold(**PLATE), partly, [fd.Force([4, 5], (0, 0, 1e-4))])
     assert len(recwarn) == 1  # the force acts in part where a node is moved
-    found = fd.fidelity(case, 2, divisions=(2, 4))
+    found = fd.fidelity(case, 2, reference="shell", divisions=(2, 4))
     assert len(recwarn) == 1
     assert "small loads" in str(found)
 
 
+@pytest.mark.matrix
 def test_numbers_stand_beside_their_units(quick):
     text = str(quick[1])
     assert max(map(len, text.splitlines())) <= 79
@@ -129,16 +133,19 @@ def test_numbers_stand_beside_their_units(quick):
 
 
 def test_a_case_with_the_right_model_keeps_it():
-    found = fd.fidelity(fd.Case(fold(**PLATE), [fd.Fix([0, 1, 2, 3])]), 2, divisions=(4, 8))
+    found = fd.fidelity(
+        fd.Case(fold(**PLATE), [fd.Fix([0, 1, 2, 3])]), 2, reference="shell", divisions=(4, 8)
+    )
     assert found.models == ("own", "standard", "n5b8e")
-    assert found.advice.startswith("Within 10 % of the shell, from the lowest mode on: own up to")
+    assert found.advice.startswith('The case\'s own model (calibration = "plate"')
+    assert "use it" not in found.advice
     assert "Displacements" not in found.advice  # there are no loads
     assert "deflection" not in found.result
 
 
 def test_a_free_sheet_has_no_displacement_under_its_weight():
     case = fd.Case(fold(**PLATE), [], [fd.Gravity((0, 0, -9.81))])
-    result = fd.fidelity(case, 2, divisions=(2, 4), models=[]).result
+    result = fd.fidelity(case, 2, reference="shell", divisions=(2, 4), models=[]).result
     assert result.attrs["rigid"] == 6
     assert "deflection" not in result
     assert (result["frequency"] > 0.0).all()
@@ -151,24 +158,23 @@ def test_superlinear_bends_have_no_stiffness(quick):
     assert np.isinf(found.result["deflection_error"].sel(model="own"))
     errors = found.result["deflection_error"].sel(model=["plate", "n5b8e"])
     np.testing.assert_allclose(errors, 0.0, atol=0.01)
-    assert "8 hinges of the case's own model are superlinear and have no" in found.advice
+    assert "8 of its hinges are superlinear and have no stiffness at rest" in found.advice
     assert "no stiffness at all (own)" in found.advice
     assert "soft" in str(found)
     assert "\nsoft: the model at rest has no stiffness against these loads\n" in str(found)
-    swung = fd.fidelity(case, 3, divisions=(2, 4), models=["plate"], secant=5.0)
+    swung = fd.fidelity(case, 3, reference="shell", divisions=(2, 4), models=["plate"], secant=5.0)
     assert np.isfinite(swung.result["deflection_error"]).all()
     assert "no stiffness" not in swung.advice
 
 
 def test_a_kresling_cell_vibrates_as_plates():
-    """Triangles that are held at their base have no mode below the limit."""
+    """Triangles that are held at their base have no mode below the limit: take the shell."""
     pattern = fd.patterns.kresling(sides=6, radius=1.0, height=0.9, twist=30)
     case = fd.Case(fd.discretize(pattern, SHEET, **PLATE), [fd.Fix("zmin")])
-    found = fd.fidelity(case, 3, divisions=(2, 4), models=["standard"])
+    found = fd.fidelity(case, 3, reference="shell", divisions=(2, 4), models=["standard"])
     assert not any(mode.below for mode in found.table())
     assert found.table()[1].shell == pytest.approx(found.table()[2].shell, rel=1e-3)  # symmetry
-    assert "panels vibrate as plates there, which bars and hinges do not" in found.advice
-    assert found.advice.endswith(SCOPE) and "fd.superelements" in SCOPE
+    assert "which bars and hinges do not: take superelements (--model" in found.advice
     assert str(found).count(" * ") == 3
     assert "\n* above 0.6 of the plate frequency, 1.365 Hz" in str(found)
 
@@ -223,9 +229,9 @@ def test_what_is_no_force_is_left_out():
     case = held(fd.Actuate("all", 100), push, fd.CreaseMoment("all", 1e-3))
     alone, others = forces_alone(case)
     assert (alone.loads, others) == ((push,), [0, 2])
-    found = fd.fidelity(case, 1, divisions=(2, 4), models=[])
+    found = fd.fidelity(case, 1, reference="shell", divisions=(2, 4), models=[])
     assert found.result.attrs["not_forces"] == "loads[0], loads[2]"
-    expected = fd.fidelity(held(push), 1, divisions=(2, 4), models=[])
+    expected = fd.fidelity(held(push), 1, reference="shell", divisions=(2, 4), models=[])
     assert float(found.result["deflection"]) == float(expected.result["deflection"])
 
 
@@ -258,17 +264,41 @@ def test_triangles_are_counted():
         assert triangle_count(pattern, 4) == len(made.triangles)
 
 
+def test_a_shell_too_large_is_refused():
+    with pytest.raises(InputError, match="divisions: the shell of 500 panels would have 16000"):
+        fd.fidelity(fd.Case(LONG), reference="shell", models=[])
+
+
+def test_superelements_are_the_reference_by_default(quick):
+    """They and the shell, graded alike, have the same limits, also under gravity and pressure."""
+    case = held(fd.Gravity((0.0, 0.0, -9.81)), fd.Pressure(2.0, [1]), fd.Force([4], (0, 0, 0.1)))
+    radius = SHEET.thickness
+    found = fd.fidelity(case, 4, models=[]).result
+    shell = fd.fidelity(
+        case, 4, reference="shell", divisions=(8, 12), models=[], vertex_radius=radius
+    ).result
+    np.testing.assert_allclose(found["frequency"], shell["frequency"], rtol=0.01)
+    np.testing.assert_allclose(found["error"], shell["error"], atol=0.02)
+    assert float(found["deflection"]) == pytest.approx(float(shell["deflection"]), rel=0.01)
+    assert (found["mesh_error"] < 0.02).all() and float(found["deflection_mesh_error"]) < 0.01
+    assert found.attrs["reference"] == "superelements" and "divisions" not in found.attrs
+
+
 def test_models_of_ones_own(quick):
     case, _ = quick
     found = fd.fidelity(
-        case, 2, divisions=(2, 4), models={"bubble": {**PLATE, "mass": "bubble"}, "same": {}}
+        case,
+        2,
+        reference="shell",
+        divisions=(2, 4),
+        models={"bubble": {**PLATE, "mass": "bubble"}, "same": {}},
     )
     assert found.models == ("own", "bubble")
     assert found.result["options"].values.tolist() == [
         'calibration = "standard", mass = "mixed_voronoi", bend_law = "superlinear"',
         'calibration = "plate", mass = "bubble", bend_law = "linear"',
     ]
-    cut = comparison(held(scheme="n4b5", **STANDARD), 2, (2, 4), ["plate"])
+    cut = comparison(held(scheme="n4b5", **STANDARD), 2, models=["plate"])
     assert cut.compared["plate"].structure.options.scheme == "n5b8"
     assert set(MODELS) == {"standard", "plate", "n5b8e", "bars"}
 
@@ -276,40 +306,56 @@ def test_models_of_ones_own(quick):
 def test_what_n5b8e_does_not_take_leaves_it_out():
     """By default, where no model is named; clamped edges go with all models."""
     soft = held(**STANDARD, fold_law="superlinear")  # no slope at rest
-    assert list(comparison(soft, 1, (2, 4)).compared) == ["own", "plate"]
+    assert list(comparison(soft, 1, "shell", (2, 4)).compared) == ["own", "plate"]
     clamped = held(**STANDARD, clamped=[(0, 1)])
-    assert list(comparison(clamped, 1, (2, 4)).compared) == ["own", "plate", "n5b8e"]
+    assert list(comparison(clamped, 1).compared) == ["own", "plate", "n5b8e"]
 
 
 def test_a_rest_state_out_of_balance_is_told():
     case = held(crease_rest=80.0, **STANDARD)
     with pytest.warns(FoldynWarning, match="the rest state is no equilibrium"):
-        fd.fidelity(case, 1, divisions=(2, 4), models=[])
+        fd.fidelity(case, 1, reference="shell", divisions=(2, 4), models=[])
 
 
-def advised(frequency, errors, **more):
+def advised(frequency, errors, reference="shell", **more):
     """Advice on made-up errors."""
-    k, m = np.shape(errors)
+    (k, m), facts = np.shape(errors), {"limit": 100.0, "reference": reference}
     values = {
         "frequency": frequency, "mesh_error": np.full(k, 0.001), "error": errors,
-        "mac": np.where(np.isinf(errors), 0.1, 0.99), 
-        "options": ["a", "b"][:m], "soft_hinges": [0] * m, **more,
+        "mac": np.where(np.isinf(errors), 0.1, 0.99), "seconds": 2.0,
+        "options": ["a", "b"][:m], "soft_hinges": [0] * m, "model_seconds": [0.02] * m,
+        "cost_ratio": [100.0] * m, **more,
     }  # fmt: skip
-    return fd.Fidelity(fidelity_dataset(held(), ["own", "plate"][:m], values, {"limit": 100.0}))
+    return fd.Fidelity(fidelity_dataset(held(), ["own", "plate"][:m], values, facts))
 
 
 def test_advice_follows_from_the_numbers():
     inf = np.inf
     own = advised([10.0, 20.0], [[0.015, 0.001], [-0.019, 0.001]]).advice
-    assert "mode on: own up to 20 Hz (1.9 % at most); plate up to 20 Hz (0.1 % at most)." in own
+    assert own.startswith("The case's own model (a) is within 1.9 % of the shell up to 20 Hz, the")
     other = advised([10.0, 20.0, 120.0], [[0.34, 0.03], [inf, -0.04], [0, 0]]).advice
-    assert "mode on: own in no mode; plate up to 100 Hz (4.0 % at most)." in other
-    partly = advised([10.0, 20.0, 30.0], [[0.5, 0.01], [0.5, 0.02], [0.5, inf]]).advice
-    assert "mode on: own in no mode; plate up to 20 Hz (2.0 % at most)." in partly
+    assert 'The model "plate" (b) is within 4.0 % of the shell up to 100 Hz, 0.6 of' in other
+    assert "at 1/100 of its cost: use it." in other
+    assert "own model (a) is off by up to 34 % and has no partner of 1 of 2 modes there" in other
+    partly = advised([10.0, 20.0, 30.0], [[0.5, 0.01], [0.5, 0.02], [0.5, inf]])
+    assert 'plate" (b) is within 2.0 % of the shell up to 20 Hz, at' in partly.advice
+    assert (
+        "The next mode, 30 Hz, has no partner in it: from there take superelements" in partly.advice
+    )
+    none = advised([10.0, 20.0], [[0.5, -0.2], [0.0, 0.0]]).advice
+    assert (
+        "No model has the lowest mode, 10 Hz, within 10 % of the shell: take superelements" in none
+    )
     coarse = advised([10.0, 20.0], [[0.0, 0.0], [0.0, 0.0]], mesh_error=np.array([0.0, -0.05]))
     assert "The finer mesh of the shell is itself about 5.0 % off" in coarse.advice
     unsettled = advised([10.0, 20.0], [[0.0, 0.0], [0.0, 0.0]], mesh_error=np.array([np.nan, 0.0]))
     assert "The meshes of the shell have not converged for mode 1, so that" in unsettled.advice
+    assert reach(partly.result, "plate", 3) == ("plate", 2, 0.02)
+    wide = advised(
+        [10.0, 20.0], [[0.0, 0.0], [0.0, 0.0]], "superelements", mesh_error=np.array([0.0, 0.03])
+    )
+    assert "is within 0.0 % of superelements up to 20 Hz" in wide.advice
+    assert "The superelements are themselves up to 3.0 % off" in wide.advice
 
 
 def test_percent():
@@ -348,8 +394,7 @@ CENTER = r"nodes: node {} is the center of panel {}"
         ),
         (lambda c: replace(c, masses=[fd.PointMass([6], 1.0)]), CENTER.format(6, 0)),
         (lambda c: replace(c, supports=[fd.Link([7], to=[2, 3, 4])]), CENTER.format(7, 1)),
-        (lambda c: fd.Case(ARROW), r"shell: .* not convex enough to be meshed"),
-        (lambda c: fd.Case(LONG), r"divisions: the shell of 500 panels would have 16000"),
+        (lambda c: fd.Case(ARROW), r"panel 0 .* not convex enough to be meshed"),
         (
             lambda c: replace(c, structure=SQUARE, supports=CORNERS),
             "^supports: hold every node alo",
@@ -364,10 +409,21 @@ def test_cases_that_are_refused(change, message):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        ({"reference": "beam"}, 'reference = "beam"'),
+        ({"divisions": (4, 8)}, "divisions = [4, 8]: are those of the shell"),
         ({"count": 0}, "count = 0: must be a whole number, at least 1"),
-        ({"divisions": 12}, "divisions = 12: give two numbers, as in (6, 12)"),
-        ({"divisions": (8, 8)}, "divisions = [8, 8]: the second mesh must be the finer one"),
-        ({"divisions": (0, 8)}, "divisions = 0: must be a whole number, at least 2"),
+        (
+            {"divisions": 12, "reference": "shell"},
+            "divisions = 12: give two numbers, as in (6, 12)",
+        ),
+        (
+            {"divisions": (8, 8), "reference": "shell"},
+            "divisions = [8, 8]: the second mesh must be the finer one",
+        ),
+        (
+            {"divisions": (0, 8), "reference": "shell"},
+            "divisions = 0: must be a whole number, at least 2",
+        ),
         ({"secant": 0.0}, "secant = 0.0: must be"),
         ({"models": "plate"}, 'models = "plate": give a list of names, as ["plate"]'),
         ({"models": ["plates"]}, "models = \"plates\": did you mean 'plate'? choose one of"),
@@ -386,11 +442,12 @@ def test_a_model_that_cannot_move_is_refused():
     moving = fd.Case(fd.discretize(SQUARE.pattern, SHEET, bend_law="linear"), CORNERS)
     with pytest.raises(InputError, match=r"^models: cut: supports: hold every node"):
         fd.fidelity(moving, models={"cut": {"scheme": "n4b5"}})
-    rows = fd.fidelity(moving, 6, divisions=(3, 6), models=[]).table()
+    rows = fd.fidelity(moving, 6, reference="shell", divisions=(3, 6), models=[]).table()
     assert [row.shell for row in rows] == sorted(row.shell for row in rows)  # extrapolated, too
     assert rows[0].mac == 0.0  # nothing moves where both have nodes
 
 
+@pytest.mark.matrix
 def test_only_comparisons_are_shown(quick):
     case, found = quick
     with pytest.raises(InputError, match=r"result: is a result of the kind modes; give one of"):
@@ -407,8 +464,8 @@ def test_graded_shells_agree_with_even_ones():
     pattern = fd.patterns.miura(cells=(1, 1), a=0.05, b=0.05, panel_angle=60, dihedral=90)
     sheet = fd.Sheet(2e9, 0.3, 1e-3, density=700.0)
     case = fd.Case(fd.discretize(pattern, sheet))
-    even = fd.fidelity(case, 5, models=["n5b8e"])
-    graded = fd.fidelity(case, 5, models=["n5b8e"], vertex_radius=1e-3)
+    even = fd.fidelity(case, 5, models=["n5b8e"], reference="shell")
+    graded = fd.fidelity(case, 5, models=["n5b8e"], reference="shell", vertex_radius=1e-3)
     assert list(graded.result.attrs["divisions"]) == [8, 12]
     assert "shell: graded toward vertices, within 0.001 m" in str(graded)
     assert "graded" not in str(even)
@@ -422,6 +479,6 @@ def test_divisions_of_graded_shells():
     case = held()
     for given in ((4, 8), (8, 10)):
         with pytest.raises(InputError, match="with a vertex_radius the first is a multiple of 8"):
-            fd.fidelity(case, divisions=given, vertex_radius=0.01)
+            fd.fidelity(case, reference="shell", divisions=given, vertex_radius=0.01)
     with pytest.raises(InputError, match=r"shell: vertex_radius = 0.4: "):
-        fd.fidelity(case, vertex_radius=0.4)
+        fd.fidelity(case, reference="shell", vertex_radius=0.4)

@@ -254,6 +254,7 @@ def test_zones_refuse_unknown_points():
         miura().path("G-X-M", 2)
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("error:.*no equilibrium")
 @pytest.mark.filterwarnings("ignore:the state is unstable")
 @pytest.mark.parametrize("preset", [None, "n5b8e"])

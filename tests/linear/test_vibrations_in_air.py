@@ -88,6 +88,7 @@ def test_frequencies_in_water_and_their_ratios_to_dry_ones_are_those_of_a_publis
     np.testing.assert_allclose(wet / dry, ratios, rtol=0.05)
 
 
+@pytest.mark.matrix
 def test_slender_plates_in_water_have_the_ratios_of_strip_theory():
     """Ratios of wet to dry frequency tend to those of a strip as the plate gets longer.
 
@@ -172,6 +173,7 @@ def test_modal_damping_has_its_ratios_in_air(sheet):
         np.testing.assert_allclose(ratios, [0.02, 0.03], rtol=1e-9)
 
 
+@pytest.mark.matrix
 def test_large_sheets_keep_the_mass_as_rows(monkeypatch):
     """The same modes and responses, and as many of them proven, as with a matrix."""
     pattern = fd.patterns.miura(cells=(2, 2), a=0.1, b=0.1, panel_angle=60, dihedral=60)

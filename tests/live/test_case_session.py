@@ -50,6 +50,7 @@ def test_computes_every_kind(session, kind):
     assert np.allclose(nodes[:6], fd.patterns.simple_fold(dihedral=90).vertices, atol=1e-6)
 
 
+@pytest.mark.matrix
 def test_a_response_curve_plays_its_motions(tmp_path, monkeypatch):
     head, _ = FOLD.replace('kind = "half_sine", duration', 'kind = "harmonic", frequency').split(
         "[analysis]"

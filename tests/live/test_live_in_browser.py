@@ -70,6 +70,7 @@ def hold_nodes(tab, server, dihedral):
     assert nodes_of(tab)[: vertices.size] == pytest.approx(vertices.ravel(), abs=1e-6)
 
 
+@pytest.mark.matrix
 def test_a_slider_changes_the_picture_and_the_view_stays(tab, running):
     opened(tab, running)
     before = 1

@@ -51,11 +51,13 @@ def request(server, method, path, body=None, **headers):
     return response.status, response.headers, text
 
 
+@pytest.mark.matrix
 def test_it_listens_to_this_machine_alone(server):
     assert server.server_address[0] == "127.0.0.1"
     assert server.address == f"http://127.0.0.1:{server.server_port}/{server.key}"
 
 
+@pytest.mark.matrix
 def test_the_page_and_its_answers(server):
     status, headers, text = request(server, "GET", f"/{server.key}")
     assert status == 200 and text == f"<p>the page of {server.key}</p>"
@@ -90,6 +92,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", REFUSED)
 def test_foreign_requests_are_refused(server, name):
     headers, status = REFUSED[name]
@@ -98,12 +101,14 @@ def test_foreign_requests_are_refused(server, name):
     assert server.asked == []
 
 
+@pytest.mark.matrix
 def test_what_is_no_json_is_refused(server):
     for body in ("{", "", "[" * 50_000):
         assert request(server, "POST", "/compute", body)[0] == 400
     assert server.asked == []
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     "path", ["/", "/compute", "/etc/passwd", "/../../etc/passwd", "/%2e%2e/etc/passwd", "//x", "*"]
 )
@@ -114,15 +119,18 @@ def test_no_other_path_is_known(server, path):
         assert request(server, "POST", path)[0] == 404
 
 
+@pytest.mark.matrix
 def test_a_page_of_another_host_is_not_given(server):
     assert request(server, "GET", f"/{server.key}", Host="evil.example")[0] == 403
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "TRACE"])
 def test_no_other_method_is_known(server, method):
     assert request(server, method, "/compute")[0] == 501
 
 
+@pytest.mark.matrix
 def test_connections_are_bounded_and_the_next_is_told_so(server):
     """Idle ones hold a thread each; as soon as one is gone there is room again."""
     before = threading.active_count()

@@ -95,6 +95,7 @@ def test_motions_keep_their_energy(method):
     assert abs(motion.attrs["energy_error"]) < 5e-3
 
 
+@pytest.mark.matrix
 def test_in_case_files_and_results(tmp_path):
     text = f"""{HELD_MIURA_TEXT}[model]
 calibration = "plate"

@@ -61,6 +61,7 @@ def test_panels_that_all_meet_have_no_end_of_it():
     assert clearance(made.nodes, made.triangles, made.triangle_panel).distance == np.inf
 
 
+@pytest.mark.matrix
 def test_a_folded_sheet_beside_points_all_over_its_panels():
     """The least distance of points on a fine grid is above by less than its spacing squared."""
     pattern = fd.patterns.miura((2, 2), panel_angle=70.0, dihedral=37.0)

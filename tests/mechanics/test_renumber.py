@@ -56,6 +56,7 @@ def test_renumbered_elements_of_mixed_and_user_laws_behave_alike(count):
     assert [run[2] for run in other.hinge_runs] == [run[2] for run in model.hinge_runs]
 
 
+@pytest.mark.matrix
 def test_node_order_brings_neighbors_together():
     """Across a sheet of 30 x 8 cells there are 17 vertices and 16 centers; its own numbers
     put all centers after all vertices."""

@@ -97,6 +97,7 @@ def test_strips_give_the_force_of_the_whole(monkeypatch, cells, laws):
     np.testing.assert_array_equal(work.angle, angle)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("count", "window", "laws"), in_pairs([2, 3, 4], [64, 16384], LAWS))
 def test_threads_agree_to_rounding_and_repeat_to_the_bit(monkeypatch, count, window, laws):
     model, u = sheet((60, 2), laws)

@@ -219,6 +219,7 @@ def test_creases_fold_one_state_into_another_without_strain(name, options, dihed
     assert energy[-1] < 1e-18 * energy.max()
 
 
+@pytest.mark.matrix
 def test_zipper_tubes_are_stiff_but_for_folding():
     """A tube folds and is squeezed softly, one end open and the other shut; a zipper only folds.
 

@@ -115,6 +115,7 @@ def test_letter_decides_where_panels_coincide(letter, angle):
     assert p.assignments == ((letter or "V"),)
 
 
+@pytest.mark.matrix
 @settings(max_examples=60)
 @given(data=st.data(), kind=st.sampled_from(sorted(GENERATORS)))
 def test_winding_is_made_consistent(data, kind):

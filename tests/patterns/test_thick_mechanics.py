@@ -111,6 +111,7 @@ def test_it_folds_as_the_boards_do(model, fraction):
         assert np.ptp(corners[:, 1]) == pytest.approx(4 * T, rel=1e-9)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("model", "method"), [("n5b8", "rk4"), ("shell", "newmark")])
 def test_a_motion_that_closes_two_boards(model, method):
     """It comes to rest with faces touching, at a dihedral of the hinge planes of 2 atan(t/w)."""

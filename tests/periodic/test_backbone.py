@@ -21,6 +21,7 @@ def spine():
     return fd.backbone(oscillator(), amplitudes=(1e-3, 2.0), harmonics=25)
 
 
+@pytest.mark.matrix
 def test_backbone_of_duffing_is_that_of_elliptic_functions(spine):
     a = spine.amplitude.values
     assert a[[0, -1]] == pytest.approx([1e-3, 2.0], rel=1e-7)
@@ -46,6 +47,7 @@ def test_small_motions_have_the_frequency_of_the_linear_mode(miura, mode):
     assert found.energy_drift.values.max() < 1e-12
 
 
+@pytest.mark.matrix
 def test_energy_of_a_sheet_is_constant_and_the_motion_is_a_simulated_one(miura):
     found = fd.backbone(miura, amplitudes=(1e-3, 2e-2), harmonics=9)
     assert found.energy_drift.values.max() < 1e-10
@@ -78,6 +80,7 @@ def test_resonance_without_damping_is_refused():
         fd.backbone(case, amplitudes=(0.01, 0.1), damped=True)
 
 
+@pytest.mark.matrix
 def test_damped_backbone_is_that_of_the_scalar_equation(resonant):
     assert resonant.frequency.values == pytest.approx(
         exact_frequency(resonant.amplitude.values), rel=1e-5
@@ -114,6 +117,7 @@ def test_what_does_not_swing_is_refused_and_what_is_lost_is_warned_of():
     assert found.sizes["point"] == 5
 
 
+@pytest.mark.matrix
 def test_points_found_are_kept_when_it_is_interrupted():
     def stop(state):
         if state.steps > 4:

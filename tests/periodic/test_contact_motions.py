@@ -54,6 +54,7 @@ def test_harmonics_converge_to_what_shooting_finds(found):
     assert size[0] == pytest.approx(size[1], rel=2e-3)
 
 
+@pytest.mark.matrix
 def test_simulated_motion_settles_on_it(found):
     assert bool(found[-1].stable)
     run = fd.simulate(bouncing(), 16.0 / F, method="rk4", dt=1.0 / F / 512, every_steps=4)
@@ -61,6 +62,7 @@ def test_simulated_motion_settles_on_it(found):
     assert last == pytest.approx(height(found[-1]), abs=2e-5)
 
 
+@pytest.mark.matrix
 def test_a_plane_that_swings_drives():
     swinging = bouncing(motion=(0, 0, 0.1), history=fd.Harmonic(F)).altered(loads=[])
     assert drive_frequency(swinging) == F
@@ -84,6 +86,7 @@ def test_a_plane_that_swings_drives():
     assert steady.amplitude.values[0] == pytest.approx(swings, rel=1e-3)
 
 
+@pytest.mark.matrix
 def test_free_motions_against_the_plane_keep_their_energy():
     spine = fd.backbone(bouncing(), amplitudes=(0.04, 0.1), harmonics=12)
     assert spine.frequency.values[-1] > 1.02 * spine.frequency.values[0]  # it hardens
@@ -95,6 +98,7 @@ def test_free_motions_against_the_plane_keep_their_energy():
     assert run.displacement.values[-1] == pytest.approx(start.displacement, abs=1e-4 * 0.1)
 
 
+@pytest.mark.matrix
 def test_panels_touch():
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=38)
     s = fd.discretize(pattern, fd.Sheet(1e5, 0.25, 0.1, 1.0), scheme="n4b5", bend_law="linear")

@@ -71,6 +71,7 @@ def test_motions_of_supports_are_differentiated_twice():
         assert moved(phase)[1:] == pytest.approx(change[:2], rel=1e-6)
 
 
+@pytest.mark.matrix
 def test_resonance_of_a_swinging_base_is_that_of_the_forces_by_which_it_moves_the_mass():
     """Bars at right angles to it have no stiffness: inertia and drag alone drive the node."""
     case = shaken().altered(loads=[])

@@ -48,6 +48,7 @@ def rate(t, state, f):
     return np.concatenate([own, (slope @ deviation).ravel()])
 
 
+@pytest.mark.matrix
 def test_it_is_where_a_pair_of_the_equation_leaves_the_circle(curve):
     (at,) = np.flatnonzero(curve.bifurcation.values == "Neimark-Sacker")
     found = curve.isel(point=at)
@@ -84,6 +85,7 @@ def strobed(point, periods=600):
     return run.displacement.values[:, X, 2] - one.displacement.values[0, X, 2], one
 
 
+@pytest.mark.matrix
 def test_motions_before_it_are_steady_and_beyond_it_quasi_periodic(curve):
     before, one = strobed(curve.isel(point=0))
     assert bool(one.stable)

@@ -36,6 +36,7 @@ def fold(loads=(), supports=(), mass_rule="panel", alpha=0.5):
     return fd.Case(s, held, list(loads), fd.Rayleigh(alpha=alpha))
 
 
+@pytest.mark.matrix
 def test_harmonics_converge_spectrally_to_what_shooting_finds(strong):
     shot = fd.periodic_motion(oscillator(), method="shooting", steps=256)
     assert difference(strong, shot) < 1e-8
@@ -115,6 +116,7 @@ def test_multipliers_are_those_of_deviations_in_simulated_motion(strong):
     assert np.sort_complex(found) == pytest.approx(np.sort_complex(strong.floquet.values), abs=1e-6)
 
 
+@pytest.mark.matrix
 def test_simulated_motion_settles_on_it(strong):
     run = fd.simulate(oscillator(), 400.0, method="rk4", dt=4.0 / 2048, every_steps=16)
     last = run.displacement.values[-129:-1, NODE, 2]

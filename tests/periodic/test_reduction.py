@@ -31,6 +31,7 @@ def test_all_modes_but_one_and_their_derivatives_are_nearly_everything():
     assert "reduction" not in whole.attrs
 
 
+@pytest.mark.matrix
 def test_few_modes_come_near_and_say_how_near():
     case = cell(2e-4)
     whole = fd.periodic_motion(case, harmonics=5)

@@ -42,6 +42,7 @@ def period_map(z, v, f):
     return end[:2], end[2:].reshape(2, 2).T
 
 
+@pytest.mark.matrix
 def test_folds_are_those_of_the_scalar_equation(curve):
     def at_fold(y):
         end, monodromy = period_map(*y)
@@ -58,6 +59,7 @@ def test_folds_are_those_of_the_scalar_equation(curve):
         assert np.abs(found.floquet.values - 1.0).min() < 1e-5
 
 
+@pytest.mark.matrix
 def test_folds_of_one_harmonic_are_the_textbook_ones():
     # Duffing's frequency equation (Nayfeh and Mook, Nonlinear Oscillations, 1979, section 4.1; here
     # by harmonic balance): ((k + 3/4 k3 a^2 - m w^2)^2 + (c w)^2) a^2 = F^2 has vertical tangents
@@ -95,6 +97,7 @@ def test_only_motions_between_the_folds_are_unstable_and_they_repel(curve):
     assert np.abs(away).max() > 1e3 * 1e-4
 
 
+@pytest.mark.matrix
 def test_curve_of_small_motions_is_the_linear_response():
     case = oscillator(force=1e-5)
     found = fd.response_curve(case, frequencies=(0.4, 0.1), harmonics=3, **FEW)
@@ -177,6 +180,7 @@ def in_a_well(share):
     return case, f
 
 
+@pytest.mark.matrix
 def test_period_doubles_and_simulation_follows():
     case, f = in_a_well(0.2)
     found = fd.response_curve(case, frequencies=(1.4 * f, 0.7 * f), harmonics=8, longest_step=0.2)
@@ -199,6 +203,7 @@ def test_period_doubles_and_simulation_follows():
     assert abs(z[1] - z[0]) > 1e-3
 
 
+@pytest.mark.matrix
 def test_measure_shows_what_it_says(curve):
     height = fd.Quantity("mm", "height", function=lambda u, v, t: 1e3 * u[NODE, 2])
     found = fd.response_curve(oscillator(), (0.1, 0.12), harmonics=3, measure=height, **FEW)
@@ -213,6 +218,7 @@ def test_measure_shows_what_it_says(curve):
     assert slow.amplitude.values == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.matrix
 def test_points_found_are_kept_with_a_warning():
     with pytest.warns(FoldynWarning, match="more than 5 points, which are kept"):
         found = fd.response_curve(oscillator(), (0.1, 0.6), harmonics=3, most_points=5)
@@ -220,6 +226,7 @@ def test_points_found_are_kept_with_a_warning():
     assert found.sizes["point"] == 6
 
 
+@pytest.mark.matrix
 def test_what_nothing_damps_is_told_where_its_curve_does_not_end():
     undamped = oscillator(alpha=0.0)
     with pytest.warns(FoldynWarning, match="point") as told:
@@ -227,6 +234,7 @@ def test_what_nothing_damps_is_told_where_its_curve_does_not_end():
     assert "give more most_points. Nothing damps the sheet" in str(told[0].message)
 
 
+@pytest.mark.matrix
 def test_points_found_are_kept_when_it_is_interrupted():
     def stop(state):
         if state.steps > 12:

@@ -20,6 +20,7 @@ from foldyn.plots.animation import frame_displacements, pace
 from foldyn.plots.scene import Sheet3D, View
 
 
+@pytest.mark.matrix
 def test_asked_frames_and_rate(case, trajectory, tmp_path):
     swing = trajectory.isel(time=slice(0, 40))
     path = animate(case, swing, path=tmp_path / "motion.gif", frames=9, fps=20, scale=5.0)
@@ -108,6 +109,7 @@ def count(picture: np.ndarray, color: str) -> int:
     return int(near[: int(0.85 * len(picture))].sum())  # above the legend
 
 
+@pytest.mark.matrix
 def test_the_frame_holds_a_free_flight(flight, tmp_path):
     case, motion = flight
     drawn = frames(animate(case, motion, path=tmp_path / "flight.gif", frames=7))
@@ -130,6 +132,7 @@ def test_a_free_flight_leaves_the_path_of_its_center(flight, case, trajectory, t
     assert all(count(frame, style.GREEN) == 0 for frame in staying)
 
 
+@pytest.mark.matrix
 def test_creases_glow_unless_all_are_actuated(structure, trajectory, tmp_path):
     some = cases.Case(structure, loads=[cases.Actuate([0], 90.0)])
     glowing = frames(animate(some, trajectory, path=tmp_path / "some.gif", frames=2))

@@ -39,6 +39,7 @@ def test_boards_move_with_their_panels():
     )
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("model", ["bars", "shell"])
 def test_one_state_or_several(model):
     sheet = fd.Sheet(1e8, 0.3, T, 500.0)

@@ -78,6 +78,7 @@ def test_moments_of_their_own_are_told_by_their_range() -> None:
     assert "moments -0.1 to 0.2 N m of creases 0, 2" in keys(draw_structure(case))
 
 
+@pytest.mark.matrix
 def test_a_crowd_of_nodes_has_fewer_arrows_than_nodes() -> None:
     s = fd.shell(PATTERN, SHEET, divisions=32)
     figure = draw_structure(fd.Case(s, loads=[fd.LineLoad("xmax", (0, 0, 1.0))]), numbers=False)

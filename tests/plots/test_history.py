@@ -13,6 +13,7 @@ def _lines(axes):
     return {line.get_label(): line for line in axes.get_lines()}
 
 
+@pytest.mark.matrix
 def test_one_row_per_node_one_curve_per_trajectory(two_rules):
     figure = plot_history(two_rules, [6, 7, 8], axes="x", max_frequency=5.0)
     assert len(figure.axes) == 6
@@ -63,6 +64,7 @@ def test_frequencies_are_shown_as_far_as_there_is_content(two_rules):
     )
 
 
+@pytest.mark.matrix
 def test_legend_holds_the_labels_once_outside_the_axes(two_rules):
     figure = plot_history(two_rules, [6, 7], axes="x")
     (legend,) = figure.legends

@@ -133,6 +133,7 @@ def cantilever():
     return case, fd.linear.modes(case, count=4)
 
 
+@pytest.mark.matrix
 def test_what_modes_do_is_told_with_its_share(cantilever):
     case, modes = cantilever
     character = fd.linear.character(modes, "x")
@@ -244,6 +245,7 @@ def test_bad_films(case, modes, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.matrix
 def test_modes_bring_their_case(case, modes, tmp_path):
     """By its place or its name, with the other arguments behind it as they are."""
     expected = draw_modes(case, modes, which=[5, 1], amplitude=0.1)

@@ -85,6 +85,7 @@ def test_a_moving_base_is_one_arrow(shaken, sheet):
     assert len(force) == 1
 
 
+@pytest.mark.matrix
 def test_nothing_is_cut_off(moved, shaken):
     for figure in (draw_structure(moved), draw_structure(shaken), plot_load_history(moved, 3.0)):
         assert_white_rim(figure)

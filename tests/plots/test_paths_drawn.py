@@ -235,6 +235,7 @@ def sheets(figure):
     return found
 
 
+@pytest.mark.matrix
 def test_shapes_are_the_chosen_points(case, path):
     figure = draw_shapes(case, path, points=[0, 2, -1], scale=2.0, view=(90.0, -90.0))
     assert [text.get_text() for text in figure.texts] == [
@@ -311,6 +312,7 @@ def test_hidden_panels_are_painted_first():
         assert (side * (corners.mean(axis=1)[:, 0] - ridge) > 0.0).all()
 
 
+@pytest.mark.matrix
 def test_an_animation_of_a_path_tells_load_factors(case, path, tmp_path, monkeypatch):
     told = []
     factors = animation._factors
@@ -375,6 +377,7 @@ def test_motions_are_no_paths(case, trajectory):
         plot_load_displacement({"a": trajectory}, [7])
 
 
+@pytest.mark.matrix
 def test_a_path_alone_needs_no_label_and_brings_its_case(held):
     path = made(held)
     nodes = np.flatnonzero(np.isclose(held.structure.nodes[:, 0], held.structure.nodes[:, 0].max()))

@@ -17,6 +17,7 @@ from foldyn import plots
 from foldyn.errors import InputError
 
 
+@pytest.mark.matrix
 def test_matplotlib_is_imported_on_first_use():
     code = (
         "import sys, foldyn, foldyn.plots, foldyn.report\n"

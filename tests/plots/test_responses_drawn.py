@@ -130,6 +130,7 @@ def test_coherence_is_drawn_where_there_is_one(case, response):
     assert line(coherence, "noisy").get_color() == line(magnitude, "noisy").get_color()
 
 
+@pytest.mark.matrix
 def test_models_and_nodes_are_told_apart(case, response):
     stiffer = made(case, poles=((5.0, 0.02, 1.0),))
     figure = plot_frf({"a": response, "b": stiffer}, [7, 6])
@@ -178,6 +179,7 @@ def test_frequencies_without_a_response_are_left_out(case):
         figure.canvas.draw()
 
 
+@pytest.mark.matrix
 def test_a_node_that_does_not_move_and_few_frequencies(case, response):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -189,6 +191,7 @@ def test_a_node_that_does_not_move_and_few_frequencies(case, response):
     assert not len(peak_dots(two.axes[0]))
 
 
+@pytest.mark.matrix
 def test_nothing_is_cut_off(case):
     noisy = made(case, coherence=0.5)
     for figure in (

@@ -150,6 +150,7 @@ def test_lines_go_through_the_points(plane):
     assert modes.axes[0].get_ylabel() == "value, b 10 (Hz)"
 
 
+@pytest.mark.matrix
 def test_samples_are_dots_and_texts_have_their_words(case, design):
     figure = plot_sweep_map(design, "value", x="x1", y="x3")
     offsets = figure.axes[0].collections[0].get_offsets()

@@ -217,6 +217,7 @@ def drawn(case):
     yield fd.frf(case, frequencies=[1.0, 2.0], drive=fd.Force("xmax", (0, 0, 1.0)))
 
 
+@pytest.mark.matrix
 def test_a_printed_result_shows_physics_and_a_copy_of_it_is_rerunnable(tmp_path) -> None:
     """Of the case it names one variable, whatever is stored; other programs keep that one."""
     made = fd.discretize(CELLS, SHEET, crease_stiffness=PER_CREASE["crease_stiffness"])
@@ -283,6 +284,7 @@ def test_rebuilding_repeats_no_warning(recwarn) -> None:
 
 
 # ------------------------------------------------------------------ files
+@pytest.mark.matrix
 def test_files_that_are_no_results(tmp_path) -> None:
     (tmp_path / "text.nc").write_text("not NetCDF")
     xr.Dataset({"a": ("x", [1.0])}).to_netcdf(tmp_path / "other.nc", engine="h5netcdf")

@@ -211,6 +211,7 @@ def test_the_landscape_of_a_snap_through():
         assert np.abs(other - one).max() < 1e-6 * np.abs(one).max()
 
 
+@pytest.mark.matrix
 def test_a_micrometer_is_as_long_as_a_meter():
     """A Miura cell of 10 um, which one length hidden in the error's floor once made 9 % wrong."""
 

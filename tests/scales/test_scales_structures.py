@@ -97,6 +97,7 @@ def test_mass_rules(name, rule):
     hold(told)
 
 
+@pytest.mark.matrix
 def test_selections_of_nodes():
     high = float(miura(ONE).nodes[:, 2].max())
 
@@ -149,6 +150,7 @@ def test_signals():
     hold(told, 1e-6)
 
 
+@pytest.mark.matrix
 def test_names_of_modes():
     def names(by):
         case = fd.Case(miura(by, bend_law="linear"), [fd.Fix([0, 1, 2], "xyz")])

@@ -23,6 +23,7 @@ def frequencies(divisions, mass="lumped"):
     return angular_frequencies(s, MIURA_HELD, 3, shift=2.0) / (2 * np.pi)
 
 
+@pytest.mark.matrix
 def test_frequencies_of_case_2_converge_from_below():
     assert frequencies(16, "consistent") == pytest.approx(FREQUENCIES, rel=5e-3)
     found = np.array([frequencies(n) for n in (4, 8, 16)])

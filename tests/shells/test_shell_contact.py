@@ -206,6 +206,7 @@ def thrown(method: str, **options):
     return case, fd.simulate(case, 0.01, method=method, initial=fd.State(velocity=v), **options)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", [*IMPLICIT[:1], *beyond(IMPLICIT[1:])])
 def test_colliding_shells_keep_momentum_and_energy(method):
     pytest.importorskip("ipctk")

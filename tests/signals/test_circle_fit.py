@@ -82,6 +82,7 @@ def test_modes_as_close_as_their_width():
     hold(circle_fits(f, receptance(f, *pair), bands=[(8.6, 9.75), (9.8, 10.9)]), pair, 1e-8, 1e-7)
 
 
+@pytest.mark.matrix
 def test_scatter_over_seeds_is_stated_and_the_least_possible():
     """Noise of 2 % of the circle's diameter, 200 seeds, band of twice the half-power width.
 
@@ -113,6 +114,7 @@ def test_scatter_over_seeds_is_stated_and_the_least_possible():
     assert bound[1] / 0.135 == pytest.approx(0.0117, rel=0.1)  # 1.2 % of the damping ratio
 
 
+@pytest.mark.matrix
 def test_mere_noise_is_refused():
     rng = np.random.default_rng(13)
     f = np.linspace(5.0, 15.0, 40)

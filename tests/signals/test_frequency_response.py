@@ -162,6 +162,7 @@ def test_coherence_of_unrelated_records_is_one_over_their_number():
     assert one.segments == 1 and np.isnan(one.coherence).all()
 
 
+@pytest.mark.matrix
 def test_scatter_over_seeds_is_the_stated_random_error():
     """Magnitude and phase (rad) deviate by sqrt((1 - c) / (2 n c)): 16 records, 200 seeds."""
     lines = slice(60, 140)
@@ -178,6 +179,7 @@ def test_scatter_over_seeds_is_the_stated_random_error():
     assert 0.01 < expected < 0.1
 
 
+@pytest.mark.matrix
 def test_noisy_records_tell_frequency_and_damping_within_their_errors():
     """20 bursts of 10 s, noise of 10 % of the response's deviation, 60 seeds.
 

@@ -86,6 +86,7 @@ def test_damping_that_depends_on_amplitude_shows_in_the_pairs():
     np.testing.assert_allclose(result.successive, -np.diff(np.log(heights))[1:], rtol=0.02)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("z", "bias", "deviation"), [(0.0255, 0.004, 0.01), (0.135, 0.03, 0.035)])
 def test_scatter_over_seeds(z, bias, deviation):
     """Noise of 1 % of the amplitude at 25 samples per cycle, 100 seeds, rest position known.

@@ -56,6 +56,7 @@ def pressed_shut(model):
     return case, fd.trace(case, "newton", steps=10)
 
 
+@pytest.mark.matrix
 def test_a_plane_presses_a_fold_shut():
     """Soft while boards turn, and then as stiff as their faces; no less force on the support."""
     s = fold(170.0)

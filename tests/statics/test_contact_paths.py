@@ -23,6 +23,7 @@ def folded(targets, steps: int = 4, **options):
     return case, fd.trace(case, "newton", steps=steps, **options)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("targets", "rest"), [*zip(TARGETS, RESTS, strict=True)])
 @pytest.mark.filterwarnings("ignore:the path loses stability")  # edge on edge it may slip
 def test_a_strip_folded_from_both_ends_comes_to_rest_in_contact(targets, rest):
@@ -40,6 +41,7 @@ def test_a_strip_folded_from_both_ends_comes_to_rest_in_contact(targets, rest):
     assert angle.min() == pytest.approx(rest, abs=0.01)
 
 
+@pytest.mark.matrix
 def test_without_the_limit_of_newtons_steps_it_crosses_itself(monkeypatch):
     pytest.importorskip("ipctk")
     hasty = Settings(jump=1e6, iterations=100)  # nothing else cuts the steps
@@ -65,6 +67,7 @@ def pressed():
     return case, layers, closing, block
 
 
+@pytest.mark.matrix
 def test_a_sheet_pressed_to_a_block_carries_load_as_its_layers_say(pressed):
     """Forces of a prototype, which minimizes energies, at lengths over the layers' thickness."""
     pytest.importorskip("ipctk")

@@ -55,6 +55,7 @@ def test_larger_patterns_take_no_more_steps(monkeypatch):
     assert max(counted) < 300 and counted[1] < 1.5 * counted[0]
 
 
+@pytest.mark.matrix
 def test_sheets_of_many_ways_to_fold_let_their_springs_go_in_few_steps(monkeypatch):
     solved, factorized = [0], Curvature.factorized
 

@@ -71,6 +71,7 @@ def test_a_dragged_strip_slides_under_mu_n_whatever_the_steps(surface, steps):
     assert lost == pytest.approx(3.5669556e-6, rel=1e-6)  # in 100 steps
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("surface", "close"), [("plane", 1e-6), ("panel", 1e-5)])
 def test_the_work_of_a_cycle_is_what_slipping_takes(surface, close):
     work, lost, stored = cycle(lambda factors: dragged(factors, surface))
@@ -85,6 +86,7 @@ def tilted(factors, surface="plane"):
     return fd.trace(SURFACES[surface][0]([], [aside]), "newton", load_factors=factors, constant=[0])
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("surface", SURFACES)
 def test_what_leans_holds_up_to_the_angle_of_friction(surface):
     with pytest.raises(ComputationError, match="no equilibrium was found beyond the load factor 0"):
@@ -168,6 +170,7 @@ def cycles():
     }
 
 
+@pytest.mark.matrix
 def test_a_rough_press_meets_more_force_on_the_way_in_and_less_on_the_way_out(cycles):
     smooth, force = (plates(*cycles[mu])[0] for mu in (0.0, 0.3))
     np.testing.assert_allclose(smooth[:8], smooth[:-9:-1], rtol=1e-6)
@@ -200,6 +203,7 @@ def test_friction_converges_with_the_steps_of_a_path():
     np.testing.assert_array_equal(again.displacement, paths[0].displacement)
 
 
+@pytest.mark.matrix
 def test_a_press_whose_creases_yield():
     """What never yields is elastic; what yields takes work, and lets the plates go."""
     case, _ = press()

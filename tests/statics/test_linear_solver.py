@@ -97,6 +97,7 @@ def test_a_pattern_is_ordered_once(monkeypatch):
     assert phases.count(pardiso.ANALYSIS) == 3
 
 
+@pytest.mark.matrix
 @pytest.mark.skipif("pardiso" not in PRESENT, reason="needs mkl")
 def test_the_same_bits_again():
     matrix, b = symmetric(3000, 0), np.ones(3000)

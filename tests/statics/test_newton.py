@@ -189,6 +189,7 @@ def test_tighter_tolerance_gives_a_closer_state():
     assert float(usual.residual[0]) < 1e-9
 
 
+@pytest.mark.matrix
 def test_panels_do_not_pass_through_each_other():
     """A linear fold under a closing moment has no equilibrium beyond closed: the path ends."""
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=40)

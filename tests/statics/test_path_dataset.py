@@ -69,6 +69,7 @@ def test_saved_and_loaded(path, stored):
     np.testing.assert_array_equal(repeated.displacement, path.displacement)
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the path loses stability")
 def test_partial_paths_and_branches_are_stored_too(stored):
     """A path of a structure made by hand cannot be run again."""
@@ -160,6 +161,7 @@ def test_statistics_cannot_hide_what_every_result_has():
         )
 
 
+@pytest.mark.matrix
 def test_cost_of_the_specimen():
     """MERLIN2 takes 1151 iterations for its 87 increments."""
     path = trace(compression(), "displacement", steps=87)

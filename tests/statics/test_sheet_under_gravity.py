@@ -36,6 +36,7 @@ def test_one_load_step(cells, most):
     assert path.negative_eigenvalues.values.tolist() == [0]
 
 
+@pytest.mark.matrix
 def test_extrapolated_stress_saves_iterations(monkeypatch):
     """Without it the same step takes half as many again: 11 and 7 iterations."""
     case = sheet(10, thickness=0.24e-3)

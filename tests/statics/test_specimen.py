@@ -83,6 +83,7 @@ def test_weight_is_carried(path, weight):
     assert mass == pytest.approx(0.24e-3 * 667 * 48 * 0.025**2 * np.sin(np.pi / 3), rel=1e-9)
 
 
+@pytest.mark.matrix
 def test_work_is_the_change_of_energy(rest):
     """To second order in the step: trapezoids of the forces along the path."""
     errors, counts = [], np.array([14, 28, 56])

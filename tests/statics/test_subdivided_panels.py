@@ -44,6 +44,7 @@ def test_a_subdivided_pattern_is_the_same_sheet():
     np.testing.assert_allclose(lengths, 0.5)
 
 
+@pytest.mark.matrix
 def test_a_driven_crease_is_driven_as_a_whole():
     folding = fd.fold(vertex([90] * 4, "VVVM"), {(0, 1): 60}, steps=4, panels="subdivided")
     driven = np.isfinite(folding.targets)

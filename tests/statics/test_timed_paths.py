@@ -150,6 +150,7 @@ def test_a_sheet_moves_as_in_a_slow_motion(part, laws, damping):
         np.testing.assert_allclose(path.memory[-1], motion.memory[-1], atol=5e-3 * scale)
 
 
+@pytest.mark.matrix
 def test_steps_that_are_cut_take_their_shares_of_the_time():
     case, few = pressed(fd.Prony(0.7, 0.3, law="linear"), 7e-3), {"iterations": 4}
     path = fd.trace(case, load_factors=[0.0, 1.0, 1.0], duration=[1.0, 2.0], settings=few)
@@ -160,6 +161,7 @@ def test_steps_that_are_cut_take_their_shares_of_the_time():
     assert opened(path)[-1] == pytest.approx(opened(fine)[-1], rel=5e-3)
 
 
+@pytest.mark.matrix
 def test_creep_buckling():
     """Under a load between the long-time limit and the instantaneous one it gives way in time.
 

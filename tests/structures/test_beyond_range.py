@@ -171,6 +171,7 @@ def test_modes_above_the_range():
     assert told(lambda: fd.modes(shell, 14)) == []
 
 
+@pytest.mark.matrix
 def test_responses_and_bands_above_the_range():
     structure, limit = fd.discretize(MIURA, CARD), 0.6 * plate_frequency(MIURA, CARD)
     held, push = fd.Case(structure, [fd.Fix("xmin")]), fd.Force([6], (0.0, 0.0, 1.0))

@@ -195,6 +195,7 @@ def test_warmth_that_all_panels_share_only_scales_a_sheet():
     np.testing.assert_allclose(pdist(moved), 1.1 * pdist(structure.nodes), atol=1e-8)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("pattern", "worst"),
     [
@@ -228,6 +229,7 @@ METHODS = ("rk4", "central_difference", "dormand_prince", "newmark", "generalize
            "energy_momentum")  # fmt: skip
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("options", [{"mass": "mixed_voronoi"}, {"preset": "n5b8e"}])
 def test_all_methods_find_the_same_motion(options):
     options = {"mass": "mixed_voronoi", **options}
@@ -284,6 +286,7 @@ def test_extrapolated_stress_saves_iterations(preset, monkeypatch):
     assert plain.attrs["iterations"] > 1.15 * quick.attrs["iterations"]
 
 
+@pytest.mark.matrix
 def test_threads_share_panels(monkeypatch):
     """The same motion to rounding, whichever thread a panel's nodes belong to."""
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
@@ -329,6 +332,7 @@ def test_a_law_of_single_bars_has_single_bars():
     assert fd.discretize(pattern, RUBBER, bar_law="linear").options.membrane == "panel"
 
 
+@pytest.mark.matrix
 def test_stiffness_follows_the_length_without_jumps():
     """The slope is the same by small and smaller steps, which whole waves would break by 6e-4."""
     sheet = fd.Sheet(3e9, 0.3, 1e-3, 800.0)

@@ -77,6 +77,7 @@ def test_a_curved_sheet_of_facets():
     np.testing.assert_allclose(made[:2], shell[:2], rtol=0.05)
 
 
+@pytest.mark.matrix
 def test_strip_bends_far():
     """A strip of ten panels, the first held at its corners, whose tip rises by a ninth of it."""
     pattern = fd.welded(cut_across(np.linspace(0.1, 0.9, 9)))

@@ -91,6 +91,7 @@ def test_sets_are_large_enough():
     assert [c.name for c in drawn(seed=1)] != names["drawn"]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("number", [0, 47, *beyond([19, 34])])
 def test_stored_results_are_what_the_code_gives(number):
     case = documented()[number]

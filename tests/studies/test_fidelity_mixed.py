@@ -27,6 +27,7 @@ def sets():
     return {name: mixed(name) for name in SETS}
 
 
+@pytest.mark.matrix
 def test_sets_are_mixed_from_the_start(sets):
     names = [case.name for cases in sets.values() for case in cases]
     assert len(set(names)) == len(names) == 100
@@ -37,6 +38,7 @@ def test_sets_are_mixed_from_the_start(sets):
         assert max(case.triangles(case.divisions[-1]) for case in cases) <= LARGE
 
 
+@pytest.mark.matrix
 def test_held_edges_are_rims(sets):
     """Edges that are held are edges of the boundary, two ends as long as each other in grids."""
     for case in (case for cases in sets.values() for case in cases):
@@ -73,6 +75,7 @@ def test_stored_shell_is_what_the_code_gives(sets):
     assert np.abs(np.abs(again.shape) - np.abs(kept.shape)).max() <= 3.0
 
 
+@pytest.mark.matrix
 def test_models_need_no_shell(sets):
     """Shapes of sheets that are stored pair with those of a model."""
     case = sets["mixed_1"][0]
@@ -104,6 +107,7 @@ def test_shares_of_the_mixed_sets():
     assert first["superelements"] == 1.0 and first["plate"] >= 0.70  # it has no modes of panels
 
 
+@pytest.mark.matrix
 def test_sets_are_stored_whole(sets):
     names = {case.name for cases in sets.values() for case in cases}
     assert names == {line for name in SETS for line in read_references(name)}

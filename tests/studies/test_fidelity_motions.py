@@ -85,6 +85,7 @@ def fold():
     return case, made, Release.of(case, made[SHELL], elastic(case, made[SHELL], 1)[1][0])
 
 
+@pytest.mark.matrix
 def test_all_models_are_held_at_the_same_fold(fold):
     case, made, release = fold
     wanted = np.radians([5.0, 30.0])
@@ -132,6 +133,7 @@ def test_stored_results_are_what_the_code_gives():
         np.testing.assert_allclose(run.alike, kept.alike, atol=2e-3)
 
 
+@pytest.mark.matrix
 def test_small_motions_have_the_linear_frequency():
     """A degree of fold: the shell's period is that of its first mode to the error of the step."""
     case = documented()[1]
@@ -207,6 +209,7 @@ def test_motions_that_fail_are_told():
     assert [run.note for run in runs(started(shell=bad, b=good))] == ["the fold is not reached"]
 
 
+@pytest.mark.matrix
 def test_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(motions, "AMPLITUDES", (5.0,))
     one = next(iter(released(documented()[1], (2.0,), 2)))
@@ -217,6 +220,7 @@ def test_the_command(tmp_path, monkeypatch, capsys):
     assert len(read(tmp_path / "motions.csv")) == 5  # the shell and four models
 
 
+@pytest.mark.matrix
 def test_why_panels_harden():
     """A panel bowed by its crease stretches its spokes; the shell's bends without stretching.
 
@@ -241,6 +245,7 @@ def test_why_panels_harden():
     assert weak == pytest.approx(1.0, abs=0.04)
 
 
+@pytest.mark.matrix
 def test_a_tower_is_as_stiff_as_the_shell_where_panels_are_membranes():
     found = stiffness(tower(1e-3, (8, 12)), "z")
     assert found["plate"][0] == pytest.approx(-0.07, abs=0.02)

@@ -49,6 +49,7 @@ def test_tasks_are_all_combinations_of_loads():
     assert len({t.name for t in found}) == len(found)
 
 
+@pytest.mark.matrix
 def test_a_task_keeps_the_errors_against_the_shell_under_the_same_load(tmp_path):
     task = Comparison("case2", SHORT, Variant(0.25, "edge"))
     assert not task.there(tmp_path)
@@ -67,6 +68,7 @@ def test_a_task_keeps_the_errors_against_the_shell_under_the_same_load(tmp_path)
     assert set(MODELS) < set(rows[0])
 
 
+@pytest.mark.matrix
 def test_outdated_and_damaged_results_are_computed_again(tmp_path, monkeypatch):
     task = Comparison("case1", SHORT)
     task.make(tmp_path)
@@ -87,6 +89,7 @@ def test_outdated_and_damaged_results_are_computed_again(tmp_path, monkeypatch):
     assert task.there(tmp_path)
 
 
+@pytest.mark.matrix
 def test_frequencies_are_those_of_partners(tmp_path):
     task = Comparison("case1", SHORT)
     task.make(tmp_path)
@@ -219,6 +222,7 @@ def test_stored_tables_know_what_cannot_differ(stored):
     assert all(abs(r["frequency"] / r["shell"] - 1.0) < 0.25 for r in low)
 
 
+@pytest.mark.matrix
 def test_page_of_the_sensitivity(stored, tmp_path):
     page = report.write_sensitivity(stored, tmp_path).read_text("utf-8")
     assert page.count("<img") == 1 and stored.about in page

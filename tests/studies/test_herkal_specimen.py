@@ -41,6 +41,7 @@ def motion(tmp_path_factory):
     return read_case(case).run()
 
 
+@pytest.mark.matrix
 def test_a_sheet_is_held_before_it_is_released(motion) -> None:
     u = motion.displacement.values
     moved = synthetic.held(motion, 0.05)
@@ -255,6 +256,7 @@ def test_a_specimen_that_slid_along_y() -> None:
     np.testing.assert_allclose(shapes[1], shapes[0], atol=1e-12)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -565,6 +567,7 @@ def test_a_fit_that_is_none_says_so(released) -> None:
     assert "beta (s) is at its bound" in told.text
 
 
+@pytest.mark.matrix
 def test_other_data_in_a_folder_leave_nothing_of_the_first(tables) -> None:
     """Figures of a synthetic study must not stand on the page of measured data."""
     inside = tables / tasks.FOLDER

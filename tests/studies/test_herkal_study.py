@@ -155,6 +155,7 @@ def test_variants():
 
 
 # ---------------------------------------------------------------------- runs
+@pytest.mark.matrix
 def test_what_is_there_is_skipped(tmp_path):
     jobs = [Job("case1", "panel", "path"), Job("case1", "panel", "modes")]
     first = pool.run(jobs, tmp_path, processes=1)
@@ -168,6 +169,7 @@ def test_what_is_there_is_skipped(tmp_path):
     assert not list(tmp_path.glob(".*"))
 
 
+@pytest.mark.matrix
 def test_other_settings_and_damaged_files_are_computed_again(tmp_path):
     job = Job("case1", "panel", "motion", SHORT)
     for damage in (b"cut short", None):
@@ -251,6 +253,7 @@ def test_table_from_stored_runs(small):
     assert math.isnan(small.error("case1", "panel", LINEAR))  # not computed
 
 
+@pytest.mark.matrix
 def test_statics_of_shell_and_bars_and_hinges(small):
     found = small.displacements("case1")
     bars = ["bars and hinges", "bars and hinges, linear bends"]
@@ -283,6 +286,7 @@ def test_table_1_is_the_papers():
     assert {f"{c}_{m}" for c in runs.CASES for m in paper_rules()} == set(rows)
 
 
+@pytest.mark.matrix
 def test_a_claim_on_the_best_is_judged_by_its_error_over_the_smallest(small, monkeypatch):
     row = {"equi_inertial": 0.4, "panel": 0.3, "centroid": 0.5, "circumcenter": 0.6}
     monkeypatch.setattr(Study, "error", lambda self, case, model, *_: row.get(model, 0.2))
@@ -320,6 +324,7 @@ def test_bounds():
         replace(least, tolerance=0.1)
 
 
+@pytest.mark.matrix
 def test_claims_of_one_case(small):
     found = {v.target.key: v for v in claims(small)}
     assert set(found) == {
@@ -364,6 +369,7 @@ def test_errors_against_the_finest_stored_motion_of_another_shell(tmp_path, monk
     assert second_table(study) == {}
 
 
+@pytest.mark.matrix
 def test_page_without_motions(tmp_path):
     study = Study(StudyPlan(SHORT, ("case1",), ("panel",)), tmp_path)
     assert "None of the paper" in report.write(study).read_text("utf-8")
@@ -395,6 +401,7 @@ def test_the_specimen_is_left_out_without_opencv(tmp_path, monkeypatch, capsys):
     assert "The paper specimen" not in (tmp_path / "study/report.html").read_text("utf-8")
 
 
+@pytest.mark.matrix
 def test_the_command_takes_half_of_the_memory_unless_forced(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("foldyn.ram_limit.memory", lambda: 1.5 * PER_NODE * 13)
     monkeypatch.setattr(studies, "QUICK", StudyPlan(SHORT, ("case2",), ("panel",)))

@@ -107,6 +107,7 @@ def test_a_fine_shell_agrees(name):
     assert np.abs(frequency[:3]).max() < 0.01
 
 
+@pytest.mark.matrix
 def test_a_coarse_shell_moves_alike():
     """Case 1 with 8 divisions, relative L2 over 10 s: 4.6 %; 16 change ours by 4.4 %."""
     motion = compare.our_motion("case1", 8, 0.01, duration=3.0)

@@ -48,6 +48,7 @@ def short_deployment(folder: Path, *changes: tuple[str, str]) -> fd.CaseFile:
     return fd.read_case(folder / "case.toml")
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("dihedral", ["179.9", "180"])
 def test_a_flat_sheet_deploys_into_the_miura(dihedral, tmp_path):
     case_file = short_deployment(tmp_path, ("dihedral = 179.9", f"dihedral = {dihedral}"))
@@ -98,6 +99,7 @@ def test_free_flight_keeps_the_energy(tumbling):
     assert float(np.abs(motion.dissipated).max()) == 0.0
 
 
+@pytest.mark.matrix
 def test_the_sheet_turns_over(tumbling):
     """In its own axes the angular momentum goes from one end of the middle axis to the other."""
     case, motion, _ = tumbling
@@ -248,6 +250,7 @@ def test_force_and_displacement_control_meet_on_one_curve(traced):
     assert set(loaded.negative_eigenvalues.values[first + 1 : second]) == {1}
 
 
+@pytest.mark.matrix
 def test_the_popped_vertex_stays(traced):
     case, path = traced("gallery/miura-popthrough")
     assert (path.point.values == "limit").sum() == 2

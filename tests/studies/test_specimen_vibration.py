@@ -49,6 +49,7 @@ def test_cases_of_the_specimen_are_one_specimen():
     assert cases["herkal/specimen-frf"].damping == vibration.PAIR
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("mass", ["circumcenter", "consistent"])
 def test_three_peaks_without_fitting(mass):
     """Within 10 % of the paper's 3.8, 9.3 and 16.7 Hz, read at a corner of the top."""
@@ -58,6 +59,7 @@ def test_three_peaks_without_fitting(mass):
         assert Verdict(TARGETS[key], frequency).holds, (key, frequency)
 
 
+@pytest.mark.matrix
 def test_air_lowers_the_frequencies_by_one_to_four_percent():
     """To first order f^2 falls by the air's share of the modal mass (docs/specimen.md)."""
     changes = {"analysis.count": 4}
@@ -78,6 +80,7 @@ def test_damping_of_the_second_and_third_peak():
     assert third == pytest.approx(0.09, rel=0.12)
 
 
+@pytest.mark.matrix
 def test_alpha_alone_damps_the_axial_mode_as_measured():
     """alpha = 2 zeta omega with 13.5 % at 9.3 Hz; without beta the third peak is damped less."""
     assert vibration.ALONE.alpha == pytest.approx(2 * 0.135 * 2 * math.pi * 9.3, rel=2e-3)

@@ -78,6 +78,7 @@ def test_a_rarefaction_overtakes_the_compression(impacts):
     assert "does not agree" in report.verdict(impacts[1e-3], small)
 
 
+@pytest.mark.matrix
 def test_impacts_keep_energy_and_momentum(impacts):
     for found in impacts.values():
         assert found.attrs["energy_error"] < 1e-3

@@ -72,6 +72,7 @@ def test_every_measure_has_kinds_that_there_are_and_a_row(one):
     assert re.search(rf"^\| `{re.escape(one.asked)}`", page, re.M), one.asked
 
 
+@pytest.mark.matrix
 def test_frequencies_and_damping_of_modes(results):
     _, modes = results["modes"]
     np.testing.assert_array_equal(take(results, "modes", "frequencies"), modes["frequency"])
@@ -114,6 +115,7 @@ def test_gaps_of_bands_are_those_of_the_table(results):
             take(results, "bands", text)
 
 
+@pytest.mark.matrix
 def test_gaps_along_stretched_states_are_kept(tmp_path):
     """A sweep over the stretch goes on from its folder; 1 is the state at rest."""
     (tmp_path / "case.toml").write_text(BANDS.replace("zone = 6\nattenuation = 20\n", ""))

@@ -51,6 +51,7 @@ def test_every_point_is_the_case_file_with_its_values(case):
     assert found["dihedral"].attrs["key"] == "pattern.dihedral"
 
 
+@pytest.mark.matrix
 def test_the_result_is_saved_and_carries_its_case_and_its_sweep(case, tmp_path):
     found = of(case)
     fd.save(found, tmp_path / "sweep.nc")
@@ -62,6 +63,7 @@ def test_the_result_is_saved_and_carries_its_case_and_its_sweep(case, tmp_path):
     np.testing.assert_array_equal(repeated["frequencies"], found["frequencies"])
 
 
+@pytest.mark.matrix
 def test_processes_give_the_same_and_do_not_compile(case):
     alone = of(case)
     found = of(case, ["frequencies", compiled_here], processes=2)
@@ -132,6 +134,7 @@ def test_points_that_fail_are_recorded_and_the_others_computed(case):
     assert np.isnan(found["frequencies"][1]).all() and np.isfinite(found["frequencies"][::2]).all()
 
 
+@pytest.mark.matrix
 def test_a_measure_that_fails_leaves_the_others(case, tmp_path):
     measures = ["peak_damping[8]", "peak_height[8]", fails_sometimes]
     case.write_text(FRF)
@@ -241,6 +244,7 @@ def test_what_is_kept_is_not_computed_again(case, tmp_path):
     np.testing.assert_array_equal(mended["frequencies"], first["frequencies"])
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     "changed", [MODES.replace("0.25", "0.3"), MODES.replace("count = 4", "count = 3")]
 )
@@ -345,6 +349,7 @@ steps = 80
 """
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore")
 def test_what_a_path_had_before_it_stopped_is_measured(tmp_path):
     """The load at which a tower snaps is found, though its creases close later on."""

@@ -133,6 +133,7 @@ def check_drift(seed: int, method: str, model: str) -> None:
     assert apart < CLOSE * size * (LATE if late else 1.0), f"{apart / size}: {case}"
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("seed", range(0, len(MOVES) - 3, 5))
 def test_sheets_in_wind_move_alike_in_every_frame(seed):
     check_drift(seed, *MOVES[seed])

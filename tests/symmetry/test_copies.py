@@ -28,7 +28,7 @@ STIFF = 1e3
 ROUNDED = 1e-11  # forces that are rounding errors but for a part CLOSE times STIFF
 IMPLICIT = ("newmark", "generalized_alpha")
 TRAPEZOID = ("rk4", "central_difference")  # by which they find the work of loads in a step
-# which kernels serve other tests, too
+# which kernels serve other tests, too; `make test` takes every other one
 QUICK = [
     *(Combination(one, model) for model in ("plate", "herkal", "merlin2") for one in ANALYSES),
     *(Combination(one, model) for model in ("n5b8e", SHELL) for one in (*IMPLICIT, STATIC)),
@@ -135,7 +135,7 @@ def reactions(result) -> np.ndarray:
 @pytest.mark.parametrize(
     "seed",
     [
-        pytest.param(seed, marks=pytest.mark.matrix) if one == SLOW else seed
+        pytest.param(seed, marks=pytest.mark.matrix) if one == SLOW or seed % 2 else seed
         for seed, one in enumerate(QUICK)
     ],
 )

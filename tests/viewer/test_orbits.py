@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 
 import numpy as np
+import pytest
 from decode import changing, decoded
 from page_samples import evaluate, in_a_well, results
 
@@ -37,6 +38,7 @@ def shown(part):
     return size[:, None, None, None] * np.einsum("sc,pcna->psna", waves, series)
 
 
+@pytest.mark.matrix
 def test_motions_are_those_of_the_result():
     (result,) = results("periodic").values()
     part = stage_of(result)
@@ -62,6 +64,7 @@ def test_of_many_points_those_with_names_are_kept(monkeypatch):
     assert len(named) < len(about["stable"]) < result.sizes["point"]
 
 
+@pytest.mark.matrix
 def test_backbones_and_curves_along_the_amplitude_have_axes_of_their_own():
     case, _ = in_a_well()
     spine = fd.backbone(case, amplitudes=(1e-3, 0.01), harmonics=3)

@@ -30,6 +30,7 @@ def shapes_of(part) -> np.ndarray:
     return (values[:, 0] + 1j * values[:, 1]).reshape(states, bands, rows, *values.shape[2:])
 
 
+@pytest.mark.matrix
 def test_modes_are_those_of_the_result_but_for_size_and_phase(part):
     (result,) = results("bands").values()
     own = result["shape"].transpose("state", "band", "phase", "node", "axis").values

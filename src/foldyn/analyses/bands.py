@@ -239,6 +239,7 @@ class BandsSection(AnalysisSection):
     zone: Annotated[int | None, Check(whole_number, least=2, most=MOST_ZONE)] = None
     attenuation: Annotated[int | None, Check(whole_number, most=MOST_LEVELS)] = None
     vary: Annotated[Varied | None, Placed(one_key, given=Mapping[str, Any])] = None
+    check_model: bool = True
     state: About = "rest"
     stretch: Annotated[
         float | Sequence[float] | None, Check(number_or_list, what="period", above=0.0)
@@ -282,7 +283,17 @@ class BandsAnalysis(Analysis):
     moving = True
     schema = BandsSchema
     needs_density = "bands need"
-    takes = ("path", "points", "count", "zone", "attenuation", "stretch", "turn", "secant")
+    takes = (
+        "path",
+        "points",
+        "count",
+        "zone",
+        "attenuation",
+        "stretch",
+        "turn",
+        "secant",
+        "check_model",
+    )
     files = ("bands", "bands-*")
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
@@ -352,7 +363,14 @@ def _bands(state: CellState, path: xarray.DataArray, given: Mapping[str, Any]) -
     """All requested results in one state."""
     began, cell, count, own = time.perf_counter(), state.cell, given["count"], state.arguments()
     found = bands(
-        cell, path, count=count, group_velocity=True, shape=True, polarization=True, **own
+        cell,
+        path,
+        count=count,
+        group_velocity=True,
+        shape=True,
+        polarization=True,
+        check_model=given["check_model"],
+        **own,
     )
     gaps = band_gaps(found)
     if given["zone"]:
@@ -383,7 +401,9 @@ def _in_zone(
     opposite = np.ravel_multi_index(tuple(-places % side), shape)  # index of -k
     half = np.flatnonzero(np.arange(len(opposite)) <= opposite)
     values = np.empty((len(phases), count))
-    found = bands(cell, phases[half], count=count, track=False, **own)["frequency"].values
+    found = bands(cell, phases[half], count=count, track=False, check_model=False, **own)[
+        "frequency"
+    ].values
     values[half] = values[opposite[half]] = found
     return values
 
@@ -433,6 +453,8 @@ def _joined(
     if vary is not None:
         along["state"] = coordinate(vary)
     facts = {name: first.attrs[name] for name in ("ticks", "tick_labels", "tracked")}
+    if "holds_to" in first.attrs:
+        facts["holds_to"] = min(one.attrs["holds_to"] for one in found)
     facts["wall_seconds"] = sum(one.attrs["wall_seconds"] for one in found)
     return bands_dataset(case, values, gaps, along, facts)
 
@@ -488,6 +510,19 @@ def _notes(result: xarray.Dataset) -> str:
         notes.append(
             "Full gaps are those at all wave vectors of the path. The greatest and least "
             "frequencies of bands may lie off it: analysis.zone computes the whole zone."
+        )
+    if "holds_to" in result.attrs:
+        error = np.nanmax(result["frequency_error"] / result["frequency"].where(lambda f: f > 0.0))
+        notes.append(
+            "The panels are superelements. Frequencies are estimated to be within "
+            f"{100.0 * error:.2g} % of a shell's on a fine mesh, and within 5 % up to "
+            f"{result.attrs['holds_to']:.4g} Hz."
+        )
+    if "model_error" in result:
+        error = np.abs(result["model_error"].values)
+        notes.append(
+            "At eight wave vectors frequencies were compared with those of superelements, in order "
+            f"of frequency: they differ by up to {100.0 * np.nanmax(error, initial=0.0):.2g} %."
         )
     residual = float(np.max(result["residual"].values))
     if residual > 1e-6:

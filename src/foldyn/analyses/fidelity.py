@@ -1,4 +1,4 @@
-"""Comparison of models with the shell: [analysis] of kind "fidelity", arguments of `fidelity`."""
+"""Models beside superelements or the shell: [analysis] of kind "fidelity"."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from foldyn.analyses.sections import AnalysisSection, CaseSchema, Count, Positiv
 from foldyn.analyses.vibration import Secant
 from foldyn.arguments import Placed
 from foldyn.cases import Case
-from foldyn.cases.models import BARS_AND_HINGES
+from foldyn.cases.models import BARS_AND_HINGES, SUPERELEMENTS
 from foldyn.errors import InputError
 from foldyn.linear import Fidelity, fidelity
-from foldyn.linear.compared import legend, percent
-from foldyn.linear.fidelity import MODELS, comparison, named
+from foldyn.linear.compared import against, legend, percent
+from foldyn.linear.fidelity import MODELS, REFERENCES, comparison, named
 from foldyn.linear.shell_of import checked_divisions
 from foldyn.report.album import Album, ByRule
 from foldyn.report.sections import Heading, Table, Text
@@ -33,6 +33,7 @@ class FidelitySection(AnalysisSection):
 
     like = (fidelity,)
     count: Count = 6
+    reference: Annotated[str, one_of(REFERENCES)] = SUPERELEMENTS
     divisions: Annotated[int | Sequence[int] | None, Placed(checked_divisions, name="")] = None
     models: Annotated[
         Sequence[str] | None, ListOf(one_of(MODELS), 'a list of names, as in ["plate"]')
@@ -55,18 +56,18 @@ class FidelitySchema(CaseSchema):
         """Refuse other models than bars and hinges."""
         if self.model.kind != BARS_AND_HINGES:
             raise InputError(
-                f" = {show(self.model.kind)}: bars and hinges are compared with the shell, which "
+                f" = {show(self.model.kind)}: bars and hinges are compared with this model, which "
                 "is made from them; leave out kind and the keys of that model",
                 "model.kind",
             )
 
 
 class FidelityAnalysis(Analysis):
-    """Comparison of models of bars and hinges with the shell."""
+    """Comparison of models of bars and hinges with superelements or the shell."""
 
     kind = "fidelity"
     schema = FidelitySchema
-    needs_density = "a comparison with the shell needs"
+    needs_density = "a comparison of frequencies needs"
     takes = arguments_of(fidelity)
     files = ("fidelity",)
     by_mass = False
@@ -104,11 +105,11 @@ class FidelityAnalysis(Analysis):
         """See `Analysis`."""
         (first, result), *_ = results.items()
         found = Fidelity(result)
-        yield Heading("How far models follow the shell")
+        yield Heading("Which model")
         yield Text(found.advice)
         yield from album.figure(
             "fidelity",
-            "Above: errors of the models' frequencies against those of the shell, 5 % shaded. "
+            f"Above: errors of the models' frequencies, of those of {against(result)}, 5 % shaded. "
             "Below: likeness of the shapes (MAC); modes below 0.5 are lost, and have no error. "
             "Dashed: 0.6 of the plate frequency, above which panels vibrate as plates.",
             lambda: plots.plot_fidelity(found),
@@ -137,7 +138,7 @@ class _Steps:
 
 
 def _models(found: Fidelity) -> Table:
-    """Table with a row for each model: its options, its errors."""
+    """Table with a row for each model: its options, its errors, its cost."""
     result, below = found.result, found.result["frequency"].values < found.limit
     forces = "deflection" in result
     header = ["model", "options", "median (%)", "largest (%)", "lost"]
@@ -152,13 +153,13 @@ def _models(found: Fidelity) -> Table:
         row.append(int(np.isinf(error).sum()))
         if forces:
             row.append(_told(float(one["deflection_error"]), "soft"))
-        rows.append(row)
+        rows.append([*row, 1e3 * float(one["model_seconds"]), f"1/{float(one['cost_ratio']):.0f}"])
     # this table shows no modes
     words = [line for line in legend(found) if not line.startswith("*")]
     return Table(
-        header,
+        [*header, "time (ms)", "relative"],
         rows,
-        f"Errors against the shell of the {int(below.sum())} modes below 0.6 of the plate "
+        f"Errors against {against(result)} of the {int(below.sum())} modes below 0.6 of the plate "
         f"frequency, {found.limit:.4g} Hz; lost modes do not count in median and largest. "
         f"{'; '.join(words)}.",
         digits=3,
@@ -166,7 +167,7 @@ def _models(found: Fidelity) -> Table:
 
 
 def _modes(found: Fidelity) -> Table:
-    """Table with a row for each mode of the shell."""
+    """Table with a row for each mode of the reference."""
     tables = [found.table(model) for model in found.models]
     rows: list[list[Any]] = []
     for every in zip(*tables, strict=True):
@@ -176,10 +177,10 @@ def _modes(found: Fidelity) -> Table:
         row.append("not converged" if np.isnan(mesh) else mesh)
         rows.append([*row, *(f"{_told(mode.error, 'lost')} ({mode.mac:.2f})" for mode in every)])
     return Table(
-        ["mode", "shell (Hz)", "mesh (%)", *found.models],
+        ["mode", f"{found.result.attrs['reference']} (Hz)", "mesh (%)", *found.models],
         rows,
-        "Elastic modes of the shell: frequency extrapolated in the size of its mesh, and about how "
-        "far the finer mesh is off; errors of the models in % and, in parentheses, their MAC. "
+        f"Elastic modes of {against(found.result)}: frequency in the limit of fine meshes, and "
+        "about how far it is off; errors of the models in % and, in parentheses, their MAC. "
         f"{'; '.join(legend(found))}.",
     )
 
@@ -189,35 +190,19 @@ def _told(error: float, otherwise: str) -> str:
 
 
 def _notes(found: Fidelity) -> str:
-    facts = found.result.attrs
-    coarse, fine = (int(n) for n in facts["divisions"])
-    if "vertex_radius" in facts:
-        how = (
-            f"of {coarse // 2}, {coarse} and {fine} divisions, graded toward vertices, within "
-            f"{facts['vertex_radius']:g} m of which panels do not stretch "
-            f"({facts['triangles']} triangles), and consistent mass; frequencies are extrapolated, "
-            "and their errors estimated, with the order that these meshes show."
-        )
-    else:
-        how = (
-            f"of {coarse} and {fine} divisions of every edge ({facts['triangles']} triangles) and "
-            "consistent mass; frequencies are extrapolated with the square of the mesh size, and "
-            "their errors estimated with the order that these meshes show together with one of "
-            f"{coarse // 2}."
-        )
+    facts, name = found.result.attrs, against(found.result)
     notes = [
-        "The shell has the same pattern, sheet, creases, supports and masses, meshes "
-        f"{how} Modes are "
-        "paired by their MAC at the nodes that both have, modes of nearly equal frequency as a "
-        "space. Supports hold the same vertices in both."
+        f"{name.capitalize()} had the same pattern, sheet, creases, supports and masses. "
+        f"{_meshes(found)} Modes are paired by their MAC at the nodes that both have, modes of "
+        "nearly equal frequency as a space. Supports hold the same vertices in both."
     ]
     if facts["rigid"]:
         notes.append(f"{facts['rigid']} rigid motions that nothing resists are left out.")
     if "deflection" in found.result:
         far = float(found.result["deflection"])
         notes.append(
-            f"Under the full forces, with the stiffness at rest, the shell would move by "
-            f"{far:.4g} m along the forces (mean, weighted by the forces)."
+            f"Under the full forces, with the stiffness at rest, {name} would move by {far:.4g} m "
+            "along the forces (mean, weighted by the forces)."
         )
     if "not_forces" in facts:
         notes.append(f"{facts['not_forces']}: no force, so it has no displacements to compare.")
@@ -225,4 +210,32 @@ def _notes(found: Fidelity) -> str:
         notes.append(
             f"Superlinear hinges have the slope of an oscillation by {facts['secant']:g} degrees."
         )
+    notes.append(
+        "Times are medians of modal analyses for as many modes of each, measured in this run; "
+        f"{name} took {float(found.result['seconds']):.3g} s."
+    )
     return "\n\n".join(notes)
+
+
+def _meshes(found: Fidelity) -> str:
+    """Sentences on the meshes of the reference and its errors."""
+    facts = found.result.attrs
+    if facts["reference"] == SUPERELEMENTS:
+        return (
+            f"Panels were condensed on fine meshes with the shapes of level {facts['level']}; the "
+            "errors are their own estimates, from other levels and meshes."
+        )
+    coarse, fine = (int(n) for n in facts["divisions"])
+    if "vertex_radius" in facts:
+        return (
+            f"Its meshes had {coarse // 2}, {coarse} and {fine} divisions, graded toward vertices, "
+            f"within {facts['vertex_radius']:g} m of which panels do not stretch "
+            f"({facts['triangles']} triangles), and consistent mass; frequencies are extrapolated, "
+            "and their errors estimated, with the order that these meshes show."
+        )
+    return (
+        f"Its meshes had {coarse} and {fine} divisions of every edge ({facts['triangles']} "
+        "triangles) and consistent mass; frequencies are extrapolated with the square of the mesh "
+        "size, and their errors estimated with the order that these meshes show together with one "
+        f"of {coarse // 2}."
+    )

@@ -83,6 +83,7 @@ class FrfSection(*(method.options for method in METHODS.values()), AnalysisSecti
     secant: Secant = None
     amplitude: Positive = 1.0
     gone = GONE
+    check_model: bool = True
 
     def agree(self) -> None:
         """Refuse options that do not fit the method."""
@@ -187,7 +188,8 @@ class FrfAnalysis(Analysis):
         """See `Analysis`."""
         section = schema.analysis
         given: dict[str, Any] = {
-            key: getattr(section, key) for key in ("frequencies", "method", "secant", "amplitude")
+            key: getattr(section, key)
+            for key in ("frequencies", "method", "secant", "amplitude", "check_model")
         }
         given["state"] = None if section.state == "rest" else section.state
         return cls({**given, **section.options(), "drive": schema.drive})

@@ -37,6 +37,7 @@ class ModesSection(AnalysisSection):
     state: About = "rest"
     secant: Secant = None
     gone = GONE
+    check_model: bool = True
 
 
 class ModesOutput(ShownSection):
@@ -106,6 +107,9 @@ class ModesAnalysis(Analysis):
         if len(elastic) and "frequency_error" in result:
             off = (result["frequency_error"].values[~rigid & ~unstable] / elastic).max()
             reach += f" (each within {size(float(off))})"
+        if "model_error" in result and np.isfinite(result["model_error"]).any():
+            off = float(np.abs(result["model_error"]).max())
+            reach += f" (within {size(off)} of superelements)"
         among = f" ({', '.join(special)})" if special else ""
         return (
             f"  {name}: {counted(result.sizes['mode'], 'mode')}{among}{reach}, "
@@ -209,8 +213,9 @@ def _compared(results: ByRule, same: Mapping[str, NDArray]) -> Table:
 
 def _table(modes: xarray.Dataset, names: xarray.Dataset, remark: str) -> Table:
     header = ["mode", "frequency (Hz)"]
-    estimated = "frequency_error" in modes
-    header += [*(["error (Hz)"] if estimated else []), "damping (%)", "what it does", "share (%)"]
+    estimated, compared = "frequency_error" in modes, "model_error" in modes
+    header += [*(["error (Hz)"] if estimated else []), *(["error (%)"] if compared else [])]
+    header += ["damping (%)", "what it does", "share (%)"]
     header += [f"{'effective mass ' if axis == 'x' else ''}{axis} (%)" for axis in "xyz"]
     free = np.asarray(modes.attrs["free_mass"], dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -221,6 +226,7 @@ def _table(modes: xarray.Dataset, names: xarray.Dataset, remark: str) -> Table:
             number,
             _frequency(modes, k),
             *([cell(modes["frequency_error"].values[k])] if estimated else []),
+            *([cell(100.0 * modes["model_error"].values[k])] if compared else []),
             cell(100.0 * modes["damping_ratio"].values[k]),
         ]
         row += [str(names["name"].values[k]), round(100.0 * float(names["share"][k].max()))]
@@ -288,6 +294,16 @@ def _notes(modes: xarray.Dataset, case: Case) -> str:
             "The panels are superelements. The errors of the frequencies are estimates of the "
             "largest difference to a shell on a fine mesh, from other levels and meshes."
         )
+    if "model_error" in modes:
+        missing = np.ravel(modes.attrs.get("missing_frequencies", ()))
+        listed = ", ".join(f"{each:.4g}" for each in missing)
+        notes.append(
+            "The errors are relative to superelements, which are within 2 % of a fine shell; modes "
+            "without an error resemble none of theirs."
+            + (f" Modes of theirs at {listed} Hz are missing here." if listed else "")
+        )
+    elif "not_compared" in modes.attrs:
+        notes.append(f"Not compared with superelements: {modes.attrs['not_compared']}.")
     if float(modes.attrs["residual"]) > 1e-6:
         notes.append(
             f"The state is no equilibrium: its residual is {modes.attrs['residual']:.2g} of the "

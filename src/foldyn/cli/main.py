@@ -151,21 +151,27 @@ def parser() -> argparse.ArgumentParser:
 
     fidelity = commands.add_parser(
         "fidelity",
-        help="compare models of bars and hinges with the shell, for a case file of any kind",
+        help="compare models of bars and hinges with superelements or the shell",
         description="Frequencies, shapes and small displacements of models of bars and hinges, "
-        "compared with the shell of the same pattern, sheet and supports, for a case file of any "
-        "kind. Options not given here are taken from its [analysis], if that is of kind fidelity.",
+        "compared with superelements, or with the shell, of the same pattern, sheet and supports, "
+        "for a case file of any kind. Options not given here are taken from its [analysis], if "
+        "that is of kind fidelity.",
     )
     _add_case(fidelity, "fidelity")
     fidelity.set_defaults(model=None)
-    fidelity.add_argument("--count", type=integer, help="how many modes of the shell (default: 6)")
+    fidelity.add_argument("--count", type=integer, help="how many modes (default: 6)")
+    fidelity.add_argument(
+        "--reference",
+        metavar="MODEL",
+        help="what to compare with: superelements (default), or shell, which takes longer",
+    )
     fidelity.add_argument(
         "--divisions",
         type=integer,
         nargs=2,
         metavar=("COARSE", "FINE"),
-        help="pieces of every edge of the two shells (default: 6 12, less for large patterns; 8 12 "
-        "with a vertex radius)",
+        help="pieces of every edge of the two shells, with --reference shell (default: 6 12, less "
+        "for large patterns; 8 12 with a vertex radius)",
     )
     fidelity.add_argument(
         "--models",
@@ -177,7 +183,8 @@ def parser() -> argparse.ArgumentParser:
         "--vertex-radius",
         type=number,
         metavar="M",
-        help="take shells graded toward vertices, down to this radius (m, about the thickness)",
+        help="distance from vertices within which panels do not stretch (m, about the thickness); "
+        "shells are then graded toward vertices",
     )
     _add_secant(fidelity)
 

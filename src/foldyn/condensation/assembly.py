@@ -13,7 +13,7 @@ Supports, clamps, welds and rigid panels leave some of these, or combinations of
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -31,6 +31,7 @@ FUNCTION = np.array([ACROSS.index(shape) for shape in ALONG])
 """Index in `ACROSS` of each shape along an edge."""
 PLACES = (0.25, 0.5, 0.75)  # of points on edges for pictures and comparisons
 HELD = 1e-9  # part of a unit vector below which supports hold a direction
+NEGLIGIBLE = 1e-6  # part of a unit vector that gives no further direction
 
 
 class Unknowns(NamedTuple):
@@ -62,6 +63,16 @@ class Unknowns(NamedTuple):
     def inner(self, panel: Any, mode: Any) -> Any:
         """A vibration of a panel."""
         return self.turn(self.edges, 0, 0) + panel * self.level.inner + mode
+
+    def owners(self, unknown: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Kinds (k,) of unknowns, `BOW`, `TURN` or `INNER`; their edges or panels; their numbers.
+
+        The numbers begin with 0 at each edge and panel.
+        """
+        begin = np.array([self.bow(0, 0), self.turn(0, 0, 0), self.inner(0, 0)])
+        each = np.array([3 * self.functions, 2 * self.level.turns, self.level.inner])
+        kind = np.searchsorted(begin, unknown, side="right") - 1
+        return (kind + BOW, *np.divmod(unknown - begin[kind], each[kind]))
 
 
 class Whole:
@@ -153,6 +164,14 @@ class Whole:
                 total[k] = sparse.csr_array(total[k] + summed)
         return total[0], total[1]
 
+    def along_axes(self, chosen: NDArray) -> Iterator[tuple[sparse.csr_array, list[Any]]]:
+        """Amplitudes (a, m) of shapes of chosen panels, and their masses along x, y, z (a, a)."""
+        for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
+            there = np.isin(group.number, chosen)
+            frames, own = group.frames[there], group.panel.products[:, :, kept[:, None], kept]
+            masses = np.einsum("pad,pbd,abij->dpij", frames, frames, own, optimize=True)
+            yield placed[np.repeat(there, len(kept))], [block_diagonal(each) for each in masses]
+
     def between(self, cut_off: float) -> tuple[NDArray, sparse.csr_array]:
         """Points (q, 3) on edges and at the means of panels' corners, and their motions (3 q, m).
 
@@ -221,8 +240,14 @@ class Whole:
     # ------------------------------------------------------------------ supports
     @cached_property
     def _across(self) -> NDArray:
-        """Directions (e, 3, 3) along each edge, and two across it."""
-        return edge_frame(self._along, np.eye(3)[np.argmin(np.abs(self._along), axis=1)])
+        """Directions (e, 3, 3) along each edge, and two across it, which turn with its panels."""
+        up = np.zeros((self.unknowns.edges, 2, 3))
+        for group in self._groups:
+            edge, backwards = self._edges_of(group.faces)
+            up[edge, backwards.astype(int)] = group.frames[:, None, 2]
+        return edge_frame(
+            self._along, np.where(up[:, 0].any(axis=1, keepdims=True), up[:, 0], up[:, 1])
+        )
 
     def dofs(
         self, held: Mapping[int, NDArray], clamped: NDArray, rigid: Collection[int]
@@ -327,7 +352,11 @@ class _Columns:
 
 def _left(vectors: NDArray, held: NDArray) -> NDArray:
     """Orthonormal vectors (k, 3) in the span of `vectors` (n, 3), normal to directions (h, 3)."""
-    if not len(vectors):
-        return vectors
-    _, size, basis = np.linalg.svd(held @ vectors.T)
-    return basis[int((size > HELD).sum()) :] @ vectors
+    _, size, basis = np.linalg.svd(held @ vectors.T, full_matrices=False)
+    taken = basis[size > HELD]
+    left, found = np.eye(len(vectors)) - taken.T @ taken, np.zeros((0, len(vectors)))
+    for part in left:  # in order, so that bases turn with the vectors
+        part = part - found.T @ (found @ part)
+        if np.linalg.norm(part) > NEGLIGIBLE:
+            found = np.vstack([found, part / np.linalg.norm(part)])
+    return found @ vectors

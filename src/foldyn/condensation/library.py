@@ -15,7 +15,7 @@ from foldyn.patterns import Pattern
 from foldyn.structures.graded import Grading
 from foldyn.structures.sheet import Sheet
 
-ROOM = 256  # condensed panels kept in memory, each about 0.5 MB
+ROOM = 256  # condensed panels kept in memory, each about 2 MB
 ALIKE = 8  # decimals of coordinates, relative to the size of the pattern, for congruent panels
 
 
@@ -68,16 +68,29 @@ def _condensed(
 
 def groups(pattern: Pattern, sheets: Sequence[Sheet], meshes: Meshes) -> list[Group]:
     """The condensed panels of a pattern, grouped by congruence; `sheets` of all panels."""
-    found: dict[tuple[_Shape, Sheet], list[tuple[int, NDArray, NDArray]]] = {}
-    for number, (face, sheet) in enumerate(zip(pattern.faces, sheets, strict=True)):
-        shape, turned, frame = _described(pattern.vertices[list(face)], pattern.size)
-        found.setdefault((shape, sheet), []).append((number, np.roll(face, -turned), frame))
     out = []
-    for (shape, sheet), members in found.items():
+    for (shape, sheet), members in _congruent(pattern, sheets).items():
         numbers, faces, frames = zip(*members, strict=True)
         panels = _condensed(shape, sheet, meshes)
         out.append(Group(*panels, np.array(faces), np.array(frames), np.array(numbers)))
     return out
+
+
+def different(pattern: Pattern, sheet: Sheet) -> int:
+    """How many panels have to be condensed."""
+    kinds, kind = sheet.kinds(len(pattern.faces))
+    return len(_congruent(pattern, [kinds[k] for k in kind]))
+
+
+def _congruent(
+    pattern: Pattern, sheets: Sequence[Sheet]
+) -> dict[tuple[_Shape, Sheet], list[tuple[int, NDArray, NDArray]]]:
+    """Numbers, vertices and frames (3, 3) of the panels of each shape and sheet."""
+    found: dict[tuple[_Shape, Sheet], list[tuple[int, NDArray, NDArray]]] = {}
+    for number, (face, sheet) in enumerate(zip(pattern.faces, sheets, strict=True)):
+        shape, turned, frame = _described(pattern.vertices[list(face)], pattern.size)
+        found.setdefault((shape, sheet), []).append((number, np.roll(face, -turned), frame))
+    return found
 
 
 def _described(x: NDArray, size: float) -> tuple[_Shape, int, NDArray]:

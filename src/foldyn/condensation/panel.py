@@ -60,6 +60,8 @@ class CondensedPanel:
         Displacements (p, 3 q) of the inner modes at points (p, 2) of the panel's plane.
     center : (3, c)
         Displacement of the mean of the corners, in the panel's frame.
+    products : (3, 3, c, c)
+        Integrals of mass times displacements along two axes of the panel's frame, kg.
     """
 
     stiffness: NDArray
@@ -67,6 +69,7 @@ class CondensedPanel:
     kind: NDArray
     inner: LinearNDInterpolator
     center: NDArray
+    products: NDArray
 
 
 def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> CondensedPanel:
@@ -116,6 +119,8 @@ def condense(
         turned = left @ right
     full[:, -count:] = inner @ turned
     reduced, carried = mesh.stiffness_of(full), full.T @ (mass @ full)
+    along = full[on_nodes].reshape(len(mesh.nodes), 3, -1).swapaxes(0, 1)
+    nodal = mass[on_nodes, on_nodes][::3, ::3]
     middle = np.linalg.norm(mesh.nodes - mesh.nodes[: mesh.corners].mean(axis=0), axis=1).argmin()
     return CondensedPanel(
         0.5 * (reduced + reduced.T),
@@ -125,6 +130,7 @@ def condense(
             mesh.nodes[:, :2], full[on_nodes, -count:].reshape(len(mesh.nodes), -1)
         ),
         full[3 * middle + np.arange(3)],
+        np.array([[a.T @ (nodal @ b) for b in along] for a in along], np.float32),
     )
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from scipy import sparse
 from foldyn.algebra.solvers import Fill
 from foldyn.condensation.assembly import Whole
 from foldyn.condensation.library import Meshes, groups
+from foldyn.condensation.panel import BOW
 from foldyn.condensation.shapes import LEVELS
 from foldyn.condensation.term import GROUPS, SuperelementsTerm
 from foldyn.errors import InputError
@@ -140,9 +142,16 @@ class Superelements(Discretized):
     @cached_property
     def whole(self) -> Whole:
         """The condensed panels on all of their unknowns."""
+        level, arcs = LEVELS[self.options.level - 1], min(one.arcs for one in self.meshes.graded)
+        if level.across >= 2 * arcs:
+            raise InputError(
+                f" = {self.options.divisions}: edges have {2 * arcs - 1} points, and a level to "
+                f"compute or compare with has {level.across} shapes; take more",
+                "divisions",
+            )
         kinds, kind = self.sheet.kinds(len(self.pattern.faces))
         made = groups(self.pattern, [kinds[k] for k in kind], self.meshes)
-        return Whole(self.pattern, made, LEVELS[self.options.level - 1])
+        return Whole(self.pattern, made, level)
 
     @cached_property
     def body(self) -> Assembly:
@@ -179,9 +188,36 @@ class Superelements(Discretized):
         rigid = rigid_panels(self.options.rigid, len(self.pattern.faces))
         return self.whole.dofs(edges, clamped, rigid)
 
+    def owners(self, edges: Mapping[int, NDArray]) -> list[tuple[int, int, int, int]]:
+        """Kind, edge or panel, number, and time of each dof that is not one of a vertex.
+
+        The time counts dofs of the same kind, edge or panel, and number.
+
+        edges : edges that supports hold, as in `held`.
+        """
+        dofs = sparse.csc_array(self._dofs(edges))
+        dofs.sort_indices()
+        first = dofs.indices[dofs.indptr[self.nodes.size : -1]]
+        kind, owner, number = self.whole.unknowns.owners(first)
+        number = np.where(kind == BOW, number // 3, number)
+        times: Counter[tuple[int, ...]] = Counter()
+        found = []
+        for one in zip(kind.tolist(), owner.tolist(), number.tolist(), strict=True):
+            found.append((*one, times[one]))
+            times[one] += 1
+        return found
+
     def spread(self, density: NDArray, edges: Mapping[int, NDArray]) -> NDArray[np.float64]:
         """See `Discretized`."""
         return self._dofs(edges).T @ self.whole.spread(density)
+
+    def along_axes(
+        self, edges: Mapping[int, NDArray], panels: NDArray
+    ) -> Iterator[tuple[sparse.csr_array, list[Any]]]:
+        """See `Whole.along_axes`, with dofs in place of unknowns."""
+        dofs = self._dofs(edges)
+        for amplitudes, masses in self.whole.along_axes(panels):
+            yield sparse.csr_array(amplitudes @ dofs), masses
 
     def between(self, edges: Mapping[int, NDArray]) -> tuple[NDArray, sparse.csr_array]:
         """Points (q, 3) on edges and in panels, and their displacements (3 q, m) for the dofs.

@@ -130,6 +130,9 @@ def long_waves(cell: UnitCell, state: State | None = None, *, along: int = 0) ->
     (2,)
     """
     along = of_kind("cell", cell, UnitCell).period("along", along)
+    if cell.case.structure.linear:
+        kind = cell.case.structure.linear
+        raise InputError(f": long waves do not support {kind}; take fd.discretize", "cell")
     linear = linearize_cell(cell, state)
     motion = linear.motions[along]
     phase = PHASE * np.eye(cell.dimensions)[along]

@@ -8,7 +8,8 @@ definite.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -18,11 +19,14 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from foldyn.cases import State
-from foldyn.errors import InputError, warn
+from foldyn.cases import Case, State
+from foldyn.condensation import Superelements
+from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning, warn
 from foldyn.linear.bloch import Bloch, null_space
+from foldyn.linear.level_error import DOUBTFUL, band_errors, first_doubtful
 from foldyn.linear.linearized import warn_beyond
 from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
+from foldyn.linear.model_error import beside, errors_of_bands, warn_of_bands
 from foldyn.linear.unit_cell import UnitCell, checked_phases
 from foldyn.linear.wave_solver import Waves, WaveSolver, check_count, slopes_of, tracked
 from foldyn.results.dataset import result_dataset
@@ -36,6 +40,7 @@ SHIFT = 1e-4  # shift, relative to the square root of the stiffness-to-mass scal
 NOISE = 1e-3  # values of s below this, relative to the shift, count as zero
 DENSE = 200  # dofs up to which all eigenvalues are computed
 SPARE = 4  # eigenvalues computed in addition to the count
+COMPARED = 8  # phases at which bars and hinges are compared with superelements
 ALL = "all"
 """Name of the direction of full gaps, which are gaps at every phase."""
 
@@ -52,6 +57,7 @@ def bands(
     secant: float | None = None,
     load_factor: float = 1.0,
     track: bool = True,
+    check_model: bool = True,
 ) -> xarray.Dataset:
     """Frequencies of Bloch waves: the bands of a repeated case.
 
@@ -82,6 +88,9 @@ def bands(
     track : bool
         Whether bands follow the shapes of their waves from phase to phase (MAC), through
         crossings; otherwise they are sorted by frequency.
+    check_model : bool
+        Whether to compare bars and hinges at rest with superelements, at some of the phases, where
+        that takes a few seconds at most.
 
     Returns
     -------
@@ -94,7 +103,12 @@ def bands(
         z). Coordinate `wave_vector` (phase, period), rad, and the coordinates and attributes of
         the phases (`distance`; `ticks`, `tick_labels`, `grid`). For the state: `vectors` (period,
         axis), m, and `angles` (period), rad, from a cell to the next, `axes` and `points` (m) of
-        screws, and `displacement`. Like other results, the dataset contains its case.
+        screws, and `displacement`. Of superelements also `frequency_error` (Hz), an estimate of the
+        largest error relative to a shell on a fine mesh, and the attribute `holds_to` (Hz), up to
+        which frequencies are estimated to be within 5 %. Of bars and hinges at rest `model_error`,
+        the relative error by comparison with superelements of a low level, in order of frequency,
+        at eight phases; nan elsewhere. Like other results, the dataset contains
+        its case.
 
     Raises
     ------
@@ -105,6 +119,8 @@ def bands(
     -----
     FoldynWarning
         The state is not an equilibrium, or unstable; hinges have no slope.
+    ModelRangeWarning
+        Bands lie above the range of the model.
 
     Notes
     -----
@@ -140,11 +156,22 @@ def bands(
         )
     with np.errstate(invalid="ignore"):
         frequency = np.sqrt(values) / TURN
-    warn_beyond(cell.case.structure, np.nan_to_num(frequency).max(axis=0), "band")
     data: dict[str, Any] = {
         "frequency": (("phase", "band"), frequency, {"units": "Hz"}),
         "eigenvalue": (("phase", "band"), values, {"units": "rad2/s2"}),
     }
+    holds_to = None
+    reference = beside(cell.case) if check_model and state is None and secant is None else None
+    if isinstance(reference, Case):
+        errors = _model_errors(cell.with_case(reference), given, frequency)
+        data["model_error"] = (("phase", "band"), errors, {"units": "1"})
+        warn_of_bands(errors)
+    else:
+        warn_beyond(cell.case.structure, np.nan_to_num(frequency).max(axis=0), "band")
+    if isinstance(cell.case.structure, Superelements):
+        errors = band_errors(linear, given, found)
+        data["frequency_error"] = (("phase", "band"), errors, {"units": "Hz"})
+        holds_to = _range(frequency, errors)
     each = list(zip(given, found, strict=True))
     if asked[0]:
         slopes = np.array([slopes_of(linear.bloch, phase, waves) for phase, waves in each])
@@ -155,16 +182,44 @@ def bands(
         shapes = np.array([linear.expanded(waves.shapes, phase) for phase, waves in each])
         data["shape"] = (("phase", "band", "node", "axis"), shapes, {"units": "m"})
     if asked[2]:
-        shares = np.array([polarizations(linear.nodes, waves) for waves in found])
+        shares = polarizations(linear, given, found)
         data["polarization"] = (("phase", "band", "axis"), shares, {"units": "1"})
     facts = {
         "count": count,
         "tracked": int(asked[3]),
         "secant": secant,
         "residual": linear.residual,
+        "holds_to": holds_to,
+        "not_compared": (reference if isinstance(reference, str) else "") or None,
         "wall_seconds": time.perf_counter() - began,
     }
     return _dataset("bands", linear, phases, given, data, facts)
+
+
+def _model_errors(reference: UnitCell, phases: NDArray, frequency: NDArray) -> NDArray[np.float64]:
+    """Relative errors (n, k) of bands, by comparison with a cell of superelements; see `bands`."""
+    chosen = np.unique(np.linspace(0, len(phases) - 1, COMPARED).round().astype(int))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        linear = linearize_cell(reference, None, None, 1.0)
+        found = WaveSolver(linear.bloch, frequency.shape[1]).at(phases[chosen])
+    true = np.sqrt(np.array([each.values for each in found]).clip(min=0.0)) / TURN
+    out = np.full(frequency.shape, np.nan)
+    out[chosen] = errors_of_bands(frequency[chosen], true)
+    return out
+
+
+def _range(frequency: NDArray, errors: NDArray) -> float:
+    """Frequency (Hz) up to which bands hold; warns if it is below the highest of theirs."""
+    holds, top = first_doubtful(frequency, errors), float(frequency.max())
+    if holds <= top:
+        warn(
+            f"the bands are estimated to hold up to {holds:.4g} Hz: frequencies from there on are "
+            f"doubtful by more than {DOUBTFUL:.0%}; take a higher level or fewer bands",
+            "superelements.md#errors",
+            ModelRangeWarning,
+        )
+    return min(holds, top)
 
 
 def _dataset(
@@ -183,11 +238,30 @@ def _dataset(
     return result.assign_attrs({key: told[key] for key in OF_PHASES if key in told})
 
 
-def polarizations(nodes: int, waves: Waves) -> NDArray[np.float64]:
-    """Shares (k, 3) of motions along x, y, z in the kinetic energy of waves, for `nodes` nodes."""
-    energy = (waves.shapes.conj() * waves.momentum)[: 3 * nodes]
-    shares = np.real(energy).reshape(nodes, 3, -1).sum(axis=0).T
-    return shares / shares.sum(axis=1, keepdims=True)
+def polarizations(
+    linear: LinearizedCell, phases: NDArray, waves: Sequence[Waves]
+) -> NDArray[np.float64]:
+    """Shares (n, k, 3) of motions along x, y, z in the kinetic energy of waves at phases (n, d)."""
+    patch, size = linear.patch, 3 * linear.nodes
+    case, structure = patch.case, patch.case.structure
+    panels, added = [], 0.0
+    if isinstance(structure, Superelements):
+        base = [min(patch.step[list(face)].tolist()) for face in structure.pattern.faces]
+        own = np.flatnonzero([not any(step) for step in base])  # panels of cell 0
+        panels = [
+            (linear.reach.gathered(amplitudes), masses)
+            for amplitudes, masses in structure.along_axes(case.held_edges, own)
+        ]
+        added = np.repeat(case.point_masses[patch.own_nodes], 3)[:, None]
+    out = []
+    for phase, (_, shapes, momentum) in zip(phases, waves, strict=True):
+        pushed = added * shapes[:size] if panels else momentum[:size]
+        energy = np.real(shapes[:size].conj() * pushed).reshape(linear.nodes, 3, -1).sum(axis=0)
+        for amplitudes, masses in panels:
+            moved = amplitudes.sparse_at(linear.bloch.factors(phase)) @ shapes
+            energy += [np.real(moved.conj() * (mass @ moved)).sum(axis=0) for mass in masses]
+        out.append((energy / energy.sum(axis=0)).T)
+    return np.array(out)
 
 
 def damped_bands(

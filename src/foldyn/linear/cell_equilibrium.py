@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from foldyn.cases import State
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.cell_patch import cell_patch
-from foldyn.linear.linearized_cell import ROUNDING, CellReach, deformed_motions, folded_body, spread
+from foldyn.linear.linearized_cell import (
+    ROUNDING,
+    CellReach,
+    check_state,
+    deformed_motions,
+    folded_body,
+    spread,
+)
 from foldyn.linear.unit_cell import UnitCell, check_commuting, images
 from foldyn.patterns.screw import Screw, of_twist, translation
 from foldyn.statics.tracing import displacement_of
@@ -71,7 +78,7 @@ def relaxed(
     >>> fd.bands(cell, [[0.5, 0.5]], count=1, state=pulled).vectors.values.round(5).tolist()
     [[0.03967, 0.0, 0.0], [0.0, 0.04008, 0.0]]
     """
-    of_kind("cell", cell, UnitCell)
+    check_state(of_kind("cell", cell, UnitCell))
     patch = cell_patch(cell)
     steps, load_factor = whole("steps", steps, least=1), number("load_factor", load_factor)
     rest = cell.case.structure.nodes

@@ -27,6 +27,8 @@ from foldyn.cases.loads import Actuate
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import resolve_creases, resolve_nodes
 from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
+from foldyn.condensation import Superelements
+from foldyn.condensation.panel import INNER
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.lattice import (
     Lattice,
@@ -63,7 +65,8 @@ class Patch:
     unit, step : (n,), (n, d)
         For each node, the node of cell 0 of which it is a copy, and R.
     hidden_unit, hidden_step : (h,), (h, d)
-        The same for the hidden dofs; -1 if the patch lacks the hidden dof of cell 0.
+        The same for the hidden dofs, all those that are not of nodes; -1 if the patch lacks the
+        hidden dof of cell 0.
     own_unit, own_step : (k,), (k, d)
         The same for the nodes of the cell's own structure.
     first : (m,)
@@ -129,7 +132,7 @@ def cell_patch(cell: UnitCell) -> Patch:
     zero = lattice.zero
     unit_of = {part: k for k, part in enumerate(part for step, part in sites if step == zero)}
     unit, step = _numbered(sites, unit_of, cell.dimensions)
-    hidden = hidden_sites(made, unit, step)
+    hidden = hidden_sites(repeated, unit, step, panels)
     hidden_of = {part: k for k, part in enumerate(part for at, part in hidden if at == zero)}
     own_unit, own_step = _numbered(own, unit_of, cell.dimensions)
     first = np.full(len(unit_of), -1)
@@ -286,11 +289,14 @@ def node_sites(
     return [sites[node] for node in range(len(structure.nodes))]
 
 
-def hidden_sites(structure: Discretized, unit: NDArray, step: NDArray) -> list[Site]:
-    """Sites of the hidden dofs of a structure: rotations about sides, and gives of edges.
+def hidden_sites(case: Case, unit: NDArray, step: NDArray, panels: Sequence[Panel]) -> list[Site]:
+    """Sites of the dofs of a patch that are not of nodes.
+
+    They are rotations about sides, gives of edges, or of superelements those of edges and panels.
 
     unit, step : for each node, the node of cell 0 of which it is a copy (n,), and R (n, d).
     """
+    structure = case.structure
     place = list(zip(map(tuple, step.tolist()), unit.tolist(), strict=True))
 
     def site(ends: Iterable[int], what: tuple) -> Site:
@@ -312,6 +318,14 @@ def hidden_sites(structure: Discretized, unit: NDArray, step: NDArray) -> list[S
         about = np.zeros((sides.rotations, 2), np.int64)
         about[sides.rotation[sides.rotation >= 0]] = np.sort(ends[sides.rotation >= 0], axis=1)
         return turns(about.tolist())
+    if isinstance(structure, Superelements):
+        lines = structure.pattern.lines.tolist()
+        return [
+            (panels[owner][0], ("panel", panels[owner][1], *what))
+            if kind == INNER
+            else site(lines[owner], (kind, *what))
+            for kind, owner, *what in structure.owners(case.held_edges)
+        ]
     assert isinstance(structure, Structure)
     assert structure.pattern is not None
     found: list[Site] = []

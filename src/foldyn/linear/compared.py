@@ -1,4 +1,4 @@
-"""`Fidelity`: the result of a comparison with the shell, mode by mode, and its advice."""
+"""`Fidelity`: models beside superelements or the shell, mode by mode, and advice."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import xarray
 
+from foldyn.cases.models import SUPERELEMENTS
 from foldyn.errors import InputError
 from foldyn.linear.reference import LEAST, NO_LIMIT
-from foldyn.structures.beyond_range import LINEAR
 from foldyn.values import choice
 
 ABREAST, WIDE = 4, 79  # in plain text: models side by side, and characters per line
@@ -22,17 +22,40 @@ ABREAST, WIDE = 4, 79  # in plain text: models side by side, and characters per 
 __all__ = ["OWN", "ComparedMode", "Fidelity"]
 OWN = "own"
 """Name of the case's own model."""
-LARGEST = 0.10  # largest error of a usable model
+GOOD, LARGEST = 0.02, 0.10  # largest errors: of a model worth keeping, and of a usable model
 MESH = 0.02  # larger mesh errors are mentioned
+BETTER = "take superelements (--model superelements on the command line, fd.superelements)"
 SCOPE = (
-    f"In linear analyses {LINEAR}: they come within 1 % of the shell. Motions and loads that turn "
-    "creases far were not compared."
+    "Only small vibrations about rest and small loads were compared: motions and loads that turn "
+    "creases far are not covered."
 )
+
+
+class Reach(NamedTuple):
+    """Range in which a model follows the reference: the lowest modes with errors of at most 10 %.
+
+    Attributes
+    ----------
+    model : str
+    count : int
+        Number of modes in the range.
+    worst : float
+        Largest error among these modes; infinite if there are none.
+    """
+
+    model: str
+    count: int
+    worst: float
 
 
 def advice(result: xarray.Dataset) -> str:
     """Advice in sentences from a comparison; see `foldyn.fidelity`."""
     return " ".join(_sentences(result))
+
+
+def against(result: xarray.Dataset) -> str:
+    """What the models are compared with, in sentences."""
+    return SUPERELEMENTS if result.attrs["reference"] == SUPERELEMENTS else "the shell"
 
 
 def percent(value: float) -> str:
@@ -49,53 +72,94 @@ def _sentences(result: xarray.Dataset) -> Iterator[str]:
     """Sentences of the advice, in order."""
     frequency, limit = result["frequency"].values, float(result.attrs["limit"])
     below = int((frequency < limit).sum())
-    names = result["model"].values.tolist()
+    reaches = [reach(result, model, below) for model in result["model"].values.tolist()]
+    own, best = reaches[0], min(reaches, key=lambda one: (-one.count, one.worst))
+    if own.count == best.count and own.worst <= max(GOOD, best.worst):
+        best = own
     if below:
-        reached = "; ".join(f"{name} {_reached(result, name, below)}" for name in names)
-        yield f"Within {size(LARGEST)} of the shell, from the lowest mode on: {reached}."
+        yield from _vibrations(result, below, best)
     else:
         yield (
-            f"The lowest mode of the shell, {frequency[0]:.4g} Hz, lies above {limit:.4g} Hz, 0.6 "
-            "of the plate frequency: panels vibrate as plates there, which bars and hinges do not."
-        )
-    soft = int(result["soft_hinges"].sel(model=OWN))
-    if soft:
-        yield (
-            f"{soft} hinges of the case's own model are superlinear and have no stiffness at rest: "
-            "take linear bends, or judge it with a secant amplitude (secant = 1, in degrees)."
+            f"The lowest mode of {against(result)}, {frequency[0]:.4g} Hz, lies above {limit:.4g} "
+            "Hz, 0.6 of the plate frequency: panels vibrate as plates there, which bars and hinges "
+            f"do not: {BETTER}."
         )
     if "deflection" in result:
-        yield _statics(result, names)
+        yield _statics(result, best)
     yield from _mesh(result, below)
     yield SCOPE
 
 
-def _reached(result: xarray.Dataset, model: str, below: int) -> str:
-    """How far a model follows the shell among the modes below the limit."""
-    frequency = result["frequency"].values
-    error = np.abs(result["error"].sel(model=model).values[:below])
-    bad = np.flatnonzero(error > LARGEST)
-    count = int(bad[0]) if len(bad) else below
-    if not count:
-        return "in no mode"
-    end = result.attrs["limit"] if below == count < len(frequency) else frequency[count - 1]
-    return f"up to {float(end):.4g} Hz ({size(float(error[:count].max()))} at most)"
+def _vibrations(result: xarray.Dataset, below: int, best: Reach) -> Iterator[str]:
+    """Sentences on the modes below the limit, for the recommended model."""
+    frequency, limit = result["frequency"].values, float(result.attrs["limit"])
+    if not best.count:
+        yield (
+            f"No model has the lowest mode, {frequency[0]:.4g} Hz, within {size(LARGEST)} of "
+            f"{against(result)}: {BETTER}."
+        )
+    else:
+        top, whole = float(frequency[best.count - 1]), best.count == below
+        upto = f"{top:.4g} Hz"
+        if whole and below < len(frequency):
+            upto = f"{limit:.4g} Hz, 0.6 of the plate frequency"
+        elif whole:
+            upto += ", the highest mode compared"
+        ratio = float(result["cost_ratio"].sel(model=best.model))
+        yield (
+            f"{_called(result, best.model)} is within {size(best.worst)} of {against(result)} up "
+            f"to {upto}, at 1/{ratio:.0f} of its cost{'' if best.model == OWN else ': use it'}."
+        )
+        if not whole:
+            yield (
+                f"The next mode, {frequency[best.count]:.4g} Hz, {_missed(result, best)}: from "
+                f"there {BETTER}."
+            )
+    if best.model != OWN:
+        yield from _own(result, below)
 
 
-def _statics(result: xarray.Dataset, names: list[str]) -> str:
-    """Displacements of the models."""
-    errors = {name: float(result["deflection_error"].sel(model=name)) for name in names}
+def _own(result: xarray.Dataset, below: int) -> Iterator[str]:
+    """Errors of the case's own model below the limit."""
+    error = np.abs(result["error"].sel(model=OWN).values[:below])
+    lost = int(np.isinf(error).sum())
+    parts = []
+    if lost < below:
+        parts.append(f"is off by up to {size(float(error[np.isfinite(error)].max()))}")
+    if lost:
+        parts.append(f"has no partner of {lost} of {below} modes")
+    yield f"{_called(result, OWN)} {' and '.join(parts)} there."
+    soft = int(result["soft_hinges"].sel(model=OWN))
+    if soft:
+        yield (
+            f"{soft} of its hinges are superlinear and have no stiffness at rest: take linear "
+            "bends, or judge it with a secant amplitude (secant = 1, in degrees)."
+        )
+
+
+def _statics(result: xarray.Dataset, best: Reach) -> str:
+    """Displacements of the recommended model, and of the case's own."""
+    errors = result["deflection_error"]
+    told = {one: float(errors.sel(model=one)) for one in dict.fromkeys([best.model, OWN])}
     texts = (
         f"{percent(error)} ({model})" if np.isfinite(error) else f"no stiffness at all ({model})"
-        for model, error in errors.items()
+        for model, error in told.items()
     )
     mesh = np.isnan(result["deflection_mesh_error"])
-    uncertain = "; the shell's have not converged" if mesh else ""
+    uncertain = "; those of the shell have not converged" if mesh else ""
     return f"Displacements under its forces, if those are small: {', '.join(texts)}{uncertain}."
 
 
+def reach(result: xarray.Dataset, model: str, below: int) -> Reach:
+    """Range in which a model follows the reference among the lowest modes."""
+    error = np.abs(result["error"].sel(model=model).values[:below])
+    bad = np.flatnonzero(error > LARGEST)
+    count = int(bad[0]) if len(bad) else below
+    return Reach(model, count, float(error[:count].max()) if count else float("inf"))
+
+
 def _mesh(result: xarray.Dataset, below: int) -> Iterator[str]:
-    """Errors of the shell itself."""
+    """Errors of the reference itself."""
     if "touched_clamp" in result.attrs:
         yield (
             f"No mesh of the shell converges: {NO_LIMIT.format(result.attrs['touched_clamp'])}. "
@@ -103,6 +167,13 @@ def _mesh(result: xarray.Dataset, below: int) -> Iterator[str]:
         )
         return
     error = np.abs(result["mesh_error"].values[: below or None])
+    if result.attrs["reference"] == SUPERELEMENTS:
+        if error.max() > MESH:
+            yield (
+                f"The superelements are themselves up to {size(float(error.max()))} off, by their "
+                "own estimate."
+            )
+        return
     unsettled = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(error)))
     if unsettled:
         yield (
@@ -116,17 +187,27 @@ def _mesh(result: xarray.Dataset, below: int) -> Iterator[str]:
         )
 
 
+def _missed(result: xarray.Dataset, best: Reach) -> str:
+    error = float(result["error"].sel(model=best.model).values[best.count])
+    return "has no partner in it" if np.isinf(error) else f"is off by {size(error)} in it"
+
+
+def _called(result: xarray.Dataset, model: str) -> str:
+    name = "case's own model" if model == OWN else f'model "{model}"'
+    return f"The {name} ({result['options'].sel(model=model).item()})"
+
+
 class ComparedMode(NamedTuple):
-    """A mode of the shell and its partner in a model.
+    """A mode of the reference, superelements or the shell, and its partner in a model.
 
     Attributes
     ----------
     mode : int
-        Number of the elastic mode of the shell, from 1.
+        Number of the elastic mode of the reference, from 1.
     shell : float
-        Frequency of the mode, Hz, extrapolated in mesh size.
+        Frequency of the mode, Hz, for the limit of fine meshes.
     mesh_error : float
-        Relative error of the frequency on the finest mesh, compared with `shell`.
+        Relative error of the frequency on the finest mesh, or as superelements estimate it.
     below : bool
         Whether the mode lies below 0.6 of the plate frequency.
     error : float
@@ -146,7 +227,7 @@ class ComparedMode(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fidelity:
-    """A comparison of models with the shell, from `foldyn.fidelity`.
+    """A comparison of models with superelements or the shell, from `foldyn.fidelity`.
 
     Parameters
     ----------
@@ -198,11 +279,11 @@ class Fidelity:
 
     @property
     def advice(self) -> str:
-        """How far each model follows the shell, and the limits of the comparison."""
+        """The model to use, up to which frequency, and the limits of the comparison."""
         return advice(self.result)
 
     def table(self, model: str = OWN) -> tuple[ComparedMode, ...]:
-        """Modes of the shell, each paired with a mode of the model."""
+        """Modes of the reference, each paired with a mode of the model."""
         one = self.result.sel(model=choice("model", model, self.models))
         names = ("mode", "frequency", "mesh_error", "error", "mac")
         columns = (one[name].values.tolist() for name in names)
@@ -233,7 +314,8 @@ def legend(found: Fidelity) -> list[str]:
         lines.append(f"* above 0.6 of the plate frequency, {found.limit:.4g} Hz")
     if "vertex_radius" in found.result.attrs:
         radius = found.result.attrs["vertex_radius"]
-        lines.append(f"shell: graded toward vertices, within {radius:g} m of which it is stiff")
+        name = found.result.attrs["reference"]
+        lines.append(f"{name}: graded toward vertices, within {radius:g} m of which it is stiff")
     return lines
 
 
@@ -241,7 +323,9 @@ def _columns(found: Fidelity, models: tuple[str, ...]) -> str:
     """Modes and errors of some models."""
     result = found.result.sel(model=list(models))
     tables = [found.table(model) for model in models]
-    rows = [["mode", "shell", *(text for model in models for text in (model, "MAC"))]]
+    rows = [
+        ["mode", result.attrs["reference"], *(text for model in models for text in (model, "MAC"))]
+    ]
     for every in zip(*tables, strict=True):
         first = every[0]
         row = [f"{first.mode}{'' if first.below else ' *'}", f"{first.shell:.4g} Hz"]
@@ -254,6 +338,8 @@ def _columns(found: Fidelity, models: tuple[str, ...]) -> str:
         for error in result["deflection_error"].values.tolist():
             row += [percent(error) if math.isfinite(error) else "soft", ""]
         rows.append(row)
+    ratios = (text for ratio in result["cost_ratio"].values for text in (f"1/{ratio:.0f}", ""))
+    rows.append(["cost", f"{result['seconds'].item():.2g} s", *ratios])
     wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for first, *others in rows:

@@ -6,6 +6,7 @@ import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from statistics import median
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,19 +18,32 @@ from foldyn.algebra.superlu import factorize
 from foldyn.arguments import brief
 from foldyn.cases import Case
 from foldyn.cases.clamped_edges import straightened
+from foldyn.cases.models import SHELL, SUPERELEMENTS
+from foldyn.condensation import Superelements
 from foldyn.errors import FoldynWarning, InputError, warn, within
 from foldyn.linear.compared import OWN, Fidelity
+from foldyn.linear.level_error import other_level
 from foldyn.linear.linearized import linearize
+from foldyn.linear.modes import modes
 from foldyn.linear.operating_point import BALANCED
 from foldyn.linear.reference import (
     SPARE,
+    Reference,
     is_graded,
     matched,
     modes_at_rest,
     reference_modes,
+    superelement_modes,
     touched_clamp,
 )
-from foldyn.linear.shell_of import check_reduced, graded_meshes, meshes, shell_of, with_structure
+from foldyn.linear.shell_of import (
+    check_reduced,
+    graded_meshes,
+    meshes,
+    shell_of,
+    superelements_of,
+    with_structure,
+)
 from foldyn.materials import Superlinear
 from foldyn.materials.law import Law
 from foldyn.mechanics.following import following_force, joined
@@ -60,31 +74,35 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
 """Models compared with the case's model: arguments of `discretize` that replace the case's own.
 
 "bars" is "n5b8e" with bars alone resisting stretching."""
+REFERENCES = (SUPERELEMENTS, SHELL)
+"""What models are compared with."""
 BESIDE = ("standard", "plate", "n5b8e")
 """Models compared by default."""
 SHOWN = ("calibration", "mass", "bend_law")
 """Options that distinguish models in tables."""
 BEYOND = 2  # additional modes of the shell, computed but not compared
+RUNS, SECONDS = 5, 3.0  # limits for timing a modal analysis: number of runs, and seconds
 
 
 def fidelity(
     case: Case,
     count: int = 6,
     *,
+    reference: str = SUPERELEMENTS,
     divisions: Sequence[int] | None = None,
     models: Sequence[str] | Mapping[str, Mapping[str, Any]] | None = None,
     secant: float | None = None,
     vertex_radius: float | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Fidelity:
-    """Compare bar-and-hinge models with the shell, for a given case.
+    """Compare bar-and-hinge models with superelements, or with the shell, for a given case.
 
-    The shell has the pattern, sheet, creases, supports, loads and masses of the case, and a
-    consistent mass. Its lowest elastic modes about rest, extrapolated from two meshes, are paired
-    with the modes of each model by their MAC at shared nodes. If forces act and supports hold the
-    sheet, displacements along small forces are compared too. A third mesh, half as fine, gives the
-    order of convergence of the shell, and from it the shell's error, or reveals that the shell has
-    not converged.
+    The reference has the pattern, sheet, creases, supports, loads and masses of the case, and a
+    consistent mass. Its lowest elastic modes about rest are paired with the modes of each model by
+    their MAC at shared nodes. If forces act and supports hold the sheet, displacements along small
+    forces are compared too. Superelements estimate their own errors. Modes of the shell are
+    extrapolated from two meshes; a third one, half as fine, gives the order of convergence, and
+    from it the shell's error, or reveals that the shell has not converged.
 
     Parameters
     ----------
@@ -92,10 +110,13 @@ def fidelity(
         Case of bars and hinges, from `discretize`. Histories and damping are ignored; loads act in
         full.
     count : int
-        Number of elastic modes of the shell.
+        Number of elastic modes of the reference.
+    reference : {"superelements", "shell"}
+        What the models are compared with. Superelements approach a shell on a fine mesh, in a
+        fraction of its time.
     divisions : (int, int), optional
-        Pieces of every edge in the two finer shells: (6, 12) by default, or fewer, with a warning,
-        if many panels would make the shell large.
+        Only for the shell: pieces of every edge in the two finer meshes, by default (6, 12), or
+        fewer, with a warning, if many panels would make the shell large.
     models : sequence of str, or mapping of str to mapping, optional
         Models compared in addition to the case's own model: names from
         `foldyn.linear.fidelity.MODELS`, by default "standard", "plate" and "n5b8e" as far as they
@@ -104,23 +125,25 @@ def fidelity(
     secant : float, optional
         Amplitude (degrees) of superlinear hinges, which have no stiffness at rest; as in `modes`.
     vertex_radius : float, optional
-        Radius (m) within which corners of the shell are rigid in their plane, as in `shell`; the
-        thickness is a good choice. The shells then have meshes graded toward vertices, by default
-        with 4, 8 and 12 divisions, and frequencies are extrapolated with the observed order. Large
-        supported sheets, and towers, converge only with such a radius.
+        Radius (m) within which corners of panels are rigid in their plane, as in `superelements`
+        and `shell`; the thickness, the default of superelements, is a good choice. Shells then have
+        meshes graded toward vertices, by default with 4, 8 and 12 divisions, and frequencies are
+        extrapolated with the observed order. Large supported sheets, and towers, converge only with
+        such a radius.
     progress : callable
         Called with the name of each step.
 
     Returns
     -------
     Fidelity
-        The attribute `advice` says up to which frequency each model follows the shell.
+        The attribute `advice` names the model to use and its frequency range.
 
     Raises
     ------
     InputError
-        The case is a shell, its structure was changed by hand, the sheet has no density, or nodes
-        other than vertices are named; a panel cannot be meshed; an argument is out of range.
+        The case is not one of bars and hinges, its structure was changed by hand, the sheet has no
+        density, or nodes other than vertices are named; a panel cannot be meshed; an
+        argument is out of range.
 
     Warns
     -----
@@ -133,11 +156,11 @@ def fidelity(
     >>> pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
     >>> sheet = fd.Sheet(1e6, 0.25, 0.01, density=1000.0)
     >>> case = fd.Case(fd.discretize(pattern, sheet), [fd.Fix([0, 1, 2, 3])])
-    >>> result = fd.fidelity(case, count=3, divisions=(4, 8), models=["n5b8e"])
+    >>> result = fd.fidelity(case, count=3, models=["n5b8e"])
     >>> [f"{100 * mode.error:+.1f} %" for mode in result.table("n5b8e")]
     ['...', ...]
     """
-    checked = comparison(case, count, divisions, models, secant, vertex_radius)
+    checked = comparison(case, count, reference, divisions, models, secant, vertex_radius)
     return checked.run(progress)
 
 
@@ -151,9 +174,10 @@ class Comparison:
     case : Case
         Case as given.
     count : int
-        Number of modes of the shell.
-    shells : (Case, Case, Case)
-        The case with shells of three meshes, finest last, with forces as its only loads.
+        Number of modes of the reference.
+    references : tuple of Case
+        The case with superelements, or with shells of three meshes, finest last, with forces as its
+        only loads.
     compared : mapping of str to Case
         The case with each model, starting with its own, with the same loads.
     not_forces : tuple of int
@@ -163,7 +187,7 @@ class Comparison:
 
     case: Case
     count: int
-    shells: tuple[Case, Case, Case]
+    references: tuple[Case, ...]
     compared: Mapping[str, Case]
     not_forces: tuple[int, ...]
     secant: float | None
@@ -171,12 +195,10 @@ class Comparison:
     def run(self, progress: Callable[[str], None] = lambda step: None) -> Fidelity:
         """Compute the comparison; `progress` is called with the name of each step."""
         began = time.perf_counter()
-        divisions = [one.structure.options.divisions for one in self.shells]
-        progress("shell with {}, {} and {} divisions".format(*divisions))
-        true = reference_modes(self.shells, self.count + BEYOND)
+        true, facts = self._reference(progress)
         count = min(self.count, len(true.frequency))
         if not count:
-            raise InputError(": its shell has no vibrations; free some of its nodes", "case")
+            raise InputError(": its sheet has no vibrations; free some of its nodes", "case")
         found = {}
         for name, held in self.compared.items():
             progress(f"model {name}")
@@ -192,17 +214,17 @@ class Comparison:
             "options": [_told(held, self.compared[OWN]) for held in self.compared.values()],
             "soft_hinges": [one.attrs["soft_hinges"] for one in found.values()],
         }
+        progress("times")
+        values |= self._times(true)
         if self.compared[OWN].loads and _held(true.found):
             progress("small loads")
             values |= self._deflections([name for name, one in found.items() if _held(one)])
         limit = plate_frequency(self.case.structure.pattern, self.case.structure.sheet)
-        facts = {
+        facts |= {
             "limit": BELOW * limit,
             "plate_frequency": limit,
-            "divisions": divisions[1:],
-            "vertex_radius": self.shells[-1].structure.options.vertex_radius,
-            "touched_clamp": touched_clamp(self.shells[-1].structure),
-            "triangles": len(true.case.structure.triangles),
+            "vertex_radius": true.case.structure.options.vertex_radius,
+            "touched_clamp": touched_clamp(true.case.structure),
             "rigid": int((true.found["eigenvalue"] <= 0.0).sum()),
             "secant": self.secant,
             "not_forces": ", ".join(f"loads[{i}]" for i in self.not_forces) or None,
@@ -211,29 +233,56 @@ class Comparison:
         }
         return Fidelity(fidelity_dataset(self.case, list(self.compared), values, facts))
 
+    def _reference(self, progress: Callable[[str], None]) -> tuple[Reference, dict[str, Any]]:
+        """Modes of the reference, two more than are compared, and facts about it."""
+        structure = self.references[-1].structure
+        if isinstance(structure, Superelements):
+            progress(f"superelements of level {structure.options.level}")
+            true = superelement_modes(self.references[-1], self.count + BEYOND)
+            return true, {"reference": SUPERELEMENTS, "level": structure.options.level}
+        divisions = [one.structure.options.divisions for one in self.references]
+        progress("shell with {}, {} and {} divisions".format(*divisions))
+        facts = {"divisions": divisions[1:], "triangles": len(structure.triangles)}
+        true = reference_modes(self.references, self.count + BEYOND)
+        return true, {"reference": SHELL, **facts}
+
+    def _times(self, true: Reference) -> dict[str, Any]:
+        """Times (s) of modal analyses, all with the same number of modes, and ratios of times."""
+        count, taken = true.found.sizes["mode"], [float(true.found.attrs["wall_seconds"])]
+        shell = _seconds(true.case, count, self.secant, taken)
+        own = np.array([_seconds(held, count, self.secant) for held in self.compared.values()])
+        return {"seconds": shell, "model_seconds": own, "cost_ratio": shell / own}
+
     def _deflections(self, held: Sequence[str]) -> dict[str, Any]:
         """Displacements along the forces: work divided by the sum of the forces on nodes.
 
         held : names of the models without free motions.
         """
-        divisions = [one.structure.options.divisions for one in self.shells]
-        works = np.array([small_loads(case).work for case in self.shells])
-        observed = is_graded(self.shells[-1])
-        true = limits(works[:, None], divisions, observed=observed).item()
-        limit = convergence(works[:, None], divisions).limit.item()
+        works = np.array([small_loads(case).work for case in self.references])
+        if len(works) == 1:
+            (case,) = self.references
+            assert isinstance(case.structure, Superelements)
+            lower = small_loads(case.altered(structure=other_level(case.structure))).work
+            true, mesh_error = works.item(), lower / works.item() - 1.0
+        else:
+            divisions = [one.structure.options.divisions for one in self.references]
+            observed = is_graded(self.references[-1])
+            true = limits(works[:, None], divisions, observed=observed).item()
+            mesh_error = works[2] / convergence(works[:, None], divisions).limit.item() - 1.0
         own = np.array([
             small_loads(case, self.secant).work if name in held else np.inf
             for name, case in self.compared.items()
         ])  # fmt: skip
         return {
             "deflection": true / float(np.abs(rest_forces(self.compared[OWN])).sum()),
-            "deflection_mesh_error": works[2] / limit - 1.0,
+            "deflection_mesh_error": mesh_error,
             "deflection_error": own / true - 1.0,
         }
 
 
 def comparison(
-    case: Case, count: int = 6, divisions: Sequence[int] | None = None,
+    case: Case, count: int = 6, reference: str = SUPERELEMENTS,
+    divisions: Sequence[int] | None = None,
     models: Sequence[str] | Mapping[str, Mapping[str, Any]] | None = None,
     secant: float | None = None, vertex_radius: float | None = None,
 ) -> Comparison:  # fmt: skip
@@ -247,14 +296,21 @@ def comparison(
     for name, held in compared.items():
         with within("" if name == OWN else f"models: {name}: "):
             held.check_movable()
-    if vertex_radius is None:
-        coarse, fine = meshes(case.structure.pattern, divisions)
+    if choice("reference", reference, REFERENCES) == SHELL:
+        if vertex_radius is None:
+            coarse, fine = meshes(case.structure.pattern, divisions)
+        else:
+            coarse, fine = graded_meshes(divisions)
+        references = [shell_of(forces, n, vertex_radius) for n in (coarse // 2, coarse, fine)]
+    elif divisions is not None:
+        raise InputError(
+            f' = {show(divisions)}: are those of the shell; give reference = "shell" too, or leave '
+            "them out",
+            "divisions",
+        )
     else:
-        coarse, fine = graded_meshes(divisions)
-    first, second, third = (
-        shell_of(forces, pieces, vertex_radius) for pieces in (coarse // 2, coarse, fine)
-    )
-    return Comparison(case, count, (first, second, third), compared, tuple(others), secant)
+        references = [superelements_of(forces, vertex_radius=vertex_radius)]
+    return Comparison(case, count, tuple(references), compared, tuple(others), secant)
 
 
 def _held(found: xarray.Dataset) -> bool:
@@ -316,6 +372,22 @@ def _written(value: Any) -> str:
     return show(value.name if isinstance(value, Law) else value)
 
 
+def _seconds(case: Case, count: int, secant: float | None, taken: Sequence[float] = ()) -> float:
+    """Median time (s) of a modal analysis, from fewer runs if these take long.
+
+    taken : times already measured.
+    """
+    times = list(taken)
+    if not times:
+        modes_at_rest(case, 1, secant)  # warm-up: computes cached values
+    while not times or (len(times) < RUNS and sum(times) < SECONDS):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FoldynWarning)
+            found = modes(case, min(count, len(case.free_dofs)), secant=secant, check_model=False)
+        times.append(float(found.attrs["wall_seconds"]))
+    return median(times)
+
+
 def _warn_of_imbalance(residual: float) -> None:
     if residual > BALANCED:
         warn(
@@ -365,14 +437,16 @@ def forces_alone(case: Case) -> tuple[Case, list[int]]:
 
 
 def rest_forces(case: Case) -> NDArray:
-    """Forces (3n,), N, of a case's loads in full, in its rest state."""
+    """Forces, N, of a case's loads in full on all of its dofs, in its rest state."""
     nodes = case.structure.nodes
-    total = sum((force for force, _ in case.load_terms), np.zeros(nodes.shape)).ravel()
+    at_rest = case.body.dofs(np.zeros_like(nodes))
+    total = np.zeros(at_rest.size)
+    for force, _ in case.load_terms:
+        total[: nodes.size] += force.ravel()
     following = joined((part, 0) for part, _ in case.following_terms)
     if not following.acts:
         return total
-    at_rest = case.body.dofs(np.zeros_like(nodes))
-    return total + following_force(following, at_rest, np.ones((1, 1)))[: total.size]
+    return total + following_force(following, at_rest, np.ones((1, 1)))
 
 
 def small_loads(case: Case, secant: float | None = None) -> SmallLoads:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any, NamedTuple
@@ -15,12 +16,14 @@ from foldyn.algebra.eigen import SHIFT, Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
 from foldyn.condensation import Superelements
 from foldyn.dynamics.progress import Reporter
-from foldyn.errors import InputError, ModelRangeWarning, StretchWarning, warn
+from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning, StretchWarning, warn
 from foldyn.linear.excitation import NAMED, Answer, absolute, drive_of
 from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
+from foldyn.linear.level_error import DOUBTFUL
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
-from foldyn.linear.modes import DOUBTFUL, range_of_superelements
+from foldyn.linear.model_error import beside
+from foldyn.linear.modes import trusted
 from foldyn.linear.time_domain import Rig, SteppedSine, reported, stepped_sine
 from foldyn.linear.transients import BurstRandom, Impulse, burst_random, impulse
 from foldyn.ram_limit import check_memory
@@ -79,6 +82,7 @@ def frf(
     amplitude: float = 1.0,
     load_factor: float = 1.0,
     progress: bool | Reporter | None = None,
+    check_model: bool = True,
     **options: Any,
 ) -> xarray.Dataset:
     """Frequency response of a case about a state: displacement per force, or per motion of a base.
@@ -112,6 +116,9 @@ def frf(
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress`, in simulated time for methods that simulate
         motions, in frequencies for the others.
+    check_model : bool
+        Whether to compare the modes of bars and hinges at rest with those of superelements, where
+        that takes a few seconds at most; as in `modes`.
     **options
         Fields of `linear.Modal`, `linear.HarmonicBalance`, `linear.Impulse`,
         `linear.SteppedSine` and `linear.BurstRandom`.
@@ -125,8 +132,9 @@ def frf(
         w t): a lag is a negative phase; nan if there is no response. `displacement` of the state,
         and `drive`, the amplitudes of the drive. `coherence` (burst_random), `unsteadiness`
         (stepped_sine) or `swing` (harmonic). Attributes hold the method, its options and facts
-        about the run, for superelements also `holds_to` (Hz), up to which modes are estimated to be
-        within 5 %.
+        about the run, also `holds_to` (Hz), up to which modes are estimated to be within 5 %: of
+        superelements, and of bars and hinges that are compared with them. The latter have
+        `mode_frequencies` (Hz) and their relative errors, `model_error` (nan: lost).
 
     Raises
     ------
@@ -176,23 +184,30 @@ def frf(
             "of the drive instead",
             "secant",
         )
-    began = time.perf_counter()
+    began, reference = time.perf_counter(), None
     with reported(progress) as report:
         if way.linear:
             system = linearize(case, state, secant=way.secant or secant, load_factor=load_factor)
             _warn_of_instability(system)
+            if check_model and state is None and not way.by_amplitude and secant is None:
+                reference = beside(case)
             answer = way.compute(system, driven, frequency, chosen, report)
-            _warn_of_stretch(system, frequency, answer.response)
+            if not isinstance(reference, Case):
+                _warn_of_stretch(system, frequency, answer.response)
             response, displacement = absolute(system, driven, answer.response), system.displacement
             own: dict[str, Any] = {"soft_hinges": system.soft}
-            if isinstance(case.structure, Superelements):
-                own["holds_to"] = _range(case, float(frequency.max()))
+            own["not_compared"] = (reference if isinstance(reference, str) else "") or None
+            if isinstance(reference, Case):
+                own |= _trusted(case, float(frequency.max()), reference)
+            elif isinstance(case.structure, Superelements):
+                own |= _trusted(case, float(frequency.max()), None)
         else:
             rig = Rig(case, state, load_factor, driven, chosen)
             answer = way.compute(rig, frequency, chosen, report)
             response, displacement = answer.response, rig.state
             own = {"integrator": rig.integrator, "dt": chosen.dt}
-    warn_beyond(case.structure, frequency, linear=not way.by_amplitude)
+    if not isinstance(reference, Case):
+        warn_beyond(case.structure, frequency, linear=not way.by_amplitude)
     facts = {
         "method": method,
         **driven.facts(),
@@ -209,18 +224,27 @@ def frf(
     )
 
 
-def _range(case: Case, top: float) -> float:
-    """Frequency (Hz), at most `top`, up to which superelements hold; warns if it is lower."""
-    holds = range_of_superelements(case, top)
+def _trusted(case: Case, top: float, reference: Case | None) -> dict[str, Any]:
+    """Facts about the frequencies up to `top` (Hz) that are right; warns if some are not.
+
+    reference : the case with superelements, for bars and hinges.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        holds, frequency, error = trusted(case, top, reference)
     if holds < top:
+        remedy = "a higher level" if reference is None else "superelements (fd.superelements)"
         warn(
             f"the response is estimated to hold up to {holds:.4g} Hz: above, frequencies of modes "
-            f"are doubtful by more than {DOUBTFUL:.0%}, or not estimated; take a higher level or "
+            f"are off by more than {DOUBTFUL:.0%}, missing or not estimated; take {remedy} or "
             "lower frequencies",
             "superelements.md#errors",
             ModelRangeWarning,
         )
-    return holds
+    own = {"holds_to": holds}
+    return (
+        own if reference is None else {**own, "mode_frequencies": frequency, "model_error": error}
+    )
 
 
 def _warn_of_instability(system: Linearized) -> None:

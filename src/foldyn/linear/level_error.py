@@ -10,18 +10,25 @@ pairs of meshes.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.linalg import eigh
 
+from foldyn.cases import Case
 from foldyn.condensation import Superelements
 from foldyn.condensation.shapes import LEVELS
 from foldyn.condensation.term import SuperelementsTerm
-from foldyn.linear.linearized import Linearized
+from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
+from foldyn.linear.wave_solver import Waves, WaveSolver
 
 LOWER = 3  # level with which the highest one is compared
 SHARES = (2.0, 2.0, 2.0, 3.0, 1.0)  # error of each level / difference to the other one
 LEAST = 1e-3  # error of every frequency, relative to it, that no comparison shows
+DOUBTFUL = 0.05  # relative error of a frequency up to which results are said to hold
+ROUNDING = 1e-4  # errors below this, relative to the highest frequency, are no reason for doubt
 TURN = 2.0 * np.pi
 
 
@@ -32,31 +39,55 @@ def other_level(structure: Superelements) -> Superelements:
 
 
 def frequency_errors(
-    linear: Linearized, values: NDArray, shapes: NDArray, other: NDArray
+    case: Case, values: NDArray, other: NDArray, changes: Iterable[NDArray]
 ) -> NDArray[np.float64]:
     """Bounds (k,), Hz, of the errors of frequencies relative to a shell on a fine mesh.
 
-    values, shapes : (k,), (nf, k) the lowest modes of the linearized case.
-    other : (k,) eigenvalues with the structure of `other_level`.
+    values : (k,) the lowest eigenvalues.
+    other : (k,) those with the structure of `other_level`.
+    changes : `coarse_changes` of stiffness and mass, (k, k), in the space of the modes.
     """
-    structure = linear.case.structure
+    structure = case.structure
     assert isinstance(structure, Superelements)
-    own, level, mesh = (
-        np.sqrt(each.clip(min=0.0)) / TURN
-        for each in (values, other, _on_coarse_meshes(linear, values, shapes))
-    )
+    stiffness, mass = (0.5 * (each + each.conj().T) for each in changes)
+    coarse = eigh(np.diag(values) + stiffness, np.eye(len(values)) + mass, eigvals_only=True)
+    own, level, mesh = (np.sqrt(each.clip(min=0.0)) / TURN for each in (values, other, coarse))
     share = SHARES[structure.options.level - 1]
     return share * np.abs(level - own) + np.abs(mesh - own) + LEAST * own
 
 
-def _on_coarse_meshes(linear: Linearized, values: NDArray, shapes: NDArray) -> NDArray:
-    """Eigenvalues (k,) with panels from coarser meshes, in the space of these modes."""
-    case, own = linear.case, linear.case.elastic_body.sheet
+def coarse_changes(case: Case) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Changes of stiffness and mass (m, m) if panels come from coarser meshes."""
+    own = case.elastic_body.sheet
     assert isinstance(case.structure, Superelements)
     assert isinstance(own, SuperelementsTerm)
     other = case.structure.term(case.held_edges, compared=True)
-    motion = linear.whole(shapes)
-    change = other.tangent(motion[:, 0]) - own.tangent(motion[:, 0])
-    stiffness = np.diag(values) + motion.T @ (change @ motion)
-    mass = np.eye(len(values)) + motion.T @ ((other.mass - own.mass) @ motion)
-    return eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T), eigvals_only=True)
+    rest = np.zeros(own.size)
+    return other.tangent(rest) - own.tangent(rest), sparse.csr_array(other.mass - own.mass)
+
+
+def band_errors(
+    linear: LinearizedCell, phases: NDArray, waves: Sequence[Waves]
+) -> NDArray[np.float64]:
+    """Bounds (n, k), Hz, of the errors of bands at phases (n, d); 0 for a frequency of 0."""
+    case = linear.cell.case
+    assert isinstance(case.structure, Superelements)
+    leveled = case.altered(structure=other_level(case.structure))
+    compared = linearize_cell(linear.cell.with_case(leveled)).bloch
+    others = WaveSolver(compared, len(waves[0].values)).at(phases)
+    changes = [linear.reach.hops(part) for part in coarse_changes(linear.patch.case)]
+    out = np.zeros((len(phases), len(waves[0].values)))
+    for row, phase, own, other in zip(out, phases, waves, others, strict=True):
+        order, factors = np.argsort(own.values), linear.bloch.factors(phase)
+        values, shapes, _ = own.ordered(order)
+        parts = (shapes.conj().T @ (part.sparse_at(factors) @ shapes) for part in changes)
+        errors = frequency_errors(case, values, other.values, parts)
+        row[order] = np.where(values > 0.0, errors, 0.0)
+    return out
+
+
+def first_doubtful(frequency: NDArray, error: NDArray) -> float:
+    """Lowest of some frequencies (Hz) whose error is more than `DOUBTFUL`; infinite if none is."""
+    least = ROUNDING * np.max(frequency, initial=0.0)
+    doubtful = frequency[error > np.maximum(DOUBTFUL * frequency, least)]
+    return float(np.min(doubtful, initial=np.inf))

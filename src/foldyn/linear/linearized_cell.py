@@ -85,7 +85,7 @@ class CellReach:
         self.steps, self._number = steps_of(offset)
         own = np.flatnonzero((offset == 0).all(axis=1))
         self.rows = own[np.argsort(self._unit[own], kind="stable")]
-        self.hidden = np.arange(self.count) >= 3 * units
+        self.hidden = (np.arange(self.count) >= 3 * units) & (body.sheet.mass is None)
         self.held = np.zeros(self.count, bool)
         self.held[: 3 * units] = patch.case.constraints.held[self.rows[: 3 * units]]
         turned = [rotation(motions, step) for step in self.steps]
@@ -97,8 +97,16 @@ class CellReach:
 
     def hops(self, matrix: sparse.sparray) -> Hops:
         """A matrix of the patch's dofs as `Hops`, in the axes of the cells."""
-        own = sparse.csr_array(self._frames.T @ matrix @ self._frames)
-        return hops(own, self.rows, self._unit, self._number, self.count, len(self.steps))
+        return self._hops(self._frames.T @ matrix, self.rows)
+
+    def gathered(self, matrix: sparse.sparray) -> Hops:
+        """A matrix (r, m) on the patch's dofs as `Hops`."""
+        return self._hops(matrix, np.arange(matrix.shape[0]))
+
+    def _hops(self, matrix: sparse.sparray, rows: NDArray) -> Hops:
+        """Rows of a matrix on the patch's dofs, with these in the axes of the cells."""
+        own, steps = sparse.csr_array(matrix @ self._frames), len(self.steps)
+        return hops(own, rows, self._unit, self._number, self.count, steps)
 
     def forces(self, q: NDArray) -> NDArray[np.float64]:
         """Forces (m,), N, of the sheet on the dofs of cell 0 for the patch at q."""
@@ -183,8 +191,10 @@ class LinearizedCell:
     patch : Patch
     motions : tuple of Screw
         Motions from a cell to the next in the state.
+    reach : CellReach
+        Dofs of cell 0 (3 node + axis, then hidden dofs), and of the patch.
     bloch : Bloch
-        Matrices of the dofs (3 node + axis, then hidden dofs) of cell 0.
+        Their matrices.
     displacement : (n, 3)
         Displacement of the nodes of the cell's own structure in the state, m.
     residual : float
@@ -194,6 +204,7 @@ class LinearizedCell:
     cell: UnitCell
     patch: Patch
     motions: tuple[Screw, ...]
+    reach: CellReach
     bloch: Bloch
     displacement: NDArray
     residual: float
@@ -274,6 +285,7 @@ def linearize_cell(
         case.elastic_body,
     )
     if state is not None:
+        check_state(cell)
         if not isinstance(state, State):
             raise InputError(f": got {type(state).__name__}; give {PLACES}", "state")
         own = displacement_of(state, cell.case, "state", PLACES)
@@ -314,7 +326,13 @@ def linearize_cell(
             "the forces at play, and motions about it are not free vibrations. Remedy: "
             "foldyn.linear.relaxed finds the equilibrium with given periods"
         )
-    return LinearizedCell(cell, patch, motions, bloch, own, residual)
+    return LinearizedCell(cell, patch, motions, reach, bloch, own, residual)
+
+
+def check_state(cell: UnitCell) -> None:
+    """Refuse states other than rest for models that are linear about it."""
+    if linear := cell.case.structure.linear:
+        raise InputError(f": {linear} are linear about the rest state only", "state")
 
 
 def _warn(message: str) -> None:

@@ -21,6 +21,7 @@ from foldyn.errors import InputError
 from foldyn.values import numbers
 
 NEAR = 3e-3  # largest relative distance of neighboring frequencies in a cluster
+SAME_PLACE = 1e-6  # largest distance of a matching node, relative to the size of the pattern
 FREQUENCY_WEIGHT = 0.05  # factor of |log(f_b / f_a)| in a pair's cost, in addition to 1 - MAC
 
 
@@ -161,6 +162,18 @@ def _weighted(shapes: NDArray, mass: Any) -> NDArray:
         )
     product = matrix @ shapes.transpose(1, 0, 2).reshape(nodes, -1)
     return product.reshape(nodes, count, components).transpose(1, 0, 2).reshape(count, -1)
+
+
+def same_places(points: NDArray, nodes: NDArray, size: float) -> tuple[NDArray, NDArray]:
+    """Numbers (j,) of the nodes (n, 3) that lie on points (p, 3), and of these points (j,).
+
+    size : size of the pattern, m.
+    """
+    from scipy.spatial import cKDTree
+
+    apart, place = cKDTree(points).query(nodes)
+    seen = np.flatnonzero(apart < SAME_PLACE * size)
+    return seen, place[seen]
 
 
 def clusters(frequency: NDArray) -> NDArray:

@@ -9,6 +9,7 @@ free to move along the axis.
 from __future__ import annotations
 
 import time
+import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,10 +23,11 @@ from foldyn.algebra.superlu import factorize
 from foldyn.cases import Case, State
 from foldyn.condensation import Superelements
 from foldyn.dynamics.modal_damping import mass_of
-from foldyn.errors import StretchWarning, warn
+from foldyn.errors import FoldynWarning, StretchWarning, warn
 from foldyn.linear.hereditary import Branches, damped_mode
-from foldyn.linear.level_error import frequency_errors, other_level
+from foldyn.linear.level_error import coarse_changes, first_doubtful, frequency_errors, other_level
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
+from foldyn.linear.model_error import SPARE, Judged, beside, judged, warn_of
 from foldyn.ram_limit import check_memory
 from foldyn.results import modes_dataset
 from foldyn.statics.rigid import free_rigid_motions, of_all_dofs, rigid_motions
@@ -38,7 +40,6 @@ RIGID = 1.0 - 1e-6  # share in the space of rigid motions above which a shape co
 ROUNDING = 1e3 * EPS  # forces on a rigid motion r below this, relative to |K| |r|, count as zero
 TURN = 2.0 * np.pi
 COUNTS = (10, 40)  # numbers of modes whose errors are estimated for a frequency response
-DOUBTFUL = 0.05  # relative error of a frequency up to which a response is said to hold
 TWINS = 1e-8  # eigenvalues with a smaller relative difference count as one
 INDEPENDENT = 1e-6  # least remainder after orthogonalization, relative to a motion's size
 
@@ -52,6 +53,7 @@ def modes(
     load_factor: float = 1.0,
     verify: bool = True,
     solver: str = "auto",
+    check_model: bool = True,
 ) -> xarray.Dataset:
     """Natural frequencies and mode shapes of a case about an equilibrium.
 
@@ -77,6 +79,9 @@ def modes(
         as the first; small problems are solved in full and do not need it.
     solver : {"auto", "superlu", "pardiso"}
         Backend of the sparse factorization, as in the settings of `trace`.
+    check_model : bool
+        Whether to compare bars and hinges at rest with superelements, where that takes a few
+        seconds at most.
 
     Returns
     -------
@@ -86,6 +91,9 @@ def modes(
         `shape` (phi' M phi = 1 kg m2, the largest entry positive), `rigid`, `rigid_share` (of the
         shape in the space of rigid motions), `damping_ratio` (phi' C phi / (2 omega), nan if the
         frequency is 0 or nan), `participation`, `effective_mass`, and `displacement` of the state;
+        of bars and hinges at rest also `model_error`, the relative error by comparison with
+        superelements of a low level (nan: no mode of theirs resembles it), and the attribute
+        `missing_frequencies` (Hz), if some of their modes have no counterpart;
         in air also `air_share`, the fluid's share of the modal mass (`free_mass`, `participation`
         and `effective_mass` include the fluid); of superelements also `frequency_error` (Hz), an
         estimate of the largest error relative to a shell on a fine mesh, and `between_shape` at
@@ -106,14 +114,18 @@ def modes(
     FoldynWarning
         The state is not an equilibrium, or is unstable; loads do not act at rest; hinges have no
         slope; a mode was missed.
-    StretchWarning
-        Panels that stretch hold much of the strain energy of a mode.
     ModelRangeWarning
-        Modes lie above the range of the model.
+        Modes are more than 5 % off, or missing; or, if they are not compared with superelements,
+        lie above the range of the model.
+    StretchWarning
+        Modes are not compared, and panels that stretch hold much of the strain energy of one.
     """
+    of_kind("case", case, Case)
+    reference = beside(case) if check_model and state is None and secant is None else None
     return spectrum_of(
-        case, count, state, secant, load_factor=load_factor, verify=verify, solver=solver
-    ).result
+        case, count, state, secant, load_factor=load_factor, verify=verify,
+        solver=solver, reference=reference,
+    ).result  # fmt: skip
 
 
 class Found(NamedTuple):
@@ -126,13 +138,14 @@ class Found(NamedTuple):
 
 def spectrum_of(
     case: Case, count: int = 6, state: State | str | None = None, secant: float | None = None, *,
-    load_factor: float = 1.0, verify: bool = True, solver: str = "auto", errors: bool = True,
+    load_factor: float = 1.0, verify: bool = True, solver: str = "auto",
+    errors: bool = True, reference: Case | str | None = None,
 ) -> Found:  # fmt: skip
     """Modes, with the linearized system and its spectrum; other arguments as in `modes`.
 
     errors : whether to estimate the errors of frequencies, for models that can.
+    reference : the case with superelements, from `model_error.beside`, to compare with.
     """
-    of_kind("case", case, Case)
     count = whole("count", count, least=1)
     check_memory(
         "count", f"{float(count):.3g} modes", 8.0 * COPIES * count * case.structure.nodes.size,
@@ -144,9 +157,10 @@ def spectrum_of(
     space, along = rigid_space(linear), unit_translations(linear)
     spectrum = lowest(pencil, count, unresisted(linear, space), verify)
     _warn(spectrum)
-    _warn_of_stretch(linear, spectrum)
-    frequency = np.sqrt(spectrum.values.clip(min=0.0)) / TURN
-    warn_beyond(case.structure, frequency, "mode", linear=True)
+    if not isinstance(reference, Case):
+        _warn_of_stretch(linear, spectrum)
+        frequency = np.sqrt(spectrum.values.clip(min=0.0)) / TURN
+        warn_beyond(case.structure, frequency, "mode", linear=True)
     statistics = {
         "count": count,
         "state": state if isinstance(state, str) else "rest" if state is None else "given",
@@ -161,31 +175,52 @@ def spectrum_of(
         "factorizations": pencil.factorizations,
         "largest_residual": float(pencil.residuals(spectrum.values, spectrum.shapes).max()),
         "rounding": _rounding(pencil, spectrum),
+        "not_compared": (reference if isinstance(reference, str) else "") or None,
         "wall_seconds": time.perf_counter() - began,
     }
     variables = _variables(linear, spectrum, space, along)
+    if isinstance(reference, Case):
+        compared = _judged(case, variables, reference)
+        variables["model_error"] = compared.error
+        if len(compared.lost):
+            statistics["missing_frequencies"] = compared.lost
     if errors and isinstance(case.structure, Superelements):
         compared = case.altered(structure=other_level(case.structure))
         other = spectrum_of(compared, count, verify=False, solver=solver, errors=False).spectrum
-        estimate = frequency_errors(linear, spectrum.values, spectrum.shapes, other.values)
+        motion = linear.whole(spectrum.shapes)
+        changes = (motion.T @ (part @ motion) for part in coarse_changes(case))
+        estimate = frequency_errors(case, spectrum.values, other.values, changes)
         variables["frequency_error"] = np.where(variables["rigid"], 0.0, estimate)
     result = modes_dataset(case, variables, statistics)
     return Found(linear, spectrum, result)
 
 
-def range_of_superelements(case: Case, top: float) -> float:
-    """Frequency (Hz) up to which modes are estimated to be within `DOUBTFUL`; at most `top`.
+def trusted(
+    case: Case, top: float, reference: Case | None = None
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Frequency (Hz), at most `top`, up to which modes are within `DOUBTFUL`.
 
-    Not more than the last of `COUNTS` modes are estimated.
+    Also returns the frequencies (k,), Hz, of the modes that were judged, at most the last of
+    `COUNTS`, and their relative errors. Superelements estimate these themselves; bars and hinges
+    are compared with their `reference`.
     """
-    frequency = np.zeros(1)
+    frequency, error, holds = np.zeros(0), np.zeros(0), 0.0
     for count in COUNTS:
-        found = spectrum_of(case, count, verify=False).result
-        frequency, error = found["frequency"].values, found["frequency_error"].values
-        doubtful = frequency[error > DOUBTFUL * frequency]
-        if doubtful.size or frequency[-1] >= top:
-            return min(float(np.append(doubtful, top)[0]), top)
-    return float(frequency[-1])
+        many = count if case.structure.linear else min(count, len(case.free_dofs))
+        found = spectrum_of(case, many, verify=False, reference=reference).result
+        elastic = found["frequency"].values > 0.0
+        frequency = found["frequency"].values[elastic]
+        if reference is None:
+            error = found["frequency_error"].values[elastic] / frequency
+        else:
+            error = found["model_error"].values[elastic]
+        missing = np.ravel(found.attrs.get("missing_frequencies", ()))
+        wrong = first_doubtful(frequency, np.abs(np.nan_to_num(error, nan=np.inf)) * frequency)
+        holds = min(wrong, float(missing.min(initial=np.inf)), top)
+        if holds < top or many < count or not frequency.size or frequency[-1] >= top:
+            break
+        holds = float(frequency[-1])
+    return holds, frequency, error
 
 
 def _variables(
@@ -217,6 +252,27 @@ def _variables(
         "effective_mass": factors**2,
         "displacement": linear.displacement,
     }
+
+
+def _judged(case: Case, found: dict[str, Any], other: Case) -> Judged:
+    """Modes of bars and hinges beside those of superelements; warns of large errors."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        most = len(found["frequency"]) + SPARE
+        true = spectrum_of(other, most, verify=False, errors=False).result
+    own, shape = elastic(true)
+    shape = np.concatenate([shape, elastic(true, shape="between_shape")[1]], axis=1)
+    compared = judged(case, found["frequency"], found["shape"], other, own, shape)
+    warn_of(compared, found["frequency"] > 0.0)
+    return compared
+
+
+def elastic(
+    found: xarray.Dataset, count: int | None = None, shape: str = "shape"
+) -> tuple[NDArray, NDArray]:
+    """Frequencies (k,), Hz, and shapes (k, n, 3) of the modes with stiffness."""
+    kept = np.flatnonzero(found["eigenvalue"].values > 0.0)[:count]
+    return found["frequency"].values[kept], found[shape].values[kept]
 
 
 def _remembered(

@@ -19,14 +19,13 @@ from foldyn.algebra.extrapolation import convergence, limits
 from foldyn.arguments import Unit, brief
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear.mac import pairs
-from foldyn.linear.modes import modes
+from foldyn.linear.mac import pairs, same_places
+from foldyn.linear.modes import elastic, modes
 from foldyn.linear.shell_of import with_structure
 from foldyn.structures.discretized import Discretized
 
 SWAPPED = 3  # additional modes of each mesh, as they may swap with the compared modes
 RIGID = 6  # most modes of a sheet without stiffness
-SAME_PLACE = 1e-6  # largest distance of a matching node, relative to the pattern's size
 FLAT = np.cos(np.radians(5.0))  # cosine between the normals of panels nearly in one plane
 NO_LIMIT = (
     "a panel touches a clamped edge at vertex {} alone, folded against it, where frequencies have "
@@ -58,11 +57,8 @@ class MeshModes(NamedTuple):
 
     def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
         """Numbers (j,) of the points (m, 3) that are nodes of the mesh, and shapes (k, j, 3)."""
-        from scipy.spatial import cKDTree
-
-        apart, place = cKDTree(self.structure.nodes).query(nodes)
-        seen = np.flatnonzero(apart < SAME_PLACE * self.structure.pattern.size)
-        return seen, self.shape[:, place[seen]]
+        seen, place = same_places(self.structure.nodes, nodes, self.structure.pattern.size)
+        return seen, self.shape[:, place]
 
 
 def mesh_modes(case: Case, count: int) -> MeshModes:
@@ -94,21 +90,24 @@ def same_modes(own: MeshModes, meshes: Sequence[MeshModes], count: int) -> NDArr
 @brief
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Elastic modes of a shell.
+    """Elastic modes of a shell, or of superelements.
 
     Attributes
     ----------
     frequency : (k,)
         Frequencies extrapolated from the meshes, Hz.
     mesh_error : (k,)
-        Relative errors of the finest mesh, from the order of convergence observed with all meshes;
-        nan if the meshes have not converged, or there is no limit.
-    mesh_frequency : (3, k)
+        Relative errors: of the finest mesh, from the order of convergence observed with all meshes,
+        nan if the meshes have not converged, or there is no limit; of superelements, as they
+        estimate them.
+    mesh_frequency : (m, k)
         Frequencies of the modes on each mesh, Hz; nan if a coarse mesh lacks a mode.
-    shape : (k, n, 3)
+    shape : (k, p, 3)
         Shapes of the fine mesh.
+    points : (p, 3)
+        Where the shapes are known, m.
     case : Case
-        The case with the shell of the fine mesh.
+        The case with the shell of the fine mesh, or with superelements.
     found : xarray.Dataset
         All modes of the fine mesh, rigid modes included.
     """
@@ -117,20 +116,14 @@ class Reference:
     mesh_error: NDArray
     mesh_frequency: NDArray
     shape: NDArray
+    points: Annotated[NDArray, Unit("m")]
     case: Case
     found: xarray.Dataset
 
     def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
         """Numbers (j,) of the points (m, 3) that are nodes of the mesh, and shapes (k, j, 3)."""
-        return MeshModes(self.case.structure, self.frequency, self.shape, self.found).at(nodes)
-
-
-def elastic(
-    found: xarray.Dataset, count: int | None = None, shape: str = "shape"
-) -> tuple[NDArray, NDArray]:
-    """Frequencies (k,), Hz, and shapes (k, n, 3) of the modes with stiffness."""
-    kept = np.flatnonzero(found["eigenvalue"].values > 0.0)[:count]
-    return found["frequency"].values[kept], found[shape].values[kept]
+        seen, place = same_places(self.points, nodes, self.case.structure.pattern.size)
+        return seen, self.shape[:, place]
 
 
 def modes_at_rest(case: Case, count: int, secant: float | None = None) -> xarray.Dataset:
@@ -142,7 +135,7 @@ def modes_at_rest(case: Case, count: int, secant: float | None = None) -> xarray
     while True:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
-            found = modes(case, asked, secant=secant)
+            found = modes(case, asked, secant=secant, check_model=False)
         missing = count - int((found["eigenvalue"].values > 0.0).sum())
         most = int(found.attrs["free_dofs"])
         if missing <= 0 or asked == most:
@@ -171,8 +164,22 @@ def reference_modes(cases: Sequence[Case], count: int) -> Reference:
         error[:] = np.nan
     rank = np.argsort(limit, kind="stable")  # extrapolation may swap close modes of a coarse mesh
     return Reference(
-        limit[rank], error[rank], values[:, rank], fine.shape[rank], cases[-1], fine.found
-    )
+        limit[rank], error[rank], values[:, rank], fine.shape[rank], fine.structure.nodes,
+        cases[-1], fine.found,
+    )  # fmt: skip
+
+
+def superelement_modes(case: Case, count: int) -> Reference:
+    """The lowest modes of superelements, at most `count`."""
+    found = modes_at_rest(case, count)
+    frequency, shape = elastic(found, count)
+    between = elastic(found, count, "between_shape")[1]
+    own = found["eigenvalue"].values > 0.0
+    error = found["frequency_error"].values[own][:count] / frequency
+    return Reference(
+        frequency, error, frequency[None], np.concatenate([shape, between], axis=1),
+        np.concatenate([case.structure.nodes, found["between_position"].values]), case, found,
+    )  # fmt: skip
 
 
 def is_graded(case: Case) -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from foldyn.cases import Case, Rayleigh
+from foldyn.condensation import SuperelementsOptions, superelements
 from foldyn.errors import InputError, warn, within
 from foldyn.patterns import Pattern
 from foldyn.shells import ShellOptions, shell
@@ -21,8 +22,8 @@ MOST_TRIANGLES = 15_000
 """Most triangles of a default shell: its modes take ten to twenty seconds."""
 GRADED = (8, 12)
 """Divisions of the two finer meshes with a vertex radius; the coarsest mesh has 4."""
-MESH = {"divisions", "mass", "vertex_radius"}
-"""Options of a shell that bars and hinges lack."""
+MESH = {"divisions", "level", "mass", "vertex_radius"}
+"""Options of shells and superelements that bars and hinges lack."""
 
 
 def check_reduced(case: Any) -> None:
@@ -84,18 +85,33 @@ def shell_of(case: Case, divisions: int, vertex_radius: float | None = None) -> 
     The first nodes of the shell are the vertices, so that supports, loads and masses apply to both.
     """
     structure = case.structure
-    own = {item.name for item in fields(structure.options)} - MESH
-    shared = {
-        item.name: getattr(structure.options, item.name)
-        for item in fields(ShellOptions)
-        if item.name in own
-    }
     with within("shell: "):
         mesh = shell(
             structure.pattern, structure.sheet, divisions=divisions, mass="consistent",
-            vertex_radius=vertex_radius, **shared,
+            vertex_radius=vertex_radius, **shared_options(structure, ShellOptions),
         )  # fmt: skip
     return with_structure(case, mesh)
+
+
+def superelements_of(case: Case, **options: Any) -> Case:
+    """The case with superelements; other arguments as in `superelements`."""
+    structure = case.structure
+    with within("superelements: "):
+        other = superelements(
+            structure.pattern, structure.sheet, **options,
+            **shared_options(structure, SuperelementsOptions),
+        )  # fmt: skip
+    return with_structure(case, other)
+
+
+def shared_options(structure: Discretized, options: type) -> dict[str, Any]:
+    """Options of bars and hinges that another model takes, too: creases, clamps, rigid panels."""
+    own = {item.name for item in fields(structure.options)} - MESH
+    return {
+        item.name: getattr(structure.options, item.name)
+        for item in fields(options)
+        if item.name in own
+    }
 
 
 def with_structure(case: Case, structure: Discretized) -> Case:

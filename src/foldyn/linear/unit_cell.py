@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise, product
@@ -66,8 +67,8 @@ class UnitCell:
     Parameters
     ----------
     case : Case
-        Case whose structure is made by `discretize` or `shell`. Creases between cells have the
-        stiffness and law of other creases, and letters from their dihedrals.
+        Case whose structure is made by `discretize`, `shell` or `superelements`. Creases between
+        cells have the stiffness and law of other creases, and letters from their dihedrals.
     vectors : sequence of sequences of float, shape (d, 3), optional
         One or two translations (m) from a cell to the next: a chain or a sheet.
     screw : Screw, optional
@@ -115,10 +116,6 @@ class UnitCell:
 
     def __post_init__(self) -> None:
         structure = of_kind("case", self.case, Case).structure
-        if structure.linear:
-            raise InputError(
-                f": waves do not support {structure.linear}; take fd.discretize or fd.shell", "case"
-            )
         pattern = structure.pattern
         if pattern is None:
             raise InputError(": its structure has no pattern that could repeat", "case")
@@ -140,6 +137,12 @@ class UnitCell:
             f"<UnitCell: {self.kinds} vertices, {len(self.case.structure.pattern.faces)} panels, "
             f"{' and '.join(ways)}>"
         )
+
+    def with_case(self, case: Case) -> UnitCell:
+        """The cell with another case of the same pattern."""
+        out = copy(self)
+        object.__setattr__(out, "case", case)
+        return out
 
     def _found(self, pattern: Pattern, near: float) -> tuple[tuple[Screw, ...], list[tuple]]:
         """The motions, and pairs of vertices that are known to be copies."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -180,7 +180,7 @@ class WaveSolver:
 
     def _lowest(
         self, stiffness: NDArray, factors: NDArray, phase: NDArray
-    ) -> tuple[NDArray, NDArray, NDArray, float]:
+    ) -> tuple[NDArray, NDArray, NDArray, NDArray | float]:
         """Eigenvalues (k,), motions and M phi (n, k) of the free dofs, and the zero threshold."""
         bloch, free = self.bloch, self.free
         wanted = {"subset_by_index": [0, self.count - 1], "check_finite": False}
@@ -209,12 +209,27 @@ class WaveSolver:
             stiffness = basis.conj().T @ stiffness @ basis
         check_count(self.count, basis.shape[1], phase)
         own_mass = basis.conj().T @ mass @ basis
+        own = self._lowest_of(stiffness, own_mass)
+        values, turn = linalg.eigh(
+            *(own.conj().T @ (part @ own) for part in (stiffness, own_mass))
+        )  # far smaller rounding errors
+        own = own @ turn
+        scale = np.real(np.diag(stiffness)) / np.real(np.diag(own_mass))
+        noise = np.maximum(_zero(scale), _noise(stiffness, own))
+        return values, basis @ own, mass @ (basis @ own), noise
+
+    def _lowest_of(self, stiffness: NDArray, mass: NDArray) -> NDArray[np.complex128]:
+        """Motions (n, k) that span those of the lowest eigenvalues of matrices (n, n)."""
+        most, last = self.count, len(mass) - 1
+        shifted = stiffness + SHIFT * _scale(stiffness, mass) * mass
         try:
-            values, own = linalg.eigh(stiffness, own_mass, **wanted)
+            return linalg.eigh(mass, shifted, subset_by_index=[last + 1 - most, last])[1]
+        except linalg.LinAlgError:  # the state is unstable
+            pass
+        try:
+            return linalg.eigh(stiffness, mass, subset_by_index=[0, most - 1])[1]
         except linalg.LinAlgError:
             raise ComputationError("a free node of the cell has no mass") from None
-        scale = np.real(np.diag(stiffness)) / np.real(np.diag(own_mass))
-        return values, basis @ own, mass @ (basis @ own), _zero(scale)
 
     def _lanczos(self, phase: NDArray) -> Waves:
         """Waves at a phase (d,), for large matrices."""
@@ -223,7 +238,7 @@ class WaveSolver:
         check_count(self.count, len(self.free) - GUARD - 1, phase)
         whole, whole_mass = bloch.stiffness.sparse_at(factors), bloch.mass.sparse_at(factors)
         stiffness, mass = (part[kept][:, kept] for part in (whole, whole_mass))
-        shift = -SHIFT * float(stiffness.diagonal().real.sum() / mass.diagonal().real.sum())
+        shift = -SHIFT * _scale(stiffness, mass)
         factor = splu(sparse.csc_array(stiffness - shift * mass))
         inverse = LinearOperator(stiffness.shape, factor.solve, dtype=complex)
         parts = np.random.default_rng(0).normal(size=(2, len(kept)))
@@ -249,6 +264,11 @@ def check_count(count: int, most: int, phase: NDArray) -> None:
             f"{phase.round(6).tolist()}; ask for no more bands",
             "count",
         )
+
+
+def _scale(stiffness: Any, mass: Any) -> float:
+    """A large eigenvalue: the ratio of the traces of matrices (n, n)."""
+    return float(stiffness.diagonal().real.sum() / mass.diagonal().real.sum())
 
 
 def _zero(scale: NDArray) -> float:

@@ -1,4 +1,4 @@
-"""Models compared with the shell: errors of frequencies and MAC of shapes, against frequency."""
+"""Models beside superelements or the shell: errors of frequencies, and MAC of shapes."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from foldyn.errors import InputError
 from foldyn.linear import Fidelity
+from foldyn.linear.compared import against
 from foldyn.linear.reference import LEAST
 from foldyn.plots import style
 from foldyn.plots.modes import hertz
@@ -20,7 +21,7 @@ MARKERS = "os^DvPX<>*"
 
 
 def plot_fidelity(fidelity: Fidelity, title: str = "") -> Figure:
-    """Draw errors of frequencies, and MAC, of models against the frequency of the shell.
+    """Draw errors of frequencies, and MAC, of models against the frequency of the reference.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ def plot_fidelity(fidelity: Fidelity, title: str = "") -> Figure:
     frequency, error = result["frequency"].values, result["error"].values
     labels = ["error of the frequency (%)", "MAC"]
     figure, (upper, lower) = style.rows(
-        (8.0, 5.6), title, "frequency of the shell (Hz)", labels, heights=[1.6, 1.0]
+        (8.0, 5.6), title, f"frequency of {against(result)} (Hz)", labels, heights=[1.6, 1.0]
     )
     shown = np.append(error[np.isfinite(error)], [-2.0 * NEAR, 2.0 * NEAR]).clip(-MOST, MOST)
     bottom, top = 115.0 * shown.min(), 115.0 * shown.max()

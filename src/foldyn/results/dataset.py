@@ -282,7 +282,7 @@ def fidelity_dataset(
     values: Mapping[str, ArrayLike],
     statistics: Mapping[str, Any],
 ) -> xr.Dataset:
-    """Dataset of a comparison of models with the shell, including its case.
+    """Dataset of a comparison of models with superelements or the shell, including its case.
 
     Parameters
     ----------
@@ -298,7 +298,7 @@ def fidelity_dataset(
     data = variables(FIDELITY, (), values)
     numbers = 1 + np.arange(len(np.asarray(values["frequency"])))
     along = {
-        "mode": ("mode", numbers, {"long_name": "elastic mode of the shell"}),
+        "mode": ("mode", numbers, {"long_name": "elastic mode of the reference"}),
         "model": ("model", np.array(list(models)), {"long_name": "model"}),
     }
     return result_dataset("fidelity", case, data, along, statistics)

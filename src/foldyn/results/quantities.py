@@ -130,6 +130,7 @@ MODES: Mapping[str, Quantity] = {
 }
 INTERNAL: Mapping[str, Quantity] = {
     "frequency_error": Quantity("Hz", "estimate of the largest error of the frequency"),
+    "model_error": Quantity("1", "error of the frequency, by comparison with superelements"),
     "air_share": Quantity("1", "share of the air in the modal mass"),
     "between_shape": Quantity("m", "mode shape between nodes", ("between", "axis")),
 }
@@ -150,6 +151,12 @@ ESTIMATES: Mapping[str, Quantity] = {
 """and those that the method adds."""
 BANDS: Mapping[str, Quantity] = {
     "frequency": Quantity("Hz", "frequency", ("phase", "band")),
+    "frequency_error": Quantity(
+        "Hz", "estimate of the largest error of the frequency", ("phase", "band")
+    ),
+    "model_error": Quantity(
+        "1", "error of the frequency, by comparison with superelements", ("phase", "band")
+    ),
     "eigenvalue": Quantity(
         "rad2/s2", "square of the angular frequency (negative: unstable)", ("phase", "band")
     ),
@@ -185,17 +192,21 @@ GAPS: Mapping[str, Quantity] = {
 }
 """Further variables of bands along the dimension `gap`."""
 FIDELITY: Mapping[str, Quantity] = {
-    "frequency": Quantity("Hz", "frequency of the shell, extrapolated from its meshes", ("mode",)),
+    "frequency": Quantity("Hz", "frequency of the reference", ("mode",)),
     "mesh_error": Quantity("1", "error of the finest mesh (nan: not converged)", ("mode",)),
     "error": Quantity("1", "error of a frequency (infinite: lost)", ("mode", "model")),
-    "mac": Quantity("1", "MAC with the mode of the shell", ("mode", "model")),
+    "mac": Quantity("1", "MAC with the mode of the reference", ("mode", "model")),
     "options": Quantity(text="arguments of discretize", dims=("model",)),
     "soft_hinges": Quantity(text="hinges without stiffness at rest", dims=("model",)),
-    "deflection": Quantity("m", "displacement of the shell along small loads, extrapolated"),
+    "seconds": Quantity("s", "time for the modes of the reference"),
+    "model_seconds": Quantity("s", "time for the modes of a model", ("model",)),
+    "cost_ratio": Quantity("1", "time for the reference divided by time for a model", ("model",)),
+    "deflection": Quantity("m", "displacement of the reference along small loads"),
     "deflection_mesh_error": Quantity("1", "error of the finest mesh (nan: not converged)"),
     "deflection_error": Quantity("1", "error of the displacement (infinite: soft)", ("model",)),
 }
-"""Variables of a comparison of models with the shell; the last three only if there are forces."""
+"""Variables of a comparison of models with superelements or the shell; the last three only if there
+are forces."""
 
 
 def variables(

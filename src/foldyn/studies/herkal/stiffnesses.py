@@ -148,7 +148,12 @@ def specimen_modes(divisions: tuple[int, int] = MESHES, **changes: Any) -> Rows:
     file = vibration.specimen("modes", changes={f"model.{k}": v for k, v in changes.items()})
     secant = file.analysis.arguments["secant"]
     found = fidelity(
-        file.case(file.masses[0]), MODES, divisions=divisions, models=BESIDE, secant=secant
+        file.case(file.masses[0]),
+        MODES,
+        reference="shell",
+        divisions=divisions,
+        models=BESIDE,
+        secant=secant,
     )
     return [
         {
