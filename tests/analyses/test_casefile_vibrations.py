@@ -32,7 +32,12 @@ gravity = [0, 0, -9.81]
 def test_what_is_left_out_has_its_default(read) -> None:
     modes = read(MODES)
     assert modes.analysis.kind == "modes"
-    assert modes.analysis.arguments == {"count": 6, "state": None, "secant": None}
+    assert modes.analysis.arguments == {
+        "count": 6,
+        "state": None,
+        "secant": None,
+        "check_model": True,
+    }
     assert (modes.output.shapes, modes.output.animation, modes.output.axis) == (6, None, None)
     assert not modes.output.named
     assert modes.initial() is None
@@ -40,7 +45,7 @@ def test_what_is_left_out_has_its_default(read) -> None:
     given = dict(response.analysis.arguments)
     np.testing.assert_array_equal(given.pop("frequencies"), np.linspace(0.0, 5.0, 51))
     assert given.pop("drive") == [Force([7, 6], (1, 0, 0))]
-    none = {"state": None, "secant": None}
+    none = {"state": None, "secant": None, "check_model": True}
     assert given == {"method": "direct", "amplitude": 1.0, **none}
     assert response.case().loads == ()  # the drive is no preload
     np.testing.assert_array_equal(response.output.nodes, [6, 7])  # the driven ones
@@ -51,7 +56,7 @@ def test_everything_that_can_be_said_of_modes(read) -> None:
     text = MODES + 'count = 12\nstate = "equilibrium"\nsecant = 0.5\n' + PRELOADS
     output = '[output]\nshapes = [1, 3]\naxis = "y"\nnodes = "xmax"\nanimation = "mp4"\n'
     found = read(text + output)
-    given = {"count": 12, "state": "equilibrium", "secant": 0.5}
+    given = {"count": 12, "state": "equilibrium", "secant": 0.5, "check_model": True}
     assert found.analysis.arguments == given
     assert found.output.shapes == (1, 3)
     assert (found.output.axis, found.output.animation, found.output.named) == ("y", "mp4", True)
@@ -68,7 +73,7 @@ def test_everything_that_can_be_said_of_a_response(read) -> None:
     np.testing.assert_array_equal(given.pop("frequencies"), [1.0, 2.5, 4.0])
     del given["drive"]
     # of the options of the method those that the file names; the others are left to the method
-    none = {"state": None, "secant": None}
+    none = {"state": None, "secant": None, "check_model": True}
     assert given == {"method": "burst_random", "amplitude": 0.1, "averages": 3, "seed": 4, **none}
     assert (found.output.axis, found.output.quantity) == ("z", "mobility")
     np.testing.assert_array_equal(found.output.nodes, [3])
