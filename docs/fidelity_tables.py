@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from verification.fidelity import motion_results as motions
-from verification.fidelity.compare import RESULTS, columns, first_table, read, summary
+from verification.fidelity.compare import RESULTS, columns, read, summary
 from verification.fidelity.mixed_models import counted, gap_table, mixed_table
 
 PAGE = Path(__file__).with_name("fidelity.md")
@@ -48,13 +48,6 @@ TABLES = {
         "| corners |",
     ),
     "gaps": lambda: gap_table(of("gaps")),
-    "internal": lambda: without(
-        first_table(of("documented_internal") + of("drawn_internal")),
-        "| 1 | ",
-        "| below 0.6 |",
-        "| 0.6 to 1 |",
-        "| above 1 |",
-    ),
     "motions": lambda: without(
         motions.summaries(motions.read()),
         "| n5b8e, linear |",

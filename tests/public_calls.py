@@ -258,12 +258,12 @@ def solved(folder: Path) -> Calls:
         "landscape": (fd.landscape, {"path": path, "case": case(), "settings": {}}),
         "modes": (fd.modes, {
             "case": case(), "count": 2, "state": None, "secant": 2.0, "load_factor": 1.0,
-            "internal": 0, "verify": True, "solver": "superlu",
+            "verify": True, "solver": "superlu",
         }),
         "frf": (fd.frf, {
             "case": case(), "drive": fd.Force([4], (0, 0, 1.0)), "frequencies": [1.0, 2.0],
             "state": None, "method": "direct", "secant": None, "amplitude": 1.0,
-            "load_factor": 1.0, "internal": 0, "progress": None,
+            "load_factor": 1.0, "progress": None,
         }),
         "bands": (fd.bands, {
             "cell": cell(), "phases": [[0.5]], "count": 2, "state": fd.State(), "secant": 2.0,

@@ -183,6 +183,8 @@ class Checked:
         Prefix of arguments in messages, such as "settings: ".
     missing : mapping of str to str
         Remedy for each required key, for messages about files that lack it.
+    gone : mapping of str to str
+        What takes the place of each key that files may no longer have.
     in_files : Check or None
         Reader for arguments of this type, if no annotation names one.
     like : sequence
@@ -191,6 +193,7 @@ class Checked:
 
     place: ClassVar[str] = ""
     missing: ClassVar[Mapping[str, str]] = NOTHING
+    gone: ClassVar[Mapping[str, str]] = NOTHING
     in_files: ClassVar[Check | None] = None
     like: ClassVar[Sequence[Any]] = ()
 

@@ -47,7 +47,7 @@ def read(
     faults, found = Faults(), {}
     needed, unknown = needs(kind), [key for key in table if key not in own]
     for key in unknown:
-        reason = _of_others(key, others) or unknown_key(key, own)
+        reason = kind.gone.get(key) or _of_others(key, others) or unknown_key(key, own)
         faults.add(UnknownKeyError(f": {reason}", f"{name}.{key[:SHOWN]}"))
     context = {"folder": folder, "find": find, "beside": found}
     meant = {nearest(key, own) for key in unknown}  # these keys need not be reported as missing

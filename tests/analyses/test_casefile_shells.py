@@ -121,8 +121,6 @@ model.kind = "shell"; model.mass = ["lumped", "panel"]; analysis.steps =; analys
 model.kind =; model.mass = "lumped" | model.mass = "lumped": only for model.kind = "shell"; choose
     one of equi_inertial
 model.kind = "shell"; model.divisions = 0 | model.divisions = 0: must be at least 1
-loads =; model.kind = "shell"; analysis.steps =; analysis.kind = "modes"; analysis.internal = 3 |
-    analysis.internal = 3: is for the panels of bars and hinges; leave it out
 loads =; model.kind = "shell"; analysis.steps =; analysis.kind = "modes"; analysis.secant = 1 |
     analysis.secant = 1.0: is for superlinear bends, which a shell cannot have; leave it out
 model.kind = "shell"; supports[0].nodes = [4, 6] | supports[0].nodes: 6 is no vertex of the
@@ -168,9 +166,9 @@ def test_responses_and_modes_as_those_of_a_shell(filed):
     arguments = read_case(filed(f"{IMPULSE}; {options}"), model="shell").analysis.arguments
     assert arguments["pulse"] == 0.01
     assert not {"integrator", "dt"} & set(arguments)
-    judged = filed('loads =; analysis = { kind = "modes", secant = 1, internal = 2, count = 3 }')
+    judged = filed('loads =; analysis = { kind = "modes", secant = 1, count = 3 }')
     given = read_case(judged, model="shell").analysis.arguments
-    assert (given["secant"], given["internal"], given["count"]) == (None, 0, 3)
+    assert (given["secant"], given["count"]) == (None, 3)
 
 
 def test_a_file_of_a_shell_as_bars_and_hinges(filed):

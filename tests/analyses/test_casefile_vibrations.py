@@ -32,7 +32,12 @@ gravity = [0, 0, -9.81]
 def test_what_is_left_out_has_its_default(read) -> None:
     modes = read(MODES)
     assert modes.analysis.kind == "modes"
-    assert modes.analysis.arguments == {"count": 6, "state": None, "secant": None, "internal": 0}
+    assert modes.analysis.arguments == {
+        "count": 6,
+        "state": None,
+        "secant": None,
+        "check_model": True,
+    }
     assert (modes.output.shapes, modes.output.animation, modes.output.axis) == (6, None, None)
     assert not modes.output.named
     assert modes.initial() is None
@@ -40,7 +45,7 @@ def test_what_is_left_out_has_its_default(read) -> None:
     given = dict(response.analysis.arguments)
     np.testing.assert_array_equal(given.pop("frequencies"), np.linspace(0.0, 5.0, 51))
     assert given.pop("drive") == [Force([7, 6], (1, 0, 0))]
-    none = {"state": None, "secant": None, "internal": 0}
+    none = {"state": None, "secant": None, "check_model": True}
     assert given == {"method": "direct", "amplitude": 1.0, **none}
     assert response.case().loads == ()  # the drive is no preload
     np.testing.assert_array_equal(response.output.nodes, [6, 7])  # the driven ones
@@ -51,27 +56,13 @@ def test_everything_that_can_be_said_of_modes(read) -> None:
     text = MODES + 'count = 12\nstate = "equilibrium"\nsecant = 0.5\n' + PRELOADS
     output = '[output]\nshapes = [1, 3]\naxis = "y"\nnodes = "xmax"\nanimation = "mp4"\n'
     found = read(text + output)
-    given = {"count": 12, "state": "equilibrium", "secant": 0.5, "internal": 0}
+    given = {"count": 12, "state": "equilibrium", "secant": 0.5, "check_model": True}
     assert found.analysis.arguments == given
     assert found.output.shapes == (1, 3)
     assert (found.output.axis, found.output.animation, found.output.named) == ("y", "mp4", True)
     np.testing.assert_array_equal(found.output.nodes, [6, 7, 8])
     assert found.case().supports == (Fix("xmin"), Impose([8], "z", -0.1))
     assert found.case().loads == (Gravity((0, 0, -9.81)),)
-
-
-@pytest.mark.matrix
-def test_internal_amplitudes_belong_to_one_scheme(read) -> None:
-    plates = '[model]\npreset = "n5b8e"\n[analysis]'
-    found = read(MODES.replace("[analysis]", plates) + "internal = 3\n").run(count=4)
-    assert found.attrs["internal"] == 3
-    driven = RESPONSE.replace("[analysis]", plates).replace("[[drive]]", "internal = 3\n[[drive]]")
-    response = read(driven).run(frequencies=[1.0])
-    assert response.attrs["internal"] == 3
-    with pytest.raises(InputError, match=r"analysis\.internal = 3: .*scheme n5b8e"):
-        read(MODES + "internal = 3\n").computation()
-    with pytest.raises(InputError, match=r"analysis\.internal = 3: .*scheme n5b8e"):
-        read(RESPONSE.replace("[[drive]]", "internal = 3\n[[drive]]")).computation()
 
 
 def test_everything_that_can_be_said_of_a_response(read) -> None:
@@ -82,7 +73,7 @@ def test_everything_that_can_be_said_of_a_response(read) -> None:
     np.testing.assert_array_equal(given.pop("frequencies"), [1.0, 2.5, 4.0])
     del given["drive"]
     # of the options of the method those that the file names; the others are left to the method
-    none = {"state": None, "secant": None, "internal": 0}
+    none = {"state": None, "secant": None, "check_model": True}
     assert given == {"method": "burst_random", "amplitude": 0.1, "averages": 3, "seed": 4, **none}
     assert (found.output.axis, found.output.quantity) == ("z", "mobility")
     np.testing.assert_array_equal(found.output.nodes, [3])
@@ -110,7 +101,8 @@ analysis.count = 0: must be at least 1
 analysis.state = "equilibrum": did you mean 'equilibrium'? choose one of rest, equil
 analysis.secant = 0: must be greater than 0
 analysis.secant = 200: must be at most 180
-analysis.internal = 7: must be at most 6
+analysis.internal = 3 | analysis.internal: internal amplitudes are no more, as superelements have
+    the modes of panels; leave it out, and take model.kind = "superelements"
 sheet.density = | sheet.density: missing; modes need it (kg/m3)
 analysis.duration = 1.0 | analysis.duration: only for analysis.kind = "dynamics", "statics" or
     "frf"; leave it out
@@ -135,8 +127,7 @@ output.axis = "-x": did you mean 'x'? choose one of x, y, z
 output = { quantity = "mobility" } | output.quantity: only for analysis.kind = "frf"; leave it out
 """
 BAD_RESPONSE = """
-analysis.method = "harmonic"; analysis.internal = 3 | analysis.internal = 3: internal amplitudes
-    are for small vibrations, and the method harmonic is for
+analysis.internal = 3 | analysis.internal: internal amplitudes are no more, as superelements have
 analysis.frequencies = | analysis.frequencies: missing; give
 analysis.frequencies = "all": must be { first = 1, last = 25, count = 241 }, in Hz, or a
 analysis.frequencies = []: must be { first = 1

@@ -48,19 +48,6 @@ def test_modes_about_an_equilibrium(write):
 
 
 @pytest.mark.matrix
-def test_internal_amplitudes_are_told(write):
-    plates = '[model]\npreset = "n5b8e"\n[analysis]\ninternal = 3\n'
-    found, page = write(plates + 'kind = "modes"\ncount = 3\n[output]\nshapes = [1]\n')
-    share = found.internal_share.values
-    most, number = 100.0 * share.max(), 1 + share.argmax()
-    assert "Each panel has 3 internal amplitudes beside its nodes" in page
-    assert f"up to {most:.0f} % of a mode&#x27;s strain energy (mode {number})" in page
-    assert "internal amplitudes</th>" in page
-    _, page = write(PUSH + plates + 'kind = "frf"\nfrequencies = [1.0, 1.5, 2.0]\n')
-    assert "internal amplitudes</th>" in page
-
-
-@pytest.mark.matrix
 def test_which_modes_are_shown(write):
     found, _ = write('[analysis]\nkind = "modes"\ncount = 5\nsecant = 1\n[output]\nshapes = [2]\n')
     assert shown_modes(found, 3) == [1, 2, 3]

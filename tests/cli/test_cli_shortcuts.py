@@ -70,7 +70,7 @@ def test_the_response_of_a_motion_to_its_forces(workplace, miura) -> None:
 def test_about_the_equilibrium_loads_act(read, miura) -> None:
     text = changed(miura, f"supports[1] = {MOVED}; {GRAVITY}")
     found = read(text, "modes", state="equilibrium")
-    given = {"count": 6, "state": "equilibrium", "secant": None, "internal": 0, "check_model": True}
+    given = {"count": 6, "state": "equilibrium", "secant": None, "check_model": True}
     assert found.analysis.arguments == given
     case = found.case()
     assert case.supports == (Fix([0, 1, 2]), Impose([8], "z", 0.1))  # without histories
@@ -121,11 +121,10 @@ def test_a_path_and_what_its_figures_show(read, miura) -> None:
 
 
 def test_flags_stand_above_what_the_file_says(read, tmp_path) -> None:
-    modes = changed(MODES_TEXT, "analysis.secant = 1.0; analysis.internal = 2; analysis.count = 3")
-    given = {"count": 3, "state": None, "secant": 1.0, "internal": 2, "check_model": True}
+    modes = changed(MODES_TEXT, "analysis.secant = 1.0; analysis.count = 3")
+    given = {"count": 3, "state": None, "secant": 1.0, "check_model": True}
     assert read(modes, "modes").analysis.arguments == given
     assert read(modes, "modes", count=5).analysis.arguments["count"] == 5
-    assert read(modes, "modes", internal=3).analysis.arguments["internal"] == 3
     stored = modes + '[initial]\nfile = "a.nc"\n'
     assert read(stored, "modes", state="rest").initial() is None
     with pytest.raises(InputError, match=r"initial\.file = .*b\.nc.*no such file"):

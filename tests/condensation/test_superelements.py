@@ -10,6 +10,7 @@ import pytest
 import foldyn as fd
 from foldyn.condensation.shapes import LEVELS
 from foldyn.errors import InputError, ModelRangeWarning
+from foldyn.linear import linearize
 
 SHEET = fd.Sheet(1e9, 0.3, 0.01, 1000.0)
 PATTERN = fd.patterns.miura(cells=(1, 1), panel_angle=55, dihedral=100)
@@ -132,6 +133,57 @@ def test_damping_of_creases(stiffer):
     np.testing.assert_allclose(own, shell, rtol=0.02)
 
 
+def test_creases_that_remember_turn_unevenly_too():
+    """A branch that relaxes at once is a damper: the ratios of both are alike."""
+    k, time = 1.0, 1e-3
+    law = fd.materials.Prony(ratios=[1.0], times=[time], law="linear")
+    damped, relaxing = (
+        fd.Case(fd.superelements(PATTERN, SHEET, crease_stiffness=k, **law), HELD, damping=damping)
+        for law, damping in (({}, fd.CreaseDamping(k * time)), ({"fold_law": law}, ()))
+    )
+    one, other = (fd.modes(case, 4) for case in (damped, relaxing))
+    np.testing.assert_allclose(other["damping_ratio"], one["damping_ratio"], rtol=1e-3)
+    np.testing.assert_allclose(other["frequency"], one["frequency"], rtol=1e-4)
+
+
+DAMPED = [fd.Rayleigh(0.02, 1e-4), fd.ModalDamping(0.02, count=8)]
+DAMPED.append(fd.ModalDamping(0.02, count=8, state="initial"))
+
+
+@pytest.mark.parametrize("damping", DAMPED)
+def test_responses_are_sums_of_modes(damping):
+    case = fd.Case(fd.superelements(PATTERN, SHEET, level=2, divisions=MESH), HELD, damping=damping)
+    found = fd.modes(case, 8)
+    if isinstance(damping, fd.ModalDamping):
+        np.testing.assert_allclose(found["damping_ratio"], 0.02, rtol=1e-6)
+    push, peak = fd.Force([TIP], (0.3, 0.1, 1.0)), float(found["frequency"][0])
+    direct, modal = (
+        fd.frf(
+            case, push, frequencies=peak * np.array([0.5, 0.95, 1.0, 1.05]), method=method
+        )["receptance"].values
+        for method in ("direct", "modal")
+    )  # fmt: skip
+    np.testing.assert_allclose(direct, modal, atol=1e-6 * np.abs(direct).max())
+    size = np.abs(direct).max(axis=(1, 2))
+    assert size[2] > size[[0, 1, 3]].max()
+
+
+def test_a_base_moves_all_that_stands_on_it():
+    """Slowly as a whole; and as forces of inertia say: x = t + H (w^2 M t)."""
+    case = fd.Case(
+        fd.superelements(PATTERN, SHEET, level=2, divisions=MESH), HELD, damping=fd.Rayleigh(0.05)
+    )
+    base, omega = fd.BaseMotion("z"), 2.0 * np.pi * 0.3
+    still, found = fd.frf(case, base, frequencies=[0.0, 0.3])["transmissibility"].values
+    np.testing.assert_allclose(still, np.tile([0.0, 0.0, 1.0], (len(still), 1)), atol=1e-8)
+    linear = linearize(case)
+    impedance = (linear.stiffness - omega**2 * linear.mass + 1j * omega * linear.damping).toarray()
+    load = (omega**2 - 1j * omega * 0.05) * linear.inertia[:, 2]
+    moved = linear.expanded(np.linalg.solve(impedance, load)[:, None]).reshape(-1, 3)
+    moved[:, 2] += 1.0
+    np.testing.assert_allclose(found, moved, atol=1e-8 * np.abs(moved).max())
+
+
 @pytest.mark.matrix
 @pytest.mark.parametrize("method", ["direct", "modal"])
 def test_responses_with_creases_that_relax(method):
@@ -242,6 +294,15 @@ def test_errors_bound_the_difference_to_fine_shells(pattern, thickness):
         assert (modes["frequency_error"] < 0.05 * modes["frequency"]).all()
         if level == 5:
             assert (off < 0.01 * limit).all()
+
+
+def test_no_motion_has_a_negative_mass():
+    """Turns of a hexagon, of hardly any mass, would get one in the limit of fine meshes."""
+    angle = np.arange(6) * np.pi / 3.0
+    hexagon = fd.Pattern(0.04 * np.column_stack([np.cos(angle), np.sin(angle)]), [range(6)])
+    sheet = fd.Sheet(youngs_modulus=2e9, poissons_ratio=0.35, thickness=3e-4, density=1200.0)
+    _, mass = fd.superelements(hexagon, sheet).whole.matrices(False)
+    assert np.linalg.eigvalsh(mass.toarray())[0] > -1e-15
 
 
 @pytest.mark.matrix

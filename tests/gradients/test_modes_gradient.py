@@ -296,7 +296,6 @@ def test_so_they_have_where_dofs_without_mass_move_along():
 @pytest.mark.parametrize(
     ("measures", "analysis", "told"),
     [
-        ("frequency[1]", {**MODES, "internal": 1}, "internal amplitudes.*leave that out"),
         ("frequency[1]", {**MODES, "secant": 1.0}, "finite amplitude.*leave that out"),
         ("unstable_modes", MODES, "has no derivative; measures with one are"),
         ("frequencies", MODES, r"measures\[0\]: frequencies is an array; ask for one"),

@@ -43,7 +43,8 @@ def test_a_clamped_square_vibrates_as_a_plate():
     pattern, edge, _ = plate("square")
     case = fd.Case(clamped(pattern, [edge]), [fd.Fix(list(edge))])
     scale = np.sqrt(SHEET.bending_modulus / (SHEET.density * SHEET.thickness)) / (2 * np.pi)
-    found = fd.modes(case, 3, internal=3).frequency.values / scale
+    panel = fd.Case(fd.superelements(pattern, SHEET, clamped=[edge]), [fd.Fix(list(edge))])
+    found = fd.modes(panel, 3).frequency.values / scale
     np.testing.assert_allclose(found, [3.4917, 8.5246, 21.429], rtol=8e-3)
     assert fd.modes(case, 1).frequency.values[0] / scale == pytest.approx(3.4917, rel=0.01)
 

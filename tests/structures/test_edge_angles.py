@@ -10,7 +10,7 @@ import foldyn as fd
 from case_texts import HELD_MIURA_TEXT
 from foldyn.checks import gradient_error, observed_order, tangent_error
 from foldyn.errors import InputError
-from foldyn.structures.condensed_panel import condensed, panel_stiffness
+from foldyn.structures.condensed_panel import condensed, heights_and_slopes, panel_stiffness
 from foldyn.structures.panel_plate import outline
 
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=1.0)
@@ -69,6 +69,20 @@ def test_energies_of_a_panel_are_not_negative(name):
     value = np.linalg.eigvalsh(stiffness)
     assert (value > -1e-9).all()
     assert (value > 1e-6).sum() == len(x) - 2 + 2
+
+
+def test_edges_turn_by_the_slope_of_the_facet_less_the_plate():
+    """The turn beta of an edge; both slopes are outward."""
+    x = np.c_[np.asarray(PANELS["square"], float), np.zeros(4)]
+    edges = [True, False, False, False]
+    shape = outline(x, x.mean(axis=0), edges, edges)
+    held = heights_and_slopes(shape)
+    assert held.shape == (6, 6)
+    tilted = np.r_[np.array([*shape.corners, shape.center]) @ [0.3, -0.2], 0.0]
+    (k,) = (held @ tilted)[5:]
+    edge = np.subtract(shape.corners[1], shape.corners[0])
+    outward = np.array([edge[1], -edge[0]]) / np.linalg.norm(edge)
+    assert k == pytest.approx(outward @ [0.3, -0.2])
 
 
 def test_size_and_place_do_not_matter():

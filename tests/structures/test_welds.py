@@ -161,10 +161,10 @@ def test_a_weld_does_not_show_beside_a_clamped_edge():
     """The first frequencies of a clamped panel in two halves: those of the whole one."""
     halves = fd.discretize(fd.welded(cut_across([0.5])), STEEL, clamped="xmin")
     assert halves.options.scheme == "n5b8e"
-    whole = fd.discretize(cut_across([]), STEEL, preset="n5b8e", clamped="xmin")
+    whole = fd.superelements(cut_across([]), STEEL, clamped="xmin")
     one = fd.modes(fd.Case(halves, [fd.Fix("xmin")]), 2).frequency.values
-    other = fd.modes(fd.Case(whole, [fd.Fix("xmin")]), 2, internal=3).frequency.values
-    np.testing.assert_allclose(one, other, rtol=0.03)
+    other = fd.modes(fd.Case(whole, [fd.Fix("xmin")]), 2).frequency.values
+    assert (np.abs(one / other - 1.0) < [1e-3, 0.035]).all()
 
 
 def test_creases_know_nothing_of_welds():
@@ -176,9 +176,3 @@ def test_creases_know_nothing_of_welds():
     np.testing.assert_allclose(made.fold_stiffness, np.arange(1, len(length) + 1) * length)
     with pytest.raises(InputError, match="no crease assigned flat"):
         fd.discretize(lines, STEEL, crease_stiffness={"flat": 1.0})
-
-
-def test_internal_amplitudes_are_refused():
-    case = fd.Case(fd.discretize(fd.welded(cut_across([0.5])), STEEL))
-    with pytest.raises(InputError, match=r"internal = 2: .* has welds \(1\); leave it out"):
-        fd.modes(case, count=8, internal=2)

@@ -18,8 +18,7 @@ import numpy as np
 
 from foldyn.cases import Case, Fix
 from foldyn.patterns import GENERATORS, Pattern
-from foldyn.shells import Shell
-from foldyn.structures import Sheet
+from foldyn.structures import Sheet, Structure
 from foldyn.structures.discretized import Discretized
 
 DOCUMENTED = Path(__file__).with_name("documented.toml")
@@ -45,7 +44,7 @@ class Held:
         fixed = [Fix(list(nodes), axes) for axes, nodes in self.points.items()]
         if not self.edges:
             return fixed
-        along = isinstance(structure, Shell)  # bars and hinges have no other nodes there
+        along = not isinstance(structure, Structure)  # bars and hinges have no other nodes there
         return [*fixed, Fix(np.unique(self.edges).tolist(), "xyz", along=along)]
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import csv
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from math import inf, nan
+from math import nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from foldyn.condensation import superelements
 from foldyn.errors import FoldynWarning
 from foldyn.linear.reference import (
     SPARE,
@@ -22,8 +23,9 @@ from foldyn.linear.reference import (
 )
 from foldyn.linear.shell_of import DIVISIONS
 from foldyn.shells import shell
-from foldyn.structures import Structure, discretize
+from foldyn.structures import discretize
 from foldyn.structures.beyond_range import BELOW, plate_frequency
+from foldyn.structures.discretized import Discretized
 from foldyn.structures.presets import resolved
 from verification.fidelity.cases import FidelityCase
 
@@ -43,6 +45,7 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
     "plate, consistent, bars": {"preset": "plate", "membrane": "bars"},
     "n5b8e, condensed, bars": {"preset": "n5b8e", "membrane": "bars"},
 }
+SUPERELEMENTS = "superelements"
 COMPARED = 8  # most compared modes of the shell
 FIRST = 5  # that are compared at any frequency
 REFERENCE = 10  # computed modes of the shell
@@ -81,8 +84,10 @@ def reference(case: FidelityCase) -> Reference:
     return reference_modes(cases, REFERENCE)
 
 
-def structure_of(case: FidelityCase, model: str) -> Structure:
-    """Bars and hinges of a case; held edges stay straight even if edges may bow."""
+def structure_of(case: FidelityCase, model: str) -> Discretized:
+    """Superelements, or bars and hinges, whose held edges stay straight even if edges may bow."""
+    if model == SUPERELEMENTS:
+        return superelements(case.pattern(), case.sheet, **case.options)
     options = {"bend_law": "linear", **case.options, **MODELS[model]}
     if resolved(**options).bowed:
         options["straight"] = case.held.edges
@@ -97,20 +102,13 @@ def compare(case: FidelityCase, true: Reference, model: str) -> list[Row]:
     return [row for row in rows if row.over_plate < BELOW]
 
 
-def first_modes(case: FidelityCase, true: Reference, internal: int) -> list[Row]:
-    """Compare the first modes by n5b8e with internal amplitudes with the shell's."""
-    return all_rows(case, true, "n5b8e, condensed", FIRST, internal)
-
-
-def all_rows(
-    case: FidelityCase, true: Shown, model: str, count: int = COMPARED, internal: int = 0
-) -> list[Row]:
+def all_rows(case: FidelityCase, true: Shown, model: str, count: int = COMPARED) -> list[Row]:
     """Compare the first modes by a model with the shell's."""
     held = case.case(structure_of(case, model))
     limit = plate_frequency(case.pattern(), case.sheet)
-    if not len(held.free_dofs):  # triangles between held edges
+    if model != SUPERELEMENTS and not len(held.free_dofs):  # triangles between held edges
         return [Row(k, f, f / limit, nan, 0.0) for k, f in enumerate(true.frequency[:count], 1)]
-    found = matched(true, count, held, modes_at_rest(held, count + SPARE, internal=internal))
+    found = matched(true, count, held, modes_at_rest(held, count + SPARE))
     rows = zip(true.frequency, found.error, found.mac, strict=False)
     return [
         Row(k, float(shell), float(shell / limit), float(error), float(mac))
@@ -213,27 +211,3 @@ def columns(s: Summary) -> str:
 
 def _percent(error: float) -> str:
     return "lost" if np.isinf(error) else f"{100 * error:.1f} %"
-
-
-# Internal amplitudes of a panel, by their name in the table.
-AMPLITUDES = {"none": 0, "1": 1, "3": 3}
-# Ranges of frequencies relative to the plate's.
-RANGES = {"below 0.6": (0.0, BELOW), "0.6 to 1": (BELOW, 1.0), "above 1": (1.0, inf),
-          "all": (0.0, inf)}  # fmt: skip
-
-
-def modes_first(case: FidelityCase, true: Reference) -> Modes:
-    """Compare the first five modes by n5b8e with internal amplitudes with the shell's."""
-    rows = {name: first_modes(case, true, count) for name, count in AMPLITUDES.items()}
-    return Modes(case.name, rows)
-
-
-def first_table(results: list[Modes]) -> str:
-    """Errors by the range of the frequency, in Markdown."""
-    lines = []
-    for title, (low, high) in RANGES.items():
-        for name in AMPLITUDES:
-            rows = [row for modes in results for row in modes.rows[name]]
-            s = summary_of([row for row in rows if low <= row.over_plate < high])
-            lines.append([title, s.modes, name, columns(s)])
-    return markdown(["frequency over $f_\\mathrm{plate}$", "modes", "amplitudes", *ERRORS], lines)

@@ -21,12 +21,12 @@ from verification.fidelity.compare import Modes, Row
 from verification.fidelity.mixed import SETS, SUPPORTS, MixedCase
 from verification.fidelity.references import Stored, case_sets, certain, read_references, stored
 
-# Compared models and their internal amplitudes, by name in the table.
+# Compared models by name in the table.
 BESIDE = {
-    "plate": ("plate, consistent", 0),
-    "n5b8e": ("n5b8e, condensed", 0),
-    "n5b8e, internal": ("n5b8e, condensed", 3),
-    "n5b8e, bars": ("n5b8e, condensed, bars", 0),
+    "plate": "plate, consistent",
+    "n5b8e": "n5b8e, condensed",
+    compare.SUPERELEMENTS: compare.SUPERELEMENTS,
+    "n5b8e, bars": "n5b8e, condensed, bars",
 }
 
 
@@ -38,10 +38,7 @@ def references(name: str, folder: Path = compare.RESULTS) -> list[tuple[MixedCas
 
 def compared(case: MixedCase, true: Stored) -> Modes:
     """The first modes of a case by every model."""
-    rows = {
-        name: compare.all_rows(case, true, model, internal=internal)
-        for name, (model, internal) in BESIDE.items()
-    }
+    rows = {name: compare.all_rows(case, true, model) for name, model in BESIDE.items()}
     return Modes(case.name, rows)
 
 

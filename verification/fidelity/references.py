@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.extrapolation import doubt, limits
 from foldyn.errors import FoldynWarning
-from foldyn.linear.reference import SAME_PLACE, reference_modes
+from foldyn.linear.mac import SAME_PLACE
+from foldyn.linear.reference import reference_modes
 from foldyn.patterns import Pattern
 from foldyn.shells import shell
 from foldyn.structures.beyond_range import BELOW, plate_frequency

@@ -159,7 +159,7 @@ def remodeled(
     """Case file for another model, or for a shell with other divisions.
 
     Parts without a meaning for the other model are left out: its unknown keys of [model], the mass
-    rules, and for a shell explicit methods with their steps, secant and internal amplitudes.
+    rules, and for a shell explicit methods with their steps, and secant amplitudes.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def _fold_law_of(preset: str | None) -> Document:
 
 def _without_bends(analysis: Mapping[str, Any]) -> dict[str, Any]:
     """The table [analysis] without keys that have meaning only for bars and hinges."""
-    left = {"secant", "internal"}
+    left = {"secant"}
     key, usual = ("method", "auto") if analysis["kind"] == "dynamics" else ("integrator", "rk4")
     method = METHODS.get(analysis.get(key, usual))
     if method is not None and not method.implicit:

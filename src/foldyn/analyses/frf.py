@@ -18,7 +18,7 @@ from foldyn import plots
 from foldyn.analyses.bars import share_bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, movable
 from foldyn.analyses.sections import AnalysisSection, Positive, ShownSection, one_of
-from foldyn.analyses.vibration import About, Internal, Secant, VibrationSchema, about, bar_closed
+from foldyn.analyses.vibration import GONE, About, Secant, VibrationSchema, about, bar_closed
 from foldyn.arguments import Check, arguments
 from foldyn.cases import BaseMotion, Case, Force
 from foldyn.cases.decode import PartOf
@@ -27,7 +27,6 @@ from foldyn.dynamics import Progress
 from foldyn.errors import InputError
 from foldyn.linear import Peak, frf, peaks_of
 from foldyn.linear.frf import METHODS, PER_FORCE, quantity_of
-from foldyn.linear.internal_modes import check_internal
 from foldyn.plots.charts import Chart, Curve
 from foldyn.report.album import Album, ByRule, by_mass_rule, listed, rules, shown_nodes
 from foldyn.report.sections import Charts, Heading, Section, Table, Text, cell
@@ -80,8 +79,8 @@ class FrfSection(*(method.options for method in METHODS.values()), AnalysisSecti
     method: Annotated[str, one_of(METHODS)] = "direct"
     state: About = "rest"
     secant: Secant = None
-    internal: Internal = 0
     amplitude: Positive = 1.0
+    gone = GONE
     check_model: bool = True
 
     def agree(self) -> None:
@@ -100,13 +99,6 @@ class FrfSection(*(method.options for method in METHODS.values()), AnalysisSecti
                 f" = {show(self.secant)}: the method {self.method} takes the amplitude of the "
                 "drive instead; leave it out, and give amplitude",
                 "secant",
-            )
-        if self.internal and method.by_amplitude:
-            raise InputError(
-                f" = {self.internal}: internal amplitudes are for small vibrations, and the method "
-                f'{self.method} is for finite ones; take method = "direct" or "modal", or leave '
-                "it out",
-                "internal",
             )
         method.options(**self.options())
 
@@ -193,7 +185,7 @@ class FrfAnalysis(Analysis):
         section = schema.analysis
         given: dict[str, Any] = {
             key: getattr(section, key)
-            for key in ("frequencies", "method", "secant", "internal", "amplitude", "check_model")
+            for key in ("frequencies", "method", "secant", "amplitude", "check_model")
         }
         given["state"] = None if section.state == "rest" else section.state
         return cls({**given, **section.options(), "drive": schema.drive})
@@ -202,7 +194,6 @@ class FrfAnalysis(Analysis):
         """See `Analysis`; `frf` refuses bad input before it first reports progress."""
         given = {**self.arguments, **about(case_file, mass), **changes}
         case = case_file.case(mass)
-        check_internal(case.structure, given.get("internal", 0))
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
             def tell(now: Progress) -> None:
@@ -359,7 +350,6 @@ def _peaks(
 def _run(case_file: CaseFile, results: ByRule) -> Table:
     keys = {
         "secant": "secant (degrees)",
-        "internal": "internal amplitudes",
         "modes": "modes",
         "amplitude": "amplitude",
         "pulse": "pulse (s)",

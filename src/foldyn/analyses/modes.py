@@ -13,12 +13,11 @@ from foldyn import plots
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
 from foldyn.analyses.sections import AnalysisSection, Animation, Count, ShownSection, some_shapes
-from foldyn.analyses.vibration import About, Internal, Secant, VibrationSchema, about, bar_closed
+from foldyn.analyses.vibration import GONE, About, Secant, VibrationSchema, about, bar_closed
 from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.linear import character, mac, modes, pair_modes
 from foldyn.linear.compared import size
-from foldyn.linear.internal_modes import check_internal
 from foldyn.report.album import Album, ByRule, by_mass_rule, listed
 from foldyn.report.sections import Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
@@ -37,7 +36,7 @@ class ModesSection(AnalysisSection):
     count: Count = 6
     state: About = "rest"
     secant: Secant = None
-    internal: Internal = 0
+    gone = GONE
     check_model: bool = True
 
 
@@ -85,7 +84,6 @@ class ModesAnalysis(Analysis):
         """See `Analysis`."""
         given = {**self.arguments, **about(case_file, mass), **changes}
         case = case_file.case(mass)
-        check_internal(case.structure, given.get("internal", 0))
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
             text = f"modes with mass rule {mass}"
@@ -257,8 +255,6 @@ def _run(case_file: CaseFile, results: ByRule) -> Table:
         "solver": "solver",
         "time (s)": "wall_seconds",
     }
-    if any("internal" in found.attrs for found in results.values()):
-        columns["internal amplitudes"] = "internal"
     return by_mass_rule(results, columns, f"{case_file.path.name}: the computation")
 
 
@@ -308,15 +304,6 @@ def _notes(modes: xarray.Dataset, case: Case) -> str:
         )
     elif "not_compared" in modes.attrs:
         notes.append(f"Not compared with superelements: {modes.attrs['not_compared']}.")
-    if "internal" in modes.attrs:
-        share = modes["internal_share"].values
-        notes.append(
-            f"Each panel has {modes.attrs['internal']} internal amplitudes beside its nodes, and "
-            "one for each edge without a crease; creases turn unevenly. Shapes are drawn at nodes, "
-            "which do not show "
-            f"them; they have up to {100.0 * np.nanmax(share):.0f} % of a mode's strain energy "
-            f"(mode {int(modes['mode'].values[np.nanargmax(share)])})."
-        )
     if float(modes.attrs["residual"]) > 1e-6:
         notes.append(
             f"The state is no equilibrium: its residual is {modes.attrs['residual']:.2g} of the "

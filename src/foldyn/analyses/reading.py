@@ -45,7 +45,7 @@ def read_case(
     model : {"bars_and_hinges", "shell"}, optional
         Model to use instead of the file's. Creases, supports, loads and output stay; parts without
         a meaning for the other model are left out: its unknown keys of [model], the mass rules, and
-        for a shell an explicit method with its step, secant and internal amplitudes.
+        for a shell an explicit method with its step, and secant amplitudes.
     divisions : int, optional
         Divisions of every edge of a shell, instead of the file's.
 

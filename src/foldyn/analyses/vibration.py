@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Annotated, Any
 
 from foldyn.analyses.casefile import CaseFile
-from foldyn.analyses.sections import CaseSchema, one_of, whole_number
+from foldyn.analyses.sections import CaseSchema, one_of
 from foldyn.analyses.start import StoredStart
 from foldyn.arguments import Check
 from foldyn.cases import Impose
@@ -18,7 +18,6 @@ from foldyn.cases.loads import LOAD
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.supports import SUPPORT
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
-from foldyn.linear.internal_modes import MOST
 from foldyn.tables import ListOf
 from foldyn.values import number, show
 
@@ -26,7 +25,10 @@ STATES = ("rest", "equilibrium")
 """States of vibration that case files name; a stored state is also possible."""
 About = Annotated[str, one_of(STATES)]
 Secant = Annotated[float | None, Check(number, above=0.0, most=180.0)]
-Internal = Annotated[int, Check(whole_number, least=0, most=MOST)]
+GONE = {
+    "internal": "internal amplitudes are no more, as superelements have the modes of panels; leave "
+    'it out, and take model.kind = "superelements"'
+}
 TIMELESS = (
     "small vibrations are about one state, in which loads and displacements act in full; leave it "
     "out"
@@ -53,12 +55,6 @@ class VibrationSchema(CaseSchema):
                 f" = {show(self.analysis.secant)}: is for superlinear bends, which "
                 f"{MODELS[self.model.kind].name} cannot have; leave it out",
                 "analysis.secant",
-            )
-        if other and getattr(self.analysis, "internal", 0):
-            raise InputError(
-                f" = {show(self.analysis.internal)}: is for the panels of bars and hinges; leave "
-                "it out",
-                "analysis.internal",
             )
         if self.initial is not None and "state" in self.analysis.stated:
             raise InputError(

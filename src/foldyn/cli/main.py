@@ -147,7 +147,7 @@ def parser() -> argparse.ArgumentParser:
     bands.add_argument(
         "--attenuation", type=integer, metavar="N", help="frequencies of an attenuation spectrum"
     )
-    _add_state(bands, internal=False)
+    _add_state(bands)
 
     fidelity = commands.add_parser(
         "fidelity",
@@ -237,7 +237,7 @@ def _add_common(command: argparse.ArgumentParser, results: str, film: bool = Tru
     )
 
 
-def _add_state(command: argparse.ArgumentParser, internal: bool = True) -> None:
+def _add_state(command: argparse.ArgumentParser) -> None:
     """Add the options for the state about which a structure vibrates."""
     command.add_argument(
         "--state",
@@ -246,14 +246,6 @@ def _add_state(command: argparse.ArgumentParser, internal: bool = True) -> None:
         "state of a result (NetCDF)",
     )
     _add_secant(command)
-    if not internal:
-        return
-    command.add_argument(
-        "--internal",
-        type=integer,
-        metavar="N",
-        help="internal amplitudes of each panel (scheme n5b8e; default: those of the file)",
-    )
 
 
 def _add_secant(command: argparse.ArgumentParser) -> None:

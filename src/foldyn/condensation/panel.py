@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg import eigh
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from foldyn.algebra.superlu import factorize
@@ -74,13 +75,16 @@ class CondensedPanel:
 def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> CondensedPanel:
     """The limit of fine meshes, from two meshes; errors fall with the square of the mesh size.
 
+    Motions that have hardly any mass would get a negative one.
+
     ratio : mesh size of `coarse` / mesh size of `fine`.
     """
     weight = 1.0 / (ratio**2 - 1.0)
+    values, motions = eigh(fine.mass + weight * (fine.mass - coarse.mass))
     return replace(
         fine,
         stiffness=fine.stiffness + weight * (fine.stiffness - coarse.stiffness),
-        mass=fine.mass + weight * (fine.mass - coarse.mass),
+        mass=(motions * values.clip(min=0.0)) @ motions.T,
     )
 
 

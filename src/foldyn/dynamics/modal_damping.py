@@ -149,13 +149,9 @@ def rows_of(
     damping: ModalDamping, case: Case, stiffness: sparse.csr_array, mass: sparse.csr_array,
     state: NDArray,
 ) -> ModalRows:  # fmt: skip
-    """Modal damping for a stiffness and a mass (m, m) at a displacement (n, 3).
-
-    The dofs of the matrices that follow the body's own dofs are free.
-    """
-    ties, body = case.constraints, case.elastic_body
-    more = np.arange(body.size, stiffness.shape[0])
-    free = np.concatenate([case.free_dofs, body.hidden, more])
+    """Modal damping for a stiffness and a mass (m, m) at a displacement (n, 3)."""
+    ties = case.constraints
+    free = np.concatenate([case.free_dofs, case.elastic_body.hidden])
     mass, stiffness = ties.matrix(mass), ties.matrix(stiffness)
     block = sparse.csc_array(mass[free][:, free])
     pencil = Pencil(sparse.csc_array(stiffness[free][:, free]), block)
@@ -201,11 +197,9 @@ def _swinging(
     """The lowest vibration modes: all damped modes, and others as low as the last of them."""
     wanted = damping.modes
     if wanted is None and pencil.finite > MOST_MODES:
-        inner = int((free >= case.elastic_body.size).sum())
-        among = f", {inner} of them internal amplitudes," if inner else ""
         raise InputError(
-            f": all modes of {pencil.finite} free dofs{among} are too many: all can be "
-            f"damped up to {MOST_MODES}; give count, or a list of ratios",
+            f": all modes of {pencil.finite} free dofs are too many: all can be damped up to "
+            f"{MOST_MODES}; give count, or a list of ratios",
             "damping.modal",
         )
     sought = pencil.finite if wanted is None else min(wanted + BEYOND, pencil.finite)

@@ -134,7 +134,6 @@ def refuse(linear: Linearized, what: str) -> None:
         "contact": case.contact is not None,
         "air": case.air is not None,
         "creases that yield, creep or relax": linear.branches is not None,
-        "internal amplitudes (internal)": linear.internal > 0,
         "slopes of finite amplitude (secant)": linear.secant is not None,
         "folds that are actuated about an equilibrium (Actuate, Temperature)": (
             bool(case.rest_terms) and bool(linear.displacement.any())

@@ -236,13 +236,7 @@ def _linear(one: Asked) -> Linearized:
     given = one.arguments
     if given.get("state") is not None:
         raise InputError(f"{NONE} a linearization about a loaded state")
-    linear = linearize(
-        one.case,
-        None,
-        secant=given.get("secant"),
-        load_factor=1.0,
-        internal=given.get("internal", 0),
-    )
+    linear = linearize(one.case, secant=given.get("secant"))
     if linear.responding is not None:
         raise InputError(f"{NONE} vibrations with laws that have memory")
     return linear

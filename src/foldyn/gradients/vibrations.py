@@ -236,9 +236,8 @@ class FrfGradient(Differentiated):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)  # `frf` has warned already
             self._linear = linearize(
-                case, state, secant=given.get("secant"), load_factor=given.get("load_factor", 1.0),
-                internal=given.get("internal", 0),
-            )  # fmt: skip
+                case, state, secant=given.get("secant"), load_factor=given.get("load_factor", 1.0)
+            )
             self._drive = drive_of(case, given["drive"], given.get("amplitude", 1.0))
         refuse(self._linear, "frequency responses")
         self._axis = None if self._drive.axis is None else AXES.index(self._drive.axis)

@@ -31,7 +31,7 @@ from foldyn.results import frf_dataset
 from foldyn.results.quantities import RESPONSES, variable
 from foldyn.signals import convert_response
 from foldyn.structures.stretching import most, remedy, stretching
-from foldyn.values import choice, number, numbers, of_kind, suggest, whole
+from foldyn.values import choice, number, numbers, of_kind, suggest
 
 
 class ResponseMethod(NamedTuple):
@@ -81,7 +81,6 @@ def frf(
     secant: float | None = None,
     amplitude: float = 1.0,
     load_factor: float = 1.0,
-    internal: int = 0,
     progress: bool | Reporter | None = None,
     check_model: bool = True,
     **options: Any,
@@ -114,8 +113,6 @@ def frf(
         Factor on the drive, for structures whose response depends on the amplitude.
     load_factor : float
         Load factor of actuated folds in a given state.
-    internal : int
-        For "direct" and "modal": internal amplitudes of each panel, as in `modes`.
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress`, in simulated time for methods that simulate
         motions, in frequencies for the others.
@@ -187,19 +184,10 @@ def frf(
             "of the drive instead",
             "secant",
         )
-    internal = whole("internal", internal)
-    if internal and way.by_amplitude:
-        raise InputError(
-            f" = {internal!r}: internal amplitudes are for small vibrations, and the method "
-            f'{method} is for finite ones; take method = "direct" or "modal", or leave it out',
-            "internal",
-        )
     began, reference = time.perf_counter(), None
     with reported(progress) as report:
         if way.linear:
-            system = linearize(
-                case, state, secant=way.secant or secant, load_factor=load_factor, internal=internal
-            )
+            system = linearize(case, state, secant=way.secant or secant, load_factor=load_factor)
             _warn_of_instability(system)
             if check_model and state is None and not way.by_amplitude and secant is None:
                 reference = beside(case)
@@ -207,7 +195,7 @@ def frf(
             if not isinstance(reference, Case):
                 _warn_of_stretch(system, frequency, answer.response)
             response, displacement = absolute(system, driven, answer.response), system.displacement
-            own = {"soft_hinges": system.soft, "internal": system.internal or None}
+            own: dict[str, Any] = {"soft_hinges": system.soft}
             own["not_compared"] = (reference if isinstance(reference, str) else "") or None
             if isinstance(reference, Case):
                 own |= _trusted(case, float(frequency.max()), reference)
@@ -219,7 +207,7 @@ def frf(
             response, displacement = answer.response, rig.state
             own = {"integrator": rig.integrator, "dt": chosen.dt}
     if not isinstance(reference, Case):
-        warn_beyond(case.structure, frequency, internal=None if way.by_amplitude else internal)
+        warn_beyond(case.structure, frequency, linear=not way.by_amplitude)
     facts = {
         "method": method,
         **driven.facts(),
@@ -287,7 +275,7 @@ def _warn_of_stretch(system: Linearized, frequency: NDArray, response: NDArray) 
         listed = ", ".join(f"{f:.4g}" for f in frequency[peaks[told]][:NAMED])
         warn(
             f"panels that stretch hold more than {limit:.0%} of the strain energy of the response "
-            f"at {listed} Hz ({share.max():.0%} at most), {remedy(structure)}",
+            f"at {listed} Hz ({share.max():.0%} at most), {remedy(structure, linear=True)}",
             "models.md#where-panels-stretch",
             StretchWarning,
         )

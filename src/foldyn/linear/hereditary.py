@@ -21,7 +21,7 @@ from scipy import sparse
 from foldyn.algebra.superlu import SingularTangentError, factorize
 from foldyn.cases import Case
 from foldyn.errors import ComputationError
-from foldyn.linear.internal_modes import Amplitudes
+from foldyn.mechanics.sheet_term import CreaseTurns
 from foldyn.structures.inelastic_hinges import memory, remembering
 
 MOST = 40  # most iterations for a mode
@@ -72,12 +72,9 @@ class Branches:
         return turns.T @ (self.weights(s)[:, None] * turns)
 
 
-def branches_of(
-    case: Case, q: NDArray, free: NDArray, inner: Amplitudes, dampers: bool = False
-) -> Branches | None:
+def branches_of(case: Case, q: NDArray, free: NDArray, dampers: bool = False) -> Branches | None:
     """Branches of a case about the dofs q (m,), on the free dofs of all unknowns.
 
-    inner : internal amplitudes of the case, by which creases also turn unevenly.
     dampers : whether to include the branches of damped creases, minus the quasi-static part that
         `dynamics.dampers` counts.
     """
@@ -86,15 +83,13 @@ def branches_of(
         parts = remembering(case.structure, case.body)
     if not parts:
         return None
-    gradient = memory(parts, case.body).gradients(q, case.body.size)
-    gradient = sparse.csr_array((gradient.data, gradient.indices, gradient.indptr))
-    size = inner.mass.shape[0]
-    gradient.resize((gradient.shape[0], size))
     turns = case.elastic_body.sheet.crease_turns
-    uneven, fold, part_of = (inner.turns, inner.fold, inner.share) if turns is None else turns
-    gradient = sparse.vstack([gradient, uneven], format="csr")
+    if turns is None:
+        gradient = memory(parts, case.body).gradients(q, case.body.size)
+        turns = CreaseTurns(gradient, np.arange(gradient.shape[0]), np.ones(gradient.shape[0]))
+    gradient, of, part_of = turns
     if ties := case.constraints:
-        gradient = sparse.csr_array(gradient @ ties.extended(size))
+        gradient = sparse.csr_array(gradient @ ties.extended(gradient.shape[1]))
     most = max(len(part.branches) for part in parts)
     relaxed, share, rate, viscous = [], [], [], []
     for part in parts:
@@ -108,14 +103,10 @@ def branches_of(
         rows = [branch.rate for branch in branches]
         rate.append(np.stack([*rows, *[np.ones(len(stiffness))] * missing], axis=1))
     relaxed, share, rate, viscous = map(np.concatenate, (relaxed, share, rate, viscous))
-    even = 0.0 if turns is not None else 1.0  # hinges whose turns are all in `uneven`
     return Branches(
         sparse.csr_array(gradient[:, free]),
-        np.concatenate([even * relaxed, relaxed[fold] * part_of]),
-        np.concatenate([even * share, share[fold] * part_of[:, None]]),
-        np.concatenate([rate, rate[fold]]),
-        np.concatenate([even * viscous, viscous[fold] * part_of]),
-    )
+        relaxed[of] * part_of, share[of] * part_of[:, None], rate[of], viscous[of] * part_of,
+    )  # fmt: skip
 
 
 def damped_mode(

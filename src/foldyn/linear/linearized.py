@@ -43,13 +43,12 @@ from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of, modal_rows, rows_of, soft_slopes
 from foldyn.errors import InputError, ModelRangeWarning, warn
 from foldyn.linear.hereditary import Branches, branches_of
-from foldyn.linear.internal_modes import Amplitudes, amplitudes, check_internal
 from foldyn.linear.operating_point import operating_point
 from foldyn.materials import Superlinear
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
-from foldyn.structures.beyond_range import range_of
+from foldyn.structures.beyond_range import LINEAR, range_of
 from foldyn.structures.discretized import Discretized
 from foldyn.values import number
 
@@ -72,8 +71,8 @@ class Linearized:
         The state, m.
     free : (nf,)
         Numbers of the free dofs, increasing: 3 node + axis; then, from 3 n on, massless dofs in
-        addition to nodal displacements, such as a shell has, and internal amplitudes. If
-        constraints tie other dofs to these, `expanded` gives the motion of all dofs.
+        addition to nodal displacements, such as a shell has. If constraints tie other dofs to
+        these, `expanded` gives the motion of all dofs.
     stiffness, mass, damping : (nf, nf)
         Sparse and symmetric: tangent (N/m), mass (kg) and damping without modal damping (N s/m):
         alpha M + beta K0, dashpots and creases in the state. The tangent includes the symmetric
@@ -104,10 +103,6 @@ class Linearized:
         Residual of the state, as a fraction of the forces that act.
     unbalanced : float
         Residual of the state, N.
-    internal : int
-        Number of internal amplitudes of each panel.
-    inner : Amplitudes
-        All internal amplitudes.
     branches : Branches or None
         Branches of laws with memory. `stiffness` excludes them, as their stiffness depends on the
         frequency.
@@ -132,8 +127,6 @@ class Linearized:
     secant: float | None
     residual: float
     unbalanced: float
-    internal: int
-    inner: Amplitudes = field(repr=False)
     branches: Branches | None = field(default=None, repr=False)
     responding: Branches | None = field(default=None, repr=False)
 
@@ -144,19 +137,11 @@ class Linearized:
 
     def expanded(self, motions: NDArray) -> NDArray:
         """Displacements (3n, k) of all nodes in motions (nf, k) of the free dofs."""
-        size = self.displacement.size
-        on_nodes = self.free < size
-        full = np.zeros((size, motions.shape[1]), motions.dtype)
-        full[self.free[on_nodes]] = motions[on_nodes]
-        return self.case.constraints.displacement(full)
-
-    def between(self, motions: NDArray) -> NDArray:
-        """Displacements (3q, k) of `inner.points` in motions (nf, k)."""
-        return self.inner.between @ self.whole(motions)
+        return self.whole(motions)[: self.displacement.size]
 
     def whole(self, motions: NDArray) -> NDArray:
         """Motions (m, k) of all unknowns in motions (nf, k)."""
-        full = np.zeros((self.inner.mass.shape[0], motions.shape[1]), motions.dtype)
+        full = np.zeros((self.case.elastic_body.size, motions.shape[1]), motions.dtype)
         full[self.free] = motions
         return self.case.constraints.displacement(full)
 
@@ -174,7 +159,6 @@ def linearize(
     *,
     secant: float | None = None,
     load_factor: float = 1.0,
-    internal: int = 0,
 ) -> Linearized:
     """Linearize a case about an equilibrium.
 
@@ -192,14 +176,11 @@ def linearize(
     load_factor : float
         Load factor of actuated folds, and of loads that depend on the displacement, in a given
         state.
-    internal : int
-        Number of internal amplitudes of each panel (scheme n5b8e; see `modes`).
 
     Raises
     ------
     InputError
-        Nothing can move; a free node has no mass; a state of another size; internal amplitudes of
-        a structure without them; contact with friction.
+        Nothing can move; a free node has no mass; a state of another size; contact with friction.
     ComputationError
         No equilibrium is found.
 
@@ -219,14 +200,12 @@ def linearize(
     amplitude = None
     if secant is not None:
         amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
-    internal = check_internal(case.structure, internal)
     check_mass(case.mass, case.constraints.determined)
     check_fill(case.structure.fill, case.body.size)
     point = operating_point(case, state, load_factor)
     check_contact(case, point.displacement, point.planes)
     body, contact = point.body.parted(ContactTerm)
-    inner = amplitudes(case.structure, body, point.dofs, internal)
-    free = np.concatenate([case.free_dofs, body.hidden, inner.dofs])
+    free = np.concatenate([case.free_dofs, body.hidden])
     exact = body.tangent(point.dofs)
     change, soft = slope_change(case, body, point.dofs, amplitude)
     if soft:
@@ -241,17 +220,14 @@ def linearize(
     loads = point.load_stiffness()
     if loads is not None:
         stiffness = sparse.csr_array(stiffness + _symmetric(loads, free))
-    stiffness, mass = inner.stiffened(stiffness), inner.massed(mass_of(case))
-    ties, more = case.constraints, inner.behind(damping_matrix(case, point.dofs, True))
-    if internal:
-        more = inner.damped(more, case.crease_damping * body.sheet.fold_hinges().length)
-    damping = case.rayleigh.matrix(mass, _reference(case, inner.stiffened(exact), internal))
-    added = _added(case, point.displacement, body, inner)
+    ties, more, mass = case.constraints, damping_matrix(case, point.dofs, True), mass_of(case)
+    damping = case.rayleigh.matrix(mass, _reference(case, exact))
+    added = _added(case, point.displacement, body)
     mass = _moved(mass, added)
-    modal = _modal_rows(case, point.displacement, stiffness, mass, internal)
+    modal = _modal_rows(case, point.displacement, stiffness, mass)
     if contact is not None:  # contact has no damping
-        stiffness = sparse.csr_array(stiffness + inner.behind(contact.tangent(point.dofs)))
-    whole = np.zeros((len(inner.dofs) + body.size, 3))
+        stiffness = sparse.csr_array(stiffness + contact.tangent(point.dofs))
+    whole = np.zeros((body.size, 3))
     whole[: point.displacement.size] = np.tile(np.eye(3), (len(point.displacement), 1))
     return Linearized(
         case=case,
@@ -263,17 +239,15 @@ def linearize(
         modal=ties.force(modal.T)[free].T,
         drag=ties.force(more @ whole)[free],
         ground=ties.force(_ground(point.body, point.dofs, whole))[free],
-        inertia=_inertia(case, whole, inner)[free],
+        inertia=ties.force(mass_of(case) @ whole)[free],
         added=None if added is None else _tied(added, ties, free),
         pushed=np.zeros((len(free), 3)) if added is None else ties.force(added @ whole)[free],
         soft=soft,
         secant=None if secant is None else float(secant),
         residual=point.relative,
         unbalanced=point.balance.residual,
-        internal=internal,
-        inner=inner,
-        branches=branches_of(case, point.dofs, free, inner),
-        responding=branches_of(case, point.dofs, free, inner, dampers=True),
+        branches=branches_of(case, point.dofs, free),
+        responding=branches_of(case, point.dofs, free, dampers=True),
     )
 
 
@@ -309,14 +283,14 @@ def _ground(body: Assembly, q: NDArray, whole: NDArray) -> NDArray:
     out = np.zeros_like(whole)
     for term in body.others:
         if not term.of_hinges:  # hinges have no strain when the whole moves
-            own, moved = term.tangent(q), whole[: body.size]
-            held = own @ moved
-            held[np.abs(held) <= ROUNDING * (abs(own) @ np.abs(moved))] = 0.0
-            out[: body.size] += held
+            own = term.tangent(q)
+            held = own @ whole
+            held[np.abs(held) <= ROUNDING * (abs(own) @ np.abs(whole))] = 0.0
+            out += held
     return out
 
 
-def _added(case: Case, displacement: NDArray, body: Assembly, inner: Amplitudes) -> Mass | None:
+def _added(case: Case, displacement: NDArray, body: Assembly) -> Mass | None:
     """Mass of the fluid (m, m) at a displacement (n, 3), kg; `Squared` if too full for a matrix."""
     found = operator_at(case, displacement)
     if found is None:
@@ -325,7 +299,7 @@ def _added(case: Case, displacement: NDArray, body: Assembly, inner: Amplitudes)
     if fits:
         matrix = added.sparse
         matrix.resize((body.size, body.size))
-        return inner.behind(matrix)
+        return matrix
     for name, there in (("modal damping", case.modal_damping), ("memory", case.remembering)):
         if there:
             raise InputError(
@@ -333,9 +307,8 @@ def _added(case: Case, displacement: NDArray, body: Assembly, inner: Amplitudes)
                 f'{name} takes; leave one out, take fewer divisions, or added_mass = "{LOCAL}"',
                 "air",
             )
-    size = body.size + len(inner.dofs)
-    rows = np.pad(added.rows, ((0, 0), (0, size - added.shape[0])))
-    return Squared(sparse.csc_array((size, size)), rows)
+    rows = np.pad(added.rows, ((0, 0), (0, body.size - added.shape[0])))
+    return Squared(sparse.csc_array((body.size, body.size)), rows)
 
 
 def _moved(mass: sparse.csr_array, added: Mass | None) -> Mass:
@@ -355,38 +328,23 @@ def _tied(matrix: Mass, ties: Constraints, free: NDArray) -> sparse.csc_array | 
     return _block(ties.matrix(matrix), free)
 
 
-def _inertia(case: Case, whole: NDArray, inner: Amplitudes) -> NDArray:
-    """Forces (m, 3) on the unknowns, for accelerations (m, 3) of the whole."""
-    load = inner.massed(mass_of(case)) @ whole
-    return np.stack([case.constraints.force(column) for column in load.T], axis=1)
-
-
-def _modal_rows(
-    case: Case, state: NDArray, stiffness: sparse.csr_array, mass: sparse.csr_array, internal: int
-) -> NDArray:
+def _modal_rows(case: Case, state: NDArray, stiffness: sparse.csr_array, mass: Mass) -> NDArray:
     """Rows (r, m) of modal damping: from the modes in the state (n, 3), or at rest."""
     damping = case.modal_damping
     if damping is not None and damping.state == "initial":
         modal = rows_of(damping, case, stiffness, mass, state)
-    elif damping is None or not internal:
-        modal = modal_rows(case)
     else:
-        body, rest = case.elastic_body, np.zeros_like(state)
-        inner = amplitudes(case.structure, body, body.dofs(rest), internal)
-        stiffness = inner.stiffened(body.tangent(body.dofs(rest)))
-        mass = _moved(inner.massed(mass_of(case)), _added(case, rest, body, inner))
-        modal = rows_of(damping, case, stiffness, mass, rest)
+        modal = modal_rows(case)
     modal.warn()
-    return np.pad(modal.rows, ((0, 0), (0, stiffness.shape[0] - modal.rows.shape[1])))
+    return modal.rows
 
 
-def _reference(case: Case, exact: sparse.csr_array, internal: int) -> sparse.csr_array:
+def _reference(case: Case, exact: sparse.csr_array) -> sparse.csr_array:
     """K0 of the damping (m, m), N/m: the exact tangent in the state, or at rest."""
     if case.rayleigh.state != "rest" or case.rayleigh.beta == 0.0:
         return exact
     body = case.elastic_body
-    rest = body.dofs(np.zeros_like(case.structure.nodes))
-    return amplitudes(case.structure, body, rest, internal).stiffened(body.tangent(rest))
+    return body.tangent(body.dofs(np.zeros_like(case.structure.nodes)))
 
 
 def _block(matrix: sparse.sparray, free: NDArray) -> sparse.csc_array:
@@ -423,7 +381,7 @@ def equivalent_slope(offset: ArrayLike, amplitude: float) -> NDArray:
 
 
 def warn_beyond(
-    structure: Discretized, frequency: NDArray, name: str = "", internal: int | None = None
+    structure: Discretized, frequency: NDArray, name: str = "", linear: bool = False
 ) -> None:
     """Warn about frequencies (k,), Hz, above the range of the model.
 
@@ -434,10 +392,10 @@ def warn_beyond(
         Frequencies of modes or responses, or the highest frequency of each band; nan is ignored.
     name : str
         Name of the numbered items, "mode" or "band"; empty if the frequencies are the input.
-    internal : int or None
-        Internal amplitudes of each panel; None if the analysis has none.
+    linear : bool
+        Whether the analysis is one that superelements take.
     """
-    limit, share = range_of(structure, internal or 0)
+    limit, share = range_of(structure)
     above = np.flatnonzero(frequency > limit)
     if not len(above):
         return
@@ -447,10 +405,7 @@ def warn_beyond(
         numbers = f"{above[0] + 1} to {above[-1] + 1}"
         numbers = numbers if together else ", ".join(str(k + 1) for k in above)
         what = f"{name} {numbers} lies" if len(above) == 1 else f"{name}s {numbers} lie"
-    remedy = "take the shell, fd.shell"
-    if internal == 0:
-        scheme = "" if structure.options.scheme == "n5b8e" else 'preset = "n5b8e" with '
-        remedy = f"take {scheme}internal = 3, or the shell"
+    remedy = f"{LINEAR}, or the shell" if linear else "take the shell, fd.shell"
     warn(
         f"{what} above {limit:.4g} Hz, {share:g} of the panels' own frequency, where most modes of "
         f"this model are more than 10 % off or missing: {remedy}",

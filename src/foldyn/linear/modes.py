@@ -51,7 +51,6 @@ def modes(
     state: State | str | None = None,
     secant: float | None = None,
     load_factor: float = 1.0,
-    internal: int = 0,
     verify: bool = True,
     solver: str = "auto",
     check_model: bool = True,
@@ -75,11 +74,6 @@ def modes(
         then get the slope equivalent to an oscillation of this amplitude.
     load_factor : float
         Load factor of actuated folds in a given state.
-    internal : int
-        Number of internal amplitudes (Craig and Bampton) of each panel, 0 to 6, for the motion of
-        its plate between corners, center and creased edges. Each edge without a crease adds one
-        amplitude; each other edge adds three, by which its crease turns unevenly along its length.
-        Only for the scheme "n5b8e" and the mass "condensed"; see `foldyn.linear.internal_modes`.
     verify : bool
         Whether to verify by a second factorization that no mode was missed. It costs about as much
         as the first; small problems are solved in full and do not need it.
@@ -103,12 +97,10 @@ def modes(
         in air also `air_share`, the fluid's share of the modal mass (`free_mass`, `participation`
         and `effective_mass` include the fluid); of superelements also `frequency_error` (Hz), an
         estimate of the largest error relative to a shell on a fine mesh, and `between_shape` at
-        `between_position`, points on edges and in panels; with internal amplitudes also
-        `internal_share`, their share of the strain energy, as shapes at nodes do not show them.
+        `between_position`, points on edges and in panels.
         Attributes: `free_mass` (kg along x, y, z), `complete` (number of lowest modes verified to
-        be complete),
-        `soft_hinges`, `residual` of the state, `rounding` (bound on the relative rounding error of
-        the eigenvalues) and facts about the computation.
+        be complete), `soft_hinges`, `residual` of the state, `rounding` (bound on the relative
+        rounding error of the eigenvalues) and facts about the computation.
 
     Raises
     ------
@@ -131,7 +123,7 @@ def modes(
     of_kind("case", case, Case)
     reference = beside(case) if check_model and state is None and secant is None else None
     return spectrum_of(
-        case, count, state, secant, load_factor=load_factor, internal=internal, verify=verify,
+        case, count, state, secant, load_factor=load_factor, verify=verify,
         solver=solver, reference=reference,
     ).result  # fmt: skip
 
@@ -146,7 +138,7 @@ class Found(NamedTuple):
 
 def spectrum_of(
     case: Case, count: int = 6, state: State | str | None = None, secant: float | None = None, *,
-    load_factor: float = 1.0, internal: int = 0, verify: bool = True, solver: str = "auto",
+    load_factor: float = 1.0, verify: bool = True, solver: str = "auto",
     errors: bool = True, reference: Case | str | None = None,
 ) -> Found:  # fmt: skip
     """Modes, with the linearized system and its spectrum; other arguments as in `modes`.
@@ -160,7 +152,7 @@ def spectrum_of(
         "take fewer",
     )  # fmt: skip
     began = time.perf_counter()
-    linear = linearize(case, state, secant=secant, load_factor=load_factor, internal=internal)
+    linear = linearize(case, state, secant=secant, load_factor=load_factor)
     pencil = Pencil(linear.stiffness, linear.mass, solver)
     space, along = rigid_space(linear), unit_translations(linear)
     spectrum = lowest(pencil, count, unresisted(linear, space), verify)
@@ -168,12 +160,11 @@ def spectrum_of(
     if not isinstance(reference, Case):
         _warn_of_stretch(linear, spectrum)
         frequency = np.sqrt(spectrum.values.clip(min=0.0)) / TURN
-        warn_beyond(case.structure, frequency, "mode", linear.internal)
+        warn_beyond(case.structure, frequency, "mode", linear=True)
     statistics = {
         "count": count,
         "state": state if isinstance(state, str) else "rest" if state is None else "given",
         "secant": linear.secant,
-        "internal": linear.internal or None,
         "free_dofs": pencil.finite,
         "free_mass": np.einsum("ia,ia->a", along, linear.mass @ along),
         "residual": linear.residual,
@@ -249,7 +240,6 @@ def _variables(
     factors = shapes.T @ (linear.mass @ along)
     full = linear.expanded(shapes).T
     return {
-        **(_internal(linear, values, shapes) if linear.internal else {}),
         **(_air(linear, shapes) if linear.added is not None else {}),
         **_between(linear, shapes),
         "frequency": omega / (2.0 * np.pi),
@@ -311,19 +301,6 @@ def _warn_of_twins(linear: Linearized, values: NDArray, shapes: NDArray) -> None
                 "responses are not affected",
                 "laws.md#in-other-analyses",
             )
-
-
-def _internal(linear: Linearized, values: NDArray, shapes: NDArray) -> dict[str, Any]:
-    """Shapes (nf, k) between nodes, and energy shares, of panels with internal amplitudes."""
-    strain = np.einsum("ik,ik->k", shapes, linear.stiffness @ shapes)
-    whole, points = linear.whole(shapes), linear.inner.points
-    part = np.einsum("ik,ik->k", whole, linear.inner.stiffness @ whole)
-    share = np.divide(part, strain, out=np.zeros_like(strain), where=values != 0.0)
-    return {
-        "internal_share": share,
-        "between_shape": linear.between(shapes).T.reshape(shapes.shape[1], *points.shape),
-        "between_position": points,
-    }
 
 
 def _between(linear: Linearized, shapes: NDArray) -> dict[str, Any]:
@@ -413,7 +390,7 @@ def _warn_of_stretch(linear: Linearized, spectrum: Spectrum) -> None:
         warn(
             f"panels that stretch hold more than {limit:.0%} of the strain energy of "
             f"mode{'s' * (len(told) > 1)} {numbers} (mode {worst + 1}: "
-            f"{min(share[worst], 1.0):.0%}), {remedy(structure)}",
+            f"{min(share[worst], 1.0):.0%}), {remedy(structure, linear=True)}",
             "models.md#where-panels-stretch",
             StretchWarning,
         )
@@ -430,8 +407,7 @@ def rigid_space(linear: Linearized) -> NDArray:
     chosen = np.linalg.lstsq(plain, allowed, rcond=None)[0]
     basis, _ = np.linalg.qr(chosen)
     motions = plain @ (basis @ basis.T)
-    whole = np.zeros((linear.inner.mass.shape[0], motions.shape[1]))
-    whole[: linear.case.elastic_body.size] = of_all_dofs(linear.case.elastic_body, x, motions)
+    whole = of_all_dofs(linear.case.elastic_body, x, motions)
     return _orthonormal(linear, whole[linear.free])
 
 

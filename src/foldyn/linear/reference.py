@@ -126,20 +126,18 @@ class Reference:
         return seen, self.shape[:, place]
 
 
-def modes_at_rest(
-    case: Case, count: int, secant: float | None = None, internal: int = 0
-) -> xarray.Dataset:
+def modes_at_rest(case: Case, count: int, secant: float | None = None) -> xarray.Dataset:
     """At least `count` elastic modes of a case about rest, or as many as it has.
 
     Warnings about the case's loads are suppressed: none acts at rest.
     """
-    asked = min(count + RIGID, len(case.free_dofs))
+    asked = max(min(count + RIGID, len(case.free_dofs)), 1)  # superelements have other dofs, too
     while True:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
-            found = modes(case, asked, secant=secant, internal=internal, check_model=False)
+            found = modes(case, asked, secant=secant, check_model=False)
         missing = count - int((found["eigenvalue"].values > 0.0).sum())
-        most = int(found.attrs["free_dofs"])  # includes internal amplitudes
+        most = int(found.attrs["free_dofs"])
         if missing <= 0 or asked == most:
             return found
         asked = min(max(asked + missing, 2 * asked), most)
@@ -255,7 +253,7 @@ def matched(true: Shown, count: int, case: Case, found: xarray.Dataset) -> Match
         Number of modes of the shell.
     case, found : Case, xarray.Dataset
         The model, and its modes, `SPARE` more than `count`. Shapes are compared at the model's
-        nodes, and with internal amplitudes also between these, where the shell's mesh has nodes.
+        nodes, of superelements also between these, where the shell's mesh has nodes.
     """
     points, weights = _points(case, found)
     seen, shape = true.at(points)
@@ -274,7 +272,7 @@ def matched(true: Shown, count: int, case: Case, found: xarray.Dataset) -> Match
 def _points(case: Case, found: xarray.Dataset) -> tuple[NDArray, NDArray]:
     """Points (p, 3) where modes are compared, and their weights (p,) in the MAC.
 
-    The points are the nodes, with the same weights for all mass rules. With internal amplitudes,
+    The points are the nodes, with the same weights for all mass rules. Of superelements,
     points between nodes are added; the total weight stays the same.
     """
     structure = case.structure

@@ -132,7 +132,6 @@ INTERNAL: Mapping[str, Quantity] = {
     "frequency_error": Quantity("Hz", "estimate of the largest error of the frequency"),
     "model_error": Quantity("1", "error of the frequency, by comparison with superelements"),
     "air_share": Quantity("1", "share of the air in the modal mass"),
-    "internal_share": Quantity("1", "share of the strain energy in internal amplitudes of panels"),
     "between_shape": Quantity("m", "mode shape between nodes", ("between", "axis")),
 }
 """Further variables of modes, of some models or in air. The dimension `between` counts the

@@ -248,19 +248,6 @@ class BarsPlatesTerm(SheetTerm):
             )
         return super().soft_hinges(q)
 
-    def turns(self, q: NDArray) -> tuple[sparse.csr_array, NDArray]:
-        """Gradients (nq, m), 1/m, of the plates' angles, and slopes (nf,) of the folds, N m/rad."""
-        model, hinges = self.model, len(self.model.hinges)
-        scratch = turned_plates(model, *self._split(q))
-        columns = 3 * model.hinges[:, :, None] + np.arange(3)
-        places = (np.repeat(np.arange(hinges), 12), columns.ravel())
-        nodal = sparse.coo_array((scratch.gradient.ravel(), places), shape=(hinges, self.size))
-        edges = self.per_hidden * sparse.eye_array(model.rotations, self.size, k=self._nodal)
-        rows = np.where(model.angle < 0, hinges - 1 - model.angle, model.angle)
-        slope = self._laws[0].slope(scratch.fold_angle, model.fold_rest)
-        all_turns = sparse.csr_array(sparse.vstack([nodal, edges], format="csr"))
-        return all_turns[rows], model.fold_stiffness * slope
-
     # ------------------------------------------------------------------ rest angles
     @property
     def rest_angles(self) -> NDArray:

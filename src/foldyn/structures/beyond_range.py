@@ -34,8 +34,9 @@ LOCKING = 1.1  # stiffness, relative to between the locking angles: frequencies 
 SHUT = 100.0  # relative stiffness above which the panels at a crease move as one
 SMOOTH = 1e-3  # rad: a fold with a smaller angle counts as flat
 DIGITS = 6  # decimals in comparisons, so that rounding does not exceed limits
-SHELL = "take the shell, fd.shell"
-GIVING = f'take preset = "n5b8e", or {SHELL[5:]}'
+LINEAR = "take superelements (fd.superelements, --model superelements)"
+SHELL = f"{LINEAR} in linear analyses, else the shell, fd.shell"
+GIVING = f'{LINEAR} in linear analyses, else preset = "n5b8e"'
 
 
 def doubt_range(pattern: Pattern, sheet: Sheet, options: ModelOptions, folds: NDArray) -> None:
@@ -262,7 +263,7 @@ def kept_apart(structure: Discretized, one: int, other: int) -> str:
 
 FIRST_OF_A_SQUARE = 13.47  # omega L^2 sqrt(rho t/G) of a free square plate, nu = 0.3 (Leissa 1973)
 BELOW = 0.6  # bars and hinges have the sheet's modes up to this fraction of plate_frequency
-N5B8E, AMPLITUDES = 0.8, 2.0  # the same for n5b8e, without and with internal amplitudes
+N5B8E = 0.8  # the same for n5b8e
 
 
 def plate_frequency(pattern: Pattern, sheet: Sheet, rigid: Collection[int] = ()) -> float:
@@ -281,13 +282,13 @@ def plate_frequency(pattern: Pattern, sheet: Sheet, rigid: Collection[int] = ())
     return float(np.delete(frequency, list(rigid)).min(initial=np.inf))
 
 
-def range_of(structure: Discretized, internal: int = 0) -> tuple[float, float]:
+def range_of(structure: Discretized) -> tuple[float, float]:
     """Frequency (Hz) up to which a model has the sheet's modes; its ratio to `plate_frequency`.
 
     Both are inf for shells and for structures made by hand.
     """
     if structure.kind != "bars_and_hinges" or structure.pattern is None:
         return np.inf, np.inf
-    share = BELOW if structure.options.scheme != "n5b8e" else AMPLITUDES if internal else N5B8E
+    share = N5B8E if structure.options.scheme == "n5b8e" else BELOW
     rigid = rigid_panels(structure.options.rigid, len(structure.pattern.faces))
     return share * plate_frequency(structure.pattern, structure.sheet, rigid), share

@@ -151,7 +151,7 @@ def discretize(
     if len(pattern.welds) and options.scheme != "n5b8e":
         warn(
             f"pattern: its welds ({len(pattern.welds)}) become hinges, which model the bending of "
-            'the sheet only roughly: take preset = "n5b8e", or a shell',
+            'the sheet only roughly: take preset = "n5b8e", superelements, or a shell',
             "facets.md#models-and-accuracy",
         )
     nodes = len(pattern.vertices) + len(pattern.faces)

@@ -11,7 +11,6 @@ from collections.abc import Callable, Hashable, Sequence
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.polynomial import Legendre
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
@@ -138,21 +137,7 @@ class PanelPlate:
         self._ends = ends
         self.heights = [{node: 1.0} for node in at.tolist()]
         sides = across_edges(edges, ends, len(self.points))
-        self.slopes, self.bows, self.lines, self._turning = _edge_functions(panel, edges, sides)
-
-    def uneven(self, count: int) -> list[dict[int, float]]:
-        """Components P_1 to P_count (Legendre) of the slopes along each creased, unclamped edge.
-
-        They are linear functions of the unknowns, like `slopes` for P_0, the mean.
-        """
-        found = []
-        for mean in self._turning:
-            ends = np.linspace(-1.0, 1.0, len(mean) + 1)
-            for k in range(1, count + 1):
-                integral = Legendre.basis(k + 1)(ends) - Legendre.basis(k - 1)(ends)
-                factor = 0.5 * len(mean) * np.diff(integral)
-                found.append(dict(zip(mean, factor * list(mean.values()), strict=True)))
-        return found
+        self.slopes, self.bows, self.lines = _edge_functions(panel, edges, sides)
 
     def solved(self, held: list[dict[int, float]]) -> tuple[NDArray, NDArray]:
         """Unknowns (size, k) for each of k held functions equal to 1, others 0; stiffness (k, k).
@@ -190,31 +175,23 @@ class PanelPlate:
         slopes /= np.linalg.norm(along, axis=1)
         return np.concatenate([0.5 * (self.points**2).sum(axis=1), slopes])
 
-    @property
-    def mass(self) -> sparse.csr_array:
-        """Mass matrix of the unknowns for a panel of mass 1; slopes have no mass."""
-        block = _parts(self.points, self.triangles)[:, None, None] * TRIANGLE_MASS
-        return of_elements(self.triangles, block, self.stiffness.shape[0])
-
 
 def _edge_functions(
     panel: Outline, edges: Sequence[NDArray], sides: Sequence[tuple[NDArray, NDArray]]
 ) -> tuple[list[dict[int, float]], ...]:
-    """Slopes, bows and lines of `PanelPlate`, and the slopes of creased edges without clamps.
+    """Slopes, bows and lines of `PanelPlate`.
 
     edges : for each edge, the indices (n + 1,) of the heights of its points.
     sides : for each edge, the indices (n,) of the slopes across its sides, and their signs, 1 if
         outward.
     """
-    slopes, bows, lines, turning = [], [], [], []
+    slopes, bows, lines = [], [], []
     x = np.array(panel.corners)
     for k, (nodes, (across, sign)) in enumerate(zip(edges, sides, strict=True)):
         nodes, n = nodes.tolist(), len(sign)
         if panel.creased[k]:
             mean = dict(zip(across.tolist(), (sign / n).tolist(), strict=True))
             slopes.append(mean)
-            if not panel.clamped[k]:
-                turning.append(mean)
             *others, (last, share) = mean.items()
             for side, part in others if panel.clamped[k] else ():
                 lines.append({side: n * part, last: -n * share})
@@ -227,7 +204,7 @@ def _edge_functions(
             for step in range(1, n):
                 part = step / n
                 lines.append({nodes[step]: 1.0, nodes[0]: part - 1.0, nodes[-1]: -part})
-    return slopes, bows, lines, turning
+    return slopes, bows, lines
 
 
 def _rows_of(functions: list[dict[int, float]], size: int) -> sparse.csr_array:

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.structures.beyond_range import LINEAR
 from foldyn.structures.discretized import Discretized
 
 BARS = "strain_bars"
@@ -25,7 +26,6 @@ with coupled bars in triangles; by mean strains of other panels with coupled bar
 give way. Measured with the mixed sets of docs/fidelity.md."""
 LEAST = 1e-9  # mean strain of the bars below which it may be rounding error
 FELT = 1e-3  # share of the kinetic energy: less strain energy does not affect a motion
-SHELL = "compare with the shell (foldyn fidelity, fd.fidelity) or take it (--model shell, fd.shell)"
 
 
 class Stretch(NamedTuple):
@@ -52,16 +52,19 @@ def most(structure: Discretized) -> float:
     return TRIANGLES if all(len(face) == 3 for face in pattern.faces) else COUPLED
 
 
-def remedy(structure: Discretized) -> str:
-    """Remedy if the share of stretching exceeds `most`: the end of a message."""
+def remedy(structure: Discretized, linear: bool = False) -> str:
+    """Remedy if the share of stretching exceeds `most`: the end of a message.
+
+    linear : whether the analysis is one that superelements take.
+    """
     if not getattr(structure, "membranes", ()):
-        return f'where single bars are far too stiff: take membrane = "panel", or {SHELL}'
-    if getattr(structure, "edge_gives", None) is None:
-        return (
-            'where edges that stay straight can be too stiff: take preset = "n5b8e" (and straight '
-            f"= edges held along their length), or {SHELL}"
-        )
-    return f"where closed and welded sheets are often 5 to 20 % off: {SHELL}"
+        why, better = "single bars are far too stiff", 'membrane = "panel", or '
+    elif getattr(structure, "edge_gives", None) is None:
+        why, better = "edges that stay straight can be too stiff", 'preset = "n5b8e", or '
+    else:
+        why, better = "closed and welded sheets are often 5 to 20 % off", ""
+    other = f"{LINEAR}, or the shell" if linear else f"take {better}the shell, fd.shell"
+    return f"where {why}: {other}"
 
 
 def stretch(structure: Any, energies: Mapping[str, NDArray], displacement: Any) -> Stretch | None:
