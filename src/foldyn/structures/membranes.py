@@ -18,7 +18,8 @@ displacements near each end of an edge of length L gain
 
 with s the distance from that end, for s between the thickness t and L/2; within t displacements are
 constant. Stresses around a force at a corner fall as 1/s. Panels share the amplitudes g of the edge
-between them (`mechanics.edge_gives`).
+between them (`mechanics.edge_gives`). Near a vertex where the sheet is smooth
+(`graded.smooth_vertices`) the gain is g (s/L) (1 - s/L)^2, and the corner is not rigid.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from foldyn.mechanics.following import Following, tensions
 from foldyn.mechanics.membranes import Membranes
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
+from foldyn.structures.graded import smooth_vertices
 from foldyn.structures.mesh import Mesh, hinge_angles, too_narrow
 from foldyn.structures.panel_membrane import Kind, grading_of, membrane_stiffness
 from foldyn.structures.panel_plate import Outline, outline
@@ -82,9 +84,10 @@ def membranes(
     parts: list[tuple] = []
     properties, kind = sheet.kinds(len(pattern.faces))
     first = np.searchsorted(mesh.inner_panel, np.arange(len(pattern.faces) + 1))
+    smooth = smooth_vertices(pattern)
     known = {
-        p: _known(own, properties[kind[p]], pattern.face_areas[p], gives[p])
-        for p, own in enumerate(sides)
+        p: _known(own, properties[kind[p]], pattern.face_areas[p], gives[p], smooth[[*face]])
+        for p, (face, own) in enumerate(zip(pattern.faces, sides, strict=True))
         if own.convex
     }
     try:
@@ -114,11 +117,12 @@ def membranes(
     ), _gives(mesh.nodes, parts, [edge for edge, _ in numbers]) if parts else None
 
 
-def _known(panel: Sides, sheet: Sheet, area: float, gives: bool) -> Kind:
+def _known(panel: Sides, sheet: Sheet, area: float, gives: bool, smooth: NDArray) -> Kind:
     """Data that determine the membrane of a panel."""
     radius = sheet.thickness / float(np.sqrt(2.0 * area))  # an outline's area is 1/2
     grading = grading_of(panel.outline, radius) if gives else None
-    return Kind(panel.outline, sheet.poissons_ratio, panel.resistance, grading)
+    there = tuple(smooth.tolist()) if gives and smooth.any() else ()
+    return Kind(panel.outline, sheet.poissons_ratio, panel.resistance, grading, there)
 
 
 def _numbers(pattern: Pattern, gives: Sequence[bool]) -> dict[tuple[Edge, int], int]:
