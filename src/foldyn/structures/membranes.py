@@ -24,7 +24,8 @@ between them (`mechanics.edge_gives`). Near a vertex where the sheet is smooth
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -64,7 +65,7 @@ class Sides(NamedTuple):
 
 def membranes(
     mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[Edge], rigid: Collection[int],
-    giving: bool = False,
+    giving: bool = False, guided: Mapping[Edge, NDArray] = MappingProxyType({}),
 ) -> tuple[tuple[PanelKind, ...], EdgeGives | None]:  # fmt: skip
     """Membranes of all panels, and how edges give way near their ends.
 
@@ -75,9 +76,10 @@ def membranes(
     bow.
     rigid : panels that do not bend.
     giving : whether other edges give way; never for panels that do not bend or are not convex.
+    guided : directions in which boundary edges can bow; see `structures.guided_edges`.
     """
     kinds: dict[tuple, list[tuple[int, NDArray, NDArray]]] = {}
-    sides, stiff = _sides(mesh, pattern, sheet, straight, rigid), set(rigid)
+    sides, stiff = _sides(mesh, pattern, sheet, straight, rigid, guided), set(rigid)
     gives = [giving and own.convex and p not in stiff for p, own in enumerate(sides)]
     numbers = _numbers(pattern, gives)
     loose = {edge_of(a, b) for a, b in pattern.boundary.tolist()} - set(straight)
@@ -160,8 +162,9 @@ def _gives(x: NDArray, parts: list[tuple], edges: list[Edge]) -> EdgeGives:
 
 
 def _sides(
-    mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[Edge], rigid: Collection[int]
-) -> list[Sides]:
+    mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[Edge], rigid: Collection[int],
+    guided: Mapping[Edge, NDArray],
+) -> list[Sides]:  # fmt: skip
     """Sides of each panel."""
     bent = edge_lookup(pattern.creases)
     welded, stiff = set(edge_lookup(pattern.welds)) | set(straight), set(rigid)
@@ -176,12 +179,16 @@ def _sides(
         edges = [edge_of(a, b) for a, b in around(face)]
         held, resistance = [edge in welded for edge in edges], [0.0] * len(edges)
         for k, edge in enumerate(edges):
-            if edge not in bent or held[k]:
+            if held[k] or (edge not in bent and edge not in guided):
                 continue
-            crease = bent[edge]
-            other = int(pattern.crease_faces[crease].sum()) - p
-            sine, cosine = np.sin(turn[crease]), np.cos(turn[crease])
-            both = edge_modulus[other] + cosine**2 * edge_modulus[p]
+            if edge in guided:
+                cosine = float(guided[edge] @ pattern.face_normals[p])
+                sine, other, both = np.sqrt(1.0 - cosine**2), p, cosine**2 * edge_modulus[p]
+            else:
+                crease = bent[edge]
+                other = int(pattern.crease_faces[crease].sum()) - p
+                sine, cosine = np.sin(turn[crease]), np.cos(turn[crease])
+                both = edge_modulus[other] + cosine**2 * edge_modulus[p]
             area = float(pattern.face_areas[p])
             both /= youngs[p] * thickness[p] * 2.0 * area  # an outline's area is 1/2
             held[k] = both > STRAIGHT * sine**2 or not stiff.isdisjoint((p, other))
