@@ -129,3 +129,31 @@ def test_refusals():
     bowed = fd.discretize(pattern, sheet, **N5B8E)
     with pytest.raises(InputError, match=r"guided = .* or straight ="):
         fd.Case(bowed, [fd.Fix("zmax", "z", along=True)])
+
+
+def test_results_keep_guided_edges(kept):
+    made = fd.discretize(
+        cell(0.06, 30), steel(1e-3), **N5B8E, straight="zmin", guided={"z": "zmax"}
+    )
+    held = [fd.Fix("zmin", along=True), fd.Fix("zmax", "z", along=True)]
+    case = fd.Case(made, held)
+    again = kept(fd.modes(case, count=2)).structure
+    assert again.options == made.options and len(made.options.guided) == SIDES
+
+
+@pytest.mark.matrix
+def test_cells_of_waves_have_guided_edges():
+    """Frequencies of two cells at the phase 0 are those of one cell at 0 and 180 degrees."""
+
+    def frequencies(cells: int, phases: list[float], guided: bool = True) -> list[float]:
+        pattern = fd.patterns.miura(cells=(cells, 1), a=0.03, b=0.031)
+        side = [(3 * k, 3 * k + 3) for k in range(2 * cells)]
+        options: dict[str, Any] = {"guided": {"z": side}} if guided else {}
+        case = fd.Case(fd.discretize(pattern, steel(2e-4), **N5B8E, **options))
+        chain = fd.UnitCell(case, vectors=fd.UnitCell(case).vectors[:1])
+        found = fd.bands(chain, [[phase] for phase in phases], count=12)
+        return sorted(found.frequency.values.ravel().tolist())[5:12]
+
+    two = frequencies(2, [0.0])
+    np.testing.assert_allclose(frequencies(1, [0.0, np.pi]), two, rtol=1e-6)
+    assert np.abs(np.array(frequencies(2, [0.0], guided=False)) / two - 1.0).max() > 1e-4
