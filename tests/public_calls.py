@@ -164,7 +164,8 @@ DATA: Calls = {
         "pattern": pattern(), "sheet": sheet(), "scheme": "n5b8", "mass": "consistent",
         "bar_law": "ogden", "fold_law": "enhanced", "bend_law": "linear", "calibration": "plate",
         "crease_stiffness": 0.5, "crease_rest": 90.0, "centers": {0: (0.433, 0.5, 0.25)},
-        "clamped": [], "rigid": None, "straight": [], "membrane": "bars", "preset": "plate",
+        "clamped": [], "rigid": None, "straight": [], "guided": {}, "membrane": "bars",
+        "preset": "plate",
     }),
     "shell": (fd.shell, {
         "pattern": pattern(), "sheet": sheet(), "divisions": 4, "mass": "lumped",

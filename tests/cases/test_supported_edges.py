@@ -158,6 +158,15 @@ def test_case_files_make_held_edges_straight(read, model):
     assert shell.supports == case.supports
 
 
+def test_case_files_guide_edges_held_along_one_axis(read):
+    text = TEXT.replace("MODEL", 'preset = "n5b8e"').replace("along =", 'axes = "x"\nalong =')
+    options = read(text).case().structure.options
+    assert options.guided == ((0, 1, "x"), (1, 2, "x")) and options.straight == ()
+    stiff = text.replace('"n5b8e"', '"n5b8e"\nstraight = "xmin"')
+    assert read(stiff).case().structure.options.straight == ((0, 1), (1, 2))
+    assert read(stiff).case().structure.options.guided == ()
+
+
 def test_what_a_case_file_names_stays(read):
     case = read(TEXT.replace("MODEL", 'preset = "n5b8e"\nstraight = [[0, 3]]')).case()
     assert case.structure.options.straight == ((0, 3), (0, 1), (1, 2))

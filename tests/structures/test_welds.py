@@ -6,6 +6,7 @@ import pytest
 import foldyn as fd
 from foldyn import checks
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.structures.graded import smooth_vertices
 from sheets_with_facets import (
     LENGTH,
     STEEL,
@@ -176,3 +177,71 @@ def test_creases_know_nothing_of_welds():
     np.testing.assert_allclose(made.fold_stiffness, np.arange(1, len(length) + 1) * length)
     with pytest.raises(InputError, match="no crease assigned flat"):
         fd.discretize(lines, STEEL, crease_stiffness={"flat": 1.0})
+
+
+def angle_section(pieces=12):
+    """Two legs of 0.5 m and a length of 6 m, welded along the fold and across."""
+    points = [
+        (6.0 * k / pieces, *at) for k in range(pieces + 1) for at in ((0.5, 0), (0, 0), (0, 0.5))
+    ]
+    faces = [
+        (3 * k + j, 3 * k + 3 + j, 3 * k + 4 + j, 3 * k + 1 + j)
+        for k in range(pieces)
+        for j in (0, 1)
+    ]
+    fold = {(3 * k + 1, 3 * k + 4): "F" for k in range(pieces)}
+    return fd.welded(fd.Pattern(points, faces, fold), join=False)
+
+
+ANGLE = fd.Sheet(90e9, 0.3, 0.1, density=1000)
+ANGLE_SHELL = (95.8, 123.77, 151.1)  # Hz: 97.41 and 96.13 first with 8 and 16 divisions, order 2
+
+
+@pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
+def test_a_thick_folded_section():
+    """Panels only five thicknesses wide: with corners rigid at welds it was 124, 198 and 311 Hz."""
+    found = elastic(fd.discretize(angle_section(), ANGLE))
+    np.testing.assert_allclose(found[:3], ANGLE_SHELL, rtol=0.04)
+
+
+@pytest.mark.matrix
+@pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
+def test_superelements_of_a_thick_folded_section():
+    """With corners rigid at welds the first frequency was 115 Hz, as it was with such a shell."""
+    pattern = angle_section()
+    found = elastic(fd.superelements(pattern, ANGLE))
+    np.testing.assert_allclose(found[:3], ANGLE_SHELL, rtol=0.003)
+    shell = fd.shell(pattern, ANGLE, divisions=8, mass="consistent", vertex_radius=0.1)
+    np.testing.assert_allclose(elastic(shell)[:3], ANGLE_SHELL, rtol=0.02)
+
+
+def test_frequencies_in_the_plane_do_not_depend_on_the_thickness():
+    """Of a flat square of 8 x 8 welded panels.
+
+    With corners rigid at welds the first rose from 1892 (0.01 mm) to 2358 Hz (20 mm).
+    The shell of 8 divisions has 1963 Hz.
+    """
+    grid = [(i / 8, j / 8) for j in range(9) for i in range(9)]
+    start = [9 * j + i for j in range(8) for i in range(8)]
+    faces = [(k, k + 1, k + 10, k + 9) for k in start]
+    pattern, found = fd.welded(fd.Pattern(grid, faces), join=False), []
+    for thickness in (1e-4, 0.0125):
+        made = fd.discretize(pattern, fd.Sheet(2e11, 0.3, thickness, density=7850))
+        case = fd.Case(made, [fd.Fix(list(range(len(made.nodes))), "z")])
+        found.append(fd.modes(case, 4).frequency.values[3])
+    assert found[1] == pytest.approx(found[0], rel=0.01)
+    assert found == pytest.approx([1963.0] * 2, rel=0.04)
+
+
+def test_where_the_sheet_is_smooth():
+    """Vertices of welds, unless a crease ends or turns there."""
+    x = [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1), (0, 2, 1), (1, 2, 1), (2, 2, 1)]
+    points = [(*at, 0)[:3] for at in x]
+    faces = [(0, 1, 4, 3), (1, 2, 5, 4), (3, 4, 7, 6), (4, 5, 8, 7)]
+    pattern = fd.Pattern(points, faces, welds=[(1, 4), (4, 7)])
+    assert np.flatnonzero(smooth_vertices(pattern)).tolist() == [1, 4, 7]
+    points[4] = (1, 1.3, 0)
+    turned = fd.Pattern([*points[:6], *points[6:]], faces, welds=[(1, 4)])
+    assert np.flatnonzero(smooth_vertices(turned)).tolist() == [1]
+    whole = fd.Pattern(points, faces)
+    assert not smooth_vertices(whole).any()

@@ -246,19 +246,25 @@ def test_why_panels_harden():
 
 
 @pytest.mark.matrix
-def test_a_tower_is_as_stiff_as_the_shell_where_panels_are_membranes():
-    found = stiffness(tower(1e-3, (8, 12)), "z")
-    assert found["plate"][0] == pytest.approx(-0.07, abs=0.02)
-    assert found["n5b8e"][0] == pytest.approx(-0.12, abs=0.02)
+@pytest.mark.parametrize(
+    ("thickness", "plate", "n5b8e"),
+    [(1e-3, -0.18, -0.22), (3e-4, 0.17, 0.0)],
+)
+def test_towers_whose_rims_bow_in_their_plane(thickness, plate, n5b8e):
+    """Thick ones are too soft: bows turn the creases, which resist that in the shell alone."""
+    found = stiffness(tower(thickness, (8, 12)), "z")
+    assert found["plate"][0] == pytest.approx(plate, abs=0.03)
+    assert found["n5b8e"][0] == pytest.approx(n5b8e, abs=0.03)
     assert found["plate, bars"][0] > 3.0
     assert found["standard"][0] > 3.0
 
 
 @pytest.mark.matrix
 def test_the_force_at_which_a_tower_snaps():
+    """Its error is that of the stiffness, less a few percent."""
     found = pressed(tower(1e-3, (8, 12)))
-    for model in ("plate", "n5b8e"):
-        assert abs(found[model]).max() < 0.09
+    for model, error in (("plate", -0.13), ("n5b8e", -0.18)):
+        assert found[model] == pytest.approx([error] * 2, abs=0.03)
     assert found["plate, bars"].min() > 3.0
 
 

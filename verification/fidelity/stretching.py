@@ -77,7 +77,8 @@ def moved(held: Held, structure: Discretized, axis: str, way: float) -> Case:
 
 def structures(held: Held) -> dict[str, Discretized]:
     """All models of a sheet."""
-    rims = [Fix(list(rim), along=True) for rim in held.rims]
+    near, far = (list(rim) for rim in held.rims)
+    rims = [Fix(near, along=True), Fix(far, held.led, along=True)]
     made: dict[str, Discretized] = {}
     for name, own in MODELS.items():
         straight = straightened(resolved(**own), held.pattern, rims)

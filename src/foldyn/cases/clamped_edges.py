@@ -17,9 +17,10 @@ from foldyn.cases.selection import edges_between, resolve_nodes
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.patterns.selection import select
-from foldyn.patterns.topology import edge_lookup, edge_of
+from foldyn.patterns.topology import Edge, edge_lookup, edge_of
 from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.discretized import Discretized
+from foldyn.structures.guided_edges import guided_edges, perpendicular
 from foldyn.values import show
 
 
@@ -59,7 +60,16 @@ def _edges(structure: Discretized, support: Any, named: NDArray, place: str) -> 
             f"{place}.along",
         )
     loose = [edge_of(*edge) for edge in edges[:, [0, -1]].tolist()]
+    sliding = {(low, high): axis for low, high, axis in getattr(structure.options, "guided", ())}
+    held = _axes(support)
+    wrong = [edge for edge in loose if sliding.get(edge, held) != held]
     loose = [edge for edge in loose if edge in structure.bowed_edges]
+    if wrong:
+        raise InputError(
+            f": the edge {wrong[0]} is guided along {sliding[wrong[0]]} only, and may bow; list it "
+            "in straight instead",
+            f"{place}.along",
+        )
     inside = sorted(set(loose) - edge_lookup(structure.pattern.boundary).keys())
     if inside:
         raise InputError(
@@ -69,9 +79,11 @@ def _edges(structure: Discretized, support: Any, named: NDArray, place: str) -> 
         )
     if loose:
         given = support.nodes if isinstance(support.nodes, str) else list(map(list, loose))
+        made = f"straight = {show(given)}"
+        if len(held) == 1:
+            made = f"guided = {show({held: given})}, or {made} if the rim is stiff"
         raise InputError(
-            f": the edge {loose[0]} may bow between its ends; make the structure with straight = "
-            f"{show(given)}",
+            f": the edge {loose[0]} may bow between its ends; make the structure with {made}",
             f"{place}.along",
         )
     return edges
@@ -107,22 +119,36 @@ def held_edges(
     return {edge: np.concatenate(held) for edge, held in found.items()}
 
 
-def straightened(options: Any, pattern: Pattern, supports: Iterable[Any]) -> dict[str, Any]:
-    """Option `straight` for supports that hold edges along their length.
+def _axes(support: Any) -> str:
+    """Axes that a support holds, or "" for one in an oblique direction."""
+    return getattr(support, "axes", None) or getattr(support, "axis", None) or ""
 
-    The option lists all boundary edges that are held so. Where edges cannot bow, the result is
-    empty.
+
+def straightened(options: Any, pattern: Pattern, supports: Iterable[Any]) -> dict[str, Any]:
+    """Options `straight` and `guided` for supports that hold edges along their length.
+
+    They list all boundary edges that are held so: along one axis perpendicular to the edge, or
+    otherwise. Where edges cannot bow, the result is empty.
     """
     if not getattr(options, "bowed", False):
         return {}
     straight = dict.fromkeys(boundary_edges(options.straight, pattern, "straight"))
+    guided = {(low, high): axis for low, high, axis in guided_edges(options.guided, pattern)}
+    found: dict[Edge, set[str]] = {}
     for support in supports:
         if getattr(support, "along", False):
             named = support.nodes
             nodes = set(select(pattern, named).tolist() if isinstance(named, str) else named)
             held = (edge for edge in edge_lookup(pattern.boundary) if nodes.issuperset(edge))
-            straight |= dict.fromkeys(sorted(held))
-    return {"straight": tuple(straight)}
+            for edge in sorted(held):
+                found.setdefault(edge, set()).update(_axes(support) or AXES)
+    for edge, axes in found.items():
+        if len(axes) == 1 and edge not in straight and perpendicular(pattern, edge, *axes):
+            guided[edge] = min(axes)
+        else:
+            straight[edge] = None
+    slid = tuple((*edge, axis) for edge, axis in guided.items() if edge not in straight)
+    return {"straight": tuple(straight), "guided": slid}
 
 
 def _between(structure: Discretized, edges: NDArray, vector: NDArray) -> NDArray[np.float64]:

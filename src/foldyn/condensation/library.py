@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.condensation.panel import CondensedPanel, condense, extrapolated
 from foldyn.patterns import Pattern
-from foldyn.structures.graded import Grading
+from foldyn.structures.graded import Grading, smooth_vertices
 from foldyn.structures.sheet import Sheet
 
 ROOM = 256  # condensed panels kept in memory, each about 2 MB
@@ -49,6 +49,7 @@ class _Shape:
 
     places: tuple[tuple[float, ...], ...]  # rounded
     size: float
+    smooth: tuple[int, ...]  # corners where the sheet is smooth
     corners: NDArray = field(compare=False)  # (k, 3), m
 
 
@@ -58,10 +59,11 @@ def _condensed(
 ) -> tuple[CondensedPanel, CondensedPanel]:
     """A panel, and the same from coarser meshes."""
     *others, finest = meshes.graded
-    fine = condense(shape.corners, sheet, finest)
+    corners, smooth = shape.corners, shape.smooth
+    fine = condense(corners, smooth, sheet, finest)
     if not others:
         return fine, fine
-    coarse, middle = (condense(shape.corners, sheet, graded, fine) for graded in others)
+    coarse, middle = (condense(corners, smooth, sheet, graded, fine) for graded in others)
     first, second, third = meshes.divisions
     return extrapolated(middle, fine, third / second), extrapolated(coarse, middle, second / first)
 
@@ -87,13 +89,15 @@ def _congruent(
 ) -> dict[tuple[_Shape, Sheet], list[tuple[int, NDArray, NDArray]]]:
     """Numbers, vertices and frames (3, 3) of the panels of each shape and sheet."""
     found: dict[tuple[_Shape, Sheet], list[tuple[int, NDArray, NDArray]]] = {}
+    smooth = smooth_vertices(pattern)
     for number, (face, sheet) in enumerate(zip(pattern.faces, sheets, strict=True)):
-        shape, turned, frame = _described(pattern.vertices[list(face)], pattern.size)
+        own = list(face)
+        shape, turned, frame = _described(pattern.vertices[own], pattern.size, smooth[own])
         found.setdefault((shape, sheet), []).append((number, np.roll(face, -turned), frame))
     return found
 
 
-def _described(x: NDArray, size: float) -> tuple[_Shape, int, NDArray]:
+def _described(x: NDArray, size: float, smooth: NDArray) -> tuple[_Shape, int, NDArray]:
     """Shape in the frame of one corner, the first of all in sorted order.
 
     Also returns the number of corners before that corner, and the frame (3, 3).
@@ -108,6 +112,9 @@ def _described(x: NDArray, size: float) -> tuple[_Shape, int, NDArray]:
         normal = normal / np.linalg.norm(normal)
         frame = np.stack([first, np.cross(normal, first), normal])
         own = away @ frame.T
+        there = tuple(np.flatnonzero(np.roll(smooth, -turned)).tolist())
         places = np.round(own / size, ALIKE) + 0.0  # no negative zeros
-        described.append((_Shape(tuple(map(tuple, places.tolist())), size, own), turned, frame))
-    return min(described, key=lambda one: one[0].places)
+        described.append(
+            (_Shape(tuple(map(tuple, places.tolist())), size, there, own), turned, frame)
+        )
+    return min(described, key=lambda one: (one[0].places, one[0].smooth))

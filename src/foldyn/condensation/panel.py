@@ -17,6 +17,7 @@ and welds, which connect the turns of edges, are not part of a panel.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -89,16 +90,18 @@ def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> 
 
 
 def condense(
-    corners: NDArray, sheet: Sheet, graded: Grading, like: CondensedPanel | None = None
-) -> CondensedPanel:
+    corners: NDArray, smooth: Collection[int], sheet: Sheet, graded: Grading,
+    like: CondensedPanel | None = None,
+) -> CondensedPanel:  # fmt: skip
     """Condense a panel with corners (k, 3), m, onto the shapes of the highest level.
 
     corners : in a frame whose third axis is nearly normal to the panel.
+    smooth : corners that are not rigid within the radius.
     like : the panel on another mesh, whose inner modes are reproduced.
     """
     from scipy.interpolate import LinearNDInterpolator  # loads slowly: not for other models
 
-    mesh = _Mesh(corners, sheet, graded)
+    mesh = _Mesh(corners, smooth, sheet, graded)
     shapes, kind, held = _edge_shapes(mesh, graded.radius)
     inside = np.setdiff1d(np.arange(mesh.size), held)
     stiffness, mass = mesh.stiffness, mesh.mass
@@ -137,7 +140,9 @@ def condense(
 class _Mesh:
     """Triangles of a panel with corners (k, 3), and the rows of side strains and rotations."""
 
-    def __init__(self, corners: NDArray, sheet: Sheet, graded: Grading) -> None:
+    def __init__(
+        self, corners: NDArray, smooth: Collection[int], sheet: Sheet, graded: Grading
+    ) -> None:
         face = tuple(range(len(corners)))
         mesh = shell_mesh(Pattern(corners, [face]), 0, graded)
         self.nodes, self.triangles, self.corners = mesh.nodes, mesh.triangles, len(corners)
@@ -147,7 +152,8 @@ class _Mesh:
         nu, n, nt = sheet.poissons_ratio, len(self.nodes), len(tri)
         stretching = sheet.youngs_modulus * sheet.thickness / (1.0 - nu**2)
         membrane, bending = triangle_stiffness(x, nu, stretching, sheet.bending_modulus)
-        membrane[(tri < len(corners)).any(axis=1)] *= STIFF
+        stiff = np.setdiff1d(face, list(smooth))
+        membrane[np.isin(tri, stiff).any(axis=1)] *= STIFF
         self._elastic = membrane, bending
         side = np.roll(x, -1, axis=1) - x
         length2 = np.einsum("tki,tki->tk", side, side)

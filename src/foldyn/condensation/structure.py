@@ -302,8 +302,8 @@ def superelements(
     fold_law, crease_stiffness, crease_rest, clamped, rigid
         As in `shell`. Creases have the slope of the law at rest.
     vertex_radius : float, optional
-        Distance from every vertex (m) within which panels do not stretch; by default the largest
-        thickness of the sheet.
+        Distance from every vertex (m) within which panels do not stretch, as in `shell`; by default
+        the largest thickness of the sheet.
 
     Returns
     -------

@@ -195,6 +195,15 @@ def _structure(
     for name in ("clamped", "straight"):
         if options.get(name):
             options[name] = _edges(name, options[name], lattice, pattern, vertices)
+    if options.get("guided"):
+        by_axis = {
+            axis: [(low, high) for low, high, own_axis in options["guided"] if own_axis == axis]
+            for axis in {axis for *_, axis in options["guided"]}
+        }
+        options["guided"] = {
+            axis: _edges("guided", edges, lattice, pattern, vertices)
+            for axis, edges in sorted(by_axis.items())
+        }
     if not isinstance(options["rigid"], str | None):
         options["rigid"] = _copied(options["rigid"], panels)
     options = {name: value for name, value in options.items() if value is not None}

@@ -44,7 +44,7 @@ from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.discretize import checked_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.edge_angles import EdgePlates, plates_model
-from foldyn.structures.graded import Grading, grading
+from foldyn.structures.graded import Grading, grading, smooth_vertices
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.membranes import PanelKind, swelling
 from foldyn.structures.mesh import double_areas, hinge_angles, lengths
@@ -254,7 +254,8 @@ class Shell(Discretized):
         """Stiffness (nt, 3, 3) of triangles: for side strains, J, and for rotations, N m."""
         membrane, bending = stiffness(self.nodes[self.triangles], self.triangle_panel, self.sheet)
         if self.graded:
-            membrane[(self.triangles < len(self.pattern.vertices)).any(axis=1)] *= STIFF
+            vertices = np.flatnonzero(~smooth_vertices(self.pattern))
+            membrane[np.isin(self.triangles, vertices).any(axis=1)] *= STIFF
         return membrane, without_free_sides(bending, self.sides.free)
 
     @cached_property
@@ -409,10 +410,10 @@ def shell(
         Panels that cannot bend at all, as in `discretize`. Their mesh has no rotations.
     vertex_radius : float, optional
         Distance from every vertex (m), about the thickness of the sheet, within which panels do not
-        stretch. The mesh gets finer toward vertices, down to this radius; away from vertices it is
-        about as fine as an even mesh with the same `divisions`, a multiple of 4. Without a radius,
-        in-plane forces concentrate at points, and frequencies of large sheets and towers fall with
-        every refinement.
+        stretch, except at vertices of welds where no crease ends or turns. The mesh gets finer
+        toward vertices, down to this radius; away from vertices it is about as fine as an even mesh
+        with the same `divisions`, a multiple of 4. Without a radius, in-plane forces concentrate at
+        points, and frequencies of large sheets and towers fall with every refinement.
 
     Returns
     -------

@@ -88,8 +88,8 @@ def _doubts(pattern: Pattern, sheet: Sheet, options: ModelOptions, folds: NDArra
             a, b = pattern.welds[thick.argmax()].tolist()
             yield (
                 f"weld ({a}, {b}) is folded, and the sheet thick there (t/(L sin fold) = "
-                f"{thick.max():.2g}, at most {FOLDED:g}): modes in which it bows come out 5 to 90 "
-                f"% too high: {SHELL}"
+                f"{thick.max():.2g}, at most {FOLDED:g}): modes in which it bows come out up to 20 "
+                f"% too high, and more with facets longer than wide: {SHELL}"
             )
         return
     strips = stiff * _strips(pattern)

@@ -25,6 +25,13 @@ from foldyn.structures.calibration import (
 )
 from foldyn.structures.clamps import boundary_edges, clamp_rows, clamp_stiffness
 from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
+from foldyn.structures.guided_edges import (
+    Guided,
+    directions,
+    guided_edges,
+    straight_in_bending,
+    straight_in_plane,
+)
 from foldyn.structures.membranes import membranes
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
 from foldyn.structures.plate import panel_plates, weld_stiffness
@@ -54,6 +61,7 @@ def discretize(
     clamped: str | Sequence[Sequence[int]] = (),
     rigid: str | Sequence[int] | None = None,
     straight: str | Sequence[Sequence[int]] = (),
+    guided: Mapping[str, str | Sequence[Sequence[int]]] | Sequence[Guided] = (),
     membrane: Literal["bars", "panel"] | None = None,
     preset: Literal["plate", "n5b8e", "herkal", "merlin2"] | None = None,
 ) -> Structure:
@@ -102,6 +110,10 @@ def discretize(
         Boundary edges that stay straight, such as along a support or a stiff rim, given like
         `clamped`; other boundary edges may bow between their ends. For "n5b8e", and in the plane of
         panels for membrane = "panel".
+    guided : mapping of {"x", "y", "z"}, optional
+        Boundary edges held along one axis along their length and free otherwise, by axis, for
+        example {"z": "zmax"} for a rim on a smooth plate, which bows in its plane. A rim glued to a
+        stiff plate is `straight`. See `foldyn.structures.guided_edges`.
     membrane : {"bars", "panel"}
         In-plane stiffness of panels: independent bars, which are exact in uniform strain at best;
         or bars coupled so that the corners have the panel's membrane stiffness, which is accurate
@@ -145,7 +157,8 @@ def discretize(
         bar_law=bar_law, fold_law=fold_law, bend_law=bend_law,
         calibration=calibration, crease_stiffness=crease_stiffness, crease_rest=crease_rest,
         clamped=edges, rigid=checked_panels(rigid, len(pattern.faces)),
-        straight=boundary_edges(straight, pattern, "straight"), membrane=membrane,
+        straight=boundary_edges(straight, pattern, "straight"),
+        guided=guided_edges(guided, pattern), membrane=membrane,
     )  # fmt: skip
     check_welds(options.rigid, pattern)
     if len(pattern.welds) and options.scheme != "n5b8e":
@@ -178,7 +191,8 @@ def discretize(
     if options.scheme == "n5b8e":
         stiff = rigid_panels(options.rigid, len(pattern.faces))
         springs = dict(zip(edges, turning.tolist(), strict=True))
-        plates = edge_plates(mesh, pattern, sheet, options.straight, stiff, springs)
+        held = straight_in_bending(options.straight, options.guided, pattern, sheet)
+        plates = edge_plates(mesh, pattern, sheet, held, stiff, springs)
         stiffness = spoke_stiffness(plates, len(mesh.folds), len(bends) + len(edges))
         bends, turning = np.split(stiffness, [len(bends)])
     elif options.calibration == "plate":
@@ -190,8 +204,11 @@ def discretize(
     coupled, gives = (), None
     if options.membrane == "panel":
         stiff = rigid_panels(options.rigid, len(pattern.faces))
-        held = [*options.straight, *edges]
-        coupled, gives = membranes(mesh, pattern, sheet, held, stiff, options.scheme == "n5b8e")
+        held = [*straight_in_plane(options.straight, options.guided, pattern), *edges]
+        coupled, gives = membranes(
+            mesh, pattern, sheet, held, stiff, options.scheme == "n5b8e",
+            directions(options.guided, pattern),
+        )  # fmt: skip
     structure = Structure(
         nodes=x,
         bars=np.concatenate([mesh.inner, pattern.lines]),

@@ -7,7 +7,8 @@ corners. A piece is a fan about its corner: rays to the cuts, and arcs about the
 
 with r the radius, s the length of the ray and m the same for all edges of a pattern. So the size of
 triangles is proportional to their distance from the vertex, down to the first arc. Triangles within
-the first arc form the corner, which is rigid in its plane (`shells.shell`).
+the first arc form the corner, which is rigid in its plane (`shells.shell`) unless the sheet is
+smooth there (`smooth_vertices`).
 
 In-plane forces concentrate at vertices, and each octave of distance from a vertex stores about
 equal energy: without a radius, or without grading, frequencies fall with every refinement.
@@ -26,6 +27,7 @@ from foldyn.patterns import Pattern
 
 PER_LOG = 3.0  # divisions/3 arcs per factor e of distance make triangles about as wide as long
 ROOM = 2.0  # least length of a ray, divided by the radius
+ON = 1e-3  # rad: a crease that turns less at a vertex goes straight on
 
 
 class Grading(NamedTuple):
@@ -114,6 +116,18 @@ def grading(pattern: Pattern, divisions: int, radius: float) -> Grading:
             "vertex_radius",
         )
     return graded(length, divisions // 4, radius)
+
+
+def smooth_vertices(pattern: Pattern) -> NDArray[np.bool_]:
+    """Mask (n,) of vertices of welds where no crease ends or turns: no forces concentrate there."""
+    number, total = np.zeros(len(pattern.vertices), int), np.zeros_like(pattern.vertices)
+    ends = pattern.vertices[pattern.creases]
+    along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
+    for k, sign in enumerate((1.0, -1.0)):
+        np.add.at(number, pattern.creases[:, k], 1)
+        np.add.at(total, pattern.creases[:, k], sign * along)
+    on = (number == 2) & (np.linalg.norm(total, axis=1) < ON)
+    return np.isin(np.arange(len(number)), pattern.welds) & ((number == 0) | on)
 
 
 def graded(length: NDArray, rays: int, radius: float) -> Grading:

@@ -18,12 +18,14 @@ displacements near each end of an edge of length L gain
 
 with s the distance from that end, for s between the thickness t and L/2; within t displacements are
 constant. Stresses around a force at a corner fall as 1/s. Panels share the amplitudes g of the edge
-between them (`mechanics.edge_gives`).
+between them (`mechanics.edge_gives`). Near a vertex where the sheet is smooth
+(`graded.smooth_vertices`) the gain is g (s/L) (1 - s/L)^2, and the corner is not rigid.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +37,7 @@ from foldyn.mechanics.following import Following, tensions
 from foldyn.mechanics.membranes import Membranes
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
+from foldyn.structures.graded import smooth_vertices
 from foldyn.structures.mesh import Mesh, hinge_angles, too_narrow
 from foldyn.structures.panel_membrane import Kind, grading_of, membrane_stiffness
 from foldyn.structures.panel_plate import Outline, outline
@@ -62,7 +65,7 @@ class Sides(NamedTuple):
 
 def membranes(
     mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[Edge], rigid: Collection[int],
-    giving: bool = False,
+    giving: bool = False, guided: Mapping[Edge, NDArray] = MappingProxyType({}),
 ) -> tuple[tuple[PanelKind, ...], EdgeGives | None]:  # fmt: skip
     """Membranes of all panels, and how edges give way near their ends.
 
@@ -73,18 +76,20 @@ def membranes(
     bow.
     rigid : panels that do not bend.
     giving : whether other edges give way; never for panels that do not bend or are not convex.
+    guided : directions in which boundary edges can bow; see `structures.guided_edges`.
     """
     kinds: dict[tuple, list[tuple[int, NDArray, NDArray]]] = {}
-    sides, stiff = _sides(mesh, pattern, sheet, straight, rigid), set(rigid)
+    sides, stiff = _sides(mesh, pattern, sheet, straight, rigid, guided), set(rigid)
     gives = [giving and own.convex and p not in stiff for p, own in enumerate(sides)]
     numbers = _numbers(pattern, gives)
     loose = {edge_of(a, b) for a, b in pattern.boundary.tolist()} - set(straight)
     parts: list[tuple] = []
     properties, kind = sheet.kinds(len(pattern.faces))
     first = np.searchsorted(mesh.inner_panel, np.arange(len(pattern.faces) + 1))
+    smooth = smooth_vertices(pattern)
     known = {
-        p: _known(own, properties[kind[p]], pattern.face_areas[p], gives[p])
-        for p, own in enumerate(sides)
+        p: _known(own, properties[kind[p]], pattern.face_areas[p], gives[p], smooth[[*face]])
+        for p, (face, own) in enumerate(zip(pattern.faces, sides, strict=True))
         if own.convex
     }
     try:
@@ -114,11 +119,12 @@ def membranes(
     ), _gives(mesh.nodes, parts, [edge for edge, _ in numbers]) if parts else None
 
 
-def _known(panel: Sides, sheet: Sheet, area: float, gives: bool) -> Kind:
+def _known(panel: Sides, sheet: Sheet, area: float, gives: bool, smooth: NDArray) -> Kind:
     """Data that determine the membrane of a panel."""
     radius = sheet.thickness / float(np.sqrt(2.0 * area))  # an outline's area is 1/2
     grading = grading_of(panel.outline, radius) if gives else None
-    return Kind(panel.outline, sheet.poissons_ratio, panel.resistance, grading)
+    there = tuple(smooth.tolist()) if gives and smooth.any() else ()
+    return Kind(panel.outline, sheet.poissons_ratio, panel.resistance, grading, there)
 
 
 def _numbers(pattern: Pattern, gives: Sequence[bool]) -> dict[tuple[Edge, int], int]:
@@ -156,8 +162,9 @@ def _gives(x: NDArray, parts: list[tuple], edges: list[Edge]) -> EdgeGives:
 
 
 def _sides(
-    mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[Edge], rigid: Collection[int]
-) -> list[Sides]:
+    mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[Edge], rigid: Collection[int],
+    guided: Mapping[Edge, NDArray],
+) -> list[Sides]:  # fmt: skip
     """Sides of each panel."""
     bent = edge_lookup(pattern.creases)
     welded, stiff = set(edge_lookup(pattern.welds)) | set(straight), set(rigid)
@@ -172,12 +179,16 @@ def _sides(
         edges = [edge_of(a, b) for a, b in around(face)]
         held, resistance = [edge in welded for edge in edges], [0.0] * len(edges)
         for k, edge in enumerate(edges):
-            if edge not in bent or held[k]:
+            if held[k] or (edge not in bent and edge not in guided):
                 continue
-            crease = bent[edge]
-            other = int(pattern.crease_faces[crease].sum()) - p
-            sine, cosine = np.sin(turn[crease]), np.cos(turn[crease])
-            both = edge_modulus[other] + cosine**2 * edge_modulus[p]
+            if edge in guided:
+                cosine = float(guided[edge] @ pattern.face_normals[p])
+                sine, other, both = np.sqrt(1.0 - cosine**2), p, cosine**2 * edge_modulus[p]
+            else:
+                crease = bent[edge]
+                other = int(pattern.crease_faces[crease].sum()) - p
+                sine, cosine = np.sin(turn[crease]), np.cos(turn[crease])
+                both = edge_modulus[other] + cosine**2 * edge_modulus[p]
             area = float(pattern.face_areas[p])
             both /= youngs[p] * thickness[p] * 2.0 * area  # an outline's area is 1/2
             held[k] = both > STRAIGHT * sine**2 or not stiff.isdisjoint((p, other))

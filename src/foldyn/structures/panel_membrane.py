@@ -53,12 +53,20 @@ class Kind(NamedTuple):
     grading : Grading, optional
         Given for a panel whose corners give way along its edges; corners are rigid within the
         radius.
+    smooth : tuple of bool
+        Corners where the sheet is smooth, which are not rigid; by default none is.
     """
 
     outline: Outline
     poissons_ratio: float
     resistance: tuple[float, ...]
     grading: Grading | None = None
+    smooth: tuple[bool, ...] = ()
+
+    @property
+    def rigid(self) -> NDArray[np.bool_]:
+        """Corners (m,) that are rigid within the radius."""
+        return ~np.array(self.smooth or np.zeros(len(self.outline.corners)), bool)
 
     @property
     def topology(self) -> tuple:
@@ -321,12 +329,14 @@ def _condensed(kinds: Sequence[Kind], meshes: Sequence[PanelMesh]) -> NDArray:
     plan = _plan(cut, not straight.all(), gives)
     x = np.stack([meshes[k].x for k in some], axis=-1)
     radius = np.array([meshes[k].radius or 0.0 for k in some])
+    rigid = np.stack([kinds[k].rigid for k in some], axis=1)
     nu = np.array([kinds[k].poissons_ratio for k in some])
     numbers = np.zeros((plan.condensing.entries, COUNT))
     shapes = np.repeat(plan.unknowns.axes[:, :, None], COUNT, axis=2)
     for k, points in enumerate(cut.along):
         edge = _edge(x[points], x[cut.at[k]], x[cut.at[(k + 1) % len(cut.at)]])
-        moves = _moves(edge, radius if gives else None)
+        ends = rigid[[k, (k + 1) % len(cut.at)]]
+        moves = _moves(edge, radius if gives else None, ends)
         if plan.bows:
             moves.insert(0, np.broadcast_to(edge.normal * ~straight[:, k], moves[0].shape))
             for lane, (kind, mesh) in enumerate(zip(kinds, meshes, strict=True)):
@@ -336,7 +346,9 @@ def _condensed(kinds: Sequence[Kind], meshes: Sequence[PanelMesh]) -> NDArray:
     numbers[:, len(kinds) :] = numbers[:, len(kinds) - 1 : len(kinds)]
     stiffness = np.repeat(1.0 / (1.0 - nu[None] ** 2), len(cut.elements), axis=0)
     if gives:
-        stiffness[np.isin(cut.elements[:, :3], cut.at).any(axis=1)] *= STIFF
+        for corner, stiff in zip(cut.at, rigid, strict=True):
+            there = (cut.elements[:, :3] == corner).any(axis=1)
+            stiffness[there] *= np.where(stiff, STIFF, 1.0)
     slopes = squares(x[cut.elements[:, :3]], stiffness)
     add_triangles(
         cut.elements, plan.unknowns.starts, plan.places, shapes.ravel(), slopes.ravel(), PRODUCTS,
@@ -362,24 +374,27 @@ def _edge(x: NDArray, start: NDArray, end: NDArray) -> Edge:
     return Edge(normal, tangent, length, ((x - start) * tangent).sum(axis=1))
 
 
-def _moves(edge: Edge, radius: NDArray | None) -> list[NDArray]:
+def _moves(edge: Edge, radius: NDArray | None, rigid: NDArray) -> list[NDArray]:
     """Motions (p, 2, 8) of edge points: one per corner displacement x, y; one per give.
 
     Edges remain straight in these motions.
 
     radius : (8,), within which corners are rigid.
+    rigid : (2, 8) mask of these corners; gives are cubic at others.
     """
     moves, gives = [], []
-    within, half = 0.0 if radius is None else radius, 0.5 * edge.length
-    for sign, far in ((1.0, edge.place), (-1.0, edge.length - edge.place)):
+    within, half = np.where(rigid, 0.0 if radius is None else radius, 0.0), 0.5 * edge.length
+    for k, (sign, far) in enumerate(((1.0, edge.place), (-1.0, edge.length - edge.place))):
         share = 1.0 - far / edge.length
-        slid = 1.0 - np.clip((far - within) / (edge.length - 2.0 * within), 0.0, 1.0)
+        between = edge.length - within[0] - within[1]
+        slid = 1.0 - np.clip((far - within[k]) / between, 0.0, 1.0)
         for c in range(2):
             across, along = edge.normal[c] * edge.normal, edge.tangent[c] * edge.tangent
             moves.append(share[:, None] * across + slid[:, None] * along)
         if radius is not None:
             held = np.log(np.maximum(far, radius) / half) / np.log(radius / half)
-            gives.append(sign * (slid - np.maximum(held, 0.0))[:, None] * edge.tangent)
+            near = np.where(rigid[k], slid - np.maximum(held, 0.0), (1.0 - share) * share**2)
+            gives.append(sign * near[:, None] * edge.tangent)
     return moves + gives
 
 

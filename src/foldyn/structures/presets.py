@@ -118,11 +118,12 @@ def _check_bends(options: ModelOptions) -> None:
 def _check_edges(options: ModelOptions) -> None:
     """Refuse options that are incompatible with the scheme n5b8e, and edges that cannot bow."""
     if options.scheme != N5B8E:
-        if options.straight and not options.bowed:
-            raise InputError(
-                ': edges bow with scheme = "n5b8e" or membrane = "panel" only: leave it out',
-                "straight",
-            )
+        for name in ("straight", "guided") if not options.bowed else ():
+            if getattr(options, name):
+                raise InputError(
+                    ': edges bow with scheme = "n5b8e" or membrane = "panel" only: leave it out',
+                    name,
+                )
         return
     needs = 'scheme = "n5b8e" needs'
     if options.calibration != "plate":

@@ -42,6 +42,7 @@ from foldyn.structures.edge_angles import (
     outlines,
     plates_model,
 )
+from foldyn.structures.guided_edges import Guided, straight_in_bending
 from foldyn.structures.mass import MASS_RULES, Surface, lumped
 from foldyn.structures.membranes import PanelKind, swelling
 from foldyn.structures.mesh import double_areas, hinge_angles
@@ -74,6 +75,7 @@ class ModelOptions(Checked):
     clamped: tuple[Edge, ...] = ()
     rigid: str | tuple[int, ...] | None = None
     straight: tuple[Edge, ...] = ()
+    guided: tuple[Guided, ...] = ()
     membrane: Annotated[str, Check(choice, known=MEMBRANES)] = "bars"
 
     @property
@@ -168,6 +170,7 @@ class Structure(Discretized):
             return frozenset()
         return frozenset(edge_lookup(self.pattern.lines)) - {
             *self.options.straight,
+            *((low, high) for low, high, _ in self.options.guided),
             *self.options.clamped,
         }
 
@@ -366,8 +369,9 @@ class Structure(Discretized):
         pattern, options = self.pattern, self.options
         assert pattern is not None
         hinges = np.concatenate([self.folds, self.bends[len(self.bends) - len(pattern.welds) :]])
+        straight = straight_in_bending(options.straight, options.guided, pattern, self.sheet)
         return outlines(
-            self.nodes, self.centers, hinges, pattern, self.sheet, options.straight,
+            self.nodes, self.centers, hinges, pattern, self.sheet, straight,
             rigid_panels(options.rigid, len(pattern.faces)), options.clamped,
         )  # fmt: skip
 
