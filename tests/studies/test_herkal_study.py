@@ -392,6 +392,7 @@ def test_the_specimen_is_left_out_without_opencv(tmp_path, monkeypatch, capsys):
         raise InputError("pip install foldyn[experiment]")
 
     monkeypatch.setattr("foldyn.experiment.opencv", missing)
+    monkeypatch.setattr(studies, "QUICK", StudyPlan(SHORT, ("case2",), ("panel",)))
     monkeypatch.setattr(Study, "compute", lambda *_: [])
     (tmp_path / "study").mkdir()
     assert main(["study", "herkal", "--quick", "--out", str(tmp_path / "study")]) == 0
