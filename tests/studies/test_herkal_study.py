@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -340,7 +341,8 @@ def test_claims_of_one_case(small):
 
 @pytest.mark.matrix
 # ---------------------------------------------------------------------- page and command
-def test_page_of_a_study(small):
+def test_page_of_a_study(small, monkeypatch):
+    monkeypatch.setattr(runs, "case_study", cache(runs.case_study))  # reads them a hundred times
     page = report.write(small).read_text("utf-8")
     for text in ("This is a coarse run", "In this coarse run", "Table 1 of the paper and ours"):
         assert text in page
