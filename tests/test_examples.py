@@ -318,7 +318,7 @@ def test_examples_are_short_scripts_with_a_picture_each():
         assert f"examples/{path.name}" in gallery, path.name
 
 
-@pytest.mark.parametrize("path", beyond(SCRIPTS, 2), ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", beyond(SCRIPTS, 3), ids=lambda p: p.stem)
 def test_figures(path):
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None

@@ -202,7 +202,7 @@ def slid(case: fd.Case, strip: list[int], run) -> tuple[np.ndarray, float]:
 
 
 RUBBING = [
-    ("panel", method, 0.2, 1e-4 if METHODS[method].implicit else None, 0.02, 0.03, 1e-2)
+    ("panel", method, 0.15, 1e-4 if METHODS[method].implicit else None, 0.02, 0.03, 1e-2)
     for method in METHODS
     if method != "newmark"
 ]
