@@ -15,6 +15,7 @@ from hypothesis import settings
 from browsers import browser  # noqa: F401 - a fixture
 from case_fixtures import kept, read  # noqa: F401 - fixtures
 from foldyn.linear import model_error
+from pairwise import FEW
 
 PANELS = model_error.PANELS
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -27,8 +28,8 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
 os.environ.setdefault("JAX_ENABLE_X64", "1")
 
-# an example may take its time on a busy machine
-settings.register_profile("foldyn", deadline=None)
+# an example may take its time on a busy machine; where few draws are asked for, fewer examples
+settings.register_profile("foldyn", deadline=None, max_examples=25 if FEW else 100)
 settings.load_profile("foldyn")
 
 # a job in the background ignores Ctrl-C, and so would every process that tests start

@@ -6,7 +6,7 @@ python tests/features.py        writes the table of docs/features.md anew
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -135,16 +135,16 @@ def tried(column: str, make: Make, setting: Setting) -> str:
     return ""
 
 
-def refusals() -> dict[tuple[str, str], str]:
-    """What is refused of each feature by each method, in its words; "" where all goes."""
+def refusals(names: Iterable[str] = FEATURES) -> dict[tuple[str, str], str]:
+    """What is refused of features by each method, in its words; "" where all goes."""
     found = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
-        for (name, make), column in product(FEATURES.items(), COLUMNS):
+        for name, column in product(names, COLUMNS):
             settings = [Setting()]
             if column in METHODS:
                 settings.append(Setting("consistent", moves=True))
-            said = (tried(column, make, setting) for setting in settings)
+            said = (tried(column, FEATURES[name], setting) for setting in settings)
             found[name, column] = next(filter(None, said), "")
     return found
 
@@ -154,18 +154,20 @@ def reason(said: str) -> str:
     return next(letter for letter, (holds, _) in REASONS.items() if holds in said)
 
 
-def table() -> str:
+def row(name: str, said: Mapping[tuple[str, str], str]) -> str:
+    """The line of a feature in the table."""
+    cells = [reason(said[name, one]) if said[name, one] else "yes" for one in COLUMNS]
+    return f"| {name} | " + " | ".join(cells) + " |"
+
+
+def table(said: Mapping[tuple[str, str], str]) -> str:
     """What works with all methods, and the table of the rest with the reasons that it has."""
-    said, used = refusals(), set[str]()
+    used = {reason(words) for words in said.values() if words}
     whole = [name for name in FEATURES if not any(said[name, one] for one in COLUMNS)]
     lines = [f"With all methods: {'; '.join(whole)}.", ""]
     lines.append("| | " + " | ".join(f"`{name}`" for name in COLUMNS) + " |")
     lines.append("|---" * (1 + len(COLUMNS)) + "|")
-    for name in FEATURES:
-        if name not in whole:
-            cells = [reason(said[name, one]) if said[name, one] else "yes" for one in COLUMNS]
-            used.update(cells)
-            lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    lines += [row(name, said) for name in FEATURES if name not in whole]
     notes = [f"- **{letter}**: {text}." for letter, (_, text) in REASONS.items() if letter in used]
     return "\n".join([*lines, "", *notes]) + "\n"
 
@@ -173,4 +175,4 @@ def table() -> str:
 if __name__ == "__main__":
     before, rest = PAGE.read_text("utf-8").split(BEGIN)
     after = rest.split(END)[1]
-    PAGE.write_text(f"{before}{BEGIN}{table()}{END}{after}", "utf-8")
+    PAGE.write_text(f"{before}{BEGIN}{table(refusals())}{END}{after}", "utf-8")

@@ -57,7 +57,7 @@ SOLVED = (
 )  # fmt: skip
 """Calls of `solved`, which computes."""
 NAMES = (*DATA, *PATTERNS, *SOLVED)
-EACH = [*DATA, *PATTERNS, *beyond(SOLVED, 5)]
+EACH = [*DATA, *PATTERNS, *beyond(SOLVED, 12)]
 
 
 @pytest.mark.matrix

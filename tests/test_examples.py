@@ -298,7 +298,7 @@ SHORT = [check for check in CHECKS if check not in LONG]
 @pytest.mark.filterwarnings("ignore::foldyn.errors.CrossingWarning")
 @pytest.mark.filterwarnings("ignore:.* creases stay closed that were to open")  # of the crane
 @pytest.mark.parametrize(
-    "check", [*beyond(SHORT, 2), *beyond(LONG, 5)], ids=lambda check: check.__name__
+    "check", [*beyond(SHORT, 4), *beyond(LONG, 8)], ids=lambda check: check.__name__
 )
 def test_example(check, tmp_path, monkeypatch, capsys):
     """Of films a few pictures; plots have tests of their own."""
@@ -318,7 +318,7 @@ def test_examples_are_short_scripts_with_a_picture_each():
         assert f"examples/{path.name}" in gallery, path.name
 
 
-@pytest.mark.parametrize("path", beyond(SCRIPTS, 2), ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", beyond(SCRIPTS, 3), ids=lambda p: p.stem)
 def test_figures(path):
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None

@@ -202,7 +202,7 @@ def slid(case: fd.Case, strip: list[int], run) -> tuple[np.ndarray, float]:
 
 
 RUBBING = [
-    ("panel", method, 0.2, 1e-4 if METHODS[method].implicit else None, 0.02, 0.03, 1e-2)
+    ("panel", method, 0.15, 1e-4 if METHODS[method].implicit else None, 0.02, 0.03, 1e-2)
     for method in METHODS
     if method != "newmark"
 ]
@@ -238,10 +238,10 @@ def test_a_strip_slides_above_the_angle_of_friction(kind, method, duration, dt, 
 @pytest.mark.parametrize(
     ("kind", "method", "duration", "dt", "still", "most"),
     [
-        ("plane", "rk4", 0.4, None, 1e-9, 1e-3),
+        ("plane", "rk4", 0.25, None, 1e-9, 1e-3),
         ("plane", ALPHA, 0.2, 2e-4, 5e-12, 1e-3),
         ("plane", ALPHA, 0.2, None, 5e-12, 1e-3),
-        *beyond([("panel", method, 0.25, dt, 1e-11, 1e-5) for _, method, _, dt, *_ in RUBBING], 2),
+        *beyond([("panel", method, 0.17, dt, 1e-11, 1e-5) for _, method, _, dt, *_ in RUBBING], 2),
     ],
 )
 def test_a_strip_sticks_below_the_angle_of_friction(kind, method, duration, dt, still, most):

@@ -119,6 +119,6 @@ def test_superlinear_law_lowers_the_order_to_seven_thirds():
     def end(n, a):
         return place(fd.simulate(case, 4.0, method="rk4", dt=4.0 / n, initial=released(a)))[-1]
 
-    ends = np.array([[end(n, a) for n in (*steps, 2**16)] for a in np.linspace(0.2, 0.4, 24)])
+    ends = np.array([[end(n, a) for n in (*steps, 2**15)] for a in np.linspace(0.2, 0.4, 12)])
     errors = np.linalg.norm(ends[:, :-1] - ends[:, -1:], axis=0)
     assert order(steps, errors) == pytest.approx(7.0 / 3.0, abs=0.2)

@@ -75,7 +75,7 @@ def half_steps(what, method, steps, every):
 @pytest.mark.parametrize(("kind", "method"), beyond(zip(KINDS, cycle(METHODS), strict=False), 3))
 def test_threads_share_a_motion(monkeypatch, method, kind):
     what = KINDS[kind]()
-    given = half_steps(what, method, 200, 7)
+    given = half_steps(what, method, 120, 7)
     alone = on(monkeypatch, 1, what, method, **given)
     assert float(np.abs(alone["displacement"]).max()) > 1e-4
     threads = 2 if kind in ("plain", "turned") else 3
@@ -98,7 +98,7 @@ def closing(contact: fd.Contact | None = None, dihedral: float = 1.6) -> tuple[f
 @pytest.mark.parametrize(("method", "threads"), beyond([("central_difference", 3), ("rk4", 2)]))
 def test_threads_share_what_touches(monkeypatch, method, threads):
     what, start = closing()
-    given = half_steps(what, method, 60, 30) | {"initial": start}
+    given = half_steps(what, method, 40, 20) | {"initial": start}
     alone = on(monkeypatch, 1, what, method, **given)
     assert (alone.contact_force.values[-1] > 0.0).mean() > 0.5  # panels touch,
     assert float(np.abs(alone.plane_force[-1]).max()) > 0.0  # and planes are met
@@ -169,7 +169,7 @@ def test_a_load_that_is_not_finite_stops_all_threads(monkeypatch, method, what):
 def test_a_motion_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path, method):
     look_often(monkeypatch)
     what, start = closing()
-    given = half_steps(what, method, 60, 30) | {"initial": start}
+    given = half_steps(what, method, 40, 20) | {"initial": start}
     whole = on(monkeypatch, 2, what, method, **given)
     resume_from = ExplicitEngine.resume_from
 

@@ -99,7 +99,7 @@ def filmed(tmp_path_factory):
     motion = fd.simulate(case, **arguments)
     seen = camera(model.rest, k1=0.0)
     film = film_of(
-        motion, seen, rate=RATE, duration=0.24, sensor=Sensor(samples=8), dropped=(DROPPED,)
+        motion, seen, rate=RATE, duration=0.16, sensor=Sensor(samples=8), dropped=(DROPPED,)
     )
     write_film(film, folder / "film.mkv")
     tracks = track_film(str(folder / "film.mkv"), model, tracking=HOW)

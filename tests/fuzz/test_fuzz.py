@@ -13,7 +13,7 @@ from pairwise import FEW, beyond
 SHORT = 10 if FEW else 20  # a few seconds
 
 
-@pytest.mark.parametrize("target", beyond(TARGETS, 2))
+@pytest.mark.parametrize("target", beyond(TARGETS, 4))
 def test_damaged_input_is_read_or_refused(target):
     report = fuzz(target, SHORT, seed=1)
     assert not report.findings, str(report)

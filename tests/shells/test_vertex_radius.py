@@ -156,9 +156,9 @@ def test_a_vertex_of_four_creases_folds_without_strain():
 
 
 @cache
-def tower(divisions, radius, thickness=1e-3):
+def tower(divisions, radius, thickness=1e-3, storeys=3):
     """First frequency of a tower of triangles, held along its bottom edges."""
-    pattern = fd.patterns.kresling(sides=4, radius=0.04, height=0.03, twist=30, storeys=3)
+    pattern = fd.patterns.kresling(sides=4, radius=0.04, height=0.03, twist=30, storeys=storeys)
     s = shell(
         pattern, STEEL[thickness], divisions=divisions, mass="consistent", vertex_radius=radius
     )
@@ -177,9 +177,9 @@ def test_modes_of_a_tower_come_in_pairs():
 def test_frequencies_of_a_tower_converge():
     """They fall with every even mesh, and with graded ones with the order of the elements."""
     meshes = [8, 12, 16]
-    found = convergence([tower(n, 1e-3) for n in meshes], meshes)
+    found = convergence([tower(n, 1e-3, storeys=1) for n in meshes], meshes)
     assert np.all((found.order > 1.5) & (found.order < 2.5))
-    half, once, twice = (tower(8, radius)[0] for radius in (5e-4, 1e-3, 2e-3))
+    half, once, twice = (tower(8, radius, storeys=1)[0] for radius in (5e-4, 1e-3, 2e-3))
     assert 1.0 > half / once > 0.98
     assert 1.0 < twice / once < 1.05
 

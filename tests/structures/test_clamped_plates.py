@@ -65,7 +65,7 @@ def test_a_clamped_panel_bends_as_the_shell(form):
 
 
 @pytest.mark.parametrize(
-    ("dihedral", "thickness"), beyond(product([60, 110, 150], [1e-3, 3e-4]), 3)
+    ("dihedral", "thickness"), beyond(product([60, 110, 150], [1e-3, 3e-4]), 6)
 )
 def test_a_clamped_miura_sheet_vibrates_as_the_shell(dihedral, thickness):
     """Creases that end at the clamp are straight in the model, and bend a little in the shell."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -340,7 +341,8 @@ def test_claims_of_one_case(small):
 
 @pytest.mark.matrix
 # ---------------------------------------------------------------------- page and command
-def test_page_of_a_study(small):
+def test_page_of_a_study(small, monkeypatch):
+    monkeypatch.setattr(runs, "case_study", cache(runs.case_study))  # reads them a hundred times
     page = report.write(small).read_text("utf-8")
     for text in ("This is a coarse run", "In this coarse run", "Table 1 of the paper and ours"):
         assert text in page
@@ -392,6 +394,7 @@ def test_the_specimen_is_left_out_without_opencv(tmp_path, monkeypatch, capsys):
         raise InputError("pip install foldyn[experiment]")
 
     monkeypatch.setattr("foldyn.experiment.opencv", missing)
+    monkeypatch.setattr(studies, "QUICK", StudyPlan(SHORT, ("case2",), ("panel",)))
     monkeypatch.setattr(Study, "compute", lambda *_: [])
     (tmp_path / "study").mkdir()
     assert main(["study", "herkal", "--quick", "--out", str(tmp_path / "study")]) == 0

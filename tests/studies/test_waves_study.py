@@ -102,7 +102,7 @@ def test_gaps_of_sheets_depend_on_their_fold_state():
 
 @pytest.mark.matrix
 def test_the_study_writes_its_page_and_goes_on(tmp_path, monkeypatch, capsys):
-    plan = Plan(dihedrals=2, phases=13, cells=24)
+    plan = Plan(dihedrals=2, phases=9, cells=16)
     monkeypatch.setattr(studies, "QUICK", plan)
     monkeypatch.setattr("foldyn.cli.study.PROCESSES", 1)
     command = ["study", "waves", "--quick", "--out", str(tmp_path / "out")]

@@ -17,6 +17,7 @@ from draws import ANALYSES, EXTRAS, MODELS, SHELL, SMALL, STATIC, Combination, D
 import foldyn as fd
 from foldyn.dynamics import METHODS
 from foldyn.dynamics.generalized_alpha import Alpha
+from pairwise import FEW
 
 # forces on held nodes, coarse steps: not what this is about
 pytestmark = pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
@@ -137,6 +138,7 @@ def reactions(result) -> np.ndarray:
     [
         pytest.param(seed, marks=pytest.mark.matrix) if one == SLOW or seed % 2 else seed
         for seed, one in enumerate(QUICK)
+        if one != SLOW or not FEW  # that of newmark is tried, which has the same loop
     ],
 )
 def test_copies_move_alike(seed):
