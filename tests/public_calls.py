@@ -259,17 +259,17 @@ def solved(folder: Path) -> Calls:
         "landscape": (fd.landscape, {"path": path, "case": case(), "settings": {}}),
         "modes": (fd.modes, {
             "case": case(), "count": 2, "state": None, "secant": 2.0, "load_factor": 1.0,
-            "verify": True, "solver": "superlu",
+            "verify": True, "solver": "superlu", "check_model": True,
         }),
         "frf": (fd.frf, {
             "case": case(), "drive": fd.Force([4], (0, 0, 1.0)), "frequencies": [1.0, 2.0],
             "state": None, "method": "direct", "secant": None, "amplitude": 1.0,
-            "load_factor": 1.0, "progress": None,
+            "load_factor": 1.0, "progress": None, "check_model": True,
         }),
         "bands": (fd.bands, {
             "cell": cell(), "phases": [[0.5]], "count": 2, "state": fd.State(), "secant": 2.0,
             "group_velocity": True, "shape": True, "polarization": True, "load_factor": 1.0,
-            "track": False,
+            "track": False, "check_model": True,
         }),
         "swept_sine": (fd.swept_sine, {
             "case": swung(), "measure": LIFT, "frequencies": [5.0, 6.0], "duration": 2.0,
@@ -337,7 +337,7 @@ def solved(folder: Path) -> Calls:
             "seed": 0, "processes": 1, "confidence": 0.95, "folder": None, "progress": None,
         }),
         "fidelity": (fd.fidelity, {  # refused: such models are not known
-            "case": case(), "count": 2, "divisions": [2, 3], "models": ["none"], "secant": 2.0,
+            "case": case(), "count": 2, "reference": "shell", "divisions": [2, 3], "models": ["none"], "secant": 2.0,
             "vertex_radius": 1e-3,
             "progress": print,
         }),

@@ -12,7 +12,7 @@ import foldyn as fd
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs/api.md").read_text("utf-8")
 MODULES = {name for name in fd.__all__ if isinstance(getattr(fd, name), ModuleType)}
-CONTRACTS = {"check", "reach", "of_nodes", "origin_of"}
+CONTRACTS = {"check", "reach", "of_nodes", "origin_of", "least_slope"}
 """Methods that loads, laws and states have for solvers."""
 
 

@@ -20,7 +20,9 @@ def made(frequency, error, limit):
         "error": error,
         "mac": np.where(np.isinf(error), 0.2, 0.9),
     }
-    return fd.Fidelity(fidelity_dataset(case, ["own", "plate"], values, {"limit": limit}))
+    return fd.Fidelity(
+        fidelity_dataset(case, ["own", "plate"], values, {"limit": limit, "reference": "shell"})
+    )
 
 
 def points(axes, marker):

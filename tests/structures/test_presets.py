@@ -21,7 +21,8 @@ PAPER = {
     "fold_law": fd.EnhancedLinear(45.0, 315.0), "calibration": "standard",
 }  # fmt: skip
 """Defaults of Foldyn before presets: the model of the paper."""
-STEPS = ("crease_stiffness", "crease_rest", "clamped", "rigid", "straight", "membrane")
+STEPS = ("crease_stiffness", "crease_rest", "clamped", "rigid", "straight", "guided",
+         "membrane")  # fmt: skip
 
 
 def options(**given):

@@ -144,6 +144,9 @@ class Copy:
     def edges(self, value: Any) -> Any:
         return self.symmetry.vertices[np.array(value, np.int64).reshape(-1, 2)].tolist()
 
+    def guided(self, value: Any) -> Any:
+        return [(*self.edges([edge])[0], axis) for *edge, axis in value]
+
     def panels_of(self, value: Any) -> Any:
         return value if isinstance(value, str) else self.symmetry.panels[list(value)].tolist()
 
@@ -235,6 +238,7 @@ LAWS = {law.__name__ for law in (*BAR_LAWS.values(), *HINGE_LAWS.values())}
 FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     **dict.fromkeys(("nodes", "between", "to"), Copy.vertices),
     **dict.fromkeys(("edges", "clamped", "straight"), Copy.edges),
+    "guided": Copy.guided,
     **dict.fromkeys(("panels", "rigid"), Copy.panels_of),
     "creases": Copy.creases,
     **dict.fromkeys(("vector", "total", "force_per_length", "acceleration"), Copy.vector),

@@ -34,6 +34,8 @@ VALUES, JACOBIAN = "value", "jacobian"
 Point = tuple[float, ...]
 Source = Callable[..., Case] | str | os.PathLike[str]
 
+UNCHECKED = {"check_model": False}  # the designs of a search are not compared one by one
+
 
 class Evaluator(Protocol):
     """Evaluates measures of designs."""
@@ -99,8 +101,11 @@ class Measured:
     def _computed(self, values: Mapping[str, Any]) -> tuple[xr.Dataset, Case]:
         if self.document:
             file = self._file(values)
-            return file.computation().result(), file.case()
+            own = file.analysis.arguments.keys() & UNCHECKED.keys()
+            return file.computation(**{key: UNCHECKED[key] for key in own}).result(), file.case()
         case, arguments = self.build(**values), dict(self.analysis or {})
+        if arguments["kind"] in ("modes", "frf"):
+            arguments = {**UNCHECKED, **arguments}
         return FUNCTIONS[arguments.pop("kind")](case, **arguments), case
 
     def _file(self, values: Mapping[str, Any]) -> CaseFile:

@@ -45,7 +45,7 @@ from foldyn.linear.excitation import drive_of, drive_terms
 from foldyn.linear.frequency_domain import dynamic_stiffness
 from foldyn.linear.frf import frf, quantity_of
 from foldyn.linear.linearized import linearize
-from foldyn.linear.modes import nodes_translated, spectrum_of, unit_translations
+from foldyn.linear.modes import nodes_translated, of_spectrum, spectrum_of, unit_translations
 from foldyn.statics.stability import oriented
 
 ALONE = 1e-6  # relative distance below which eigenvalues count as one
@@ -65,7 +65,7 @@ class ModesGradient(Differentiated):
     """
 
     def __init__(self, case: Case, arguments: Mapping[str, Any]) -> None:
-        found = spectrum_of(case, **arguments)
+        found = spectrum_of(case, **of_spectrum(arguments))
         refuse(found.linear, "modes")
         self.case, self.result, self._linear = case, found.result, found.linear
         self._values, self._shapes = found.spectrum.values, oriented(found.spectrum.shapes)

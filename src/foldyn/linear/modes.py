@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 import warnings
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -193,6 +194,11 @@ def spectrum_of(
         variables["frequency_error"] = np.where(variables["rigid"], 0.0, estimate)
     result = modes_dataset(case, variables, statistics)
     return Found(linear, spectrum, result)
+
+
+def of_spectrum(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of `modes` for `spectrum_of`, which does not compare models by itself."""
+    return {name: value for name, value in arguments.items() if name != "check_model"}
 
 
 def trusted(

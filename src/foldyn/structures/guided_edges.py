@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import Edge
+from foldyn.patterns.topology import Edge, edge_of
 from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.sheet import Sheet
-from foldyn.values import show
+from foldyn.values import show, whole
 
 AXES = "xyz"
 STEEP = 3.0  # sin(g) L/t above which plates have straight edges; see `edge_angles`
@@ -46,7 +46,7 @@ def guided_edges(given: Any, pattern: Pattern) -> tuple[Guided, ...]:
         }
         found = [(*edge, axis) for axis, edges in chosen.items() for edge in edges]
     elif isinstance(given, Sequence) and not isinstance(given, str):
-        found = [(int(low), int(high), str(axis)) for low, high, axis in given]
+        found = [_guided(one) for one in given]
     else:
         raise InputError(
             f' = {show(given)}: give edges by axis, as in guided = {{"z": "zmax"}}', "guided"
@@ -55,6 +55,13 @@ def guided_edges(given: Any, pattern: Pattern) -> tuple[Guided, ...]:
     if twice := [edge for edge in edges if edges.count(edge) > 1]:
         raise InputError(f": {twice[0]} is listed twice; list it in straight instead", "guided")
     return tuple(found)
+
+
+def _guided(given: Any) -> Guided:
+    """An edge and its axis, as options have them."""
+    if isinstance(given, Sequence) and len(given) == 3 and given[2] in tuple(AXES):
+        return (*edge_of(*(whole("guided", each) for each in given[:2])), given[2])
+    raise InputError(f": {show(given)}: give two vertices and an axis x, y or z", "guided")
 
 
 def perpendicular(pattern: Pattern, edge: Edge, axis: str) -> bool:

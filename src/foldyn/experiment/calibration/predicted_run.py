@@ -20,7 +20,7 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.modal import FrequencyResponse, ModalParameters, ModeShapes
 from foldyn.gradients.neighbors import Asked, equilibria, modes, motions, responses
-from foldyn.linear.modes import spectrum_of
+from foldyn.linear.modes import of_spectrum, spectrum_of
 from foldyn.patterns import Pattern
 from foldyn.values import show
 
@@ -129,10 +129,11 @@ def _changes(
         return {**steady(case_file), "initial": run.start(case_file)}
     if run.kind == "modes":
         counts = [one.count for one in members if isinstance(one, ModeShapes | ModalParameters)]
-        return {"count": min(max(given["count"], *counts), len(case.free_dofs))}
+        most = min(max(given["count"], *counts), len(case.free_dofs))
+        return {"count": most, "check_model": False}
     if run.kind == "frf":
         lines = [one.frequency for one in members if isinstance(one, FrequencyResponse)]
-        return {"frequencies": np.unique(np.concatenate(lines))}
+        return {"frequencies": np.unique(np.concatenate(lines)), "check_model": False}
     return {
         "method": "newton", "load_factors": _path(case, members), "first_step": None,
         "until": None, "settings": replace(given["settings"], stability=False),
@@ -172,7 +173,7 @@ def with_neighbors(
         return result, equilibria(one, result, beside)
     if one.case.structure.nodes.size > MANY:
         raise InputError("modes of so many dofs are found as quickly as their neighbors")
-    base = spectrum_of(one.case, **one.arguments)
+    base = spectrum_of(one.case, **of_spectrum(one.arguments))
     fitted = [each for each in members if not each.held_out]
     places = [each.places(base.result, one.case) for each in fitted]  # type: ignore[attr-defined]
     return base.result, modes(base, beside, np.unique(np.concatenate(places)).tolist())
