@@ -337,9 +337,8 @@ def solved(folder: Path) -> Calls:
             "seed": 0, "processes": 1, "confidence": 0.95, "folder": None, "progress": None,
         }),
         "fidelity": (fd.fidelity, {  # refused: such models are not known
-            "case": case(), "count": 2, "reference": "shell", "divisions": [2, 3], "models": ["none"], "secant": 2.0,
-            "vertex_radius": 1e-3,
-            "progress": print,
+            "case": case(), "count": 2, "reference": "shell", "divisions": [2, 3],
+            "models": ["none"], "secant": 2.0, "vertex_radius": 1e-3, "progress": print,
         }),
         "periodic_motion": (fd.periodic_motion, {
             "case": shaken(), "frequency": 1.0, "harmonics": 1, "method": "harmonic_balance",

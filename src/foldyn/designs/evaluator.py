@@ -101,8 +101,8 @@ class Measured:
     def _computed(self, values: Mapping[str, Any]) -> tuple[xr.Dataset, Case]:
         if self.document:
             file = self._file(values)
-            own = file.analysis.arguments.keys() & UNCHECKED.keys()
-            return file.computation(**{key: UNCHECKED[key] for key in own}).result(), file.case()
+            own: dict[str, Any] = UNCHECKED if "check_model" in file.analysis.arguments else {}
+            return file.computation(**own).result(), file.case()
         case, arguments = self.build(**values), dict(self.analysis or {})
         if arguments["kind"] in ("modes", "frf"):
             arguments = {**UNCHECKED, **arguments}
