@@ -35,6 +35,7 @@ def tracked_files() -> list[Path]:
     return [ROOT / name for name in listing.split("\0") if name and (ROOT / name).is_file()]
 
 
+@pytest.mark.matrix
 def test_layers_contract():
     script = Path(sys.executable).with_name("lint-imports")
     if not script.exists():

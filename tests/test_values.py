@@ -116,6 +116,7 @@ def test_no_message_is_long(kind):
     assert str(kind(f"file: {'x' * 5000}: take fewer")).endswith("x: take fewer")  # the remedy
 
 
+@pytest.mark.matrix
 def test_what_passes_the_doors_makes_sound_structures():
     """At the corners of the ranges nothing overflows or vanishes on the way in."""
     refused: list[str] = []

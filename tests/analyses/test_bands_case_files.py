@@ -77,6 +77,7 @@ def test_figures_show_each_state(tmp_path, found, monkeypatch):
         assert f"dihedral {(60, 100)[k]} degrees" in captions[-2 + k]
 
 
+@pytest.mark.matrix
 def test_gaps_are_those_of_the_whole_zone_and_of_legs(found):
     """In a full gap there is no frequency of path or zone, and bands touch both of its ends."""
     rows = zip(
@@ -135,6 +136,7 @@ def test_stretched_periods_are_those_of_the_state(tmp_path):
     assert (np.abs(pulled["frequency"][1] - pulled["frequency"][0]).max() > 1e-3 * top).item()
 
 
+@pytest.mark.matrix
 def test_one_of_the_periods_makes_a_chain(tmp_path):
     few = {"zone": None, "points": 5, "vary": None, "attenuation": None}
     chain = case_file(tmp_path, periods=[1], **few).run()

@@ -92,6 +92,7 @@ def test_where_a_path_ends() -> None:
             assert reached(u, 1.0) is answer
 
 
+@pytest.mark.matrix
 def test_a_path_starts_from_a_stored_state(read, tmp_path) -> None:
     found = read(PATH + '[initial]\nfile = "first.nc"\nat = 1\n')
     with pytest.raises(InputError, match=r'initial\.file = "first\.nc": .*no such file'):

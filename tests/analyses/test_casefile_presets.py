@@ -82,6 +82,7 @@ def test_results_state_their_model_whole(read, tmp_path: Path):
         assert fd.case_of(stored).structure.options == PRESETS[name]
 
 
+@pytest.mark.matrix
 def test_shipped_cases_name_the_model_that_they_had():
     """The options of before there were presets, whatever the default is."""
     for name, path in shipped_cases().items():

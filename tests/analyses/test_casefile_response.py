@@ -101,6 +101,7 @@ def test_what_a_file_gets_wrong_is_named(tmp_path, changed, message):
         read_case(written(tmp_path, analysis))
 
 
+@pytest.mark.matrix
 def test_an_interrupted_curve_is_kept(tmp_path, monkeypatch, capsys):
     whole = response_curve
 

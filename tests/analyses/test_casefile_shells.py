@@ -196,6 +196,7 @@ def test_wrong_models_for_a_file(filed, arguments, edits, message):
     check(lambda _: read_case(filed(edits), **arguments), "", message)
 
 
+@pytest.mark.matrix
 def test_a_state_of_another_mesh_is_refused(filed, tmp_path):
     bent = fd.trace(read_case(filed(SHELL)).case(), load_factors=[1.0])
     fd.save(bent, tmp_path / "coarse.nc")

@@ -50,6 +50,7 @@ ANALYSES = {
 }
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("analysis", ANALYSES)
 def test_run_and_stored(model, analysis, tmp_path):

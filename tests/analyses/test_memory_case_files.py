@@ -44,6 +44,7 @@ def written(folder, text):
     return path
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", LAWS)
 def test_a_case_file_has_the_law_and_its_result_keeps_it(tmp_path, name):
     """The motion can be computed again from what it carries, to the last bit."""
@@ -64,6 +65,7 @@ def test_a_case_file_has_the_law_and_its_result_keeps_it(tmp_path, name):
     np.testing.assert_array_equal(again.memory, stored.memory)
 
 
+@pytest.mark.matrix
 def test_a_motion_starts_from_a_stored_state_and_its_memory(tmp_path):
     text = FOLD.format(law=LAWS["plastic"][0])
     first = fd.read_case(written(tmp_path, text + MOTION)).run()
@@ -110,6 +112,7 @@ def fold_case(law, **options):
     )
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("duration", ["0.5", "[0, 0.5, 2]"])
 def test_a_path_with_a_time(tmp_path, duration):
     law = 'fold_law = { kind = "eyring", barrier_moment = 2e-4, rate = 1e-4 }'

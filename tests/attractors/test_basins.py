@@ -51,6 +51,7 @@ def test_basins_of_a_symmetric_cell_are_symmetric(cell, found):
     assert (found.periods == 1).all()
 
 
+@pytest.mark.matrix
 def test_the_boundary_is_the_stable_manifold_of_the_saddle(cell):
     """From the saddle backward in time, along the direction that comes to it."""
     root = -0.5 * ALPHA - np.sqrt(0.25 * ALPHA**2 + 1.0)
@@ -90,6 +91,7 @@ def test_a_finer_grid_moves_the_boundary_by_less_than_a_cell(cell, found):
     np.testing.assert_array_equal(between[agree], corners[0][agree])
 
 
+@pytest.mark.matrix
 def test_motions_of_a_drive_are_told_apart_by_their_orbits():
     """A small force: a vibration in each well, mirrored half a period later."""
     case = duffing(-1.0, ALPHA, 0.05, omega=1.1)
@@ -112,6 +114,7 @@ def test_chaos_is_no_attractor_that_repeats():
     assert found.basin.values.tolist() == [-1, -1] and found.sizes["attractor"] == 0
 
 
+@pytest.mark.matrix
 def test_starts_that_all_end_in_one_orbit_have_its_number():
     """Once a period they are in one place, which has no range by which to compare."""
     case = duffing(1.0, 1.0, 0.1, cubic=False)  # at resonance: x = -0.1 cos t

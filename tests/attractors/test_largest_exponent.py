@@ -60,6 +60,7 @@ def test_a_stable_orbit_has_half_the_damping():
     assert float(found.exponent) == pytest.approx(-0.05, rel=0.01)
 
 
+@pytest.mark.matrix
 def test_uedas_oscillator_is_chaotic(ueda):
     found = fd.lyapunov_exponent(ueda, 800 * TURN, settle=50 * TURN, dt=TURN / 80)
     error = float(found.error)

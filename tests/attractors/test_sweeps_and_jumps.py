@@ -158,6 +158,7 @@ def test_base_motions_and_multiples_of_the_drive_are_swept():
     assert found.periods.item() == 1
 
 
+@pytest.mark.matrix
 def test_a_period_doubling_shows_in_the_section():
     """x'' + 0.3 x' - x + x^3 = f cos 1.2 t: periods 1, 2, 4 at these f.
 

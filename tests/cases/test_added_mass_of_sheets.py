@@ -90,6 +90,7 @@ def test_a_disk_has_the_mass_of_lamb_with_400_elements():
     assert np.log((1 - found[0]) / (1 - found[1])) / np.log(1.5) == pytest.approx(2.0, abs=0.25)
 
 
+@pytest.mark.matrix
 def test_plates_close_to_each_other_squeeze_the_fluid_between_them():
     """In a narrow gap h the fluid has the energy of torsion, 0.1406 rho a^4 / 2h for speeds 1, -1.
 
@@ -212,6 +213,7 @@ def test_shells_and_bars_move_the_same_fluid():
     np.testing.assert_allclose(*masses, rtol=1e-3, atol=1e-6)
 
 
+@pytest.mark.matrix
 def test_panels_of_any_number_of_corners_have_elements():
     """A house is the same however it is cut into panels, to the error of the grid."""
     house = np.array([(0, 0), (1, 0), (1, 1), (0.5, 1.5), (0, 1)], float)

@@ -84,6 +84,7 @@ def beam() -> np.ndarray:
     return np.array([1e-6 / (3.0 * d * 0.1), 3.516 / (2.0 * np.pi) * np.sqrt(d / areal)])
 
 
+@pytest.mark.matrix
 def test_a_clamped_strip_of_the_shell_bends_and_swings_as_a_beam():
     s = structure("shell", strip(1), FLAT, divisions=12, clamped=[(0, 1)])
     assert cantilever(s, [2, 3]) == pytest.approx(beam(), rel=0.01)
@@ -106,6 +107,7 @@ def test_a_clamped_chain_of_rigid_panels_bends_as_a_beam(panels):
     assert f == pytest.approx(exact[1], rel=1.2 / panels)  # lumped masses
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("preset", "frequency", "deflection"),
     [("plate", -0.163, 0.198), ("n5b8e", 0.014, -0.005), ("herkal", -0.098, -0.167)],

@@ -126,6 +126,7 @@ def test_case_files_and_results_hold_them(text, load, model, read, kept) -> None
     assert np.abs(found.displacement).max() > 1e-6
 
 
+@pytest.mark.matrix
 def test_a_motion_keeps_their_histories(kept) -> None:
     loads = [fd.Pressure(1e-3, [2, 3], fd.Ramp(0.1)), fd.CreaseMoment([0], 1e-3, fd.Pulse(0.02))]
     motion = fd.simulate(

@@ -44,6 +44,7 @@ def test_a_shell_is_held_on_the_whole_edge(shell):
     assert (frequencies(shell, ALONG) > 1.001 * frequencies(shell, fd.Fix("xmin"))).all()
 
 
+@pytest.mark.matrix
 def test_axes_and_directions_say_the_same(shell):
     one = frequencies(shell, fd.Fix("xmin", "z", along=True), fd.Fix("xmin", "xy", along=True))
     assert one == pytest.approx(frequencies(shell, ALONG), rel=1e-9)
@@ -193,12 +194,14 @@ kind = "statics"
     assert case.supports == (ALONG, fd.Fix("xmax", "x", along=True))
 
 
+@pytest.mark.matrix
 def test_stored_cases_keep_it(kept):
     shell = fd.shell(FOLD, SHEET, divisions=4, vertex_radius=1e-3)
     again = kept(fd.modes(fd.Case(shell, [ALONG]), 2))
     assert again.supports == (ALONG,) and again.structure.options.vertex_radius == 1e-3
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 def test_models_that_stand_beside_the_own_one_hold_it_too():
     case = fd.Case(fd.discretize(FOLD, SHEET, preset="plate", membrane="bars"), [ALONG])

@@ -66,6 +66,7 @@ def off_the_paraboloid(structure: fd.Structure, load: fd.Temperature, kappa: flo
     return float(np.abs(path.displacement.values[-1, :, 2] - lift).max() / np.abs(lift).max())
 
 
+@pytest.mark.matrix
 def test_a_free_strip_expands_without_stress() -> None:
     for structure in models(strip()):
         path = traced(structure, fd.Temperature(30.0, expansion=1e-4), factors=(0.0, 0.5, 1.0))
@@ -145,6 +146,7 @@ def test_panels_that_are_welded_curl_as_one(cut) -> None:
     assert off_the_paraboloid(structure, fd.Temperature(1.0, curvature=1e-5), 1e-5) < 1e-5
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("crease", [0.02, 2.0])
 def test_creases_of_a_folded_sheet_stay_straight_as_in_the_shell(crease) -> None:
     """Where they hold back the curl; schemes without edge angles do not know of that."""

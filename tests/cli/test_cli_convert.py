@@ -108,6 +108,7 @@ def test_a_result_with_its_states(result) -> None:
     assert "file_frames" not in written("a.fold")
 
 
+@pytest.mark.matrix
 def test_a_result_as_a_series(result) -> None:
     told = result[0].call("convert", "run.nc", "run.obj", "--frames", "4")
     assert told.new == [f"run_000{k}.obj" for k in range(4)]
@@ -116,6 +117,7 @@ def test_a_result_as_a_series(result) -> None:
     assert "run_0003.obj: belongs to a longer series" in told
 
 
+@pytest.mark.matrix
 def test_a_result_is_known_by_its_content(result) -> None:
     Path("run.nc").rename("run.result")
     assert result[0].call("convert", "run.result", "run.glb", "--quiet").new == ["run.glb"]

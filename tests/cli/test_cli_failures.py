@@ -44,6 +44,7 @@ def test_a_forced_step_far_above_the_critical_one(workplace, edited, factor) -> 
     check_partial("case-results/result.nc", 5.0)
 
 
+@pytest.mark.matrix
 def test_panel_through_panel(workplace) -> None:
     workplace.write(SHUT)
     failed = workplace.call("run", "case.toml")

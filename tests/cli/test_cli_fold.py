@@ -29,6 +29,7 @@ def turned(file: str) -> float:
     return 180.0 - math.degrees(pattern.dihedrals[0])
 
 
+@pytest.mark.matrix
 def test_a_pattern_is_folded_by_a_fraction(workplace, flap) -> None:
     told = workplace.good("fold", flap, "--to", "50%", "--steps", "3")
     assert told.new == ["flap-folded.fold", "flap-folded.html"]

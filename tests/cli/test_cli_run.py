@@ -82,6 +82,7 @@ def test_names_beyond_ascii(workplace, miura) -> None:
     assert done.new == [folder, f"{folder}/result.nc"]
 
 
+@pytest.mark.matrix
 def test_free_flight_is_legal(workplace, miura) -> None:
     workplace.write(changed(miura, "supports ="))
     workplace.good("run", "case.toml", "--no-figures")

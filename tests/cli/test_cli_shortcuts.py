@@ -36,6 +36,7 @@ def read(tmp_path):
     return read_text
 
 
+@pytest.mark.matrix
 def test_the_modes_of_a_motion(workplace, miura) -> None:
     again = ("--no-figures", "--count", "3", "--secant", "2", "--out", "pulse")
     workplace.write(miura)

@@ -73,6 +73,7 @@ def test_a_sweep_of_which_all_points_fail_fails(sweep):
     assert "sweep.nc" in done.err
 
 
+@pytest.mark.matrix
 def test_the_table_and_the_command_line(sweep, workplace):
     table = '[sweep]\nmeasures = ["frequencies"]\n[sweep.vary]\n"sheet.thickness" = [0.01]\n'
     assert sweep("--processes 1 --no-figures", text=MODES_TEXT + table).status == 0

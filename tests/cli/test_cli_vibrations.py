@@ -52,6 +52,7 @@ def cells_of(page: str) -> list[list[str]]:
     return [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in rows]
 
 
+@pytest.mark.matrix
 def test_modes_become_a_result_that_is_that_of_python(workplace) -> None:
     workplace.write(MODES)
     done = workplace.good("run", "case.toml", "--no-figures")
@@ -65,6 +66,7 @@ def test_modes_become_a_result_that_is_that_of_python(workplace) -> None:
     np.testing.assert_allclose(again["shape"], stored["shape"], atol=1e-9)
 
 
+@pytest.mark.matrix
 def test_a_response_becomes_a_result_that_is_that_of_python(workplace) -> None:
     workplace.write(RESPONSE)
     done = workplace.good("run", "case.toml", "--no-figures")

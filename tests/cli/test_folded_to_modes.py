@@ -30,6 +30,7 @@ def test_the_page_has_commands_for_each_pattern_of_its_table():
     assert sorted(COMMANDS) == sorted(TABLE) == files
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     "name", ["square-twist", "bird-base", *beyond(["waterbomb", "crane", "miura", "resch"], 2)]
 )

@@ -22,6 +22,7 @@ def stamped(folder: str = "case-results") -> dict:
     return json.loads(Path(folder, STAMP).read_text())
 
 
+@pytest.mark.matrix
 def test_the_stamp_says_what_the_folder_is_of(workplace, edited) -> None:
     assert workplace.run(edited(RULES)).status == 0
     told = stamped()
@@ -31,6 +32,7 @@ def test_the_stamp_says_what_the_folder_is_of(workplace, edited) -> None:
     assert told["foldyn_version"] == fd.__version__
 
 
+@pytest.mark.matrix
 def test_results_of_rules_that_are_no_longer_asked_for_go(workplace, edited, miura) -> None:
     workplace.run(edited(RULES))
     workplace.write(miura)
@@ -143,6 +145,7 @@ def test_a_folder_that_another_run_holds(workplace, miura) -> None:
     assert not Path("case-results", LOCK).exists()
 
 
+@pytest.mark.matrix
 def test_a_full_disk_is_got_around(workplace, edited, monkeypatch, tmp_path_factory) -> None:
     """What cannot be saved where it was to go is saved in the temporary folder, and named."""
     save, elsewhere = fd.results.save, tmp_path_factory.mktemp("elsewhere")
@@ -166,6 +169,7 @@ def test_a_full_disk_is_got_around(workplace, edited, monkeypatch, tmp_path_fact
     assert stamped()["results"] == ["result-panel.nc"]
 
 
+@pytest.mark.matrix
 def test_figures_that_cannot_be_drawn_do_not_hide_the_result(workplace, edited) -> None:
     Path("r/structure.png").mkdir(parents=True)
     workplace.write(edited("output.interval = 0.02"))

@@ -53,6 +53,7 @@ def assert_those_of_shells(
     return found, known
 
 
+@pytest.mark.matrix
 def test_bands_of_a_sector_of_a_ring_are_those_of_the_shell():
     assert_those_of_shells(SIDE, [(0.0,), (2.0,)], 4, screw=RING, count=4)
 
@@ -92,6 +93,7 @@ def test_bands_of_a_tower_are_those_of_the_shell():
     assert_those_of_shells(TOWER, [(0.5,), (2.0,)])
 
 
+@pytest.mark.matrix
 def test_a_closed_ring_has_the_waves_of_its_sector():
     """A storey of a tower, of which a side is the cell: rotations about the axis."""
     whole = fd.superelements(TOWER, SHEET, level=1, divisions=4)
@@ -101,6 +103,7 @@ def test_a_closed_ring_has_the_waves_of_its_sector():
     np.testing.assert_allclose(np.sort(found)[:30], known, rtol=1e-6, atol=1e-3)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("one", "two"),
     [
@@ -126,6 +129,7 @@ def test_two_cells_have_the_waves_of_one(one, two):
     np.testing.assert_allclose(found, known, rtol=1e-6, atol=1e-3)
 
 
+@pytest.mark.matrix
 def test_another_choice_of_the_cell_has_the_same_bands():
     """Panels moved by a period, in another order, with other first corners."""
     vertices, faces = MIURA.vertices, [np.array(face) for face in MIURA.faces]
@@ -184,6 +188,7 @@ def test_damped_creases_damp_and_attenuate_as_in_shells():
     np.testing.assert_allclose(*found, rtol=0.015)
 
 
+@pytest.mark.matrix
 def test_errors_of_bands():
     own = fd.superelements(PANEL, SHEET, level=3, divisions=8)
     cell = fd.UnitCell(fd.Case(own), STEPS)
@@ -239,6 +244,7 @@ count = 4
 """
 
 
+@pytest.mark.matrix
 def test_a_case_file_gives_bands(tmp_path):
     path = tmp_path / "sheet.toml"
     path.write_text(CASE, encoding="utf-8")

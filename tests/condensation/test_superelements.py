@@ -79,6 +79,7 @@ def test_parts_at_vertices(case):
     np.testing.assert_allclose(own, shell, rtol=3e-3)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     "options",
     [{"clamped": "xmin"}, {"rigid": [1]}, {"crease_stiffness": 40.0}, {"fold_law": "linear"}],
@@ -89,6 +90,7 @@ def test_options_mean_what_they_mean_for_shells(options):
     np.testing.assert_allclose(own, shell, rtol=4e-3)
 
 
+@pytest.mark.matrix
 def test_panels_of_different_sheets():
     sheet = replace(SHEET, panels=[fd.PanelSheet([0, 3], thickness=0.02, youngs_modulus=2e9)])
     own, shell = (frequencies(s, count=6) for s in both(sheet=sheet))
@@ -108,6 +110,7 @@ def test_a_weld_continues_the_sheet():
     np.testing.assert_allclose(own, whole, rtol=0.03)
 
 
+@pytest.mark.matrix
 def test_oblique_supports_hold_like_turned_ones():
     c, s = np.cos(0.7), np.sin(0.7)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -133,6 +136,7 @@ def test_damping_of_creases(stiffer):
     np.testing.assert_allclose(own, shell, rtol=0.02)
 
 
+@pytest.mark.matrix
 def test_creases_that_remember_turn_unevenly_too():
     """A branch that relaxes at once is a damper: the ratios of both are alike."""
     k, time = 1.0, 1e-3
@@ -150,6 +154,7 @@ DAMPED = [fd.Rayleigh(0.02, 1e-4), fd.ModalDamping(0.02, count=8)]
 DAMPED.append(fd.ModalDamping(0.02, count=8, state="initial"))
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("damping", DAMPED)
 def test_responses_are_sums_of_modes(damping):
     case = fd.Case(fd.superelements(PATTERN, SHEET, level=2, divisions=MESH), HELD, damping=damping)
@@ -212,6 +217,7 @@ def test_responses_say_how_far_they_hold():
     assert high.attrs["holds_to"] == pytest.approx(float(doubtful[0]))
 
 
+@pytest.mark.matrix
 def test_participation_includes_parts_that_move_with_supports():
     own, shell = (fd.modes(fd.Case(s, HELD), 3) for s in both())
     np.testing.assert_allclose(own["effective_mass"], shell["effective_mass"], rtol=0.03, atol=0.05)
@@ -229,6 +235,7 @@ def test_shapes_between_vertices():
         np.testing.assert_allclose(a, np.sign(a @ b) * b, atol=0.01 * np.abs(b).max())
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     "load",
     [
@@ -296,6 +303,7 @@ def test_errors_bound_the_difference_to_fine_shells(pattern, thickness):
             assert (off < 0.01 * limit).all()
 
 
+@pytest.mark.matrix
 def test_no_motion_has_a_negative_mass():
     """Turns of a hexagon, of hardly any mass, would get one in the limit of fine meshes."""
     angle = np.arange(6) * np.pi / 3.0

@@ -86,6 +86,7 @@ def test_a_rest_angle_beyond_closing_is_named():
         )
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("history", [fd.Ramp(0.5, smooth=True), None])
 def test_a_shell_that_its_crease_folds(history):
     """Free of all else it comes to rest at the new angle, and the actuator's work is counted."""

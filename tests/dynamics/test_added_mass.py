@@ -76,6 +76,7 @@ def test_a_sheet_that_folds_moves_alike_wherever_it_stands():
     assert_allclose(tied, last_place(held=fd.Fix([0, 1, 2], "z")), atol=1e-10 * SIDE)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("first", [1, 2, 3])
 def test_a_sheet_moves_alike_whatever_the_first_corner_of_its_panels(first):
     """Of two triangles that share an element the first one must not have it alone."""
@@ -215,6 +216,7 @@ def test_what_does_not_take_added_mass_says_so():
     assert blown.attrs["method"] == "dormand_prince"
 
 
+@pytest.mark.matrix
 def test_panels_that_close_on_each_other_end_the_motion():
     pattern = fd.patterns.simple_fold(a=SIDE, b=SIDE, dihedral=60)
     sheet, crease = fd.Sheet(2e7, 0.3, 2e-3, density=300.0), {"crease_stiffness": 0.5}

@@ -117,6 +117,7 @@ def forces(case, v):
     return force, term.damping(np.zeros(v.size)).toarray()
 
 
+@pytest.mark.matrix
 def test_drag_of_a_turning_panel_is_that_of_its_parts():
     """A plate that turns about an edge: 1/2 rho Cd w^2 int y^2 dA = 1/2 rho Cd w^2 b a^3 / 3."""
     structure, rate = plate(), 3.0

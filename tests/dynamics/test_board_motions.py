@@ -87,6 +87,7 @@ def test_without_contact_boards_pass_through_each_other():
     assert deepest(case, motion) > 0.3 * T
 
 
+@pytest.mark.matrix
 def test_a_thick_miura_bounces_between_planes():
     """All its vertices are hinged in the middle; it loses nothing."""
     pattern = fd.thicken(fd.patterns.miura(cells=(2, 2)), 0.01, offsets=0.0)

@@ -122,6 +122,7 @@ def test_stiff_damping_is_implicit():
     assert "critical step 1.8e-07 s" in reason
 
 
+@pytest.mark.matrix
 def test_a_slow_load_is_implicit():
     """Ten seconds of pushing are half a million explicit steps, and a few hundred implicit ones."""
     case = fd.read_case(find_case("herkal/specimen-release")).case()

@@ -118,6 +118,7 @@ def test_methods_converge_to_one_motion_with_their_orders(method, mass):
     assert order(steps, errors) == pytest.approx(METHODS[method].order, rel=0.075)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", METHODS)
 def test_energies_balance_in_the_default_model_and_methods_agree(method):
     push = fd.Force([7], (0.01, 0.0, 0.0), fd.HalfSine(0.1))

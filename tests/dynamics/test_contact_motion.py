@@ -122,6 +122,7 @@ def test_a_conserving_strip_loses_no_energy_where_it_touches():
     assert run.attrs["energy_error"] < 1e-9
 
 
+@pytest.mark.matrix
 def test_it_crosses_itself_without_contact_or_without_the_limit_of_steps(monkeypatch):
     pytest.importorskip("ipctk")
     case = folded_from_both_ends(None)
@@ -283,6 +284,7 @@ def test_nodes_make_way_for_a_plane_that_hits_them():
     assert (height > -2e-3 + 6e-3 * np.minimum(run.time.values / 2e-3, 1.0)).all()
 
 
+@pytest.mark.matrix
 def test_supports_that_move_press_panels_together():
     pytest.importorskip("ipctk")
     s = fd.discretize(fd.patterns.simple_fold(a=0.04, b=0.05, dihedral=40), SHEET)

@@ -122,6 +122,7 @@ def test_work_is_the_change_of_the_energy(kind, angle):
     assert touched > 50
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("kind", KINDS)
 def test_in_short_steps_it_is_the_gradient_halfway(kind):
     pair, rng, orders = Pair(kind), np.random.default_rng(2), []

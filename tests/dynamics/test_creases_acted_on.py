@@ -91,6 +91,7 @@ def test_motions_are_those_with_edge_angles_without_mass(method, law, loads):
     assert balance(found) < (2e-5 if central else 1e-6)
 
 
+@pytest.mark.matrix
 def test_runge_kutta_keeps_its_order():
     """In displacements; and in the balance, where forces are constant."""
     steps = (8e-5, 4e-5, 1e-5)
@@ -166,6 +167,7 @@ def test_creases_that_remember_or_are_damped_move_as_with_edge_angles_without_ma
     assert balance(found) < (2e-4 if jerky else 1e-6)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("kind", "order"),
     [

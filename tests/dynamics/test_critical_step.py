@@ -50,6 +50,7 @@ def test_motion_just_below_and_above_the_limit(damping, method):
     assert above > 10.0 * below
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the energy balance")
 @pytest.mark.parametrize("method", ["rk4", "dormand_prince"])
 @DAMPINGS

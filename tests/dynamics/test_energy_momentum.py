@@ -259,6 +259,7 @@ def test_with_memory_it_tends_to_the_motion_of_other_methods_with_order_two(mode
         assert law == "plastic" or order(steps, errors) > 1.8
 
 
+@pytest.mark.matrix
 def test_newtons_method_takes_as_many_iterations_as_without_memory():
     counts = [
         fd.simulate(moved("plate", law), 0.6, method=METHOD, dt=6e-3).attrs["iterations"]

@@ -122,6 +122,7 @@ def test_one_that_fails_does_not_stop_the_others():
     np.testing.assert_array_equal(without.displacement[0], many.displacement[0])
 
 
+@pytest.mark.matrix
 def test_what_lanes_do_not_take_is_computed_alone():
     """Between cases that they take, of two kinds of laws; each with the bits of `simulate`."""
     s, (fix,) = FIRST.structure, FIRST.supports

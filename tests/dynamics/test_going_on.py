@@ -84,6 +84,7 @@ def test_an_origin_of_other_nodes_is_refused():
         fd.simulate(fd.Case(small, [fd.Fix([2, 3, 4, 5])]), 0.01, method="rk4", initial=start)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("damping", "air"), [(MODAL, None), (fd.Rayleigh(), WATER)])
 def test_motions_of_one_case_side_by_side_begin_each_with_its_own(damping, air):
     case = fd.Case(S, HELD, [PUSH], damping, air=air)

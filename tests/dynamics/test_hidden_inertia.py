@@ -101,6 +101,7 @@ def test_dofs_of_explicit_methods_are_those_of_the_same_model(kind):
     assert change == pytest.approx(other.internal(z) @ step, rel=1e-6)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("kind", "method"),
     [("condensed", method) for method in EXPLICIT]
@@ -120,6 +121,7 @@ def test_a_smooth_motion_is_that_without_inertia(kind, method):
         assert apart(found[name].values, wanted[name].values) < 2e-4
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("kind", ["condensed", "inertia_exact", "shell"])
 def test_a_free_sheet_keeps_its_momenta_and_its_energy(kind):
     made = fd.Case(structure(kind))
@@ -157,6 +159,7 @@ def test_kinetic_energy_includes_rotations_that_follow_the_nodes():
     assert found == pytest.approx(own + nodal, rel=1e-12)
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:creases are damped")
 @pytest.mark.parametrize("method", EXPLICIT)
 def test_a_motion_goes_on_from_a_checkpoint_bit_for_bit(method, tmp_path):
@@ -187,6 +190,7 @@ def test_inertia_is_that_of_a_copy():
     np.testing.assert_allclose(hidden_inertia(held), 27.0 * hidden_inertia(made), rtol=1e-9)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", EXPLICIT)
 def test_a_motion_goes_on_from_the_last_sample_of_another(method):
     """With dofs that samples do not hold; not so the next implicit one, which balances them."""

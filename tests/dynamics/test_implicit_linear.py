@@ -117,6 +117,7 @@ def test_steps_are_those_of_the_amplification_matrix(method, radius, wh, damping
     np.testing.assert_allclose(v, exact[:, 1], rtol=1e-6, atol=1e-10 * max(1.0, wh))
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:steps of 0.5 s do not resolve")
 @pytest.mark.parametrize("method", ["newmark", "energy_momentum"])
 def test_a_linear_system_keeps_its_energy_and_closes_its_balance(method):

@@ -29,6 +29,7 @@ def pull(history=None, value: float = 1e-3) -> fd.Impose:
     return fd.Impose([6, 7, 8], "x", value, history)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", METHODS)
 def test_oscillator_on_a_shaken_base(method):
     """x'' = w^2 (b - x) with b = B sin(p t) from rest, in closed form; observed order."""

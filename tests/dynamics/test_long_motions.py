@@ -169,6 +169,7 @@ def test_a_finished_motion_is_only_read(kept):
     assert looked
 
 
+@pytest.mark.matrix
 def test_ctrl_c_says_what_is_kept(kept):
     said = r"keeps it up to t = 0\.\d+ s: continue it by"
     with pytest.raises(MotionInterrupted, match=said) as stopped:
@@ -180,6 +181,7 @@ def test_ctrl_c_says_what_is_kept(kept):
     same(simulated("sheet", **kept, resume=True), whole)
 
 
+@pytest.mark.matrix
 def test_a_motion_that_fails_is_stored_until_then(kept, tmp_path):
     wild = {"duration": 4.0, "every_steps": 1, "interval": None, "dt": 0.0175, "force": True}
     failed = []

@@ -270,12 +270,14 @@ def continued(case, method, folder, duration, **steps):
     return part, again
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("law", ["linear", *LAWS])
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_implicit_motions_go_on_from_their_ends_bit_by_bit(law, method, tmp_path):
     continued(pushed(LAWS.get(law, law)), method, tmp_path, 0.6, **STEPS)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("law", ["linear", PRONY], ids=["linear", "prony"])
 def test_they_go_on_with_steps_that_are_chosen_by_their_error(law, tmp_path):
     steps = {"tolerance": 1e-5, "dt": 0.05, "interval": 0.125}
@@ -341,6 +343,7 @@ def test_rotations_of_a_shell_go_on(method, tmp_path):
     continued(case, method, tmp_path, 0.1, dt=1e-3, every_steps=20)
 
 
+@pytest.mark.matrix
 def test_a_continued_motion_runs_again_from_itself(tmp_path):
     _, again = continued(pushed(), ALPHA, tmp_path, 0.6, **STEPS)
     state = fd.initial_state(again, at=0)
@@ -387,6 +390,7 @@ def test_only_the_ends_of_a_motion_and_the_same_method_go_on(whole):
 
 
 # ------------------------------------------------------------------ what laws are, and take
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", [DP, ALPHA])
 @pytest.mark.parametrize("name", LAWS)
 def test_a_structure_that_has_moved_does_the_same_work(name, method):

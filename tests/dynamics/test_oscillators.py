@@ -18,6 +18,7 @@ K = 8.0  # N/m
 SPRING = spring(OMEGA)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("cubic", [0.0, 40.0])
 @pytest.mark.parametrize("method", METHODS)
 def test_order_on_linear_and_duffing_oscillators(method, cubic):

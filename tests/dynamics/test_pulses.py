@@ -149,6 +149,7 @@ def test_supports_and_folds_that_move_for_a_moment(method):
         assert apart(found, true) < 0.02
 
 
+@pytest.mark.matrix
 def test_steps_end_at_knots():
     """Beginnings, corners and ends of all histories; sharp corners of tables only."""
     tap = fd.Table([0.0, 0.31, 0.32, 0.33], [0, 0, 1, 0])
@@ -181,6 +182,7 @@ def test_slow_loads_still_take_few_steps():
     assert fd.simulate(case, 400.0, method="newmark").attrs["steps"] < 600
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["rk4", "central_difference", *IMPLICIT])
 def test_fixed_steps_that_miss_a_pulse_say_so(method):
     """Half-sine of one step, harmonic of a whole period a step; none for what they resolve."""
@@ -208,6 +210,7 @@ def test_long_motions_are_looked_at_about_their_knots():
     assert tried(pushed(tap), 200.0, "central_difference", dt=1e-3, every_steps=10_000)[1]
 
 
+@pytest.mark.matrix
 def test_functions_are_looked_at_within_steps_and_warned_about():
     """A function's pulse longer than the points' distance is found; its corners may be named."""
 

@@ -17,6 +17,7 @@ def run(sample, method="rk4", **given):
     )
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["rk4", "generalized_alpha"])
 def test_functions_get_the_state_at_the_samples_and_are_stored(method, tmp_path):
     speeds = fd.Quantity("m/s", "speed", ("node", "axis"), lambda u, v, t: np.abs(v))
@@ -32,6 +33,7 @@ def test_functions_get_the_state_at_the_samples_and_are_stored(method, tmp_path)
     np.testing.assert_array_equal(fd.load(tmp_path / "motion.nc").place, motion.place)
 
 
+@pytest.mark.matrix
 def test_functions_cannot_change_the_motion():
     def spoil(u, v, t):
         u[:] = v[:] = 7.0

@@ -41,6 +41,7 @@ def both(made, method="rk4", duration=LONG):
     return fd.simulate(made, length, method=method, interval=interval), wanted
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("ratio", "model", "method"),
     [
@@ -93,6 +94,7 @@ def bistable():
     )
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("law", "moment"),
     [
@@ -107,6 +109,7 @@ def test_creases_of_other_laws_soften_as_in_implicit_motions(law, moment):
     assert apart(found, wanted) < 2e-3
 
 
+@pytest.mark.matrix
 def test_a_motion_as_fast_as_edge_angles_swing_is_doubted():
     """Yielding in three swings, after a tenth of the time that the test above gives it."""
     made = case(100.0 * AS_STIFF, PLASTIC, duration=0.1 * LONG)

@@ -27,6 +27,7 @@ def swung(method: str, **options):
     return motion, np.abs(place(motion) - 0.1 * np.cos(OMEGA * motion.time.values)).max()
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("method", "tolerance", "power", "near", "error"),
     [
@@ -145,6 +146,7 @@ def test_two_jumps_within_a_nanosecond_are_one(method):
     np.testing.assert_allclose(*found, rtol=0, atol=1e-7 * np.abs(found[0]).max())
 
 
+@pytest.mark.matrix
 def test_statistics_travel_with_the_result(tmp_path):
     motion = fd.simulate(
         case2(), 0.5, method="generalized_alpha", interval=0.1, spectral_radius=0.5
@@ -160,6 +162,7 @@ def test_statistics_travel_with_the_result(tmp_path):
     np.testing.assert_allclose(again.displacement, motion.displacement, rtol=0, atol=1e-12)
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the energy balance")
 def test_steps_on_which_newton_fails_are_halved_and_counted():
     """A spinning soft sheet with a tenth of a radian a step: some steps are taken in parts."""
@@ -186,6 +189,7 @@ def test_coefficients_are_those_of_scipy_and_fulfil_their_conditions():
     np.testing.assert_allclose(dormand_prince.E.sum(), 0.0, atol=1e-15)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("law", ["superlinear", fd.Plastic(2e-3, 0.01)], ids=["", "yields"])
 @pytest.mark.parametrize("preset", ["plate", "n5b8e"])
 def test_moments_that_jump_do_the_work_that_is_stored_and_lost(preset, law):

@@ -108,6 +108,7 @@ def test_threads_share_what_touches(monkeypatch, method, threads):
     assert found.attrs["energy_error"] == pytest.approx(alone.attrs["energy_error"], rel=1e-3)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", METHODS)
 def test_where_nothing_touches_threads_give_the_bits_of_a_motion_without_contact(
     monkeypatch, method

@@ -83,6 +83,7 @@ def test_a_model_that_is_not_there(tmp_path):
         track_film(str(tmp_path / "sheets.mkv"), model())
 
 
+@pytest.mark.matrix
 def test_more_nodes_than_points(sharp):
     few = Tracking(corners=CornerSettings(most=8), nodes=tuple(range(20)))
     with pytest.raises(InputError, match="8 points are tracked, fewer than the 20 nodes"):

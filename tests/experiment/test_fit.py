@@ -50,6 +50,7 @@ def test_exact_forces_give_the_parameters_exactly(pressed) -> None:
     assert found.scores[0].relative < 1e-5
 
 
+@pytest.mark.matrix
 def test_a_tie_follows_its_parameter(pressed) -> None:
     ties = {"sheet.thickness": "0.01 * sheet.length_scale_ratio"}
     found = fd.fit(pressed, [forces(pressed, 1e-5)], parameters=[RATIO], ties=ties)
@@ -70,6 +71,7 @@ def test_intervals_follow_the_noise(pressed) -> None:
     assert 0.5 < small.misfit < 1.6
 
 
+@pytest.mark.matrix
 def test_what_the_data_cannot_tell_is_said(pressed) -> None:
     density = Parameter("sheet.density", 2.0)
     found = fd.fit(pressed, [forces(pressed, 1e-5)], parameters=[RATIO, density])
@@ -98,6 +100,7 @@ def test_parameters_of_which_only_quotients_count(swung) -> None:
     assert two["sheet.youngs_modulus"].value == pytest.approx(1e6, rel=0.01)
 
 
+@pytest.mark.matrix
 def test_a_parameter_at_its_bound_is_said_to_be_there(pressed) -> None:
     found = fd.fit(pressed, [forces(pressed)], parameters=[Parameter(RATIO.key, 2.0, 1.5, 5.0)])
     assert found.estimates[0].at_bound

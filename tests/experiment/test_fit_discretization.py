@@ -161,6 +161,7 @@ def test_a_path_has_no_time_step(tmp_path) -> None:
     assert problem(pressed, [one], [Parameter("sheet.thickness")], {}).finer([0.01]) == []
 
 
+@pytest.mark.matrix
 def test_a_model_that_fails_with_finer_steps_is_told_of(swung, seen, monkeypatch) -> None:
     from foldyn.experiment.calibration import fit
 
@@ -179,6 +180,7 @@ def test_a_model_that_fails_with_finer_steps_is_told_of(swung, seen, monkeypatch
     assert alpha.lower < alpha.value < alpha.upper
 
 
+@pytest.mark.matrix
 def test_finer_evaluations_are_kept_too(swung, seen, tmp_path) -> None:
     course: list = []
     for _ in range(2):
@@ -194,6 +196,7 @@ def test_finer_evaluations_are_kept_too(swung, seen, tmp_path) -> None:
     assert course[-1].found == found.evaluations
 
 
+@pytest.mark.matrix
 def test_trends_and_shifts_take_degrees_of_freedom(swung, seen) -> None:
     """The residual of noise has as many less as a record's mean, slope and start are free."""
     aligned = replace(seen, time=TIME[10:50], values=seen.values[10:50], align=0.01)

@@ -251,6 +251,7 @@ def tracks(along: str, lost: bool = True) -> xr.Dataset:
     return xr.Dataset(held, axes, {"foldyn_tracks": 1})
 
 
+@pytest.mark.matrix
 def test_tracks_of_a_film_are_histories(folder) -> None:
     tracks("time").to_netcdf(folder / "film.nc", engine="h5netcdf")
     one = recognize(folder / "film.nc", axis="y")
@@ -262,6 +263,7 @@ def test_tracks_of_a_film_are_histories(folder) -> None:
         shapes(folder / "film.nc", load_factor=[1, 2, 3])
 
 
+@pytest.mark.matrix
 def test_tracks_of_photographs_are_shapes(folder) -> None:
     tracks("photo").isel(axis=[0, 1, 2]).to_netcdf(folder / "photos.nc", engine="h5netcdf")
     one = shapes(folder / "photos.nc", nodes=[9], load_factor=[0.2, 0.5, 1.0])

@@ -91,6 +91,7 @@ def test_the_page_shows_the_model_and_charts(fitted, tmp_path) -> None:
     assert page.index("data-foldyn=") < page.index("Parameters") < page.index("How it was computed")
 
 
+@pytest.mark.matrix
 def test_histories_are_drawn_where_they_are_compared(fitted) -> None:
     """Without the mean, which is taken off both."""
     one = fitted.problem.measurements[2]

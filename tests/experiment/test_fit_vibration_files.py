@@ -99,6 +99,7 @@ def folder(tmp_path, results):
     return tmp_path
 
 
+@pytest.mark.matrix
 def test_a_fit_file_says_what_was_measured(folder, results) -> None:
     hertz, damping, shapes, response, held = read_fit(folder / "fit.toml").data
     assert isinstance(hertz, NaturalFrequencies)
@@ -161,6 +162,7 @@ def test_columns_tell_what_a_file_holds(folder) -> None:
         recognize(folder / "frf.csv", axis="x")
 
 
+@pytest.mark.matrix
 def test_magnitudes_and_other_quantities(folder) -> None:
     (folder / "frf.csv").write_text("frequency [kHz],node 8 z magnitude [m/s²/N]\n0.1,3\n0.2,4\n")
     one = read_fit(folder / "fit.toml").data[3]

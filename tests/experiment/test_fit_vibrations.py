@@ -204,6 +204,7 @@ def test_velocities_and_accelerations_per_force(folder, response, quantity) -> N
     np.testing.assert_allclose(said, one.observed(), rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.matrix
 def test_a_moving_base_gives_a_transmissibility(tmp_path) -> None:
     drive = "[[drive]]\nnodes = [8]\nforce = [0, 0, 1]\n"
     path = fit_cases.write(tmp_path, FRF.replace(drive, '[[drive]]\nbase = "z"\n'))

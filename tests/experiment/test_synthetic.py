@@ -94,6 +94,7 @@ def test_neighboring_panels_differ_in_color():
     assert (color[a] != color[b]).all()
 
 
+@pytest.mark.matrix
 def test_films_of_simulations_and_photos_of_paths(tmp_path):
     structure = folded(70.0)
     held, pull = fd.Fix([20, 22, 24]), fd.Force([1, 3], (0.01, 0, 0))

@@ -22,6 +22,7 @@ def test_nodes_keep_their_identity_and_their_place(sharp, tracked):
     assert error[known].max() < 2.0  # the nearest other node is 35 pixels away
 
 
+@pytest.mark.matrix
 def test_standard_errors_are_of_the_size_of_the_errors(sharp, tracked):
     point = tracked["node_of_point"].values
     told = np.full((80, 25), np.nan)

@@ -36,6 +36,7 @@ def test_a_row_for_each_sample_and_node(tmp_path):
         np.testing.assert_array_equal(found, run.velocity[:, :, k])
 
 
+@pytest.mark.matrix
 def test_a_row_for_each_point_of_a_backbone_and_each_of_its_harmonics(tmp_path):
     spine = backbone()
     frame = table(spine, tmp_path)

@@ -72,6 +72,7 @@ def test_lines_through_one_point(count):
     assert (len(p.faces), len(p.vertices)) == (2 * count, 2 * count + 1)
 
 
+@pytest.mark.matrix
 @settings(max_examples=15)
 @given(st.randoms(use_true_random=False), st.integers(2, 9))
 def test_the_order_of_lines_does_not_matter(random, count):

@@ -97,6 +97,7 @@ def test_flat_patterns_of_every_generator(kind, extension, tmp_path):
     assert kind != "miura" or found.diagnosis.repairs == found.diagnosis.doubts == ()
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("extension", BOTH)
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**31))
@@ -107,6 +108,7 @@ def test_random_flat_patterns(extension, seed, tmp_path_factory):
     assert_alike(p, diagnose(path, facets="hinge").pattern)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("extension", FOLDED)
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**31))

@@ -38,6 +38,7 @@ def test_what_nodes_reach_at_once_has_a_derivative_where_they_stay_alike(measure
     assert max(Design(tower, {"stiffness": uneven}, [measure], PRESSED).errors().values()) < 1e-5
 
 
+@pytest.mark.matrix
 def test_what_counts_for_nothing_may_tie() -> None:
     both = "displacement[6,z] + 0 * strain"
     found = fd.sensitivity(tower, {"stiffness": np.full(10, 0.15)}, measures=both, analysis=PRESSED)

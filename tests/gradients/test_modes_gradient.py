@@ -48,6 +48,7 @@ def test_gradients_agree_with_differences(preset, measures, closely):
     assert max(errors.values()) < closely, errors
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("preset", PRESETS)
 def test_gradients_by_the_shape_of_panels(preset):
     design = Design(build(preset), {"panel_angle": 61.7}, ["frequency[1]", "frequency[2]"], MODES)
@@ -251,6 +252,7 @@ def test_their_sum_has_one():
     assert found["gradient_one"].values[0] == pytest.approx(slope, rel=1e-5)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("rates", [{"one": 1.0}, {"one": 0.3, "other": -1.0}, {"thickness": 1.0}])
 def test_each_has_derivatives_in_one_direction(rates):
     k = pair()

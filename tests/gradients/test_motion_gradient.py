@@ -52,6 +52,7 @@ def test_gradients_agree_with_differences(preset):
         assert max(errors.values()) < 1e-6, errors
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
 def test_gradients_by_what_the_sheet_is_made_of(mass):
     values = {"youngs": 1e5, "force": 0.4}
@@ -183,6 +184,7 @@ def test_a_size_of_zero_has_no_derivative():
         fd.sensitivity(still, ["fold_stiffness"], measures="largest_displacement", analysis=MOTION)
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:creases are damped")  # two nodes that are struck shake them
 @pytest.mark.parametrize("method", ["rk4", "central_difference"])
 @pytest.mark.parametrize("model", ["n5b8e", "shell"])

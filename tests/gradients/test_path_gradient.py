@@ -151,6 +151,7 @@ def test_numbers_of_one_equilibrium_share_the_factors(monkeypatch: pytest.Monkey
     assert len(count) == 1
 
 
+@pytest.mark.matrix
 def test_barriers_share_the_landscape(monkeypatch: pytest.MonkeyPatch) -> None:
     count: list[int] = []
 

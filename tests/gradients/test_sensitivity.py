@@ -200,6 +200,7 @@ def test_stiffnesses_of_several_decades():
     assert found == pytest.approx([own(k) for k in range(4)], rel=1e-8)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("preset", ["plate", "herkal"])
 def test_a_kink_of_the_design_is_warned_of(preset):
     """Plates bend otherwise beyond corners of 120 degrees; rectangles along either diagonal."""

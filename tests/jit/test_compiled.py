@@ -112,6 +112,7 @@ def move(x, at, out, place):
     put(out, place, eight(x, at))
 
 
+@pytest.mark.matrix
 def test_formulas_of_eights_are_those_of_numbers():
     """On both sides of every choice, and of what is not a number."""
     random = np.random.default_rng(0)

@@ -39,6 +39,7 @@ def run(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, env=where, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("name", "value", "told"),
     [

@@ -208,6 +208,7 @@ def test_frequency_responses_from_motions_are_the_direct_ones(kind, model, metho
     )
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:damping. .* resist")
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if "start" in kind or "relax" in kind])
 def test_steady_motions_of_diagrams_are_the_direct_responses(kind):
@@ -333,6 +334,7 @@ def test_motions_of_basins_settle_at_that_rate(kind, model):
     assert np.abs(off).max() < 1e-5 * np.abs(start.velocity).max() * period
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the energy balance of the motion")
 def test_damped_creases_of_plates_are_of_first_order_but_by_energy_momentum():
     case = swing("creases", "plate")

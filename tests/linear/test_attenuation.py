@@ -43,6 +43,7 @@ def test_chains_of_masses_and_springs_decay_as_their_formula_says():
     assert found.attenuation.values == pytest.approx([0.0, exact[1].imag], rel=10.0 * stiff)
 
 
+@pytest.mark.matrix
 def test_attenuation_is_above_zero_in_gaps_alone():
     cell, phase = miura(), np.pi
     ky = np.full(81, phase)

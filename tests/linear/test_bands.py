@@ -30,6 +30,7 @@ def assert_alike(cell, supercell, counts, states=({}, {}), **options):
     np.testing.assert_allclose(own, whole, rtol=0.0, atol=EXACT * whole[-1])
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("mass", RULES)
 def test_supercells_have_the_waves_of_one_cell(mass):
     assert_alike(miura(mass=mass), miura((2, 2), mass=mass), (2, 2))
@@ -244,6 +245,7 @@ def powers(cell, way, count):
     return np.log2(np.sqrt(b.eigenvalue[1].values / b.eigenvalue[0].values))
 
 
+@pytest.mark.matrix
 def test_branches_that_begin_at_zero():
     """A sheet: bending and two in its plane; a strip: two that bend, torsion and stretching; a
     tower: torsion and stretching at no phase, bending at its angle in turning axes."""
@@ -336,6 +338,7 @@ def test_long_waves_are_those_of_the_homogenized_sheet():
 
 
 # ---------------------------------------------------------------------- sorting and refusals
+@pytest.mark.matrix
 def test_bands_follow_shapes_through_crossings():
     b = fd.bands(miura(), miura().path("G-X", 120), count=8, shape=True, group_velocity=True)
     frequency = b.frequency.values
@@ -368,6 +371,7 @@ def test_states_that_are_no_equilibrium_are_told():
     assert b.vectors.values == pytest.approx(np.array([[0.0, 0.0, 0.03003]]))
 
 
+@pytest.mark.matrix
 def test_bands_are_stored_with_their_case(tmp_path):
     b = fd.bands(miura(), miura().path("G-X", 3), count=2, shape=True)
     fd.save(b, tmp_path / "bands.nc")

@@ -104,6 +104,7 @@ def test_the_spectrum_of_a_small_motion_peaks_on_the_bands(tapped):
     assert set(strong) == {0, 1}  # of both bands
 
 
+@pytest.mark.matrix
 def test_energy_and_momenta_are_kept_in_an_impact(tapped):
     case = UNIT.chain(40)
     mass = np.asarray(case.mass.sum(axis=0)).ravel()

@@ -51,6 +51,7 @@ def of_shell(*arguments):
     return convergence([first_mode(n, *arguments) for n in MESHES], MESHES).limit
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("times", [0.01, 1.0, 100.0])
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_between_rigid_panels(pattern, times):
@@ -65,6 +66,7 @@ def test_between_rigid_panels(pattern, times):
     assert share == pytest.approx(1.0, abs=2e-3)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("pattern", "held", "times"), in_pairs(PATTERNS, [True, False], [0.01, 0.1])
 )
@@ -76,6 +78,7 @@ def test_where_creases_have_most_of_the_energy(pattern, held, times):
         assert ratio == pytest.approx(wanted, rel=0.01)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("times", [0.1, 1.0, 10.0, 1000.0])
 @pytest.mark.parametrize("held", [True, False], ids=["held", "free"])
 def test_with_the_inertia_of_panels_that_bend(held, times):

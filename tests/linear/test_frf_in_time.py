@@ -31,6 +31,7 @@ def error_of(method, case=None, **options) -> float:
     return largest_error(found.receptance.values[:, 1:, 0], exact)
 
 
+@pytest.mark.matrix
 def test_simulated_motions_write_no_document_and_discretize_nothing(monkeypatch):
     """The response alone carries the case, whose structure is known to be made again."""
     case, calls = miura_case(alpha=2.0), []
@@ -102,6 +103,7 @@ def test_a_miura_cell():
     assert (sines.unsteadiness <= 1e-4).all()
 
 
+@pytest.mark.matrix
 def test_bursts_are_coherent_and_repeatable():
     case, drive = chain(**DAMPING), PUSH
     options = {"averages": 3, "duration": 30.0, "estimator": "h2"}
@@ -229,7 +231,7 @@ def test_imposed_nodes_stay_where_the_state_puts_them():
 
 
 # ------------------------------------------------------------------------ progress, refusals
-@pytest.mark.parametrize("method", ["direct", *TIMED])
+@pytest.mark.parametrize("method", ["direct", *beyond(TIMED, 1)])
 def test_progress(method):
     told = []
     frf(

@@ -29,6 +29,7 @@ def beside(case: fd.Case, **options) -> fd.Case:
     return case.altered(structure=fd.superelements(case.structure.pattern, PAPER, **own))
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("preset", "options"),
     [("n5b8e", {}), *beyond([("plate", {}), ("n5b8e", {"clamped": [(0, 1)]})], 1)],
@@ -41,6 +42,7 @@ def test_errors_are_those_relative_to_the_best_superelements(preset, options):
     assert "missing_frequencies" not in found.attrs
 
 
+@pytest.mark.matrix
 def test_modes_far_off_and_missing_are_told_in_one_line():
     case = held()
     with pytest.warns(FoldynWarning) as caught:
@@ -62,6 +64,7 @@ def test_rigid_modes_have_no_error():
     assert np.isnan(found.model_error[:6]).all() and (np.abs(found.model_error[6:]) < 0.05).all()
 
 
+@pytest.mark.matrix
 def test_what_is_not_compared_says_so():
     big = fd.patterns.miura((11, 10), 0.03, b=0.03, panel_angle=60, dihedral=100)
     assert "440 panels, more than 200" in fd.modes(held(pattern=big), 1).attrs["not_compared"]
@@ -89,6 +92,7 @@ def test_responses_hold_up_to_the_first_doubtful_mode():
     assert low.attrs["holds_to"] == low.frequency[-1]
 
 
+@pytest.mark.matrix
 def test_modes_that_resemble_nothing_have_no_error():
     case = held("n5b8e")
     other = model_error.beside(case)
@@ -103,6 +107,7 @@ def test_modes_that_resemble_nothing_have_no_error():
     assert "resemble" in own.doubts(np.ones(3, bool)) and "missing" in own.doubts(np.ones(3, bool))
 
 
+@pytest.mark.matrix
 def test_bands_far_off_are_told():
     """Those of the gallery's cell, whose gap lies near 500 Hz and with the model near 330 Hz."""
     sheet = fd.Sheet(3e9, 0.3, thickness=2.4e-4, density=1200.0, length_scale_ratio=10.0)

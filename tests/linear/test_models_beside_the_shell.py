@@ -93,6 +93,7 @@ def test_displacements_are_those_of_the_study(miura):
     assert 0.0 < float(result["deflection_mesh_error"]) < 0.02  # a coarser mesh is softer
 
 
+@pytest.mark.matrix
 def test_the_models_of_case_study_2(miura):
     """The case's own is "standard", which is left out; each finer model has smaller errors.
 
@@ -115,6 +116,7 @@ def test_the_models_of_case_study_2(miura):
     assert fd.case_of(found.result).loads == case.loads
 
 
+@pytest.mark.matrix
 def test_warnings_of_the_case_are_not_repeated(recwarn):
     partly = [fd.Fix([0, 1, 2, 3]), fd.Impose([4], "z", 0.1)]
     case = fd.Case(fold(**PLATE), partly, [fd.Force([4, 5], (0, 0, 1e-4))])
@@ -132,6 +134,7 @@ def test_numbers_stand_beside_their_units(quick):
     assert not any(line.startswith(("%", "Hz")) for line in text.splitlines())
 
 
+@pytest.mark.matrix
 def test_a_case_with_the_right_model_keeps_it():
     found = fd.fidelity(
         fd.Case(fold(**PLATE), [fd.Fix([0, 1, 2, 3])]), 2, reference="shell", divisions=(4, 8)
@@ -151,6 +154,7 @@ def test_a_free_sheet_has_no_displacement_under_its_weight():
     assert (result["frequency"] > 0.0).all()
 
 
+@pytest.mark.matrix
 def test_superlinear_bends_have_no_stiffness(quick):
     case, found = quick
     assert found.models == ("own", "standard", "plate", "n5b8e")
@@ -167,6 +171,7 @@ def test_superlinear_bends_have_no_stiffness(quick):
     assert "no stiffness" not in swung.advice
 
 
+@pytest.mark.matrix
 def test_a_kresling_cell_vibrates_as_plates():
     """Triangles that are held at their base have no mode below the limit: take the shell."""
     pattern = fd.patterns.kresling(sides=6, radius=1.0, height=0.9, twist=30)
@@ -223,6 +228,7 @@ def test_the_shell_is_held_and_loaded_as_the_case():
     assert np.abs(mean[0]).max() > 2.0  # the pressure, too
 
 
+@pytest.mark.matrix
 def test_what_is_no_force_is_left_out():
     """Of an actuated and heated fold under a force only the force counts."""
     push = fd.Force([4, 5], (0, 0, 1e-4))
@@ -269,6 +275,7 @@ def test_a_shell_too_large_is_refused():
         fd.fidelity(fd.Case(LONG), reference="shell", models=[])
 
 
+@pytest.mark.matrix
 def test_superelements_are_the_reference_by_default(quick):
     """They and the shell, graded alike, have the same limits, also under gravity and pressure."""
     case = held(fd.Gravity((0.0, 0.0, -9.81)), fd.Pressure(2.0, [1]), fd.Force([4], (0, 0, 0.1)))
@@ -284,6 +291,7 @@ def test_superelements_are_the_reference_by_default(quick):
     assert found.attrs["reference"] == "superelements" and "divisions" not in found.attrs
 
 
+@pytest.mark.matrix
 def test_models_of_ones_own(quick):
     case, _ = quick
     found = fd.fidelity(

@@ -112,6 +112,7 @@ def test_where_there_is_nothing_to_compare_with():
     assert refinement(miura(3, only_there)) is None
 
 
+@pytest.mark.matrix
 def test_results_of_case_files_say_it(read, tmp_path):
     """As attributes, on the page, and by the command; not of bars and hinges."""
     text = f"""{HELD_MIURA_TEXT}[[loads]]

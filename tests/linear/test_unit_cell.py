@@ -58,6 +58,7 @@ def test_tubes_repeat_under_screws(name):
     assert sum(motion.turns for motion in cell_of(pattern).motions) == 1
 
 
+@pytest.mark.matrix
 def test_periods_stay_with_a_pattern_that_is_moved_and_folded(tmp_path):
     pattern = fd.patterns.miura(a=0.03, b=0.03)
     for made in (
@@ -234,6 +235,7 @@ def test_models_that_do_not_repeat_are_refused():
         fd.bands(fd.UnitCell(sideways), [[0.5]])
 
 
+@pytest.mark.matrix
 def test_periods_that_cannot_be_reached_are_told():
     with pytest.raises(InputError, match="motions: 1 of them; the cell has 2"):
         fd.linear.relaxed(miura(), miura().vectors[:1])
@@ -268,6 +270,7 @@ def test_compressed_sheets_that_are_unstable_are_in_equilibrium(preset):
     assert fd.bands(cell, [[0.5, 0.5]], count=2, state=state).attrs["residual"] == 0.0
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("error", "ignore::foldyn.errors.ModelRangeWarning")
 def test_small_changes_of_periods_count():
     """Below the tolerance at which vertices meet."""

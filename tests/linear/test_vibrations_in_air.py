@@ -74,6 +74,7 @@ def test_the_share_of_the_air_lowers_the_frequency(sheet):
     np.testing.assert_allclose(fall, found.air_share.values, rtol=5e-3)
 
 
+@pytest.mark.matrix
 def test_frequencies_in_water_and_their_ratios_to_dry_ones_are_those_of_a_published_computation():
     """Square steel cantilever of 10 m, 0.238 m thick (rad/s).
 
@@ -231,6 +232,7 @@ def test_what_does_not_take_air_refuses_it(sheet):
             call(windy)
 
 
+@pytest.mark.matrix
 def test_a_case_file_has_air(tmp_path, sheet):
     text = """
 [pattern]

@@ -71,6 +71,7 @@ def test_a_folding_has_its_states_and_angles():
     assert np.isclose(np.degrees(folding.path["fold_angle"].values[-1, 0]), -90.0, atol=1e-6)
 
 
+@pytest.mark.matrix
 def test_files_that_do_not_go_together_are_refused(tmp_path):
     one = write(tmp_path, MIURA)
     with pytest.raises(fd.errors.InputError, match="FILE: 2 files that are not all results"):

@@ -134,6 +134,7 @@ OTHERS = sorted(name for name in MODELS if "coupled" not in name and name not in
 AMPLITUDES = (0.02, 0.15, 0.4)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(  # JAX compiles each anew: all states of a model where it is compiled
     ("name", "amplitude"), [*product(SOME, AMPLITUDES), *beyond(product(OTHERS, AMPLITUDES), 8)]
 )

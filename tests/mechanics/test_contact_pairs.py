@@ -93,6 +93,7 @@ def whole(block, nodes) -> np.ndarray:
     return out
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("kind", ["vertex", "edges", "parallel edges"])
 def test_forces_and_tangents_are_exact(amid, kind):
     rng, errors = np.random.default_rng(2), []

@@ -83,6 +83,7 @@ def test_nothing_and_triangles_without_area_cross_nothing():
     assert not len(crossing_panels(points, np.array([(0, 1, 2), (3, 4, 5)]), np.array([0, 1])))
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("count", [2, 60])
 def test_crossings_are_those_of_an_independent_library(count):
     """`has_intersections` of the IPC Toolkit (Ferguson et al., https://ipctk.xyz), by sides."""

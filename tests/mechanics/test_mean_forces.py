@@ -286,6 +286,7 @@ def thrown(kind: type[Net]) -> Any:
     return fd.simulate(case, 20.0, method="energy_momentum", dt=0.02, every_steps=50, initial=start)
 
 
+@pytest.mark.matrix
 def test_a_sheet_of_ones_own_keeps_its_energy():
     """Springs of another package, with nothing but forces and energies."""
     motion = thrown(Net)
@@ -294,6 +295,7 @@ def test_a_sheet_of_ones_own_keeps_its_energy():
     assert np.ptp(total) < 1e-9 * total[0]
 
 
+@pytest.mark.matrix
 def test_the_balance_closes_with_a_term_that_dissipates():
     motion = thrown(Dragged)
     assert float(motion.dissipated[-1]) > 0.99 * float(motion.kinetic[0])

@@ -130,6 +130,7 @@ def weak(pair: Rubbing, x) -> None:
         pair.tie[:2] += 0.5 * (np.array([p, q]) - pair.tie[:2])
 
 
+@pytest.mark.matrix
 def test_what_sticks_has_a_potential(pair):
     """Its gradient is the force, its second derivative the tangent."""
     rng, errors = np.random.default_rng(3), []
@@ -213,6 +214,7 @@ def test_a_slip_keeps_the_force_and_dissipates_what_the_spring_lets_go(pair):
     assert slipped > 5
 
 
+@pytest.mark.matrix
 def test_power_is_that_of_the_forces(pair):
     rng = np.random.default_rng(8)
     x, v = pair.touching(rng), rng.standard_normal((10, 3))

@@ -128,6 +128,7 @@ def test_evaluations_in_a_compiled_loop_do_not_overtake_each_other():
     assert relative(ends[3] - u, ends[0] - u) < 1e-11
 
 
+@pytest.mark.matrix
 def test_every_element_and_node_belongs_to_one_strip(monkeypatch):
     model, _ = sheet((60, 2))
     n = len(model.rest)
@@ -156,6 +157,7 @@ def test_work_is_shared_evenly():
     assert counts.max() < 1.2 * counts.min()
 
 
+@pytest.mark.matrix
 def test_models_that_cannot_be_shared_stay_on_one_thread():
     """Elements between random nodes reach through the whole model; so do small sheets'."""
     tangled = random_model(200, 200, 200)
@@ -193,6 +195,7 @@ def test_a_failure_on_one_thread_ends_the_waiting_of_the_others():
         run_together(fail_or_wait, members, [(k,) for k in range(3)])
 
 
+@pytest.mark.matrix
 def test_waiting_ends_when_the_team_is_broken():
     members = team(2)
     members[0].state[BROKEN] = 1
@@ -212,6 +215,7 @@ def shares_of(member, count):
     return part(member, count)
 
 
+@pytest.mark.matrix
 def test_parts_of_a_count_follow_each_other():
     for count in (0, 1, 2, 7, 100):
         parts = [shares_of(member, count) for member in team(3)]

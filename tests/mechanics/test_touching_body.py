@@ -105,6 +105,7 @@ def test_forces_of_a_stack_are_the_gradient_and_tangents_exact(stack):
     assert abs(matrix - matrix.T).max() < 1e-9 * abs(matrix).max()
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("dihedral", [1.0, 359.0])
 def test_guards_keep_dihedrals_between_0_and_360(dihedral):
     pattern = fd.patterns.simple_fold(a=0.02, b=0.02, dihedral=10.0)

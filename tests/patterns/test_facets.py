@@ -214,6 +214,7 @@ def test_the_message_names_the_remedy(make):
         make(darts(), STEEL)
 
 
+@pytest.mark.matrix
 def test_a_folded_sheet_with_panels_that_are_not_convex():
     """Cut before it is folded or afterward, it is the same; the models agree within 15 %."""
     before = fd.fold(fd.convex(darts()), angles={(0, 1): 60}).pattern

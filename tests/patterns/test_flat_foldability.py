@@ -20,6 +20,7 @@ def vertex(degrees, letters):
     return Pattern([[0, 0], *rim], faces, {(0, 1 + k): letter for k, letter in enumerate(letters)})
 
 
+@pytest.mark.matrix
 @given(
     st.lists(st.floats(25, 65), min_size=6, max_size=6).map(lambda a: np.array(a) * 360 / sum(a)),
     st.permutations("MMMMVV"),

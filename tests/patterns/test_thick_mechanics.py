@@ -171,6 +171,7 @@ load_factors = [0.5, 1]
 """
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("kind", "model"), [("bars_and_hinges", ""), ("shell", "divisions = 2")])
 def test_from_a_case_file_to_a_result_and_back(tmp_path, kind, model):
     path = tmp_path / "case.toml"

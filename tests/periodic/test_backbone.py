@@ -60,6 +60,7 @@ def test_energy_of_a_sheet_is_constant_and_the_motion_is_a_simulated_one(miura):
     assert run.displacement.values[-1] == pytest.approx(start, abs=1e-8)
 
 
+@pytest.mark.matrix
 def test_constant_loads_shift_the_state_about_which_it_vibrates(miura):
     loaded = miura.altered(loads=[fd.Force([7], (2e-3, 0, 0))])
     found = fd.backbone(loaded, amplitudes=(1e-6, 2e-6), harmonics=3)
@@ -97,6 +98,7 @@ def test_damped_backbone_follows_the_peaks_of_response_curves(resonant):
     assert curve.amplitude.values.max() == pytest.approx(here, rel=5e-3)
 
 
+@pytest.mark.matrix
 def test_in_phase_resonance_force_and_displacement_are_a_quarter_apart(resonant):
     first = resonant.coefficient.values[:, 1, NODE, 2]
     assert np.angle(first / -1j) == pytest.approx(-np.pi / 2, abs=1e-9)  # the force is a sine

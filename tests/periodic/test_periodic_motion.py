@@ -46,6 +46,7 @@ def test_harmonics_converge_spectrally_to_what_shooting_finds(strong):
     assert abs(shot.floquet.values[0]) == pytest.approx(abs(strong.floquet.values[0]), rel=1e-6)
 
 
+@pytest.mark.matrix
 def test_estimate_of_what_is_missing_is_near_the_truth(strong):
     for harmonics in (3, 5):
         with_few = fd.periodic_motion(oscillator(), harmonics=harmonics)

@@ -75,6 +75,7 @@ def test_folds_of_one_harmonic_are_the_textbook_ones():
         assert slope == pytest.approx(0.0, abs=1e-5 * K**2)
 
 
+@pytest.mark.matrix
 def test_only_motions_between_the_folds_are_unstable_and_they_repel(curve):
     at = np.flatnonzero(curve.bifurcation.values == "fold")
     stable = curve.stable.values.copy()
@@ -258,6 +259,7 @@ def test_a_fork_without_branch_is_warned_of():
         tracer._fork(family, Event("period doubling", point), 0, print)
 
 
+@pytest.mark.matrix
 def test_a_curve_is_saved_and_loaded(tmp_path, curve):
     fd.save(curve, tmp_path / "curve.nc")
     again = fd.load(tmp_path / "curve.nc")

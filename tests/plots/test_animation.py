@@ -34,6 +34,7 @@ def test_asked_frames_and_rate(case, trajectory, tmp_path):
     assert all(np.abs(a[lower] - b[lower]).max() > 60 for a, b in pairwise(pictures))
 
 
+@pytest.mark.matrix
 def test_the_rate_of_a_gif_is_the_one_told(case, trajectory, tmp_path, monkeypatch):
     told = []
     monkeypatch.setattr("foldyn.plots.animation.pace", lambda s: told.append(s) or "")
@@ -42,6 +43,7 @@ def test_the_rate_of_a_gif_is_the_one_told(case, trajectory, tmp_path, monkeypat
     assert told == [pytest.approx(9.99 / 3 / shown)]
 
 
+@pytest.mark.matrix
 def test_a_sheet_at_rest_keeps_all_frames(case, trajectory, tmp_path):
     still = trajectory.assign(displacement=0.0 * trajectory["displacement"])
     with Image.open(animate(case, still, path=tmp_path / "rest.gif", frames=5)) as gif:
@@ -221,6 +223,7 @@ def fake(tmp_path, monkeypatch):
     return put
 
 
+@pytest.mark.matrix
 def test_ffmpeg_gets_every_frame(fake, case, trajectory, tmp_path):
     fake(fail=False)
     film = animate(case, trajectory, path=tmp_path / "motion.mp4", frames=5, fps=30)

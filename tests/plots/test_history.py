@@ -30,6 +30,7 @@ def test_one_row_per_node_one_curve_per_trajectory(two_rules):
     assert [a.get_xlabel() for a in figure.axes[-2:]] == ["time (s)", "frequency (Hz)"]
 
 
+@pytest.mark.matrix
 def test_content_peaks_at_frequency_and_amplitude(two_rules):
     figure = plot_history(two_rules, [7], axes=["x"], max_frequency=5.0)
     for label, frequency, amplitude in (("panel", 2.0, 0.014), ("consistent", 1.5, 0.021)):
@@ -132,6 +133,7 @@ def test_uneven_times_are_refused(trajectory):
             plot_history({"run": trajectory, "still": still}, [6])
 
 
+@pytest.mark.matrix
 def test_a_motion_alone_has_no_label(trajectory):
     figures = [plot_history(given, [6, 7]) for given in (trajectory, {"run": trajectory})]
     for one, other in zip(*(figure.axes for figure in figures), strict=True):

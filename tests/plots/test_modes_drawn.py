@@ -113,6 +113,7 @@ def test_rigid_modes_are_left_out_unless_asked_for(case, modes):
     assert chosen_modes(made(case, rigid=np.ones(5, bool)), None) == [1, 2, 3, 4, 5]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("count", [1, 2, 4, 5])
 def test_captions_of_two_lines_have_room(case, modes, count):
     names = {k: "first bending along y (93 %)" for k in range(1, 6)}
@@ -170,6 +171,7 @@ def test_a_film_is_a_period_without_a_seam(case, modes, tmp_path, monkeypatch):
         np.testing.assert_allclose(np.linalg.norm(a - rest, axis=1).max(), abs(swing), atol=1e-12)
 
 
+@pytest.mark.matrix
 def test_a_film_shows_both_extremes_within_its_frame(case, modes, tmp_path):
     file = animate_modes(case, modes, path=tmp_path / "modes.gif", which=[4, 5], frames=4, fps=10)
     pictures = frames(file)

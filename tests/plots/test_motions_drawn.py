@@ -60,6 +60,7 @@ def test_imposed_displacements_have_marks_and_arrows(moved, sheet):
     assert keys(draw_structure(moved, supports=False))[-1] == "valley crease"
 
 
+@pytest.mark.matrix
 def test_actuated_creases_glow(moved, sheet):
     figure = draw_structure(moved, numbers=False, view=(90.0, -90.0))
     assert keys(figure)[0] == "actuated crease"

@@ -265,6 +265,7 @@ def test_shapes_tell_what_is_unstable(case, path):
     ]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("count", [1, 5, *beyond([8, 2, 4])])
 def test_shapes_lie_in_the_figure_and_apart(case, path, count):
     figure = draw_shapes(case, path, points=list(range(count)), title="Shapes")

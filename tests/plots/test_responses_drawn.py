@@ -150,6 +150,7 @@ def test_models_and_nodes_are_told_apart(case, response):
     assert keys(plot_frf({"a": response, "b": stiffer}, [7]))[:2] == ["a", "b"]
 
 
+@pytest.mark.matrix
 def test_responses_at_other_frequencies_share_the_frame(case, response):
     few = made(case, f=np.array([2.0, 4.0, 20.0]))
     figure = plot_frf({"fine": response, "stepped": few}, [7], axes="x")

@@ -166,6 +166,7 @@ def test_energies_of_a_path(path):
     assert set(keys(figure)) == {"membrane", "bending", "folds", "at the start + work done"}
 
 
+@pytest.mark.matrix
 def test_shapes_and_films(case, path, motion, tmp_path):
     assert len(draw_shapes(case, path, points=[0, -1]).axes) == 2
     with Image.open(animate(case, motion, path=tmp_path / "m.gif", frames=3)) as film:

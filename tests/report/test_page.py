@@ -155,6 +155,7 @@ def test_a_column_of_numbers_holds_nothing_but_the_numbers():
     ]  # fmt: skip
 
 
+@pytest.mark.matrix
 def test_points_of_a_column_stand_below_each_other(tmp_path, browser):
     write_report([COLUMNS], tmp_path / "page.html", title="Numbers")
     tab = browser.new_page()

@@ -72,6 +72,7 @@ def test_every_flipped_bit_shows(file, motion):
             assert "is damaged: its checksum does not match" in refusal(file)
 
 
+@pytest.mark.matrix
 def test_files_without_a_seal_are_read(file, motion):
     xr.testing.assert_identical(fd.load(unsealed(file)), motion)
     assert netcdf.sound(file) is None
@@ -89,6 +90,7 @@ def test_other_programs_read_and_change_sealed_files(file, motion):
     assert found["displacement"].values[1, 2, 0] == 0.5
 
 
+@pytest.mark.matrix
 def test_a_file_cut_short_is_refused(file):
     sound = file.read_bytes()
     for left in (0, 5, 100, len(sound) // 2, len(sound) - SEAL - 1):

@@ -37,6 +37,7 @@ def test_every_reason_is_in_the_documentation():
     assert set(named) == set(REASONS)
 
 
+@pytest.mark.matrix
 def test_rigid_modes_have_no_damping_ratio(tmp_path):
     found = fd.modes(fd.Case(FOLD), count=8)
     rigid = found.rigid.values

@@ -145,6 +145,7 @@ CASES = {
 }
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", CASES)
 def test_a_case_survives_a_file_exactly(name, tmp_path) -> None:
     ds = dataset(CASES[name])
@@ -196,6 +197,7 @@ def test_loads_that_share_a_function_share_a_table() -> None:
     assert len(case_of(ds).load_terms) == 1
 
 
+@pytest.mark.matrix
 def test_functions_that_move_supports_are_stored_as_smooth_tables(tmp_path) -> None:
     found = case_of(stored(dataset(moving_case(lambda t: 1.0 - math.cos(3 * t))), tmp_path))
     moves, pushes = found.supports[1].history, found.loads[2].history

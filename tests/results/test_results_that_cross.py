@@ -58,6 +58,7 @@ def crossed():
     return case, motion, said
 
 
+@pytest.mark.matrix
 def test_a_motion_says_once_which_panels_cross_and_when(crossed):
     _, motion, said = crossed
     assert [one.category for one in said] == [CrossingWarning]

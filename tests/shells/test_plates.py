@@ -111,6 +111,7 @@ def frequencies(edges, divisions, mass, count=6):
     return angular_frequencies(s, held, rigid + count, shift=unit) / unit
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("edges", "mass"),
     [

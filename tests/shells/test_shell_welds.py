@@ -53,6 +53,7 @@ def test_hinges_do_not(whole):
     assert elastic(made)[0] < 0.8 * whole[0]
 
 
+@pytest.mark.matrix
 def test_large_bending_of_a_cantilever():
     """A tip force that lifts the strip by an eighth of its length, as without lines."""
     tips = {}
@@ -74,6 +75,7 @@ def test_energy_force_and_tangent():
     assert checks.tangent_error(body.internal, body.tangent, at=q) < 1e-6
 
 
+@pytest.mark.matrix
 def test_a_curved_sheet_of_facets():
     """Facets of a pipe converge to it, whatever their number, and need not lie in one plane."""
     coarse, fine = (

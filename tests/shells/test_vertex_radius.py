@@ -116,6 +116,7 @@ def test_corners_hardly_stretch():
     assert np.abs(strain[corner]).max() < 5 / STIFF * np.abs(strain[~corner]).max()
 
 
+@pytest.mark.matrix
 def test_bending_is_as_without():
     """The corners of panels bend as the rest: a square plate vibrates as an even mesh says."""
     sheet = STEEL[1e-3]
@@ -166,6 +167,7 @@ def tower(divisions, radius, thickness=1e-3, storeys=3):
     return fd.modes(fd.Case(s, held), 3).frequency.values
 
 
+@pytest.mark.matrix
 def test_modes_of_a_tower_come_in_pairs():
     """Its mesh has the symmetry of the tower: a quarter of a turn."""
     twisting, one, other = tower(4, 1e-3)

@@ -134,6 +134,7 @@ def mean_ratio(estimator: str, in_force: float, in_response: float) -> float:
     return float(np.mean((estimate.response / exact)[band]).real)
 
 
+@pytest.mark.matrix
 def test_noise_in_the_response_leaves_h1_and_inflates_h2():
     force, _, exact = noisy(1, 400, 0.0, 0.0)
     power = np.abs(exact[86:100]) ** 2 * np.mean(np.sum(force**2, axis=1))  # 8.6 ... 9.9 Hz
@@ -143,6 +144,7 @@ def test_noise_in_the_response_leaves_h1_and_inflates_h2():
     assert np.min(noise / power) > 0.2
 
 
+@pytest.mark.matrix
 def test_noise_in_the_force_leaves_h2_deflates_h1_and_lowers_the_coherence_by_its_share():
     # the burst fills half of the record, the noise all of it: one power in every line
     assert mean_ratio("h2", 0.5, 0.0) == pytest.approx(1.0, abs=0.02)

@@ -72,6 +72,7 @@ def test_a_plane_presses_a_fold_shut():
     assert path.reaction.to_numpy()[-1][2::3].sum() == pytest.approx(force[-1], rel=1e-9)
 
 
+@pytest.mark.matrix
 def test_an_accordion_that_is_driven_closed_does_not_push():
     """Faces touch at 180 degrees, in a stack of N t, and no earlier."""
     s = fd.discretize(fd.thicken(strip(4), T), SHEET)
@@ -84,6 +85,7 @@ def test_an_accordion_that_is_driven_closed_does_not_push():
     assert case.contact_term.nearest(case.body.dofs(u[-2]))[1] > 1.5
 
 
+@pytest.mark.matrix
 def test_boards_hinged_at_one_height_close_before_their_hinge_planes_do():
     """Their dihedral would jump from 0 to 360 degrees where faces meet: a guard stays before it."""
     s = fd.discretize(fd.thicken(strip(4, letters="VVV"), T), SHEET, fold_law="linear")

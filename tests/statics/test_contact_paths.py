@@ -95,6 +95,7 @@ def test_steps_are_cut_anew_from_each_point():
     assert np.diff(path.load_factor.values).min() < 0.05 / 2**8
 
 
+@pytest.mark.matrix
 def test_what_the_plates_give_is_what_the_sheet_stores(pressed):
     case, _, _, path = pressed
     force = plates(case, path)[0]

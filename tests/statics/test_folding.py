@@ -188,6 +188,7 @@ def test_panels_bend_by_as_little_as_slips_of_drawing_need(slip):
     np.testing.assert_allclose(drawn.angles, exact.angles, atol=0.01)
 
 
+@pytest.mark.matrix
 def test_a_square_twist_folds_only_with_strain_and_says_so():
     folding = fd.fold(square_twist(), 60, steps=6)
     assert not folding.wrong

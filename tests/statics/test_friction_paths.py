@@ -178,6 +178,7 @@ def test_a_rough_press_meets_more_force_on_the_way_in_and_less_on_the_way_out(cy
     assert (force[10:-1] < 0.99 * smooth[10:-1]).all()
 
 
+@pytest.mark.matrix
 def test_the_energy_of_a_rough_press_closes(cycles):
     for case, path in cycles.values():
         stored = sum(path[group].values for group in case.energy_groups)

@@ -102,6 +102,7 @@ def test_kresling_by_displacement():
     assert error < TOLERANCE * np.ptp(data["Fhis"])
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["mgdcm", "arc_length"])
 def test_kresling_limit_load(method):
     data, case = golden("kresling6")

@@ -47,6 +47,7 @@ def kresling():
     return landscape(by_motion), landscape(by_force)
 
 
+@pytest.mark.matrix
 def test_kresling_by_force_and_by_displacement(kresling):
     """The two ways see one landscape; the force is that on all six nodes."""
     one, other = kresling

@@ -42,6 +42,7 @@ def test_flat_sheet_deploys(dihedral):
     assert strain < 1e-12 * PAPER.youngs_modulus * PAPER.thickness**3
 
 
+@pytest.mark.matrix
 def test_actuators_do_the_work():
     """Against a held edge the sheet stores energy: what the actuators put in, to second order."""
     s = flat_miura((1, 1), 150.0)

@@ -68,6 +68,7 @@ def test_snap_back(method):
     assert np.ptp(limits.load_factor.values) > 0.2 * truss.h  # it goes back a long way
 
 
+@pytest.mark.matrix
 def test_load_stepping_ends_at_the_limit_point():
     """It returns exactly the given factors, and has not snapped through."""
     with pytest.raises(ComputationError, match="arc_length") as caught:

@@ -48,6 +48,7 @@ def pinned(structure) -> float:
     return float(fd.modes(fd.Case(structure, [fd.Fix("ymin or ymax")]), 1).frequency.values[0])
 
 
+@pytest.mark.matrix
 def test_strips_with_stiff_creases():
     """A pinned strip with rigid creases is a beam: told where its frequency is off."""
     metal = fd.Sheet(7e10, 0.0, 0.008, density=2700.0)
@@ -95,6 +96,7 @@ def test_skew_panels():
         assert told(lambda p=pattern, s=sheet: fd.discretize(p, s, preset="n5b8e")) == []
 
 
+@pytest.mark.matrix
 def test_limits_themselves_are_within_range_whatever_rounding_says():
     for dihedral in (100, 115, 125, 140):
         skew = fd.patterns.miura(panel_angle=33, dihedral=dihedral)

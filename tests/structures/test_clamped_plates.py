@@ -38,6 +38,7 @@ def extrapolated(found):
     return fine + (fine - coarse) * 64 / (144 - 64)
 
 
+@pytest.mark.matrix
 def test_a_clamped_square_vibrates_as_a_plate():
     """omega a^2 sqrt(rho t / D) of Leissa, J. Sound Vib. 31, 1973, by Ritz: a little high."""
     pattern, edge, _ = plate("square")
@@ -49,6 +50,7 @@ def test_a_clamped_square_vibrates_as_a_plate():
     assert fd.modes(case, 1).frequency.values[0] / scale == pytest.approx(3.4917, rel=0.01)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("form", FORMS)
 def test_a_clamped_panel_bends_as_the_shell(form):
     pattern, edge, tips = plate(form)
@@ -82,6 +84,7 @@ def test_a_clamped_miura_sheet_vibrates_as_the_shell(dihedral, thickness):
     np.testing.assert_allclose(found, extrapolated(frequencies), rtol=0.035)
 
 
+@pytest.mark.matrix
 def test_a_clamped_bilayer_curls_as_the_shell():
     """The clamp keeps both from curling across it."""
     vertices = [[0.1 * i, 0.1 * j, 0.0] for i in range(5) for j in (0, 1)]
@@ -96,6 +99,7 @@ def test_a_clamped_bilayer_curls_as_the_shell():
     assert float(found) == pytest.approx(float(wanted), rel=0.01)
 
 
+@pytest.mark.matrix
 def test_a_panel_is_level_at_its_clamped_edge():
     """Its mass follows a cantilever: 33/140 at the tip of a beam; shifts have all of it."""
     x = np.array([[0, 0, 0], [4, 0, 0], [4, 1, 0], [0, 1.0, 0]])
@@ -123,6 +127,7 @@ def test_rigid_panels_turn_at_a_clamped_edge_as_those_of_the_default():
     assert not clamped(rigid="all").surface.clamped
 
 
+@pytest.mark.matrix
 def test_explicit_and_implicit_motions_are_alike():
     load = fd.Force([6, 7, 8], (0, 0, 5e-3), fd.HalfSine(0.2))
     case = fd.Case(clamped(), [fd.Fix("xmin")], [load], fd.Rayleigh(0.1))

@@ -263,6 +263,7 @@ def test_a_turning_sheet_takes_few_iterations():
     assert iterations[1] < 2 * iterations[0]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("preset", ["plate", "n5b8e"])
 def test_extrapolated_stress_saves_iterations(preset, monkeypatch):
     """A thin sheet falls: with its true stresses Newton's method takes 1.3 to 1.5 times as many."""

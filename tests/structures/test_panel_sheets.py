@@ -224,6 +224,7 @@ youngs_modulus = 2e6
 """
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     "model",
     [
@@ -279,6 +280,7 @@ def test_all_panels_of_another_material_are_a_sheet_of_it(model):
     np.testing.assert_allclose(one.kinetic, two.kinetic, rtol=1e-8, atol=1e-15)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("model", "method"), [("n5b8", "rk4"), ("shell", "newmark")])
 def test_energy_of_a_motion_with_panels_that_differ(model, method):
     """Kinetic + strain + dissipated - work closes."""

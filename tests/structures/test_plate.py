@@ -184,6 +184,7 @@ def test_what_stays_as_in_the_standard_calibration():
     assert (plate.fold_stiffness < plain.fold_stiffness).all()
 
 
+@pytest.mark.matrix
 def test_case_files_and_results_keep_it(read, kept):
     found = read(f"""{HELD_MIURA_TEXT}[model]
 calibration = "plate"

@@ -86,6 +86,7 @@ def test_paths_and_motions():
     assert "of the strain energy where that is largest, at t = 0.0" in text
 
 
+@pytest.mark.matrix
 def test_membranes():
     """Between two held edges `plate` is too stiff, which is told, and `n5b8e` right.
 

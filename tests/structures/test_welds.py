@@ -130,6 +130,7 @@ def test_motion_keeps_its_energy(method):
     assert np.abs(total).max() < 1e-4 * np.abs(result.work).max()
 
 
+@pytest.mark.matrix
 def test_results_keep_welds(kept):
     pattern = fd.welded(triangulated(5, seed=3))
     case = fd.Case(fd.discretize(pattern, STEEL))
@@ -158,6 +159,7 @@ def test_a_panel_that_is_bent_in_its_middle_gives_way_like_a_fold_on_a_stiff_cre
     assert triangles == pytest.approx(g * across / (2 * LENGTH * WIDTH / across / 3))
 
 
+@pytest.mark.matrix
 def test_a_weld_does_not_show_beside_a_clamped_edge():
     """The first frequencies of a clamped panel in two halves: those of the whole one."""
     halves = fd.discretize(fd.welded(cut_across([0.5])), STEEL, clamped="xmin")
@@ -215,6 +217,7 @@ def test_superelements_of_a_thick_folded_section():
     np.testing.assert_allclose(elastic(shell)[:3], ANGLE_SHELL, rtol=0.02)
 
 
+@pytest.mark.matrix
 def test_frequencies_in_the_plane_do_not_depend_on_the_thickness():
     """Of a flat square of 8 x 8 welded panels.
 

@@ -161,6 +161,7 @@ def test_summary_counts_a_lost_mode_as_an_infinite_error():
     assert summary([Modes("", {"m": modes.rows["m"][-2:]})], "m").ninetieth == np.inf
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("case", ["case1", "case2", "case3", "case4"])
 def test_small_displacements(case):
     """Within 5 % of the shell under small loads; the standard calibration is at least 10 % off."""
@@ -169,6 +170,7 @@ def test_small_displacements(case):
     assert found.error["standard"] < -0.1
 
 
+@pytest.mark.matrix
 def test_large_loads():
     """Numbers of the page: case 1 under the paper's loads, and a rhombus lifted by 8 t."""
     found = under_loads("case1", (0.1, 1.0))

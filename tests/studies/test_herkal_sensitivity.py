@@ -114,6 +114,7 @@ def test_the_program_is_told_by_what_computes(tmp_path):
     assert digest(tmp_path) != before
 
 
+@pytest.mark.matrix
 def test_results_of_another_program_are_computed_again(tmp_path, monkeypatch):
     job = Job("case1", "panel", "path")
     job.make(tmp_path)

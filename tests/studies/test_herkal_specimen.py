@@ -193,6 +193,7 @@ def path():
     return calibration.pressed(evaluation.FACTORS)
 
 
+@pytest.mark.matrix
 def test_where_on_the_path_a_shape_lies(path) -> None:
     there = calibration.pressed([0.3333])
     moved = there.displacement.sel(node=list(FRONT), axis="x").values[0]

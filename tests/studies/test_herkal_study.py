@@ -208,6 +208,7 @@ def test_one_failure_does_not_stop_the_others(tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.glob("*.nc")] == ["case1-centroid-path.nc"]
 
 
+@pytest.mark.matrix
 def test_results_are_those_of_the_vertices(tmp_path):
     job = Job("case2", REFERENCE, "path", SHORT)
     pool.run([job], tmp_path, processes=1)
@@ -266,6 +267,7 @@ def test_statics_of_shell_and_bars_and_hinges(small):
     assert found["n5b8e"][0] == pytest.approx(-0.0348, rel=0.01)
 
 
+@pytest.mark.matrix
 def test_modes_have_partners(small):
     found = small.frequencies("case1", "consistent")
     assert found.mac[0] > 0.99 and 0.0 < found.deviation[0] < 0.2  # 2 divisions are soft

@@ -91,6 +91,7 @@ def test_soft_folds_move_more_and_swing_slower():
 
 
 # ------------------------------------------------------------------ our shell
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", CASES)
 def test_a_coarse_shell_is_near(name):
     """With 8 divisions, at worst 2.3 % (case 2, statics) and 1.9 % (case 1, third frequency)."""

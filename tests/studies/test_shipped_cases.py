@@ -121,6 +121,7 @@ def test_the_sheet_turns_over(tumbling):
     assert min(np.array(middle) / middle[0]) < -0.99
 
 
+@pytest.mark.matrix
 def test_pictures_of_the_gallery_are_small(tumbling):
     _, _, folder = tumbling
     drawn = [DOCS / "images" / "deployment.gif", DOCS / "images" / "tumbling.gif"]

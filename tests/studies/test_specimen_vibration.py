@@ -73,6 +73,7 @@ def test_air_lowers_the_frequencies_by_one_to_four_percent():
     assert fall == pytest.approx(share, rel=0.03)
 
 
+@pytest.mark.matrix
 def test_damping_of_the_second_and_third_peak():
     """The paper's pair was made from 13.5 and 9 %: both are found again within a tenth or so."""
     _, second, third = peaks("circumcenter").damping
@@ -115,6 +116,7 @@ def test_modes_are_wobble_axial_wobble(published):
     assert share["second bending along y"] > 0.8
 
 
+@pytest.mark.matrix
 def test_the_first_wobble_is_driven_at_a_corner_not_in_the_middle():
     """In the first wobble the top turns about its middle, which stays where it is."""
     found = damped_by_alpha()

@@ -83,6 +83,7 @@ def test_frequencies_and_damping_of_modes(results):
         take(results, "modes", "frequency[9]")
 
 
+@pytest.mark.matrix
 def test_gaps_of_bands_are_those_of_the_table(results):
     """Signed: a gap of the table where it is above 0, an overlap of neighbors below."""
     _, bands = results["bands"]

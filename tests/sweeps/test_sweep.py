@@ -35,6 +35,7 @@ def frequency(result, case):
     return result["frequency"].values[0]
 
 
+@pytest.mark.matrix
 def test_every_point_is_the_case_file_with_its_values(case):
     found = of(case, ["frequencies", "frequency[2]"])
     assert found["frequencies"].dims == ("dihedral", "length_scale_ratio", "mode")
@@ -74,6 +75,7 @@ def test_processes_give_the_same_and_do_not_compile(case):
     assert (compiled[others] == 0).all()
 
 
+@pytest.mark.matrix
 def test_the_table_in_the_file(case):
     table = '[sweep]\nmeasures = ["frequencies"]\n[sweep.vary]\n"sheet.thickness" = "0.01:0.02:3"\n'
     case.write_text(MODES + table)
@@ -92,6 +94,7 @@ def test_the_table_in_the_file(case):
     assert fd.read_case(case).run()["frequency"].size == 4  # any other command leaves it alone
 
 
+@pytest.mark.matrix
 def test_mass_rules_of_the_file_are_an_axis(case):
     case.write_text(MODES + '[model]\nmass = ["panel", "centroid"]\n')
     found = of(case, vary=ONE)
@@ -114,6 +117,7 @@ def test_ties_follow(case):
     assert (tied["frequencies"][1] != free["frequencies"][1]).any()  # mountains lock, too
 
 
+@pytest.mark.matrix
 def test_names_stay_apart(case):
     case.write_text(FRF)
     vary = {"drive[0].force[2]": [1, 2], "damping.alpha": [0.2], "damping.beta": [0.0]}
@@ -225,6 +229,7 @@ def kept(folder: Path) -> dict[str, tuple[int, int]]:
     return {one.name: (one.stat().st_ino, one.stat().st_mtime_ns) for one in folder.iterdir()}
 
 
+@pytest.mark.matrix
 def test_what_is_kept_is_not_computed_again(case, tmp_path):
     folder = tmp_path / "points"
     first = of(case, folder=folder)

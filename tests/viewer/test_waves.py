@@ -41,6 +41,7 @@ def test_modes_are_those_of_the_result_but_for_size_and_phase(part):
     assert np.abs(turned - found).max() < 2.0 * OF_SHAPES
 
 
+@pytest.mark.matrix
 def test_of_many_modes_every_kth_is_kept(monkeypatch, part):
     monkeypatch.setattr(import_module("foldyn.viewer.waves"), "MOST_NUMBERS", 3000)
     shown = results("bands")
