@@ -142,7 +142,8 @@ class Superelements(Discretized):
     @cached_property
     def whole(self) -> Whole:
         """The condensed panels on all of their unknowns."""
-        level, arcs = LEVELS[self.options.level - 1], min(one.arcs for one in self.meshes.graded)
+        # the coarsest of several meshes is only for estimates of errors
+        level, arcs = LEVELS[self.options.level - 1], min(m.arcs for m in self.meshes.graded[-2:])
         if level.across >= 2 * arcs:
             raise InputError(
                 f" = {self.options.divisions}: edges have {2 * arcs - 1} points, and a level to "
