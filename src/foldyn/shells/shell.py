@@ -161,14 +161,6 @@ class Shell(Discretized):
         sheet = ShellTerm(self.model, laws, self.sides.piece_crease, self._scale)
         return Assembly(sheet, *(MembranesTerm(own, sheet.rows) for _, own in self.membranes))
 
-    @cached_property
-    def for_explicit(self) -> Shell:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """See `Discretized`."""
-        if not self.massless or self.by_folds:
-            return self
-        other = replace(self, by_folds=True)
-        return other.marked() if self.as_made else other
-
     @property
     def rotations(self) -> int:
         """Number of rotations, which are dofs in addition to the displacements."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -122,6 +122,8 @@ class Discretized:
         Nodes along each clamped edge of a mesh, from one end to the other.
     bowed_edges : collection of (low, high)
         Edges of the pattern that may bow between their ends without nodes there.
+    by_folds : bool
+        Whether dofs beside folds are those of explicit methods, see `foldyn.mechanics.plates`.
     as_made : bool
         Whether `discretize`, or the model's own function, made it and can rebuild it from pattern,
         sheet and options. `dataclasses.replace` resets it.
@@ -149,6 +151,7 @@ class Discretized:
     massless: ClassVar[str] = ""
     clamped_nodes: Sequence[NDArray] = ()
     bowed_edges: Collection[Edge] = ()
+    by_folds: bool = False
     as_made: bool = False
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
@@ -228,10 +231,13 @@ class Discretized:
         """The structure with another mesh, if it has a mesh."""
         raise NotImplementedError
 
-    @property
-    def for_explicit(self) -> Discretized:
+    @cached_property
+    def for_explicit(self) -> Self:
         """The structure with the dofs that explicit methods take."""
-        return self
+        if not self.massless or self.by_folds:
+            return self
+        other = replace(self, by_folds=True)
+        return other.marked() if self.as_made else other
 
     def held(self, edges: Mapping[int, NDArray]) -> Assembly:
         """Model for solvers if supports hold edges along their whole length.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, ClassVar
 
@@ -249,14 +249,6 @@ class Structure(Discretized):
             self.clamps, self.by_folds,
         )  # fmt: skip
         return BarsPlatesTerm(model, (self.fold_law, self.bend_law))
-
-    @cached_property
-    def for_explicit(self) -> Structure:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """See `Discretized`."""
-        if not self.massless or self.by_folds:
-            return self
-        other = replace(self, by_folds=True)
-        return other.marked() if self.as_made else other
 
     def _rows(self, group: int, hinges: NDArray) -> NDArray:
         """Rows in `model.hinges` of the folds (group 0) or bends (1), which may be interleaved."""
