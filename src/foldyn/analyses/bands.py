@@ -284,16 +284,9 @@ class BandsAnalysis(Analysis):
     schema = BandsSchema
     needs_density = "bands need"
     takes = (
-        "path",
-        "points",
-        "count",
-        "zone",
-        "attenuation",
-        "stretch",
-        "turn",
-        "secant",
+        "path", "points", "count", "zone", "attenuation", "stretch", "turn", "secant",
         "check_model",
-    )
+    )  # fmt: skip
     files = ("bands", "bands-*")
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
@@ -363,15 +356,9 @@ def _bands(state: CellState, path: xarray.DataArray, given: Mapping[str, Any]) -
     """All requested results in one state."""
     began, cell, count, own = time.perf_counter(), state.cell, given["count"], state.arguments()
     found = bands(
-        cell,
-        path,
-        count=count,
-        group_velocity=True,
-        shape=True,
-        polarization=True,
-        check_model=given["check_model"],
-        **own,
-    )
+        cell, path, count=count, group_velocity=True, shape=True, polarization=True,
+        check_model=given["check_model"], **own,
+    )  # fmt: skip
     gaps = band_gaps(found)
     if given["zone"]:
         zone = cell.grid(given["zone"]).values
@@ -401,10 +388,8 @@ def _in_zone(
     opposite = np.ravel_multi_index(tuple(-places % side), shape)  # index of -k
     half = np.flatnonzero(np.arange(len(opposite)) <= opposite)
     values = np.empty((len(phases), count))
-    found = bands(cell, phases[half], count=count, track=False, check_model=False, **own)[
-        "frequency"
-    ].values
-    values[half] = values[opposite[half]] = found
+    found = bands(cell, phases[half], count=count, track=False, check_model=False, **own)
+    values[half] = values[opposite[half]] = found["frequency"].values
     return values
 
 

@@ -109,7 +109,7 @@ class FidelityAnalysis(Analysis):
         yield Text(found.advice)
         yield from album.figure(
             "fidelity",
-            f"Above: errors of the models' frequencies, of those of {against(result)}, 5 % shaded. "
+            f"Above: errors of the models' frequencies, relative to {against(result)}, 5 % shaded. "
             "Below: likeness of the shapes (MAC); modes below 0.5 are lost, and have no error. "
             "Dashed: 0.6 of the plate frequency, above which panels vibrate as plates.",
             lambda: plots.plot_fidelity(found),

@@ -64,9 +64,7 @@ class BarsPlates(NamedTuple):
     hinges: NDArray  # (nf + nb, 4) of the folds, then of the bends
     wings: NDArray  # (c, 3) virtual wings of clamped edges, from the edge's middle, m
     fold_rotations: NDArray  # (nf, 2) rotations on both sides of each fold, or -1
-    unmoved: (
-        NDArray  # (nf,) dihedrals without displacements, rad, if dofs are turns of folds; or (0,)
-    )
+    unmoved: NDArray  # (nf,) dihedrals at rest, rad, if dofs are turns of folds; or (0,)
     fold_stiffness: NDArray  # (nf,) N m/rad
     fold_rest: NDArray  # (nf,) rad
     fold_parameters: NDArray  # (nf, 4)
