@@ -8,6 +8,7 @@ import pytest
 import foldyn as fd
 from foldyn.errors import FoldynWarning, ModelRangeWarning
 from foldyn.linear import model_error
+from foldyn.linear.modes import points_of
 from pairwise import beyond
 
 pytestmark = [
@@ -95,13 +96,13 @@ def test_responses_hold_up_to_the_first_doubtful_mode():
 @pytest.mark.matrix
 def test_modes_that_resemble_nothing_have_no_error():
     case = held("n5b8e")
-    other = model_error.beside(case)
-    assert isinstance(other, fd.Case)
-    found = fd.modes(beside(case, level=1), 3)
+    superelements = beside(case, level=1)
+    found = fd.modes(superelements, 3)
+    points = points_of(superelements, found)
     shape = np.concatenate([found["shape"], found["between_shape"]], axis=1)
     turned = np.roll(fd.modes(case, 3)["shape"].values, 1, axis=1)
     own = model_error.judged(
-        case, found.frequency.values, turned, other, found.frequency.values, shape
+        case, found.frequency.values, turned, points, found.frequency.values, shape
     )
     assert np.isnan(own.error).any() and len(own.lost) > 0
     assert "resemble" in own.doubts(np.ones(3, bool)) and "missing" in own.doubts(np.ones(3, bool))

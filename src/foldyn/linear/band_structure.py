@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from foldyn.cases import Case, State
+from foldyn.cases import State
 from foldyn.condensation import Superelements
 from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning, warn
 from foldyn.linear.bloch import Bloch, null_space
@@ -161,9 +161,9 @@ def bands(
         "eigenvalue": (("phase", "band"), values, {"units": "rad2/s2"}),
     }
     holds_to = None
-    reference = beside(cell.case) if check_model and state is None and secant is None else None
-    if isinstance(reference, Case):
-        errors = _model_errors(cell.with_case(reference), given, frequency)
+    compared = beside(cell.case, check_model, state, secant)
+    if compared.case is not None:
+        errors = _model_errors(cell.with_case(compared.case), given, frequency)
         data["model_error"] = (("phase", "band"), errors, {"units": "1"})
         warn_of_bands(errors)
     else:
@@ -190,7 +190,7 @@ def bands(
         "secant": secant,
         "residual": linear.residual,
         "holds_to": holds_to,
-        "not_compared": (reference if isinstance(reference, str) else "") or None,
+        "not_compared": compared.why,
         "wall_seconds": time.perf_counter() - began,
     }
     return _dataset("bands", linear, phases, given, data, facts)

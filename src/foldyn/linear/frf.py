@@ -22,7 +22,7 @@ from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
 from foldyn.linear.level_error import DOUBTFUL
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
-from foldyn.linear.model_error import beside
+from foldyn.linear.model_error import ALONE, Beside, beside
 from foldyn.linear.modes import trusted
 from foldyn.linear.time_domain import Rig, SteppedSine, reported, stepped_sine
 from foldyn.linear.transients import BurstRandom, Impulse, burst_random, impulse
@@ -184,29 +184,25 @@ def frf(
             "of the drive instead",
             "secant",
         )
-    began, reference = time.perf_counter(), None
+    began, compared = time.perf_counter(), ALONE
     with reported(progress) as report:
         if way.linear:
             system = linearize(case, state, secant=way.secant or secant, load_factor=load_factor)
             _warn_of_instability(system)
-            if check_model and state is None and not way.by_amplitude and secant is None:
-                reference = beside(case)
+            compared = beside(case, check_model and not way.by_amplitude, state, secant)
             answer = way.compute(system, driven, frequency, chosen, report)
-            if not isinstance(reference, Case):
+            if compared.case is None:
                 _warn_of_stretch(system, frequency, answer.response)
             response, displacement = absolute(system, driven, answer.response), system.displacement
-            own: dict[str, Any] = {"soft_hinges": system.soft}
-            own["not_compared"] = (reference if isinstance(reference, str) else "") or None
-            if isinstance(reference, Case):
-                own |= _trusted(case, float(frequency.max()), reference)
-            elif isinstance(case.structure, Superelements):
-                own |= _trusted(case, float(frequency.max()), None)
+            own: dict[str, Any] = {"soft_hinges": system.soft, "not_compared": compared.why}
+            if compared.case is not None or isinstance(case.structure, Superelements):
+                own |= _trusted(case, float(frequency.max()), compared)
         else:
             rig = Rig(case, state, load_factor, driven, chosen)
             answer = way.compute(rig, frequency, chosen, report)
             response, displacement = answer.response, rig.state
             own = {"integrator": rig.integrator, "dt": chosen.dt}
-    if not isinstance(reference, Case):
+    if compared.case is None:
         warn_beyond(case.structure, frequency, linear=not way.by_amplitude)
     facts = {
         "method": method,
@@ -224,16 +220,14 @@ def frf(
     )
 
 
-def _trusted(case: Case, top: float, reference: Case | None) -> dict[str, Any]:
-    """Facts about the frequencies up to `top` (Hz) that are right; warns if some are not.
-
-    reference : the case with superelements, for bars and hinges.
-    """
+def _trusted(case: Case, top: float, compared: Beside) -> dict[str, Any]:
+    """Facts about the frequencies up to `top` (Hz) that are right; warns if some are not."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
-        holds, frequency, error = trusted(case, top, reference)
+        holds, frequency, error = trusted(case, top, compared)
+    own = compared.case is None
     if holds < top:
-        remedy = "a higher level" if reference is None else "superelements (fd.superelements)"
+        remedy = "a higher level" if own else "superelements (fd.superelements)"
         warn(
             f"the response is estimated to hold up to {holds:.4g} Hz: above, frequencies of modes "
             f"are off by more than {DOUBTFUL:.0%}, missing or not estimated; take {remedy} or "
@@ -241,10 +235,8 @@ def _trusted(case: Case, top: float, reference: Case | None) -> dict[str, Any]:
             "superelements.md#errors",
             ModelRangeWarning,
         )
-    own = {"holds_to": holds}
-    return (
-        own if reference is None else {**own, "mode_frequencies": frequency, "model_error": error}
-    )
+    more = {} if own else {"mode_frequencies": frequency, "model_error": error}
+    return {"holds_to": holds, **more}
 
 
 def _warn_of_instability(system: Linearized) -> None:

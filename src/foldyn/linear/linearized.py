@@ -401,10 +401,7 @@ def warn_beyond(
         return
     what = f"frequencies up to {frequency[above].max():.4g} Hz lie"
     if name:
-        together = len(above) > 2 and above[-1] - above[0] == len(above) - 1
-        numbers = f"{above[0] + 1} to {above[-1] + 1}"
-        numbers = numbers if together else ", ".join(str(k + 1) for k in above)
-        what = f"{name} {numbers} lies" if len(above) == 1 else f"{name}s {numbers} lie"
+        what = f"{numbered(name, above + 1)} lie{'s' * (len(above) == 1)}"
     remedy = f"{LINEAR}, or the shell" if linear else "take the shell, fd.shell"
     warn(
         f"{what} above {limit:.4g} Hz, {share:g} of the panels' own frequency, where most modes of "
@@ -412,3 +409,10 @@ def warn_beyond(
         "fidelity.md#vibration",
         ModelRangeWarning,
     )
+
+
+def numbered(name: str, numbers: NDArray) -> str:
+    """Modes or bands by number, as "mode 3", "modes 1, 2" or "modes 4 to 9"."""
+    if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
+        return f"{name}s {numbers[0]} to {numbers[-1]}"
+    return f"{name}{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers.tolist()))}"

@@ -7,18 +7,20 @@ second. Modes of both are paired by their shapes at the nodes that the models sh
 from __future__ import annotations
 
 import warnings
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.condensation.library import different
-from foldyn.condensation.structure import Superelements
 from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning, warn
+from foldyn.linear.level_error import DOUBTFUL
+from foldyn.linear.linearized import numbered
 from foldyn.linear.mac import pairs, same_places
 from foldyn.linear.shell_of import check_reduced, superelements_of
 from foldyn.structures import Structure
+from foldyn.structures.beyond_range import LINEAR
 
 LEVEL, DIVISIONS = 2, 12
 """The superelements to compare with."""
@@ -26,34 +28,50 @@ PANELS, SHAPES = 200, 20
 """Most panels, and most different ones, that are compared: a comparison takes 2 to 4 s."""
 SPARE = 10  # additional modes of superelements among which partners are sought
 LEAST = 0.5  # least MAC of a partner
-DOUBTFUL = 0.05  # relative error above which a mode is told of
 SLOW = 1e-3  # frequencies of bands below this, relative to the highest, are not compared
-REMEDY = "take superelements (fd.superelements, --model superelements)"
 BELOW = 0.9  # modes below this share of the highest frequency that have no partner are missing
 
 
-def beside(case: Case) -> Case | str:
-    """The case with superelements, without loads; or why it is not compared with them.
+class Beside(NamedTuple):
+    """What a case is compared with.
 
-    Empty for other models than bars and hinges, and for structures without a pattern.
+    Attributes
+    ----------
+    case : Case or None
+        The case with superelements, without loads.
+    why : str or None
+        Why bars and hinges are not compared; None for other models, and where nobody asks.
     """
+
+    case: Case | None = None
+    why: str | None = None
+
+
+ALONE = Beside()
+"""Not compared."""
+
+
+def beside(case: Case, asked: bool, state: Any, secant: float | None) -> Beside:
+    """What a case is compared with, if asked for; at rest, and with the slopes of its laws only."""
     structure = case.structure
+    if not asked or state is not None or secant is not None:
+        return ALONE
     if structure.kind != Structure.kind or structure.pattern is None:
-        return ""
+        return ALONE
     pattern = structure.pattern
     if len(pattern.faces) > PANELS:
-        return f"{len(pattern.faces)} panels, more than {PANELS}"
+        return Beside(why=f"{len(pattern.faces)} panels, more than {PANELS}")
     try:
         check_reduced(case)
         shapes = different(pattern, structure.sheet)
         if shapes > SHAPES:
-            return f"{shapes} different panels, more than {SHAPES}"
+            return Beside(why=f"{shapes} different panels, more than {SHAPES}")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
             bare = case.altered(loads=(), contact=None)
-            return superelements_of(bare, level=LEVEL, divisions=DIVISIONS)
+            return Beside(superelements_of(bare, level=LEVEL, divisions=DIVISIONS))
     except InputError as error:
-        return str(error)
+        return Beside(why=str(error))
 
 
 class Judged(NamedTuple):
@@ -80,7 +98,7 @@ class Judged(NamedTuple):
         told = [far] if far else []
         if len(alone):
             told.append(
-                f"{_numbered('mode', alone)} resemble{'s' * (len(alone) == 1)} no mode of "
+                f"{numbered('mode', alone)} resemble{'s' * (len(alone) == 1)} no mode of "
                 "superelements"
             )
         if len(self.lost):
@@ -108,25 +126,22 @@ def warn_of_bands(errors: NDArray) -> None:
     told = _far_off("band", largest)
     if told:
         warn(
-            f"{told} at some wave vectors: {REMEDY}",
+            f"{told} at some wave vectors: {LINEAR}",
             "superelements.md#bars-and-hinges-beside-them",
             ModelRangeWarning,
         )
 
 
 def judged(
-    case: Case, frequency: NDArray, shape: NDArray, other: Case, true: NDArray, shapes: NDArray
+    case: Case, frequency: NDArray, shape: NDArray, points: NDArray, true: NDArray, shapes: NDArray
 ) -> Judged:
     """Pair modes of a case with those of superelements.
 
     frequency, shape : (k,), (k, n, 3) all modes of the case, with nan or 0 Hz for those that are
     not elastic.
-    other, true, shapes : the case with superelements, and its elastic modes (j,), (j, n', 3) at
-    vertices and then between them.
+    points, true, shapes : (p, 3), (j,), (j, p, 3) points and elastic modes of superelements.
     """
-    structure, reference = case.structure, other.structure
-    assert isinstance(reference, Superelements)
-    points = np.concatenate([reference.nodes, reference.between(other.held_edges)[0]])
+    structure = case.structure
     shared, place = same_places(points, structure.nodes, structure.pattern.size)
     elastic = np.flatnonzero(frequency > 0.0)
     found = pairs(
@@ -147,7 +162,7 @@ def warn_of(own: Judged, elastic: NDArray) -> None:
     doubts = own.doubts(elastic)
     if doubts:
         warn(
-            f"{doubts}: {REMEDY}",
+            f"{doubts}: {LINEAR}",
             "superelements.md#bars-and-hinges-beside-them",
             ModelRangeWarning,
         )
@@ -160,13 +175,6 @@ def _far_off(name: str, errors: NDArray) -> str:
         return ""
     worst = np.abs(errors).argmax()
     return (
-        f"{_numbered(name, off + 1)} differ{'s' * (len(off) == 1)} by more than {DOUBTFUL:.0%} "
+        f"{numbered(name, off + 1)} differ{'s' * (len(off) == 1)} by more than {DOUBTFUL:.0%} "
         f"from superelements ({name} {worst + 1}: {errors[worst]:+.0%})"
     )
-
-
-def _numbered(name: str, numbers: NDArray) -> str:
-    """Modes or bands by number, as "mode 3", "modes 1, 2" or "modes 4 to 9"."""
-    if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
-        return f"{name}s {numbers[0]} to {numbers[-1]}"
-    return f"{name}{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers.tolist()))}"

@@ -28,7 +28,7 @@ from foldyn.errors import FoldynWarning, StretchWarning, warn
 from foldyn.linear.hereditary import Branches, damped_mode
 from foldyn.linear.level_error import coarse_changes, first_doubtful, frequency_errors, other_level
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
-from foldyn.linear.model_error import SPARE, Judged, beside, judged, warn_of
+from foldyn.linear.model_error import ALONE, SPARE, Beside, Judged, beside, judged, warn_of
 from foldyn.ram_limit import check_memory
 from foldyn.results import modes_dataset
 from foldyn.statics.rigid import free_rigid_motions, of_all_dofs, rigid_motions
@@ -122,10 +122,9 @@ def modes(
         Modes are not compared, and panels that stretch hold much of the strain energy of one.
     """
     of_kind("case", case, Case)
-    reference = beside(case) if check_model and state is None and secant is None else None
     return spectrum_of(
         case, count, state, secant, load_factor=load_factor, verify=verify,
-        solver=solver, reference=reference,
+        solver=solver, compared=beside(case, check_model, state, secant),
     ).result  # fmt: skip
 
 
@@ -140,12 +139,12 @@ class Found(NamedTuple):
 def spectrum_of(
     case: Case, count: int = 6, state: State | str | None = None, secant: float | None = None, *,
     load_factor: float = 1.0, verify: bool = True, solver: str = "auto",
-    errors: bool = True, reference: Case | str | None = None,
+    errors: bool = True, compared: Beside = ALONE,
 ) -> Found:  # fmt: skip
     """Modes, with the linearized system and its spectrum; other arguments as in `modes`.
 
     errors : whether to estimate the errors of frequencies, for models that can.
-    reference : the case with superelements, from `model_error.beside`, to compare with.
+    compared : what to compare the modes with.
     """
     count = whole("count", count, least=1)
     check_memory(
@@ -158,7 +157,7 @@ def spectrum_of(
     space, along = rigid_space(linear), unit_translations(linear)
     spectrum = lowest(pencil, count, unresisted(linear, space), verify)
     _warn(spectrum)
-    if not isinstance(reference, Case):
+    if compared.case is None:
         _warn_of_stretch(linear, spectrum)
         frequency = np.sqrt(spectrum.values.clip(min=0.0)) / TURN
         warn_beyond(case.structure, frequency, "mode", linear=True)
@@ -176,18 +175,17 @@ def spectrum_of(
         "factorizations": pencil.factorizations,
         "largest_residual": float(pencil.residuals(spectrum.values, spectrum.shapes).max()),
         "rounding": _rounding(pencil, spectrum),
-        "not_compared": (reference if isinstance(reference, str) else "") or None,
+        "not_compared": compared.why,
         "wall_seconds": time.perf_counter() - began,
     }
     variables = _variables(linear, spectrum, space, along)
-    if isinstance(reference, Case):
-        compared = _judged(case, variables, reference)
-        variables["model_error"] = compared.error
-        if len(compared.lost):
-            statistics["missing_frequencies"] = compared.lost
+    if compared.case is not None:
+        found = _judged(case, variables, compared.case)
+        variables["model_error"] = found.error
+        statistics["missing_frequencies"] = found.lost if len(found.lost) else None
     if errors and isinstance(case.structure, Superelements):
-        compared = case.altered(structure=other_level(case.structure))
-        other = spectrum_of(compared, count, verify=False, solver=solver, errors=False).spectrum
+        leveled = case.altered(structure=other_level(case.structure))
+        other = spectrum_of(leveled, count, verify=False, solver=solver, errors=False).spectrum
         motion = linear.whole(spectrum.shapes)
         changes = (motion.T @ (part @ motion) for part in coarse_changes(case))
         estimate = frequency_errors(case, spectrum.values, other.values, changes)
@@ -202,21 +200,21 @@ def of_spectrum(arguments: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def trusted(
-    case: Case, top: float, reference: Case | None = None
+    case: Case, top: float, compared: Beside
 ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
     """Frequency (Hz), at most `top`, up to which modes are within `DOUBTFUL`.
 
     Also returns the frequencies (k,), Hz, of the modes that were judged, at most the last of
     `COUNTS`, and their relative errors. Superelements estimate these themselves; bars and hinges
-    are compared with their `reference`.
+    are compared with them.
     """
     frequency, error, holds = np.zeros(0), np.zeros(0), 0.0
     for count in COUNTS:
         many = count if case.structure.linear else min(count, len(case.free_dofs))
-        found = spectrum_of(case, many, verify=False, reference=reference).result
+        found = spectrum_of(case, many, verify=False, compared=compared).result
         elastic = found["frequency"].values > 0.0
         frequency = found["frequency"].values[elastic]
-        if reference is None:
+        if compared.case is None:
             error = found["frequency_error"].values[elastic] / frequency
         else:
             error = found["model_error"].values[elastic]
@@ -266,19 +264,26 @@ def _judged(case: Case, found: dict[str, Any], other: Case) -> Judged:
         warnings.simplefilter("ignore", FoldynWarning)
         most = len(found["frequency"]) + SPARE
         true = spectrum_of(other, most, verify=False, errors=False).result
-    own, shape = elastic(true)
-    shape = np.concatenate([shape, elastic(true, shape="between_shape")[1]], axis=1)
-    compared = judged(case, found["frequency"], found["shape"], other, own, shape)
-    warn_of(compared, found["frequency"] > 0.0)
-    return compared
+    points = points_of(other, true)
+    out = judged(case, found["frequency"], found["shape"], points, *elastic(true, None))
+    warn_of(out, found["frequency"] > 0.0)
+    return out
 
 
-def elastic(
-    found: xarray.Dataset, count: int | None = None, shape: str = "shape"
-) -> tuple[NDArray, NDArray]:
-    """Frequencies (k,), Hz, and shapes (k, n, 3) of the modes with stiffness."""
+def elastic(found: xarray.Dataset, count: int | None) -> tuple[NDArray, NDArray]:
+    """Frequencies (k,), Hz, and shapes (k, p, 3) at `points_of` of the modes with stiffness."""
     kept = np.flatnonzero(found["eigenvalue"].values > 0.0)[:count]
-    return found["frequency"].values[kept], found[shape].values[kept]
+    names = [name for name in ("shape", "between_shape") if name in found]
+    shape = np.concatenate([found[name].values[kept] for name in names], axis=1)
+    return found["frequency"].values[kept], shape
+
+
+def points_of(case: Case, found: xarray.Dataset) -> NDArray[np.float64]:
+    """Points (p, 3), m, where modes are known: nodes, and of superelements points between them."""
+    nodes = case.structure.nodes
+    if "between_position" not in found:
+        return nodes
+    return np.concatenate([nodes, found["between_position"].values])
 
 
 def _remembered(

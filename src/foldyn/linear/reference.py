@@ -20,7 +20,8 @@ from foldyn.arguments import Unit, brief
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.mac import pairs, same_places
-from foldyn.linear.modes import elastic, modes
+from foldyn.linear.model_error import LEAST, SPARE
+from foldyn.linear.modes import elastic, modes, points_of
 from foldyn.linear.shell_of import with_structure
 from foldyn.structures.discretized import Discretized
 
@@ -31,8 +32,6 @@ NO_LIMIT = (
     "a panel touches a clamped edge at vertex {} alone, folded against it, where frequencies have "
     "no limit: meshes and programs differ by 20 %"
 )
-LEAST = 0.5  # least MAC of a partner
-SPARE = 10  # additional modes of a model among which partners are sought
 MODES = 3
 FINE = 16  # pieces per edge: with more, the estimate is expensive
 
@@ -173,13 +172,9 @@ def superelement_modes(case: Case, count: int) -> Reference:
     """The lowest modes of superelements, at most `count`."""
     found = modes_at_rest(case, count)
     frequency, shape = elastic(found, count)
-    between = elastic(found, count, "between_shape")[1]
     own = found["eigenvalue"].values > 0.0
     error = found["frequency_error"].values[own][:count] / frequency
-    return Reference(
-        frequency, error, frequency[None], np.concatenate([shape, between], axis=1),
-        np.concatenate([case.structure.nodes, found["between_position"].values]), case, found,
-    )  # fmt: skip
+    return Reference(frequency, error, frequency[None], shape, points_of(case, found), case, found)
 
 
 def is_graded(case: Case) -> bool:
@@ -259,8 +254,6 @@ def matched(true: Shown, count: int, case: Case, found: xarray.Dataset) -> Match
     seen, shape = true.at(points)
     wanted = true.frequency[:count]
     frequency, own = elastic(found, count + SPARE)
-    if "between_shape" in found:
-        own = np.concatenate([own, elastic(found, count + SPARE, "between_shape")[1]], axis=1)
     partner, mac = np.full(len(wanted), np.nan), np.zeros(len(wanted))
     both = pairs(wanted, shape[:count], frequency, own[:, seen], weights[seen])
     mac[both.first] = both.mac
@@ -278,11 +271,9 @@ def _points(case: Case, found: xarray.Dataset) -> tuple[NDArray, NDArray]:
     structure = case.structure
     even = replace(structure, options=replace(structure.options, mass="mixed_voronoi"))
     weights = with_structure(case, even).nodal_mass
-    if "between_shape" not in found:
-        return structure.nodes, weights
-    between = found["between_position"].values
-    more = np.full(len(between), weights.sum() / len(between))
-    return np.concatenate([structure.nodes, between]), np.concatenate([weights, more])
+    points = points_of(case, found)
+    between = len(points) - len(weights)
+    return points, np.append(weights, np.full(between, weights.sum() / max(between, 1)))
 
 
 class Refinement(NamedTuple):
