@@ -82,6 +82,23 @@ def _aligned(rows: int) -> list[NDArray]:
 
 
 @inner_scalar
+def put_dihedral(x, q, g):
+    """Put the gradient of hinge q of a block, and in the last row its angle, for points x."""
+    (
+        g[12 * BLOCK + q],
+        g[q], g[BLOCK + q], g[2 * BLOCK + q],
+        g[3 * BLOCK + q], g[4 * BLOCK + q], g[5 * BLOCK + q],
+        g[6 * BLOCK + q], g[7 * BLOCK + q], g[8 * BLOCK + q],
+        g[9 * BLOCK + q], g[10 * BLOCK + q], g[11 * BLOCK + q],
+    ) = dihedral_gradient(
+        x[q], x[BLOCK + q], x[2 * BLOCK + q],
+        x[3 * BLOCK + q], x[4 * BLOCK + q], x[5 * BLOCK + q],
+        x[6 * BLOCK + q], x[7 * BLOCK + q], x[8 * BLOCK + q],
+        x[9 * BLOCK + q], x[10 * BLOCK + q], x[11 * BLOCK + q],
+    )  # fmt: skip
+
+
+@inner_scalar
 def whole_lanes(m):
     """Number of lanes to compute for m elements: rounded up to whole vectors."""
     return (m + LANES - 1) // LANES * LANES
@@ -272,18 +289,7 @@ def add_hinge_forces(model, low, high, scratch):
                 prefetch_range(stiffness, after, BLOCK)
                 prefetch_range(rest, after, BLOCK)
             for q in range(whole_lanes(m)):
-                (
-                    g[12 * BLOCK + q],
-                    g[q], g[BLOCK + q], g[2 * BLOCK + q],
-                    g[3 * BLOCK + q], g[4 * BLOCK + q], g[5 * BLOCK + q],
-                    g[6 * BLOCK + q], g[7 * BLOCK + q], g[8 * BLOCK + q],
-                    g[9 * BLOCK + q], g[10 * BLOCK + q], g[11 * BLOCK + q],
-                ) = dihedral_gradient(
-                    x[q], x[BLOCK + q], x[2 * BLOCK + q],
-                    x[3 * BLOCK + q], x[4 * BLOCK + q], x[5 * BLOCK + q],
-                    x[6 * BLOCK + q], x[7 * BLOCK + q], x[8 * BLOCK + q],
-                    x[9 * BLOCK + q], x[10 * BLOCK + q], x[11 * BLOCK + q],
-                )  # fmt: skip
+                put_dihedral(x, q, g)
             for q in range(m):
                 kept[first + q] = angle[q]
             if code == LINEAR:

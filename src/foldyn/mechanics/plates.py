@@ -33,9 +33,8 @@ from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment, hinge_slope
 from foldyn.mechanics.bars_hinges import bars_hinges_kernels
-from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.discrete_gradient import discrete_gradient, mean_moment, put_motion
-from foldyn.mechanics.force import ForceScratch, force_scratch, whole_lanes
+from foldyn.mechanics.force import ForceScratch, force_scratch, put_dihedral, whole_lanes
 from foldyn.mechanics.model import BLOCK, BarsHinges
 from foldyn.mechanics.term import (
     ENERGIES,
@@ -132,18 +131,7 @@ def turn_hinges(model, u, scratch):
                 for c in range(12):
                     x[c * BLOCK + q] = flat(p)[c]
         for q in range(whole_lanes(m)):
-            (
-                g[12 * BLOCK + q],
-                g[q], g[BLOCK + q], g[2 * BLOCK + q],
-                g[3 * BLOCK + q], g[4 * BLOCK + q], g[5 * BLOCK + q],
-                g[6 * BLOCK + q], g[7 * BLOCK + q], g[8 * BLOCK + q],
-                g[9 * BLOCK + q], g[10 * BLOCK + q], g[11 * BLOCK + q],
-            ) = dihedral_gradient(
-                x[q], x[BLOCK + q], x[2 * BLOCK + q],
-                x[3 * BLOCK + q], x[4 * BLOCK + q], x[5 * BLOCK + q],
-                x[6 * BLOCK + q], x[7 * BLOCK + q], x[8 * BLOCK + q],
-                x[9 * BLOCK + q], x[10 * BLOCK + q], x[11 * BLOCK + q],
-            )  # fmt: skip
+            put_dihedral(x, q, g)
         for q in range(m):
             scratch.angle[first + q] = g[12 * BLOCK + q]
             for c in range(12):
