@@ -179,7 +179,7 @@ def test_a_panel_that_touches_a_clamp_has_no_limit(radius, divisions):
     touching, whole = told([(1, 2)]), told([(0, 1), (1, 2)])
     assert touching.result.attrs["touched_clamp"] == 1
     assert np.isnan(touching.result.mesh_error).all()
-    assert "touches a clamped edge at vertex 1 alone" in touching.advice
+    assert "touches a clamped edge at vertex 1 alone" in touching.notes[0]
     assert "touched_clamp" not in whole.result.attrs
     assert np.isfinite(whole.result.mesh_error).all()
     shell = fd.shell(cell, sheet, divisions=4, clamped=[(1, 2)])

@@ -18,7 +18,7 @@ from foldyn.cases import Case
 from foldyn.cases.models import BARS_AND_HINGES, SUPERELEMENTS
 from foldyn.errors import InputError
 from foldyn.linear import Fidelity, fidelity
-from foldyn.linear.compared import against, legend, percent
+from foldyn.linear.compared import WITHIN, against, legend, percent
 from foldyn.linear.fidelity import MODELS, REFERENCES, comparison, named
 from foldyn.linear.shell_of import checked_divisions
 from foldyn.report.album import Album, ByRule
@@ -97,7 +97,7 @@ class FidelityAnalysis(Analysis):
         return compute
 
     def line(self, name: str, result: xarray.Dataset) -> str:
-        """All modes in a table, and the advice."""
+        """All modes in a table, and notes."""
         return str(Fidelity(result))
 
     @staticmethod
@@ -105,8 +105,7 @@ class FidelityAnalysis(Analysis):
         """See `Analysis`."""
         (first, result), *_ = results.items()
         found = Fidelity(result)
-        yield Heading("Which model")
-        yield Text(found.advice)
+        yield Heading("Errors")
         yield from album.figure(
             "fidelity",
             f"Above: errors of the models' frequencies, relative to {against(result)}, 5 % shaded. "
@@ -138,7 +137,7 @@ class _Steps:
 
 
 def _models(found: Fidelity) -> Table:
-    """Table with a row for each model: its options, its errors, its cost."""
+    """Table with a row for each model: its options, its errors, its range."""
     result, below = found.result, found.result["frequency"].values < found.limit
     forces = "deflection" in result
     header = ["model", "options", "median (%)", "largest (%)", "lost"]
@@ -153,11 +152,11 @@ def _models(found: Fidelity) -> Table:
         row.append(int(np.isinf(error).sum()))
         if forces:
             row.append(_told(float(one["deflection_error"]), "soft"))
-        rows.append([*row, 1e3 * float(one["model_seconds"]), f"1/{float(one['cost_ratio']):.0f}"])
+        rows.append([*row, found.holds_to(model)])
     # this table shows no modes
     words = [line for line in legend(found) if not line.startswith("*")]
     return Table(
-        [*header, "time (ms)", "relative"],
+        [*header, f"{WITHIN} (Hz)"],
         rows,
         f"Errors against {against(result)} of the {int(below.sum())} modes below 0.6 of the plate "
         f"frequency, {found.limit:.4g} Hz; lost modes do not count in median and largest. "
@@ -210,11 +209,7 @@ def _notes(found: Fidelity) -> str:
         notes.append(
             f"Superlinear hinges have the slope of an oscillation by {facts['secant']:g} degrees."
         )
-    notes.append(
-        "Times are medians of modal analyses for as many modes of each, measured in this run; "
-        f"{name} took {float(found.result['seconds']):.3g} s."
-    )
-    return "\n\n".join(notes)
+    return "\n\n".join([*notes, *found.notes])
 
 
 def _meshes(found: Fidelity) -> str:

@@ -1,9 +1,8 @@
-"""`Fidelity`: models beside superelements or the shell, mode by mode, and advice."""
+"""`Fidelity`: models beside superelements or the shell, mode by mode."""
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from textwrap import fill
@@ -22,35 +21,13 @@ ABREAST, WIDE = 4, 79  # in plain text: models side by side, and characters per 
 __all__ = ["OWN", "ComparedMode", "Fidelity"]
 OWN = "own"
 """Name of the case's own model."""
-GOOD, LARGEST = 0.02, 0.10  # largest errors: of a model worth keeping, and of a usable model
+WITHIN = "10 % up to"
+LARGEST = 0.10  # error of a usable model
 MESH = 0.02  # larger mesh errors are mentioned
-BETTER = "take superelements (--model superelements on the command line, fd.superelements)"
 SCOPE = (
     "Only small vibrations about rest and small loads were compared: motions and loads that turn "
     "creases far are not covered."
 )
-
-
-class Reach(NamedTuple):
-    """Range in which a model follows the reference: the lowest modes with errors of at most 10 %.
-
-    Attributes
-    ----------
-    model : str
-    count : int
-        Number of modes in the range.
-    worst : float
-        Largest error among these modes; infinite if there are none.
-    """
-
-    model: str
-    count: int
-    worst: float
-
-
-def advice(result: xarray.Dataset) -> str:
-    """Advice in sentences from a comparison; see `foldyn.fidelity`."""
-    return " ".join(_sentences(result))
 
 
 def against(result: xarray.Dataset) -> str:
@@ -68,104 +45,15 @@ def size(value: float) -> str:
     return percent(abs(value))[1:]
 
 
-def _sentences(result: xarray.Dataset) -> Iterator[str]:
-    """Sentences of the advice, in order."""
-    frequency, limit = result["frequency"].values, float(result.attrs["limit"])
-    below = int((frequency < limit).sum())
-    reaches = [reach(result, model, below) for model in result["model"].values.tolist()]
-    own, best = reaches[0], min(reaches, key=lambda one: (-one.count, one.worst))
-    if own.count == best.count and own.worst <= max(GOOD, best.worst):
-        best = own
-    if below:
-        yield from _vibrations(result, below, best)
-    else:
-        yield (
-            f"The lowest mode of {against(result)}, {frequency[0]:.4g} Hz, lies above {limit:.4g} "
-            "Hz, 0.6 of the plate frequency: panels vibrate as plates there, which bars and hinges "
-            f"do not: {BETTER}."
-        )
-    if "deflection" in result:
-        yield _statics(result, best)
-    yield from _mesh(result, below)
-    yield SCOPE
-
-
-def _vibrations(result: xarray.Dataset, below: int, best: Reach) -> Iterator[str]:
-    """Sentences on the modes below the limit, for the recommended model."""
-    frequency, limit = result["frequency"].values, float(result.attrs["limit"])
-    if not best.count:
-        yield (
-            f"No model has the lowest mode, {frequency[0]:.4g} Hz, within {size(LARGEST)} of "
-            f"{against(result)}: {BETTER}."
-        )
-    else:
-        top, whole = float(frequency[best.count - 1]), best.count == below
-        upto = f"{top:.4g} Hz"
-        if whole and below < len(frequency):
-            upto = f"{limit:.4g} Hz, 0.6 of the plate frequency"
-        elif whole:
-            upto += ", the highest mode compared"
-        ratio = float(result["cost_ratio"].sel(model=best.model))
-        yield (
-            f"{_called(result, best.model)} is within {size(best.worst)} of {against(result)} up "
-            f"to {upto}, at 1/{ratio:.0f} of its cost{'' if best.model == OWN else ': use it'}."
-        )
-        if not whole:
-            yield (
-                f"The next mode, {frequency[best.count]:.4g} Hz, {_missed(result, best)}: from "
-                f"there {BETTER}."
-            )
-    if best.model != OWN:
-        yield from _own(result, below)
-
-
-def _own(result: xarray.Dataset, below: int) -> Iterator[str]:
-    """Errors of the case's own model below the limit."""
-    error = np.abs(result["error"].sel(model=OWN).values[:below])
-    lost = int(np.isinf(error).sum())
-    parts = []
-    if lost < below:
-        parts.append(f"is off by up to {size(float(error[np.isfinite(error)].max()))}")
-    if lost:
-        parts.append(f"has no partner of {lost} of {below} modes")
-    yield f"{_called(result, OWN)} {' and '.join(parts)} there."
-    soft = int(result["soft_hinges"].sel(model=OWN))
-    if soft:
-        yield (
-            f"{soft} of its hinges are superlinear and have no stiffness at rest: take linear "
-            "bends, or judge it with a secant amplitude (secant = 1, in degrees)."
-        )
-
-
-def _statics(result: xarray.Dataset, best: Reach) -> str:
-    """Displacements of the recommended model, and of the case's own."""
-    errors = result["deflection_error"]
-    told = {one: float(errors.sel(model=one)) for one in dict.fromkeys([best.model, OWN])}
-    texts = (
-        f"{percent(error)} ({model})" if np.isfinite(error) else f"no stiffness at all ({model})"
-        for model, error in told.items()
-    )
-    mesh = np.isnan(result["deflection_mesh_error"])
-    uncertain = "; those of the shell have not converged" if mesh else ""
-    return f"Displacements under its forces, if those are small: {', '.join(texts)}{uncertain}."
-
-
-def reach(result: xarray.Dataset, model: str, below: int) -> Reach:
-    """Range in which a model follows the reference among the lowest modes."""
-    error = np.abs(result["error"].sel(model=model).values[:below])
-    bad = np.flatnonzero(error > LARGEST)
-    count = int(bad[0]) if len(bad) else below
-    return Reach(model, count, float(error[:count].max()) if count else float("inf"))
-
-
-def _mesh(result: xarray.Dataset, below: int) -> Iterator[str]:
+def _mesh(result: xarray.Dataset) -> Iterator[str]:
     """Errors of the reference itself."""
     if "touched_clamp" in result.attrs:
         yield (
-            f"No mesh of the shell converges: {NO_LIMIT.format(result.attrs['touched_clamp'])}. "
-            "Clamp an edge of that panel, not its corner alone."
+            f"No mesh converges: {NO_LIMIT.format(result.attrs['touched_clamp'])}. Clamp an edge "
+            "of that panel, not its corner alone."
         )
         return
+    below = int((result["frequency"].values < result.attrs["limit"]).sum())
     error = np.abs(result["mesh_error"].values[: below or None])
     if result.attrs["reference"] == SUPERELEMENTS:
         if error.max() > MESH:
@@ -185,16 +73,6 @@ def _mesh(result: xarray.Dataset, below: int) -> Iterator[str]:
             f"The finer mesh of the shell is itself about {size(float(error.max()))} off its "
             "limit: compare again with finer divisions."
         )
-
-
-def _missed(result: xarray.Dataset, best: Reach) -> str:
-    error = float(result["error"].sel(model=best.model).values[best.count])
-    return "has no partner in it" if np.isinf(error) else f"is off by {size(error)} in it"
-
-
-def _called(result: xarray.Dataset, model: str) -> str:
-    name = "case's own model" if model == OWN else f'model "{model}"'
-    return f"The {name} ({result['options'].sel(model=model).item()})"
 
 
 class ComparedMode(NamedTuple):
@@ -262,10 +140,8 @@ class Fidelity:
         )
 
     def __str__(self) -> str:
-        """A table in plain text, and the advice."""
-        # numbers stay next to their units
-        held = re.sub(r"(\d) (%|Hz)", "\\1\u00a0\\2", self.advice)
-        return f"{_text(self)}\n\n{fill(held, WIDE)}".replace("\u00a0", " ")
+        """A table in plain text, and notes."""
+        return "\n\n".join([_text(self), *(fill(note, WIDE) for note in self.notes)])
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -278,9 +154,20 @@ class Fidelity:
         return float(self.result.attrs["limit"])
 
     @property
-    def advice(self) -> str:
-        """The model to use, up to which frequency, and the limits of the comparison."""
-        return advice(self.result)
+    def notes(self) -> tuple[str, ...]:
+        """What to know about the numbers, in sentences."""
+        soft = int(self.result["soft_hinges"].sel(model=OWN))
+        told = (
+            f"{soft} hinges of the case's own model are superlinear and have no stiffness at rest: "
+            "take linear bends, or judge it with a secant amplitude (secant = 1, in degrees)."
+        )
+        return (*_mesh(self.result), *([told] if soft else []), SCOPE)
+
+    def holds_to(self, model: str = OWN) -> float:
+        """Frequency (Hz) of the highest mode up to which a model is within 10 %; 0 if none is."""
+        error = np.abs(self.result["error"].sel(model=choice("model", model, self.models)).values)
+        good = int((np.append(error, np.inf) > LARGEST).argmax())
+        return float(self.result["frequency"].values[good - 1]) if good else 0.0
 
     def table(self, model: str = OWN) -> tuple[ComparedMode, ...]:
         """Modes of the reference, each paired with a mode of the model."""
@@ -338,8 +225,8 @@ def _columns(found: Fidelity, models: tuple[str, ...]) -> str:
         for error in result["deflection_error"].values.tolist():
             row += [percent(error) if math.isfinite(error) else "soft", ""]
         rows.append(row)
-    ratios = (text for ratio in result["cost_ratio"].values for text in (f"1/{ratio:.0f}", ""))
-    rows.append(["cost", f"{result['seconds'].item():.2g} s", *ratios])
+    held = (text for model in models for text in (f"{found.holds_to(model):.4g} Hz", ""))
+    rows.append([WITHIN, "", *held])
     wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for first, *others in rows:

@@ -6,7 +6,6 @@ import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from statistics import median
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +23,6 @@ from foldyn.errors import FoldynWarning, InputError, warn, within
 from foldyn.linear.compared import OWN, Fidelity
 from foldyn.linear.level_error import other_level
 from foldyn.linear.linearized import linearize
-from foldyn.linear.modes import modes
 from foldyn.linear.operating_point import BALANCED
 from foldyn.linear.reference import (
     SPARE,
@@ -81,7 +79,6 @@ BESIDE = ("standard", "plate", "n5b8e")
 SHOWN = ("calibration", "mass", "bend_law")
 """Options that distinguish models in tables."""
 BEYOND = 2  # additional modes of the shell, computed but not compared
-RUNS, SECONDS = 5, 3.0  # limits for timing a modal analysis: number of runs, and seconds
 
 
 def fidelity(
@@ -136,7 +133,7 @@ def fidelity(
     Returns
     -------
     Fidelity
-        The attribute `advice` names the model to use and its frequency range.
+        Printed, a table; `holds_to` is the frequency up to which a model is within 10 %.
 
     Raises
     ------
@@ -214,8 +211,6 @@ class Comparison:
             "options": [_told(held, self.compared[OWN]) for held in self.compared.values()],
             "soft_hinges": [one.attrs["soft_hinges"] for one in found.values()],
         }
-        progress("times")
-        values |= self._times(true)
         if self.compared[OWN].loads and _held(true.found):
             progress("small loads")
             values |= self._deflections([name for name, one in found.items() if _held(one)])
@@ -245,13 +240,6 @@ class Comparison:
         facts = {"divisions": divisions[1:], "triangles": len(structure.triangles)}
         true = reference_modes(self.references, self.count + BEYOND)
         return true, {"reference": SHELL, **facts}
-
-    def _times(self, true: Reference) -> dict[str, Any]:
-        """Times (s) of modal analyses, all with the same number of modes, and ratios of times."""
-        count, taken = true.found.sizes["mode"], [float(true.found.attrs["wall_seconds"])]
-        shell = _seconds(true.case, count, self.secant, taken)
-        own = np.array([_seconds(held, count, self.secant) for held in self.compared.values()])
-        return {"seconds": shell, "model_seconds": own, "cost_ratio": shell / own}
 
     def _deflections(self, held: Sequence[str]) -> dict[str, Any]:
         """Displacements along the forces: work divided by the sum of the forces on nodes.
@@ -370,22 +358,6 @@ def _told(case: Case, own: Case) -> str:
 
 def _written(value: Any) -> str:
     return show(value.name if isinstance(value, Law) else value)
-
-
-def _seconds(case: Case, count: int, secant: float | None, taken: Sequence[float] = ()) -> float:
-    """Median time (s) of a modal analysis, from fewer runs if these take long.
-
-    taken : times already measured.
-    """
-    times = list(taken)
-    if not times:
-        modes_at_rest(case, 1, secant)  # warm-up: computes cached values
-    while not times or (len(times) < RUNS and sum(times) < SECONDS):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)
-            found = modes(case, min(count, len(case.free_dofs)), secant=secant, check_model=False)
-        times.append(float(found.attrs["wall_seconds"]))
-    return median(times)
 
 
 def _warn_of_imbalance(residual: float) -> None:
