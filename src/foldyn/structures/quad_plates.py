@@ -216,9 +216,8 @@ def twists(x: NDArray) -> NDArray:
 
 
 def _flexibilities(x: NDArray, straight: NDArray, poissons_ratio: NDArray) -> NDArray:
-    nodes, weights = legendre.leggauss(POINTS)
-    at = np.stack(np.meshgrid(nodes, nodes, indexing="ij"), axis=2).reshape(-1, 2)
-    curvature, area = _curvatures(x, at)
+    _, weights = legendre.leggauss(POINTS)
+    curvature, area = _curvatures(x)
     curvature = curvature * np.sqrt(area * np.outer(weights, weights).ravel())[:, :, None, None]
     nu = poissons_ratio[:, None, None]
     xx, yy, xy = (np.ascontiguousarray(curvature[:, :, k]) for k in range(3))
@@ -230,7 +229,7 @@ def _flexibilities(x: NDArray, straight: NDArray, poissons_ratio: NDArray) -> ND
     loads = np.zeros((len(x), energy.shape[1], 5))
     loads[:, 0, 0] = 1.0
     for k in range(4):
-        loads[:, :, 1 + k] = _mean_slope(x, k, nodes, 0.5 * weights)
+        loads[:, :, 1 + k] = _mean_slope(x, k, 0.5 * weights)
     own, degree = _edge_and_degree()
     held = (own >= 0) & straight[:, own]
     coarse, fine = (_solved(energy, loads, held | (degree > d)) for d in DEGREES)
@@ -282,17 +281,37 @@ def _polynomials(derivative: int) -> tuple[list[NDArray], list[NDArray]]:
     return linear, bows
 
 
-def _shapes(heights: NDArray, at: NDArray, d: int, e: int) -> NDArray:
-    """Derivatives (p, n, k) of all shapes at points (n, 2): d times in xi, e times in eta."""
+@cache
+def _points(edge: int | None) -> NDArray:
+    """Coordinates xi, eta (n, 2) of the Gauss points of an edge, or of the whole panel."""
+    nodes, _ = legendre.leggauss(POINTS)
+    if edge is None:
+        return np.stack(np.meshgrid(nodes, nodes, indexing="ij"), axis=2).reshape(-1, 2)
+    start, end = SIGNS[edge], SIGNS[(edge + 1) % 4]
+    return 0.5 * ((1.0 - nodes)[:, None] * start + (1.0 + nodes)[:, None] * end)
+
+
+@cache
+def _functions(edge: int | None, d: int, e: int) -> tuple[NDArray, NDArray]:
+    """Bilinear functions (n, 4) of the corners and all shapes but the twist (n, k - 1) there.
+
+    They are derivatives, d times in xi, e times in eta.
+    """
+    at = _points(edge)
     (ends, bows), (sides, lifts) = _line(at[:, 0], d), _line(at[:, 1], e)
     corners = np.stack([ends[:, i] * sides[:, j] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))], 1)
-    twist = (heights @ corners.T)[:, :, None]
     others = [
         (sides[:, :, None] * bows[:, None, :]).reshape(len(at), -1),  # bows of edges 0 and 2
         (ends[:, :, None] * lifts[:, None, :]).reshape(len(at), -1),  # bows of edges 3 and 1
         (bows[:, :, None] * lifts[:, None, :]).reshape(len(at), -1),
     ]
-    rest = np.concatenate(others, axis=1)
+    return corners, np.concatenate(others, axis=1)
+
+
+def _shapes(heights: NDArray, edge: int | None, d: int, e: int) -> NDArray:
+    """Derivatives (p, n, k) of all shapes at Gauss points: d times in xi, e times in eta."""
+    corners, rest = _functions(edge, d, e)
+    twist = (heights @ corners.T)[:, :, None]
     return np.concatenate([twist, np.broadcast_to(rest, (len(heights), *rest.shape))], axis=2)
 
 
@@ -306,17 +325,17 @@ def _jacobian(x: NDArray, at: NDArray) -> NDArray:
     )
 
 
-def _curvatures(x: NDArray, at: NDArray) -> tuple[NDArray, NDArray]:
+def _curvatures(x: NDArray) -> tuple[NDArray, NDArray]:
     """Second derivatives (p, n, 3, k) of all shapes, xx, yy and xy; areas (p, n) at the points."""
     heights = twists(x)
-    jacobian = _jacobian(x, at)
+    jacobian = _jacobian(x, _points(None))
     inverse = np.linalg.inv(jacobian)  # rows xi, eta; columns x, y
-    slopes = np.stack([_shapes(heights, at, 1, 0), _shapes(heights, at, 0, 1)], axis=2)
+    slopes = np.stack([_shapes(heights, None, 1, 0), _shapes(heights, None, 0, 1)], axis=2)
     by = np.swapaxes(inverse, 2, 3) @ slopes  # with respect to x, y
     # d2 w/d xi2 etc., minus the effect of curved coordinates: x, y are bilinear
     mixed = 0.25 * np.einsum("v,pva->pa", SIGNS[:, 0] * SIGNS[:, 1], x)
-    xi, eta = _shapes(heights, at, 2, 0), _shapes(heights, at, 0, 2)
-    cross = _shapes(heights, at, 1, 1) - np.einsum("pa,pnak->pnk", mixed, by)
+    xi, eta = _shapes(heights, None, 2, 0), _shapes(heights, None, 0, 2)
+    cross = _shapes(heights, None, 1, 1) - np.einsum("pa,pnak->pnk", mixed, by)
     a, b = inverse[:, :, 0, :, None], inverse[:, :, 1, :, None]
 
     def second(i: int, j: int) -> NDArray:
@@ -327,13 +346,11 @@ def _curvatures(x: NDArray, at: NDArray) -> tuple[NDArray, NDArray]:
     return curvature, np.linalg.det(jacobian)
 
 
-def _mean_slope(x: NDArray, k: int, nodes: NDArray, weights: NDArray) -> NDArray:
+def _mean_slope(x: NDArray, k: int, weights: NDArray) -> NDArray:
     """Mean outward slopes (p, k) of all shapes at edge k."""
-    start, end = SIGNS[k], SIGNS[(k + 1) % 4]
-    at = 0.5 * ((1.0 - nodes)[:, None] * start + (1.0 + nodes)[:, None] * end)
     heights = twists(x)
-    slopes = np.stack([_shapes(heights, at, 1, 0), _shapes(heights, at, 0, 1)], axis=2)
-    by = np.swapaxes(np.linalg.inv(_jacobian(x, at)), 2, 3) @ slopes
+    slopes = np.stack([_shapes(heights, k, 1, 0), _shapes(heights, k, 0, 1)], axis=2)
+    by = np.swapaxes(np.linalg.inv(_jacobian(x, _points(k))), 2, 3) @ slopes
     along = x[:, (k + 1) % 4] - x[:, k]
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
     outward /= np.linalg.norm(along, axis=1)[:, None]
