@@ -21,6 +21,8 @@ from foldyn.cases import Case
 from foldyn.condensation import Superelements
 from foldyn.condensation.shapes import LEVELS
 from foldyn.condensation.term import SuperelementsTerm
+from foldyn.errors import ModelRangeWarning, warn
+from foldyn.linear.linearized import numbered
 from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
 from foldyn.linear.wave_solver import Waves, WaveSolver
 
@@ -54,6 +56,23 @@ def frequency_errors(
     own, level, mesh = (np.sqrt(each.clip(min=0.0)) / TURN for each in (values, other, coarse))
     share = SHARES[structure.options.level - 1]
     return share * np.abs(level - own) + np.abs(mesh - own) + LEAST * own
+
+
+def warn_of_errors(structure: Superelements, frequency: NDArray, error: NDArray) -> None:
+    """Warn about modes whose frequencies (k,), Hz, may be off by `error` (k,), more than 5 %."""
+    off = np.flatnonzero(error > DOUBTFUL * frequency)
+    if not len(off):
+        return
+    share = error[off] / np.maximum(frequency[off], ROUNDING * frequency.max())
+    better = "take a higher level"
+    if structure.options.level == len(LEVELS):
+        better = "cut panels that are much longer than wide into welded ones (Pattern(welds=...))"
+    warn(
+        f"{numbered('mode', off + 1)} may be more than {DOUBTFUL:.0%} off (frequency_error; mode "
+        f"{off[share.argmax()] + 1}: {share.max():.0%}): {better}",
+        "superelements.md#errors",
+        ModelRangeWarning,
+    )
 
 
 def coarse_changes(case: Case) -> tuple[sparse.csr_array, sparse.csr_array]:

@@ -26,7 +26,13 @@ from foldyn.condensation import Superelements
 from foldyn.dynamics.modal_damping import mass_of
 from foldyn.errors import FoldynWarning, StretchWarning, warn
 from foldyn.linear.hereditary import Branches, damped_mode
-from foldyn.linear.level_error import coarse_changes, first_doubtful, frequency_errors, other_level
+from foldyn.linear.level_error import (
+    coarse_changes,
+    first_doubtful,
+    frequency_errors,
+    other_level,
+    warn_of_errors,
+)
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
 from foldyn.linear.model_error import ALONE, SPARE, Beside, Judged, beside, judged, warn_of
 from foldyn.ram_limit import check_memory
@@ -122,10 +128,13 @@ def modes(
         Modes are not compared, and panels that stretch hold much of the strain energy of one.
     """
     of_kind("case", case, Case)
-    return spectrum_of(
+    found = spectrum_of(
         case, count, state, secant, load_factor=load_factor, verify=verify,
         solver=solver, compared=beside(case, check_model, state, secant),
     ).result  # fmt: skip
+    if check_model and isinstance(case.structure, Superelements):
+        warn_of_errors(case.structure, found["frequency"].values, found["frequency_error"].values)
+    return found
 
 
 class Found(NamedTuple):
