@@ -65,7 +65,7 @@ class MixedCase(FidelityCase):
             columns, rows = (2 * n for n in self.shape["cells"])
             ends = [list(range(n, n + rows + 1)) for n in (0, columns * (rows + 1))]
             return ends, tuple(end[k] for end in ends for k in (0, -1))
-        return _outline(_pattern(self.kind, {**self.shape, "dihedral": FLAT}))
+        return outline(_pattern(self.kind, {**self.shape, "dihedral": FLAT}))
 
     @property
     def divisions(self) -> tuple[int, int, int]:
@@ -90,11 +90,12 @@ def mixed(name: str) -> list[MixedCase]:
     """
     seed, count = SETS[name]
     rng = np.random.default_rng(seed)
-    turns = zip(_turns(rng, KINDS), _turns(rng, SUPPORTS), strict=True)
+    turns = zip(turns_of(rng, KINDS), turns_of(rng, SUPPORTS), strict=True)
     return [_one(rng, *next(turns)) for _ in range(count)]
 
 
-def _turns(rng: np.random.Generator, names: Sequence[str]) -> Iterator[str]:
+def turns_of(rng: np.random.Generator, names: Sequence[str]) -> Iterator[str]:
+    """Names, over and over, in an order that is redrawn for each round."""
     while True:
         yield from map(str, rng.permutation(names))
 
@@ -104,7 +105,7 @@ def _one(rng: np.random.Generator, kind: str, support: str) -> MixedCase:
         shape = _shape(rng, kind)
         sheet = cases.random_sheet(rng, 1.0, 30.0)
         try:
-            edge, width = _sizes(_pattern(kind, shape))
+            edge, width = sizes(_pattern(kind, shape))
         except InputError:
             continue
         sheet = replace(sheet, thickness=edge * sheet.thickness)
@@ -160,7 +161,7 @@ def _uneven(rng: np.random.Generator, line: NDArray) -> NDArray[np.float64]:
     return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
 
 
-def _sizes(pattern: Pattern) -> tuple[float, float]:
+def sizes(pattern: Pattern) -> tuple[float, float]:
     """The shortest edge and the least width of a panel, m."""
     edges, widths = [], []
     for face in pattern.faces:
@@ -173,7 +174,7 @@ def _sizes(pattern: Pattern) -> tuple[float, float]:
     return float(min(edges)), float(min(widths))
 
 
-def _outline(flat: Pattern) -> tuple[list[list[int]], tuple[int, ...]]:
+def outline(flat: Pattern) -> tuple[list[list[int]], tuple[int, ...]]:
     """Vertices along the two ends of a sheet in x, in sequence, and its four corners."""
     sides = {(a, b) for face in flat.faces for a, b in pairwise((*face, face[0]))}
     after = {a: b for a, b in sides if (b, a) not in sides}

@@ -100,8 +100,10 @@ def certain(case: MixedCase, true: Stored) -> bool:
     return bool((true.doubt[counts] <= CERTAIN).all())  # nan is not
 
 
-def computed(case: MixedCase, divisions: tuple[int, int, int]) -> dict[str, Any]:
-    """Compute the content of a file's line."""
+def computed(
+    case: MixedCase, divisions: tuple[int, int, int], count: int = COMPARED
+) -> dict[str, Any]:
+    """Compute the content of a file's line, with `count` modes."""
     began = time.perf_counter()
     pattern, radius = case.pattern(), case.sheet.thickness
     with warnings.catch_warnings():
@@ -119,7 +121,7 @@ def computed(case: MixedCase, divisions: tuple[int, int, int]) -> dict[str, Any]
             )
             for n in divisions
         ]
-        true = reference_modes(meshes, COMPARED)
+        true = reference_modes(meshes, count)
     _, shape = true.at(points_of(pattern))
     scale = STEPS / np.abs(shape).max(axis=(1, 2), keepdims=True)
     return {

@@ -209,13 +209,15 @@ class Loaded:
         return _sum_by_history(self._rest_changes())
 
     def _rest_changes(self) -> Summands:
-        count = len(self.structure.body.sheet.rest_angles)
         for change, history in self.actuation_terms:
-            yield np.pad(change, (0, count - len(change))), history
+            yield self._of_all_rest_angles(change), history
         for place, load in self._loads():
             turns = load.turns(self.structure, place)
             if turns is not None and turns.any():
-                yield np.pad(turns, (0, count - len(turns))), load.history
+                yield self._of_all_rest_angles(turns), load.history
+
+    def _of_all_rest_angles(self, change: NDArray) -> NDArray:
+        return np.pad(change, (0, len(self.structure.body.sheet.rest_angles) - len(change)))
 
     def _actuations(self) -> Summands:
         first: dict[int, str] = {}  # the load that actuates a crease

@@ -24,6 +24,7 @@ from scipy import sparse
 from foldyn.condensation.library import Group
 from foldyn.condensation.panel import BOW, INNER, TURN, VERTEX, block_diagonal, edge_frame
 from foldyn.condensation.shapes import ACROSS, ALONG, Level, bows
+from foldyn.mechanics.block_matrix import of_elements
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import edge_lookup
 
@@ -31,6 +32,7 @@ FUNCTION = np.array([ACROSS.index(shape) for shape in ALONG])
 """Index in `ACROSS` of each shape along an edge."""
 PLACES = (0.25, 0.5, 0.75)  # of points on edges for pictures and comparisons
 HELD = 1e-9  # part of a unit vector below which supports hold a direction
+AT_ONCE = 64  # panels of which full matrices are made at once
 NEGLIGIBLE = 1e-6  # part of a unit vector that gives no further direction
 
 
@@ -151,17 +153,26 @@ class Whole:
         along = np.where(backwards[:, :, None], -1.0, 1.0) * self._along[edge]
         return edge_frame(along, area[:, None])
 
-    def matrices(self, compared: bool = False) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """Stiffness and mass (m, m) of all panels, or of the panels to compare with."""
-        size = self.unknowns.size
+    def matrices(
+        self, dofs: sparse.csr_array, coarser: bool = False
+    ) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """Stiffness and mass (d, d) of all panels for dofs, of which unknowns (m, d) are made.
+
+        coarser : whether to give their changes if panels come from coarser meshes.
+        """
+        size = dofs.shape[1]
         total = [sparse.csr_array((size, size)) for _ in range(2)]
         for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
-            panel = group.compared if compared else group.panel
-            count = len(group.number)
-            for k, own in enumerate((panel.stiffness, panel.mass)):
-                blocks = np.tile(own[np.ix_(kept, kept)], (count, 1, 1))
-                summed = placed.T @ (block_diagonal(blocks).tocsr() @ placed)
-                total[k] = sparse.csr_array(total[k] + summed)
+            own, other = group.panel, group.compared
+            parts = [own.stiffness, own.mass]
+            if coarser:
+                parts = [other.stiffness - own.stiffness, other.mass - own.mass]
+            amplitudes, count = sparse.csr_array(placed @ dofs), len(kept)
+            for first in range(0, amplitudes.shape[0], AT_ONCE * count):
+                columns, motion = _by_panel(amplitudes[first : first + AT_ONCE * count], count)
+                for k, part in enumerate(parts):
+                    blocks = motion.swapaxes(1, 2) @ (part[np.ix_(kept, kept)] @ motion)
+                    total[k] = sparse.csr_array(total[k] + of_elements(columns, blocks, size))
         return total[0], total[1]
 
     def along_axes(self, chosen: NDArray) -> Iterator[tuple[sparse.csr_array, list[Any]]]:
@@ -183,7 +194,7 @@ class Whole:
         points, columns = [], _Columns()
         for place in PLACES:
             points.append((1.0 - place) * x[ends[:, 0]] + place * x[ends[:, 1]])
-            values = np.stack([bows(np.array([place]), cut_off / of, 1)[0] for of in length])
+            values = bows(np.full(own.edges, place), cut_off / length, 1)
             vertices = [3 * ends[:, k, None, None] + axis for k in range(2)]
             bowed = [own.bow(edge, k)[:, None, None] + axis for k in range(own.functions)]
             rows = np.concatenate([*vertices, *bowed], axis=1)  # (e, 2 + functions, 3)
@@ -323,6 +334,25 @@ class Whole:
             for function, own_directions in enumerate(taken):
                 free = _left(self._across[edge][own_directions], directions)
                 columns.add(np.tile(own.bow(edge, function) + np.arange(3), (len(free), 1)), free)
+
+
+def _by_panel(amplitudes: sparse.csr_array, count: int) -> tuple[NDArray, NDArray]:
+    """Dofs (p, u) that p panels depend on, and their amplitudes (p, count, u) for these.
+
+    Panels with fewer than u dofs repeat their first one, with amplitudes of 0.
+
+    amplitudes : (p count, d) of panel after panel for all dofs.
+    """
+    entries, size = sparse.coo_array(amplitudes), amplitudes.shape[1]
+    panel, row = np.divmod(entries.row, count)
+    used, place = np.unique(panel.astype(np.int64) * size + entries.col, return_inverse=True)
+    begin = np.searchsorted(used, size * np.arange(amplitudes.shape[0] // count + 1))
+    number = np.arange(np.diff(begin).max(initial=0))
+    there = number < np.diff(begin)[:, None]
+    columns = used[np.where(there, begin[:-1, None] + number, begin[:-1, None])] % size
+    motion = np.zeros((len(columns), count, len(number)))
+    motion[panel, row, place - begin[panel]] = entries.data
+    return columns, motion
 
 
 class _Columns:

@@ -1,4 +1,8 @@
-"""Condensed panels by shape: congruent panels of one sheet are condensed once."""
+"""Condensed panels by shape: congruent panels of one sheet are condensed once.
+
+Stiffness and mass are proportional to Young's modulus and to the density, so panels are condensed,
+and kept in memory and on disk, for a sheet with a modulus and a density of 1.
+"""
 
 from __future__ import annotations
 
@@ -10,24 +14,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.condensation.panel import CondensedPanel, condense, extrapolated
+from foldyn.condensation.kept import Meshes, kept
+from foldyn.condensation.panel import CondensedPanel
 from foldyn.patterns import Pattern
-from foldyn.structures.graded import Grading, smooth_vertices
+from foldyn.structures.graded import smooth_vertices
 from foldyn.structures.sheet import Sheet
 
 ROOM = 256  # condensed panels kept in memory, each about 2 MB
 ALIKE = 8  # decimals of coordinates, relative to the size of the pattern, for congruent panels
-
-
-class Meshes(NamedTuple):
-    """Meshes on which panels are condensed, coarse to fine.
-
-    With several meshes the condensed panels are extrapolated from the two finest, and compared with
-    the panels extrapolated from the first and the one before the finest.
-    """
-
-    graded: tuple[Grading, ...]
-    divisions: tuple[int, ...]
 
 
 class Group(NamedTuple):
@@ -55,17 +49,10 @@ class _Shape:
 
 @lru_cache(maxsize=ROOM)
 def _condensed(
-    shape: _Shape, sheet: Sheet, meshes: Meshes
+    shape: _Shape, poissons_ratio: float, thickness: float, meshes: Meshes
 ) -> tuple[CondensedPanel, CondensedPanel]:
-    """A panel, and the same from coarser meshes."""
-    *others, finest = meshes.graded
-    corners, smooth = shape.corners, shape.smooth
-    fine = condense(corners, smooth, sheet, finest)
-    if not others:
-        return fine, fine
-    coarse, middle = (condense(corners, smooth, sheet, graded, fine) for graded in others)
-    first, second, third = meshes.divisions
-    return extrapolated(middle, fine, third / second), extrapolated(coarse, middle, second / first)
+    """A panel of a sheet of unit modulus and density, and the same from coarser meshes."""
+    return kept(shape.corners, shape.smooth, poissons_ratio, thickness, meshes)
 
 
 def groups(pattern: Pattern, sheets: Sequence[Sheet], meshes: Meshes) -> list[Group]:
@@ -73,8 +60,9 @@ def groups(pattern: Pattern, sheets: Sequence[Sheet], meshes: Meshes) -> list[Gr
     out = []
     for (shape, sheet), members in _congruent(pattern, sheets).items():
         numbers, faces, frames = zip(*members, strict=True)
-        panels = _condensed(shape, sheet, meshes)
-        out.append(Group(*panels, np.array(faces), np.array(frames), np.array(numbers)))
+        panels = _condensed(shape, sheet.poissons_ratio, sheet.thickness, meshes)
+        own, compared = (panel.of(sheet) for panel in panels)
+        out.append(Group(own, compared, np.array(faces), np.array(frames), np.array(numbers)))
     return out
 
 
@@ -102,19 +90,18 @@ def _described(x: NDArray, size: float, smooth: NDArray) -> tuple[_Shape, int, N
 
     Also returns the number of corners before that corner, and the frame (3, 3).
     """
+    order = (np.arange(len(x))[:, None] + np.arange(len(x))) % len(x)
+    away = x[order] - x[:, None]
+    first = away[:, 1] / np.linalg.norm(away[:, 1], axis=1)[:, None]
+    area = np.cross(away, np.roll(away, -1, axis=1)).sum(axis=1)
+    normal = area - (area * first).sum(axis=1)[:, None] * first
+    normal = normal / np.linalg.norm(normal, axis=1)[:, None]
+    frames = np.stack([first, np.cross(normal, first), normal], axis=1)
+    corners = away @ frames.swapaxes(1, 2)
+    places = np.round(corners / size, ALIKE) + 0.0  # no negative zeros
     described = []
-    for turned in range(len(x)):
-        corners = np.roll(x, -turned, axis=0)
-        away = corners - corners[0]
-        first = away[1] / np.linalg.norm(away[1])
-        area = np.cross(away, np.roll(away, -1, axis=0)).sum(axis=0)
-        normal = area - (area @ first) * first
-        normal = normal / np.linalg.norm(normal)
-        frame = np.stack([first, np.cross(normal, first), normal])
-        own = away @ frame.T
-        there = tuple(np.flatnonzero(np.roll(smooth, -turned)).tolist())
-        places = np.round(own / size, ALIKE) + 0.0  # no negative zeros
-        described.append(
-            (_Shape(tuple(map(tuple, places.tolist())), size, there, own), turned, frame)
-        )
-    return min(described, key=lambda one: (one[0].places, one[0].smooth))
+    for turned, own in enumerate(places.tolist()):
+        there = tuple(np.flatnonzero(smooth[order[turned]]).tolist())
+        described.append((tuple(map(tuple, own)), there, turned))
+    least, there, turned = min(described)
+    return _Shape(least, size, there, corners[turned]), turned, frames[turned]

@@ -57,8 +57,6 @@ class CondensedPanel:
     kind : (c, 3)
         Kind of each shape: (VERTEX, corner, axis), (BOW, 3 edge + axis, number), (TURN, edge,
         number) or (INNER, 0, mode).
-    inner : LinearNDInterpolator
-        Displacements (p, 3 q) of the inner modes at points (p, 2) of the panel's plane.
     center : (3, c)
         Displacement of the mean of the corners, in the panel's frame.
     products : (3, 3, c, c)
@@ -68,9 +66,19 @@ class CondensedPanel:
     stiffness: NDArray
     mass: NDArray
     kind: NDArray
-    inner: LinearNDInterpolator
     center: NDArray
     products: NDArray
+
+    def of(self, sheet: Sheet) -> CondensedPanel:
+        """The panel of a sheet, from that of a sheet of unit modulus and density."""
+        modulus, density = sheet.youngs_modulus, sheet.density
+        assert density is not None
+        return replace(
+            self,
+            stiffness=modulus * self.stiffness,
+            mass=density * self.mass,
+            products=np.float32(density) * self.products,
+        )
 
 
 def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> CondensedPanel:
@@ -91,13 +99,15 @@ def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> 
 
 def condense(
     corners: NDArray, smooth: Collection[int], sheet: Sheet, graded: Grading,
-    like: CondensedPanel | None = None,
-) -> CondensedPanel:  # fmt: skip
+    like: LinearNDInterpolator | None = None,
+) -> tuple[CondensedPanel, LinearNDInterpolator]:  # fmt: skip
     """Condense a panel with corners (k, 3), m, onto the shapes of the highest level.
+
+    Also returns the displacements (p, 3 q) of its inner modes at points (p, 2) of its plane.
 
     corners : in a frame whose third axis is nearly normal to the panel.
     smooth : corners that are not rigid within the radius.
-    like : the panel on another mesh, whose inner modes are reproduced.
+    like : the inner modes on another mesh, which are reproduced.
     """
     from scipy.interpolate import LinearNDInterpolator  # loads slowly: not for other models
 
@@ -116,7 +126,7 @@ def condense(
     )
     turned = np.eye(len(inner.T), count)
     if like is not None:
-        theirs = like.inner(mesh.nodes[:, :2]).reshape(-1, count)
+        theirs = like(mesh.nodes[:, :2]).reshape(-1, count)
         common = inner[on_nodes].T @ (mass[on_nodes, on_nodes] @ np.nan_to_num(theirs))
         left, _, right = np.linalg.svd(common, full_matrices=False)
         turned = left @ right
@@ -125,16 +135,15 @@ def condense(
     along = full[on_nodes].reshape(len(mesh.nodes), 3, -1).swapaxes(0, 1)
     nodal = mass[on_nodes, on_nodes][::3, ::3]
     middle = np.linalg.norm(mesh.nodes - mesh.nodes[: mesh.corners].mean(axis=0), axis=1).argmin()
-    return CondensedPanel(
+    panel = CondensedPanel(
         0.5 * (reduced + reduced.T),
         0.5 * (carried + carried.T),
         np.concatenate([kind, [(INNER, 0, k) for k in range(count)]]),
-        LinearNDInterpolator(
-            mesh.nodes[:, :2], full[on_nodes, -count:].reshape(len(mesh.nodes), -1)
-        ),
         full[3 * middle + np.arange(3)],
         np.array([[a.T @ (nodal @ b) for b in along] for a in along], np.float32),
     )
+    modes = full[on_nodes, -count:].reshape(len(mesh.nodes), -1)
+    return panel, LinearNDInterpolator(mesh.nodes[:, :2], modes)
 
 
 class _Mesh:

@@ -50,16 +50,16 @@ HIGHEST = LEVELS[-1]
 SHAPES = (ALONG, ACROSS, ACROSS)
 
 
-def bows(place: NDArray, cut_off: float, axis: int) -> NDArray[np.float64]:
+def bows(place: NDArray, cut_off: NDArray | float, axis: int) -> NDArray[np.float64]:
     """Shapes (p, s) of the displacements in a direction at places (p,) of an edge.
 
     Parameters
     ----------
     place : (p,)
         From 0 to 1.
-    cut_off : float
+    cut_off : float or (p,)
         Distance from the ends, relative to the length of the edge, below which places are not
-        stretched.
+        stretched; of one edge, or of an edge for each place.
     axis : {0, 1, 2}
         0 is along the edge.
     """

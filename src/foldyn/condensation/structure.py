@@ -157,17 +157,21 @@ class Superelements(Discretized):
     @cached_property
     def body(self) -> Assembly:
         """Model for solvers, with edges that no support holds."""
-        return self.held({})
+        return Assembly(self._term({}))
 
     def held(self, edges: Mapping[int, NDArray]) -> Assembly:
         """Model for solvers if supports hold edges; see `Discretized`."""
-        return Assembly(self.term(edges))
+        return Assembly(self._term(edges)) if edges else self.body
 
-    def term(self, edges: Mapping[int, NDArray], compared: bool = False) -> SuperelementsTerm:
-        """The sheet if supports hold edges, as in `held`.
+    def coarser(self, edges: Mapping[int, NDArray]) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """Changes of stiffness and mass (m, m) if panels come from coarser meshes.
 
-        compared : whether to take panels from coarser meshes; the dofs are the same.
+        edges : edges that supports hold, as in `held`.
         """
+        return self.whole.matrices(self._dofs(edges), coarser=True)
+
+    def _term(self, edges: Mapping[int, NDArray]) -> SuperelementsTerm:
+        """The sheet if supports hold edges, as in `held`."""
         made, count, dofs = self.whole, len(self.pattern.creases), self._dofs(edges)
         degree = np.tile(np.arange(made.level.turns), count)
         turns = CreaseTurns(
@@ -175,7 +179,7 @@ class Superelements(Discretized):
             np.repeat(np.arange(count), made.level.turns),
             1.0 / (2 * degree + 1),
         )
-        panels, mass = (sparse.csr_array(dofs.T @ own @ dofs) for own in made.matrices(compared))
+        panels, mass = made.matrices(dofs)
         parts = dofs.power(2).sum(axis=0)  # unknowns of each dof: two turns at welds, otherwise one
         rotated = (dofs.T @ made.rotated / parts[:, None])[self.nodes.size :]
         return SuperelementsTerm(
@@ -358,7 +362,7 @@ def superelements(
         triangle_panel=np.array(panel),
         folds=folds,
         fold_stiffness=fold_stiffness(options.crease_stiffness, pattern, sheet),
-        fold_rest=fold_rest(options.crease_rest, folds, pattern.vertices, pattern),
+        fold_rest=fold_rest(options.crease_rest, pattern.dihedrals, pattern),
         pattern=pattern,
         sheet=sheet,
         options=options,

@@ -20,7 +20,6 @@ from scipy.linalg import eigh
 from foldyn.cases import Case
 from foldyn.condensation import Superelements
 from foldyn.condensation.shapes import LEVELS
-from foldyn.condensation.term import SuperelementsTerm
 from foldyn.errors import ModelRangeWarning, warn
 from foldyn.linear.linearized import numbered
 from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
@@ -77,12 +76,8 @@ def warn_of_errors(structure: Superelements, frequency: NDArray, error: NDArray)
 
 def coarse_changes(case: Case) -> tuple[sparse.csr_array, sparse.csr_array]:
     """Changes of stiffness and mass (m, m) if panels come from coarser meshes."""
-    own = case.elastic_body.sheet
     assert isinstance(case.structure, Superelements)
-    assert isinstance(own, SuperelementsTerm)
-    other = case.structure.term(case.held_edges, compared=True)
-    rest = np.zeros(own.size)
-    return other.tangent(rest) - own.tangent(rest), sparse.csr_array(other.mass - own.mass)
+    return case.structure.coarser(case.held_edges)
 
 
 def band_errors(

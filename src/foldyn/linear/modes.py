@@ -162,9 +162,8 @@ def spectrum_of(
     )  # fmt: skip
     began = time.perf_counter()
     linear = linearize(case, state, secant=secant, load_factor=load_factor)
-    pencil = Pencil(linear.stiffness, linear.mass, solver)
-    space, along = rigid_space(linear), unit_translations(linear)
-    spectrum = lowest(pencil, count, unresisted(linear, space), verify)
+    pencil, space, spectrum = _lowest(linear, count, solver, verify)
+    along = unit_translations(linear)
     _warn(spectrum)
     if compared.case is None:
         _warn_of_stretch(linear, spectrum)
@@ -194,13 +193,21 @@ def spectrum_of(
         statistics["missing_frequencies"] = found.lost if len(found.lost) else None
     if errors and isinstance(case.structure, Superelements):
         leveled = case.altered(structure=other_level(case.structure))
-        other = spectrum_of(leveled, count, verify=False, solver=solver, errors=False).spectrum
+        other = _lowest(linearize(leveled), count, solver, verify=False)[-1]
         motion = linear.whole(spectrum.shapes)
         changes = (motion.T @ (part @ motion) for part in coarse_changes(case))
         estimate = frequency_errors(case, spectrum.values, other.values, changes)
         variables["frequency_error"] = np.where(variables["rigid"], 0.0, estimate)
     result = modes_dataset(case, variables, statistics)
     return Found(linear, spectrum, result)
+
+
+def _lowest(
+    linear: Linearized, count: int, solver: str, verify: bool
+) -> tuple[Pencil, NDArray, Spectrum]:
+    """The eigenvalue problem, its motions as a rigid body, and its lowest modes."""
+    pencil, space = Pencil(linear.stiffness, linear.mass, solver), rigid_space(linear)
+    return pencil, space, lowest(pencil, count, unresisted(linear, space), verify)
 
 
 def of_spectrum(arguments: Mapping[str, Any]) -> dict[str, Any]:

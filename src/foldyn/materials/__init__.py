@@ -45,6 +45,7 @@ __all__ = [
 
 BarLaw.compiled, BarLaw.known = staticmethod(switch.bar_table), switch.BARS
 HingeLaw.compiled, HingeLaw.known = staticmethod(switch.hinge_table), switch.HINGES
+HingeLaw.slopes = staticmethod(switch.hinge_slopes)
 
 BAR_LAWS: Mapping[str, type[BarLaw]] = {law.name: law for law in switch.BAR_LAWS}
 HINGE_LAWS: Mapping[str, type[HingeLaw]] = {

@@ -191,8 +191,9 @@ class EnhancedLinear(HingeLaw):
 
     def parameters(self, rest: NDArray) -> NDArray:
         """theta1 and theta2 (rad), and the moment and energy at rest to subtract, of each hinge."""
-        table = columns(len(rest), *self.linear_between)
-        if self.code == STRESS_FREE:
+        low, high = self.linear_between
+        table = columns(len(rest), low, high)
+        if self.code == STRESS_FREE and not ((rest >= low) & (rest <= high)).all():  # else zeros
             _relieve_each(writable(rest), table)
         return table
 

@@ -33,7 +33,7 @@ class Law(Checked, ABC):
     """`BarFormulas` or `HingeFormulas` for each code of the law; `code` is that of the first."""
     rest_state: tuple[float, ...]
     compiled: ClassVar[Callable[..., NDArray]]
-    """Function that returns a table of all functions of a law for its code; set by the registry."""
+    """Function that returns a table of functions of a law for its code; set by the registry."""
     known: ClassVar[Mapping[int, Any]]
     """Formulas that the switch knows, by code; set by the registry."""
 
@@ -99,6 +99,8 @@ class HingeLaw(Law):
     """Whether the parameters of the formulas depend on the rest angle."""
     closed_at_rest: bool = True
     """Whether a hinge can be closed at rest, with a dihedral of 0 or 2 pi."""
+    slopes: ClassVar[Callable[..., NDArray]]
+    """Function that returns the slopes alone, which superelements need; see `compiled`."""
 
     def check(self, field: str) -> None:
         """Refuse unknown laws, and parameters that do not follow the rest angle they depend on."""
@@ -139,24 +141,27 @@ class HingeLaw(Law):
 
     def slope(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
         """Slope of the moment / k at dihedral `theta`."""
-        return self._table(theta, rest)[2]
+        return self._rows(self.slopes, theta, rest)[0]
 
     def rest_slope(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
         """Derivative of energy / k (rad) with respect to the rest dihedral."""
-        return self._table(theta, rest)[3]
+        return self._table(theta, rest)[2]
 
     def moment_by(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
         """Derivatives (4, ...) of moment / k with respect to rest and to `parameters` a, b, c."""
-        return self._table(theta, rest)[4:]
+        return self._table(theta, rest)[3:]
 
     def _table(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
+        return self._rows(self.compiled, theta, rest)
+
+    def _rows(self, compiled: Callable[..., NDArray], theta: ArrayLike, rest: ArrayLike) -> NDArray:
         # copies: read-only arrays would compile the table again
         theta, rest = (
             np.array(each, float, order="C") for each in np.broadcast_arrays(theta, rest)
         )
         address = np.array(self.addresses or (0, 0, 0), np.int64)
         parameters = np.ascontiguousarray(self.parameters(rest.ravel()))
-        flat = self.compiled(self.code, theta.ravel(), rest.ravel(), parameters, address)
+        flat = compiled(self.code, theta.ravel(), rest.ravel(), parameters, address)
         return flat.reshape((len(flat), *theta.shape))
 
 

@@ -87,19 +87,28 @@ def bar_table(code, e, address):
 
 
 @kernel
+def hinge_slopes(code, theta, rest, p, address):
+    """Slopes (1, n) of one law at theta (n,)."""
+    out = np.empty((1, theta.size))
+    for i in range(theta.size):
+        a, b, c, d = p[i, 0], p[i, 1], p[i, 2], p[i, 3]
+        out[0, i] = hinge_slope(code, theta[i], rest[i], a, b, c, d, address[2])
+    return out
+
+
+@kernel
 def hinge_table(code, theta, rest, p, address):
-    """Rows (8, n) of one law at theta (n,): energy, moment, slope, and further derivatives.
+    """Rows (7, n) of one law at theta (n,): energy, moment, and derivatives.
 
     These are the derivative of the energy with respect to the rest angle, and the derivatives of
     the moment with respect to the rest angle and to a, b and c.
     """
-    out = np.empty((8, theta.size))
+    out = np.empty((7, theta.size))
     for i in range(theta.size):
         t, r, a, b, c, d = theta[i], rest[i], p[i, 0], p[i, 1], p[i, 2], p[i, 3]
         out[0, i] = hinge_energy(code, t, r, a, b, c, d, address[0])
         out[1, i] = hinge_moment(code, t, r, a, b, c, d, address[1])
-        out[2, i] = hinge_slope(code, t, r, a, b, c, d, address[2])
-        out[3, i] = hinge_rest_slope(code, t, r, a, b, c, d, address[0])
+        out[2, i] = hinge_rest_slope(code, t, r, a, b, c, d, address[0])
         by = hinge_moment_by(code, t, r, a, b, c, d, address[1])
-        out[4, i], out[5, i], out[6, i], out[7, i] = by
+        out[3, i], out[4, i], out[5, i], out[6, i] = by
     return out

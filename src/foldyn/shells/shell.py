@@ -456,7 +456,9 @@ def shell(
         triangle_panel=mesh.panel,
         sides=ends,
         fold_stiffness=fold_stiffness(options.crease_stiffness, pattern, sheet),
-        piece_rest=fold_rest(options.crease_rest, pieces, mesh.nodes, pattern, ends.piece_crease),
+        piece_rest=fold_rest(
+            options.crease_rest, hinge_angles(mesh.nodes, pieces), pattern, ends.piece_crease
+        ),
         pattern=pattern,
         sheet=sheet,
         options=options,

@@ -29,7 +29,7 @@ from foldyn.errors import InputError, warn
 from foldyn.patterns import Pattern
 from foldyn.patterns.crease_data import crease_values
 from foldyn.patterns.topology import around, edge_of
-from foldyn.structures.mesh import Mesh, double_areas, hinge_angles, lengths
+from foldyn.structures.mesh import Mesh, double_areas, lengths
 from foldyn.structures.sheet import Sheet
 from foldyn.values import doubt_degrees, number, numbers, show, single
 
@@ -262,17 +262,13 @@ def fold_stiffness(given: PerCrease, pattern: Pattern, sheet: Sheet) -> NDArray:
 
 
 def fold_rest(
-    given: PerCrease,
-    folds: NDArray,
-    x: NDArray,
-    pattern: Pattern,
-    crease: NDArray | None = None,
+    given: PerCrease, drawn: NDArray, pattern: Pattern, crease: NDArray | None = None
 ) -> NDArray:
-    """Rest dihedrals (rad) of hinge rows, none of them closed.
+    """Rest dihedrals (rad) of hinge rows with the dihedrals `drawn` (nf,), none of them closed.
 
     crease : index of each row's crease; by default, row k belongs to crease k.
     """
-    crease = np.arange(len(folds)) if crease is None else crease
+    crease = np.arange(len(drawn)) if crease is None else crease
     degrees, chosen = _values("crease_rest", given, pattern)
     closed = degrees[chosen & ((degrees <= 0.0) | (degrees >= 360.0))]
     if closed.size:
@@ -283,7 +279,6 @@ def fold_rest(
     rest, given_there = np.radians(degrees)[crease], chosen[crease]
     if given_there.all():
         return rest
-    drawn = hinge_angles(x, folds)
     shut = (drawn < 1e-9) | (drawn > 2.0 * np.pi - 1e-9) | np.isnan(drawn)
     shut |= np.abs(drawn - pattern.dihedrals[crease]) > np.pi  # closed according to its assignment
     wrong = np.flatnonzero(shut & ~given_there)

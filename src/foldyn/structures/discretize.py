@@ -219,7 +219,7 @@ def discretize(
         folds=mesh.folds,
         fold_stiffness=folds,
         panel_softness=softness,
-        fold_rest=fold_rest(options.crease_rest, mesh.folds, x, pattern),
+        fold_rest=fold_rest(options.crease_rest, hinge_angles(x, mesh.folds), pattern),
         bends=hinges,
         bend_stiffness=bends,
         bend_rest=hinge_angles(x, hinges),

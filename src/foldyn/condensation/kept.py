@@ -1,0 +1,116 @@
+"""Condensed panels on disk, in the folder of the compiled kernels: each is condensed once.
+
+The name of a file is a digest of all that its content depends on: the exact corners, material,
+thickness and meshes, the sources of this computation, the versions of what it calls, and the
+processor. Files that are damaged or hold something else count as missing, and a folder that cannot
+be written is left alone. The files used longest ago go first.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import llvmlite.binding
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from foldyn.condensation.panel import CondensedPanel, condense, extrapolated
+from foldyn.jit.kernel_cache import folder_for
+from foldyn.jit.sources import digest
+from foldyn.structures.graded import Grading
+from foldyn.structures.sheet import Sheet
+from foldyn.threads import one_thread
+from foldyn.writing import remove_leftovers, whole
+
+MOST = 500_000_000  # bytes of all files; each has about 2 MB
+HERE = Path(__file__).resolve()
+
+
+class Meshes(NamedTuple):
+    """Meshes on which panels are condensed, coarse to fine.
+
+    With several meshes the condensed panels are extrapolated from the two finest, and compared with
+    the panels extrapolated from the first and the one before the finest.
+    """
+
+    graded: tuple[Grading, ...]
+    divisions: tuple[int, ...]
+
+
+Panels = tuple[CondensedPanel, CondensedPanel]
+
+
+def kept(
+    corners: NDArray, smooth: Sequence[int], poissons_ratio: float, thickness: float, meshes: Meshes
+) -> Panels:
+    """A panel as `condensed` makes it, from disk if it is there."""
+    given = (corners.tolist(), smooth, poissons_ratio, thickness, meshes)
+    folder = folder_for(HERE.parent)
+    if folder is None:
+        return condensed(corners, smooth, poissons_ratio, thickness, meshes)
+    tools = (scipy.__version__, llvmlite.binding.get_host_cpu_name())
+    key = repr((digest(HERE, condensed.__name__), tools, given))
+    path = folder / f"panel-{hashlib.sha256(key.encode()).hexdigest()[:32]}.npz"
+    found = _read(path, key)
+    if found is None:
+        found = condensed(corners, smooth, poissons_ratio, thickness, meshes)
+        with suppress(OSError):
+            _write(path, key, found)
+    return found
+
+
+def condensed(
+    corners: NDArray, smooth: Sequence[int], poissons_ratio: float, thickness: float, meshes: Meshes
+) -> Panels:
+    """A panel of a sheet of unit modulus and density, and the same from coarser meshes."""
+    *others, finest = meshes.graded
+    sheet = Sheet(1.0, poissons_ratio, thickness, 1.0)
+    with one_thread():  # bits that do not depend on the number of threads
+        fine, modes = condense(corners, smooth, sheet, finest)
+        if not others:
+            return fine, fine
+        coarse, middle = (condense(corners, smooth, sheet, own, modes)[0] for own in others)
+        first, second, third = meshes.divisions
+        return (
+            extrapolated(middle, fine, third / second),
+            extrapolated(coarse, middle, second / first),
+        )
+
+
+def _read(path: Path, key: str) -> Panels | None:
+    """Panels of a file; None if it is missing or damaged, or holds others."""
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            found = dict(stored)
+        if found.pop("key").item() != key:
+            return None
+        compared = {name: found.pop(f"compared_{name}") for name in ("stiffness", "mass")}
+        panel = CondensedPanel(**found)
+    except Exception:  # readers raise any kind of exception on damaged files
+        return None
+    with suppress(OSError):
+        path.touch()  # used now
+    return panel, replace(panel, **compared)
+
+
+def _write(path: Path, key: str, panels: Panels) -> None:
+    """Store panels; then the files used longest ago go until the others fit."""
+    panel, compared = panels
+    with whole(path) as part:
+        np.savez(
+            part, key=np.array(key), compared_stiffness=compared.stiffness,
+            compared_mass=compared.mass, **vars(panel),
+        )  # fmt: skip
+    remove_leftovers(path.parent)
+    files = [(own.stat(), own) for own in path.parent.glob("panel-*.npz")]
+    room = MOST
+    for status, own in sorted(files, key=lambda one: one[0].st_mtime, reverse=True):
+        room -= status.st_size
+        if room < 0:
+            own.unlink()
