@@ -18,6 +18,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 from scipy import sparse
 
@@ -26,12 +27,14 @@ from foldyn.condensation.panel import BOW, INNER, TURN, VERTEX, block_diagonal, 
 from foldyn.condensation.shapes import ACROSS, ALONG, Level, bows
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import edge_lookup
+from foldyn.structures.discretized import Distributed
 
 FUNCTION = np.array([ACROSS.index(shape) for shape in ALONG])
 """Index in `ACROSS` of each shape along an edge."""
 PLACES = (0.25, 0.5, 0.75)  # of points on edges for pictures and comparisons
 HELD = 1e-9  # part of a unit vector below which supports hold a direction
 NEGLIGIBLE = 1e-6  # part of a unit vector that gives no further direction
+POINTS = 96  # of Gauss' rule for means along edges
 
 
 class Unknowns(NamedTuple):
@@ -204,7 +207,30 @@ class Whole:
         points.append(np.array([x[list(face)].mean(axis=0) for face in self._pattern.faces]))
         return np.concatenate(points), sparse.csr_array(sparse.vstack([on_edges, centers]))
 
-    def spread(self, density: NDArray) -> NDArray[np.float64]:
+    def spread(self, load: Distributed, cut_off: float) -> NDArray[np.float64]:
+        """Forces (m,), N, on the unknowns due to a distributed load; `cut_off` as in `between`."""
+        own, out = self.unknowns, np.zeros(self.unknowns.size)
+        if load.creases is not None:
+            crease = np.arange(len(load.creases))
+            for side in range(2):
+                out[own.turn(crease, side, 0)] -= load.creases
+        if load.edges is not None:
+            force = np.linalg.norm(self._along, axis=1)[:, None] * load.edges
+            np.add.at(out[: 3 * own.vertices].reshape(-1, 3), self.edges.T, 0.5 * force)
+            z, share = leggauss(POINTS)
+            places = 0.5 * (1.0 + z)
+            for edge in np.flatnonzero(force.any(axis=1)).tolist():
+                length = float(np.linalg.norm(self._along[edge]))
+                mean = 0.5 * share @ bows(places, cut_off / length, 1)[:, : own.functions]
+                first = own.bow(edge, 0)
+                out[first : first + 3 * own.functions] += np.outer(mean, force[edge]).ravel()
+        if load.swollen is not None:
+            for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
+                forces = load.swollen[group.number] @ group.panel.thermal[kept].T
+                out += placed.T @ forces.ravel()
+        return out if load.panels is None else out + self._on_panels(load.panels)
+
+    def _on_panels(self, density: NDArray) -> NDArray[np.float64]:
         """Forces (m,), N, on the unknowns due to forces on panels (np, 3), N/m2.
 
         They follow from the inertia forces of a translation, which are evenly spread, too.
@@ -218,6 +244,14 @@ class Whole:
             per_area = inertia * area / (moved[:, 0] @ inertia[:, 0])
             own = np.einsum("pad,pd->pa", group.frames, density[group.number])
             out += placed.T @ (own @ per_area.T).ravel()
+        return out
+
+    @property
+    def held_energies(self) -> NDArray[np.float64]:
+        """`CondensedPanel.held_energy` of each panel (np, 2)."""
+        out = np.zeros((self.unknowns.panels, 2))
+        for group in self._groups:
+            out[group.number] = group.panel.held_energy
         return out
 
     @property

@@ -22,6 +22,7 @@ from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, Superlinear, hinge_law
 from foldyn.materials.inelastic_law import memory_of
 from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.following import Following
 from foldyn.mechanics.sheet_term import NO_DOF, CreaseTurns, FoldHinges
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned
@@ -38,10 +39,11 @@ from foldyn.structures.calibration import (
 )
 from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.discretize import checked_kinds
-from foldyn.structures.discretized import Discretized, HingeKind, read_only
+from foldyn.structures.discretized import Discretized, Distributed, HingeKind, read_only
 from foldyn.structures.graded import grading
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
+from foldyn.structures.swelling import Swelling
 from foldyn.values import choice, length, whole
 
 MASSES = ("consistent",)  # mass rules
@@ -208,9 +210,17 @@ class Superelements(Discretized):
             times[one] += 1
         return found
 
-    def spread(self, density: NDArray, edges: Mapping[int, NDArray]) -> NDArray[np.float64]:
+    def spread(self, load: Distributed, edges: Mapping[int, NDArray]) -> NDArray[np.float64]:
         """See `Discretized`."""
-        return self._dofs(edges).T @ self.whole.spread(density)
+        return self._dofs(edges).T @ self.whole.spread(load, self.meshes.graded[-1].radius)
+
+    def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
+        """See `Discretized`; `spread` has the forces."""
+        free, energy = np.concatenate([strain, curvature]), self.whole.held_energies
+        return Swelling(
+            np.zeros(len(self.folds)), Following(), (free, np.zeros(0)),
+            (energy.T.ravel() * free, np.zeros(0)),
+        )  # fmt: skip
 
     def along_axes(
         self, edges: Mapping[int, NDArray], panels: NDArray

@@ -79,6 +79,15 @@ class HingeKind(NamedTuple):
         return self.onset**2 * unit.energy((theta - rest) / self.onset, 0.0)
 
 
+class Distributed(NamedTuple):
+    """Loads on the panels, edges and creases of a pattern; None is no load."""
+
+    panels: NDArray | None = None  # (np, 3) force per area, N/m2
+    edges: NDArray | None = None  # (ne, 3) force per length, N/m, in the order of `pattern.lines`
+    creases: NDArray | None = None  # (nf,) moment that opens each crease, N m
+    swollen: NDArray | None = None  # (np, 2) free strain, and curvature (1/m), of each panel
+
+
 def read_only(array: NDArray) -> NDArray:
     """Return the array, made read-only."""
     array.setflags(write=False)
@@ -247,8 +256,8 @@ class Discretized:
         """
         return self.body
 
-    def spread(self, density: NDArray, edges: Mapping[int, NDArray]) -> NDArray:
-        """Forces (m,), N, on all dofs of a linear model due to forces on panels (np, 3), N/m2.
+    def spread(self, load: Distributed, edges: Mapping[int, NDArray]) -> NDArray:
+        """Forces (m,), N, on all dofs of a linear model due to a distributed load.
 
         edges : edges that supports hold, as in `held`.
         """
