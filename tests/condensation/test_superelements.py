@@ -100,6 +100,20 @@ def test_panels_of_different_sheets():
 
 
 @pytest.mark.matrix
+def test_thick_panels():
+    """Boards six times as long as thick, whose corners are rigid over a third of the creases."""
+    place = [(0.5 * k, y) for y in (0.0, 0.3) for k in range(4)]
+    faces = [(k, k + 1, k + 5, k + 4) for k in range(3)]
+    boards = fd.thicken(fd.Pattern(place, faces, {(1, 5): "V", (2, 6): "M"}), 0.05)
+    sheet = replace(SHEET, thickness=0.05)
+    own, shell = both(boards, sheet, clamped="xmin")
+    np.testing.assert_allclose(frequencies(own), frequencies(shell), rtol=2e-3)
+    weight = on_rigid_motions(own, fd.Gravity((0.0, 0.0, 1.0)))[2]
+    mass = fd.modes(fd.Case(own), 7)["effective_mass"].sum("mode").values
+    np.testing.assert_allclose([weight, *mass], 1.5 * 0.3 * sheet.areal_density, rtol=1e-7)
+
+
+@pytest.mark.matrix
 def test_a_weld_continues_the_sheet():
     grid = np.array([[i, j, 0.0] for j in (0.0, 1.0) for i in (0.0, 0.8, 2.0)])
     faces = [(0, 1, 4, 3), (1, 2, 5, 4)]
@@ -477,11 +491,12 @@ def test_a_case_file_gives_modes_that_can_be_run_again(tmp_path):
 
 
 @pytest.mark.matrix
-def test_a_path_has_a_page(tmp_path):
+def test_a_path_has_a_page(tmp_path, monkeypatch):
     path = tmp_path / "sheet.toml"
     warm = "[[loads]]\ntemperature = 0.1\nexpansion = 1e-5\n"
     text = CASE.replace('kind = "modes"\ncount = 3', f'kind = "statics"\n{warm}')
     path.write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
     assert main(["run", str(path)]) == 0
     assert "panels" in (tmp_path / "sheet-results/report.html").read_text("utf-8")
 

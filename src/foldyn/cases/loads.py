@@ -215,7 +215,7 @@ class Gravity(Load):
     def distributed(self, structure: Discretized, place: str) -> Distributed:
         """See `Load`."""
         mass = structure.sheet.values("areal_density", len(structure.pattern.faces))
-        return Distributed(panels=self.weight(mass))
+        return Distributed(panels=self.weight(mass * structure.board_share))
 
     def weight(self, mass: NDArray[np.float64]) -> NDArray[np.float64]:
         """Forces (n, 3), N, on nodes with masses (n,), kg."""

@@ -24,10 +24,12 @@ from scipy import sparse
 
 from foldyn.condensation.library import Group
 from foldyn.condensation.panel import BOW, INNER, TURN, VERTEX, block_diagonal, edge_frame
-from foldyn.condensation.shapes import ACROSS, ALONG, Level, bows
+from foldyn.condensation.shapes import ACROSS, ALONG, Level, bows, turns
+from foldyn.mechanics.sheet_term import CreaseTurns
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import edge_lookup
 from foldyn.structures.discretized import Distributed
+from foldyn.structures.graded import Grading
 
 FUNCTION = np.array([ACROSS.index(shape) for shape in ALONG])
 """Index in `ACROSS` of each shape along an edge."""
@@ -207,13 +209,11 @@ class Whole:
         points.append(np.array([x[list(face)].mean(axis=0) for face in self._pattern.faces]))
         return np.concatenate(points), sparse.csr_array(sparse.vstack([on_edges, centers]))
 
-    def spread(self, load: Distributed, cut_off: float) -> NDArray[np.float64]:
-        """Forces (m,), N, on the unknowns due to a distributed load; `cut_off` as in `between`."""
+    def spread(self, load: Distributed, graded: Grading) -> NDArray[np.float64]:
+        """Forces (m,), N, on the unknowns due to a distributed load; `graded`: the finest mesh."""
         own, out = self.unknowns, np.zeros(self.unknowns.size)
         if load.creases is not None:
-            crease = np.arange(len(load.creases))
-            for side in range(2):
-                out[own.turn(crease, side, 0)] -= load.creases
+            out -= self.crease_turns(graded).mean.T @ load.creases
         if load.edges is not None:
             force = np.linalg.norm(self._along, axis=1)[:, None] * load.edges
             np.add.at(out[: 3 * own.vertices].reshape(-1, 3), self.edges.T, 0.5 * force)
@@ -221,7 +221,7 @@ class Whole:
             places = 0.5 * (1.0 + z)
             for edge in np.flatnonzero(force.any(axis=1)).tolist():
                 length = float(np.linalg.norm(self._along[edge]))
-                mean = 0.5 * share @ bows(places, cut_off / length, 1)[:, : own.functions]
+                mean = 0.5 * share @ bows(places, graded.radius / length, 1)[:, : own.functions]
                 first = own.bow(edge, 0)
                 out[first : first + 3 * own.functions] += np.outer(mean, force[edge]).ravel()
         if load.swollen is not None:
@@ -263,13 +263,25 @@ class Whole:
             out[self.unknowns.turn(edge, side, 0)] = sign * along
         return out
 
-    def turns_of(self, edges: NDArray) -> sparse.csr_array:
-        """Turns (k * turns, m) of both sides of edges (k,) relative to each other."""
-        own, count = self.unknowns, self.level.turns
-        first = own.turn(edges[:, None], 0, np.arange(count)).ravel()
+    def crease_turns(self, graded: Grading) -> CreaseTurns:
+        """Turns of both sides of the creases relative to each other.
+
+        Creases turn by what they do at the middles of the pieces of a mesh, as panels do.
+        """
+        own, count, creases = self.unknowns, self.level.turns, len(self._pattern.creases)
+        first = own.turn(np.arange(creases)[:, None], 0, np.arange(count)).ravel()
         row = np.tile(np.arange(len(first)), 2)
         column = np.concatenate([first, first + count])
-        return sparse.csr_array((np.ones(len(row)), (row, column)), (len(first), own.size))
+        entries = (np.ones(len(row)), (row, column))
+        amplitudes = sparse.csr_array(entries, (len(first), own.size))
+        roots = np.zeros((creases, count, count))  # of the mean squares
+        for crease, along in enumerate(self._along[:creases]):
+            places = np.append(0.0, graded.places(float(np.linalg.norm(along))))
+            share = np.diff(places, append=1.0)
+            shapes = turns(places + 0.5 * share, count)
+            roots[crease] = np.linalg.cholesky(shapes.T @ (share[:, None] * shapes)).T
+        rows = block_diagonal(roots).tocsr() @ amplitudes if creases else amplitudes
+        return CreaseTurns(sparse.csr_array(rows), np.repeat(np.arange(creases), count))
 
     # ------------------------------------------------------------------ supports
     @cached_property

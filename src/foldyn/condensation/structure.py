@@ -14,7 +14,7 @@ from scipy import sparse
 
 from foldyn.algebra.solvers import Fill
 from foldyn.condensation.assembly import Whole
-from foldyn.condensation.library import Meshes, groups
+from foldyn.condensation.library import ALIKE, Meshes, groups
 from foldyn.condensation.panel import BOW
 from foldyn.condensation.shapes import LEVELS
 from foldyn.condensation.term import GROUPS, SuperelementsTerm
@@ -152,8 +152,12 @@ class Superelements(Discretized):
                 f"compute or compare with has {level.across} shapes; take more",
                 "divisions",
             )
-        kinds, kind = self.sheet.kinds(len(self.pattern.faces))
-        made = groups(self.pattern, [kinds[k] for k in kind], self.meshes)
+        (kinds, kind), share = self.sheet.kinds(len(self.pattern.faces)), self.board_share
+        density = np.round(share, ALIKE) * np.array([kinds[k].density for k in kind])
+        sheets = [
+            replace(kinds[k], density=own) for k, own in zip(kind, density.tolist(), strict=True)
+        ]
+        made = groups(self.pattern, sheets, self.meshes)
         return Whole(self.pattern, made, level)
 
     @cached_property
@@ -170,13 +174,9 @@ class Superelements(Discretized):
 
         compared : whether to take panels from coarser meshes; the dofs are the same.
         """
-        made, count, dofs = self.whole, len(self.pattern.creases), self._dofs(edges)
-        degree = np.tile(np.arange(made.level.turns), count)
-        turns = CreaseTurns(
-            sparse.csr_array(made.turns_of(np.arange(count)) @ dofs),
-            np.repeat(np.arange(count), made.level.turns),
-            1.0 / (2 * degree + 1),
-        )
+        made, dofs = self.whole, self._dofs(edges)
+        rows, fold = made.crease_turns(self.meshes.graded[-1])
+        turns = CreaseTurns(sparse.csr_array(rows @ dofs), fold)
         panels, mass = (sparse.csr_array(dofs.T @ own @ dofs) for own in made.matrices(compared))
         parts = dofs.power(2).sum(axis=0)  # unknowns of each dof: two turns at welds, otherwise one
         rotated = (dofs.T @ made.rotated / parts[:, None])[self.nodes.size :]
@@ -212,7 +212,7 @@ class Superelements(Discretized):
 
     def spread(self, load: Distributed, edges: Mapping[int, NDArray]) -> NDArray[np.float64]:
         """See `Discretized`."""
-        return self._dofs(edges).T @ self.whole.spread(load, self.meshes.graded[-1].radius)
+        return self._dofs(edges).T @ self.whole.spread(load, self.meshes.graded[-1])
 
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """See `Discretized`; `spread` has the forces."""
@@ -323,7 +323,7 @@ def superelements(
     Raises
     ------
     InputError
-        An argument out of range; a panel that cannot be meshed; thick panels.
+        An argument out of range; a panel that cannot be meshed.
 
     Examples
     --------
@@ -342,11 +342,6 @@ def superelements(
     check_sheet(sheet, pattern)
     if sheet.density is None:
         raise InputError("sheet: density is missing: give it (kg/m3), the panels' mass needs it")
-    if pattern.boards is not None:
-        raise InputError(
-            "pattern: has thick panels, which superelements do not support; give the thin pattern, "
-            "or take the shell, fd.shell"
-        )
     radius = (
         float(np.max(sheet.values("thickness", len(pattern.faces))))
         if vertex_radius is None

@@ -23,6 +23,9 @@ GROUPS: Mapping[str, str] = {
 }
 
 
+RESISTED = 1e-10  # stiffness of a rotation, relative to that of its parts, above which it counts
+
+
 class _Matrix(NamedTuple):
     indptr: NDArray
     indices: NDArray
@@ -101,10 +104,10 @@ class SuperelementsTerm(SheetTerm):
     ) -> None:  # fmt: skip
         self.mass, self.crease_turns, self._fold_hinges, self._panels = mass, turns, folds, panels
         self.rotated, self._slope, self._changed = rotated, slope, np.zeros(len(slope))
-        resisted = turns.rows * (slope[turns.fold] * turns.share)[:, None]
+        resisted = turns.rows * slope[turns.fold][:, None]
         self._folds = sparse.csr_array(turns.rows.T @ resisted)
         self._stiffness = sparse.csr_array(panels + self._folds)
-        self._extent = float(np.linalg.norm(np.ptp(nodes, axis=0)))
+        self._nodes, self._extent = nodes, float(np.linalg.norm(np.ptp(nodes, axis=0)))
         self.model = None
         self.size = panels.shape[0]
         self.rows = -(-self.size // 3)
@@ -120,7 +123,7 @@ class SuperelementsTerm(SheetTerm):
         own = _Context(
             panels,
             folds,
-            turns.rows.T @ np.where(turns.share == 1.0, moment[turns.fold], 0.0),
+            turns.mean.T @ moment,
             0.5 * float(moment @ self._changed),
         )
         return CompiledTerm(Context(own), {FORCES: _forces, ENERGIES: _energies})
@@ -144,6 +147,20 @@ class SuperelementsTerm(SheetTerm):
         other._changed = self._changed + rest - self.rest_angles
         other._fold_hinges = self._fold_hinges._replace(rest=rest)
         return other
+
+    def holds(self, q: NDArray) -> sparse.csr_array:
+        """See `Term`: clamped edges resist rotations of the whole."""
+        arm = (self._nodes - self._nodes.mean(axis=0)) / self._extent
+        turned = np.concatenate([np.cross(np.eye(3), own).T for own in arm])
+        turned = np.concatenate([turned, self.rotated / self._extent])
+        resisted, kinds = np.linalg.eigh(turned.T @ (self._stiffness @ turned))
+        size = (np.abs(turned).T @ (abs(self._stiffness) @ np.abs(turned))).max()
+        moved = np.linalg.pinv(
+            np.hstack([np.tile(np.eye(3), (len(arm), 1)), turned[: self._nodes.size]])
+        )[3:]
+        rows = kinds[:, resisted > RESISTED * size].T @ moved
+        rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+        return sparse.csr_array(np.pad(rows, ((0, 0), (0, self.size - rows.shape[1]))))
 
     @property
     def folds(self) -> Folds:

@@ -272,6 +272,14 @@ class Discretized:
         raise InputError("this structure has no panels that could swell")
 
     @cached_property
+    def board_share(self) -> NDArray | float:
+        """Area of each thick panel's board, relative to the panel, (np,); 1 for a thin pattern."""
+        if self.pattern is None or self.pattern.boards is None:
+            return 1.0
+        area = 0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
+        return self.pattern.boards.areas / np.bincount(self.triangle_panel, area)
+
+    @cached_property
     def surface(self) -> Surface:
         """Triangles with their masses, the input of mass rules.
 
@@ -286,10 +294,6 @@ class Discretized:
         welds = self.pattern.welds.tolist() if self.pattern is not None else []
         count = max(len(faces), int(self.triangle_panel.max(initial=-1)) + 1)
         area = 0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
-        areal_density = self.sheet.values("areal_density", count)
-        if self.pattern is not None and self.pattern.boards is not None:
-            drawn = np.bincount(self.triangle_panel, area)
-            areal_density = areal_density * (self.pattern.boards.areas / drawn)
         return Surface(
             nodes=self.nodes,
             faces=faces,
@@ -297,7 +301,7 @@ class Discretized:
             triangles=self.triangles,
             triangle_panel=self.triangle_panel,
             triangle_area=area,
-            areal_density=areal_density,
+            areal_density=self.sheet.values("areal_density", count) * self.board_share,
             welds=tuple((low, high) for low, high in welds),
         )
 
