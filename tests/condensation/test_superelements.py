@@ -81,6 +81,26 @@ def test_parts_at_vertices(case):
     np.testing.assert_allclose(own, shell, rtol=3e-3)
 
 
+def test_rigid_motions_move_the_same_water_as_in_other_models():
+    water = fd.Air(density=998.0)
+    made, bars = both(level=1)[0], fd.discretize(PATTERN, SHEET, scheme="n4b5")
+    motions, n = rigid_motions(made), made.nodes.size
+    own, other = (fd.Case(s, air=water).added_mass() for s in (made, bars))
+    exact = motions[:n].T @ (other @ motions[:n])
+    found = motions.T @ (own @ motions)
+    np.testing.assert_allclose(found, exact, atol=1e-9 * np.abs(exact).max())
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize("added", [True, "local"])
+def test_modes_in_water(added):
+    water = fd.Air(density=998.0, added_mass=added)
+    own, shell = (fd.modes(fd.Case(s, HELD, air=water), 4) for s in both())
+    np.testing.assert_allclose(own["frequency"], shell["frequency"], rtol=5e-3)
+    np.testing.assert_allclose(own["air_share"], shell["air_share"], atol=1e-3)
+    np.testing.assert_allclose(own["effective_mass"], shell["effective_mass"], rtol=0.03, atol=2.0)
+
+
 @pytest.mark.matrix
 @pytest.mark.parametrize(
     "options",
@@ -282,13 +302,18 @@ def test_small_static_loads(load):
     np.testing.assert_allclose(own, shell, atol=most * np.abs(shell).max())
 
 
-def on_rigid_motions(structure, load):
-    """Work of a load in unit translations, and in rotations by 1 rad about the origin."""
+def rigid_motions(structure):
+    """Unit translations of all dofs, and rotations by 1 rad about the origin, (m, 6)."""
     rotated = np.concatenate([np.cross(np.eye(3), x).T for x in structure.nodes])
     rotated = np.concatenate([rotated, structure.body.sheet.rotated])
     moved = np.zeros(rotated.shape)
     moved[: structure.nodes.size] = np.tile(np.eye(3), (len(structure.nodes), 1))
-    return structure.spread(load.distributed(structure, ""), {}) @ np.hstack([moved, rotated])
+    return np.hstack([moved, rotated])
+
+
+def on_rigid_motions(structure, load):
+    """Work of a load in `rigid_motions`."""
+    return structure.spread(load.distributed(structure, ""), {}) @ rigid_motions(structure)
 
 
 def test_forces_and_moments_of_loads_are_exact():
@@ -395,7 +420,6 @@ def test_congruent_panels_are_condensed_once():
 
 MOVES_FAR = {
     "contact": {"contact": fd.Contact()},
-    "air": {"air": fd.Air()},
     r"loads\[0\]: the force": {"loads": [fd.LineLoad([(0, 1)], (0.0, 0.0, 1.0))]},
     "StrainDamping": {"damping": fd.StrainDamping(1e-3)},
 }

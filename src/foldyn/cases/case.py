@@ -157,14 +157,11 @@ class Case(Loaded, Damped):
 
     def _check_linear(self) -> None:
         """Refuse what a linear model with nodes at vertices only leaves out."""
-        if not self.structure.linear:
-            return
-        for place, part in {"contact": self.contact, "air": self.air}.items():
-            if part is not None:
-                raise InputError(
-                    f"{place}: {type(part).__name__} is not supported by {self.structure.linear}; "
-                    "take fd.shell or fd.discretize"
-                )
+        if self.structure.linear and self.contact is not None:
+            raise InputError(
+                f"contact: Contact is not supported by {self.structure.linear}; take fd.shell or "
+                "fd.discretize"
+            )
 
     def _acts_between(self, load: Load, place: str) -> bool:
         """Whether a load of a linear model acts on panels, creases or edges that move."""
@@ -324,7 +321,8 @@ class Case(Loaded, Damped):
         -------
         AddedMass
             A symmetric operator on displacements (3n,), dof 3 node + axis, in kg: `added @ x`,
-            `added.diagonal()`, and for small sheets `added.todense()`.
+            `added.diagonal()`, and for small sheets `added.todense()`. With superelements it acts
+            on all of their dofs, at rest; the first 3n are those of the vertices.
 
         Raises
         ------

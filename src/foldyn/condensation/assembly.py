@@ -177,6 +177,19 @@ class Whole:
             masses = np.einsum("pad,pbd,abij->dpij", frames, frames, own, optimize=True)
             yield placed[np.repeat(there, len(kept))], [block_diagonal(each) for each in masses]
 
+    def lifts(self, points: NDArray, panel: NDArray) -> sparse.csr_array:
+        """Displacements (k, m) normal to panels (k,) at points (k, 3) in them."""
+        total = sparse.csr_array((len(points), self.unknowns.size))
+        for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
+            own = np.stack([np.flatnonzero(panel == number) for number in group.number])
+            away = points[own] - self._pattern.vertices[group.faces[:, :1]]
+            local = np.einsum("pei,pdi->ped", away, group.frames[:, :2])
+            shapes = group.panel.lift(local)[:, :, kept]
+            entries = (np.ones(own.size), (own.ravel(), np.arange(own.size)))
+            put = sparse.csr_array(entries, shape=(len(points), own.size))
+            total = total + put @ (block_diagonal(shapes).tocsr() @ placed)
+        return sparse.csr_array(total)
+
     def between(self, cut_off: float) -> tuple[NDArray, sparse.csr_array]:
         """Points (q, 3) on edges and at the means of panels' corners, and their motions (3 q, m).
 

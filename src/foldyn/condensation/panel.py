@@ -60,6 +60,8 @@ class CondensedPanel:
         number) or (INNER, 0, mode).
     inner : LinearNDInterpolator
         Displacements (p, 3 q) of the inner modes at points (p, 2) of the panel's plane.
+    lift : LinearNDInterpolator
+        Displacements (p, c) normal to the panel's plane at points (p, 2) of this plane.
     center : (3, c)
         Displacement of the mean of the corners, in the panel's frame.
     products : (3, 3, c, c)
@@ -74,6 +76,7 @@ class CondensedPanel:
     mass: NDArray
     kind: NDArray
     inner: LinearNDInterpolator
+    lift: LinearNDInterpolator
     center: NDArray
     products: NDArray
     thermal: NDArray
@@ -136,13 +139,14 @@ def condense(
     along = full[on_nodes].reshape(len(mesh.nodes), 3, -1).swapaxes(0, 1)
     nodal = mass[on_nodes, on_nodes][::3, ::3]
     middle = np.linalg.norm(mesh.nodes - mesh.nodes[: mesh.corners].mean(axis=0), axis=1).argmin()
+    inside_modes = full[on_nodes, -count:].reshape(len(mesh.nodes), -1)
+    interpolated = LinearNDInterpolator(mesh.nodes[:, :2], inside_modes)
     return CondensedPanel(
         0.5 * (reduced + reduced.T),
         0.5 * (carried + carried.T),
         np.concatenate([kind, [(INNER, 0, k) for k in range(count)]]),
-        LinearNDInterpolator(
-            mesh.nodes[:, :2], full[on_nodes, -count:].reshape(len(mesh.nodes), -1)
-        ),
+        interpolated,
+        LinearNDInterpolator(interpolated.tri, full[on_nodes][2::3]),
         full[3 * middle + np.arange(3)],
         np.array([[a.T @ (nodal @ b) for b in along] for a in along], np.float32),
         np.concatenate([full[:, :-count].T @ forces, np.zeros((count, 2))]),

@@ -214,6 +214,12 @@ class Superelements(Discretized):
         """See `Discretized`."""
         return self._dofs(edges).T @ self.whole.spread(load, self.meshes.graded[-1])
 
+    def lifts(
+        self, points: NDArray, panel: NDArray, edges: Mapping[int, NDArray]
+    ) -> sparse.csr_array:
+        """See `Discretized`."""
+        return sparse.csr_array(self.whole.lifts(points, panel) @ self._dofs(edges))
+
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """See `Discretized`; `spread` has the forces."""
         free, energy = np.concatenate([strain, curvature]), self.whole.held_energies

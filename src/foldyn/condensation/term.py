@@ -97,6 +97,7 @@ class SuperelementsTerm(SheetTerm):
     undifferentiated = "superelements"
     mass: sparse.csr_array
     crease_turns: CreaseTurns
+    rotated: NDArray
 
     def __init__(
         self, panels: sparse.csr_array, mass: sparse.csr_array, turns: CreaseTurns, slope: NDArray,

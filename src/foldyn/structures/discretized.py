@@ -263,6 +263,15 @@ class Discretized:
         """
         raise NotImplementedError
 
+    def lifts(
+        self, points: NDArray, panel: NDArray, edges: Mapping[int, NDArray]
+    ) -> sparse.csr_array:
+        """Displacements (k, m) normal to panels (k,) at points (k, 3) in them, in linear models.
+
+        edges : edges that supports hold, as in `held`.
+        """
+        raise NotImplementedError
+
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """Additions to the structure if panels swell: if they would stretch and curl when free.
 
