@@ -43,6 +43,7 @@ class Fluid:
     catch: sparse.csr_array
     _density: float
     _surface: tuple[NDArray, ...]  # arguments of `flow_of`
+    _lifts: sparse.csr_array | None = None  # (k, m) normal velocities, in linear models
 
     @cached_property
     def flow(self) -> Flow:
@@ -53,8 +54,13 @@ class Fluid:
         return self._density * flow_of(*self._surface)
 
     def on(self, x: NDArray) -> AddedMass:
-        """Added mass with the normals of the triangles when the nodes are at x (n, 3), m."""
-        normal = normal_velocities(x, self.triangles, self.under, self.shares)
+        """Added mass with the normals of the triangles when the nodes are at x (n, 3), m.
+
+        In linear models it acts on all dofs, and the normals are those at rest.
+        """
+        normal = self._lifts
+        if normal is None:
+            normal = normal_velocities(x, self.triangles, self.under, self.shares)
         return AddedMass(sparse.csr_array(self.catch @ normal), self.flow)
 
 
@@ -87,9 +93,15 @@ def fluid_at(case: Any, displacement: NDArray) -> Fluid:
     if not local:
         _check_gaps(structure.pattern, elements, points)
     surface = points, elements.triangles, elements.unknown
-    catch = sparse.csr_array(sparse.csc_array(caught(*surface))[:, elements.element])
-    given = structure.triangles, elements.under, elements.shares, catch
-    return Fluid(*given, case.air.density, (*surface, elements.panel) if local else surface)
+    catch, lifts = sparse.csc_array(caught(*surface)), None
+    if structure.linear:
+        centers = points[elements.triangles].mean(axis=1)
+        lifts = structure.lifts(centers, elements.panel, case.held_edges)
+    else:
+        catch = catch[:, elements.element]
+    given = structure.triangles, elements.under, elements.shares, sparse.csr_array(catch)
+    made = (*surface, elements.panel) if local else surface
+    return Fluid(*given, case.air.density, made, lifts)
 
 
 def operator_at(case: Any, displacement: NDArray) -> tuple[AddedMass, bool] | None:

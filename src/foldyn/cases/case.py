@@ -20,9 +20,8 @@ from foldyn.cases.clamped_edges import supported_points
 from foldyn.cases.contact import Contact
 from foldyn.cases.damping import Damping, Rayleigh, dampings
 from foldyn.cases.history import CONSTANT, History, as_history, factor
-from foldyn.cases.loads import LOADS, Force, Gravity, Load
+from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
-from foldyn.cases.region_loads import Pressure
 from foldyn.cases.state import State
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
 from foldyn.errors import Faults, FoldynWarning, InputError, within
@@ -38,6 +37,8 @@ from foldyn.structures.discretized import Discretized, read_only
 from foldyn.structures.inelastic_hinges import Remembering, remembering
 from foldyn.structures.mass import center_of_mass, inertia_tensor, row_sums
 from foldyn.values import objects, show
+
+ROUNDING = 1e-9  # part of a force that counts as none
 
 
 @brief
@@ -148,24 +149,30 @@ class Case(Loaded, Damped):
         if self.constraints:
             _ = self.imposed_terms
         for place, load in self._loads():
-            load.check(self.structure, self.fixed, place)
+            if not (self.structure.linear and self._acts_between(load, place)):
+                load.check(self.structure, self.fixed, place)
             if isinstance(load, Gravity):
                 with within(f"{place}: gravity needs the mass of the structure: "):
                     _ = self.mass
 
     def _check_linear(self) -> None:
         """Refuse what a linear model with nodes at vertices only leaves out."""
-        if not self.structure.linear:
-            return
-        taken = Force, Gravity, Pressure
-        others = {place: load for place, load in self._loads() if not isinstance(load, taken)}
-        given = {**others, "contact": self.contact, "air": self.air}
-        for place, part in given.items():
-            if part is not None:
-                raise InputError(
-                    f"{place}: {type(part).__name__} is not supported by {self.structure.linear}, "
-                    "which take Force, Gravity and Pressure; take fd.shell or fd.discretize"
-                )
+        if self.structure.linear and self.contact is not None:
+            raise InputError(
+                f"contact: Contact is not supported by {self.structure.linear}; take fd.shell or "
+                "fd.discretize"
+            )
+
+    def _acts_between(self, load: Load, place: str) -> bool:
+        """Whether a load of a linear model acts on panels, creases or edges that move."""
+        spread = load.distributed(self.structure, place)
+        if spread is None or spread.edges is None:
+            return spread is not None
+        return any(
+            edge not in self.held_edges or _beyond(force, self.held_edges[edge])
+            for edge, force in enumerate(spread.edges)
+            if force.any()
+        )
 
     def _check_selections(self) -> None:
         """Refuse nodes and creases that do not exist; report all of them together."""
@@ -178,7 +185,8 @@ class Case(Loaded, Damped):
             with faults.collected():
                 getattr(self, name)
         for place, load in self._loads():
-            for part in (load.loaded, load.rest_changes, load.following):
+            acts = load.distributed if self.structure.linear else load.following
+            for part in (load.loaded, load.rest_changes, acts):
                 with faults.collected():
                     part(self.structure, place)
         faults.raise_all()
@@ -313,7 +321,8 @@ class Case(Loaded, Damped):
         -------
         AddedMass
             A symmetric operator on displacements (3n,), dof 3 node + axis, in kg: `added @ x`,
-            `added.diagonal()`, and for small sheets `added.todense()`.
+            `added.diagonal()`, and for small sheets `added.todense()`. With superelements it acts
+            on all of their dofs, at rest; the first 3n are those of the vertices.
 
         Raises
         ------
@@ -367,3 +376,9 @@ class Case(Loaded, Damped):
     def inertia(self) -> NDArray[np.float64]:
         """Inertia tensor (3, 3) at rest about the center of mass, kg m2."""
         return inertia_tensor(self.structure.nodes, self.mass)
+
+
+def _beyond(force: NDArray, held: NDArray) -> bool:
+    """Whether a force (3,) also acts normal to directions (h, 3)."""
+    left = force - np.linalg.pinv(held) @ (held @ force)
+    return bool(np.linalg.norm(left) > ROUNDING * np.linalg.norm(force))

@@ -263,18 +263,28 @@ class Loaded:
         return tuple((part, load.history) for part, load in found if part is not None)
 
     def _following(self, load: Load, place: str) -> Following | None:
-        """Displacement-dependent forces, or in a linear model the forces on all of its dofs."""
-        density = load.density(self.structure, place) if self.structure.linear else None
-        if density is None:
+        """Displacement-dependent forces; in a linear model what `_forces` lacks, on all dofs."""
+        spread = load.distributed(self.structure, place) if self.structure.linear else None
+        if spread is None:
             return load.following(self.structure, place)
-        forces = self.structure.spread(density, self.held_edges)
+        forces, nodal = (
+            self.structure.spread(spread, self.held_edges),
+            load.forces(self.structure, place),
+        )
+        if nodal is not None:
+            forces[: nodal.size] -= nodal.ravel()
         return pushes(np.arange(len(forces)), forces)
 
     @cached_property
     def swellings(self) -> tuple[tuple[Swelling, History], ...]:
         """Free stretching and curling of panels due to each load, with its history."""
-        found = ((load.swelling(self.structure, place), load) for place, load in self._loads())
-        return tuple((own, load.history) for own, load in found if own is not None)
+        found = []
+        for place, load in self._loads():
+            own = load.swelling(self.structure, place)
+            if own is not None:
+                forces = self._following(load, place)
+                found.append((own._replace(forces=forces), load.history))
+        return tuple(found)
 
     @cached_property
     def gravity_terms(self) -> Terms:

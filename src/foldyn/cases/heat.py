@@ -13,7 +13,8 @@ from foldyn.structures.discretized import Discretized
 from foldyn.structures.structure import Structure
 from foldyn.structures.swelling import Swelling
 
-IN_PLANE, BENDING = ("strain_membrane", "strain_bars"), ("strain_bending", "strain_bends")
+IN_PLANE = "strain_membrane", "strain_bars", "strain_panels"
+BENDING = "strain_bending", "strain_bends", "strain_panels"
 
 
 def heat_of(

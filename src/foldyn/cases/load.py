@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from foldyn.cases.decode import Part
 from foldyn.errors import InputError, warn
 from foldyn.mechanics.following import Following
-from foldyn.structures.discretized import Discretized
+from foldyn.structures.discretized import Discretized, Distributed
 from foldyn.structures.swelling import Swelling
 
 
@@ -59,8 +59,8 @@ class Load(Part):
         """Displacement-dependent forces at factor 1; None if there are none."""
         return None
 
-    def density(self, structure: Discretized, place: str) -> NDArray[np.float64] | None:
-        """Force per area (np, 3), N/m2, on the panels of a linear model at rest; None if none."""
+    def distributed(self, structure: Discretized, place: str) -> Distributed | None:
+        """The load on panels, edges and creases at rest, for linear models; None if on nodes."""
         return None
 
     def swelling(self, structure: Discretized, place: str) -> Swelling | None:

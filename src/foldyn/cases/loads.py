@@ -23,7 +23,7 @@ from foldyn.cases.load import Load, check_held
 from foldyn.cases.region_loads import CreaseMoment, LineLoad, Pressure, Temperature, TotalForce
 from foldyn.cases.selection import Creases, Nodes, resolve_creases, resolve_nodes
 from foldyn.errors import InputError, within
-from foldyn.structures.discretized import Discretized
+from foldyn.structures.discretized import Discretized, Distributed
 from foldyn.values import doubt_degrees, number, number_or_list, one_or_each, parsed, show, vector
 
 __all__ = [
@@ -212,10 +212,10 @@ class Gravity(Load):
 
     apart = "acts on the whole structure"
 
-    def density(self, structure: Discretized, place: str) -> NDArray[np.float64]:
+    def distributed(self, structure: Discretized, place: str) -> Distributed:
         """See `Load`."""
         mass = structure.sheet.values("areal_density", len(structure.pattern.faces))
-        return self.weight(mass)
+        return Distributed(panels=self.weight(mass * structure.board_share))
 
     def weight(self, mass: NDArray[np.float64]) -> NDArray[np.float64]:
         """Forces (n, 3), N, on nodes with masses (n,), kg."""

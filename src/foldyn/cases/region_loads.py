@@ -29,11 +29,20 @@ from foldyn.cases.selection import (
 from foldyn.errors import InputError
 from foldyn.mechanics.following import Following, joined, moments, pressures, pushes
 from foldyn.mechanics.sheet_term import NO_DOF
+from foldyn.patterns.topology import edge_lookup
 from foldyn.structures import Laminate
-from foldyn.structures.discretized import Discretized
+from foldyn.structures.discretized import Discretized, Distributed
 from foldyn.structures.sheet import check_layers
 from foldyn.structures.swelling import Swelling
 from foldyn.values import number, number_or_list, one_or_each, show, vector
+
+
+def _chosen(structure: Discretized, panels: Panels, place: str) -> NDArray[np.bool_]:
+    """Whether each panel (np,) of a structure with a pattern is among the given ones."""
+    chosen = np.zeros(len(structure.pattern.faces), bool)
+    triangles = resolve_panels(structure, panels, f"{place}.panels")
+    chosen[structure.triangle_panel[triangles]] = True
+    return chosen
 
 
 class Spread(Load):
@@ -60,6 +69,16 @@ class Spread(Load):
         measure = self.measure(structure, place)
         whole = float(measure.sum())
         return (measure / whole)[:, None] * self.total_of(whole)
+
+    def on_edges(self, structure: Discretized, edges: Edges, place: str) -> Distributed:
+        """The force, spread evenly over edges."""
+        along, lines = resolve_edges(structure, edges, f"{place}.edges"), structure.pattern.lines
+        number = edge_lookup(lines)
+        chosen = [number[low, high] for low, high in along[:, [0, -1]].tolist()]
+        whole = float(self.measure(structure, place).sum())
+        per_length = np.zeros((len(lines), 3))
+        per_length[chosen] = self.total_of(whole) / whole
+        return Distributed(edges=per_length)
 
 
 @dataclass(frozen=True)
@@ -135,6 +154,16 @@ class TotalForce(Spread):
         """See `Spread`."""
         return np.array(self.total)
 
+    def distributed(self, structure: Discretized, place: str) -> Distributed | None:
+        """See `Load`."""
+        if self.edges is not None:
+            return self.on_edges(structure, self.edges, place)
+        if self.panels is None:
+            return None
+        chosen = _chosen(structure, self.panels, place)
+        area = float(structure.pattern.face_areas[chosen].sum())
+        return Distributed(panels=np.outer(chosen, self.total) / area)
+
     def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse a force that acts only on held axes; warn if some axes of its nodes are held."""
         nodes = np.flatnonzero(self.measure(structure, place))
@@ -177,6 +206,10 @@ class LineLoad(Spread):
         """See `Spread`."""
         return measure * np.array(self.force_per_length)
 
+    def distributed(self, structure: Discretized, place: str) -> Distributed:
+        """See `Load`."""
+        return self.on_edges(structure, self.edges, place)
+
     def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse a load that acts only on held axes."""
         nodes = np.flatnonzero(self.measure(structure, place))
@@ -214,14 +247,10 @@ class Pressure(Load):
         pressure = np.full(len(chosen), self.pressure)
         return pressures(structure.nodes, structure.triangles[chosen], pressure)
 
-    def density(self, structure: Discretized, place: str) -> NDArray[np.float64]:
+    def distributed(self, structure: Discretized, place: str) -> Distributed:
         """See `Load`."""
-        pattern, density = structure.pattern, np.zeros((len(structure.pattern.faces), 3))
-        chosen = np.unique(
-            structure.triangle_panel[resolve_panels(structure, self.panels, f"{place}.panels")]
-        )
-        density[chosen] = self.pressure * pattern.face_normals[chosen]
-        return density
+        chosen = _chosen(structure, self.panels, place)
+        return Distributed(panels=self.pressure * chosen[:, None] * structure.pattern.face_normals)
 
     def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse a pressure on panels whose nodes are all held."""
@@ -276,6 +305,13 @@ class CreaseMoment(Load):
         hidden, back = pieces.hidden[chosen], -part[:, None] * pieces.hidden_turn[chosen]
         there = hidden != NO_DOF
         return joined([(turning, 0), (pushes(hidden[there], back[there]), 0)])
+
+    def distributed(self, structure: Discretized, place: str) -> Distributed:
+        """See `Load`."""
+        creases, moment = self.of_creases(structure, place)
+        each = np.zeros(len(structure.folds))
+        each[creases] = moment
+        return Distributed(creases=each)
 
     def turns(self, structure: Discretized, place: str) -> NDArray | None:
         """See `Load`: compliant panels at a crease turn under the whole moment."""
@@ -374,11 +410,16 @@ class Temperature(Load):
         """See `Load`."""
         if structure.pattern is None:
             raise InputError(f"{place}: this structure has no pattern with panels")
-        chosen = np.zeros(len(structure.pattern.faces))
-        triangles = resolve_panels(structure, self.panels, f"{place}.panels")
-        chosen[structure.triangle_panel[triangles]] = self.change
-        expansion, curvature = self._per_kelvin
-        return structure.swollen(chosen * expansion, chosen * curvature)
+        return structure.swollen(*self._free(structure, place).T)
+
+    def distributed(self, structure: Discretized, place: str) -> Distributed:
+        """See `Load`."""
+        return Distributed(swollen=self._free(structure, place))
+
+    def _free(self, structure: Discretized, place: str) -> NDArray[np.float64]:
+        """Free strain, and curvature (1/m), of each panel (np, 2)."""
+        chosen = _chosen(structure, self.panels, place)
+        return np.outer(chosen, self.change * np.array(self._per_kelvin))
 
     def following(self, structure: Discretized, place: str) -> Following:
         """See `Load`."""

@@ -18,15 +18,19 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.condensation.library import Group
 from foldyn.condensation.panel import BOW, INNER, TURN, VERTEX, block_diagonal, edge_frame
-from foldyn.condensation.shapes import ACROSS, ALONG, Level, bows
+from foldyn.condensation.shapes import ACROSS, ALONG, Level, bows, turns
 from foldyn.mechanics.block_matrix import of_elements
+from foldyn.mechanics.sheet_term import CreaseTurns
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import edge_lookup
+from foldyn.structures.discretized import Distributed
+from foldyn.structures.graded import Grading
 
 FUNCTION = np.array([ACROSS.index(shape) for shape in ALONG])
 """Index in `ACROSS` of each shape along an edge."""
@@ -34,6 +38,7 @@ PLACES = (0.25, 0.5, 0.75)  # of points on edges for pictures and comparisons
 HELD = 1e-9  # part of a unit vector below which supports hold a direction
 AT_ONCE = 64  # panels of which full matrices are made at once
 NEGLIGIBLE = 1e-6  # part of a unit vector that gives no further direction
+POINTS = 96  # of Gauss' rule for means along edges
 
 
 class Unknowns(NamedTuple):
@@ -183,6 +188,19 @@ class Whole:
             masses = np.einsum("pad,pbd,abij->dpij", frames, frames, own, optimize=True)
             yield placed[np.repeat(there, len(kept))], [block_diagonal(each) for each in masses]
 
+    def lifts(self, points: NDArray, panel: NDArray) -> sparse.csr_array:
+        """Displacements (k, m) normal to panels (k,) at points (k, 3) in them."""
+        total = sparse.csr_array((len(points), self.unknowns.size))
+        for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
+            own = np.stack([np.flatnonzero(panel == number) for number in group.number])
+            away = points[own] - self._pattern.vertices[group.faces[:, :1]]
+            local = np.einsum("pei,pdi->ped", away, group.frames[:, :2])
+            shapes = group.panel.lift(local)[:, :, kept]
+            entries = (np.ones(own.size), (own.ravel(), np.arange(own.size)))
+            put = sparse.csr_array(entries, shape=(len(points), own.size))
+            total = total + put @ (block_diagonal(shapes).tocsr() @ placed)
+        return sparse.csr_array(total)
+
     def between(self, cut_off: float) -> tuple[NDArray, sparse.csr_array]:
         """Points (q, 3) on edges and at the means of panels' corners, and their motions (3 q, m).
 
@@ -215,7 +233,28 @@ class Whole:
         points.append(np.array([x[list(face)].mean(axis=0) for face in self._pattern.faces]))
         return np.concatenate(points), sparse.csr_array(sparse.vstack([on_edges, centers]))
 
-    def spread(self, density: NDArray) -> NDArray[np.float64]:
+    def spread(self, load: Distributed, graded: Grading) -> NDArray[np.float64]:
+        """Forces (m,), N, on the unknowns due to a distributed load; `graded`: the finest mesh."""
+        own, out = self.unknowns, np.zeros(self.unknowns.size)
+        if load.creases is not None:
+            out -= self.crease_turns(graded).mean.T @ load.creases
+        if load.edges is not None:
+            force = np.linalg.norm(self._along, axis=1)[:, None] * load.edges
+            np.add.at(out[: 3 * own.vertices].reshape(-1, 3), self.edges.T, 0.5 * force)
+            z, share = leggauss(POINTS)
+            places = 0.5 * (1.0 + z)
+            for edge in np.flatnonzero(force.any(axis=1)).tolist():
+                length = float(np.linalg.norm(self._along[edge]))
+                mean = 0.5 * share @ bows(places, graded.radius / length, 1)[:, : own.functions]
+                first = own.bow(edge, 0)
+                out[first : first + 3 * own.functions] += np.outer(mean, force[edge]).ravel()
+        if load.swollen is not None:
+            for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
+                forces = load.swollen[group.number] @ group.panel.thermal[kept].T
+                out += placed.T @ forces.ravel()
+        return out if load.panels is None else out + self._on_panels(load.panels)
+
+    def _on_panels(self, density: NDArray) -> NDArray[np.float64]:
         """Forces (m,), N, on the unknowns due to forces on panels (np, 3), N/m2.
 
         They follow from the inertia forces of a translation, which are evenly spread, too.
@@ -232,6 +271,14 @@ class Whole:
         return out
 
     @property
+    def held_energies(self) -> NDArray[np.float64]:
+        """`CondensedPanel.held_energy` of each panel (np, 2)."""
+        out = np.zeros((self.unknowns.panels, 2))
+        for group in self._groups:
+            out[group.number] = group.panel.held_energy
+        return out
+
+    @property
     def rotated(self) -> NDArray[np.float64]:
         """Unknowns (m, 3) other than displacements, in rotations by 1 rad about x, y, z."""
         along = self._along / np.linalg.norm(self._along, axis=1)[:, None]
@@ -240,13 +287,25 @@ class Whole:
             out[self.unknowns.turn(edge, side, 0)] = sign * along
         return out
 
-    def turns_of(self, edges: NDArray) -> sparse.csr_array:
-        """Turns (k * turns, m) of both sides of edges (k,) relative to each other."""
-        own, count = self.unknowns, self.level.turns
-        first = own.turn(edges[:, None], 0, np.arange(count)).ravel()
+    def crease_turns(self, graded: Grading) -> CreaseTurns:
+        """Turns of both sides of the creases relative to each other.
+
+        Creases turn by what they do at the middles of the pieces of a mesh, as panels do.
+        """
+        own, count, creases = self.unknowns, self.level.turns, len(self._pattern.creases)
+        first = own.turn(np.arange(creases)[:, None], 0, np.arange(count)).ravel()
         row = np.tile(np.arange(len(first)), 2)
         column = np.concatenate([first, first + count])
-        return sparse.csr_array((np.ones(len(row)), (row, column)), (len(first), own.size))
+        entries = (np.ones(len(row)), (row, column))
+        amplitudes = sparse.csr_array(entries, (len(first), own.size))
+        roots = np.zeros((creases, count, count))  # of the mean squares
+        for crease, along in enumerate(self._along[:creases]):
+            places = np.append(0.0, graded.places(float(np.linalg.norm(along))))
+            share = np.diff(places, append=1.0)
+            shapes = turns(places + 0.5 * share, count)
+            roots[crease] = np.linalg.cholesky(shapes.T @ (share[:, None] * shapes)).T
+        rows = block_diagonal(roots).tocsr() @ amplitudes if creases else amplitudes
+        return CreaseTurns(sparse.csr_array(rows), np.repeat(np.arange(creases), count))
 
     # ------------------------------------------------------------------ supports
     @cached_property

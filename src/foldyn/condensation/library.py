@@ -20,7 +20,7 @@ from foldyn.patterns import Pattern
 from foldyn.structures.graded import smooth_vertices
 from foldyn.structures.sheet import Sheet
 
-ROOM = 256  # condensed panels kept in memory, each about 2 MB
+ROOM = 256  # condensed panels kept in memory, each about 3 MB
 ALIKE = 8  # decimals of coordinates, relative to the size of the pattern, for congruent panels
 
 

@@ -38,6 +38,7 @@ from foldyn.shells.shell import STIFF
 from foldyn.structures.graded import Grading
 from foldyn.structures.panel_plate import TRIANGLE_MASS
 from foldyn.structures.sheet import Sheet
+from foldyn.structures.swelling import chord_turns
 
 if TYPE_CHECKING:
     from scipy.interpolate import LinearNDInterpolator
@@ -57,17 +58,29 @@ class CondensedPanel:
     kind : (c, 3)
         Kind of each shape: (VERTEX, corner, axis), (BOW, 3 edge + axis, number), (TURN, edge,
         number) or (INNER, 0, mode).
+    points : (p, 2)
+        Points of the panel's plane.
+    lifts : (p, c)
+        Displacements of these points normal to the plane.
     center : (3, c)
         Displacement of the mean of the corners, in the panel's frame.
     products : (3, 3, c, c)
         Integrals of mass times displacements along two axes of the panel's frame, kg.
+    thermal : (c, 2)
+        Forces of a panel with a unit free strain, or a unit free curvature.
+    held_energy : (2,)
+        Twice the energy of such a panel with its edges held.
     """
 
     stiffness: NDArray
     mass: NDArray
     kind: NDArray
+    points: NDArray
+    lifts: NDArray
     center: NDArray
     products: NDArray
+    thermal: NDArray
+    held_energy: NDArray
 
     def of(self, sheet: Sheet) -> CondensedPanel:
         """The panel of a sheet, from that of a sheet of unit modulus and density."""
@@ -78,7 +91,15 @@ class CondensedPanel:
             stiffness=modulus * self.stiffness,
             mass=density * self.mass,
             products=np.float32(density) * self.products,
+            thermal=modulus * self.thermal,
+            held_energy=modulus * self.held_energy,
         )
+
+    def lift(self, points: NDArray) -> NDArray[np.float64]:
+        """Displacements (p, c) normal to the panel's plane at points (p, 2) of this plane."""
+        from scipy.interpolate import LinearNDInterpolator
+
+        return LinearNDInterpolator(self.points, self.lifts)(points)
 
 
 def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> CondensedPanel:
@@ -92,7 +113,10 @@ def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> 
     values, motions = eigh(fine.mass + weight * (fine.mass - coarse.mass))
     return replace(
         fine,
-        stiffness=fine.stiffness + weight * (fine.stiffness - coarse.stiffness),
+        **{
+            name: (1.0 + weight) * getattr(fine, name) - weight * getattr(coarse, name)
+            for name in ("stiffness", "thermal", "held_energy")
+        },
         mass=(motions * values.clip(min=0.0)) @ motions.T,
     )
 
@@ -131,6 +155,7 @@ def condense(
         left, _, right = np.linalg.svd(common, full_matrices=False)
         turned = left @ right
     full[:, -count:] = inner @ turned
+    forces, energy = mesh.thermal
     reduced, carried = mesh.stiffness_of(full), full.T @ (mass @ full)
     along = full[on_nodes].reshape(len(mesh.nodes), 3, -1).swapaxes(0, 1)
     nodal = mass[on_nodes, on_nodes][::3, ::3]
@@ -139,8 +164,12 @@ def condense(
         0.5 * (reduced + reduced.T),
         0.5 * (carried + carried.T),
         np.concatenate([kind, [(INNER, 0, k) for k in range(count)]]),
+        mesh.nodes[:, :2],
+        full[on_nodes][2::3].astype(np.float32),
         full[3 * middle + np.arange(3)],
         np.array([[a.T @ (nodal @ b) for b in along] for a in along], np.float32),
+        np.concatenate([full[:, :-count].T @ forces, np.zeros((count, 2))]),
+        energy - np.einsum("mk,mk->k", forces[inside], factors.solve(forces[inside])),
     )
     modes = full[on_nodes, -count:].reshape(len(mesh.nodes), -1)
     return panel, LinearNDInterpolator(mesh.nodes[:, :2], modes)
@@ -187,6 +216,8 @@ class _Mesh:
         ]
         psi = (rows.ravel(), 3 * n + number.ravel(), -sign.ravel())
         self._rotations = _rows(self.size, 3 * nt, phi, psi)
+        curled = [chord_turns(x[:, (k, k - 2, k - 1)]) for k in range(3)]
+        self._free = np.ones((nt, 3)), np.stack(curled, axis=1)  # see `structures.swelling`
 
     @property
     def stiffness(self) -> sparse.csc_array:
@@ -201,6 +232,15 @@ class _Mesh:
             strain = rows @ shapes
             out += strain.T @ (block_diagonal(own) @ strain)
         return out
+
+    @property
+    def thermal(self) -> tuple[NDArray, NDArray]:
+        """Forces (m, 2) of a unit free strain and a unit free curvature, and 2 energy (2,)."""
+        pairs = list(zip(self._elastic, self._free, strict=True))
+        held = [np.einsum("tkl,tl->tk", own, free) for own, free in pairs]
+        rows = self._strains, self._rotations
+        forces = [own.T @ each.ravel() for own, each in zip(rows, held, strict=True)]
+        return np.stack(forces, axis=1), np.einsum("ktl,ktl->k", self._free, held)
 
     @property
     def mass(self) -> sparse.csr_array:

@@ -14,7 +14,7 @@ from scipy import sparse
 
 from foldyn.algebra.solvers import Fill
 from foldyn.condensation.assembly import Whole
-from foldyn.condensation.library import Meshes, groups
+from foldyn.condensation.library import ALIKE, Meshes, groups
 from foldyn.condensation.panel import BOW
 from foldyn.condensation.shapes import LEVELS
 from foldyn.condensation.term import GROUPS, SuperelementsTerm
@@ -22,6 +22,7 @@ from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, Superlinear, hinge_law
 from foldyn.materials.inelastic_law import memory_of
 from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.following import Following
 from foldyn.mechanics.sheet_term import NO_DOF, CreaseTurns, FoldHinges
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned
@@ -38,10 +39,11 @@ from foldyn.structures.calibration import (
 )
 from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.discretize import checked_kinds
-from foldyn.structures.discretized import Discretized, HingeKind, read_only
+from foldyn.structures.discretized import Discretized, Distributed, HingeKind, read_only
 from foldyn.structures.graded import grading
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
+from foldyn.structures.swelling import Swelling
 from foldyn.values import choice, length, whole
 
 MASSES = ("consistent",)  # mass rules
@@ -150,8 +152,12 @@ class Superelements(Discretized):
                 f"compute or compare with has {level.across} shapes; take more",
                 "divisions",
             )
-        kinds, kind = self.sheet.kinds(len(self.pattern.faces))
-        made = groups(self.pattern, [kinds[k] for k in kind], self.meshes)
+        (kinds, kind), share = self.sheet.kinds(len(self.pattern.faces)), self.board_share
+        density = np.round(share, ALIKE) * np.array([kinds[k].density for k in kind])
+        sheets = [
+            replace(kinds[k], density=own) for k, own in zip(kind, density.tolist(), strict=True)
+        ]
+        made = groups(self.pattern, sheets, self.meshes)
         return Whole(self.pattern, made, level)
 
     @cached_property
@@ -172,13 +178,9 @@ class Superelements(Discretized):
 
     def _term(self, edges: Mapping[int, NDArray]) -> SuperelementsTerm:
         """The sheet if supports hold edges, as in `held`."""
-        made, count, dofs = self.whole, len(self.pattern.creases), self._dofs(edges)
-        degree = np.tile(np.arange(made.level.turns), count)
-        turns = CreaseTurns(
-            sparse.csr_array(made.turns_of(np.arange(count)) @ dofs),
-            np.repeat(np.arange(count), made.level.turns),
-            1.0 / (2 * degree + 1),
-        )
+        made, dofs = self.whole, self._dofs(edges)
+        rows, fold = made.crease_turns(self.meshes.graded[-1])
+        turns = CreaseTurns(sparse.csr_array(rows @ dofs), fold)
         panels, mass = made.matrices(dofs)
         parts = dofs.power(2).sum(axis=0)  # unknowns of each dof: two turns at welds, otherwise one
         rotated = (dofs.T @ made.rotated / parts[:, None])[self.nodes.size :]
@@ -212,9 +214,23 @@ class Superelements(Discretized):
             times[one] += 1
         return found
 
-    def spread(self, density: NDArray, edges: Mapping[int, NDArray]) -> NDArray[np.float64]:
+    def spread(self, load: Distributed, edges: Mapping[int, NDArray]) -> NDArray[np.float64]:
         """See `Discretized`."""
-        return self._dofs(edges).T @ self.whole.spread(density)
+        return self._dofs(edges).T @ self.whole.spread(load, self.meshes.graded[-1])
+
+    def lifts(
+        self, points: NDArray, panel: NDArray, edges: Mapping[int, NDArray]
+    ) -> sparse.csr_array:
+        """See `Discretized`."""
+        return sparse.csr_array(self.whole.lifts(points, panel) @ self._dofs(edges))
+
+    def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
+        """See `Discretized`; `spread` has the forces."""
+        free, energy = np.concatenate([strain, curvature]), self.whole.held_energies
+        return Swelling(
+            np.zeros(len(self.folds)), Following(), (free, np.zeros(0)),
+            (energy.T.ravel() * free, np.zeros(0)),
+        )  # fmt: skip
 
     def along_axes(
         self, edges: Mapping[int, NDArray], panels: NDArray
@@ -317,7 +333,7 @@ def superelements(
     Raises
     ------
     InputError
-        An argument out of range; a panel that cannot be meshed; thick panels.
+        An argument out of range; a panel that cannot be meshed.
 
     Examples
     --------
@@ -336,11 +352,6 @@ def superelements(
     check_sheet(sheet, pattern)
     if sheet.density is None:
         raise InputError("sheet: density is missing: give it (kg/m3), the panels' mass needs it")
-    if pattern.boards is not None:
-        raise InputError(
-            "pattern: has thick panels, which superelements do not support; give the thin pattern, "
-            "or take the shell, fd.shell"
-        )
     radius = (
         float(np.max(sheet.values("thickness", len(pattern.faces))))
         if vertex_radius is None

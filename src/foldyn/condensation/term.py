@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,9 @@ GROUPS: Mapping[str, str] = {
 }
 
 
+RESISTED = 1e-10  # stiffness of a rotation, relative to that of its parts, above which it counts
+
+
 class _Matrix(NamedTuple):
     indptr: NDArray
     indices: NDArray
@@ -31,6 +35,8 @@ class _Matrix(NamedTuple):
 class _Context(NamedTuple):
     panels: _Matrix
     folds: _Matrix
+    moved: NDArray  # (m,) forces of changed rest angles, N
+    held: float  # energy of the folds at rest under these, J
 
 
 class _Scratch(NamedTuple):
@@ -56,17 +62,17 @@ def _forces(own, u, v, t, force, powers):
     size = own.panels.indptr.size - 1
     q, out = numbers_at(u, size), numbers_at(force, size)
     for i in range(size):
-        out[i] = _pull(own.panels, q, i) + _pull(own.folds, q, i)
+        out[i] = _pull(own.panels, q, i) + _pull(own.folds, q, i) + own.moved[i]
 
 
 @energies
 def _energies(own, u, out):
     size = own.panels.indptr.size - 1
     q, energy = numbers_at(u, size), numbers_at(out, 2)
-    energy[0] = energy[1] = 0.0
+    energy[0], energy[1] = 0.0, own.held
     for i in range(size):
         energy[0] += 0.5 * _pull(own.panels, q, i) * q[i]
-        energy[1] += 0.5 * _pull(own.folds, q, i) * q[i]
+        energy[1] += (0.5 * _pull(own.folds, q, i) + own.moved[i]) * q[i]
 
 
 class SuperelementsTerm(SheetTerm):
@@ -91,17 +97,18 @@ class SuperelementsTerm(SheetTerm):
     undifferentiated = "superelements"
     mass: sparse.csr_array
     crease_turns: CreaseTurns
+    rotated: NDArray
 
     def __init__(
         self, panels: sparse.csr_array, mass: sparse.csr_array, turns: CreaseTurns, slope: NDArray,
         folds: FoldHinges, nodes: NDArray, rotated: NDArray,
     ) -> None:  # fmt: skip
         self.mass, self.crease_turns, self._fold_hinges, self._panels = mass, turns, folds, panels
-        self.rotated = rotated
-        resisted = turns.rows * (slope[turns.fold] * turns.share)[:, None]
+        self.rotated, self._slope, self._changed = rotated, slope, np.zeros(len(slope))
+        resisted = turns.rows * slope[turns.fold][:, None]
         self._folds = sparse.csr_array(turns.rows.T @ resisted)
         self._stiffness = sparse.csr_array(panels + self._folds)
-        self._extent = float(np.linalg.norm(np.ptp(nodes, axis=0)))
+        self._nodes, self._extent = nodes, float(np.linalg.norm(np.ptp(nodes, axis=0)))
         self.model = None
         self.size = panels.shape[0]
         self.rows = -(-self.size // 3)
@@ -109,11 +116,16 @@ class SuperelementsTerm(SheetTerm):
 
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """See `Term`."""
+        turns, moment = self.crease_turns, self._slope * self._changed
+        panels, folds = (
+            _Matrix(m.indptr.astype(np.int64), m.indices.astype(np.int64), m.data)
+            for m in (self._panels, self._folds)
+        )
         own = _Context(
-            *(
-                _Matrix(m.indptr.astype(np.int64), m.indices.astype(np.int64), m.data)
-                for m in (self._panels, self._folds)
-            )
+            panels,
+            folds,
+            turns.mean.T @ moment,
+            0.5 * float(moment @ self._changed),
         )
         return CompiledTerm(Context(own), {FORCES: _forces, ENERGIES: _energies})
 
@@ -130,9 +142,30 @@ class SuperelementsTerm(SheetTerm):
         """See `SheetTerm`; a copy, because other terms add to it."""
         return self._stiffness.copy()
 
+    def folded(self, rest: NDArray) -> SuperelementsTerm:
+        """See `SheetTerm`; a crease turns evenly by the change of its rest angle."""
+        other = copy(self)
+        other._changed = self._changed + rest - self.rest_angles
+        other._fold_hinges = self._fold_hinges._replace(rest=rest)
+        return other
+
+    def holds(self, q: NDArray) -> sparse.csr_array:
+        """See `Term`: clamped edges resist rotations of the whole."""
+        arm = (self._nodes - self._nodes.mean(axis=0)) / self._extent
+        turned = np.concatenate([np.cross(np.eye(3), own).T for own in arm])
+        turned = np.concatenate([turned, self.rotated / self._extent])
+        resisted, kinds = np.linalg.eigh(turned.T @ (self._stiffness @ turned))
+        size = (np.abs(turned).T @ (abs(self._stiffness) @ np.abs(turned))).max()
+        moved = np.linalg.pinv(
+            np.hstack([np.tile(np.eye(3), (len(arm), 1)), turned[: self._nodes.size]])
+        )[3:]
+        rows = kinds[:, resisted > RESISTED * size].T @ moved
+        rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+        return sparse.csr_array(np.pad(rows, ((0, 0), (0, self.size - rows.shape[1]))))
+
     @property
     def folds(self) -> Folds:
-        """See `SheetTerm`; none can be actuated."""
+        """See `SheetTerm`; motions refuse superelements before they ask for actuated folds."""
         return Folds(np.zeros(0), np.zeros((0, 4)), np.zeros(0))
 
     def turn(self, q: NDArray, other: NDArray) -> float:

@@ -98,7 +98,7 @@ def dampers(case: Case, quasi_static: bool = False) -> list[Term]:
     turns, hinged = body.sheet.crease_turns, case.crease_damping
     if turns is not None and hinged.any():
         hinges = body.sheet.fold_hinges()
-        own = (hinged * hinges.length)[turns.fold] * turns.share
+        own = (hinged * hinges.length)[turns.fold]
         constant = sparse.csr_array(constant + turns.rows.T @ (turns.rows * own[:, None]))
     ends = np.concatenate(pairs)
     terms: list[Term] = [DampingMatrix(constant)] if constant.nnz else []

@@ -86,8 +86,8 @@ def branches_of(case: Case, q: NDArray, free: NDArray, dampers: bool = False) ->
     turns = case.elastic_body.sheet.crease_turns
     if turns is None:
         gradient = memory(parts, case.body).gradients(q, case.body.size)
-        turns = CreaseTurns(gradient, np.arange(gradient.shape[0]), np.ones(gradient.shape[0]))
-    gradient, of, part_of = turns
+        turns = CreaseTurns(gradient, np.arange(gradient.shape[0]))
+    gradient, of = turns
     if ties := case.constraints:
         gradient = sparse.csr_array(gradient @ ties.extended(gradient.shape[1]))
     most = max(len(part.branches) for part in parts)
@@ -104,9 +104,8 @@ def branches_of(case: Case, q: NDArray, free: NDArray, dampers: bool = False) ->
         rate.append(np.stack([*rows, *[np.ones(len(stiffness))] * missing], axis=1))
     relaxed, share, rate, viscous = map(np.concatenate, (relaxed, share, rate, viscous))
     return Branches(
-        sparse.csr_array(gradient[:, free]),
-        relaxed[of] * part_of, share[of] * part_of[:, None], rate[of], viscous[of] * part_of,
-    )  # fmt: skip
+        sparse.csr_array(gradient[:, free]), relaxed[of], share[of], rate[of], viscous[of]
+    )
 
 
 def damped_mode(

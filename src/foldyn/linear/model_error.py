@@ -59,6 +59,8 @@ def beside(case: Case, asked: bool, state: Any, secant: float | None) -> Beside:
     if structure.kind != Structure.kind or structure.pattern is None:
         return ALONE
     pattern = structure.pattern
+    if case.air is not None:
+        return Beside(why="it moves in a fluid, whose flow would have to be computed once more")
     if len(pattern.faces) > PANELS:
         return Beside(why=f"{len(pattern.faces)} panels, more than {PANELS}")
     try:

@@ -356,7 +356,8 @@ def unit_translations(linear: Linearized) -> NDArray:
     allowed motions, weighted by mass.
     """
     if linear.case.elastic_body.sheet.mass is not None:
-        return factorize(sparse.csc_array(linear.mass)).solve(linear.inertia)
+        own = linear.case.constraints.matrix(mass_of(linear.case))[linear.free][:, linear.free]
+        return factorize(sparse.csc_array(own)).solve(linear.inertia)
     on_nodes = linear.free < linear.displacement.size
     if not linear.case.constraints:
         return (on_nodes[:, None] & (linear.free[:, None] % 3 == np.arange(3))).astype(float)

@@ -86,11 +86,19 @@ def no_fold_hinges() -> FoldHinges:
 
 
 class CreaseTurns(NamedTuple):
-    """Turns of creases that vary along them, as sums of Legendre polynomials, r of them."""
+    """Turns of creases that vary along them, as r numbers.
 
-    rows: sparse.csr_array  # (r, m) amplitudes of the dofs, rad/m
+    Squares of the numbers of a fold add up to the mean square of its turn along it; the first
+    number is the mean turn.
+    """
+
+    rows: sparse.csr_array  # (r, m) numbers of the dofs, rad/m
     fold: NDArray  # (r,) index of the fold
-    share: NDArray  # (r,) mean square of the polynomial along the fold
+
+    @property
+    def mean(self) -> sparse.csr_array:
+        """Rows (nf, m) of the mean turns, rad/m."""
+        return self.rows[np.unique(self.fold, return_index=True)[1]]
 
 
 class Blocks(Protocol):

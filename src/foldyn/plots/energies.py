@@ -21,6 +21,7 @@ from foldyn.plots.charts import Chart, Curve
 COLORS: Mapping[str, str] = {
     "strain_bars": style.VERMILLION,
     "strain_membrane": style.VERMILLION,
+    "strain_panels": style.VERMILLION,
     "strain_bends": style.PURPLE,
     "strain_bending": style.PURPLE,
     "strain_folds": style.GREEN,

@@ -20,9 +20,7 @@ from foldyn.mechanics.contact.term import GROUP as CONTACT
 from foldyn.mechanics.springs import GROUP
 from foldyn.results.contents import nodes_of
 from foldyn.results.quantities import RESPONSES
-from foldyn.shells.term import GROUPS as OF_SHELLS
 from foldyn.structures import Structure
-from foldyn.structures.bars_hinges import GROUPS as OF_BARS_AND_HINGES
 from foldyn.values import choice, show
 
 P = ParamSpec("P")
@@ -231,6 +229,7 @@ def asked(
 STRAIN: Mapping[str, str] = {
     "strain_bars": "bars",
     "strain_membrane": "membrane",
+    "strain_panels": "panels",
     "strain_bends": "bends",
     "strain_bending": "bending",
     "strain_folds": "folds",
@@ -311,9 +310,8 @@ def chosen(
 
 def parts_of(result: xr.Dataset) -> tuple[str, ...]:
     """Names of the strain energies of a result, in the order of its structure."""
-    own = OF_SHELLS if set(OF_SHELLS) <= set(result.data_vars) else OF_BARS_AND_HINGES
-    others = (str(name) for name in result.data_vars if name not in own)
-    return (*own, *(name for name in others if name.startswith("strain_") or name == CONTACT))
+    names = map(str, result.data_vars)
+    return tuple(name for name in names if name.startswith("strain_") or name == CONTACT)
 
 
 def strain_name(part: str) -> str:

@@ -79,6 +79,15 @@ class HingeKind(NamedTuple):
         return self.onset**2 * unit.energy((theta - rest) / self.onset, 0.0)
 
 
+class Distributed(NamedTuple):
+    """Loads on the panels, edges and creases of a pattern; None is no load."""
+
+    panels: NDArray | None = None  # (np, 3) force per area, N/m2
+    edges: NDArray | None = None  # (ne, 3) force per length, N/m, in the order of `pattern.lines`
+    creases: NDArray | None = None  # (nf,) moment that opens each crease, N m
+    swollen: NDArray | None = None  # (np, 2) free strain, and curvature (1/m), of each panel
+
+
 def read_only(array: NDArray) -> NDArray:
     """Return the array, made read-only."""
     array.setflags(write=False)
@@ -247,8 +256,17 @@ class Discretized:
         """
         return self.body
 
-    def spread(self, density: NDArray, edges: Mapping[int, NDArray]) -> NDArray:
-        """Forces (m,), N, on all dofs of a linear model due to forces on panels (np, 3), N/m2.
+    def spread(self, load: Distributed, edges: Mapping[int, NDArray]) -> NDArray:
+        """Forces (m,), N, on all dofs of a linear model due to a distributed load.
+
+        edges : edges that supports hold, as in `held`.
+        """
+        raise NotImplementedError
+
+    def lifts(
+        self, points: NDArray, panel: NDArray, edges: Mapping[int, NDArray]
+    ) -> sparse.csr_array:
+        """Displacements (k, m) normal to panels (k,) at points (k, 3) in them, in linear models.
 
         edges : edges that supports hold, as in `held`.
         """
@@ -261,6 +279,14 @@ class Discretized:
             toward the front.
         """
         raise InputError("this structure has no panels that could swell")
+
+    @cached_property
+    def board_share(self) -> NDArray | float:
+        """Area of each thick panel's board, relative to the panel, (np,); 1 for a thin pattern."""
+        if self.pattern is None or self.pattern.boards is None:
+            return 1.0
+        area = 0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
+        return self.pattern.boards.areas / np.bincount(self.triangle_panel, area)
 
     @cached_property
     def surface(self) -> Surface:
@@ -277,10 +303,6 @@ class Discretized:
         welds = self.pattern.welds.tolist() if self.pattern is not None else []
         count = max(len(faces), int(self.triangle_panel.max(initial=-1)) + 1)
         area = 0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
-        areal_density = self.sheet.values("areal_density", count)
-        if self.pattern is not None and self.pattern.boards is not None:
-            drawn = np.bincount(self.triangle_panel, area)
-            areal_density = areal_density * (self.pattern.boards.areas / drawn)
         return Surface(
             nodes=self.nodes,
             faces=faces,
@@ -288,7 +310,7 @@ class Discretized:
             triangles=self.triangles,
             triangle_panel=self.triangle_panel,
             triangle_area=area,
-            areal_density=areal_density,
+            areal_density=self.sheet.values("areal_density", count) * self.board_share,
             welds=tuple((low, high) for low, high in welds),
         )
 

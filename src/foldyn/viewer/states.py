@@ -220,7 +220,8 @@ def fields(case: Case, result: xr.Dataset, displacement: NDArray) -> dict[str, F
 
     Fields that displacements do not determine are left out. These are moments and energies if laws
     have memory. They are crease angles too if panels yield next to creases with memory or (in
-    motions) with dampers, or if panels reach no equilibrium. Speeds are not included: the page
+    motions) with dampers, if panels reach no equilibrium, or in linear models, whose creases also
+    turn between vertices. Speeds are not included: the page
     computes them from displacements.
     """
     structure, out = case.structure, {}
@@ -229,7 +230,7 @@ def fields(case: Case, result: xr.Dataset, displacement: NDArray) -> dict[str, F
         out["contact"] = Field("force of contact", "N", "node", touch, False)
     if isinstance(structure, Structure):
         out["bar_strain"] = _strain_field(bar_strain(structure, displacement))
-    if not creases_known(case, result):
+    if structure.linear or not creases_known(case, result):
         return out
     try:
         found = states(case, result, displacement)
