@@ -11,7 +11,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,7 +19,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from foldyn.condensation.panel import CondensedPanel, condense, extrapolated
+from foldyn.condensation.panel import CondensedPanel, beside, condense, extrapolated
 from foldyn.jit.kernel_cache import folder_for
 from foldyn.jit.sources import digest
 from foldyn.structures.graded import Grading
@@ -28,27 +27,25 @@ from foldyn.structures.sheet import Sheet
 from foldyn.threads import one_thread
 from foldyn.writing import remove_leftovers, whole
 
-MOST = 500_000_000  # bytes of all files; each has about 2 MB
+MOST = 500_000_000  # bytes of all files; each has about 5 MB
 HERE = Path(__file__).resolve()
 
 
 class Meshes(NamedTuple):
     """Meshes on which panels are condensed, coarse to fine.
 
-    With several meshes the condensed panels are extrapolated from the two finest, and compared with
-    the panels extrapolated from the first and the one before the finest.
+    With several meshes the condensed panels are extrapolated from the two finest. For estimates of
+    errors, they are compared with panels extrapolated from the first mesh and the one before the
+    finest, and with those on the finest mesh.
     """
 
     graded: tuple[Grading, ...]
     divisions: tuple[int, ...]
 
 
-Panels = tuple[CondensedPanel, CondensedPanel]
-
-
 def kept(
     corners: NDArray, smooth: Sequence[int], poissons_ratio: float, thickness: float, meshes: Meshes
-) -> Panels:
+) -> CondensedPanel:
     """A panel as `condensed` makes it, from disk if it is there."""
     given = (corners.tolist(), smooth, poissons_ratio, thickness, meshes)
     folder = folder_for(HERE.parent)
@@ -67,46 +64,39 @@ def kept(
 
 def condensed(
     corners: NDArray, smooth: Sequence[int], poissons_ratio: float, thickness: float, meshes: Meshes
-) -> Panels:
-    """A panel of a sheet of unit modulus and density, and the same from coarser meshes."""
+) -> CondensedPanel:
+    """A panel of a sheet of unit modulus and density."""
     *others, finest = meshes.graded
     sheet = Sheet(1.0, poissons_ratio, thickness, 1.0)
     with one_thread():  # bits that do not depend on the number of threads
         fine, modes = condense(corners, smooth, sheet, finest)
         if not others:
-            return fine, fine
+            return fine
         coarse, middle = (condense(corners, smooth, sheet, own, modes)[0] for own in others)
         first, second, third = meshes.divisions
-        return (
-            extrapolated(middle, fine, third / second),
-            extrapolated(coarse, middle, second / first),
-        )
+        coarser = extrapolated(coarse, middle, second / first)
+        return beside(extrapolated(middle, fine, third / second), [coarser, fine])
 
 
-def _read(path: Path, key: str) -> Panels | None:
-    """Panels of a file; None if it is missing or damaged, or holds others."""
+def _read(path: Path, key: str) -> CondensedPanel | None:
+    """The panel of a file; None if it is missing or damaged, or holds another."""
     try:
         with np.load(path, allow_pickle=False) as stored:
             found = dict(stored)
         if found.pop("key").item() != key:
             return None
-        compared = {name: found.pop(f"compared_{name}") for name in ("stiffness", "mass")}
         panel = CondensedPanel(**found)
     except Exception:  # readers raise any kind of exception on damaged files
         return None
     with suppress(OSError):
         path.touch()  # used now
-    return panel, replace(panel, **compared)
+    return panel
 
 
-def _write(path: Path, key: str, panels: Panels) -> None:
-    """Store panels; then the files used longest ago go until the others fit."""
-    panel, compared = panels
+def _write(path: Path, key: str, panel: CondensedPanel) -> None:
+    """Store a panel; then the files used longest ago go until the others fit."""
     with whole(path) as part:
-        np.savez(
-            part, key=np.array(key), compared_stiffness=compared.stiffness,
-            compared_mass=compared.mass, **vars(panel),
-        )  # fmt: skip
+        np.savez(part, key=np.array(key), **vars(panel))
     remove_leftovers(path.parent)
     files = [(own.stat(), own) for own in path.parent.glob("panel-*.npz")]
     room = MOST

@@ -31,7 +31,6 @@ class Group(NamedTuple):
     """
 
     panel: CondensedPanel
-    compared: CondensedPanel  # the same from coarser meshes
     faces: NDArray  # (p, k) vertices
     frames: NDArray  # (p, 3, 3) axes of the panels' frames, in rows
     number: NDArray  # (p,) indices in the pattern
@@ -50,8 +49,8 @@ class _Shape:
 @lru_cache(maxsize=ROOM)
 def _condensed(
     shape: _Shape, poissons_ratio: float, thickness: float, meshes: Meshes
-) -> tuple[CondensedPanel, CondensedPanel]:
-    """A panel of a sheet of unit modulus and density, and the same from coarser meshes."""
+) -> CondensedPanel:
+    """A panel of a sheet of unit modulus and density."""
     return kept(shape.corners, shape.smooth, poissons_ratio, thickness, meshes)
 
 
@@ -60,9 +59,8 @@ def groups(pattern: Pattern, sheets: Sequence[Sheet], meshes: Meshes) -> list[Gr
     out = []
     for (shape, sheet), members in _congruent(pattern, sheets).items():
         numbers, faces, frames = zip(*members, strict=True)
-        panels = _condensed(shape, sheet.poissons_ratio, sheet.thickness, meshes)
-        own, compared = (panel.of(sheet) for panel in panels)
-        out.append(Group(own, compared, np.array(faces), np.array(frames), np.array(numbers)))
+        own = _condensed(shape, sheet.poissons_ratio, sheet.thickness, meshes).of(sheet)
+        out.append(Group(own, np.array(faces), np.array(frames), np.array(numbers)))
     return out
 
 

@@ -17,7 +17,7 @@ and welds, which connect the turns of edges, are not part of a panel.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -70,6 +70,8 @@ class CondensedPanel:
         Forces of a panel with a unit free strain, or a unit free curvature.
     held_energy : (2,)
         Twice the energy of such a panel with its edges held.
+    changes : (n, 2, c, c)
+        Changes of stiffness and mass if the panel comes from fewer or coarser meshes, in n ways.
     """
 
     stiffness: NDArray
@@ -81,6 +83,7 @@ class CondensedPanel:
     products: NDArray
     thermal: NDArray
     held_energy: NDArray
+    changes: NDArray
 
     def of(self, sheet: Sheet) -> CondensedPanel:
         """The panel of a sheet, from that of a sheet of unit modulus and density."""
@@ -93,6 +96,7 @@ class CondensedPanel:
             products=np.float32(density) * self.products,
             thermal=modulus * self.thermal,
             held_energy=modulus * self.held_energy,
+            changes=self.changes * np.array([modulus, density])[:, None, None],
         )
 
     def lift(self, points: NDArray) -> NDArray[np.float64]:
@@ -119,6 +123,13 @@ def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> 
         },
         mass=(motions * values.clip(min=0.0)) @ motions.T,
     )
+
+
+def beside(panel: CondensedPanel, others: Sequence[CondensedPanel]) -> CondensedPanel:
+    """The panel, with its changes to others."""
+    own = np.stack([panel.stiffness, panel.mass])
+    changes = [np.stack([other.stiffness, other.mass]) - own for other in others]
+    return replace(panel, changes=np.array(changes))
 
 
 def condense(
@@ -170,6 +181,7 @@ def condense(
         np.array([[a.T @ (nodal @ b) for b in along] for a in along], np.float32),
         np.concatenate([full[:, :-count].T @ forces, np.zeros((count, 2))]),
         energy - np.einsum("mk,mk->k", forces[inside], factors.solve(forces[inside])),
+        np.zeros((0, 2, *reduced.shape)),
     )
     modes = full[on_nodes, -count:].reshape(len(mesh.nodes), -1)
     return panel, LinearNDInterpolator(mesh.nodes[:, :2], modes)

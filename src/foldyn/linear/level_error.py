@@ -4,8 +4,8 @@ Each level contains the lower ones, so that frequencies fall with the level, tow
 shell. The next level alone is no measure of the error: some numbers of shapes do not rise from one
 level to the next. So each level is compared with the highest one, and that with level 3, and the
 differences are multiplied by `SHARES`, found to be large enough in 97 % of modes of 28 sheets
-(docs/superelements.md). The error of the mesh is the difference between extrapolations from two
-pairs of meshes.
+(docs/superelements.md). The error of the mesh is the lesser of two bounds, by the difference to
+another extrapolation, from two coarser meshes, and to the finest mesh alone.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 from scipy.linalg import eigh
 
 from foldyn.cases import Case
@@ -27,6 +26,7 @@ from foldyn.linear.wave_solver import Waves, WaveSolver
 
 LOWER = 3  # level with which the highest one is compared
 SHARES = (2.0, 2.0, 2.0, 3.0, 1.0)  # error of each level / difference to the other one
+MESHES = (1.0, 4.0)  # error of meshes / differences to coarser meshes, and to the finest alone
 LEAST = 1e-3  # error of every frequency, relative to it, that no comparison shows
 DOUBTFUL = 0.05  # relative error of a frequency up to which results are said to hold
 ROUNDING = 1e-4  # errors below this, relative to the highest frequency, are no reason for doubt
@@ -40,21 +40,27 @@ def other_level(structure: Superelements) -> Superelements:
 
 
 def frequency_errors(
-    case: Case, values: NDArray, other: NDArray, changes: Iterable[NDArray]
+    case: Case, values: NDArray, other: NDArray, changes: Iterable[Iterable[NDArray]]
 ) -> NDArray[np.float64]:
     """Bounds (k,), Hz, of the errors of frequencies relative to a shell on a fine mesh.
 
     values : (k,) the lowest eigenvalues.
     other : (k,) those with the structure of `other_level`.
-    changes : `coarse_changes` of stiffness and mass, (k, k), in the space of the modes.
+    changes : of stiffness and mass (k, k), in the space of the modes, each for other meshes.
     """
     structure = case.structure
     assert isinstance(structure, Superelements)
-    stiffness, mass = (0.5 * (each + each.conj().T) for each in changes)
-    coarse = eigh(np.diag(values) + stiffness, np.eye(len(values)) + mass, eigvals_only=True)
-    own, level, mesh = (np.sqrt(each.clip(min=0.0)) / TURN for each in (values, other, coarse))
-    share = SHARES[structure.options.level - 1]
-    return share * np.abs(level - own) + np.abs(mesh - own) + LEAST * own
+    meshes = []
+    for change in changes:
+        stiffness, mass = (0.5 * (each + each.conj().T) for each in change)
+        meshes.append(
+            eigh(np.diag(values) + stiffness, np.eye(len(values)) + mass, eigvals_only=True)
+        )
+    own, level, *meshes = (np.sqrt(e.clip(min=0.0)) / TURN for e in (values, other, *meshes))
+    # of long panels, the coarsest mesh tells nothing
+    bounds = [share * np.abs(each - own) for share, each in zip(MESHES, meshes, strict=False)]
+    mesh = np.min(bounds or [0.0 * own], axis=0)
+    return SHARES[structure.options.level - 1] * np.abs(level - own) + mesh + LEAST * own
 
 
 def warn_of_errors(structure: Superelements, frequency: NDArray, error: NDArray) -> None:
@@ -74,12 +80,6 @@ def warn_of_errors(structure: Superelements, frequency: NDArray, error: NDArray)
     )
 
 
-def coarse_changes(case: Case) -> tuple[sparse.csr_array, sparse.csr_array]:
-    """Changes of stiffness and mass (m, m) if panels come from coarser meshes."""
-    assert isinstance(case.structure, Superelements)
-    return case.structure.coarser(case.held_edges)
-
-
 def band_errors(
     linear: LinearizedCell, phases: NDArray, waves: Sequence[Waves]
 ) -> NDArray[np.float64]:
@@ -89,12 +89,20 @@ def band_errors(
     leveled = case.altered(structure=other_level(case.structure))
     compared = linearize_cell(linear.cell.with_case(leveled)).bloch
     others = WaveSolver(compared, len(waves[0].values)).at(phases)
-    changes = [linear.reach.hops(part) for part in coarse_changes(linear.patch.case)]
+    patch = linear.patch.case
+    assert isinstance(patch.structure, Superelements)
+    changes = [
+        [linear.reach.hops(part) for part in change]
+        for change in patch.structure.changes(patch.held_edges)
+    ]
     out = np.zeros((len(phases), len(waves[0].values)))
     for row, phase, own, other in zip(out, phases, waves, others, strict=True):
         order, factors = np.argsort(own.values), linear.bloch.factors(phase)
         values, shapes, _ = own.ordered(order)
-        parts = (shapes.conj().T @ (part.sparse_at(factors) @ shapes) for part in changes)
+        parts = [
+            [shapes.conj().T @ (part.sparse_at(factors) @ shapes) for part in change]
+            for change in changes
+        ]
         errors = frequency_errors(case, values, other.values, parts)
         row[order] = np.where(values > 0.0, errors, 0.0)
     return out

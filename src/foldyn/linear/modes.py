@@ -27,7 +27,6 @@ from foldyn.dynamics.modal_damping import mass_of
 from foldyn.errors import FoldynWarning, StretchWarning, warn
 from foldyn.linear.hereditary import Branches, damped_mode
 from foldyn.linear.level_error import (
-    coarse_changes,
     first_doubtful,
     frequency_errors,
     other_level,
@@ -195,7 +194,10 @@ def spectrum_of(
         leveled = case.altered(structure=other_level(case.structure))
         other = _lowest(linearize(leveled), count, solver, verify=False)[-1]
         motion = linear.whole(spectrum.shapes)
-        changes = (motion.T @ (part @ motion) for part in coarse_changes(case))
+        changes = [
+            [motion.T @ (part @ motion) for part in change]
+            for change in case.structure.changes(case.held_edges)
+        ]
         estimate = frequency_errors(case, spectrum.values, other.values, changes)
         variables["frequency_error"] = np.where(variables["rigid"], 0.0, estimate)
     result = modes_dataset(case, variables, statistics)
