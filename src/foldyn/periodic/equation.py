@@ -47,7 +47,7 @@ class Tangents:
     """Tangents of a body with respect to the unknowns, or projected on vectors of unknowns.
 
     Entries are added directly at their positions in the matrix. Terms whose positions are not known
-    in advance, such as contact, and sheets other than bars and hinges go through sparse matrices.
+    in advance, such as contact, go through sparse matrices.
 
     Parameters
     ----------
@@ -62,15 +62,16 @@ class Tangents:
         self, body: Assembly, basis: sparse.csr_array, vectors: NDArray | None = None
     ) -> None:
         self._basis, self._vectors, size = basis, vectors, basis.shape[1]
-        places: dict[int, tuple[NDArray, NDArray]] = {}  # by number of the term; -1 is the sheet
-        if isinstance(body.sheet, BarsHingesTerm):
-            places[-1] = _of_blocks(body.sheet)
+        sheet, places = body.sheet, {}  # by number of the term; -1 is the sheet
+        blocks = isinstance(sheet, BarsHingesTerm)
+        places[-1] = (
+            _of_blocks(sheet) if blocks else sheet.tangent(np.zeros(sheet.size)).tocoo().coords
+        )
         for k, term in enumerate(body.others):
             if type(term).tangent is Term.tangent:
                 places[k] = term.places
         spread = {k: _spread(basis, *at) for k, at in places.items()}
-        every = [np.zeros(0, np.int64), *(place for place, _, _ in spread.values())]
-        self._union = union = np.unique(np.concatenate(every))
+        self._union = union = np.unique(np.concatenate([place for place, _, _ in spread.values()]))
         self._own = {
             k: sparse.csr_array(
                 (weight, (np.searchsorted(union, place), entry)), (len(union), len(places[k][0]))
@@ -89,12 +90,12 @@ class Tangents:
     def put(self, body: Assembly, u: NDArray, out: NDArray) -> None:
         """Write the tangent at displacements u (m,) into `out`."""
         data, sheet, rest = np.zeros(len(self._union)), body.sheet, None
-        if -1 in self._own and isinstance(sheet, BarsHingesTerm):
-            blocks = np.zeros((len(sheet.sparsity.indices), 3, 3))
-            add_tangent(sheet.model, sheet.sparsity, nodal(u), -np.inf, blocks)
-            data += self._own[-1] @ blocks.ravel()
+        if isinstance(sheet, BarsHingesTerm):
+            entries = np.zeros((len(sheet.sparsity.indices), 3, 3))
+            add_tangent(sheet.model, sheet.sparsity, nodal(u), -np.inf, entries)
         else:
-            rest = sheet.tangent(u)
+            entries = sheet.tangent(u).data
+        data += self._own[-1] @ entries.ravel()
         for k, term in enumerate(body.others):
             if k in self._own:
                 data += self._own[k] @ term.entries(u)
