@@ -150,9 +150,14 @@ def check_smooth(case: Case, name: str) -> None:
     Raises
     ------
     InputError
-        The case has friction, or laws with memory.
+        The case has friction or laws with memory, or its model is linear.
     """
     case.check_movable()
+    if case.structure.linear:
+        raise InputError(
+            f"structure: {case.structure.linear} serve linear analyses, and {name} follows large "
+            'motions; take preset = "n5b8e", or the shell'
+        )
     if case.contact is not None and case.contact.rubs:
         raise InputError(
             f": {name} takes forces that depend on the displacement alone, but friction depends on "

@@ -107,7 +107,7 @@ def periodic_motion(
     ------
     InputError
         An argument out of range; nothing drives the case, or not harmonically; friction, laws with
-        memory, damping with a matrix that varies, massless unknowns, or supports that let it drift.
+        memory, damping with a matrix that varies, or supports that let it drift.
     ComputationError
         No motion is found.
 
