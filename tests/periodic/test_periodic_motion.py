@@ -206,6 +206,10 @@ def test_a_result_is_saved_and_loaded(tmp_path, strong):
 
 PUSH = fd.Force([0], (1e-3, 0, 0), history=fd.Harmonic(0.4))
 REFUSED = {
+    "serve linear analyses": fd.Case(
+        fd.superelements(fd.patterns.simple_fold(**PANEL), fd.Sheet(1e6, 0.25, 0.01, 1.0)),
+        [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")], [PUSH],
+    ),
     "nothing drives it": fold(),
     r"loads\[0\].history: is of the kind 'ramp'": fold(
         [fd.Force([0], (1e-3, 0, 0), history=fd.Ramp(1.0))]
@@ -215,10 +219,6 @@ REFUSED = {
     "constant matrix": fd.Case(fold().structure, fold().supports, [PUSH], fd.StrainDamping(1e-3)),
     "friction depends on how it was reached": fd.Case(
         fold().structure, fold().supports, [PUSH], contact=fd.Contact(friction=0.3)
-    ),
-    "unknowns without mass": fd.Case(
-        fd.shell(fd.patterns.simple_fold(**PANEL), fd.Sheet(1e6, 0.25, 0.01, 1.0), divisions=2),
-        [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")], [PUSH],
     ),
     "hinges have memory": fd.Case(
         fd.discretize(

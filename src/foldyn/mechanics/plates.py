@@ -244,12 +244,18 @@ def _turn_folds_by(model, z, scratch):
 
 def turned_plates(model: BarsPlates, u: NDArray, z: NDArray | None = None) -> PlatesScratch:
     """Dihedrals and gradients at displacements u (n, 3); rotations and angles of folds for z."""
-    scratch = plates_scratch(model)
-    own, room = Context(model), Context(scratch)  # as in `_forces`: one version of each kernel
+    return turned_contexts(model, u, z)[1].value
+
+
+def turned_contexts(
+    model: BarsPlates, u: NDArray, z: NDArray | None = None
+) -> tuple[Context, Context]:
+    """Contexts of the model and of `turned_plates`."""
+    own, room = Context(model), Context(plates_scratch(model))  # one version of each kernel
     turn_hinges(own, u, room)
     if z is not None:
         _turn_folds_by(own, z, room)
-    return scratch
+    return own, room
 
 
 @inner

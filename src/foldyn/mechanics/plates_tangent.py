@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.compiled import inner_scalar, kernel
-from foldyn.jit.context import Context
 from foldyn.mechanics.dihedral import add_hessian, carry_wing
 from foldyn.mechanics.plates import (
     BarsPlates,
@@ -24,7 +23,7 @@ from foldyn.mechanics.plates import (
     put_points,
     rides,
     turn_plate,
-    turned_plates,
+    turned_contexts,
 )
 from foldyn.mechanics.tangent import distinct
 
@@ -255,10 +254,11 @@ def add_plates_tangent(
 
     floor : least slope of the folds' law per unit stiffness; smaller slopes are raised to it.
     """
-    turned = turned_plates(model, u, z)
-    own, scratch = Context(model), Context(turned)
+    own, scratch = turned_contexts(model, u, z)
     _add_folds(own, pattern, u, scratch, floor, data)
     wide = 3 * int(np.diff(pattern.begin).max(initial=0))
     bend = np.empty((int(np.diff(model.start).max(initial=0)), wide))
-    _add_plates(own, pattern, turned.x, scratch, bend, np.empty(wide), np.empty((wide, wide)), data)
+    _add_plates(
+        own, pattern, scratch.value.x, scratch, bend, np.empty(wide), np.empty((wide, wide)), data
+    )
     _add_bends(own, pattern, u, scratch, data)

@@ -186,7 +186,10 @@ class SheetTerm(Term):
     # ------------------------------------------------------------------ mechanics
     @abstractmethod
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """Derivative (m, m) of the forces; slopes per unit stiffness are at least `floor`."""
+        """Derivative (m, m) of the forces; slopes per unit stiffness are at least `floor`.
+
+        Its entries have the same places at all q.
+        """
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
         """Matrix for a Newton step at q, after an iterate `before`."""

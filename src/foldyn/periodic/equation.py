@@ -9,7 +9,8 @@ constant ones.
 f(x, theta) contains the internal forces minus the loads, and W = 2 pi f. s2 and s1 are the effect
 of moving supports: M and C times the second and first derivatives of the support motion with
 respect to theta. Displacements of all dofs are u = u0 + B x + U(theta); forces on the unknowns are
-B' times the forces on all dofs.
+B' times the forces on all dofs. The last unknowns may have no mass, as edge angles have: without
+damping they are in balance at all times.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg import eigh
 
 from foldyn.attractors.drive import check_harmonic, lowest_frequency
 from foldyn.cases import Case, Constant, Harmonic, Origin
@@ -45,7 +47,7 @@ class Tangents:
     """Tangents of a body with respect to the unknowns, or projected on vectors of unknowns.
 
     Entries are added directly at their positions in the matrix. Terms whose positions are not known
-    in advance, such as contact, and sheets other than bars and hinges go through sparse matrices.
+    in advance, such as contact, go through sparse matrices.
 
     Parameters
     ----------
@@ -60,15 +62,16 @@ class Tangents:
         self, body: Assembly, basis: sparse.csr_array, vectors: NDArray | None = None
     ) -> None:
         self._basis, self._vectors, size = basis, vectors, basis.shape[1]
-        places: dict[int, tuple[NDArray, NDArray]] = {}  # by number of the term; -1 is the sheet
-        if isinstance(body.sheet, BarsHingesTerm):
-            places[-1] = _of_blocks(body.sheet)
+        sheet, places = body.sheet, {}  # by number of the term; -1 is the sheet
+        blocks = isinstance(sheet, BarsHingesTerm)
+        places[-1] = (
+            _of_blocks(sheet) if blocks else sheet.tangent(np.zeros(sheet.size)).tocoo().coords
+        )
         for k, term in enumerate(body.others):
             if type(term).tangent is Term.tangent:
                 places[k] = term.places
         spread = {k: _spread(basis, *at) for k, at in places.items()}
-        every = [np.zeros(0, np.int64), *(place for place, _, _ in spread.values())]
-        self._union = union = np.unique(np.concatenate(every))
+        self._union = union = np.unique(np.concatenate([place for place, _, _ in spread.values()]))
         self._own = {
             k: sparse.csr_array(
                 (weight, (np.searchsorted(union, place), entry)), (len(union), len(places[k][0]))
@@ -87,12 +90,12 @@ class Tangents:
     def put(self, body: Assembly, u: NDArray, out: NDArray) -> None:
         """Write the tangent at displacements u (m,) into `out`."""
         data, sheet, rest = np.zeros(len(self._union)), body.sheet, None
-        if -1 in self._own and isinstance(sheet, BarsHingesTerm):
-            blocks = np.zeros((len(sheet.sparsity.indices), 3, 3))
-            add_tangent(sheet.model, sheet.sparsity, nodal(u), -np.inf, blocks)
-            data += self._own[-1] @ blocks.ravel()
+        if isinstance(sheet, BarsHingesTerm):
+            entries = np.zeros((len(sheet.sparsity.indices), 3, 3))
+            add_tangent(sheet.model, sheet.sparsity, nodal(u), -np.inf, entries)
         else:
-            rest = sheet.tangent(u)
+            entries = sheet.tangent(u).data
+        data += self._own[-1] @ entries.ravel()
         for k, term in enumerate(body.others):
             if k in self._own:
                 data += self._own[k] @ term.entries(u)
@@ -147,9 +150,14 @@ def check_smooth(case: Case, name: str) -> None:
     Raises
     ------
     InputError
-        The case has friction, laws with memory, or unknowns without mass.
+        The case has friction or laws with memory, or its model is linear.
     """
     case.check_movable()
+    if case.structure.linear:
+        raise InputError(
+            f"structure: {case.structure.linear} serve linear analyses, and {name} follows large "
+            'motions; take preset = "n5b8e", or the shell'
+        )
     if case.contact is not None and case.contact.rubs:
         raise InputError(
             f": {name} takes forces that depend on the displacement alone, but friction depends on "
@@ -162,11 +170,6 @@ def check_smooth(case: Case, name: str) -> None:
             f"structure: {name} takes forces that depend on the displacement alone, and some "
             "hinges have memory (prony, plastic, or damped creases between compliant panels); take "
             "an elastic law, or simulate the motion"
-        )
-    if len(case.body.hidden):
-        raise InputError(
-            f"structure: {name} takes bars and hinges, and this model also has unknowns without "
-            'mass; take scheme = "n5b8" or "n4b5"'
         )
 
 
@@ -267,8 +270,8 @@ class Equation:
 
     Attributes
     ----------
-    size : int
-        Number k of unknowns.
+    size, heavy : int
+        Number k of unknowns, and of those with mass, which come first.
     basis : sparse or dense (m, k)
         The matrix B.
     offset : (m,)
@@ -291,10 +294,11 @@ class Equation:
         check_mass(case.mass, case.constraints.determined)
         self.case, self.body, self.drive, self.origin = case, case.body, Drive(case), origin
         self.level = 1.0 if driven else 0.0
-        free, total = case.free_dofs, self.body.size
+        total, self.heavy = self.body.size, len(case.free_dofs)
+        self._free = np.concatenate([case.free_dofs, self.body.hidden])
         whole = case.constraints.extended(total) if case.constraints else sparse.eye_array(total)
-        self.basis = sparse.csr_array(sparse.csc_array(whole)[:, free])
-        self.size, self.offset = len(free), np.zeros(total)
+        self.basis = sparse.csr_array(sparse.csc_array(whole)[:, self._free])
+        self.size, self.offset = len(self._free), np.zeros(total)
         self.whole: Equation = self
         self.tangents = Tangents(self.body, self.basis)
         nodal = mass_of(case)
@@ -339,11 +343,40 @@ class Equation:
             ]
         )
 
+    @property
+    def delays(self) -> bool:
+        """Whether damping delays unknowns without mass."""
+        return bool(self.damping[self.heavy :].any())
+
+    def follow(self, stiffness: NDArray) -> NDArray:
+        """Motion (..., k - n, n) of unknowns without mass, in balance, with the n others."""
+        n = self.heavy
+        return -np.linalg.solve(stiffness[..., n:, n:], stiffness[..., n:, :n])
+
+    def condensed(self, stiffness: NDArray) -> NDArray:
+        """Stiffness (..., n, n) of unknowns with mass, the others being in balance, N/m."""
+        n = self.heavy
+        return stiffness[..., :n, :n] + stiffness[..., :n, n:] @ self.follow(stiffness)
+
+    def vibrations(self, stiffness: NDArray, first: int, last: int) -> tuple[NDArray, NDArray]:
+        """Squared frequencies and shapes (k, r) of modes `first` to `last`, from 0."""
+        mass = self.mass[: self.heavy, : self.heavy]
+        value, shape = eigh(self.condensed(stiffness), mass, subset_by_index=[first, last])
+        return value, np.concatenate([shape, self.follow(stiffness) @ shape])
+
+    def nodal(self, dofs: NDArray) -> NDArray:
+        """Displacements (s, n, 3) of the nodes, of those of all dofs (s, m)."""
+        nodes = self.case.structure.nodes
+        return dofs[:, : nodes.size].reshape(-1, *nodes.shape)
+
     def unknowns(self, displacement: NDArray, instants: Instants) -> NDArray:
         """Unknowns (s, k) of displacements (s, n, 3) of all nodes at some instants."""
-        flat = displacement.reshape(len(displacement), -1) - instants.moved - self.offset
-        ties = self.case.constraints
-        found = np.array([ties.coordinates(u)[self.case.free_dofs] for u in flat])
+        return self.coordinates(instants.balanced(displacement), instants)
+
+    def coordinates(self, dofs: NDArray, instants: Instants) -> NDArray:
+        """Unknowns (s, k) of displacements (s, m) of all dofs at some instants."""
+        flat, ties = dofs - instants.moved - self.offset, self.case.constraints
+        found = np.array([ties.coordinates(u)[self._free] for u in flat])
         return found if self.whole is self else found @ self._back.T
 
 
@@ -384,6 +417,16 @@ class Instants:
     def displacements(self, x: NDArray) -> NDArray:
         """Displacements of all dofs (s, m), m, from unknowns (s, k)."""
         return x @ self.equation.basis.T + self.moved + self.equation.offset
+
+    def balanced(self, displacement: NDArray) -> NDArray:
+        """Displacements (s, m) of all dofs, of those of nodes (s, n, 3); others are in balance."""
+        following, none = self.equation._following, np.zeros(self.moved.shape[1])
+        return np.array(
+            [
+                body.dofs(u, following_force(following, none, factor))
+                for u, body, factor in zip(displacement, self.bodies, self._factor, strict=True)
+            ]
+        )
 
     def _each(self, x: NDArray):
         """Yield the number, the displacement and the body of each instant."""

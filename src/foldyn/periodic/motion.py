@@ -107,7 +107,7 @@ def periodic_motion(
     ------
     InputError
         An argument out of range; nothing drives the case, or not harmonically; friction, laws with
-        memory, damping with a matrix that varies, massless unknowns, or supports that let it drift.
+        memory, damping with a matrix that varies, or supports that let it drift.
     ComputationError
         No motion is found.
 
@@ -245,8 +245,8 @@ def _shot(
     few = Balance(equation, Fourier(min(balance.fourier.harmonics, FEW * longer)), longer)
     near = Orbit.of(few, balanced(few, coefficients(few, guess, omega), omega, 1e-3).x, omega)
     shooting = Shooting(equation, omega, steps, longer)
-    begin = [values_of(near.amplitudes, np.zeros(1), k)[0] for k in (0, 1)]
-    found = newton(shooting, np.concatenate(begin), tolerance)
+    x, v = (values_of(near.amplitudes, np.zeros(1), k)[0] for k in (0, 1))
+    found = newton(shooting, np.concatenate([x, v[: equation.heavy]]), tolerance)
     if found is None:
         raise ComputationError(
             f"method = 'shooting': does not converge at {omega / TURN:g} Hz; give more steps, or "

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import xarray
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from foldyn.cases import Case, State
 from foldyn.cases.contact_checks import check_contact
@@ -202,21 +201,19 @@ def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, ND
     check_contact(case, displacement, at.planes[0])
     place = equation.unknowns(displacement[None], at)[0]
     stiffness = _settled(equation, at, place)
-    if mode > equation.size:
-        raise InputError(f" = {mode}: there are {equation.size} modes", "mode")
+    if mode > equation.heavy:
+        raise InputError(f" = {mode}: there are {equation.heavy} modes", "mode")
     soft = equation.body.sheet.soft_hinges(at.displacements(place[None])[0])
     if len(soft.offset):  # laws with zero slope at rest
         floored = equation.body.tangent(at.displacements(place[None])[0], FLOOR)
         stiffness = equation.projected(floored)
-    value, vector = eigh(stiffness, equation.mass, subset_by_index=[mode - 1, mode - 1])
+    value, vector = equation.vibrations(stiffness, mode - 1, mode - 1)
     if not value[0] > 0.0:
         raise ComputationError(
             f"mode {mode} does not swing: the equilibrium is unstable, or nothing resists it; take "
             "a state near a stable one, or another mode"
         )
-    nodes = (equation.basis @ vector[:, 0]).reshape(-1, 3)
-    largest = np.linalg.norm(nodes, axis=1).max()
-    return place, math.sqrt(value[0]) / TURN, vector[:, 0] / largest
+    return place, math.sqrt(value[0]) / TURN, vector[:, 0] / _reach(equation, vector.T)
 
 
 def _settled(equation: Equation, at: Any, place: NDArray) -> NDArray:
@@ -310,7 +307,7 @@ def _sharpened(family: Free, orbit: Orbit) -> Orbit:
 
 def _reach(equation: Equation, motions: NDArray) -> float:
     """Largest displacement of a node in motions (j, k) of the unknowns."""
-    nodes = (motions @ equation.basis.T).reshape(len(motions), -1, 3)
+    nodes = equation.nodal(motions @ equation.basis.T)
     return float(np.linalg.norm(nodes, axis=2).max())
 
 
@@ -338,7 +335,8 @@ def _follow(
 def _largest(orbit: Orbit, place: NDArray) -> float:
     """Largest displacement of any node from the equilibrium (k,) in a motion, m."""
     phase = TURN * np.arange(SHOWN) / SHOWN
-    mean = orbit.equation.at(np.zeros(1), 0.0).displacements(place[None]).reshape(1, -1, 3)
+    equation = orbit.equation
+    mean = equation.nodal(equation.at(np.zeros(1), 0.0).displacements(place[None]))
     return float(np.linalg.norm(orbit.displacement(phase) - mean, axis=2).max())
 
 

@@ -82,42 +82,78 @@ def stage_phases(steps: int, tableau: Tableau = GAUSS) -> NDArray:
 
 
 class Stages:
-    """Matrices of steps of a fixed length, for a linear equation with k unknowns."""
+    """Steps of a fixed length h, for an equation with k unknowns, the first n of which have mass.
 
-    def __init__(self, mass: NDArray, damping: NDArray, h: float, tableau: Tableau) -> None:
-        self.mass, self.damping, self.h, self.tableau, k = mass, damping, h, tableau, len(mass)
-        fixed = np.einsum("ab,ij->aibj", np.eye(STAGES), mass)
-        fixed += h * np.einsum("ab,ij->aibj", tableau.a, damping)
-        self._fixed, self._size = fixed, STAGES * k
+    A state is the k unknowns, followed by the velocities of those with mass. Stages a (3, k, ...)
+    are accelerations; of unknowns without mass, velocities.
+    """
+
+    def __init__(
+        self, mass: NDArray, damping: NDArray, h: float, tableau: Tableau, heavy: int
+    ) -> None:
+        self.mass, self.damping, self.h, self.c, k = mass, damping, h, tableau.c, len(mass)
+        light, self._heavy, self._size = np.arange(k) >= heavy, heavy, STAGES * k
+        a, aa = tableau.a[:, :, None], tableau.aa[:, :, None]
+        b, ba = tableau.b[:, None], tableau.ba[:, None]
+        self._moved = np.where(light, h * a, h**2 * aa)  # (3, 3, k) displacements by stages
+        self._sped = np.where(light, np.eye(STAGES)[:, :, None], h * a)  # velocities by stages
+        self._ends = np.where(light, h * b, h**2 * ba), np.where(light, 0.0, h * b)
+        self._fixed = np.einsum("ab,ij->aibj", np.eye(STAGES), mass)
+        self._fixed += np.einsum("abj,ij->aibj", self._sped, damping)
+
+    def parts(self, state: NDArray) -> tuple[NDArray, NDArray]:
+        """Displacements and velocities (k, ...) in a state; 0 of unknowns without mass."""
+        k = len(self.mass)
+        v = np.zeros_like(state[:k])
+        v[: self._heavy] = state[k:]
+        return state[:k], v
+
+    def at(self, state: NDArray, a: NDArray) -> tuple[NDArray, NDArray]:
+        """Displacements and velocities (3, k, ...) at the stages of a step from a state."""
+        x, v = self.parts(state)
+        ahead = x + self.h * np.multiply.outer(self.c, v)
+        moved, sped = (np.einsum("abj,bj...->aj...", by, a) for by in (self._moved, self._sped))
+        return ahead + moved, v + sped
+
+    def end(self, state: NDArray, a: NDArray) -> NDArray:
+        """The state one step later."""
+        x, v = self.parts(state)
+        moved, sped = (np.einsum("bj,bj...->j...", by, a) for by in self._ends)
+        return np.concatenate([x + self.h * v + moved, (v + sped)[: self._heavy]])
 
     def factors(self, stiffness: NDArray):
         """Factors of the stages' matrix for stiffnesses (3, k, k)."""
-        added = self.h**2 * np.einsum("ab,aij->aibj", self.tableau.aa, stiffness)
+        added = np.einsum("abj,aij->aibj", self._moved, stiffness)
         return lu_factor((self._fixed + added).reshape(self._size, self._size))
 
     def tangent_step(self, factors, stiffness: NDArray, motion: NDArray) -> NDArray:
-        """Motions (2k, n), k displacements followed by k velocities, one step later."""
-        h, k, tableau = self.h, len(self.mass), self.tableau
-        x, v = motion[:k], motion[k:]
-        ahead = x + h * tableau.c[:, None, None] * v
+        """States (k + n, ...) of the linear equation one step later."""
+        x, v = self.parts(motion)
+        ahead = x + self.h * np.multiply.outer(self.c, v)
         right = -(stiffness @ ahead) - self.damping @ v
-        a = lu_solve(factors, right.reshape(self._size, -1)).reshape(STAGES, k, -1)
-        after = x + h * v + h**2 * np.tensordot(tableau.ba, a, 1)
-        return np.concatenate([after, v + h * np.tensordot(tableau.b, a, 1)])
+        a = lu_solve(factors, right.reshape(self._size, -1)).reshape(STAGES, *x.shape)
+        return self.end(motion, a)
 
 
 def monodromy(equation: Equation, stiffness: NDArray, w: float, drag: float) -> NDArray:
-    """Matrix (2k, 2k) of small motions (x, dx/dtau) over a period, for tangents (steps, 3, k, k).
+    """Matrix of small motions (x, dx/dtau) over a period, for tangents (steps, 3, k, k).
+
+    Unknowns without mass are condensed; if damping delays them, they are part of the motion, and
+    tangents are those at the stages of Radau's method, at which they keep no error of their start.
 
     w : base frequency, rad/s; drag : 1/s. The factor exp(-drag t / 2) is removed from the motion
     before integration, and restored exactly.
     """
-    half = 0.5 * drag
-    mass, damping = equation.mass, equation.damping
-    steps, k = len(stiffness), equation.size
-    stages = Stages(w**2 * mass, w * (damping - drag * mass), 2.0 * np.pi / steps, GAUSS)
+    half, delays, steps = 0.5 * drag, equation.delays, len(stiffness)
+    k = equation.size if delays else equation.heavy
+    stiffness = stiffness if delays else equation.condensed(stiffness)
+    mass, damping = equation.mass[:k, :k], equation.damping[:k, :k]
+    stages = Stages(
+        w**2 * mass, w * (damping - drag * mass), 2.0 * np.pi / steps,
+        RADAU if delays else GAUSS, equation.heavy,
+    )  # fmt: skip
     shift = half * damping - half**2 * mass
-    motion = np.eye(2 * k)
+    motion = np.eye(k + equation.heavy)
     for tangent in stiffness:
         left = tangent - shift
         motion = stages.tangent_step(stages.factors(left), left, motion)
@@ -147,8 +183,9 @@ class Shooting:
         self.steps = steps * multiple
         self._at = [equation.at(multiple * row, level) for row in stage_phases(self.steps, RADAU)]
         self._stages = Stages(
-            self.w**2 * equation.mass, self.w * equation.damping, 2.0 * np.pi / self.steps, RADAU
-        )
+            self.w**2 * equation.mass, self.w * equation.damping, 2.0 * np.pi / self.steps, RADAU,
+            equation.heavy,
+        )  # fmt: skip
         self._last: tuple[bytes, NDArray, NDArray] | None = None
 
     def residual(self, y: NDArray) -> NDArray:
@@ -172,18 +209,12 @@ class Shooting:
 
     def _step(self, y: NDArray, motion: NDArray, a: NDArray, at) -> tuple:
         """State, derivative and stage accelerations after one step of Radau's method."""
-        stages, h, k = self._stages, self._stages.h, self.equation.size
-        x, v, driven = y[:k], y[k:], at.driving(self.omega)
-        ahead, last, step = x + h * RADAU.c[:, None] * v, np.inf, np.zeros_like(a)
+        stages, driven = self._stages, at.driving(self.omega)
+        last, step = np.inf, np.zeros_like(a)
         stiffness, factors = np.zeros(0), None
         for iteration in range(ITERATIONS):
-            stage = ahead + h**2 * RADAU.aa @ a
-            left = (
-                a @ stages.mass
-                + (v + h * RADAU.a @ a) @ stages.damping.T
-                + at.forces(stage)
-                + driven
-            )
+            stage, speed = stages.at(y, a)
+            left = a @ stages.mass + speed @ stages.damping.T + at.forces(stage) + driven
             if iteration and not np.isfinite(left).all():  # passes through a contact
                 step *= 0.5
                 a = a + step
@@ -196,9 +227,7 @@ class Shooting:
             if not change > SETTLED * np.abs(a).max() or (iteration > 2 and change > STUCK * last):
                 break
             last = change
-        motion = stages.tangent_step(factors, stiffness, motion)
-        end = np.concatenate([x + h * v + h**2 * RADAU.ba @ a, v + h * RADAU.b @ a])
-        return end, motion, a
+        return stages.end(y, a), stages.tangent_step(factors, stiffness, motion), a
 
 
 def is_stable(found: NDArray) -> bool:
@@ -240,10 +269,14 @@ class Orbit:
         """Period of the motion, s."""
         return 2.0 * np.pi * self.multiple / self.omega
 
+    def dofs(self, phase: NDArray) -> NDArray:
+        """Displacements (s, m) of all dofs at phases (s,) of the motion."""
+        at = self.equation.at(self.multiple * phase, self.level)
+        return at.displacements(values_of(self.amplitudes, phase))
+
     def displacement(self, phase: NDArray) -> NDArray:
         """Displacements (s, n, 3), m, of all nodes at phases (s,) of the motion."""
-        at = self.equation.at(self.multiple * phase, self.level)
-        return at.displacements(values_of(self.amplitudes, phase)).reshape(len(phase), -1, 3)
+        return self.equation.nodal(self.dofs(phase))
 
     def velocity(self, phase: NDArray) -> NDArray:
         """Velocities (s, n, 3), m/s, of all nodes at phases (s,) of the motion."""
@@ -251,7 +284,7 @@ class Orbit:
         level = self.level * self.equation.level
         moved = drive.sums(drive.moves, self.multiple * phase, level, size)[1]
         own = values_of(self.amplitudes, phase, 1) @ self.equation.basis.T / self.multiple
-        return self.omega * (own + moved).reshape(len(phase), -1, 3)
+        return self.omega * self.equation.nodal(own + moved)
 
     def node_amplitudes(self) -> NDArray:
         """Complex amplitudes (h + 1, n, 3), m, of all nodes, including the motion of supports."""
@@ -270,7 +303,7 @@ class Orbit:
         phase = 2.0 * np.pi * np.arange(SHOWN + 1) / SHOWN
         at = self.equation.at(self.multiple * phase, self.level)
         u = at.displacements(values_of(self.amplitudes, phase))
-        if len(crossings_of(case, self.displacement(phase[:1])).crossed):
+        if len(crossings_of(case, self.equation.nodal(u[:1])).crossed):
             return True
         parts = zip(u[:-1], np.diff(u, axis=0), at.planes, np.diff(at.planes, axis=0), strict=False)
         return any(
@@ -279,8 +312,9 @@ class Orbit:
         )
 
     def multipliers(self, steps: int) -> NDArray:
-        """Floquet multipliers (2k,), the largest first; steps : steps in a period of the drive."""
-        equation, phase = self.equation, stage_phases(self.multiple * steps)
+        """Floquet multipliers, the largest first; steps : steps in a period of the drive."""
+        equation = self.equation
+        phase = stage_phases(self.multiple * steps, RADAU if equation.delays else GAUSS)
         at = equation.at(self.multiple * phase.ravel(), self.level)
         tangents = at.tangents(values_of(self.amplitudes, phase.ravel()))
         stiffness = tangents.reshape(*phase.shape, equation.size, equation.size)
@@ -320,7 +354,7 @@ class Orbit:
         fourier = Fourier(len(self.amplitudes) - 1)
         balance, phase = Balance(whole, fourier, self.multiple), fourier.phase
         at = balance.instants(self.level)
-        states = whole.unknowns(self.displacement(phase), at)
+        states = whole.coordinates(self.dofs(phase), at)
         x = fourier.fit @ states
         left = fourier.complex_of(balance.residual(x, self.omega, at))
         few = whole.at(self.multiple * phase[::4], self.level)

@@ -16,7 +16,7 @@ import copy
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.linalg import cho_factor, cho_solve
 
 from foldyn.cases.contact_checks import check_contact
 from foldyn.errors import ComputationError, InputError
@@ -45,9 +45,9 @@ def reduced(equation: Equation, modes: int, displacement: NDArray) -> Equation:
     still = equation.at(np.zeros(1), 0.0)
     check_contact(equation.case, displacement, still.planes[0])
     place = equation.unknowns(displacement[None], still)[0]
-    if modes >= equation.size:
+    if modes >= equation.heavy:
         raise InputError(
-            f" = {modes}: must be below the number of unknowns, {equation.size}", "modes"
+            f" = {modes}: must be below the number of unknowns, {equation.heavy}", "modes"
         )
     stiffness = still.tangents(place[None])[0]
     try:
@@ -57,7 +57,7 @@ def reduced(equation: Equation, modes: int, displacement: NDArray) -> Equation:
             "modes: the sheet is not stable in the state about which its modes are taken, or has "
             "bends without stiffness there; start from a stable state, with bend_law = 'linear'"
         ) from None
-    shapes = eigh(stiffness, equation.mass, subset_by_index=[0, modes - 1])[1]
+    shapes = equation.vibrations(stiffness, 0, modes - 1)[1]
     vectors = [*shapes.T, *_derivatives(equation, still, place, shapes, factors)]
     vectors += _static(equation, place, factors)
     basis = _independent(equation.mass, np.array(vectors).T)
@@ -70,8 +70,8 @@ def _derivatives(
     """Modal derivatives (k,) of all pairs of shapes (k, r)."""
     found = []
     for j, shape in enumerate(shapes.T):
-        nodes = (equation.basis @ shape).reshape(-1, 3)
-        step = PROBE * equation.length / np.linalg.norm(nodes, axis=1).max()
+        nodes = equation.nodal((equation.basis @ shape)[None])
+        step = PROBE * equation.length / np.linalg.norm(nodes, axis=2).max()
         up, down = (still.tangents((place + s * shape)[None])[0] for s in (step, -step))
         change = (up - down) / (2.0 * step)
         found += [cho_solve(factors, -change @ other) for other in shapes.T[: j + 1]]
@@ -109,7 +109,7 @@ def _projected(
     out.tangents = Tangents(equation.body, equation.basis, basis)
     out.basis = equation.basis @ basis
     out.offset = equation.basis @ place
-    out.size = basis.shape[1]
+    out.size = out.heavy = basis.shape[1]
     out.mass, out.damping = (basis.T @ part @ basis for part in (equation.mass, equation.damping))
     mass, drag = equation._moved
     out._moved = basis.T @ mass, basis.T @ drag

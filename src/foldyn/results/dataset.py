@@ -409,7 +409,7 @@ def periodic_dataset(
         Displacement (m) and velocity (m/s).
     coefficient : ndarray, complex, shape (h + 1, n, 3)
         Amplitudes of exp(2 pi i j t / period), m.
-    floquet : array_like, complex, shape (2k,)
+    floquet : array_like, complex, shape (r,)
     stable : bool
     periods : int
         Number of drive periods per period of the motion.
