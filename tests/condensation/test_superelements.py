@@ -547,7 +547,8 @@ def test_long_panels_are_warned_of_with_an_error_that_bounds_theirs():
 
     def modes(pieces):
         x = np.array([[0.05, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.05]])
-        points = np.concatenate([x + [0.0, 0.4 * k / pieces, 0.0] for k in range(pieces + 1)])
+        step = 0.4 / pieces * np.eye(3)[1]
+        points = np.concatenate([x + k * step for k in range(pieces + 1)])
         first = [3 * k + i for k in range(pieces) for i in range(2)]
         faces = [(i, i + 1, i + 4, i + 3) for i in first]
         welds = fd.Pattern(points, faces).creases.tolist()
