@@ -32,6 +32,8 @@ thickness = 0.01
 density = 700.0
 [[supports]]
 nodes = "xmin"
+[model]
+preset = "plate"
 [analysis]
 kind = "modes"
 count = 6

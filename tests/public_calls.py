@@ -215,7 +215,7 @@ PATTERNS: Calls = {
 CASE = changed(
     FOLD_TEXT,
     "pattern.dihedral = 120; sheet.density = 1e3; supports = [{ nodes = [0, 1, 2, 3] }]; "
-    'analysis = { kind = "modes", count = 2 }',
+    'model.preset = "plate"; analysis = { kind = "modes", count = 2 }',
 )
 
 

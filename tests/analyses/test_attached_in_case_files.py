@@ -22,6 +22,7 @@ poissons_ratio = 0.3
 thickness = 0.01
 density = 100.0
 [model]
+preset = "plate"
 clamped = [[0, 1]]
 [[supports]]
 nodes = "xmin"
@@ -51,7 +52,7 @@ load_factors = [0.5, 1.0]
 def path(request, tmp_path):
     text = FILE
     if request.param == "shell":
-        text = text.replace("[model]", '[model]\nkind = "shell"\ndivisions = 2')
+        text = text.replace('preset = "plate"', 'kind = "shell"\ndivisions = 2')
     (tmp_path / "case.toml").write_text(text, "utf-8")
     return tmp_path / "case.toml"
 

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import foldyn as fd
-from case_texts import MIURA_TEXT
+from case_texts import MIURA_TEXT, PLATE
 from foldyn import plots
 from foldyn.analyses.bands import BandsAnalysis
 from foldyn.analyses.reading import case_of_document, read_as
@@ -20,7 +20,7 @@ from foldyn.live.case_session import computed, offered
 from foldyn.report.album import Album
 from foldyn.report.sections import Picture
 
-BANDS_TEXT = f"""{MIURA_TEXT}[analysis]
+BANDS_TEXT = f"""{MIURA_TEXT}{PLATE}[analysis]
 kind = "bands"
 count = 5
 points = 17
@@ -145,7 +145,7 @@ def test_one_of_the_periods_makes_a_chain(tmp_path):
     np.testing.assert_array_equal(chain["frequency"], given["frequency"])
     assert chain.sizes["period"] == 1
     tower = '[pattern]\nkind = "kresling"\n' + MIURA_TEXT.partition('miura"')[2]
-    tower += '[analysis]\nkind = "bands"\nperiods = [0]\npoints = 3\n'
+    tower += PLATE + '[analysis]\nkind = "bands"\nperiods = [0]\npoints = 3\n'
     assert case_file(tmp_path, tower).run()["angles"].values == pytest.approx(np.pi / 6.0)
 
 
@@ -154,7 +154,7 @@ def test_a_screw_of_the_file_is_that_of_the_generator(tmp_path):
     text = f"""[pattern]
 vertices = {tower.vertices.tolist()}
 faces = {[list(face) for face in tower.faces]}
-{MIURA_TEXT.partition("miura" + chr(34))[2]}[analysis]
+{MIURA_TEXT.partition("miura" + chr(34))[2]}{PLATE}[analysis]
 kind = "bands"
 points = 5
 screw = {{ axis = "z", angle = 30, shift = 0.05 }}

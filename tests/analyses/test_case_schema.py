@@ -7,13 +7,13 @@ import tomllib
 
 import pytest
 
-from case_texts import HELD_MIURA_TEXT, MODES_TEXT, changed
+from case_texts import HELD_MIURA_TEXT, MODES_TEXT, PLATE, changed
 from foldyn.analyses.registry import case_schema
 from foldyn.cli.main import main
 from foldyn.errors import InputError
 from foldyn.studies import find_case, shipped_cases
 
-FRF_TEXT = f"""{HELD_MIURA_TEXT}[[drive]]
+FRF_TEXT = f"""{HELD_MIURA_TEXT}{PLATE}[[drive]]
 nodes = [7]
 force = [0.01, 0, 0]
 [analysis]

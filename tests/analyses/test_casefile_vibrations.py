@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from casefile_checks import check
 
-from case_texts import HELD_MIURA_TEXT, changed, rows
+from case_texts import HELD_MIURA_TEXT, PLATE, changed, rows
 from foldyn.cases import BaseMotion, Fix, Force, Gravity, Impose
 from foldyn.errors import InputError
 
-MODES = f'{HELD_MIURA_TEXT}[analysis]\nkind = "modes"\n'
+MODES = f'{HELD_MIURA_TEXT}{PLATE}[analysis]\nkind = "modes"\n'
 RESPONSE = (
     MODES.replace("modes", "frf")
     + """frequencies = { first = 0, last = 5, count = 51 }
@@ -86,7 +86,7 @@ def test_a_base_drives_and_every_vertex_that_can_move_is_shown(read) -> None:
 
 
 def test_a_stored_state_and_a_list_of_mass_rules(read, tmp_path) -> None:
-    text = MODES.replace("[analysis]", '[model]\nmass = ["panel", "centroid"]\n[analysis]')
+    text = MODES.replace('preset = "plate"', 'mass = ["panel", "centroid"]')
     found = read(text + '[initial]\nfile = "pressed.nc"\nat = 3\n' + PRELOADS)
     assert found.masses == ["panel", "centroid"]
     assert found.analysis.arguments["state"] is None

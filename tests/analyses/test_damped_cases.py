@@ -34,7 +34,7 @@ direction = "z"
 between = [0, 5]
 dashpot = 2e-3
 """
-MODELS = {"bars": 'bend_law = "linear"', "shell": 'kind = "shell"\ndivisions = 2'}
+MODELS = {"bars": 'preset = "plate"', "shell": 'kind = "shell"\ndivisions = 2'}
 ANALYSES = {
     "dynamics": (
         "[[loads]]\nnodes = [5]\nforce = [0, 0, 1e-3]\n"

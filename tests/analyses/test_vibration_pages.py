@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from case_texts import HELD_MIURA_TEXT, changed
+from case_texts import HELD_MIURA_TEXT, PLATE, changed
 from foldyn import plots
 from foldyn.analyses import read_case
 from foldyn.analyses.frf import driven_direction
@@ -15,7 +15,8 @@ from foldyn.linear import peaks_of
 from foldyn.plots.frf import curves_of
 
 SHEET = changed(
-    HELD_MIURA_TEXT, "pattern.cells = [2, 1]; pattern.dihedral = 90; damping.alpha = 0.5"
+    HELD_MIURA_TEXT,
+    "pattern.cells = [2, 1]; pattern.dihedral = 90; damping.alpha = 0.5",
 )
 PUSH = '[[drive]]\nnodes = "xmax"\nforce = [0, 0, 1e-4]\n'
 
@@ -27,7 +28,8 @@ def write(tmp_path, monkeypatch):
 
     def write_page(text: str):
         file = tmp_path / "case.toml"
-        file.write_text(SHEET + text, "utf-8")
+        model = "" if "[model]" in text else PLATE
+        file.write_text(SHEET + model + text, "utf-8")
         case_file = read_case(file)
         results = {rule: case_file.run(rule) for rule in case_file.masses}
         page = case_file.analysis.page(case_file, results, tmp_path, figures="png")

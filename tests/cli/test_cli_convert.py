@@ -171,6 +171,7 @@ def test_slips_of_drawing_in_case_files(files) -> None:
     off = flat.vertices + [(5e-5 * (k % 3), 0, 0) for k in range(len(flat.vertices))]
     fd.write_pattern(flat.changed(vertices=off), "hand.fold")
     rest = "[sheet]\nyoungs_modulus = 1e9\npoissons_ratio = 0.3\nthickness = 2e-4\ndensity = 800\n"
+    rest += '[model]\npreset = "plate"\n'
     case = '[pattern]\nfile = "hand.fold"\n{}\n' + rest + '[analysis]\nkind = "modes"\ncount = 7\n'
     Path("x.toml").write_text(case.format("tolerance = 1e-4\nflat_foldable = true"))
     with pytest.warns(FoldynWarning, match="to where they fold flat"):

@@ -9,7 +9,7 @@ import pytest
 from fit_cases import PRESSED, SAME_STEPS, SWUNG, write
 
 import foldyn as fd
-from case_texts import HELD_MIURA_TEXT
+from case_texts import HELD_MIURA_TEXT, PLATE
 from foldyn.dynamics.generalized_alpha import Alpha
 from foldyn.errors import InputError
 from foldyn.experiment import (
@@ -58,14 +58,14 @@ DATA = {
         KEYS | {"loads[0].force[2]": -1e-3},
     ),
     "modes": (
-        MIURA + MODES,
+        MIURA + PLATE + MODES,
         [NaturalFrequencies(frequency=[1.0, 2.0, 3.0, 4.0, 5.0], sigma=1.0),
          DampingRatios(damping_ratio=[0.1, 0.1, 0.1, 0.1, 0.1], sigma=1.0),
          ModeShapes(nodes=FREE, values=SHAPES, axes="xz", sigma=1.0)],
         KEYS | {"damping.alpha": 0.4, "damping.beta": 0.01},
     ),
     "responses": (
-        MIURA.replace("alpha = 0.4", "alpha = 1.0") + FRF,
+        MIURA.replace("alpha = 0.4", "alpha = 1.0") + PLATE + FRF,
         [FrequencyResponse(nodes=[6, 8], axis="z", frequency=LINES, values=np.ones((5, 2)) + 1j)],
         KEYS | {"damping.alpha": 1.0, "damping.beta": 0.01, "drive[0].force[1]": 0.3},
     ),

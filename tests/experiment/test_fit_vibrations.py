@@ -10,7 +10,7 @@ import pytest
 from fit_cases import refused
 
 import foldyn as fd
-from case_texts import HELD_FOLD_TEXT, HELD_MIURA_TEXT
+from case_texts import HELD_FOLD_TEXT, HELD_MIURA_TEXT, PLATE
 from foldyn.errors import InputError
 from foldyn.experiment import (
     DampingRatios,
@@ -22,7 +22,7 @@ from foldyn.experiment import (
 from foldyn.experiment.calibration.fit_problem import problem
 from pairwise import FEW
 
-DAMPED = HELD_MIURA_TEXT + "[damping]\nalpha = 0.4\n"
+DAMPED = HELD_MIURA_TEXT + PLATE + "[damping]\nalpha = 0.4\n"
 MODES = DAMPED + '[analysis]\nkind = "modes"\ncount = 4\n'
 FRF = (
     DAMPED
@@ -42,7 +42,9 @@ def folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("miura")
     fit_cases.write(place, MODES, "modes.toml")
     fit_cases.write(place, FRF, "frf.toml")
-    fit_cases.write(place, HELD_FOLD_TEXT + '[analysis]\nkind = "modes"\ncount = 4\n', "fold.toml")
+    fit_cases.write(
+        place, HELD_FOLD_TEXT + PLATE + '[analysis]\nkind = "modes"\ncount = 4\n', "fold.toml"
+    )
     return place
 
 

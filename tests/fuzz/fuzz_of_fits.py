@@ -24,6 +24,7 @@ poissons_ratio = 0.25
 thickness = 0.01
 density = 1.0
 [model]
+preset = "plate"
 fold_law = { kind = "enhanced", theta1 = 45, theta2 = 290 }
 [damping]
 alpha = 0.4

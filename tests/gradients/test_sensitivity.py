@@ -24,6 +24,8 @@ thickness = 0.02
 density = 900.0
 [[supports]]
 nodes = "xmin"
+[model]
+preset = "plate"
 [analysis]
 kind = "modes"
 count = 3

@@ -247,6 +247,8 @@ youngs_modulus = 1.2e9
 poissons_ratio = 0.2
 thickness = 1e-4
 density = 700.0
+[model]
+preset = "plate"
 [[supports]]
 nodes = "xmin"
 [air]

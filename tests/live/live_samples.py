@@ -45,6 +45,8 @@ cells = [2, 1]
 [[supports]]
 nodes = "xmin"
 axes = "xyz"
+[model]
+preset = "plate"
 [analysis]
 kind = "modes"
 """

@@ -236,6 +236,8 @@ youngs_modulus = 1e9
 poissons_ratio = 0.3
 thickness = 1e-3
 density = 500
+[model]
+preset = "plate"
 [analysis]
 kind = "modes"
 """

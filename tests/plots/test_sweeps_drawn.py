@@ -8,7 +8,7 @@ import xarray as xr
 from scipy import stats
 
 import foldyn as fd
-from case_texts import HELD_MIURA_TEXT
+from case_texts import HELD_MIURA_TEXT, PLATE
 from foldyn.errors import InputError
 from foldyn.plots import (
     plot_main_effects,
@@ -22,7 +22,7 @@ from foldyn.results import main_effects, sobol_indices
 @pytest.fixture(scope="module")
 def case(tmp_path_factory):
     path = tmp_path_factory.mktemp("case") / "case.toml"
-    path.write_text(HELD_MIURA_TEXT + '[analysis]\nkind = "modes"\ncount = 2\n')
+    path.write_text(HELD_MIURA_TEXT + PLATE + '[analysis]\nkind = "modes"\ncount = 2\n')
     return fd.read_case(path).case()
 
 

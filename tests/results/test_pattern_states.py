@@ -146,6 +146,8 @@ youngs_modulus = 1e6
 poissons_ratio = 0.25
 thickness = 0.01
 density = 1.0
+[model]
+preset = "plate"
 [[supports]]
 nodes = "xmin"
 [analysis]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from case_texts import HELD_MIURA_TEXT
+from case_texts import HELD_MIURA_TEXT, PLATE
 from foldyn.cli.main import main
 from foldyn.errors import UnitsWarning
 from foldyn.studies import find_case, shipped_cases
@@ -114,7 +114,7 @@ def test_a_case_file_says_it_once(tmp_path, capsys):
     text = HELD_MIURA_TEXT.replace("[sheet]", f"panel_angle = {np.pi / 3}\n[sheet]")
     text = text.replace("youngs_modulus = 1e6", "youngs_modulus = 200.0")
     text = text.replace("density = 1.0", "density = 1000.0")
-    (tmp_path / "case.toml").write_text(f'{text}[analysis]\nkind = "modes"\n')
+    (tmp_path / "case.toml").write_text(f'{text}{PLATE}[analysis]\nkind = "modes"\n')
     main(["run", str(tmp_path / "case.toml"), "--no-figures", "--out", str(tmp_path / "out")])
     said = capsys.readouterr().err
     assert said.count("is pi/3, but angles are in degrees: give 60") == 1

@@ -8,11 +8,11 @@ import time
 
 from numba.core.dispatcher import Dispatcher
 
-from case_texts import HELD_FOLD_TEXT, HELD_MIURA_TEXT, MIURA_TEXT, MODES_TEXT
+from case_texts import HELD_FOLD_TEXT, HELD_MIURA_TEXT, MIURA_TEXT, MODES_TEXT, PLATE
 
 MODES = MODES_TEXT
 DAMPED = HELD_MIURA_TEXT + "[damping]\nalpha = 0.2\n"
-FRF = f"""{DAMPED}[[drive]]
+FRF = f"""{DAMPED}{PLATE}[[drive]]
 nodes = [8]
 force = [0, 0, 1]
 [analysis]
@@ -31,7 +31,7 @@ method = "newmark"
 [output]
 interval = 0.02
 """
-BANDS = f"""{MIURA_TEXT}[analysis]
+BANDS = f"""{MIURA_TEXT}{PLATE}[analysis]
 kind = "bands"
 count = 5
 points = 17

@@ -10,6 +10,7 @@ import pytest
 from swept_cases import FRF, MODES, PATH, compiled_here, fails_sometimes
 
 import foldyn as fd
+from case_texts import changed
 from foldyn.analyses.keys import replaced
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.errors import ComputationError, InputError
@@ -96,7 +97,7 @@ def test_the_table_in_the_file(case):
 
 @pytest.mark.matrix
 def test_mass_rules_of_the_file_are_an_axis(case):
-    case.write_text(MODES + '[model]\nmass = ["panel", "centroid"]\n')
+    case.write_text(changed(MODES, 'model.mass = ["panel", "centroid"]'))
     found = of(case, vary=ONE)
     assert found["mass"].values.tolist() == ["panel", "centroid"]
     results = [fd.read_case(case).run(rule)["frequency"].values for rule in ("panel", "centroid")]
@@ -108,8 +109,8 @@ def test_mass_rules_of_the_file_are_an_axis(case):
 
 
 def test_ties_follow(case):
-    law = '[model]\nfold_law = { kind = "enhanced", theta1 = 45, theta2 = 315 }\n'
-    case.write_text(MODES + law)
+    law = 'model.fold_law = { kind = "enhanced", theta1 = 45, theta2 = 315 }'
+    case.write_text(changed(MODES, law))
     ties = {"model.fold_law.theta2": "360 - model.fold_law.theta1"}
     tied = of(case, vary={"model.fold_law.theta1": [30, 100]}, ties=ties)
     free = of(case, vary={"model.fold_law.theta1": [30, 100]})

@@ -29,6 +29,8 @@ thickness = 0.01
 density = 1.0
 [damping]
 alpha = 0.1
+[model]
+preset = "plate"
 [analysis]
 kind = "bands"
 count = 4

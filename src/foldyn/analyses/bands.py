@@ -264,6 +264,20 @@ class BandsSchema(VibrationSchema):
     analysis: BandsSection
     output: BandsOutput = BandsOutput()
 
+    @property
+    def beyond_rest(self) -> str:
+        """See `VibrationSchema`."""
+        stated = [key for key in STATED if getattr(self.analysis, key) is not None]
+        return super().beyond_rest or (f"analysis.{stated[0]}" if stated else "")
+
+    @property
+    def solutions(self) -> tuple[float, str]:
+        """See `VibrationSchema`; each wave vector counts."""
+        own = self.analysis
+        states = 1 if own.vary is None else len(own.vary.values)
+        count = states * (own.points + (own.zone or 0) ** 2 // 2)
+        return count, f" at {count} wave vectors"
+
     def agree(self) -> None:
         """Refuse loads other than folded creases, unless a stored state is given."""
         super().agree()

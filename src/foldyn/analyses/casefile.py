@@ -15,7 +15,7 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn.analyses.provenance import Call, provenance
-from foldyn.analyses.sections import CaseSchema, DesignSection, SweepSection
+from foldyn.analyses.sections import CaseSchema, Choice, DesignSection, SweepSection
 from foldyn.analyses.start import Start, start_of
 from foldyn.arguments import arguments
 from foldyn.cases import Case, State
@@ -203,8 +203,8 @@ class CaseFile:
         Title of the file, or "".
     pattern : Pattern
     sheet : Sheet
-    model : str
-        "bars_and_hinges" or "shell".
+    choice : Choice
+        The kind of model, and why.
     masses : list of str
         One mass rule, or several to compare.
     analysis : Analysis
@@ -220,7 +220,7 @@ class CaseFile:
     title: str
     pattern: Pattern
     sheet: Sheet
-    model: str
+    choice: Choice
     masses: list[str]
     analysis: Analysis
     output: Output
@@ -238,6 +238,11 @@ class CaseFile:
     def _repr_html_(self) -> str | None:
         """A picture for notebooks."""
         return picture(self.pattern, repr(self))
+
+    @property
+    def model(self) -> str:
+        """Kind of model: "bars_and_hinges", "shell" or "superelements"."""
+        return self.choice.kind
 
     @property
     def heading(self) -> str:
@@ -392,7 +397,9 @@ class Computation:
             return self.compute(progress, begun)
 
     def run(self, progress: bool = False, begun: Begun = lambda: None) -> xarray.Dataset:
-        """Compute the result and add estimates of its mesh error."""
+        """Compute the result, and add its model, if that was chosen, and its mesh error."""
         result = self.result(progress, begun)
         judged = refinement(self.case_file.case(self.mass))
-        return result if judged is None else result.assign_attrs(judged.facts())
+        told = self.case_file.choice.told
+        facts = {**({"model_choice": told} if told else {}), **(judged.facts() if judged else {})}
+        return result.assign_attrs(facts) if facts else result

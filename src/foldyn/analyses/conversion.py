@@ -182,7 +182,8 @@ def remodeled(
     if kind != now and kind != BARS_AND_HINGES:
         changed["analysis"] = _without_bends(document["analysis"])
     finer = {} if divisions is None else {"divisions": divisions}
-    changed["model"] = {**given, "kind": kind, **finer}
+    named = {"kind": kind} if "kind" in given or model is not None or finer else {}
+    changed["model"] = {**given, **named, **finer}
     return changed
 
 

@@ -54,7 +54,7 @@ class FidelitySchema(CaseSchema):
 
     def agree(self) -> None:
         """Refuse other models than bars and hinges."""
-        if self.model.kind != BARS_AND_HINGES:
+        if self.model.kind not in (None, BARS_AND_HINGES):
             raise InputError(
                 f" = {show(self.model.kind)}: bars and hinges are compared with this model, which "
                 "is made from them; leave out kind and the keys of that model",

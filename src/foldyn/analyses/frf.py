@@ -34,6 +34,10 @@ from foldyn.tables import ListOf, check_keys
 from foldyn.values import number, show, whole
 
 MOST_FREQUENCIES = 100_000
+SLOPES_AT_REST = ("direct", "modal")
+"""Methods that need nothing but a linear structure."""
+PER_MODES = 12
+"""Frequencies that the method "direct" solves in the time of the modes."""
 OPTIONS = frozenset(key for method in METHODS.values() for key in arguments(method.options))
 """Options of all methods."""
 
@@ -151,6 +155,20 @@ class FrfSchema(VibrationSchema):
     analysis: FrfSection
     drive: Annotated[Sequence[Any], ListOf(DRIVE, least=1)]
     output: FrfOutput = FrfOutput()
+
+    @property
+    def beyond_rest(self) -> str:
+        """See `VibrationSchema`."""
+        linear = self.analysis.method in SLOPES_AT_REST
+        return super().beyond_rest or ("" if linear else "analysis.method")
+
+    @property
+    def solutions(self) -> tuple[float, str]:
+        """See `VibrationSchema`."""
+        count = len(self.analysis.frequencies)
+        if self.analysis.method != "direct" or count <= PER_MODES:
+            return super().solutions
+        return count / PER_MODES, f" at {count} frequencies"
 
     def agree(self) -> None:
         """Refuse further drives with a moving base."""

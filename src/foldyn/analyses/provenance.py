@@ -79,11 +79,11 @@ def inputs(case_file: Any, case: Case, results: ByRule) -> list[tuple[str, str]]
         *((len(getattr(structure, part, ())), part) for part in ("bars", "folds", "bends")),
     ]  # fmt: skip
     counted = ", ".join(f"{count} {what}" for count, what in counts if count)
-    analysis = case_file.analysis
+    analysis, kind = case_file.analysis, case_file.choice.told or case_file.model.replace("_", " ")
     return [
         ("pattern", f"{counted}; size {pattern.size:.6g} m"),
         ("sheet", _said(case_file.sheet)),
-        ("model", f"{case_file.model.replace('_', ' ')}; {_listed(model)}"),
+        ("model", f"{kind}; {_listed(model)}"),
         ("mesh", mesh_error(next(iter(results.values())))),
         ("supports", _parts(case.supports)),
         ("loads", _parts(case.loads)),

@@ -14,9 +14,11 @@ import numpy as np
 from foldyn.analyses.casefile import CaseFile, Output
 from foldyn.analyses.conversion import converted, flagged, remodeled
 from foldyn.analyses.keys import dotted, replaced
+from foldyn.analyses.model_choice import choice_of
 from foldyn.analyses.motion import SAMPLING
 from foldyn.analyses.pattern_section import FACES, FACETS, HINGES, READING
 from foldyn.analyses.registry import ANALYSES, schema_of
+from foldyn.analyses.sections import Choice
 from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.clamped_edges import straightened
 from foldyn.cases.decode import call_from
@@ -120,16 +122,16 @@ def validated(path: Path, document: Mapping[str, Any]) -> Any:
 
 def case_of_document(
     path: Path, document: Mapping[str, Any], text: str = "", pattern: Any = None,
-    structures: Mapping[str, Any] | None = None,
+    structures: Mapping[str, Any] | None = None, choice: Choice | None = None,
 ) -> CaseFile:  # fmt: skip
     """Check the content of a case file and make its cases; see `read_case`.
 
     text : text of the file, if the document was read from one.
     pattern, structures : pattern and structures (by mass rule) made from this document before;
         both are made if not given.
+    choice : the model if the document leaves it open; decided here if not given.
     """
     schema = validated(path, document)
-    model = MODELS[schema.model.kind]
     kind, faults = ANALYSES[schema.analysis.kind], Faults()
     made = pattern is not None
     sheet, resolved = schema.sheet, None
@@ -141,16 +143,18 @@ def case_of_document(
     if schema.sheet.density is None and kind.needs_density and not schema.masses:
         faults.add(InputError(f": missing; {kind.needs_density} it (kg/m3)", "sheet.density"))
     with within("", path):
+        choice = choice_of(schema, pattern, choice)
+        model, given = MODELS[choice.kind], schema.model.options(choice.kind)
         with faults.collected(), within("model: "):
             # the pattern is missing if its table is wrong
             welds = bool(len(getattr(pattern, "welds", ())))
-            resolved = model.options(welds=welds, **schema.model.options)
+            resolved = model.options(welds=welds, **given)
         faults.raise_all()
         with within("model: "):
             straight = straightened(resolved, pattern, schema.supports)
-        options = {**schema.model.options, **straight}
+        options = {**given, **straight}
         masses = list(schema.model.mass or [resolved.mass])[: None if kind.by_mass else 1]
-        if schema.model.kind == SHELL:
+        if choice.kind == SHELL:
             _check_vertices(schema, len(pattern.vertices))
         with within("damping"):
             damping = schema.damping.made()
@@ -184,9 +188,10 @@ def case_of_document(
         )
     shown = {k: v for k, v in schema.output.values().items() if k not in ("nodes", *SAMPLING)}
     case_file = CaseFile(
-        path, schema.title, pattern, sheet, schema.model.kind, masses, analysis,
+        path, schema.title, pattern, sheet, choice, masses, analysis,
         Output(nodes, chosen is not None, **shown), schema, make,
-        lambda values: case_of_document(path, replaced(document, values), text), cases, text,
+        lambda values: case_of_document(path, replaced(document, values), text, choice=choice),
+        cases, text,
     )  # fmt: skip
     start = getattr(schema, "initial", None)
     if start is not None and start.file is None:

@@ -7,7 +7,7 @@ should name the key; the objects that are built from the tables check the rest.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from foldyn.analyses.keys import Tie, ties_of
 from foldyn.analyses.pattern_section import PatternOf
@@ -20,7 +20,7 @@ from foldyn.cases.decode import KindOf, law_from
 from foldyn.cases.directions import AXES, check_pairs
 from foldyn.cases.loads import LOAD
 from foldyn.cases.masses import MASS
-from foldyn.cases.models import BARS_AND_HINGES, MODELS
+from foldyn.cases.models import BARS_AND_HINGES, MODELS, SUPERELEMENTS
 from foldyn.cases.selection import Nodes, check_nodes
 from foldyn.cases.supports import SUPPORT
 from foldyn.condensation import superelements
@@ -98,7 +98,7 @@ def _masses(name: str, value: Any, beside: Mapping[str, Any]) -> list[str]:
 
 def known_masses(beside: Mapping[str, Any]) -> list[str]:
     """Mass rules of the model, or of all models if the kind of model is invalid."""
-    kinds = [beside["kind"]] if "kind" in beside else list(MODELS)
+    kinds = [beside["kind"] or BARS_AND_HINGES] if "kind" in beside else list(MODELS)
     return [name for kind in kinds for name in MODELS[kind].masses]
 
 
@@ -160,19 +160,36 @@ Edges = Annotated[str | Sequence[Sequence[int]] | None, Check(_edges)]
 Animation = Annotated[str | None, one_of(ANIMATIONS)]
 
 
+class Choice(NamedTuple):
+    """The kind of model of a case file, and why not superelements if the file leaves it open."""
+
+    kind: str
+    why: str = ""
+    open: bool = False
+
+    @property
+    def told(self) -> str:
+        """What an open choice fell on, in words; "" if nobody asks."""
+        name = MODELS[self.kind].name
+        if self.kind == SUPERELEMENTS and self.open:
+            return f"{name}, the default of linear analyses"
+        return f"{name}, as superelements {self.why}" if self.why else ""
+
+
 class ModelSection(Section):
     """[model]: arguments of `discretize`, `shell` or `superelements`, with their defaults.
 
     Parameters
     ----------
-    kind : {"bars_and_hinges", "shell", "superelements"}
-        Kind of model.
+    kind : {"bars_and_hinges", "shell", "superelements"}, optional
+        Kind of model; by default superelements for linear analyses of what they take, unless a key
+        is given that only bars and hinges have, or a mass rule, and bars and hinges otherwise.
     mass : str or sequence of str
         Mass rule; a list compares several.
     """
 
     like = (discretize, shell, superelements)
-    kind: Annotated[str, one_of(MODELS)] = BARS_AND_HINGES
+    kind: Annotated[str | None, one_of(MODELS)] = None
     preset: Annotated[str | None, one_of(PRESETS)] = None
     scheme: Annotated[str | None, one_of(SCHEMES)] = None
     level: Annotated[int | None, Check(whole_number, most=len(LEVELS))] = None
@@ -195,7 +212,7 @@ class ModelSection(Section):
 
     def agree(self) -> None:
         """Refuse keys of other models."""
-        model = MODELS[self.kind]
+        model = MODELS[self.kind or BARS_AND_HINGES]
         strange = [
             key
             for key in arguments(type(self))
@@ -211,10 +228,19 @@ class ModelSection(Section):
             )
 
     @property
-    def options(self) -> dict[str, Any]:
-        """Options of the model that the file gives, without the mass rule."""
+    def open(self) -> bool:
+        """Whether the analysis decides on the kind of model."""
+        return self.stated <= shared_keys()
+
+    def options(self, kind: str) -> dict[str, Any]:
+        """Options of a kind of model that the file gives, without the mass rule."""
         given = self.stated - {"kind", "mass"}
-        return {key: getattr(self, key) for key in MODELS[self.kind].keys if key in given}
+        return {key: getattr(self, key) for key in MODELS[kind].keys if key in given}
+
+
+def shared_keys() -> set[str]:
+    """Keys of [model] that leave the kind open: those of bars and hinges and superelements."""
+    return {*MODELS[BARS_AND_HINGES].keys} & {*MODELS[SUPERELEMENTS].keys} - {"mass"}
 
 
 class AnalysisSection(Section):

@@ -47,13 +47,26 @@ class VibrationSchema(CaseSchema):
     initial: StoredStart | None = None
     analysis: Any
 
+    @property
+    def beyond_rest(self) -> str:
+        """The key that asks for more than small vibrations about rest; "" if none does."""
+        if self.initial is not None:
+            return "initial"
+        own = self.analysis
+        return "analysis.state" if own.state != "rest" else "analysis.secant" if own.secant else ""
+
+    @property
+    def solutions(self) -> tuple[float, str]:
+        """Work relative to that of modes, and the words for it."""
+        return 1.0, ""
+
     def agree(self) -> None:
         """Refuse options that the model does not have, and contradictory states."""
-        other = self.model.kind != BARS_AND_HINGES
-        if other and "secant" in self.analysis.stated:
+        kind = self.model.kind or BARS_AND_HINGES
+        if kind != BARS_AND_HINGES and "secant" in self.analysis.stated:
             raise InputError(
                 f" = {show(self.analysis.secant)}: is for superlinear bends, which "
-                f"{MODELS[self.model.kind].name} cannot have; leave it out",
+                f"{MODELS[kind].name} cannot have; leave it out",
                 "analysis.secant",
             )
         if self.initial is not None and "state" in self.analysis.stated:

@@ -229,5 +229,7 @@ def _introduction(
         parts = PARTS[case_file.model]
         counted = ", ".join(f"{len(getattr(structure, part))} {part}" for part in parts)
         say(f"{case_file.title or case_file.path.name}: {counted}")
+        if case_file.choice.told:
+            say(f"  model: {case_file.choice.told}")
 
     return introduce

@@ -16,6 +16,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from foldyn.cases import Case
+from foldyn.condensation import Superelements
 from foldyn.errors import InputError, warn
 from foldyn.linear.shell_of import check_reduced, shell_of
 from foldyn.materials import MemoryLaw
@@ -260,7 +261,7 @@ def _shell_case(case: Case, divisions: int | None) -> Case:
             )
         return case
     count = DIVISIONS if divisions is None else whole("divisions", divisions, least=1)
-    check_reduced(case)
+    check_reduced(case, Superelements.kind)
     return shell_of(case, count)
 
 

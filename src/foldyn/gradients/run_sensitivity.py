@@ -16,8 +16,11 @@ from numpy.typing import NDArray
 
 from foldyn.analyses import CaseFile
 from foldyn.analyses.keys import replaced
+from foldyn.analyses.model_choice import NO_GRADIENTS
 from foldyn.analyses.reading import case_of_document, read_document
+from foldyn.analyses.sections import Choice
 from foldyn.cases import Case
+from foldyn.cases.models import BARS_AND_HINGES
 from foldyn.dynamics import simulate
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import InputError, within
@@ -293,11 +296,16 @@ def _check_acts(structure: Discretized, name: str) -> None:
         )
 
 
+OPEN = Choice(BARS_AND_HINGES, NO_GRADIENTS, open=True)
+"""The model of case files that leave it open."""
+
+
 def case_file_at(place: Path, document: dict[str, Any], values: Mapping[str, Any]) -> CaseFile:
-    """A case file with other values for some keys."""
+    """A case file with other values for some keys, of a model that has gradients."""
     plain = {key: np.asarray(value).tolist() for key, value in values.items()}
     changed = replaced(document, plain)
-    return case_of_document(place, {k: v for k, v in changed.items() if k not in ASIDE})
+    kept = {key: value for key, value in changed.items() if key not in ASIDE}
+    return case_of_document(place, kept, choice=OPEN)
 
 
 def _of_file(

@@ -26,8 +26,10 @@ MESH = {"divisions", "level", "mass", "vertex_radius"}
 """Options of shells and superelements that bars and hinges lack."""
 
 
-def check_reduced(case: Any) -> None:
+def check_reduced(case: Any, *others: str) -> None:
     """Refuse anything but a case of bars and hinges that has a shell equivalent.
+
+    others : kinds of models that will do, too.
 
     Raises
     ------
@@ -37,7 +39,7 @@ def check_reduced(case: Any) -> None:
     """
     of_kind("case", case, Case)
     structure = case.structure
-    if structure.kind != Structure.kind:
+    if structure.kind not in (Structure.kind, *others):
         raise InputError(
             f": its model is {structure.kind}, and the shell is made from bars and hinges; make "
             'its structure with fd.discretize (in a case file model.kind = "bars_and_hinges")',

@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from foldyn.analyses import CaseFile
 from foldyn.analyses.conversion import converted
 from foldyn.analyses.reading import case_of_document, read_document
+from foldyn.analyses.sections import Choice
+from foldyn.cases.models import BARS_AND_HINGES
 from foldyn.dynamics import prepare
 from foldyn.errors import FoldynError, FoldynWarning, InputError, warn
 from foldyn.live.controls import changed, controls
@@ -300,7 +302,7 @@ def _kept(document: Document) -> Document:
 def _frequencies(path: Path, document: Document) -> NDArray[np.float64]:
     """Lowest natural frequencies (Hz) above 0."""
     about = {**_modes(path, document), "analysis": {"kind": "modes", "count": COUNT}}
-    found = case_of_document(path, about).run()
+    found = case_of_document(path, about, choice=Choice(BARS_AND_HINGES)).run()
     values = found["frequency"].values[~found["rigid"].values]
     values = values[np.isfinite(values) & (values > 0.0)]
     if not len(values):

@@ -16,6 +16,7 @@ from foldyn.analyses import CaseFile
 from foldyn.analyses.casefile import Moving
 from foldyn.analyses.keys import Tie, files_of, replaced
 from foldyn.analyses.reading import case_of_document
+from foldyn.analyses.sections import Choice
 from foldyn.errors import ComputationError, InputError, Told
 from foldyn.store import program
 from foldyn.sweeps.evaluations import Evaluation
@@ -47,6 +48,8 @@ class Job:
     measures : tuple of Asked
     program : str
         Digest of the program that started the sweep.
+    choice : Choice, optional
+        The model, one for all points, if the case file leaves it open.
     """
 
     path: Path
@@ -55,6 +58,7 @@ class Job:
     ties: tuple[Tie, ...]
     measures: tuple[Asked, ...]
     program: str
+    choice: Choice | None = None
 
     def changes(self, point: Point) -> dict[str, Any]:
         """Values of all keys at a point, including ties."""
@@ -73,7 +77,7 @@ class Job:
 
     def case_file(self, point: Point) -> CaseFile:
         """Case file at a point."""
-        return case_of_document(self.path, self.changed(point))
+        return case_of_document(self.path, self.changed(point), choice=self.choice)
 
     def stamp(self, point: Point) -> list[Any]:
         """Everything that a point's evaluation depends on."""
@@ -83,7 +87,7 @@ class Job:
         there = [self.path.parent / file for file in sorted(files_of(document))]
         files = {str(file): _digest(str(file)) for file in there}
         measures = [[one.name, one.text, code_of(one.measure.function)] for one in self.measures]
-        return [self.program, document, files, measures]
+        return [self.program, document, files, measures, self.choice and self.choice.kind]
 
     def __call__(self, point: Point) -> Evaluation:
         """Evaluate a point; errors become part of the evaluation."""

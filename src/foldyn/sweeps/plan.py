@@ -10,11 +10,13 @@ from typing import Any
 from foldyn.analyses import CaseFile
 from foldyn.analyses.casefile import Compute
 from foldyn.analyses.keys import parts, ties_of
+from foldyn.analyses.model_choice import bound
 from foldyn.analyses.motion import MotionAnalysis
 from foldyn.analyses.ranges import SAMPLINGS, Varied, varied
 from foldyn.analyses.reading import case_of_document, read_document, validated
-from foldyn.analyses.sections import SweepSection
+from foldyn.analyses.sections import Choice, SweepSection
 from foldyn.arguments import Placed
+from foldyn.cases.models import BARS_AND_HINGES
 from foldyn.dynamics.gpu.choice import DEVICES
 from foldyn.errors import Faults, InputError, within
 from foldyn.input_files import path_of
@@ -110,7 +112,13 @@ def plan_of(
     how = chosen.samples or 0, chosen.method, chosen.seed
     points = samples(keys, *how) if sampled else grid(keys)
     names = tuple(one.key for one in keys)
-    job = Job(path, document, names, tuple(chosen.ties), _measures(measures), this_program())
+    if case_file.choice.open and (own := [name for name in names if bound(name)]):
+        other = Choice(BARS_AND_HINGES, f"do not have {own[0]}, which varies", open=True)
+        case_file = case_of_document(path, document, choice=other)
+    job = Job(
+        path, document, names, tuple(chosen.ties), _measures(measures), this_program(),
+        case_file.choice,
+    )  # fmt: skip
     _check_keys(job, keys, points[0])
     faults = Faults()
     for one in job.measures:

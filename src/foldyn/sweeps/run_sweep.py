@@ -140,7 +140,8 @@ def dataset(plan: Plan, found: Sequence[Evaluation], facts: Mapping[str, Any]) -
     failed = sum(bool(one.failure) for one in checked)
     facts = {
         "kind": plan.case_file.analysis.kind, "method": plan.method, "points": len(found),
-        "failed": failed, "program": plan.job.program, **facts,
+        "failed": failed, "program": plan.job.program,
+        "model_choice": plan.case_file.choice.told or None, **facts,
     }  # fmt: skip
     if not on_grid:
         facts |= {"samples": plan.count, "seed": plan.seed}

@@ -175,7 +175,10 @@ class Problem:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
             document = replaced(run.document, changes)
-            made = case_of_document(run.path, document, pattern=pattern, structures=structures)
+            made = case_of_document(
+                run.path, document, pattern=pattern, structures=structures,
+                choice=run.choices[0] if run.choices else None,
+            )  # fmt: skip
         if fixed and not run.patterns:
             run.patterns.append(made.pattern)
         return made
@@ -320,6 +323,7 @@ def problem(
     guess = made.space.column("guess")
     for run in made.runs:
         case_file = case_of_document(run.path, replaced(run.document, made.space.changes(guess)))
+        run.choices.append(case_file.choice)
         for i in run.members:
             _check(measurements[i], case_file)
     made.examine(guess)

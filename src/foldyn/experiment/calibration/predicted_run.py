@@ -13,6 +13,7 @@ from xarray import Variable
 
 from foldyn.analyses import CaseFile
 from foldyn.analyses.casefile import Computation
+from foldyn.analyses.sections import Choice
 from foldyn.cases import Case, State
 from foldyn.dynamics.methods import method_of
 from foldyn.dynamics.motion import Motion
@@ -50,6 +51,8 @@ class PredictedRun:
         The pattern, once it is generated, for all parameter values that do not change it.
     starts : list of State or None
         The stored initial state, once it is read.
+    choices : list of Choice
+        The model, once it is decided, for all parameter values.
     """
 
     path: Path
@@ -57,6 +60,7 @@ class PredictedRun:
     members: tuple[int, ...]
     patterns: list[Pattern] = field(repr=False, default_factory=list)
     starts: list[State | None] = field(repr=False, default_factory=list)
+    choices: list[Choice] = field(repr=False, default_factory=list)
 
     @property
     def kind(self) -> str:
