@@ -3,10 +3,11 @@
     python benchmarks/first_use.py [--rounds 3]
 
 Each round starts with an empty folder of kernels and computes motions of a four-panel sheet one
-after the other, each with something new; then modes and implicit motions in a second folder; then
-a second process of the first kind, which finds all kernels, and Python's bytecode, as an installed
-package has it. Printed are the medians, and beside each how much slower the machine was than at its
-best: the time of a fixed piece of Python before and after, over the shortest one met.
+after the other, each with something new; then modes and implicit motions in a second folder, and
+modes of superelements in a third; then second processes of the first and the last kind, which find
+all kernels and condensed panels, and Python's bytecode, as an installed package has it. Printed are
+the medians, and beside each how much slower the machine was than at its best: the time of a fixed
+piece of Python before and after, over the shortest one met.
 """
 
 from __future__ import annotations
@@ -22,6 +23,12 @@ import time
 from collections.abc import Callable, Mapping
 
 LOOPS = 400_000
+PROCESSES = {
+    "explicit": "a second process, all five",
+    "implicit": "",
+    "superelements": "a second process, both",
+}
+"""What second processes are called in the table, by kind."""
 
 
 def piece() -> float:
@@ -46,6 +53,11 @@ def uses() -> Mapping[str, Mapping[str, Callable[[], object]]]:
     def motion(method, *supports, **parts):
         return lambda: fd.simulate(case(*supports, **parts), 0.01, method=method)
 
+    def panels():
+        pattern = fd.patterns.miura(cells=(3, 3), dihedral=120)
+        own = fd.superelements(pattern, fd.Sheet(1e9, 0.3, 0.01, 1000.0))
+        return fd.modes(fd.Case(own, [fd.Fix("xmin", along=True)]), 6)
+
     return {
         "explicit": {
             "first rk4 motion": motion("rk4"),
@@ -59,6 +71,7 @@ def uses() -> Mapping[str, Mapping[str, Callable[[], object]]]:
             "newmark after that": motion("newmark"),
             "energy_momentum after that": motion("energy_momentum"),
         },
+        "superelements": {"modes of 36 superelements": panels, "the same again": panels},
     }
 
 
@@ -97,12 +110,15 @@ def main() -> None:
         return
     rounds: list[dict[str, tuple[float, float, float]]] = []
     for _ in range(given.rounds):
-        with tempfile.TemporaryDirectory() as one, tempfile.TemporaryDirectory() as other:
-            found = measured("explicit", one) | measured("implicit", other)
-            for _ in range(2):  # the first one fills the folder
-                again = measured("explicit", one, f"{one}/bytecode")["the whole process"]
-            del found["the whole process"]
-            rounds.append(found | {"a second process, all five": again})
+        found = {}
+        for process, second in PROCESSES.items():
+            with tempfile.TemporaryDirectory() as folder:
+                found |= measured(process, folder)
+                del found["the whole process"]
+                for _ in range(2 if second else 0):  # the first one fills the folder
+                    again = measured(process, folder, f"{folder}/bytecode")["the whole process"]
+                    found[second] = again
+        rounds.append(found)
     best = min(piece for one in rounds for _, *pieces in one.values() for piece in pieces)
     print(f"{'':36}  CPU s  slowdown")
     for name in rounds[0]:
