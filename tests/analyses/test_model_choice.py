@@ -41,7 +41,7 @@ analysis.secant = 2 | bars and hinges, as superelements do not take analysis.sec
 {FRF}, frequencies = [1], method = "harmonic" }} | bars and hinges, ... take analysis.method
 {BANDS}, stretch = 1.1 }} | bars and hinges, ... take analysis.stretch
 model.fold_law = "superlinear" | bars and hinges, ... refuse the case (fold_law = 'superlinear':
-air.density = 1.2 | bars and hinges, as superelements refuse the case (air: Air is not
+air.density = 1.2 | superelements, the default
 contact.planes = [{{ point = [0, 0, -9], normal = [0, 0, 1] }}] | bars and ... (contact: Contact is
 damping.strain = {{ beta = 1e-4 }} | bars and hinges, ... (damping: StrainDamping
 pattern.cells = [10, 11] | bars and hinges, ... take long: 440 panels, more than 400

@@ -25,7 +25,7 @@ from foldyn.structures import Sheet
 from verification.fidelity.compare import markdown
 
 STEEL = Sheet(2e11, 0.3, 1e-3, density=7850.0)
-MESHES = (4, 8, 16)
+MESHES = (8, 16, 24)
 NAFEMS = (0.421, 1.029, 2.582, 3.306, 3.753, 6.555)
 """Frequencies (Hz) of FV16: NAFEMS, The Standard NAFEMS Benchmarks, 1990."""
 
@@ -73,7 +73,7 @@ def landmarks() -> list[Landmark]:
     plate = Pattern([[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0]], [(0, 1, 2, 3)])
     turn = np.radians(np.linspace(0.0, 90.0, 6))
     arc = 0.03 * np.stack([np.sin(turn), 0.0 * turn, np.cos(turn)], axis=1)
-    blade = welded(facets(arc, 0.2, 5))
+    blade = welded(facets(arc, 0.2, 10))
     corner = np.array([[0.05, 0, 0], [0, 0, 0], [0, 0, 0.05]], float)
     held = "ymin or ymax"
     rolled = yoshimura(cells=(4, 4), a=0.05, b=0.1, dihedral=150.0)
@@ -85,7 +85,7 @@ def landmarks() -> list[Landmark]:
             {"clamped": [(0, 3)]}, (Fix([0, 3], along=True),), NAFEMS,
         ),
         strip(2), strip(5), strip(20),
-        Landmark("blade, welded facets of 9 x 40 mm", blade, STEEL, {}, (Fix("ymin", along=True),)),
+        Landmark("blade, welded facets of 9 x 20 mm", blade, STEEL, {}, (Fix("ymin", along=True),)),
         *(
             Landmark(
                 f"L-section, welded facets of 50 x {400 // n} mm", welded(facets(corner, 0.4, n)),
