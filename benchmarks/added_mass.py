@@ -20,7 +20,7 @@ PRODUCTS = 15
 def plate() -> fd.Structure:
     """A square panel."""
     square = fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2, 3)])
-    return fd.discretize(square, fd.Sheet(1e9, 0.3, 1e-3, density=700.0))
+    return fd.discretize(square, fd.Sheet(1e9, 0.3, 1e-3, density=700.0), preset="plate")
 
 
 def median(matrix, vector: np.ndarray) -> float:

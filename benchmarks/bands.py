@@ -28,7 +28,7 @@ def cell(mass: str) -> fd.UnitCell:
     """A cell of 64 nodes."""
     pattern = fd.patterns.miura(cells=(4, 2), a=0.03, b=0.03)
     sheet = fd.Sheet(1e9, 0.3, 1e-3, density=1000.0)
-    nodal = fd.discretize(pattern, sheet, mass=mass)
+    nodal = fd.discretize(pattern, sheet, mass=mass, preset="plate")
     return fd.UnitCell(fd.Case(nodal))
 
 

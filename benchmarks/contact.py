@@ -33,7 +33,7 @@ PAPER = fd.Sheet(1.219e9, 0.2, 0.24e-3, 690.0, length_scale_ratio=2.7)
 def sheet(cells: tuple[int, int], dihedral: float) -> fd.Structure:
     """A folded sheet."""
     pattern = fd.patterns.miura(cells=cells, a=0.02, b=0.02, panel_angle=60, dihedral=dihedral)
-    return fd.discretize(pattern, PAPER, mass="mixed_voronoi")
+    return fd.discretize(pattern, PAPER, mass="mixed_voronoi", preset="plate")
 
 
 def step_times(structure: fd.Structure, method: str, steps: int) -> tuple[float, float]:
@@ -76,7 +76,7 @@ def two_sheets(cells: tuple[int, int]) -> tuple[fd.Structure, np.ndarray]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)  # that they have no edge in common
         both = pattern.joined(pattern.moved((0.0, 0.0, 0.05)))
-    structure = fd.discretize(both, PAPER)
+    structure = fd.discretize(both, PAPER, preset="plate")
     u = np.zeros_like(structure.nodes)
     upper = len(pattern.vertices)
     a, b, c = (structure.nodes[structure.triangles[:, k]] for k in range(3))

@@ -43,7 +43,9 @@ def uses() -> Mapping[str, Mapping[str, Callable[[], object]]]:
     """What is computed, in order, by the name of the process that does it."""
     import foldyn as fd
 
-    structure = fd.discretize(fd.patterns.miura(cells=(1, 1)), fd.Sheet(1e6, 0.25, 0.01, 1.0))
+    structure = fd.discretize(
+        fd.patterns.miura(cells=(1, 1)), fd.Sheet(1e6, 0.25, 0.01, 1.0), preset="plate"
+    )
     held, spring = fd.Fix("xmin"), fd.Spring(1.0, nodes=[7])
     push, contact = fd.Force([5], (0.0, 0.0, 1e-3)), fd.Contact()
 

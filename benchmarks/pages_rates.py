@@ -44,7 +44,7 @@ COUNT = f"""seconds => new Promise((done) => {{
 def moving(cells: tuple[int, int]) -> tuple[xr.Dataset, fd.Case]:
     """A sheet that sways: 100 samples of six waves, as a dataset with what pages read."""
     pattern = fd.patterns.miura(cells, 0.025, b=0.025, panel_angle=60, dihedral=100)
-    structure = fd.discretize(pattern, fd.Sheet(1.2e9, 0.2, 0.24e-3, density=667.0))
+    structure = fd.discretize(pattern, fd.Sheet(1.2e9, 0.2, 0.24e-3, density=667.0), preset="plate")
     case = fd.Case(structure, [fd.Fix([0, 1, 2], axes="xyz")])
     place = structure.nodes / pattern.size
     time = np.linspace(0.0, 1.0, 100)

@@ -27,7 +27,7 @@ def specimen(*motion: fd.BaseMotion) -> fd.Case:
     pattern = fd.patterns.miura(cells=(4, 3), a=0.025, b=0.025, panel_angle=60, dihedral=39.2)
     paper = fd.Sheet(1219e6, 0.2, 0.24e-3, density=667.0, length_scale_ratio=2.7)
     held = [fd.Fix(range(56, 63), "x"), fd.Fix([59], "y"), fd.Fix([57, 59, 61], "z")]
-    s = fd.discretize(pattern, paper)
+    s = fd.discretize(pattern, paper, preset="plate")
     return fd.Case(s, [*held, *motion], damping=fd.Rayleigh(alpha=4.0))
 
 

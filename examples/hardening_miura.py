@@ -14,7 +14,7 @@ def case(dihedral):
     """Four panels: corners on a smooth floor, one side at a smooth wall."""
     pattern = fd.patterns.miura(cells=(1, 1), a=edge, b=edge, panel_angle=60, dihedral=dihedral)
     held = [fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2, 6, 8], "z"), fd.Fix([1], "y")]
-    return fd.Case(fd.discretize(pattern, sheet), held)
+    return fd.Case(fd.discretize(pattern, sheet, preset="plate"), held)
 
 
 modes = np.array([fd.modes(case(one), count=2).frequency.values for one in dihedrals])  # Hz

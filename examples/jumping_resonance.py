@@ -3,7 +3,7 @@
 import foldyn as fd
 
 pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
-s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, density=1.0))
+s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, density=1.0), preset="plate")
 held = [fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2, 6, 8], "z"), fd.Fix([1], "y")]
 curves = {}
 for force in (5e-5, 1e-4, 2e-4):  # N

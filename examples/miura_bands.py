@@ -13,7 +13,7 @@ below = 4  # number of the band below the gap
 def cell(dihedral):
     """Four panels, which repeat along x and y."""
     pattern = fd.patterns.miura(a=0.03, b=0.03, panel_angle=60, dihedral=dihedral)
-    return fd.UnitCell(fd.Case(fd.discretize(pattern, sheet)))
+    return fd.UnitCell(fd.Case(fd.discretize(pattern, sheet, preset="plate")))
 
 
 bottom, top = [], []

@@ -6,7 +6,7 @@ import foldyn as fd
 
 pattern = fd.patterns.miura(cells=(4, 3), a=0.025, b=0.025, panel_angle=60, dihedral=39.2)
 paper = fd.Sheet(1.219e9, 0.2, 0.24e-3, density=667.0, length_scale_ratio=2.7)
-s = fd.discretize(pattern, paper)
+s = fd.discretize(pattern, paper, preset="plate")
 held = [fd.Fix(range(56, 63), "x"), fd.Fix([59], "y"), fd.Fix([57, 59, 61], "z")]
 middle = 8.5  # Hz, at which the base has the acceleration
 curves = {}

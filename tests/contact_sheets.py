@@ -17,7 +17,11 @@ def strip(panels: int = 3) -> fd.Structure:
     nodes = [[0.04 * i, 0.05 * j, 0.0] for i in range(panels + 1) for j in (0, 1)]
     faces = [(2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1) for i in range(panels)]
     return fd.discretize(
-        fd.Pattern(nodes, faces, name="strip"), SHEET, fold_law="linear", membrane="bars"
+        fd.Pattern(nodes, faces, name="strip"),
+        SHEET,
+        fold_law="linear",
+        membrane="bars",
+        preset="plate",
     )
 
 
@@ -33,7 +37,7 @@ def on_a_panel(shift=(0.0, 0.0), turn: float = 0.0) -> tuple[fd.Structure, list[
     strip = strip @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + [*shift, z]
     faces = [(0, 1, 2, 3), (4, 6, 7, 5), (6, 8, 9, 7)]
     pattern = fd.Pattern(np.vstack([ground, strip]), faces, name="strip on a panel")
-    made = fd.discretize(pattern, SHEET, fold_law="linear", membrane="bars")
+    made = fd.discretize(pattern, SHEET, fold_law="linear", membrane="bars", preset="plate")
     return made, [*range(4, 10), *made.centers[1:].tolist()]
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import foldyn as fd
 from foldyn.dynamics import METHODS
 from foldyn.errors import FoldynWarning, InputError
+from named_models import named
 
 PAGE = Path(__file__).resolve().parents[1] / "docs/features.md"
 BEGIN, END = "<!-- table -->\n", "<!-- end of the table -->\n"
@@ -34,7 +35,7 @@ class Setting:
     moves: bool = False
 
     def sheet(self, pattern: fd.Pattern = PATTERN, **options: Any) -> fd.Structure:
-        return fd.discretize(pattern, SHEET, mass=self.mass, **options)
+        return fd.discretize(pattern, SHEET, mass=self.mass, **named(options))
 
     def shell(self) -> fd.Shell:
         return fd.shell(PATTERN, SHEET, divisions=1)

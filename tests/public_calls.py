@@ -32,13 +32,13 @@ def sheet() -> fd.Sheet:
 @cache
 def cell() -> fd.UnitCell:
     """The sheet of which that is a pleat."""
-    return fd.UnitCell(fd.Case(fd.discretize(pattern(), sheet())))
+    return fd.UnitCell(fd.Case(fd.discretize(pattern(), sheet(), preset="plate")))
 
 
 @cache
 def case() -> fd.Case:
     """One side held, the other pushed."""
-    made = fd.discretize(pattern(), sheet())
+    made = fd.discretize(pattern(), sheet(), preset="plate")
     return fd.Case(
         made, [fd.Fix([0, 1, 2, 3])], [fd.Force([4, 5], (0, 0, 1e-3))], fd.Rayleigh(alpha=1.0)
     )
@@ -146,11 +146,12 @@ DATA: Calls = {
         "axis": (0.0, 0.5, 1.0), "angle": 30.0, "shift": 0.5, "point": (0.0, 0.5, 0.0),
     }),
     "UnitCell": (fd.UnitCell, {
-        "case": fd.Case(fd.discretize(pattern(), sheet())), "vectors": [(3.0**0.5, 0.0, 0.0)],
-        "screw": None, "tolerance": 0.5**20,
+        "case": fd.Case(fd.discretize(pattern(), sheet(), preset="plate")),
+        "vectors": [(3.0**0.5, 0.0, 0.0)], "screw": None, "tolerance": 0.5**20,
     }),
     "Case": (fd.Case, {
-        "structure": fd.discretize(pattern(), sheet()), "supports": [fd.Fix([0, 1, 2, 3])],
+        "structure": fd.discretize(pattern(), sheet(), preset="plate"),
+        "supports": [fd.Fix([0, 1, 2, 3])],
         "loads": [fd.Force([4, 5], (0, 0, 1e-3))], "damping": fd.Rayleigh(alpha=1.0),
         "masses": [fd.PointMass([4], 0.5)], "contact": fd.Contact(thickness=0.01),
         "air": fd.Air(density=998.0),

@@ -19,6 +19,7 @@ import foldyn as fd
 from foldyn.cases.document import from_document, to_document
 from foldyn.errors import FoldynError, FoldynWarning, InputError
 from foldyn.patterns import GENERATORS
+from named_models import named
 from pairwise import beyond
 from public_calls import DATA, PATTERNS, case, pattern, sheet, solved
 
@@ -164,7 +165,7 @@ def test_a_case_of_numpys_numbers_is_written_and_read(real, whole, kind, tmp_pat
     creases = {"crease_stiffness": real(0.5), "crease_rest": real(90.0)}
     law = fd.Plastic(real(0.5), kinematic=real(0.25), law=fd.EnhancedLinear(real(45), real(315)))
     if kind == "bars":
-        structure = fd.discretize(pattern(), material, **creases, fold_law=law)
+        structure = fd.discretize(pattern(), material, **named(creases), fold_law=law)
     else:
         structure = fd.shell(pattern(), material, divisions=whole(2), **creases)
     made = fd.Case(
@@ -196,4 +197,4 @@ def test_a_folding_stands_for_its_pattern():
         np.testing.assert_array_equal(one.nodes, other.nodes)
         assert one.pattern is folding.pattern
     with pytest.raises(InputError, match="pattern: got Case, give a Pattern"):
-        fd.discretize(case(), sheet())
+        fd.discretize(case(), sheet(), preset="plate")

@@ -21,6 +21,7 @@ from foldyn.cases import LOADS, SUPPORTS, BaseMotion, Force, Table
 from foldyn.cases.decode import law_from
 from foldyn.cli.main import main
 from foldyn.tables import keys, table_under
+from named_models import named
 from pairwise import FEW
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -104,7 +105,7 @@ def test_the_error_that_the_tutorial_states(tutorial):
 
 def test_the_quantities_of_the_results_page_can_be_sampled():
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
-    structure = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0))
+    structure = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), preset="plate")
     case = fd.Case(structure, loads=[fd.Force([6, 7, 8], (0.01, 0.0, 0.0))])
     (block,) = (b for b in blocks("results.md", "python") if "sample=" in b)
     motion = executed(block, fd=fd, np=np, case=case)["trajectory"]
@@ -301,7 +302,7 @@ def test_what_a_swinging_panel_and_a_twisting_one_make_of_a_rule():
 
     def swing(rule: str) -> float:
         laws = {"fold_law": "linear", "bend_law": "linear", "crease_stiffness": 1e-6}
-        s = fd.discretize(square, sheet, mass=rule, **laws)
+        s = fd.discretize(square, sheet, mass=rule, **named(laws))
         held = [node for node in range(len(s.nodes)) if s.nodes[node, 0] < 1e-9]
         return float(fd.modes(fd.Case(s, [fd.Fix(held, "xyz")]), 1).frequency[0])
 
@@ -312,7 +313,7 @@ def test_what_a_swinging_panel_and_a_twisting_one_make_of_a_rule():
         assert 100 * swing(rule) / true == pytest.approx(float(percent), abs=0.06), rule
     corners = fd.Pattern([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2, 3]])
     for rule, twist in (("consistent", 6), ("inertia_exact", 3)):
-        mass = fd.discretize(corners, sheet, mass=rule).mass
+        mass = fd.discretize(corners, sheet, mass=rule, preset="plate").mass
         w = np.array([1.0, -1.0, 1.0, -1.0, 0.0])
         assert w @ (mass @ w) == pytest.approx(mass.sum() / twist)
         assert f"m w^2/{twist}$" in page

@@ -27,7 +27,7 @@ def snapping():
 
 def _objects():
     pattern = fd.patterns.miura(cells=(6, 5))
-    s = fd.discretize(pattern, SHEET)
+    s = fd.discretize(pattern, SHEET, preset="plate")
     case = fd.Case(s, [fd.Fix(MANY, "xy"), fd.Impose(MANY, "z", [0.0] * 50)], [], fd.Rayleigh(0.1))
     t = np.linspace(0.0, 4.0, 401)
     ringing = np.exp(-t) * np.cos(2 * np.pi * 3 * t)

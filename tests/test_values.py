@@ -127,7 +127,7 @@ def test_what_passes_the_doors_makes_sound_structures():
             sheet = fd.Sheet(modulus, 0.25, thickness, density, ratio)
             pattern = fd.patterns.miura(a=size, b=size)
             try:
-                bars = fd.discretize(pattern, sheet)
+                bars = fd.discretize(pattern, sheet, preset="plate")
             except InputError as error:
                 refused.append(str(error))
                 with pytest.raises(InputError, match="out of range"):

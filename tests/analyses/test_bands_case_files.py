@@ -44,7 +44,9 @@ def found(tmp_path_factory):
 
 def cell_at(dihedral: float) -> fd.UnitCell:
     pattern = fd.patterns.miura(dihedral=dihedral)
-    return fd.UnitCell(fd.Case(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0))))
+    return fd.UnitCell(
+        fd.Case(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), preset="plate"))
+    )
 
 
 @pytest.mark.matrix
@@ -161,7 +163,7 @@ screw = {{ axis = "z", angle = 30, shift = 0.05 }}
 """
     own = case_file(tmp_path, text).run()
     sheet = fd.Sheet(1e6, 0.25, 0.01, 1.0)
-    cell = fd.UnitCell(fd.Case(fd.discretize(tower, sheet)))
+    cell = fd.UnitCell(fd.Case(fd.discretize(tower, sheet, preset="plate")))
     marked = fd.bands(cell, cell.path("G-X", 5))["eigenvalue"].values
     noise = 1e-9 * np.abs(marked).max()
     np.testing.assert_allclose(np.sort(own["eigenvalue"]), np.sort(marked), rtol=0, atol=noise)

@@ -44,9 +44,9 @@ def test_the_example_of_the_design(read, example, tmp_path) -> None:
 def test_what_is_left_out_has_its_default(read, short) -> None:
     found = read(short)
     assert found.title == ""
-    assert found.masses == [PRESETS["plate"].mass]
+    assert found.masses == [PRESETS["n5b8e"].mass]
     case = found.case()
-    assert case.structure.options == PRESETS["plate"]
+    assert case.structure.options == PRESETS["n5b8e"]
     assert case.damping == Rayleigh()
     assert case.load_terms[0][1] == Constant()
     np.testing.assert_array_equal(found.output.nodes, [6, 7])  # the loaded ones

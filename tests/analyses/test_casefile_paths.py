@@ -12,7 +12,7 @@ from foldyn.analyses.path import Reached
 from foldyn.cases import Fix, Force, Gravity, Impose
 from foldyn.errors import InputError
 from foldyn.statics import Settings
-from foldyn.structures import ModelOptions
+from foldyn.structures import PRESETS
 
 PATH = f"""{HELD_MIURA_TEXT.replace("density = 1.0", "")}[[loads]]
 nodes = [7, 6]
@@ -52,7 +52,7 @@ def test_what_is_left_out_has_its_default(read) -> None:
     np.testing.assert_array_equal(output.nodes, [6, 7])  # the loaded ones
     assert (output.axis, output.shapes, output.animation) == (None, 4, None)
     assert output.max_frequency is None
-    assert found.masses == [ModelOptions().mass]
+    assert found.masses == [PRESETS["n5b8e"].mass]
     assert found.case().loads == (Force([7, 6], (1, 0, 0)),)
     assert found.initial() is None
 

@@ -83,7 +83,7 @@ def test_defaults_of_a_shell(filed):
     assert case_file.masses == ["lumped"]
     assert case_file.analysis.arguments["method"] == "auto"
     plain = read_case(filed(MOTION))
-    assert plain.masses == ["consistent"]
+    assert plain.masses == ["condensed"]
 
 
 def test_shells_move_by_all_methods(filed):
@@ -174,7 +174,7 @@ def test_responses_and_modes_as_those_of_a_shell(filed):
 def test_a_file_of_a_shell_as_bars_and_hinges(filed):
     path = filed(f'{SHELL}; model.mass = "lumped"; model.crease_rest = 290')
     case_file = read_case(path, model="bars_and_hinges")
-    assert (case_file.model, case_file.masses) == ("bars_and_hinges", ["consistent"])
+    assert (case_file.model, case_file.masses) == ("bars_and_hinges", ["condensed"])
     assert case_file.case().structure.options.crease_rest == 290
     assert read_case(path, divisions=4).case().structure.options.divisions == 4
     assert read_case(path, model="shell").case().structure.options.divisions == 2

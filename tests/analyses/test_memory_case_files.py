@@ -12,6 +12,7 @@ from case_texts import HELD_FOLD_TEXT
 from foldyn.errors import ComputationError, InputError
 from foldyn.exports.creased_shell import fold_slopes
 from foldyn.viewer.states import fields
+from named_models import named
 
 FOLD = f"""{HELD_FOLD_TEXT.replace("= 60", "= 120")}[[loads]]
 nodes = [0, 1]
@@ -106,7 +107,7 @@ def test_faults_are_named(tmp_path, law, message):
 def fold_case(law, **options):
     pattern, sheet = fd.patterns.simple_fold(dihedral=120), fd.Sheet(1e6, 0.25, 0.01, 1.0)
     return fd.Case(
-        fd.discretize(pattern, sheet, fold_law=law, mass="panel", **options),
+        fd.discretize(pattern, sheet, fold_law=law, mass="panel", **named(options)),
         [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")],
         [fd.Force([0, 1], (1e-3, 0, 0))],
     )
@@ -158,7 +159,7 @@ def test_a_mode_that_does_not_swing_any_more_is_an_error():
     made = fold_case(law := fd.Prony(100.0, 0.02, law="linear"))
     # rigid panels: others would swing on creases that hardly turn
     options = {"fold_law": law, "mass": "panel", "rigid": "all"}
-    structure = fd.discretize(made.structure.pattern, made.structure.sheet, **options)
+    structure = fd.discretize(made.structure.pattern, made.structure.sheet, **named(options))
     case = fd.Case(structure, made.supports)
     with pytest.raises(ComputationError, match="they damp it so strongly that it does not vibrate"):
         fd.modes(case, 1)

@@ -43,7 +43,6 @@ analysis.secant = 2 | bars and hinges, as superelements do not take analysis.sec
 model.fold_law = "superlinear" | bars and hinges, ... refuse the case (fold_law = 'superlinear':
 air.density = 1.2 | superelements, the default
 contact.planes = [{{ point = [0, 0, -9], normal = [0, 0, 1] }}] | bars and ... (contact: Contact is
-damping.strain = {{ beta = 1e-4 }} | bars and hinges, ... (damping: StrainDamping
 pattern.cells = [10, 11] | bars and hinges, ... take long: 440 panels, more than 400
 {MANY} | bars and hinges, ... take long: 21 different panels, more than 20
 {FRF}, frequencies = {{ first = 1, last = 9, count = 1201 }} }} | bars ... 4 panels at 1201 freq

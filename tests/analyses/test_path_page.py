@@ -17,7 +17,7 @@ from foldyn.report.sections import Charts
 @pytest.fixture
 def cell():
     pattern = fd.patterns.miura(cells=(1, 1))
-    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01))
+    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01), preset="plate")
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,8 @@ def test_settings_of_a_path_count(read) -> None:
 
 
 def test_each_mass_rule_and_other_arguments(read) -> None:
-    case_file = read(FOLD + PUSH + MOTION + '[model]\nmass = ["panel", "centroid"]\n')
+    model = '[model]\npreset = "plate"\nmass = ["panel", "centroid"]\n'
+    case_file = read(FOLD + PUSH + MOTION + model)
     motions = {mass: case_file.run(mass, duration=0.01) for mass in case_file.masses}
     first = case_file.run(duration=0.01)
     np.testing.assert_array_equal(first.displacement, motions["panel"].displacement)

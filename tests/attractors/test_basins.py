@@ -153,7 +153,9 @@ def test_a_kresling_tower_falls_to_either_side_of_its_barrier():
 @pytest.mark.matrix
 def test_a_grid_that_was_cut_off_goes_on(tmp_path, monkeypatch):
     s = fd.discretize(
-        fd.patterns.simple_fold(1.0, 1.0, dihedral=60), fd.Sheet(1e6, 0.25, 0.1, density=1.0)
+        fd.patterns.simple_fold(1.0, 1.0, dihedral=60),
+        fd.Sheet(1e6, 0.25, 0.1, density=1.0),
+        preset="plate",
     )
     case = fd.Case(s, [fd.Fix([4, 5]), fd.Fix([0, 1], "yz")], damping=fd.Rayleigh(alpha=40.0))
     monkeypatch.setattr("foldyn.attractors.grid.AT_ONCE", 2)

@@ -81,7 +81,7 @@ def test_the_exponent_converges_to_the_published_value(ueda):
 def test_tied_nodes_stay_tied():
     """Two masses that are linked move as one of twice the mass."""
     pattern = fd.patterns.simple_fold(1.0, 1.0, dihedral=60)
-    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.1, density=1.0))
+    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.1, density=1.0), preset="plate")
     push = fd.Force([0, 1], (1.0, 0, 0), history=fd.Harmonic(5.0))
     held = [fd.Fix([4, 5]), fd.Fix([0, 1], "yz")]
     case = fd.Case(s, [*held, fd.Link([0, 1], "x")], [push], damping=fd.Rayleigh(alpha=4.0))
@@ -96,10 +96,12 @@ def test_what_has_no_exponent_is_refused(ueda):
         fd.patterns.simple_fold(1.0, 1.0, dihedral=60),
         fd.Sheet(1e6, 0.25, 0.01, density=1.0),
     )
-    touching = fd.Case(fd.discretize(pattern, sheet), contact=fd.Contact(thickness=0.01))
+    touching = fd.Case(
+        fd.discretize(pattern, sheet, preset="plate"), contact=fd.Contact(thickness=0.01)
+    )
     with pytest.raises(InputError, match="contact: the exponent needs smooth forces"):
         fd.lyapunov_exponent(touching, 1.0)
-    yielding = fd.discretize(pattern, sheet, fold_law=fd.Plastic(10.0))
+    yielding = fd.discretize(pattern, sheet, fold_law=fd.Plastic(10.0), preset="plate")
     with pytest.raises(InputError, match="structure: some of its hinges yield or creep"):
         fd.lyapunov_exponent(fd.Case(yielding, [fd.Fix([4, 5])]), 1.0)
     with pytest.raises(InputError, match="duration = 1 s: is shorter than a period of the drive"):

@@ -76,7 +76,9 @@ def test_states_between_samples_are_those_of_a_cubic():
 @pytest.mark.matrix
 def test_sections_keep_the_case_and_can_be_stored(tmp_path):
     s = fd.discretize(
-        fd.patterns.simple_fold(1.0, 1.0, dihedral=60), fd.Sheet(1e6, 0.25, 0.01, density=1.0)
+        fd.patterns.simple_fold(1.0, 1.0, dihedral=60),
+        fd.Sheet(1e6, 0.25, 0.01, density=1.0),
+        preset="plate",
     )
     push = fd.Force([0, 1], (1e-3, 0, 0), history=fd.Harmonic(0.5))
     case = fd.Case(s, [fd.Fix([4, 5]), fd.Fix([0, 1], "yz")], [push], fd.Rayleigh(alpha=2.0))

@@ -265,7 +265,9 @@ def test_jumps_are_large_changes_within_the_width():
 
 def test_what_cannot_be_swept_is_refused(hardening):
     creases = fd.discretize(
-        fd.patterns.simple_fold(1.0, 1.0, dihedral=60), fd.Sheet(1e6, 0.25, 0.01, density=1.0)
+        fd.patterns.simple_fold(1.0, 1.0, dihedral=60),
+        fd.Sheet(1e6, 0.25, 0.01, density=1.0),
+        preset="plate",
     )
     swinging = fd.Case(
         creases, [fd.Fix([4, 5])], [fd.Actuate("all", angle=70, history=fd.Harmonic(1.0))]

@@ -13,7 +13,7 @@ from foldyn.errors import InputError
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1000.0)
 PATTERN = fd.patterns.miura(cells=(2, 2), a=1.0, b=1.0, panel_angle=60, dihedral=60)
-STRUCTURE = fd.discretize(PATTERN, SHEET)
+STRUCTURE = fd.discretize(PATTERN, SHEET, preset="plate")
 LETTERS = np.array(PATTERN.assignments)
 
 
@@ -30,7 +30,7 @@ def test_change_goes_from_the_rest_value_to_the_angle() -> None:
 
 def test_rest_values_given_to_discretize_are_where_it_starts() -> None:
     """An angle that is the rest value still actuates."""
-    structure = fd.discretize(PATTERN, SHEET, crease_rest=100)
+    structure = fd.discretize(PATTERN, SHEET, crease_rest=100, preset="plate")
     case = Case(structure, loads=[Actuate([4, 5], [100, 130])])
     ((change, _),) = case.actuation_terms
     np.testing.assert_allclose(change[[4, 5]], [0.0, np.radians(30)], rtol=1e-14, atol=1e-15)
@@ -52,7 +52,7 @@ def test_creases_by_assignment() -> None:
 def test_all_leaves_out_flat_creases() -> None:
     letters = ["F", "U", *PATTERN.assignments[2:]]
     with_flat = fd.Pattern(PATTERN.vertices, PATTERN.faces, letters)
-    case = Case(fd.discretize(with_flat, SHEET), loads=[Actuate("all", 180)])
+    case = Case(fd.discretize(with_flat, SHEET, preset="plate"), loads=[Actuate("all", 180)])
     np.testing.assert_array_equal(case.actuated_creases, np.arange(1, len(letters)))
     # flattening: every rest angle of the others becomes pi
     ((change, _),) = case.actuation_terms
@@ -84,7 +84,7 @@ def test_closed_creases_need_a_law_that_allows_them(angle) -> None:
     with pytest.raises(InputError, match=r"loads\[0\]\.angle = (0|360): .*infinite moment"):
         Case(STRUCTURE, loads=[load])
     for law in (fd.EnhancedLinear(rest="as_published"), "linear"):
-        structure = fd.discretize(PATTERN, SHEET, fold_law=law)
+        structure = fd.discretize(PATTERN, SHEET, fold_law=law, preset="plate")
         ((change, _),) = Case(structure, loads=[load]).actuation_terms
         rest = np.degrees(structure.fold_rest + change)[:2]
         np.testing.assert_allclose(rest, np.broadcast_to(angle, 2), atol=1e-12)
@@ -96,8 +96,12 @@ def test_equal_actuations_compare_equal() -> None:
     assert Actuate("all", 60) != Actuate("all", 61)
 
 
-FLAT = fd.discretize(fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)]), SHEET)
-PANEL = fd.discretize(fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2, 3)]), SHEET)
+FLAT = fd.discretize(
+    fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)]), SHEET, preset="plate"
+)
+PANEL = fd.discretize(
+    fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2, 3)]), SHEET, preset="plate"
+)
 BARE = dataclasses.replace(STRUCTURE, pattern=None)
 PUSHED = [Force([5], (1, 0, 0)), Actuate([2, 3], 90)]
 WORDS = [Actuate("all", 90), Actuate("valley", 90)]

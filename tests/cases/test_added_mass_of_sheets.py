@@ -14,7 +14,7 @@ WATER = 998.0
 
 def plates(*corners):
     faces = [tuple(range(4 * k, 4 * k + 4)) for k in range(len(corners))]
-    return fd.discretize(fd.Pattern(np.concatenate(corners), faces), SHEET)
+    return fd.discretize(fd.Pattern(np.concatenate(corners), faces), SHEET, preset="plate")
 
 
 def rectangle(a, b, height=0.0, aside=0.0):
@@ -135,7 +135,7 @@ def test_a_folded_sheet_has_the_mass_of_another_method():
     counts = 4, 6, 9
     other = np.array([vortex_rings(pattern, n) for n in counts]).reshape(3, 9)
     expected = np.polyfit(1.0 / np.array(counts), other, 2)[-1].reshape(3, 3)
-    structure = fd.discretize(pattern, SHEET)
+    structure = fd.discretize(pattern, SHEET, preset="plate")
     unit = np.tile(np.eye(3), (len(structure.nodes), 1))
     coarse, fine = (unit.T @ (added(structure, n) @ unit) for n in (8, 12))
     found = fine + (fine - coarse) / (1.5**2 - 1)
@@ -145,7 +145,7 @@ def test_a_folded_sheet_has_the_mass_of_another_method():
 # ------------------------------------------------------------------ every sheet
 @pytest.fixture(scope="module")
 def folded():
-    return fd.discretize(miura(), SHEET)
+    return fd.discretize(miura(), SHEET, preset="plate")
 
 
 def test_it_is_symmetric_and_positive_and_its_forms_agree(folded):
@@ -170,7 +170,7 @@ def test_it_turns_shifts_scales_and_renumbers_with_the_sheet(folded):
     place = np.argsort(order)
     faces = [tuple(place[[*face[1:], face[0]]].tolist()) for face in reversed(pattern.faces)]
     other = fd.Pattern(3.0 * pattern.vertices[order] @ turn.T + [50.0, -20.0, 7.0], faces)
-    moved = fd.discretize(other, SHEET)
+    moved = fd.discretize(other, SHEET, preset="plate")
     found = added(moved).todense()
     count = len(faces)
     node = np.append(order, len(order) + count - 1 - np.arange(count))  # centers, in panel order
@@ -185,7 +185,9 @@ def test_rounding_does_not_choose_how_regular_grids_are_integrated():
     pattern = fd.patterns.miura(cells=(2, 1), a=0.03, b=0.03, panel_angle=60, dihedral=100)
     found = [
         fd.Case(
-            fd.discretize(fd.Pattern(pattern.vertices + shift, pattern.faces), SHEET),
+            fd.discretize(
+                fd.Pattern(pattern.vertices + shift, pattern.faces), SHEET, preset="plate"
+            ),
             air=fd.Air(resolution=2),
         ).added_mass().todense()
         for shift in (0.0, [1.0, 2.0, 3.0])
@@ -196,7 +198,7 @@ def test_rounding_does_not_choose_how_regular_grids_are_integrated():
 def test_a_state_moves_the_elements_as_a_pattern_that_is_folded_so(folded):
     """Panels bend in no rigid folding, so both have the same elements."""
     flatter = fd.patterns.miura(cells=(2, 1), a=1.0, b=1.3, panel_angle=70, dihedral=130)
-    other = fd.discretize(flatter, SHEET)
+    other = fd.discretize(flatter, SHEET, preset="plate")
     case = fd.Case(folded, air=fd.Air())
     found = case.added_mass(fd.State(displacement=other.nodes - folded.nodes))
     expected = added(other, density=1.204).todense()
@@ -206,7 +208,10 @@ def test_a_state_moves_the_elements_as_a_pattern_that_is_folded_so(folded):
 def test_shells_and_bars_move_the_same_fluid():
     pattern = miura()
     masses = []
-    for structure in (fd.discretize(pattern, SHEET), fd.shell(pattern, SHEET, divisions=3)):
+    for structure in (
+        fd.discretize(pattern, SHEET, preset="plate"),
+        fd.shell(pattern, SHEET, divisions=3),
+    ):
         operator = added(structure)
         unit = np.stack([along(structure, row) for row in np.eye(3)], axis=1)
         masses.append(unit.T @ (operator @ unit))
@@ -218,7 +223,9 @@ def test_panels_of_any_number_of_corners_have_elements():
     """A house is the same however it is cut into panels, to the error of the grid."""
     house = np.array([(0, 0), (1, 0), (1, 1), (0.5, 1.5), (0, 1)], float)
     cuts = [(0, 1, 2, 3, 4)], [(0, 1, 2, 4), (4, 2, 3)], [(0, 1, 2), (0, 2, 4), (4, 2, 3)]
-    found = [heave(fd.discretize(fd.Pattern(house, cut), SHEET), 12) for cut in cuts]
+    found = [
+        heave(fd.discretize(fd.Pattern(house, cut), SHEET, preset="plate"), 12) for cut in cuts
+    ]
     np.testing.assert_allclose(found, found[0], rtol=0.01)
 
 
@@ -253,11 +260,11 @@ def test_panels_that_lie_on_each_other_are_refused():
 
 def test_a_fold_may_close_to_a_degree_but_not_altogether():
     half = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=40)
-    s = fd.discretize(half, SHEET)
+    s = fd.discretize(half, SHEET, preset="plate")
     case = fd.Case(s, air=fd.Air(1.0))
     for degrees, refused in ((1.0, False), (0.05, True)):
         flat = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=degrees)
-        closed = fd.discretize(flat, SHEET).nodes
+        closed = fd.discretize(flat, SHEET, preset="plate").nodes
         state = fd.State(displacement=closed - s.nodes)
         if refused:
             with pytest.raises(InputError, match="panels 0 and 1"):
@@ -277,4 +284,4 @@ def test_sheets_without_a_flow_are_refused(folded):
     box = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
     closed = fd.Pattern(box, [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
     with pytest.raises(InputError, match="encloses a volume"):
-        added(fd.discretize(closed, SHEET))
+        added(fd.discretize(closed, SHEET, preset="plate"))

@@ -9,7 +9,7 @@ from foldyn.errors import InputError
 
 def plate(a=1.0, b=1.0):
     pattern = fd.Pattern([(0, 0), (a, 0), (a, b), (0, b)], [(0, 1, 2, 3)])
-    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, density=1000.0))
+    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, density=1000.0), preset="plate")
 
 
 @pytest.mark.parametrize(

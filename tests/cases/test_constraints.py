@@ -14,7 +14,7 @@ from foldyn.errors import InputError
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
 FOLD = fd.patterns.simple_fold()
-BARS = fd.discretize(FOLD, SHEET)
+BARS = fd.discretize(FOLD, SHEET, preset="plate")
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -118,11 +118,14 @@ BENT = fd.Pattern([[0, 0, 0], [1, 0, 0], [1, 1, 0.1], [0, 1, 0]], [[0, 1, 2, 3]]
         (lambda: fd.Case(BARS, [fd.Fix([0]), ROLLER]), CANNOT + r"\[1\]"),
         (lambda: fd.Case(BARS, TIED), CANNOT + r"\[2\]"),
         (
-            lambda: fd.discretize(FOLD, SHEET, rigid=[2]),
+            lambda: fd.discretize(FOLD, SHEET, rigid=[2], preset="plate"),
             r"\[2\]: panel 2 is out of range; .* 0 to 1",
         ),
         (lambda: fd.shell(FOLD, SHEET, divisions=2, rigid="none"), 'rigid = "none": must be "all"'),
-        (lambda: fd.discretize(BENT, SHEET, rigid="all"), r"panel 0 is not flat: node 0 lies 0.07"),
+        (
+            lambda: fd.discretize(BENT, SHEET, rigid="all", preset="plate"),
+            r"panel 0 is not flat: node 0 lies 0.07",
+        ),
         (lambda: fd.shell(BENT, SHEET, divisions=2, rigid=[0]), "rigid: panel 0 is not flat"),
     ],
 )

@@ -16,7 +16,7 @@ from foldyn.errors import InputError
 from foldyn.tables import read
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
-FOLD = fd.discretize(fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60), SHEET)
+FOLD = fd.discretize(fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60), SHEET, preset="plate")
 PLANE = fd.Plane((0, 0, -0.1), (0, 0, 2), friction=0.4, motion=(0, 0, 0.2), history=fd.Ramp(1.0))
 
 
@@ -107,7 +107,7 @@ def test_in_a_path_the_load_factor_moves_planes(read, model):
 
 def test_what_may_touch_follows_the_sheet():
     parts = [fd.PanelSheet(panels=[1], thickness=0.02)]
-    s = fd.discretize(FOLD.pattern, replace(SHEET, panels=parts))
+    s = fd.discretize(FOLD.pattern, replace(SHEET, panels=parts), preset="plate")
     held = np.zeros(len(s.nodes), bool)
     made = fd.Contact().sheets(s, held)
     np.testing.assert_allclose(made.thickness, [0.01, 0.02])

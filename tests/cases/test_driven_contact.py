@@ -67,7 +67,7 @@ def test_panels_that_supports_move_through_each_other():
     square = np.array([[0, 0, 0], [0.04, 0, 0], [0.04, 0.04, 0], [0, 0.04, 0]])
     above = square * 0.5 + [0.01, 0.01, 2e-3]
     pattern = fd.Pattern(np.vstack([square, above]), [(0, 1, 2, 3), (4, 5, 6, 7)])
-    s = fd.discretize(pattern, fd.Sheet(1e9, 0.3, 2e-4, 700.0))
+    s = fd.discretize(pattern, fd.Sheet(1e9, 0.3, 2e-4, 700.0), preset="plate")
     held = [fd.Fix([0, 1, 2, 3]), fd.Fix([4, 5, 6, 7], "xy"), fd.Impose([6, 7], "z", -1e-3, LATE)]
 
     def lowered(by: float, contact: fd.Contact | None) -> fd.Case:
@@ -84,7 +84,7 @@ def test_panels_without_a_center_have_no_node_of_that_number():
     nodes = [[0, 0, 0], [0.04, 0, 0], [0, 0.04, 0], [0, 0, 1e-3], [0.04, 0, 1e-3], [0, 0.04, 1e-3]]
     free = [[0.06, 0, 0], [0.1, 0, 0], [0.06, 0.04, 0]]
     pattern = fd.Pattern(nodes + free, [(0, 1, 2), (3, 4, 5), (6, 7, 8)])
-    s = fd.discretize(pattern, fd.Sheet(1e9, 0.3, 2e-4, 700.0))
+    s = fd.discretize(pattern, fd.Sheet(1e9, 0.3, 2e-4, 700.0), preset="plate")
     supports = [fd.Fix([0, 1, 2]), fd.Fix([3, 4, 5, 6, 7], "xy"), fd.Fix([6, 7], "z")]
     drop = fd.Impose([3], "z", -5e-4, LATE)
     prepare(fd.Case(s, [*supports, drop], contact=fd.Contact()), 0.02, method="rk4", interval=0.01)

@@ -20,7 +20,7 @@ MAKERS = [fd.discretize, lambda *args, **options: fd.shell(*args, divisions=2, *
 
 def reached(load: fd.Actuate, structure: fd.Structure | None = None) -> np.ndarray:
     """Rest dihedrals (degrees) at factor 1; nan of creases that the load leaves alone."""
-    structure = structure or fd.discretize(PATTERN, SHEET)
+    structure = structure or fd.discretize(PATTERN, SHEET, preset="plate")
     case = fd.Case(structure, loads=[load])
     ((change, _),) = case.actuation_terms
     angles = np.degrees(structure.fold_rest + change)
@@ -63,7 +63,9 @@ def test_fully_folded_needs_a_law_that_allows_it(given):
     mountain = fd.Actuate(int(np.flatnonzero(LETTERS == "M")[0]), fold_angle=-180)
     with pytest.raises(InputError, match=r"loads\[0\]\.fold_angle = -180: this fold law"):
         reached(mountain)  # is named by its own fold angle
-    found = reached(fd.Actuate("all", **given), fd.discretize(PATTERN, SHEET, fold_law="linear"))
+    found = reached(
+        fd.Actuate("all", **given), fd.discretize(PATTERN, SHEET, fold_law="linear", preset="plate")
+    )
     np.testing.assert_allclose(found, np.where(LETTERS == "V", 0.0, 360.0), atol=1e-13)
 
 
@@ -99,7 +101,9 @@ def test_wrong_arguments(given, message):
 )
 def test_creases_that_cannot_fold_so(load, message):
     letters = ["F", "U", *PATTERN.assignments[2:]]
-    structure = fd.discretize(fd.Pattern(PATTERN.vertices, PATTERN.faces, letters), SHEET)
+    structure = fd.discretize(
+        fd.Pattern(PATTERN.vertices, PATTERN.faces, letters), SHEET, preset="plate"
+    )
     with pytest.raises(InputError, match=message):
         fd.Case(structure, loads=[load])
 

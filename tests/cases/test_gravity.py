@@ -17,7 +17,7 @@ MASSLESS = r"loads\[0\]: gravity needs the mass of the structure: .*density is m
 
 def structure(mass: str = "mixed_voronoi", density: float | None = 1000.0) -> fd.Structure:
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.3, panel_angle=60, dihedral=60)
-    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, density), mass=mass)
+    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, density), mass=mass, preset="plate")
 
 
 @pytest.mark.parametrize("mass", MASS_RULES)

@@ -14,13 +14,14 @@ from scipy.integrate import solve_ivp
 
 import foldyn as fd
 from foldyn.structures.structure import hinge_angles
+from named_models import named
 
 GAMMA, DIHEDRAL = 60.0, 100.0
 STIFF = fd.Sheet(1e9, 0.25, 0.01, density=300.0)
 CREASE, STRETCH = 0.02, 1e-8  # N m/rad per m, against some 1e7 N of the bars
 CLOSER = np.cos(np.radians(GAMMA))
 MODELS = {
-    "bars": lambda pattern, **more: fd.discretize(pattern, STIFF, mass="consistent", **more),
+    "bars": lambda pattern, **more: fd.discretize(pattern, STIFF, mass="consistent", **named(more)),
     "shell": lambda pattern, **more: fd.shell(
         pattern, STIFF, divisions=2, mass="consistent", **more
     ),

@@ -83,7 +83,7 @@ def test_blocks_of_implicit_steps_are_the_tangent(model):
 
 
 def test_renumbered_nodes_keep_their_springs():
-    s = fd.discretize(fd.patterns.miura(cells=(8, 8)), SHEET)
+    s = fd.discretize(fd.patterns.miura(cells=(8, 8)), SHEET, preset="plate")
     assert len(s.nodes) > 300  # below, nothing is renumbered
     body = fd.Case(s, [fd.Spring(3.0, nodes=[5], direction="x"), *SOME]).body
     other, by = body.renumbered()

@@ -11,6 +11,7 @@ import foldyn as fd
 from case_texts import MIURA_TEXT
 from foldyn.analyses.reading import read_as
 from foldyn.errors import FoldynWarning, InputError
+from named_models import named
 
 SHEET = fd.Sheet(2e11, 0.3, 1e-3, density=7850.0)
 MIURA = fd.patterns.miura(cells=(2, 2), a=0.04, b=0.04, panel_angle=60, dihedral=110)
@@ -83,11 +84,11 @@ MODELS: dict[str, Any] = {
 
 @pytest.mark.parametrize("name", sorted(MODELS))
 def test_edges_of_bars_and_hinges_must_be_straight(name):
-    bowed = fd.discretize(MIURA, SHEET, **MODELS[name])
+    bowed = fd.discretize(MIURA, SHEET, **named(MODELS[name]))
     with pytest.raises(InputError, match=r"supports\[0\].along: the edge \(0, 1\) may bow .* "
                        'make the structure with straight = "xmin"'):  # fmt: skip
         fd.Case(bowed, [ALONG])
-    straight = fd.discretize(MIURA, SHEET, **MODELS[name], straight="xmin")
+    straight = fd.discretize(MIURA, SHEET, **named(MODELS[name]), straight="xmin")
     held = frequencies(straight, ALONG)
     assert np.array_equal(held, frequencies(straight, fd.Fix("xmin")))
     assert (held >= frequencies(bowed, fd.Fix("xmin"))).all()
@@ -99,13 +100,13 @@ def test_edges_of_bars_and_hinges_must_be_straight(name):
 @pytest.mark.matrix
 def test_a_shell_and_bars_and_hinges_agree():
     shell = fd.shell(MIURA, SHEET, divisions=8, mass="consistent", vertex_radius=1e-3)
-    reduced = fd.discretize(MIURA, SHEET, **MODELS["both"], straight="xmin")
+    reduced = fd.discretize(MIURA, SHEET, **named(MODELS["both"]), straight="xmin")
     assert frequencies(reduced, ALONG) == pytest.approx(frequencies(shell, ALONG), rel=0.05)
 
 
 def bare():
     """A structure without a pattern."""
-    made = fd.discretize(FOLD, SHEET)
+    made = fd.discretize(FOLD, SHEET, preset="plate")
     return fd.Structure(made.nodes, made.bars, made.bar_area, SHEET)
 
 
@@ -117,7 +118,7 @@ NONE = r"along: no edge .* nodes = \[0, 8\]; name them"
     ("make", "nodes", "text"),
     [
         (
-            lambda: fd.discretize(FOLD, SHEET, **MODELS["both"]),
+            lambda: fd.discretize(FOLD, SHEET, **named(MODELS["both"])),
             CREASE,
             "the crease .* take a shell",
         ),

@@ -22,7 +22,9 @@ def through_each_other(depth: float) -> fd.Pattern:
 
 
 MODELS = {
-    "bars and hinges": lambda pattern: fd.discretize(pattern, SHEET, fold_law="linear"),
+    "bars and hinges": lambda pattern: fd.discretize(
+        pattern, SHEET, fold_law="linear", preset="plate"
+    ),
     "shell": lambda pattern: fd.shell(pattern, SHEET, divisions=2, fold_law="linear"),
 }
 ANALYSES = {

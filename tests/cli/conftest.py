@@ -18,6 +18,7 @@ from foldyn.cli.run import DRAWN
 ROUGH = re.compile("warning: .*(panels that stretch|lies? above .* of the panels' own frequency)")
 MIURA = f"""title = "a Miura unit cell"
 {FOLD_TEXT.replace("simple_fold", "miura")}[model]
+preset = "plate"
 mass = "circumcenter"
 [damping]
 alpha = 0.0628

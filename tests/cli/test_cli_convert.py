@@ -87,7 +87,7 @@ def test_bad_input_has_status_2_and_writes_nothing(files, arguments, message) ->
 @pytest.fixture
 def result(workplace):
     """A motion of a Miura cell with six samples."""
-    case = fd.Case(fd.discretize(fd.patterns.miura(), SHEET), [fd.Fix([0, 1, 2])])
+    case = fd.Case(fd.discretize(fd.patterns.miura(), SHEET, preset="plate"), [fd.Fix([0, 1, 2])])
     motion = fd.simulate(case, 0.005, method="rk4", dt=1e-3, initial=None, force=True)
     fd.save(motion, "run.nc")
     return workplace, motion

@@ -89,4 +89,4 @@ def test_info_tells_the_models(workplace) -> None:
     lines = workplace.call("info").out.splitlines()
     assert "model shell: mass lumped, consistent (default: lumped)" in lines
     (reduced,) = [line for line in lines if line.startswith("model bars_and_hinges: ")]
-    assert reduced.endswith("(default: consistent)")
+    assert reduced.endswith("(default: condensed)")

@@ -223,7 +223,7 @@ def test_a_design_is_saved(tmp_path):
 def build(thickness):
     pattern = fd.patterns.miura(cells=(1, 1), dihedral=100)
     sheet = fd.Sheet(1e6, 0.25, thickness, density=1000.0)
-    return fd.Case(fd.discretize(pattern, sheet), [fd.Fix("xmin")])
+    return fd.Case(fd.discretize(pattern, sheet, preset="plate"), [fd.Fix("xmin")])
 
 
 BOUNDS = {"thickness": (0.005, 0.02)}

@@ -19,7 +19,7 @@ def two_sheets() -> tuple[fd.Structure, np.ndarray]:
     turned[:, 2] += 0.02 * turned[:, 0]
     faces = [(0, 1, 4, 3), (1, 2, 5, 4), (6, 7, 10, 9), (7, 8, 11, 10)]
     pattern = fd.Pattern(np.vstack([grid, turned]), faces, name="two sheets")
-    s = fd.discretize(pattern, SHEET, fold_law="linear")
+    s = fd.discretize(pattern, SHEET, fold_law="linear", preset="plate")
     upper = np.zeros(len(s.nodes), bool)
     upper[6:12] = upper[s.centers[2:]] = True
     return s, upper
@@ -36,7 +36,7 @@ def folded_from_both_ends(contact: fd.Contact | None) -> fd.Case:
 def tower(force: float, contact: fd.Contact | None, history=PULSE, alpha: float = 200.0) -> fd.Case:
     """The Kresling tower of the gallery, its top pushed down."""
     pattern = fd.patterns.kresling(sides=6, radius=0.04, height=0.06, twist=30, storeys=1)
-    s = fd.discretize(pattern, SHEET, membrane="bars")
+    s = fd.discretize(pattern, SHEET, membrane="bars", preset="plate")
     push = fd.Force(nodes=list(range(6, 12)), vector=(0, 0, -force), history=history)
     return fd.Case(
         s, [fd.Fix(nodes=list(range(6)))], [push], fd.Rayleigh(alpha=alpha), contact=contact

@@ -24,7 +24,7 @@ SHEET = fd.Sheet(1e6, 0.25, 0.01, 1000.0)
 def sheet(thickness: float = 0.01, force: float = 0.05) -> fd.Case:
     """A cell that swings on a base that moves, under loads with jumps."""
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
-    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, thickness, 1000.0))
+    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, thickness, 1000.0), preset="plate")
     base = fd.BaseMotion("x", fd.Harmonic(2.0), 0.001)
     loads = [fd.Force([6, 7, 8], (force, 0, 0), fd.Pulse(duration=0.3))]
     return fd.Case(s, [fd.Fix([0, 1, 2]), base], loads, fd.Rayleigh(2.0, 1e-5))
@@ -33,7 +33,9 @@ def sheet(thickness: float = 0.01, force: float = 0.05) -> fd.Case:
 def actuated() -> fd.Case:
     """A fold with a law that depends on its rest angle, which moves."""
     pattern = fd.patterns.simple_fold(dihedral=120)
-    s = fd.discretize(pattern, SHEET, fold_law=fd.EnhancedLinear(theta1=90, theta2=270))
+    s = fd.discretize(
+        pattern, SHEET, fold_law=fd.EnhancedLinear(theta1=90, theta2=270), preset="plate"
+    )
     swing = fd.Actuate("all", 220.0, fd.Ramp(0.5, smooth=True))
     return fd.Case(s, [fd.Fix([2, 3])], [swing], fd.Rayleigh(alpha=0.5))
 
@@ -57,7 +59,7 @@ def touching() -> fd.Case:
 def blown() -> fd.Case:
     """A cell that folds by itself in gusts of a dense gas, which moves with it."""
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=120)
-    s = fd.discretize(pattern, SHEET)
+    s = fd.discretize(pattern, SHEET, preset="plate")
     gas = fd.Air(10.0, (0.4, 0.0, 0.8), history=fd.Harmonic(3.0), resolution=2)
     fold = fd.Actuate("all", fraction=0.6, history=fd.Ramp(0.5, smooth=True))
     return fd.Case(s, [fd.Fix([0, 1, 2])], [fold], air=gas)
@@ -66,7 +68,7 @@ def blown() -> fd.Case:
 def warmed() -> fd.Case:
     """A cell that stretches and curls as it gets warm and cold again."""
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=110)
-    s = fd.discretize(pattern, SHEET)
+    s = fd.discretize(pattern, SHEET, preset="plate")
     heat = fd.Temperature(40.0, expansion=2e-4, curvature=1e-3, history=fd.HalfSine(duration=0.5))
     return fd.Case(s, [fd.Fix([0, 1, 2])], [heat])
 

@@ -18,6 +18,7 @@ from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.gpu import choice
 from foldyn.dynamics.gpu.checks import METHODS, lacking
 from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
+from named_models import named
 
 STEPS, END = {"dt": 1e-5, "every_steps": 2}, 4e-5
 SOME = ["central_difference"] if os.environ.get("NUMBA_ENABLE_CUDASIM") == "1" else METHODS
@@ -68,7 +69,7 @@ def case(k: int = 0, laws: str = "enhanced", damping=None, supports=(), **option
     loads = [fd.Force(far, (0, 0, -2e-3 * (k + 1)), fd.HalfSine(2e-4 * (1 + k)))]
     if k % 2:
         loads += [fd.Gravity((0, 0, -9.81)), fd.Force(far[:1], (1e-3, 0, 0), lambda t: 1 + t)]
-    structure = fd.discretize(pattern, material, **given)
+    structure = fd.discretize(pattern, material, **named(given))
     return fd.Case(structure, [fd.Fix(held), *supports], loads, damping or fd.Rayleigh(0.2 * k))
 
 

@@ -9,6 +9,7 @@ from foldyn.cases.added_mass import fluid_at
 from foldyn.dynamics.gpu.checks import lacking
 from foldyn.dynamics.system import pack
 from foldyn.errors import ComputationError, InputError
+from named_models import named
 
 SIDE = 0.1
 FLUID = {"density": 100.0, "drag": False}
@@ -18,12 +19,12 @@ EXPLICIT = ("rk4", "central_difference", "dormand_prince")
 def plate(modulus=1e8, thickness=0.01):
     corners = SIDE * np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
     sheet = fd.Sheet(modulus, 0.3, thickness, density=100.0)
-    return fd.discretize(fd.Pattern(corners, [(0, 1, 2, 3)]), sheet)
+    return fd.discretize(fd.Pattern(corners, [(0, 1, 2, 3)]), sheet, preset="plate")
 
 
 def folded(**changes):
     pattern = fd.patterns.miura(cells=(1, 1), a=SIDE, b=SIDE, panel_angle=60, dihedral=120)
-    return fd.discretize(pattern, fd.Sheet(5e6, 0.3, 1e-3, density=300.0), **changes)
+    return fd.discretize(pattern, fd.Sheet(5e6, 0.3, 1e-3, density=300.0), **named(changes))
 
 
 def momenta(case, motion, sample):
@@ -37,7 +38,7 @@ def momenta(case, motion, sample):
 @pytest.mark.parametrize("added_mass", [True, "local"])
 def test_the_energy_of_the_fluid_is_that_of_the_added_mass(added_mass):
     pattern = fd.patterns.miura(cells=(2, 2), a=SIDE, b=SIDE, panel_angle=60, dihedral=100)
-    structure = fd.discretize(pattern, fd.Sheet(5e6, 0.3, 1e-3, density=300.0))
+    structure = fd.discretize(pattern, fd.Sheet(5e6, 0.3, 1e-3, density=300.0), preset="plate")
     fluid = fd.Air(density=100.0, drag=False, added_mass=added_mass, resolution=2)
     case, random = fd.Case(structure, air=fluid), np.random.default_rng(5)
     moved, v = 0.01 * SIDE * random.random((2, *structure.nodes.shape))
@@ -56,7 +57,7 @@ def last_place(turned=None, shift=0.0, first=0, held=None):
     pattern = folded().pattern
     faces = [face[first:] + face[:first] for face in pattern.faces]
     placed = fd.Pattern(pattern.vertices @ turned.T + shift, faces)
-    sheet = fd.discretize(placed, fd.Sheet(5e6, 0.3, 1e-3, density=300.0))
+    sheet = fd.discretize(placed, fd.Sheet(5e6, 0.3, 1e-3, density=300.0), preset="plate")
     push = fd.Force([6, 8], turned @ (0.01, 0.02, 0.05))
     case = fd.Case(sheet, [held or fd.Fix([0, 1, 2])], [push], air=fd.Air(**FLUID, resolution=2))
     motion = fd.simulate(case, 0.05, method="rk4", interval=0.05)
@@ -150,7 +151,7 @@ def test_new_flows_converge(monkeypatch):
     """Two panels that close on dense gas: half as much turn between two flows, less error."""
     pattern = fd.patterns.simple_fold(a=SIDE, b=SIDE, dihedral=120)
     sheet, crease = fd.Sheet(2e7, 0.3, 2e-3, density=300.0), {"crease_stiffness": 0.2}
-    structure = fd.discretize(pattern, sheet, crease_rest=220.0, **crease)
+    structure = fd.discretize(pattern, sheet, crease_rest=220.0, **named(crease))
     monkeypatch.setattr("foldyn.dynamics.motion.LOOK_EVERY", 2)
     moved = {}
     for turn in (4.0, 2.0, 0.5, None):
@@ -206,7 +207,9 @@ def test_what_does_not_take_added_mass_says_so():
     assert fd.simulate(case, 1e-3, method="auto", interval=1e-3).attrs["method"] == "dormand_prince"
     with pytest.raises(InputError, match=r"air\.added_mass: the exponent needs a constant mass"):
         fd.lyapunov_exponent(case, 1.0)
-    voronoi = fd.discretize(case.structure.pattern, case.structure.sheet, mass="mixed_voronoi")
+    voronoi = fd.discretize(
+        case.structure.pattern, case.structure.sheet, mass="mixed_voronoi", preset="plate"
+    )
     blown = fd.Case(voronoi, air=fd.Air(added_mass=False))
     assert lacking(blown, pack(blown, 1.0)) == "air of the case"  # on a GPU
     shell = fd.shell(
@@ -221,6 +224,6 @@ def test_panels_that_close_on_each_other_end_the_motion():
     pattern = fd.patterns.simple_fold(a=SIDE, b=SIDE, dihedral=60)
     sheet, crease = fd.Sheet(2e7, 0.3, 2e-3, density=300.0), {"crease_stiffness": 0.5}
     fluid = fd.Air(density=20.0, drag=False)
-    case = fd.Case(fd.discretize(pattern, sheet, crease_rest=358.0, **crease), air=fluid)
+    case = fd.Case(fd.discretize(pattern, sheet, crease_rest=358.0, **named(crease)), air=fluid)
     with pytest.raises(ComputationError, match="the flow about the sheet is lost: air: panels 0"):
         fd.simulate(case, 0.1, method="central_difference", interval=0.002)

@@ -23,7 +23,7 @@ UNTURNED = np.eye(3)
 
 def plate(turn=UNTURNED, sheet=SHEET):
     corners = SIDE * np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
-    return fd.discretize(fd.Pattern(corners @ turn.T, [(0, 1, 2, 3)]), sheet)
+    return fd.discretize(fd.Pattern(corners @ turn.T, [(0, 1, 2, 3)]), sheet, preset="plate")
 
 
 BALANCED = {"rk4": 1e-9, "central_difference": 1e-4, "dormand_prince": 1e-9, "newmark": 1e-5} | {

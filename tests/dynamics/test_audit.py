@@ -17,7 +17,7 @@ SUPPORTS = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
 
 def fold(thickness=0.01, density=1.0, size=1.0):
     pattern = fd.patterns.simple_fold(size, 1.2 * size, dihedral=60)
-    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, thickness, density))
+    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, thickness, density), preset="plate")
 
 
 def motion(structure, load, method="rk4", duration=0.3, initial=None, history=None):

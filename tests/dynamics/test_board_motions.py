@@ -19,7 +19,9 @@ G = 9.81
 def slammed() -> tuple[fd.Case, fd.State]:
     """Two free boards, folded by 150 degrees, of which one falls onto the other as they drift."""
     pattern = fd.thicken(strip(2, fold_angle=150.0), T)
-    case = fd.Case(fd.discretize(pattern, SOFT, crease_stiffness=0.5), contact=fd.Contact())
+    case = fd.Case(
+        fd.discretize(pattern, SOFT, crease_stiffness=0.5, preset="plate"), contact=fd.Contact()
+    )
     above = case.structure.nodes[:, 2] - 0.5 * T
     velocity = np.zeros_like(case.structure.nodes)
     velocity[:, 2] = -5.0 * np.maximum(above, 0.0)
@@ -91,7 +93,9 @@ def test_without_contact_boards_pass_through_each_other():
 def test_a_thick_miura_bounces_between_planes():
     """All its vertices are hinged in the middle; it loses nothing."""
     pattern = fd.thicken(fd.patterns.miura(cells=(2, 2)), 0.01, offsets=0.0)
-    s = fd.discretize(pattern, fd.Sheet(1e7, 0.3, 0.01, 500.0), crease_stiffness=1.0)
+    s = fd.discretize(
+        pattern, fd.Sheet(1e7, 0.3, 0.01, 500.0), crease_stiffness=1.0, preset="plate"
+    )
     z = s.nodes[:, 2]
     floor = fd.Plane((0, 0, z.min() - 0.006), (0, 0, 1))
     lid = fd.Plane((0, 0, z.max() + 0.03), (0, 0, -1))
@@ -106,7 +110,7 @@ def test_a_thick_miura_bounces_between_planes():
 @pytest.mark.parametrize("method", ["dormand_prince", "newmark", *beyond(["energy_momentum"])])
 def test_boards_come_to_rest_on_the_floor(method):
     """With their weight on it, their middles half a thickness less what that compresses above."""
-    s = fd.discretize(fd.thicken(strip(2), T), fd.Sheet(1e7, 0.3, T, 100.0))
+    s = fd.discretize(fd.thicken(strip(2), T), fd.Sheet(1e7, 0.3, T, 100.0), preset="plate")
     floor = fd.Plane((0, 0, -0.52 * T), (0, 0, 1))
     contact = fd.Contact(planes=[floor])
     case = fd.Case(s, [], [fd.Gravity((0, 0, -G))], fd.Rayleigh(alpha=30.0), contact=contact)
@@ -124,7 +128,7 @@ def test_boards_come_to_rest_on_the_floor(method):
 @pytest.mark.parametrize(("angle", "alpha"), [(20.0, 0.0), (10.0, 50.0)])
 def test_a_board_slides_on_a_slope_and_sticks_on_a_gentle_one(angle, alpha):
     """It slides as g (sin a - mu cos a) says, and stays where it has come to rest."""
-    board = fd.discretize(fd.thicken(strip(2), T), fd.Sheet(1e8, 0.3, T, 100.0))
+    board = fd.discretize(fd.thicken(strip(2), T), fd.Sheet(1e8, 0.3, T, 100.0), preset="plate")
     a = np.radians(angle)
     contact = fd.Contact(friction=0.3, planes=[fd.Plane((0, 0, -0.4965 * T), (0, 0, 1))])
     pull = fd.Gravity((G * np.sin(a), 0.0, -G * np.cos(a)))

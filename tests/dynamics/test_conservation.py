@@ -122,7 +122,7 @@ def test_methods_converge_to_one_motion_with_their_orders(method, mass):
 @pytest.mark.parametrize("method", METHODS)
 def test_energies_balance_in_the_default_model_and_methods_agree(method):
     push = fd.Force([7], (0.01, 0.0, 0.0), fd.HalfSine(0.1))
-    s = fd.discretize(fd.patterns.miura(dihedral=60), SHEET)
+    s = fd.discretize(fd.patterns.miura(dihedral=60), SHEET, preset="plate")
     case = fd.Case(s, CELL_HELD, [push], fd.Rayleigh(alpha=0.5))
     motion, true = (
         fd.simulate(case, 0.3, method=name, interval=0.01, **steps_of(name, 1e-4))

@@ -287,7 +287,7 @@ def test_nodes_make_way_for_a_plane_that_hits_them():
 @pytest.mark.matrix
 def test_supports_that_move_press_panels_together():
     pytest.importorskip("ipctk")
-    s = fd.discretize(fd.patterns.simple_fold(a=0.04, b=0.05, dihedral=40), SHEET)
+    s = fd.discretize(fd.patterns.simple_fold(a=0.04, b=0.05, dihedral=40), SHEET, preset="plate")
     close = fd.Impose([4, 5], "x", -0.995 * np.ptp(s.nodes[:, 0]), fd.Ramp(0.02, smooth=True))
     supports = [fd.Fix([0, 1]), close, fd.Fix([4, 5], "yz")]
     case = fd.Case(s, supports, damping=fd.Rayleigh(alpha=200.0), contact=fd.Contact())
@@ -301,7 +301,9 @@ def test_a_start_behind_a_plane_or_inside_each_other_is_refused():
     with pytest.raises(InputError, match=r"contact.planes\[0\]: node 0 is 0.001 m behind"):
         fd.simulate(fd.Case(strip(), contact=behind), 0.01, method="rk4")
     folded = fd.patterns.simple_fold(a=0.02, b=0.02, dihedral=1.0)
-    case = fd.Case(fd.discretize(folded, SHEET, fold_law="linear"), contact=fd.Contact())
+    case = fd.Case(
+        fd.discretize(folded, SHEET, fold_law="linear", preset="plate"), contact=fd.Contact()
+    )
     with pytest.warns(FoldynWarning, match="nearer to each other than the sheet is thick"):
         fd.simulate(case, 1e-4, method="rk4")
 
@@ -322,7 +324,7 @@ def test_a_relaxing_fold_falls_on_a_plane_and_its_energies_balance():
     pattern = fd.patterns.simple_fold(a=0.05, b=0.05, dihedral=90)
     ground = fd.Plane((0, 0, pattern.vertices[:, 2].min() - 1e-3), (0, 0, 1), friction=0.4)
     law = fd.Prony(ratios=[3.0], times=[0.01])
-    s = fd.discretize(pattern, fd.Sheet(1e9, 0.25, 1e-3, 800.0), fold_law=law)
+    s = fd.discretize(pattern, fd.Sheet(1e9, 0.25, 1e-3, 800.0), fold_law=law, preset="plate")
     weight, contact = fd.Gravity((0, 0, -G)), fd.Contact(planes=[ground])
     case = fd.Case(s, [], [weight], fd.Rayleigh(alpha=3.0), contact=contact)
     fallen = fd.simulate(case, 0.3, method="auto", interval=0.005)

@@ -11,6 +11,7 @@ from scipy import linalg
 import foldyn as fd
 from foldyn.dynamics import METHODS, largest_frequency
 from foldyn.dynamics.stability import MARGIN, frequency_bound, stability_limit
+from named_models import named
 
 OMEGA = 4.0
 DAMPINGS = pytest.mark.parametrize(
@@ -99,7 +100,7 @@ def test_the_bound_of_frequencies_is_one(dihedral, mass):
 def test_largest_frequency_equals_a_dense_eigensolver(mass, cells):
     pattern = fd.patterns.miura(cells, b=1.2, panel_angle=70, dihedral=100)
     laws = {"bend_law": "linear", "fold_law": "linear", "preset": "herkal"}
-    s = fd.discretize(pattern, SHEET, mass=mass, **laws)
+    s = fd.discretize(pattern, SHEET, mass=mass, **named(laws))
     case = fd.Case(s, [fd.Fix([0], "xyz")])
     free = np.ix_(case.free_dofs, case.free_dofs)
     k = s.tangent(np.zeros_like(s.nodes)).toarray()[free]

@@ -28,7 +28,7 @@ def crumpling(seed: int) -> fd.Case:
     thickness = size * 10.0 ** rng.uniform(-2.7, -2.1)
     modulus, density = 10.0 ** rng.uniform(9.0, 9.6), 700.0
     sheet = fd.Sheet(modulus, 0.25, thickness, density, length_scale_ratio=rng.uniform(0.2, 0.8))
-    s = fd.discretize(pattern, sheet, fold_law="linear")
+    s = fd.discretize(pattern, sheet, fold_law="linear", preset="plate")
     creases = rng.permutation(len(pattern.creases))[: max(2, len(pattern.creases) * 2 // 3)]
     rest = np.degrees(s.fold_rest[creases])
     turns = rng.uniform(-170.0, 170.0, len(creases))

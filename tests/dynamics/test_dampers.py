@@ -270,7 +270,7 @@ def test_panels_of_several_kinds_are_damped_anywhere():
         (1.9, 0, 0.5), (2.1, 0.8, 0.5),
     ]  # fmt: skip
     pattern = fd.Pattern(vertices, [(0, 1, 2, 3, 4), (1, 0, 5), (2, 1, 6, 7)])
-    case = fd.Case(fd.discretize(pattern, SHEET), damping=fd.StrainDamping(BETA))
+    case = fd.Case(fd.discretize(pattern, SHEET, preset="plate"), damping=fd.StrainDamping(BETA))
     rng, body = np.random.default_rng(4), case.elastic_body
     u, v = 0.1 * rng.standard_normal((2, *case.structure.nodes.shape))
     force, power = resisted(case, u, v)

@@ -9,6 +9,7 @@ from measured import agree
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.lanes import WIDTH
+from named_models import named
 
 STEPS = {"dt": 2e-5, "every_steps": 10}
 
@@ -18,7 +19,7 @@ def sheet(k: int = 0, cells=(1, 1), **options) -> fd.Case:
     pattern = fd.patterns.miura(cells, panel_angle=60.0, dihedral=110.0 + 2 * k)
     material = fd.Sheet(1e6 * (1.0 + 0.1 * k), 0.25, 0.01, density=1.0 + 0.05 * k)
     laws = {"fold_law": fd.EnhancedLinear(60, 300), "bend_law": "superlinear"}
-    s = fd.discretize(pattern, material, **{"mass": "mixed_voronoi", **laws, **options})
+    s = fd.discretize(pattern, material, **named({"mass": "mixed_voronoi", **laws, **options}))
     x = pattern.vertices[:, 0]
     held, far = np.flatnonzero(x <= 1e-9), np.flatnonzero(x >= x.max() - 1e-9)
     loads = [fd.Force(far, (0, 0, -2e-3 * (k + 1)), fd.HalfSine(0.02 + 0.002 * k))]
@@ -128,7 +129,7 @@ def test_what_lanes_do_not_take_is_computed_alone():
     s, (fix,) = FIRST.structure, FIRST.supports
     held = fd.Fix(np.flatnonzero(s.nodes[:, 0] <= s.nodes[:, 0].min() + 1e-9))
     gravity = [fd.Gravity("-z")]
-    consistent = fd.discretize(s.pattern, s.sheet, mass="consistent")
+    consistent = fd.discretize(s.pattern, s.sheet, mass="consistent", preset="plate")
     alone = [
         fd.Case(s, [fix], [fd.Actuate("all", 120.0, fd.Ramp(0.1))]),
         fd.Case(s, [fix, fd.BaseMotion("x", fd.Harmonic(2.0), 1e-3)], gravity),

@@ -20,6 +20,7 @@ from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.gpu import checks, choice
 from foldyn.errors import InputError
 from foldyn.mechanics.springs import SpringsTerm
+from named_models import named
 
 PATTERN = fd.patterns.miura((1, 1), panel_angle=60.0, dihedral=110.0)
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
@@ -52,7 +53,7 @@ def card(monkeypatch):
 
 
 def sheet(**options) -> fd.Case:
-    return fd.Case(fd.discretize(PATTERN, SHEET, **options), [HELD])
+    return fd.Case(fd.discretize(PATTERN, SHEET, **named(options)), [HELD])
 
 
 LUMPED = {"mass": "mixed_voronoi"}

@@ -15,6 +15,7 @@ from foldyn.dynamics import METHODS as METHODS_BY_NAME
 from foldyn.dynamics import prepare
 from foldyn.dynamics.checkpoint import restore, snapshot
 from foldyn.errors import InputError
+from named_models import named
 from one_hinge import STIFFNESS, WING, moment, one_hinge, opened, turned
 from pairwise import beyond
 
@@ -228,7 +229,7 @@ def test_folds_and_bends_of_a_sheet(law):
     """Without a law its creases have dampers, in series with the panels."""
     pattern = fd.patterns.miura((1, 1), 0.1, b=0.1, dihedral=120)
     laws = {"fold_law": law, "bend_law": law} if law else {}
-    structure = fd.discretize(pattern, fd.Sheet(1e9, 0.3, 1e-3, 1000.0), **laws)
+    structure = fd.discretize(pattern, fd.Sheet(1e9, 0.3, 1e-3, 1000.0), **named(laws))
     damping = fd.Rayleigh() if law else fd.CreaseDamping(1e-3)
     case = fd.Case(structure, [fd.Fix([0, 1, 2], "xyz")], damping=damping)
     assert len(case.remembering)

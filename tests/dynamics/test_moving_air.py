@@ -10,6 +10,7 @@ import foldyn as fd
 from foldyn.dynamics import prepare
 from foldyn.dynamics.methods import METHODS
 from foldyn.errors import InputError, ModelRangeWarning
+from named_models import named
 
 SIDE = 0.2
 WIND = np.array([0.4, -0.3, 0.6])
@@ -20,7 +21,7 @@ PRESSING = 0.5 * 20.0 * 1.2 * SIDE**2  # 1/2 rho Cd A of the plate, kg/m
 def plate(**changes):
     corners = SIDE * np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
     sheet = fd.Sheet(1e8, 0.3, 0.02, density=150.0)
-    return fd.discretize(fd.Pattern(corners, [(0, 1, 2, 3)]), sheet, **changes)
+    return fd.discretize(fd.Pattern(corners, [(0, 1, 2, 3)]), sheet, **named(changes))
 
 
 def fluid(**changes):
@@ -36,7 +37,7 @@ def folded(added_mass, wind, drift, history=None, loads=()):
     """A sheet that folds while it turns and drifts, and how it moves."""
     pattern = fd.patterns.simple_fold(a=SIDE, b=1.2 * SIDE, dihedral=130)
     crease = {"crease_stiffness": 0.3, "crease_rest": 200.0}
-    structure = fd.discretize(pattern, fd.Sheet(2e7, 0.3, 2e-3, density=500.0), **crease)
+    structure = fd.discretize(pattern, fd.Sheet(2e7, 0.3, 2e-3, density=500.0), **named(crease))
     blows = {} if history is None else {"history": history}
     air = fluid(added_mass=added_mass, velocity=wind, drag=True, resolution=2, **blows)
     spin = np.cross((2.0, -1.0, 3.0), structure.nodes)
@@ -175,7 +176,7 @@ def test_what_knows_no_flow_at_rest_refuses_wind():
 )
 def test_sheets_that_stand_in_a_wind_with_added_mass_are_warned_of(changes, speed, warns):
     pattern = fd.patterns.simple_fold(a=SIDE, b=0.8 * SIDE, dihedral=95)
-    structure = fd.discretize(pattern, fd.Sheet(2e7, 0.3, 2e-3, density=500.0))
+    structure = fd.discretize(pattern, fd.Sheet(2e7, 0.3, 2e-3, density=500.0), preset="plate")
     case = fd.Case(structure, air=fluid(**{"velocity": WIND, "resolution": 2} | changes))
     start = fd.State(velocity=np.full(structure.nodes.shape, speed))
     with warnings.catch_warnings(record=True) as caught:

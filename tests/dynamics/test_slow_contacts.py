@@ -34,7 +34,7 @@ def curvature(x):
 
 def pressed(mass: str):
     """A packed case in which a strip lies on a panel and a corner on the ground."""
-    s = fd.discretize(on_a_panel()[0].pattern, SHEET, fold_law="linear", mass=mass)
+    s = fd.discretize(on_a_panel()[0].pattern, SHEET, fold_law="linear", mass=mass, preset="plate")
     contact = fd.Contact(planes=[fd.Plane((0, 0, -DEPTH), (0.0, 0.0, 1.0))])
     return pack(fd.Case(s, damping=fd.Rayleigh(alpha=ALPHA), contact=contact), 1e-4)
 

@@ -205,6 +205,8 @@ def test_moments_that_jump_do_the_work_that_is_stored_and_lost(preset, law):
 
 
 def test_the_work_of_an_angle_that_stops_turning_where_the_motion_ends():
-    made = fd.discretize(fd.patterns.simple_fold(dihedral=120), SHEET, crease_stiffness=0.2)
+    made = fd.discretize(
+        fd.patterns.simple_fold(dihedral=120), SHEET, crease_stiffness=0.2, preset="plate"
+    )
     case = fd.Case(made, [fd.Fix([0, 1, 2, 3])], [fd.Actuate("all", 115.0, fd.Ramp(0.1))])
     assert fd.simulate(case, 0.1, method=DP).attrs["energy_error"] < 1e-6

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 import foldyn as fd
 from foldyn.dynamics import METHODS
 from foldyn.errors import InputError
+from named_models import named
 
 G = 9.81
 FLAT = fd.Pattern([[0, 0, 0], [1, 0, 0], [0.3, 0.8, 0.4]], [[0, 1, 2]], [])
@@ -99,9 +100,11 @@ def test_two_sheets_that_are_linked_are_one(method, mass) -> None:
     cut = fd.Pattern(np.vstack([points, points[1:3]]), [faces[0], [6, 4, 5, 7]], [])
     options = {"mass": mass, "bend_law": "linear", "preset": "herkal"}
     load, supports = [fd.Force([4, 5], (0.0, 1e-4, -1e-3), fd.Pulse(0.3))], [fd.Fix([0, 1, 3])]
-    one = fd.Case(fd.discretize(whole, SHEET, crease_stiffness=0.0, **options), supports, load)
+    one = fd.Case(
+        fd.discretize(whole, SHEET, crease_stiffness=0.0, **named(options)), supports, load
+    )
     linked = [*supports, fd.Link([1, 6]), fd.Link([2, 7])]
-    other = fd.Case(fd.discretize(cut, SHEET, **options), linked, load)
+    other = fd.Case(fd.discretize(cut, SHEET, **named(options)), linked, load)
     u, v = (simulated(case, 0.5, method) for case in (one, other))
     assert v.energy_error < 1e-4
     u, v = u.displacement.values, v.displacement.values

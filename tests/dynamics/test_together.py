@@ -84,7 +84,12 @@ def test_threads_share_a_motion(monkeypatch, method, kind):
 
 def closing(contact: fd.Contact | None = None, dihedral: float = 1.6) -> tuple[fd.Case, fd.State]:
     """A long Miura sheet, nearly closed, that closes at once; on a base that moves."""
-    s = fd.discretize(fd.patterns.miura(cells=(30, 1), dihedral=dihedral), HEAVY, fold_law="linear")
+    s = fd.discretize(
+        fd.patterns.miura(cells=(30, 1), dihedral=dihedral),
+        HEAVY,
+        fold_law="linear",
+        preset="plate",
+    )
     z, down = s.nodes[:, 2], fd.Ramp(0.2, smooth=True)
     ground = fd.Plane((0, 0, z.min() - 0.0049), (0, 0, 1), friction=0.3)
     press = fd.Plane((0, 0, z.max() + 0.0049), (0, 0, -1), 0.2, (0.002, 0, -0.002), down)
@@ -128,7 +133,7 @@ def test_small_structures_and_what_cannot_be_shared_run_on_one_thread(monkeypatc
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     called = fd.Force(nodes=[TIP], vector=(0, 0, 1.0), history=lambda t: 1.0)
     touching, law = closing()[0], fd.Prony([0.5], [0.02], law="linear")
-    remembering = fd.discretize(touching.structure.pattern, HEAVY, fold_law=law)
+    remembering = fd.discretize(touching.structure.pattern, HEAVY, fold_law=law, preset="plate")
     small = fd.discretize(fd.patterns.miura(), HEAVY, preset="herkal")
     for what, threads in (
         (case(), 2),

@@ -24,7 +24,7 @@ FRONT = [i * 5 + j for i in range(5) for j in (1, 3)]
 
 def folded(dihedral: float) -> Any:
     pattern = fd.patterns.miura(cells=CELLS, a=0.025, b=0.025, panel_angle=60, dihedral=dihedral)
-    return fd.discretize(pattern, fd.Sheet(1.2e9, 0.2, 2.4e-4, 667.0))
+    return fd.discretize(pattern, fd.Sheet(1.2e9, 0.2, 2.4e-4, 667.0), preset="plate")
 
 
 def dihedral_at(time: np.ndarray) -> np.ndarray:

@@ -33,7 +33,7 @@ def motion_of(case: fd.Case) -> object:
 @pytest.fixture(scope="session")
 def case() -> fd.Case:
     """Two by one Miura cells."""
-    structure = fd.discretize(fd.patterns.miura(cells=(2, 1)), SHEET)
+    structure = fd.discretize(fd.patterns.miura(cells=(2, 1)), SHEET, preset="plate")
     return fd.Case(structure, [fd.Fix([0, 1, 2])], [fd.Force([7], (0.01, 0, 0))])
 
 

@@ -16,13 +16,14 @@ from foldyn.exports import opensees
 from foldyn.exports.creased_shell import creased_shell
 from foldyn.linear.linearized import linearize
 from foldyn.linear.shell_of import shell_of
+from named_models import named
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 
 
 def fold(sheet=SHEET, **options):
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
-    structure = fd.discretize(pattern, sheet, **options)
+    structure = fd.discretize(pattern, sheet, **named(options))
     supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
     return fd.Case(structure, supports, [fd.Force([0, 1], (-1e-5, 0, 0))])
 
@@ -39,7 +40,7 @@ def clamped():
 def tower():
     """Triangles; six panels meet at inner vertices."""
     pattern = fd.patterns.kresling(sides=5, radius=1.0, height=0.9, twist=30, storeys=2)
-    structure = fd.discretize(pattern, SHEET)
+    structure = fd.discretize(pattern, SHEET, preset="plate")
     return fd.Case(structure, [fd.Fix("zmin", "xyz")], [fd.Force("zmax", (0, 0, 1e-5))])
 
 
@@ -107,7 +108,7 @@ def test_a_clamped_edge_keeps_the_rotations_of_its_panel():
 def test_panels_that_touch_at_a_vertex_are_tied():
     points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 1, 0], [2, 2, 0], [1, 2, 0]]
     pattern = fd.Pattern(points, [(0, 1, 2, 3), (2, 4, 5, 6)])
-    case = fd.Case(fd.discretize(pattern, SHEET), [fd.Fix([0, 1, 3])])
+    case = fd.Case(fd.discretize(pattern, SHEET, preset="plate"), [fd.Fix([0, 1, 3])])
     shell = creased_shell(case, 2)
     (pair,) = shell.loose
     assert not shell.joints

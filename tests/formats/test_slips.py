@@ -72,7 +72,7 @@ def test_frequencies_of_a_mended_sheet_are_those_without_slips(tmp_path):
     found = []
     for pattern in (SHEET, mended):
         folded = fd.fold(pattern, fraction=0.4, steps=2, initial="pattern").pattern
-        structure = fd.discretize(folded.moved(-folded.vertices.min(axis=0)), sheet)
+        structure = fd.discretize(folded.moved(-folded.vertices.min(axis=0)), sheet, preset="plate")
         found.append(fd.modes(fd.Case(structure, [fd.Fix("x < 0.002")]), 4).frequency.values)
     np.testing.assert_allclose(found[1], found[0], rtol=0.02)
 

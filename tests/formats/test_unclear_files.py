@@ -125,10 +125,12 @@ def test_a_crease_on_the_wrong_side_of_closed_cannot_be_simulated(file):
     for depth in (-2e-7, 2e-4):
         pattern = read_pattern(file(**pleats("V", depth)))
         if depth > 0:
-            assert fd.discretize(pattern, sheet).fold_rest[0] == pytest.approx(1e-4, rel=1e-3)
+            assert fd.discretize(pattern, sheet, preset="plate").fold_rest[0] == pytest.approx(
+                1e-4, rel=1e-3
+            )
         else:
             with pytest.raises(InputError, match="folded flat upon itself"):
-                fd.discretize(pattern, sheet)
+                fd.discretize(pattern, sheet, preset="plate")
 
 
 # ------------------------------------------------------------------------------ SVG

@@ -34,7 +34,10 @@ def results(folder: Path) -> list[bytes]:
     sheet = fd.Sheet(1e6, 0.25, 0.01, 1000.0)
     table = fd.Table([0.0, 0.1, 0.3], [0.0, 1.0, 0.5])
     found = []
-    for structure in (fd.discretize(pattern, sheet), fd.shell(pattern, sheet, divisions=2)):
+    for structure in (
+        fd.discretize(pattern, sheet, preset="plate"),
+        fd.shell(pattern, sheet, divisions=2),
+    ):
         case = fd.Case(structure, [fd.Fix("xmin")], [fd.Force("xmax", (0.0, 0.0, 1.0), table)])
         found.append(_motion(case))
     found.append(_response(case))

@@ -20,7 +20,7 @@ def tower(stiffness: Any, thickness: float = 0.018, force: float = 0.04) -> fd.C
     pattern = fd.patterns.kresling(sides=5, radius=0.6, height=0.8, twist=26)
     sheet = fd.Sheet(1.4e6, 0.3, thickness, 900.0)
     own: Any = np.broadcast_to(stiffness, 10)
-    made = fd.discretize(pattern, sheet, crease_stiffness=own)
+    made = fd.discretize(pattern, sheet, crease_stiffness=own, preset="plate")
     return fd.Case(made, [fd.Fix("zmin")], [fd.Force("zmax", (0, 0, -force))])
 
 
@@ -53,7 +53,9 @@ def test_a_sample_that_repeats_the_highest_displacement() -> None:
 
     def lifted(height: float) -> fd.Case:
         pattern = fd.patterns.simple_fold(a=1.0, b=1.2, dihedral=120)
-        made = fd.discretize(pattern, fd.Sheet(1e5, 0.25, 0.03, 400.0), crease_stiffness=0.5)
+        made = fd.discretize(
+            pattern, fd.Sheet(1e5, 0.25, 0.03, 400.0), crease_stiffness=0.5, preset="plate"
+        )
         lift = fd.Impose([4, 5], "z", height, fd.Ramp(0.1))
         return fd.Case(made, [fd.Fix([0, 1, 2, 3]), lift])
 
@@ -85,7 +87,9 @@ def near(gap: float, size: float = 1.0, tilt: float = 0.0) -> fd.Case:
     above[2:, 2] += 0.3
     above[[1, 2], 2] += tilt
     pattern = fd.Pattern(np.vstack([square, above]), [(0, 1, 2, 3), (4, 5, 6, 7)])
-    return fd.Case(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0)), [fd.Fix([0, 1, 3])])
+    return fd.Case(
+        fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), preset="plate"), [fd.Fix([0, 1, 3])]
+    )
 
 
 @pytest.mark.matrix

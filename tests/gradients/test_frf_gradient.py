@@ -131,7 +131,7 @@ def with_a_rigid_panel(shift: float) -> fd.Case:
     ]
     pattern = fd.Pattern(points, [(0, 1, 2, 3), (1, 4, 5, 2)])
     sheet = fd.Sheet(1e6, 0.25, 0.02, 900.0)
-    return fd.Case(fd.discretize(pattern, sheet, rigid=[1]), [fd.Fix([0, 1, 3])])
+    return fd.Case(fd.discretize(pattern, sheet, rigid=[1], preset="plate"), [fd.Fix([0, 1, 3])])
 
 
 def test_a_design_that_changes_what_constraints_tie_is_refused() -> None:

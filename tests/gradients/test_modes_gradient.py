@@ -59,7 +59,9 @@ def test_gradients_by_the_shape_of_panels(preset):
 def test_how_near_panels_are_at_rest():
     def folded(dihedral: float, panel_angle: float) -> fd.Case:
         pattern = fd.patterns.miura((2, 1), panel_angle=panel_angle, dihedral=dihedral)
-        return fd.Case(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0)), [fd.Fix("xmin")])
+        return fd.Case(
+            fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), preset="plate"), [fd.Fix("xmin")]
+        )
 
     values = {"dihedral": 43.0, "panel_angle": 63.0}
     assert max(Design(folded, values, ["clearance"], MODES).errors().values()) < 1e-6
@@ -70,7 +72,10 @@ def test_how_near_panels_are_at_rest():
         square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
         points = np.vstack([square, square[:, [0, 2, 1]] + np.array([0.3, 0.4, height])])
         pattern = fd.Pattern(points, [(0, 1, 2, 3), (4, 5, 6, 7)])
-        return fd.Case(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0)), [fd.Fix([0, 1, 3])])
+        return fd.Case(
+            fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), preset="plate"),
+            [fd.Fix([0, 1, 3])],
+        )
 
     assert fd.sensitivity(crossed, {"height": 0.2}, measures="clearance", analysis=MODES)[
         "gradient_height"
@@ -180,7 +185,7 @@ def test_bends_near_a_kink_of_their_law(preset, law, force):
 def test_what_has_no_mass_stays_in_balance(model, analysis):
     """Creases that are not at their rest angle bend the panels, more or less with the design."""
     pattern = fd.patterns.miura(panel_angle=62.0, b=1.1, dihedral=95.0)
-    rest = np.degrees(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.02)).fold_rest)
+    rest = np.degrees(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.02), preset="plate").fold_rest)
 
     def build(thickness: float, stiffness: float) -> fd.Case:
         sheet = fd.Sheet(1e6, 0.25, thickness, 800.0)

@@ -12,6 +12,7 @@ import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.gradients.parameters import Columns, Parameters, Slope, numbers_of
 from foldyn.mechanics.pullback import Arrays
+from named_models import named
 
 MODES = {"kind": "modes", "count": 3}
 CASE = """
@@ -75,7 +76,7 @@ def test_a_case_file_is_changed_by_its_keys(tmp_path):
 
     def own(panel_angle: float, thickness: float) -> fd.Case:
         pattern = fd.patterns.miura(panel_angle=panel_angle)
-        made = fd.discretize(pattern, fd.Sheet(1e6, 0.25, thickness, 900.0))
+        made = fd.discretize(pattern, fd.Sheet(1e6, 0.25, thickness, 900.0), preset="plate")
         return fd.Case(made, [fd.Fix("xmin")])
 
     other = fd.sensitivity(
@@ -215,7 +216,7 @@ def test_a_kink_of_the_design_is_warned_of(preset):
         if preset == "plate":
             pattern = fd.patterns.miura(panel_angle=60.0 + shift, dihedral=110.0)
         options = {"preset": preset, "bend_law": "linear" if preset == "herkal" else None}
-        made = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.02, 900.0), **options)
+        made = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.02, 900.0), **named(options))
         return fd.Case(made, [fd.Fix([0, 1, 2, 3])])
 
     with pytest.warns(FoldynWarning, match=r"shift: the numbers of the case .* have a kink here"):

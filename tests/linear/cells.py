@@ -13,6 +13,7 @@ import foldyn as fd
 from foldyn.linear.bloch import null_space
 from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.wave_solver import WaveSolver
+from named_models import named
 
 SHEET = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3, density=1000.0)
 
@@ -21,14 +22,14 @@ SHEET = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3, density
 def miura(cells: tuple[int, int] = (1, 1), **options: Any) -> fd.UnitCell:
     """Cells of a sheet."""
     pattern = fd.patterns.miura(cells=cells, a=0.03, b=0.031)
-    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET, **options)))
+    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET, **named(options))))
 
 
 @cache
 def chain(cells: int = 1, **options: Any) -> fd.UnitCell:
     """Cells of a strip along x with free sides."""
     pattern = fd.patterns.miura(cells=(cells, 1), a=0.03, b=0.031)
-    case = fd.Case(fd.discretize(pattern, SHEET, **options))
+    case = fd.Case(fd.discretize(pattern, SHEET, **named(options)))
     return fd.UnitCell(case, vectors=fd.UnitCell(case).vectors[:1])
 
 
@@ -36,7 +37,7 @@ def chain(cells: int = 1, **options: Any) -> fd.UnitCell:
 def kresling(storeys: int = 1, sides: int = 5, **options: Any) -> fd.UnitCell:
     """Storeys of a tower."""
     pattern = fd.patterns.kresling(sides=sides, radius=0.03, height=0.03, storeys=storeys)
-    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET, **options)))
+    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET, **named(options))))
 
 
 @cache
@@ -45,7 +46,7 @@ def squares(count: int = 1) -> fd.UnitCell:
     side = 0.03
     points = [(side * i, side * j, 0.0) for i in range(count + 1) for j in (0, 1)]
     faces = [(2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1) for i in range(count)]
-    structure = fd.discretize(fd.Pattern(points, faces), SHEET)
+    structure = fd.discretize(fd.Pattern(points, faces), SHEET, preset="plate")
     return fd.UnitCell(fd.Case(structure), vectors=[(count * side, 0, 0), (0, side, 0)])
 
 

@@ -156,7 +156,7 @@ def test_simulated_motions_decay_as_the_frequency_response_says(kind, model, met
 def test_damping_at_the_start_is_that_of_folds_and_pressure_there(load, kind):
     """A mode of unit mass dissipates 2 zeta omega v^2, with rest angles as they are turned."""
     pattern = fd.patterns.miura(cells=(1, 1), a=0.9, b=0.7, panel_angle=70, dihedral=110)
-    s = fd.discretize(pattern, fd.Sheet(1e8, 0.3, 0.012, 250.0))
+    s = fd.discretize(pattern, fd.Sheet(1e8, 0.3, 0.012, 250.0), preset="plate")
     case = fd.Case(s, [fd.Fix([0, 1, 4, 3])], [load], KINDS[kind][0])
     modes = fd.modes(case, 2, state="equilibrium")
     for k in range(2):
@@ -252,7 +252,7 @@ def test_gradients_have_the_damping_or_refuse_it(kind, measure, analysis):
 
     def case_at(thickness: float) -> fd.Case:
         sheet = fd.Sheet(1e9, 0.3, thickness, 300.0)
-        s = fd.discretize(PATTERN, sheet, crease_stiffness=60.0, fold_law=law)
+        s = fd.discretize(PATTERN, sheet, crease_stiffness=60.0, fold_law=law, preset="plate")
         return fd.Case(s, [HELD, *supports], [PRELOAD], damping)
 
     def gradient(thickness: float) -> tuple[float, float]:

@@ -30,7 +30,7 @@ def test_chains_of_masses_and_springs_decay_as_their_formula_says():
     side, k, m = 0.02, 400.0, 0.01
     pattern = fd.Pattern([[0, 0], [side, 0], [side, side], [0, side]], [(0, 1, 2, 3)])
     light = fd.Sheet(1e3, 0.3, 1e-5, density=1e-6)
-    structure = fd.discretize(pattern, light)
+    structure = fd.discretize(pattern, light, preset="plate")
     supports = [fd.Fix(range(len(structure.nodes)), axes="yz"), fd.Fix([2, 3, 4], axes="x")]
     supports.append(fd.Spring(k, between=[(0, 1)], direction="x"))
     case = fd.Case(structure, supports, masses=[fd.PointMass([0, 1], m)])

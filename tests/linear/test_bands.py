@@ -122,7 +122,9 @@ def with_attachments(counts):
         fd.Fix(corners, axes="y"),
     ]
     masses = [fd.PointMass(middle, 0.003), fd.PointMass(corners, 0.001)]
-    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET), supports, masses=masses))
+    return fd.UnitCell(
+        fd.Case(fd.discretize(pattern, SHEET, preset="plate"), supports, masses=masses)
+    )
 
 
 def test_supports_and_masses_repeat_and_partners_count_once():
@@ -138,7 +140,7 @@ def on_turning_supports(storeys):
         way = (np.cos(angle), np.sin(angle), 0.3)
         supports.append(fd.Spring(500.0, nodes=[5 * ring], direction=way))
         supports.append(fd.Fix([5 * ring + 2], direction=way))
-    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET), supports))
+    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET, preset="plate"), supports))
 
 
 def test_directions_turn_with_a_screw():
@@ -150,7 +152,7 @@ def zipper(cells):
     pattern = fd.patterns.zipper_tubes(cells=cells, a=0.03, b=0.03)
     ties = pattern.custom["foldyn:ties"]
     links = [fd.Link([node], to=corners) for node, corners in ties]
-    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET), links))
+    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET, preset="plate"), links))
 
 
 def riding(storeys):
@@ -158,7 +160,7 @@ def riding(storeys):
     pattern = fd.patterns.kresling(sides=6, radius=0.03, height=0.03, storeys=storeys)
     rings = [range(6 * r, 6 * r + 6) for r in range(storeys + 1)]
     links = [fd.Link(list(ring[1::2]), to=list(ring[::2])) for ring in rings]
-    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET), links))
+    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET, preset="plate"), links))
 
 
 @pytest.mark.matrix
@@ -170,9 +172,11 @@ def test_links_repeat():
 def test_a_closed_ring_has_the_waves_of_its_sector():
     """One storey of a tower, of which a side is the cell: rotations about the axis."""
     pattern = fd.patterns.kresling(sides=6, radius=0.03, height=0.03)
-    whole = fd.modes(fd.Case(fd.discretize(pattern, SHEET)), count=36)
+    whole = fd.modes(fd.Case(fd.discretize(pattern, SHEET, preset="plate")), count=36)
     side = fd.Pattern(pattern.vertices[[0, 1, 6, 7]], [(0, 1, 3), (0, 3, 2)])
-    cell = fd.UnitCell(fd.Case(fd.discretize(side, SHEET)), screw=fd.Screw("z", 60.0, 0.0))
+    cell = fd.UnitCell(
+        fd.Case(fd.discretize(side, SHEET, preset="plate")), screw=fd.Screw("z", 60.0, 0.0)
+    )
     own = eigenvalues(cell, of_ring((6,)))
     top = whole.eigenvalue.values[-1]
     np.testing.assert_allclose(own, whole.eigenvalue.values, rtol=0.0, atol=EXACT * top)
@@ -184,7 +188,7 @@ def test_a_closed_tube_has_the_waves_of_its_sector():
 
     def cell(bases, dihedral):
         pattern = fd.patterns.waterbomb(cells=(bases, 2), a=0.03, b=0.02, dihedral=dihedral)
-        return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET)))
+        return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET, preset="plate")))
 
     def open_by(dihedral):
         return cell(1, dihedral).motions[0].angle - 40.0
@@ -272,7 +276,8 @@ class Homogenized:
         options = {"a": 0.03, "b": 0.031, "dihedral": 100.0}
         thick = fd.Sheet(1e9, 0.3, 3e-3, density=1000.0)
         self.sheets = [
-            fd.discretize(fd.patterns.miura(cells=(n, n), **options), thick) for n in (1, 2, 3)
+            fd.discretize(fd.patterns.miura(cells=(n, n), **options), thick, preset="plate")
+            for n in (1, 2, 3)
         ]
         self.cell = fd.UnitCell(fd.Case(self.sheets[0]))
         self.area = float(np.linalg.norm(np.cross(*self.cell.vectors)))

@@ -17,7 +17,9 @@ TIME = np.linspace(0.0, 1.0, 41)
 
 
 def miura(cells):
-    return fd.Case(fd.discretize(fd.patterns.miura(cells=cells, a=0.03, b=0.03), SHEET))
+    return fd.Case(
+        fd.discretize(fd.patterns.miura(cells=cells, a=0.03, b=0.03), SHEET, preset="plate")
+    )
 
 
 def test_a_rigid_screw_motion_turns_and_moves_all_cells_alike():
@@ -175,7 +177,8 @@ def test_cells_of_a_ring_are_found_and_do_not_advance():
     part = fd.Pattern(storey.vertices[[0, 1, 6, 7]], [[f % 6 + f // 6 * 2 for f in face]
                                                     for face in faces])  # fmt: skip
     one = fd.UnitCell(
-        fd.Case(fd.discretize(part, SHEET)), screw=fd.Screw("z", angle=60.0, shift=0.0)
+        fd.Case(fd.discretize(part, SHEET, preset="plate")),
+        screw=fd.Screw("z", angle=60.0, shift=0.0),
     )
     nodes = storey.vertices
     moved = np.zeros((4, *nodes.shape))

@@ -11,6 +11,7 @@ from foldyn.errors import InputError
 from foldyn.linear import character, modes
 from foldyn.linear.character import main_axis
 from foldyn.results import modes_dataset
+from named_models import named
 
 STRAIGHT = {"fold_law": "linear", "bend_law": "linear"}
 KINDS = ["axial", "bending along y", "bending along z", "torsion", "distortion"]
@@ -19,7 +20,9 @@ KINDS = ["axial", "bending along y", "bending along z", "torsion", "distortion"]
 def tall():
     """A Kresling column of many storeys along z."""
     pattern = fd.patterns.kresling(sides=8, radius=1, height=0.5, twist=20, storeys=12)
-    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), membrane="bars", **STRAIGHT)
+    return fd.discretize(
+        pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), membrane="bars", **named(STRAIGHT)
+    )
 
 
 def given(s, shapes):
@@ -138,10 +141,10 @@ def test_rigid_modes_are_called_so():
 
 def test_by_default_the_axis_leads_away_from_the_supports():
     sheet = fd.Sheet(1.0, 0.25, 0.01, 1.0)
-    long = fd.discretize(fd.patterns.miura(cells=(4, 1)), sheet)
+    long = fd.discretize(fd.patterns.miura(cells=(4, 1)), sheet, preset="plate")
     for held in ([], [fd.Fix("xmin")], [fd.Fix("ymin")]):  # it is much longer than wide
         assert main_axis(fd.Case(long, held)) == "x"
-    square = fd.discretize(fd.patterns.miura(cells=(2, 1)), sheet)
+    square = fd.discretize(fd.patterns.miura(cells=(2, 1)), sheet, preset="plate")
     found = modes(fd.Case(square, [fd.Fix("ymax")]), 3, secant=1.0)
     assert character(found).attrs["axis"] == "y"
     for name in ("name", "share"):
@@ -150,7 +153,7 @@ def test_by_default_the_axis_leads_away_from_the_supports():
 
 def test_one_dozen_of_nodes_has_two_stations():
     pattern = fd.patterns.kresling(sides=6, radius=1, height=0.9, twist=30, storeys=1)
-    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0))
+    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), preset="plate")
     t = s.nodes[:, 2:] / 0.9 * [0.0, 0.0, 1.0]
     assert character(given(s, [t]), "z").kind_of.values.tolist() == ["axial"]
 

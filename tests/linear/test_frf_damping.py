@@ -151,7 +151,7 @@ def test_in_time():
 def test_modal_damping_fills_the_matrix_where_that_is_cheaper(count, method, monkeypatch):
     """Few damped modes leave the factorized matrix sparse, all of them are a full one."""
     pattern = fd.patterns.miura(cells=(3, 3))
-    s = fd.discretize(pattern, fd.Sheet(1e6, 0.3, 0.05, 100.0))
+    s = fd.discretize(pattern, fd.Sheet(1e6, 0.3, 0.05, 100.0), preset="plate")
     case = fd.Case(s, [fd.Fix([0, 1, 2])], damping=fd.ModalDamping(0.02, count))
     system = linearize(case)
     there = abs(system.stiffness) + abs(system.mass)

@@ -113,7 +113,7 @@ def test_bands_far_off_are_told():
     """Those of the gallery's cell, whose gap lies near 500 Hz and with the model near 330 Hz."""
     sheet = fd.Sheet(3e9, 0.3, thickness=2.4e-4, density=1200.0, length_scale_ratio=10.0)
     pattern = fd.patterns.miura(a=0.03, b=0.03, panel_angle=60, dihedral=60)
-    cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet)))
+    cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet, preset="plate")))
     with pytest.warns(ModelRangeWarning, match=r"bands .*differ by more than 5% from superel"):
         found = fd.bands(cell, cell.path("G-X", 9), count=6)
     error = found["model_error"].values
@@ -129,3 +129,11 @@ def test_bands_far_off_are_told():
     np.testing.assert_allclose(stated, ratio, rtol=0.02)
     assert ratio.min() < 0.7  # the gap is told of
     assert "model_error" not in fd.bands(cell, [[0.1, 0.0]], count=1, check_model=False)
+
+
+def test_of_rigid_panels_there_are_few_modes_to_compare():
+    case = held(rigid="all")
+    assert abs(fd.modes(case, 1).model_error.item()) < 1e-3
+    for each in (case, beside(case, rigid="all")):
+        found = fd.frf(each, fd.Force([4], (0.0, 0.0, 1.0)), frequencies=[1.0, 2.0])
+        assert found.attrs["holds_to"] == 2.0

@@ -15,6 +15,7 @@ from foldyn.linear.compared import SCOPE, legend, percent
 from foldyn.linear.fidelity import MODELS, comparison, forces_alone, rest_forces, small_loads
 from foldyn.linear.shell_of import meshes, shell_of, triangle_count
 from foldyn.results import fidelity_dataset
+from named_models import named
 from pairwise import beyond
 from verification.fidelity.compare import RESULTS, read
 
@@ -41,7 +42,7 @@ LONG = fd.discretize(strip(500), SHEET, bend_law="linear")
 
 def fold(**options) -> fd.Structure:
     """A simple fold, which takes milliseconds."""
-    return fd.discretize(fd.patterns.simple_fold(), SHEET, **options)
+    return fd.discretize(fd.patterns.simple_fold(), SHEET, **named(options))
 
 
 def held(*loads, **options) -> fd.Case:
@@ -235,7 +236,9 @@ def test_what_is_no_force_is_left_out():
 
 def test_pressure_is_a_force():
     """On a plate of two flat rigid panels under a small pressure: p b a^2/2 on the crease k."""
-    structure = fd.discretize(strip(2), SHEET, crease_stiffness=0.1, rigid="all", fold_law="linear")
+    structure = fd.discretize(
+        strip(2), SHEET, crease_stiffness=0.1, rigid="all", fold_law="linear", preset="plate"
+    )
     case = fd.Case(structure, [fd.Fix([0, 1, 3, 4])], [fd.Pressure(1e-3, [1])])
     turn = 1e-3 * 0.5 / 0.1  # rad
     assert small_loads(case).work == pytest.approx(1e-3 * 0.5 * turn, rel=2e-2)
@@ -361,7 +364,7 @@ def heavier(case):
 
 
 def massless(case):
-    return fd.discretize(case.structure.pattern, replace(SHEET, density=None))
+    return fd.discretize(case.structure.pattern, replace(SHEET, density=None), preset="plate")
 
 
 CENTER = r"nodes: node {} is the center of panel {}"
@@ -456,7 +459,7 @@ def test_graded_shells_agree_with_even_ones():
     """A free sheet has the same limits, within what both say they are off."""
     pattern = fd.patterns.miura(cells=(1, 1), a=0.05, b=0.05, panel_angle=60, dihedral=90)
     sheet = fd.Sheet(2e9, 0.3, 1e-3, density=700.0)
-    case = fd.Case(fd.discretize(pattern, sheet))
+    case = fd.Case(fd.discretize(pattern, sheet, preset="plate"))
     even = fd.fidelity(case, 5, models=["n5b8e"], reference="shell")
     graded = fd.fidelity(case, 5, models=["n5b8e"], reference="shell", vertex_radius=1e-3)
     assert list(graded.result.attrs["divisions"]) == [8, 12]

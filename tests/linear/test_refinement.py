@@ -107,7 +107,7 @@ def test_a_coarse_mesh_without_modes():
 
 def test_where_there_is_nothing_to_compare_with():
     assert refinement(miura(32)) is None  # dear
-    assert refinement(fd.Case(fd.discretize(fd.patterns.miura(), SHEET))) is None
+    assert refinement(fd.Case(fd.discretize(fd.patterns.miura(), SHEET, preset="plate"))) is None
     only_there = [fd.Fix([0, 1, 2, 20], "xyz")]  # no vertex
     assert refinement(miura(3, only_there)) is None
 

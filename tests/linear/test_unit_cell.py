@@ -28,7 +28,7 @@ TWISTED = {
 
 
 def cell_of(pattern, **given):
-    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET)), **given)
+    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET, preset="plate")), **given)
 
 
 @pytest.mark.parametrize("name", REPEATING)
@@ -71,7 +71,7 @@ def test_periods_stay_with_a_pattern_that_is_moved_and_folded(tmp_path):
     assert len(folded.faces) == 4
     assert cell_of(folded).vectors.shape == (2, 3)
     assert folded.rim_families.keys() == flat.rim_families.keys()
-    case = fd.Case(fd.discretize(pattern, SHEET))
+    case = fd.Case(fd.discretize(pattern, SHEET, preset="plate"))
     fd.save(fd.modes(case, 2), tmp_path / "modes.nc")
     again = fd.case_of(fd.load(tmp_path / "modes.nc")).structure.pattern
     assert [pairs.tolist() for pairs in again.periods] == [p.tolist() for p in pattern.periods]
@@ -224,10 +224,10 @@ def test_what_does_not_repeat_is_refused(case, match):
 
 def test_models_that_do_not_repeat_are_refused():
     pattern = fd.patterns.miura(a=0.03, b=0.031)
-    each = fd.discretize(pattern, SHEET, crease_stiffness=[0.1] * 4)
+    each = fd.discretize(pattern, SHEET, crease_stiffness=[0.1] * 4, preset="plate")
     with pytest.raises(InputError, match=r"crease_stiffness: has no value for the crease between"):
         fd.bands(fd.UnitCell(fd.Case(each)), [[0.5, 0.5]])
-    law = fd.discretize(pattern, SHEET, fold_law=fd.Prony([0.5], [1.0]))
+    law = fd.discretize(pattern, SHEET, fold_law=fd.Prony([0.5], [1.0]), preset="plate")
     with pytest.raises(InputError, match=r"fold_law = .*has memory"):
         fd.bands(fd.UnitCell(fd.Case(law)), [[0.5, 0.5]])
     sideways = fd.Case(kresling().case.structure, [fd.Link([0, 1], axes="x")])

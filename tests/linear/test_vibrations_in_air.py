@@ -178,7 +178,7 @@ def test_modal_damping_has_its_ratios_in_air(sheet):
 def test_large_sheets_keep_the_mass_as_rows(monkeypatch):
     """The same modes and responses, and as many of them proven, as with a matrix."""
     pattern = fd.patterns.miura(cells=(2, 2), a=0.1, b=0.1, panel_angle=60, dihedral=60)
-    made = fd.discretize(pattern, fd.Sheet(1.2e9, 0.2, 1e-4, density=700.0))
+    made = fd.discretize(pattern, fd.Sheet(1.2e9, 0.2, 1e-4, density=700.0), preset="plate")
     tied = [fd.Fix("xmin"), fd.Link("xmax", "xyz")]
     held = fd.Case(made, tied, damping=fd.Rayleigh(1.0), air=fd.Air(resolution=2))
     push, loose = fd.Force("xmax", (1e-3, 0.0, 1e-3)), held.altered(supports=())
@@ -210,7 +210,7 @@ def test_drag_changes_nothing_at_rest(sheet):
 
 def _thick(thickness):
     pattern = fd.patterns.miura(cells=(1, 1), a=0.1, b=0.1, panel_angle=60, dihedral=90)
-    made = fd.discretize(pattern, fd.Sheet(1.2e9, 0.2, thickness, density=700.0))
+    made = fd.discretize(pattern, fd.Sheet(1.2e9, 0.2, thickness, density=700.0), preset="plate")
     return fd.Case(made, [fd.Fix("xmin")], air=AIR)
 
 

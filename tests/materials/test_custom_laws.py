@@ -108,7 +108,9 @@ def test_what_cannot_be_compiled(function):
     law = CustomHingeLaw(function, function, function, name="bad one")
     with pytest.raises(InputError, match=r"'bad one': energy_of cannot be compiled"):
         law.moment(1.0, 1.0)
-    s = fd.discretize(fd.patterns.simple_fold(), fd.Sheet(1e6, 0.25, 0.01), fold_law=law)
+    s = fd.discretize(
+        fd.patterns.simple_fold(), fd.Sheet(1e6, 0.25, 0.01), fold_law=law, preset="plate"
+    )
     with pytest.raises(InputError, match="bad one"):
         s.energy(np.zeros(s.nodes.shape))
 

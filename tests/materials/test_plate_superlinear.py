@@ -14,6 +14,7 @@ from foldyn import checks
 from foldyn.errors import InputError
 from foldyn.materials import PlateSuperlinear, Superlinear
 from foldyn.materials.plate_superlinear import SQUARE
+from named_models import named
 
 SHEET, HELD = fd.Sheet(1e6, 0.25, 0.01, density=1.0), fd.Fix("xmin", "xyz")
 
@@ -21,7 +22,7 @@ SHEET, HELD = fd.Sheet(1e6, 0.25, 0.01, density=1.0), fd.Fix("xmin", "xyz")
 def structure(**options):
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.3)
     options = {"calibration": "plate", "bend_law": "plate_superlinear", **options}
-    return fd.discretize(pattern, SHEET, **options)
+    return fd.discretize(pattern, SHEET, **named(options))
 
 
 def test_limits_of_the_law():

@@ -24,6 +24,7 @@ from foldyn.materials import (
 )
 from foldyn.materials.formulas import HingeFormulas
 from foldyn.materials.switch import move_rest
+from named_models import named
 
 STEP = 1e-5
 HINGES = {
@@ -202,7 +203,7 @@ class Nameless(HingeLaw):
 def test_a_law_that_the_kernels_do_not_know_is_refused(field, law):
     pattern, sheet = fd.patterns.simple_fold(), fd.Sheet(1e6, 0.25, 0.01)
     with pytest.raises(InputError, match=rf"^{field}: '{law.name}', code .*, is not a law"):
-        fd.discretize(pattern, sheet, **{field: law})
+        fd.discretize(pattern, sheet, **named({field: law}))
     if field == "fold_law":
         with pytest.raises(InputError, match="is not a law that the kernels know"):
             fd.shell(pattern, sheet, divisions=2, fold_law=law)

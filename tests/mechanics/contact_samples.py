@@ -7,6 +7,7 @@ import numpy as np
 import foldyn as fd
 from foldyn.mechanics.contact.candidates import PLANE_COLUMNS, Sheets, Tables, tables
 from foldyn.mechanics.contact.term import ContactTerm
+from named_models import named
 
 T = 0.24e-3
 SHEET = fd.Sheet(
@@ -20,7 +21,7 @@ def miura(dihedral: float, cells: int = 2, **options) -> fd.Structure:
     pattern = fd.patterns.miura(
         cells=(cells, cells), a=0.02, b=0.02, panel_angle=60, dihedral=dihedral
     )
-    return fd.discretize(pattern, SHEET, fold_law="linear", **options)
+    return fd.discretize(pattern, SHEET, fold_law="linear", **named(options))
 
 
 def sheets(nodes, triangles, panel, thickness: float, planes=(), friction=0.0) -> Sheets:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import foldyn as fd
+from named_models import named
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1000.0, length_scale_ratio=2.0)
 
@@ -64,7 +65,7 @@ _made: dict[str, fd.Structure] = {}
 def structure(name: str) -> fd.Structure:
     if name not in _made:
         make, options = MODELS[name]
-        _made[name] = fd.discretize(make(), SHEET, **{"membrane": "bars", **options})
+        _made[name] = fd.discretize(make(), SHEET, **named({"membrane": "bars", **options}))
     return _made[name]
 
 

@@ -21,7 +21,12 @@ def whole() -> Assembly:
     """Bars and hinges, a clamp, springs, contact, and creases with memory."""
     pattern = fd.patterns.miura(cells=(1, 1))
     structure = fd.discretize(
-        pattern, SHEET, clamped=[(0, 1)], fold_law=fd.Prony([0.5], [0.1]), membrane="bars"
+        pattern,
+        SHEET,
+        clamped=[(0, 1)],
+        fold_law=fd.Prony([0.5], [0.1]),
+        membrane="bars",
+        preset="plate",
     )
     floor = fd.Plane((0, 0, structure.nodes[:, 2].min() - 2e-3), (0, 0, 1))
     springs = [fd.Spring(3.0, nodes=[7], direction="x"), fd.Spring(2.0, between=[(5, 8)])]

@@ -18,6 +18,7 @@ from foldyn.mechanics.contact.boards import (
     ride_on,
     step_jacobian,
 )
+from named_models import named
 from strips import strip
 
 T = 0.1
@@ -88,7 +89,7 @@ def test_a_step_moves_points_by_its_matrix_and_turns_them_about_its_middle():
 
 # ------------------------------------------------------------------ boards
 def case_of(pattern, planes=(), thickness=None, **options):
-    structure = fd.discretize(pattern, SHEET, **options)
+    structure = fd.discretize(pattern, SHEET, **named(options))
     return fd.Case(structure, contact=fd.Contact(thickness, planes=planes))
 
 

@@ -57,7 +57,7 @@ def test_panels_that_cross_have_none():
 
 
 def test_panels_that_all_meet_have_no_end_of_it():
-    made = fd.discretize(fd.patterns.miura(), fd.Sheet(1e6, 0.25, 0.01))
+    made = fd.discretize(fd.patterns.miura(), fd.Sheet(1e6, 0.25, 0.01), preset="plate")
     assert clearance(made.nodes, made.triangles, made.triangle_panel).distance == np.inf
 
 
@@ -65,7 +65,7 @@ def test_panels_that_all_meet_have_no_end_of_it():
 def test_a_folded_sheet_beside_points_all_over_its_panels():
     """The least distance of points on a fine grid is above by less than its spacing squared."""
     pattern = fd.patterns.miura((2, 2), panel_angle=70.0, dihedral=37.0)
-    made = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01))
+    made = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01), preset="plate")
     turn = Rotation.random(random_state=3).as_matrix()
     found = clearance(made.nodes @ turn.T + 5.0, made.triangles, made.triangle_panel)
     share = np.linspace(0.0, 1.0, 21)

@@ -39,7 +39,7 @@ class Silent(SpringsTerm):
 
 def test_an_energy_without_a_kernel_is_refused():
     sheet = fd.Sheet(1e6, 0.25, 0.01, 1.0)
-    structure = fd.discretize(fd.patterns.simple_fold(), sheet)
+    structure = fd.discretize(fd.patterns.simple_fold(), sheet, preset="plate")
     body = fd.Case(structure, [fd.Fix([0, 1]), fd.Spring(1.0, nodes=[4])]).body
     springs = body.term(SpringsTerm).springs
     assert Assembly(body.sheet, SpringsTerm(springs)).energies(np.zeros(body.size)).sum() == 0.0

@@ -61,7 +61,7 @@ def test_node_order_brings_neighbors_together():
     """Across a sheet of 30 x 8 cells there are 17 vertices and 16 centers; its own numbers
     put all centers after all vertices."""
     pattern = fd.patterns.miura(cells=(30, 8))
-    model = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01)).model
+    model = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01), preset="plate").model
     order = node_order(model)
     assert sorted(order) == list(range(len(model.rest)))
     other, _ = renumber(model, order)
@@ -73,7 +73,7 @@ def test_node_order_brings_neighbors_together():
 
 def test_node_order_keeps_numbers_that_are_good():
     pattern = fd.patterns.kresling(sides=6, storeys=12)
-    model = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01)).model
+    model = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01), preset="plate").model
     np.testing.assert_array_equal(node_order(model), np.arange(len(model.rest)))
 
 

@@ -22,6 +22,7 @@ from foldyn.mechanics import threads as threads_module
 from foldyn.mechanics.model import node_order, renumber
 from foldyn.mechanics.strips import reach, shares, strips
 from foldyn.mechanics.threads import BROKEN, part, run_together, team, wait
+from named_models import named
 from pairwise import in_pairs
 
 # relative to the norm of the force: sums of some ten numbers in another order
@@ -56,7 +57,7 @@ def again_and_again(model, u, force, work, times):
 def sheet(cells, laws="mixed"):
     """Model of a Miura sheet numbered along it, and a displacement."""
     s = fd.discretize(
-        fd.patterns.miura(cells=cells, dihedral=100), fd.Sheet(1e6, 0.25, 0.01), **LAWS[laws]
+        fd.patterns.miura(cells=cells, dihedral=100), fd.Sheet(1e6, 0.25, 0.01), **named(LAWS[laws])
     )
     model, _ = renumber(s.model, node_order(s.model))
     u = np.random.default_rng(0).uniform(-0.02, 0.02, model.rest.shape)

@@ -109,7 +109,7 @@ def test_forces_of_a_stack_are_the_gradient_and_tangents_exact(stack):
 @pytest.mark.parametrize("dihedral", [1.0, 359.0])
 def test_guards_keep_dihedrals_between_0_and_360(dihedral):
     pattern = fd.patterns.simple_fold(a=0.02, b=0.02, dihedral=10.0)
-    s = fd.discretize(pattern, STACK.sheet, fold_law="linear", crease_rest=dihedral)
+    s = fd.discretize(pattern, STACK.sheet, fold_law="linear", crease_rest=dihedral, preset="plate")
     body = touching(s)
     x = body.tables.rest.copy()
     half = np.radians(5.0 - 0.5 * dihedral)  # turns both panels about the ridge, nodes 2 and 3

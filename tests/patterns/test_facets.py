@@ -237,7 +237,7 @@ poissons_ratio = 0.3
 thickness = 1e-3
 density = 500
 [model]
-preset = "plate"
+kind = "bars_and_hinges"
 [analysis]
 kind = "modes"
 """

@@ -10,6 +10,7 @@ import pytest
 import foldyn as fd
 from foldyn.patterns import GENERATORS, Pattern
 from foldyn.patterns.topology import edge_lookup, edge_of
+from named_models import named
 
 FOLDING = {
     "simple_fold": (1.0, 60.0, 179.0),
@@ -209,7 +210,7 @@ def test_creases_fold_one_state_into_another_without_strain(name, options, dihed
     """Their rest angles go from those of one state to those of the other: no energy is left."""
     make = fd.patterns.GENERATORS[name]
     first, last = (make(**options, dihedral=dihedral) for dihedral in dihedrals)
-    structure = fd.discretize(first, SHEET, fold_law="linear")
+    structure = fd.discretize(first, SHEET, fold_law="linear", preset="plate")
     angles = np.degrees(last.dihedrals).tolist()
     case = fd.Case(structure, loads=[fd.Actuate(list(range(len(angles))), angle=angles)])
     path = fd.trace(case, steps=5, inertia_relief=True)
@@ -233,8 +234,8 @@ def test_zipper_tubes_are_stiff_but_for_folding():
     stiff = fd.Sheet(1e9, 0.3, 1e-2, 700.0)
     options = {"fold_law": "linear", "crease_stiffness": 0.5}
     links = [fd.Link([node], to=corners) for node, corners in zipper.custom["foldyn:ties"]]
-    one = fd.modes(fd.Case(fd.discretize(tube, stiff, **options)), count=8)
-    two = fd.modes(fd.Case(fd.discretize(zipper, stiff, **options), supports=links), count=8)
+    one = fd.modes(fd.Case(fd.discretize(tube, stiff, **named(options))), count=8)
+    two = fd.modes(fd.Case(fd.discretize(zipper, stiff, **named(options)), supports=links), count=8)
     fold, squeeze = one.frequency.values[6:]
     both, other = two.frequency.values[6:]
     assert squeeze < 5 * fold

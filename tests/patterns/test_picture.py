@@ -49,7 +49,7 @@ def test_the_nearest_panel_comes_last():
 
 def test_what_is_made_of_a_pattern_shows_it():
     pattern = fd.patterns.simple_fold()
-    structure = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0))
+    structure = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), preset="plate")
     case = fd.Case(structure, [fd.Fix([0, 1])])
     own = pattern._repr_html_().partition("<path")[2].partition("</svg>")[0]
     for each in (structure, case, fd.shell(pattern, structure.sheet, divisions=2)):

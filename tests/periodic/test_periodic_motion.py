@@ -223,7 +223,7 @@ REFUSED = {
     "hinges have memory": fd.Case(
         fd.discretize(
             fd.patterns.simple_fold(**PANEL), fd.Sheet(1e6, 0.25, 0.01, 1.0),
-            fold_law=fd.Prony(0.5, 0.1),
+            fold_law=fd.Prony(0.5, 0.1), preset="plate"
         ),
         [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")], [PUSH],
     ),

@@ -13,7 +13,7 @@ from foldyn.linear.band_structure import ALL
 @pytest.fixture(scope="module")
 def cell():
     sheet = fd.Sheet(1e9, 0.3, 1e-3, density=1000.0)
-    structure = fd.discretize(fd.patterns.miura(a=0.03, b=0.03), sheet)
+    structure = fd.discretize(fd.patterns.miura(a=0.03, b=0.03), sheet, preset="plate")
     return fd.UnitCell(fd.Case(structure, [fd.Spring(1e3, nodes=[4])]))
 
 

@@ -43,7 +43,11 @@ def test_boards_move_with_their_panels():
 @pytest.mark.parametrize("model", ["bars", "shell"])
 def test_one_state_or_several(model):
     sheet = fd.Sheet(1e8, 0.3, T, 500.0)
-    s = fd.shell(THICK, sheet, divisions=2) if model == "shell" else fd.discretize(THICK, sheet)
+    s = (
+        fd.shell(THICK, sheet, divisions=2)
+        if model == "shell"
+        else fd.discretize(THICK, sheet, preset="plate")
+    )
     u = np.zeros_like(s.nodes)
     assert len(fd.plots.draw_boards(fd.Case(s)).axes) == 1
     assert len(fd.plots.draw_boards(s, u).axes) == 1

@@ -114,7 +114,11 @@ def test_rest_angles_are_marked_without_moment(structure):
 def test_equal_hinges_share_a_curve_and_many_are_counted(pattern):
     sheet = structures.Sheet(1e6, 0.25, 0.01)
     different = structures.discretize(
-        pattern, sheet, crease_stiffness=[0.1, 0.2, 0.3, 0.4], crease_rest=[60, 300, 60, 300]
+        pattern,
+        sheet,
+        crease_stiffness=[0.1, 0.2, 0.3, 0.4],
+        crease_rest=[60, 300, 60, 300],
+        preset="plate",
     )
     fold = plot_laws(different).axes[0]
     assert len(fold.get_legend().get_texts()) == 4
@@ -124,7 +128,7 @@ def test_equal_hinges_share_a_curve_and_many_are_counted(pattern):
     fold = plot_laws(equal).axes[0]
     (text,) = fold.get_legend().get_texts()
     assert "and 6 more" in text.get_text()
-    many = structures.discretize(flat, sheet, crease_stiffness=np.arange(1.0, 8.0))
+    many = structures.discretize(flat, sheet, crease_stiffness=np.arange(1.0, 8.0), preset="plate")
     legend = plot_laws(many).axes[0].get_legend()
     assert len(legend.get_texts()) == 4
     assert legend.get_title().get_text() == "3 other pairs of k and rest not shown"
@@ -132,7 +136,7 @@ def test_equal_hinges_share_a_curve_and_many_are_counted(pattern):
 
 def test_triangles_have_no_bends(pattern):
     triangle = patterns.Pattern([(0, 0), (1, 0), (0, 1), (1, 1)], [(0, 1, 2), (1, 3, 2)])
-    s = structures.discretize(triangle, structures.Sheet(1e6, 0.25, 0.01))
+    s = structures.discretize(triangle, structures.Sheet(1e6, 0.25, 0.01), preset="plate")
     titles = [axes.get_title() for axes in plot_laws(s).axes]
     assert [title.split(":")[0] for title in titles] == ["folds", "bars"]
 

@@ -39,7 +39,7 @@ def test_creases_and_panels_have_the_colors_of_their_values():
     figure = fd.plots.draw_sensitivity(PATTERN, values, label="label")
     assert figure.axes[1].get_xlabel() == "label"
     assert len({color[:3] for color in colored(figure)}) == len(values)
-    sheet = fd.discretize(PATTERN, fd.Sheet(1e6, 0.25, 0.01))
+    sheet = fd.discretize(PATTERN, fd.Sheet(1e6, 0.25, 0.01), preset="plate")
     panels = fd.plots.draw_sensitivity(sheet, [0, 1, 2, 3], on="panel")
     figures = fd.plots.draw_structure(sheet), panels
     plain, painted = (

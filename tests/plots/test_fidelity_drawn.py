@@ -14,7 +14,7 @@ from foldyn.results import fidelity_dataset
 def made(frequency, error, limit):
     """A comparison of two models with made-up numbers."""
     sheet = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
-    case = fd.Case(fd.discretize(fd.patterns.simple_fold(), sheet))
+    case = fd.Case(fd.discretize(fd.patterns.simple_fold(), sheet, preset="plate"))
     values = {
         "frequency": frequency,
         "error": error,

@@ -18,7 +18,7 @@ PATTERN = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
 
 
 def models():
-    return [fd.discretize(PATTERN, SHEET), fd.shell(PATTERN, SHEET, divisions=4)]
+    return [fd.discretize(PATTERN, SHEET, preset="plate"), fd.shell(PATTERN, SHEET, divisions=4)]
 
 
 def heads(figure) -> int:
@@ -73,7 +73,7 @@ def test_arcs_of_a_moment_lie_on_the_front_and_point_to_the_panels_it_opens(s, s
 
 def test_moments_of_their_own_are_told_by_their_range() -> None:
     pattern = fd.patterns.miura(cells=(1, 1), panel_angle=60, dihedral=60)
-    s = fd.discretize(pattern, SHEET)
+    s = fd.discretize(pattern, SHEET, preset="plate")
     case = fd.Case(s, loads=[fd.CreaseMoment([0, 2], [0.2, -0.1])])
     assert "moments -0.1 to 0.2 N m of creases 0, 2" in keys(draw_structure(case))
 
@@ -88,7 +88,7 @@ def test_a_crowd_of_nodes_has_fewer_arrows_than_nodes() -> None:
     figure = draw_structure(fd.Case(s, loads=[fd.TotalForce((0, 0, 1), panels="all")]))
     figure.canvas.draw()
     assert few < heads(figure) < 60
-    reduced = fd.discretize(PATTERN, SHEET)
+    reduced = fd.discretize(PATTERN, SHEET, preset="plate")
     figure = draw_structure(fd.Case(reduced, loads=[fd.LineLoad("xmax", (0, 0, 1.0))]))
     figure.canvas.draw()
     assert heads(figure) == 2
@@ -113,7 +113,7 @@ HEAT = [
 
 
 def heated() -> fd.Case:
-    structure = fd.discretize(MIURA, SHEET)
+    structure = fd.discretize(MIURA, SHEET, preset="plate")
     return fd.Case(structure, [fd.Fix("xmin")], HEAT)
 
 
@@ -149,7 +149,11 @@ DASHPOTS = [
 @pytest.mark.parametrize("model", ["bars", "shell"])
 def test_dashpots_have_lines_and_a_legend(model):
     pattern = fd.patterns.miura()
-    s = fd.discretize(pattern, SHEET) if model == "bars" else fd.shell(pattern, SHEET, divisions=2)
+    s = (
+        fd.discretize(pattern, SHEET, preset="plate")
+        if model == "bars"
+        else fd.shell(pattern, SHEET, divisions=2)
+    )
     case = fd.Case(s, [fd.Fix("xmin"), *DASHPOTS])
     lines = dashpot_lines(case, s.nodes, 0.1, View(28.0, -60.0))
     ends = {tuple(np.round(point, 9)) for point in lines.reshape(-1, 3)}
@@ -162,5 +166,5 @@ def test_dashpots_have_lines_and_a_legend(model):
 
 
 def test_none_without_dashpots():
-    case = fd.Case(fd.discretize(fd.patterns.miura(), SHEET), [fd.Fix("xmin")])
+    case = fd.Case(fd.discretize(fd.patterns.miura(), SHEET, preset="plate"), [fd.Fix("xmin")])
     assert not len(dashpot_lines(case, case.structure.nodes, 0.1, View(28.0, -60.0)))

@@ -88,7 +88,9 @@ def test_modes_about_a_state_are_drawn_over_it(case):
 
 def test_the_scale_is_one_at_which_shapes_can_be_read(case):
     """12 % of the sheet where all nodes move, less where one of them leaves its neighbors."""
-    large = structures.discretize(patterns.miura(cells=(4, 4)), case.structure.sheet)
+    large = structures.discretize(
+        patterns.miura(cells=(4, 4)), case.structure.sheet, preset="plate"
+    )
     modes = made(cases.Case(large))
     modes["shape"][3] = [0.0, 0.5, 0.0]
     figure = draw_modes(large, modes, which=[4, 5])

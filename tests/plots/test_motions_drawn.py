@@ -13,7 +13,9 @@ from foldyn.plots import draw_structure, plot_load_history, style
 @pytest.fixture(scope="module")
 def sheet():
     pattern = patterns.miura(cells=(2, 2), a=1.0, b=1.0, panel_angle=60, dihedral=60)
-    return structures.discretize(pattern, structures.Sheet(1e6, 0.25, 0.01, density=1.0))
+    return structures.discretize(
+        pattern, structures.Sheet(1e6, 0.25, 0.01, density=1.0), preset="plate"
+    )
 
 
 @pytest.fixture(scope="module")

@@ -303,7 +303,7 @@ def test_hidden_panels_are_painted_first():
     By the middles of whole triangles some of the hidden panel would lie before the other one.
     """
     pattern = patterns.simple_fold(a=1.0, b=1.0, dihedral=20)
-    s = structures.discretize(pattern, structures.Sheet(1e6, 0.25, 0.01))
+    s = structures.discretize(pattern, structures.Sheet(1e6, 0.25, 0.01), preset="plate")
     sheet, view = Sheet3D.of(s), scene.View(0.0, 0.0)
     _, axes = scene.view_figure(s.nodes, view)
     hidden, visible = DrawnSheet(axes, sheet, s.nodes, view)._pieces(s.nodes)

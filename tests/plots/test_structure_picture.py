@@ -133,7 +133,9 @@ def test_a_pattern_alone_can_be_drawn():
 
 def test_flat_sheet():
     flat = patterns.Pattern([(0, 0), (2, 0), (2, 1), (0, 1)], [(0, 1, 2, 3)])
-    figure = draw_structure(structures.discretize(flat, structures.Sheet(1e6, 0.3, 0.01)))
+    figure = draw_structure(
+        structures.discretize(flat, structures.Sheet(1e6, 0.3, 0.01), preset="plate")
+    )
     low, high = figure.axes[0].get_zlim()
     assert low < 0.0 < high
     assert keys(figure) == ["boundary"]

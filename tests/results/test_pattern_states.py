@@ -30,14 +30,14 @@ TOLD = told(MIURA)
 @pytest.fixture(scope="module")
 def motion():
     """A Miura cell that is pulled."""
-    case = fd.Case(fd.discretize(TOLD, SHEET), HELD, [fd.Force([7], (0.01, 0, 0))])
+    case = fd.Case(fd.discretize(TOLD, SHEET, preset="plate"), HELD, [fd.Force([7], (0.01, 0, 0))])
     return fd.simulate(case, 0.01, method="rk4", every_steps=20)
 
 
 @pytest.fixture(scope="module")
 def path():
     plain = fd.Pattern(MIURA.vertices, MIURA.faces, name="miura")
-    case = fd.Case(fd.discretize(plain, SHEET), HELD, [fd.Force([7], (1e-4, 0, 0))])
+    case = fd.Case(fd.discretize(plain, SHEET, preset="plate"), HELD, [fd.Force([7], (1e-4, 0, 0))])
     return fd.trace(case, load_factors=[0.5, 1.0])
 
 
@@ -58,7 +58,7 @@ def test_a_result_without_them_is_as_it_was(path):
 
 def test_data_that_cannot_be_written_is_an_obstacle():
     pattern = MIURA.changed(custom={"a:b": object()})
-    found = fd.modes(fd.Case(fd.discretize(pattern, SHEET), HELD), count=1)
+    found = fd.modes(fd.Case(fd.discretize(pattern, SHEET, preset="plate"), HELD), count=1)
     assert "custom data" in found.attrs["not_rerunnable_because"]
 
 

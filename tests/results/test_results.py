@@ -17,6 +17,7 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import LinearHinge
 from foldyn.results import case_of, load, save, trajectory_dataset
 from foldyn.results.stored_case import document_of, sections_of
+from named_models import named
 
 SHEET = fd.Sheet(1e6, 0.25, 1.0 / 3.0, 0.1, 2.7)
 CELLS = fd.patterns.miura((2, 1), a=1 / 3, b=0.7)
@@ -25,7 +26,7 @@ ENERGIES = ("kinetic", "strain_bars", "strain_folds", "strain_bends", "dissipate
 
 def make_case(history=None, pattern=CELLS, **model) -> fd.Case:
     """Case with awkward numbers: thirds and tenths that no short decimal holds."""
-    structure = fd.discretize(pattern, SHEET, **model)
+    structure = fd.discretize(pattern, SHEET, **named(model))
     return fd.Case(
         structure,
         [fd.Fix("xmin"), fd.Fix([9, 7], "zx")],
@@ -43,7 +44,7 @@ def moving_case(history) -> fd.Case:
         fd.Actuate("mountain", 200 / 3 + 180, history), fd.Actuate([5, 1], [100.1, 1 / 3]),
         fd.Force([12], (0, 0.1, 0), history),
     ]  # fmt: skip
-    return fd.Case(fd.discretize(CELLS, SHEET), supports, loads)
+    return fd.Case(fd.discretize(CELLS, SHEET, preset="plate"), supports, loads)
 
 
 def dataset(case: fd.Case, samples: int = 5, **statistics) -> xr.Dataset:
@@ -222,7 +223,9 @@ def drawn(case):
 @pytest.mark.matrix
 def test_a_printed_result_shows_physics_and_a_copy_of_it_is_rerunnable(tmp_path) -> None:
     """Of the case it names one variable, whatever is stored; other programs keep that one."""
-    made = fd.discretize(CELLS, SHEET, crease_stiffness=PER_CREASE["crease_stiffness"])
+    made = fd.discretize(
+        CELLS, SHEET, crease_stiffness=PER_CREASE["crease_stiffness"], preset="plate"
+    )
     case = fd.Case(made, [fd.Fix("xmin")], [fd.Force("xmax", (0, 0, 1e-3), CHIRP)])
     hidden = set(document_of(dataset(case))[1]) - {"rest_position"}
     assert {"vertices", "faces", "tables_family0_creases", "tables_crease_stiffness"} <= hidden
@@ -252,7 +255,7 @@ CUBIC = fd.CustomHingeLaw(
     slope_of=lambda t, r: 3.0 * (t - r) ** 2,
     name="cubic",
 )
-MADE = fd.discretize(CELLS, SHEET)
+MADE = fd.discretize(CELLS, SHEET, preset="plate")
 CHANGED = dataclasses.replace(MADE, fold_stiffness=2.0 * MADE.fold_stiffness)
 BARE = dataclasses.replace(MADE, pattern=None)
 MOVED = [fd.Impose([9], "x", 0.1, lambda t: t), fd.BaseMotion("x", lambda t: t)]

@@ -110,7 +110,7 @@ def test_what_was_seen_is_stored_and_shown(crossed, tmp_path):
 def test_what_crosses_at_rest_is_not_reported():
     points = [(0, 0, 0), (2, 0, 0), (1, 2, 0), (1, -1, -1), (1, 2, 1), (1, -1, 1)]
     pattern = fd.Pattern(points, [(0, 1, 2), (3, 4, 5)], [])
-    case = fd.Case(fd.discretize(pattern, PAPER))
+    case = fd.Case(fd.discretize(pattern, PAPER, preset="plate"))
     u = np.zeros((2, 6, 3))
     u[1, 3:, 0] = 5.0  # apart
     assert not len(crossings_of(case, u).crossed)
@@ -138,7 +138,9 @@ def pushed(method: str, **options):
     pattern = fd.patterns.kresling(sides=6, radius=0.04, height=0.06, twist=30)
     push = fd.Force(list(range(6, 12)), (0, 0, -80.0), fd.HalfSine(0.02))
     held = fd.Fix(list(range(6)))
-    case = fd.Case(fd.discretize(pattern, PAPER), [held], [push], fd.Rayleigh(alpha=20.0))
+    case = fd.Case(
+        fd.discretize(pattern, PAPER, preset="plate"), [held], [push], fd.Rayleigh(alpha=20.0)
+    )
     return fd.simulate(case, 0.01, method=method, **options)
 
 

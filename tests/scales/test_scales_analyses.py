@@ -149,7 +149,7 @@ def modes(make, by, count=6, state=None, supports=FOLD_SUPPORTS, secant=1.0, **d
 
 def sheet_of_panels(by):
     pattern = fd.patterns.miura((3, 3), by.length, b=1.1 * by.length, panel_angle=60, dihedral=60)
-    return fd.discretize(pattern, sheet(by))
+    return fd.discretize(pattern, sheet(by), preset="plate")
 
 
 MODES = {
@@ -217,7 +217,7 @@ def test_a_micrometer_is_as_long_as_a_meter():
 
     def motion(size):
         pattern = fd.patterns.miura((1, 1), size, b=size, panel_angle=60, dihedral=60)
-        s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01 * size, 1.0))
+        s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01 * size, 1.0), preset="plate")
         load = fd.Force([7], (1e-3 * size**2, 0, 0), fd.HalfSine(0.5 * size))
         case = fd.Case(s, MIURA_SUPPORTS, [load], fd.Rayleigh(0.1 / size))
         return fd.simulate(case, 2.0 * size, method="generalized_alpha", interval=0.25 * size)

@@ -91,7 +91,7 @@ def test_structures(name, scheme):
 )
 def test_mass_rules(name, rule):
     def told(by):
-        s = fd.discretize(PATTERNS[name](by.length), sheet(by), mass=rule)
+        s = fd.discretize(PATTERNS[name](by.length), sheet(by), mass=rule, preset="plate")
         return [s.mass.toarray() / by.mass]
 
     hold(told)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import foldyn as fd
+from named_models import named
 
 DECADES = (-9.0, 3.0)
 
@@ -72,13 +73,13 @@ def sheet(by: Units, thickness: float = 0.01, density: float = 1.0) -> fd.Sheet:
 def miura(by: Units, **model) -> fd.Structure:
     """A Miura unit cell."""
     pattern = fd.patterns.miura((1, 1), by.length, b=1.1 * by.length, panel_angle=60, dihedral=60)
-    return fd.discretize(pattern, sheet(by), **model)
+    return fd.discretize(pattern, sheet(by), **named(model))
 
 
 def fold(by: Units, **model) -> fd.Structure:
     """Two panels."""
     pattern = fd.patterns.simple_fold(by.length, 1.2 * by.length, dihedral=60)
-    return fd.discretize(pattern, sheet(by), **model)
+    return fd.discretize(pattern, sheet(by), **named(model))
 
 
 def shell(by: Units, divisions: int = 3, **model) -> fd.Shell:

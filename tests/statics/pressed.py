@@ -16,7 +16,7 @@ def press(cells: int = 2, end: float = 0.7) -> tuple[fd.Case, int]:
     Its middle row stands in the plane of symmetry. Returns the case and the number of layers.
     """
     pattern = fd.patterns.miura(cells=(cells, cells), a=0.02, b=0.02, panel_angle=60, dihedral=70)
-    s = fd.discretize(pattern, SHEET, fold_law="linear")
+    s = fd.discretize(pattern, SHEET, fold_law="linear", preset="plate")
     low, high = s.nodes[:, 0].min(), s.nodes[:, 0].max()
     row, layers = 2 * cells + 1, 2 * cells
     middle = list(range(cells * row, cells * row + row))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from named_models import named
 from strips import strip
 
 T, PUSH = 0.1, 100.0
@@ -18,7 +19,7 @@ def fold(angle: float = 150.0, model: str = "bars", **options) -> fd.Structure:
     options = {"crease_stiffness": 5.0} | options
     if model == "shell":
         return fd.shell(pattern, SHEET, divisions=2, **options)
-    return fd.discretize(pattern, SHEET, **options)
+    return fd.discretize(pattern, SHEET, **named(options))
 
 
 def lower(structure) -> np.ndarray:
@@ -75,7 +76,7 @@ def test_a_plane_presses_a_fold_shut():
 @pytest.mark.matrix
 def test_an_accordion_that_is_driven_closed_does_not_push():
     """Faces touch at 180 degrees, in a stack of N t, and no earlier."""
-    s = fd.discretize(fd.thicken(strip(4), T), SHEET)
+    s = fd.discretize(fd.thicken(strip(4), T), SHEET, preset="plate")
     drive = fd.Actuate("all", fraction="100%")
     case = fd.Case(s, [fd.Fix([0, 1, 5])], [drive], contact=fd.Contact())
     path = fd.trace(case, "displacement", steps=10)
@@ -88,7 +89,9 @@ def test_an_accordion_that_is_driven_closed_does_not_push():
 @pytest.mark.matrix
 def test_boards_hinged_at_one_height_close_before_their_hinge_planes_do():
     """Their dihedral would jump from 0 to 360 degrees where faces meet: a guard stays before it."""
-    s = fd.discretize(fd.thicken(strip(4, letters="VVV"), T), SHEET, fold_law="linear")
+    s = fd.discretize(
+        fd.thicken(strip(4, letters="VVV"), T), SHEET, fold_law="linear", preset="plate"
+    )
     loads = [fd.Actuate([1], fold_angle=179.0), fd.CreaseMoment([1], -1000.0)]
     case = fd.Case(s, [fd.Fix([0, 1, 2, 5, 6, 7])], loads, contact=fd.Contact())
     path = fd.trace(case, "newton", steps=20)
@@ -102,7 +105,7 @@ def test_panels_that_pass_through_each_other_are_refused():
     """A mountain that is hinged in the front face has no room for its boards."""
     pattern = fd.thicken(strip(2, fold_angle=60.0, letters="M"), T, offsets=T / 2)
     case = fd.Case(
-        fd.discretize(pattern, SHEET),
+        fd.discretize(pattern, SHEET, preset="plate"),
         [fd.Fix([0, 1, 3])],
         [fd.Force([2], (0.0, 0.0, 1.0))],
         contact=fd.Contact(),

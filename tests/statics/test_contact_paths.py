@@ -125,7 +125,9 @@ def test_tangents_with_plates_are_exact(pressed):
 
 def test_newtons_method_rests_on_planes_at_the_factors_asked_for():
     """A flap that closes onto the ground: what the ground carries, the held panel holds down."""
-    s = fd.discretize(fd.patterns.simple_fold(0.04, 0.05, dihedral=100), SHEET, fold_law="linear")
+    s = fd.discretize(
+        fd.patterns.simple_fold(0.04, 0.05, dihedral=100), SHEET, fold_law="linear", preset="plate"
+    )
     ground = fd.Plane((0, 0, s.nodes[:, 2].min() - 2.0 * T), (0, 0, 1))
     held, fold = fd.Fix([0, 1, 2, 3]), fd.Actuate([0], 290.0)
     case = fd.Case(s, [held], [fold], contact=fd.Contact(planes=[ground]))

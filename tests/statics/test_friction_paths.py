@@ -21,7 +21,7 @@ MU, WEIGHT, WAY = 0.4, 0.06, 5e-5  # N, m
 def strip(supports, loads=(), **plane):
     """A flat strip that its weight, the load 0, presses onto a rough plane."""
     pattern = fd.patterns.simple_fold(a=0.04, b=0.05, dihedral=180)
-    s = fd.discretize(pattern, SHEET, fold_law="linear", membrane="bars")
+    s = fd.discretize(pattern, SHEET, fold_law="linear", membrane="bars", preset="plate")
     ground = fd.Plane((0, 0, -0.495 * T), (0, 0, 1), friction=MU, **plane)
     n = len(s.nodes)
     weight = fd.Force(list(range(n)), (0, 0, -WEIGHT / n))
@@ -215,7 +215,7 @@ def test_a_press_whose_creases_yield():
         ("strong", fd.Plastic(1e3, law="linear"), way),
         ("weak", fd.Plastic(0.02, kinematic=0.005, law="linear"), [*way, *way[-2::-1]]),
     ):
-        s = fd.discretize(case.structure.pattern, SHEET, fold_law=law)
+        s = fd.discretize(case.structure.pattern, SHEET, fold_law=law, preset="plate")
         paths[name] = fd.trace(replace(case, structure=s), "newton", load_factors=factors)
     elastic, strong, weak = (plates(case, path)[0] for path in paths.values())
     np.testing.assert_allclose(strong, elastic, rtol=1e-9, atol=1e-12)

@@ -97,7 +97,9 @@ def test_a_path_goes_on_from_a_stored_point():
 def test_a_sheet_yields_and_springs_back():
     """A fold bent beyond its yield moment keeps a part of the turn without load."""
     pattern, sheet = fd.patterns.simple_fold(1.0, 1.0, dihedral=120), fd.Sheet(1e6, 0.25, 0.01)
-    structure = fd.discretize(pattern, sheet, fold_law=fd.Plastic(1e-3, kinematic=0.002))
+    structure = fd.discretize(
+        pattern, sheet, fold_law=fd.Plastic(1e-3, kinematic=0.002), preset="plate"
+    )
     push = fd.Force([0, 1], (5.2e-3, 0, 0))
     case = fd.Case(structure, [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")], [push])
     path = fd.statics.trace(case, "newton", load_factors=[0.5, 1.0, 0.5, 0.0])

@@ -26,7 +26,7 @@ def reactions(path, nodes) -> np.ndarray:
 
 
 MODELS = {
-    "bars": lambda pattern: fd.discretize(pattern, SHEET, mass="consistent"),
+    "bars": lambda pattern: fd.discretize(pattern, SHEET, mass="consistent", preset="plate"),
     "shell": lambda pattern: fd.shell(pattern, SHEET, divisions=4),
 }
 

@@ -75,7 +75,7 @@ def test_a_crane_opens_from_its_folded_state_with_every_crease_its_way():
     assert turned.min() > 150.0 and turned.max() < 180.0
     assert folding.strain < 2e-3 and math.degrees(folding.bend) < 20.0
     # its own bends are no creases, so that a structure can be made of it
-    structure = fd.discretize(folding.pattern, fd.Sheet(1.2e9, 0.2, 1e-4, 700.0))
+    structure = fd.discretize(folding.pattern, fd.Sheet(1.2e9, 0.2, 1e-4, 700.0), preset="plate")
     assert len(structure.folds) == 186
 
 

@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 import foldyn as fd
 from foldyn.errors import ComputationError, InputError
+from named_models import named
 from one_hinge import STIFFNESS, WING, moment, one_hinge, opened
 
 PRONY = fd.Prony([0.5, 0.2], [0.02, 0.3], law="linear")
@@ -124,7 +125,7 @@ LINEAR_FOLDS = {"fold_law": "linear"}  # in series with their panels
 def test_a_sheet_moves_as_in_a_slow_motion(part, laws, damping):
     """Of panels so light that nothing but the creases takes time, in the default model."""
     duration, n = 0.5, 50
-    structure = fd.discretize(fd.patterns.simple_fold(dihedral=120), SHEET, **laws)
+    structure = fd.discretize(fd.patterns.simple_fold(dihedral=120), SHEET, **named(laws))
     cases = []
     for history in (fd.Constant(), fd.Ramp(duration)):
         held, given = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")], part(history)
@@ -195,7 +196,7 @@ def test_critical_points_have_their_share_of_the_time():
     supports = [fd.Fix([0, 1], "xyz"), fd.Fix([4, 5], "yz"), fd.Impose([4, 5], "x", -4e-5)]
     for ratio, duration in ((1e-9, 1e9), (2.0, 1e9), (2.0, 1.0), (2.0, 1e-9), (1e-9, 1e-9)):
         laws = {"fold_law": fd.Prony(ratio, 0.2, law="linear"), "crease_stiffness": 0.2}
-        case = fd.Case(fd.discretize(pattern, SHEET, membrane="bars", **laws), supports)
+        case = fd.Case(fd.discretize(pattern, SHEET, membrane="bars", **named(laws)), supports)
         path = fd.trace(case, "displacement", steps=2, duration=duration / 2)
         np.testing.assert_allclose(path.elapsed, duration * path.load_factor, rtol=1e-4)
         with pytest.raises(InputError, match="creases have relaxed in part"):
@@ -211,7 +212,7 @@ def test_a_fold_creeps_until_a_plane_carries_its_load():
     sheet, law = fd.Sheet(1e9, 0.25, 1e-3, 800.0), fd.Eyring(1e-3, 1e-2)
     ground = fd.Plane((0, 0, pattern.vertices[:, 2].min() - 2e-3), (0, 0, 1))
     case = fd.Case(
-        fd.discretize(pattern, sheet, fold_law=law), [fd.Fix([0, 1, 2, 3], "xyz")],
+        fd.discretize(pattern, sheet, fold_law=law, preset="plate"), [fd.Fix([0, 1, 2, 3], "xyz")],
         [fd.Force([4, 5], (0, 0, -0.02))], contact=fd.Contact(planes=[ground]),
     )  # fmt: skip
     path = fd.trace(case, load_factors=[0.0] + [1.0] * 12, duration=[0.0] + [0.1] * 11)

@@ -91,7 +91,9 @@ def test_state_under_constant_loads_alone():
 
 
 def test_rest_angle_out_of_range():
-    s = fd.discretize(fd.patterns.simple_fold(dihedral=60), fd.Sheet(1e6, 0.25, 0.01))
+    s = fd.discretize(
+        fd.patterns.simple_fold(dihedral=60), fd.Sheet(1e6, 0.25, 0.01), preset="plate"
+    )
     supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
     case = fd.Case(s, supports, [fd.Actuate([0], 200.0)])
     with pytest.raises(InputError, match="at 4 the rest angle of crease 0 would leave 0 to 360"):

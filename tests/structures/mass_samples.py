@@ -6,6 +6,7 @@ import numpy as np
 
 import foldyn as fd
 from foldyn.structures import MASS_RULES
+from named_models import named
 
 RHO, T = 700.0, 0.02
 SHEET = fd.Sheet(1e6, 0.3, T, density=RHO)
@@ -32,7 +33,7 @@ PANELS = {
 def one(vertices, mass, **options):
     vertices = np.asarray(vertices, float)
     pattern = fd.Pattern(vertices, [list(range(len(vertices)))])
-    return fd.discretize(pattern, SHEET, mass=mass, **options)
+    return fd.discretize(pattern, SHEET, mass=mass, **named(options))
 
 
 def shares(vertices, mass, **options):

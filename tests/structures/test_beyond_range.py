@@ -64,10 +64,18 @@ def test_strips_with_stiff_creases():
         in_series = exact / np.sqrt(1.0 + modulus / (stiff * 0.2))  # creases smeared out
         assert (abs(pinned(made) / in_series - 1.0) > 0.08) == loud
     soft = 0.29 * modulus / 0.2
-    assert told(lambda: fd.discretize(strip(5, 0.6), metal, crease_stiffness=soft)) == []
+    assert (
+        told(lambda: fd.discretize(strip(5, 0.6), metal, crease_stiffness=soft, preset="plate"))
+        == []
+    )
     square = strip(5, 0.2)
-    assert told(lambda: fd.discretize(square, metal, crease_stiffness=10.0 * soft)) == []
-    (text,) = told(lambda: fd.discretize(strip(5, 0.6), metal, crease_stiffness=1.1 * soft))
+    assert (
+        told(lambda: fd.discretize(square, metal, crease_stiffness=10.0 * soft, preset="plate"))
+        == []
+    )
+    (text,) = told(
+        lambda: fd.discretize(strip(5, 0.6), metal, crease_stiffness=1.1 * soft, preset="plate")
+    )
     assert '--model superelements) in linear analyses, else preset = "n5b8e" (docs' in text
 
 
@@ -82,7 +90,14 @@ def test_stiff_creases(preset):
     assert told(lambda: made(2.9)) == []
     (text,) = told(lambda: made(3.1))
     assert "is 3.1 times as stiff as its panels" in text and "preset" not in text
-    assert told(lambda: fd.discretize(MIURA, CARD, crease_stiffness=9 * whole, rigid="all")) == []
+    assert (
+        told(
+            lambda: fd.discretize(
+                MIURA, CARD, crease_stiffness=9 * whole, rigid="all", preset="plate"
+            )
+        )
+        == []
+    )
     assert told(lambda: fd.shell(MIURA, CARD, divisions=2, crease_stiffness=9.0 * whole)) == []
     herkal = {"preset": "herkal", "crease_stiffness": 9.0 * whole}
     assert told(lambda: fd.discretize(MIURA, CARD, **herkal)) == []
@@ -92,7 +107,7 @@ def test_skew_panels():
     for angle, loud in ((32.5, True), (33.5, False)):
         pattern = fd.patterns.miura(panel_angle=angle, dihedral=110)
         sheet = fd.Sheet(4e9, 0.3, 0.005)
-        assert len(told(lambda p=pattern, s=sheet: fd.discretize(p, s))) == loud
+        assert len(told(lambda p=pattern, s=sheet: fd.discretize(p, s, preset="plate"))) == loud
         assert told(lambda p=pattern, s=sheet: fd.discretize(p, s, preset="n5b8e")) == []
 
 
@@ -100,14 +115,21 @@ def test_skew_panels():
 def test_limits_themselves_are_within_range_whatever_rounding_says():
     for dihedral in (100, 115, 125, 140):
         skew = fd.patterns.miura(panel_angle=33, dihedral=dihedral)
-        assert told(lambda p=skew: fd.discretize(p, fd.Sheet(4e9, 0.3, 0.005))) == []
+        assert (
+            told(lambda p=skew: fd.discretize(p, fd.Sheet(4e9, 0.3, 0.005), preset="plate")) == []
+        )
     for ratio in (0.1, 0.2, 0.35, 0.4):
         foam = fd.Sheet(3e7, ratio, 4e-3)
         for width in (0.03, 0.05, 0.07):
             flap = fd.patterns.simple_fold(a=width, b=0.1, dihedral=120)
             stiff = 3.0 * foam.bending_modulus / width
             assert (
-                told(lambda p=flap, s=foam, k=stiff: fd.discretize(p, s, crease_stiffness=k)) == []
+                told(
+                    lambda p=flap, s=foam, k=stiff: fd.discretize(
+                        p, s, crease_stiffness=k, preset="plate"
+                    )
+                )
+                == []
             )
 
 
@@ -125,18 +147,22 @@ def test_nearly_flat_creases():
     for sine, loud in ((0.01 / 0.16, True), (0.01 / 0.14, False)):
         fold = 180.0 - np.degrees(np.arcsin(sine))
         pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=fold)
-        assert len(told(lambda p=pattern: fd.discretize(p, sheet))) == loud
+        assert len(told(lambda p=pattern: fd.discretize(p, sheet, preset="plate"))) == loud
         assert told(lambda p=pattern: fd.discretize(p, sheet, preset="n5b8e")) == []
-    assert told(lambda: fd.discretize(strip(4, 0.25), sheet)) == []  # flat creases do bow
+    # flat creases do bow
+    assert told(lambda: fd.discretize(strip(4, 0.25), sheet, preset="plate")) == []
 
 
 def test_clamped_edges():
     few = fd.patterns.miura(cells=(2, 2))
     more = fd.patterns.miura(cells=(5, 1))
     sheet = fd.Sheet(4e9, 0.3, 0.005)
-    assert "clamped edges" in told(lambda: fd.discretize(few, sheet, clamped="xmin"))[0]
+    assert (
+        "clamped edges"
+        in told(lambda: fd.discretize(few, sheet, clamped="xmin", preset="plate"))[0]
+    )
     assert told(lambda: fd.discretize(FLAP, sheet, clamped="xmin", preset="n5b8e")) == []
-    assert told(lambda: fd.discretize(more, sheet, clamped="xmin")) == []
+    assert told(lambda: fd.discretize(more, sheet, clamped="xmin", preset="plate")) == []
 
 
 def test_the_range_of_models():
@@ -149,11 +175,13 @@ def test_the_range_of_models():
         assert range_of(made) == pytest.approx((share * plate, share))
     thin = [fd.PanelSheet([3], thickness=2e-4)]
     other = fd.Sheet(4e9, 0.3, 4e-4, density=800.0, panels=thin)
-    assert range_of(fd.discretize(MIURA, other))[0] == pytest.approx(0.3 * plate)
-    assert range_of(fd.discretize(MIURA, other, rigid=[3]))[0] == pytest.approx(0.6 * plate)
-    assert range_of(fd.discretize(MIURA, CARD, rigid="all"))[0] == np.inf
+    assert range_of(fd.discretize(MIURA, other, preset="plate"))[0] == pytest.approx(0.3 * plate)
+    assert range_of(fd.discretize(MIURA, other, rigid=[3], preset="plate"))[0] == pytest.approx(
+        0.6 * plate
+    )
+    assert range_of(fd.discretize(MIURA, CARD, rigid="all", preset="plate"))[0] == np.inf
     assert range_of(fd.shell(MIURA, CARD, divisions=2))[0] == np.inf
-    s = fd.discretize(MIURA, CARD)
+    s = fd.discretize(MIURA, CARD, preset="plate")
     assert range_of(fd.Structure(s.nodes, s.bars, s.bar_area, s.sheet))[0] == np.inf
 
 
@@ -175,7 +203,10 @@ def test_modes_above_the_range():
 
 @pytest.mark.matrix
 def test_responses_and_bands_above_the_range():
-    structure, limit = fd.discretize(MIURA, CARD), 0.6 * plate_frequency(MIURA, CARD)
+    structure, limit = (
+        fd.discretize(MIURA, CARD, preset="plate"),
+        0.6 * plate_frequency(MIURA, CARD),
+    )
     held, push = fd.Case(structure, [fd.Fix("xmin")]), fd.Force([6], (0.0, 0.0, 1.0))
     assert told(lambda: fd.frf(held, push, frequencies=np.linspace(0.2, 0.99, 5) * limit)) == []
     (text,) = told(lambda: fd.frf(held, push, frequencies=np.linspace(0.2, 1.01, 5) * limit))
@@ -204,7 +235,7 @@ def test_what_stretches():
         for name in ("herkal", "plate", "n5b8e")
     }
     assert limits == {"herkal": [0.05, 0.05], "plate": [0.4, 0.4], "n5b8e": [np.inf, 0.5]}
-    assert most(fd.discretize(fd.patterns.kresling(), sheet)) == 0.1
+    assert most(fd.discretize(fd.patterns.kresling(), sheet, preset="plate")) == 0.1
     assert most(fd.discretize(angle_section(0.0), sheet)) == 0.5
     assert most(fd.shell(tube, sheet, divisions=2)) == np.inf
 

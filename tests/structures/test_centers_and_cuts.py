@@ -10,6 +10,7 @@ import pytest
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.structures.mesh import polygon_center, quad_centers
+from named_models import named
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1000.0)
 DART = [[0, 0], [2, -1], [0.6, 0], [2, 1]]  # reflex at 2
@@ -19,7 +20,7 @@ SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
 
 def one(vertices, **options):
     pattern = fd.Pattern(vertices, [list(range(len(vertices)))])
-    return fd.discretize(pattern, SHEET, **options)
+    return fd.discretize(pattern, SHEET, **named(options))
 
 
 def regular(m):
@@ -152,7 +153,7 @@ def test_pattern_of_many_kinds_of_panels():
     hexagon = np.c_[regular(6), np.zeros(6)]
     vertices = np.vstack([hexagon, [[1.8, 1.0, 0], [-1.5, -1.8, 0], [-0.5, -2.0, 0]]])
     pattern = fd.Pattern(vertices, [[1, 0, 6], [0, 1, 2, 3, 4, 5], [4, 3, 7, 8]])
-    s = fd.discretize(pattern, SHEET)
+    s = fd.discretize(pattern, SHEET, preset="plate")
     assert s.centers.tolist() == [-1, 9, 10]
     assert [s.triangle_panel.tolist().count(p) for p in range(3)] == [1, 6, 4]
     kinds = np.sort(s.bars, axis=1).tolist()
@@ -164,7 +165,7 @@ def test_pattern_of_many_kinds_of_panels():
 def test_a_panel_too_narrow_for_its_center_is_refused():
     """Rounding hides where diagonals cross that are parallel to 1e-9; near that, it does not."""
     for length in (1.0, 1e4):
-        center = fd.discretize(fd.patterns.simple_fold(a=length), SHEET).nodes[6]
+        center = fd.discretize(fd.patterns.simple_fold(a=length), SHEET, preset="plate").nodes[6]
         np.testing.assert_allclose(center, [length / 4, 0.5, length * 0.75**0.5 / 2], rtol=1e-6)
     with pytest.raises(InputError, match=r'^panel 0: is so narrow .* scheme = "n4b5"'):
-        fd.discretize(fd.patterns.simple_fold(a=2.0**31), SHEET)
+        fd.discretize(fd.patterns.simple_fold(a=2.0**31), SHEET, preset="plate")

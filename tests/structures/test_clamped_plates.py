@@ -10,6 +10,7 @@ import pytest
 import foldyn as fd
 from foldyn.structures.condensed_panel import panel_mass
 from foldyn.structures.panel_plate import outline
+from named_models import named
 from pairwise import beyond
 
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=100.0)
@@ -121,7 +122,7 @@ def test_rigid_panels_turn_at_a_clamped_edge_as_those_of_the_default():
     options = {"rigid": "all", "mass": "consistent", "membrane": "bars"}
     found, expected = (
         fd.modes(fd.Case(s, [fd.Fix("xmin")]), 2).frequency.values
-        for s in (clamped(**options), fd.discretize(MIURA, SHEET, clamped="xmin", **options))
+        for s in (clamped(**options), fd.discretize(MIURA, SHEET, clamped="xmin", **named(options)))
     )
     np.testing.assert_allclose(found, expected, rtol=1e-9)
     assert not clamped(rigid="all").surface.clamped

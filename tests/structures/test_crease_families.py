@@ -44,14 +44,14 @@ def test_a_closed_crease_needs_a_rest_angle_of_its_family():
     shut = fd.Pattern([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.2, 0.1, 0), (0.2, 0.9, 0)],
                       [(0, 1, 2, 3), (2, 1, 4, 5)], {(1, 2): "V"})  # fmt: skip
     with pytest.raises(InputError, match="folded flat upon itself"):
-        fd.discretize(shut, SHEET)
-    s = fd.discretize(shut, SHEET, crease_rest={"valley": 20})
+        fd.discretize(shut, SHEET, preset="plate")
+    s = fd.discretize(shut, SHEET, crease_rest={"valley": 20}, preset="plate")
     assert np.degrees(s.fold_rest) == pytest.approx([20.0])
 
 
 def test_the_mapping_is_copied():
     given = {"mountain": 0.1}
-    s = fd.discretize(MIURA, SHEET, crease_stiffness=given)
+    s = fd.discretize(MIURA, SHEET, crease_stiffness=given, preset="plate")
     given["mountain"] = 5.0
     assert s.options.crease_stiffness == {"mountain": 0.1}
 

@@ -8,6 +8,7 @@ import pytest
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.patterns import GENERATORS
+from named_models import named
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1000.0)
 MORE = {"simple_fold": {}, "miura": {"cells": (2, 1)}, "eggbox": {"cells": (1, 2)}, "kresling": {}}
@@ -16,7 +17,7 @@ SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
 
 def one(vertices, **options):
     pattern = fd.Pattern(vertices, [list(range(len(vertices)))])
-    return fd.discretize(pattern, SHEET, **options)
+    return fd.discretize(pattern, SHEET, **named(options))
 
 
 @pytest.mark.parametrize("name", sorted(GENERATORS))
@@ -89,9 +90,9 @@ def test_hinge_orientation(name, scheme):
 
 def test_angles_of_the_contract():
     """A mountain has 300 degrees for a dihedral of 60, the Miura's ridge along x, too."""
-    s = fd.discretize(fd.patterns.simple_fold(dihedral=60), SHEET)
+    s = fd.discretize(fd.patterns.simple_fold(dihedral=60), SHEET, preset="plate")
     np.testing.assert_allclose(np.degrees(s.fold_rest), [300.0], rtol=0, atol=1e-12)
-    m = fd.discretize(fd.patterns.miura(dihedral=60), SHEET)
+    m = fd.discretize(fd.patterns.miura(dihedral=60), SHEET, preset="plate")
     found = np.degrees(m.fold_rest)[[m.pattern.creases.tolist().index(c) for c in ([1, 4], [4, 7])]]
     np.testing.assert_allclose(found, 300.0, rtol=0, atol=1e-10)
 
@@ -99,7 +100,7 @@ def test_angles_of_the_contract():
 def test_specimen_numbering():
     """The paper's fold 2-9 and bend 8-64 are our 1-8 and 7-63."""
     pattern = fd.patterns.miura(cells=(4, 3), a=0.025, b=0.025, panel_angle=60, dihedral=39.2)
-    s = fd.discretize(pattern, SHEET)
+    s = fd.discretize(pattern, SHEET, preset="plate")
     assert (len(pattern.vertices), len(pattern.faces), len(s.nodes)) == (63, 48, 111)
     assert [1, 8] in np.sort(s.folds[:, :2], axis=1).tolist()
     assert [7, 63] in np.sort(s.bends[:, :2], axis=1).tolist()
@@ -111,7 +112,7 @@ def test_specimen_numbering():
 
 
 def test_arrays_are_read_only():
-    s = fd.discretize(fd.patterns.miura(), SHEET)
+    s = fd.discretize(fd.patterns.miura(), SHEET, preset="plate")
     for name in ("nodes", "bars", "bar_length", "bar_area", "folds", "fold_stiffness",
                  "fold_rest", "bends", "bend_stiffness", "bend_rest", "triangles"):  # fmt: skip
         with pytest.raises(ValueError, match="read-only"):
@@ -125,20 +126,20 @@ def test_arrays_are_read_only():
 def test_inputs_are_left_alone():
     vertices, center = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), [0.4, 0.5, 0.0]
     own, given = np.array(center), vertices.copy()
-    s = fd.discretize(fd.Pattern(given, [[0, 1, 2, 3]]), SHEET, centers={0: own})
+    s = fd.discretize(fd.Pattern(given, [[0, 1, 2, 3]]), SHEET, centers={0: own}, preset="plate")
     np.testing.assert_array_equal(given, vertices)
     own[:] = given[:] = 9.0
     assert given.flags.writeable
     np.testing.assert_array_equal(s.nodes, [*vertices, center])
     stiffness = np.array([1.0, 2.0, 3.0, 4.0])
-    s = fd.discretize(fd.patterns.miura(), SHEET, crease_stiffness=stiffness)
+    s = fd.discretize(fd.patterns.miura(), SHEET, crease_stiffness=stiffness, preset="plate")
     before = s.fold_stiffness.copy()
     stiffness[:] = 0.0
     np.testing.assert_array_equal(s.fold_stiffness, before)
 
 
 def test_displacements_of_wrong_shape():
-    s = fd.discretize(fd.patterns.simple_fold(), SHEET)
+    s = fd.discretize(fd.patterns.simple_fold(), SHEET, preset="plate")
     n = len(s.nodes)
     u = np.random.default_rng(0).uniform(-0.01, 0.01, (n, 3))
     np.testing.assert_array_equal(s.internal_force(u.ravel()), s.internal_force(u))
@@ -165,11 +166,11 @@ def test_crease_stiffness_per_length():
 def test_crease_rest_in_degrees():
     pattern = fd.patterns.miura(dihedral=60)
     for given in (170, [100.0, 200.0, 300.0, 1.0]):
-        s = fd.discretize(pattern, SHEET, crease_rest=given)
+        s = fd.discretize(pattern, SHEET, crease_rest=given, preset="plate")
         np.testing.assert_allclose(s.fold_rest, np.radians(given), rtol=1e-14)
     u = np.zeros_like(s.nodes)
     assert np.abs(s.internal_force(u)).max() > 1e-3  # not at rest as drawn
-    assert (s.bend_rest == fd.discretize(pattern, SHEET).bend_rest).all()
+    assert (s.bend_rest == fd.discretize(pattern, SHEET, preset="plate").bend_rest).all()
     np.testing.assert_allclose(s.dihedrals(u)[0], pattern.dihedrals, rtol=1e-13)
 
 
@@ -184,7 +185,7 @@ SHUT = fd.Pattern([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 1, 0]], [[0, 1, 2], [1
 )  # fmt: skip
 def test_wrong_crease_values(field, value):
     with pytest.raises(InputError, match=field):
-        fd.discretize(fd.patterns.miura(), SHEET, **{field: value})
+        fd.discretize(fd.patterns.miura(), SHEET, **named({field: value}))
 
 
 @pytest.mark.parametrize(
@@ -201,7 +202,7 @@ def test_wrong_crease_values(field, value):
 )
 def test_what_cannot_be_made(pattern, sheet, options, message):
     with pytest.raises(InputError, match=message):
-        fd.discretize(pattern, sheet, **options)
+        fd.discretize(pattern, sheet, **named(options))
 
 
 @pytest.mark.parametrize(

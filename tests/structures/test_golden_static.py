@@ -13,6 +13,7 @@ import pytest
 from scipy import sparse
 
 import foldyn as fd
+from named_models import named
 
 GOLDEN = Path(__file__).resolve().parents[3] / "shared" / "golden"
 FILES = sorted(GOLDEN.glob("static_*.npz"))
@@ -46,7 +47,7 @@ def structure_of(path, calibration="merlin2", stored_centers=True):
         centers = {p: x for p, x in stored.items() if len(pattern.faces[p]) > 4}
     law = fd.EnhancedLinear(low, high, rest="as_published")
     options = {"scheme": scheme, "calibration": calibration, "fold_law": law, "centers": centers}
-    return data, fd.discretize(pattern, sheet, **options)
+    return data, fd.discretize(pattern, sheet, **named(options))
 
 
 @pytest.fixture(scope="module", params=FILES, ids=lambda p: p.stem.removeprefix("static_"))

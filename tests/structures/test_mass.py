@@ -77,7 +77,7 @@ def test_safe_rules_on_single_panels(panel, scheme, rule):
 
 
 def test_mass_needs_a_density():
-    s = fd.discretize(fd.patterns.miura(), fd.Sheet(1e6, 0.25, 0.01))
+    s = fd.discretize(fd.patterns.miura(), fd.Sheet(1e6, 0.25, 0.01), preset="plate")
     assert s.energy(np.zeros_like(s.nodes)) == 0.0  # statics does without
     with pytest.raises(InputError, match="density is missing"):
         _ = s.mass
@@ -91,7 +91,9 @@ def test_panel_rule():
         (TRAPEZOID, "n5b8", 1 / 5), (TRAPEZOID, "n4b5", 1 / 4), (HEXAGON, "n5b8", 1 / 7)
     ):  # fmt: skip
         np.testing.assert_allclose(shares(shape, "panel", scheme=scheme), part, rtol=1e-14)
-    two = fd.discretize(fd.patterns.simple_fold(1.0, 1.0), SHEET, mass="panel").mass.diagonal()
+    two = fd.discretize(
+        fd.patterns.simple_fold(1.0, 1.0), SHEET, mass="panel", preset="plate"
+    ).mass.diagonal()
     np.testing.assert_allclose(two, RHO * T * np.array([1, 1, 2, 2, 1, 1, 1, 1]) / 5, rtol=1e-14)
 
 
@@ -140,7 +142,9 @@ def test_circumcenter_refuses_obtuse_triangles():
     assert total.min() == pytest.approx(-1.63, abs=0.005)
     assert (shares(OBLIQUE, "mixed_voronoi") > 0).all()
     with pytest.raises(InputError, match="circumcenter"):
-        _ = fd.discretize(fd.patterns.miura(a=1.0, b=4.0), SHEET, mass="circumcenter").mass
+        _ = fd.discretize(
+            fd.patterns.miura(a=1.0, b=4.0), SHEET, mass="circumcenter", preset="plate"
+        ).mass
 
 
 def apex(degrees):

@@ -53,7 +53,7 @@ def test_parallelograms_beside_other_panels():
     """A square between a triangle and a trapezoid: the sum of their own matrices."""
     x = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [-1, 0.5], [2, 0.1], [2, 0.7]])
     faces = {(0, 3, 4): "consistent", (0, 1, 2, 3): "bubble", (1, 5, 6, 2): "consistent"}
-    whole = fd.discretize(fd.Pattern(x, list(faces)), SHEET, mass="bubble")
+    whole = fd.discretize(fd.Pattern(x, list(faces)), SHEET, mass="bubble", preset="plate")
     total = np.zeros((len(whole.nodes),) * 2)
     for (face, rule), center in zip(faces.items(), whole.centers, strict=True):
         nodes = [*face, center] if center >= 0 else face
@@ -116,7 +116,7 @@ def test_straight_creases_make_a_difference():
     strip = fd.Pattern([(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (2, 1), (3, 1)],
                        [(0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6)])  # fmt: skip
     sheet = fd.Sheet(1e6, 0.3, T, density=RHO)
-    mass = fd.discretize(strip, sheet, mass="condensed").mass.toarray()
+    mass = fd.discretize(strip, sheet, mass="condensed", preset="plate").mass.toarray()
     centers = [8, 9, 10]
     own = mass[centers, centers] / (RHO * T)
     assert own[0] == pytest.approx(own[2], rel=1e-6)

@@ -159,7 +159,7 @@ def test_mass_center_and_inertia_of_a_structure():
     sheet = fd.Sheet(1e6, 0.25, 0.01, 60.0)
     exact = np.diag([0.8, 0.8, 1.6])
     for rule in MASS_RULES:
-        plate = fd.discretize(pattern, sheet, mass=rule)
+        plate = fd.discretize(pattern, sheet, mass=rule, preset="plate")
         assert plate.total_mass == pytest.approx(2.4)
         np.testing.assert_allclose(plate.center_of_mass, [2.0, 2.0, 3.0], rtol=1e-14)
         if rule in MATRICES | {"inertia_exact"}:
@@ -175,7 +175,9 @@ def test_mass_center_and_inertia_of_a_structure():
 @pytest.mark.parametrize("rule", ["mixed_voronoi", "consistent", "panel"])
 def test_a_spinning_structure_has_the_energy_of_its_inertia(rule):
     """Kinetic energy of a rigid turn is w I w / 2, with every rule."""
-    s = fd.discretize(fd.patterns.miura(a=1.0, b=1.3), fd.Sheet(1e6, 0.25, 0.01, 60.0), mass=rule)
+    s = fd.discretize(
+        fd.patterns.miura(a=1.0, b=1.3), fd.Sheet(1e6, 0.25, 0.01, 60.0), mass=rule, preset="plate"
+    )
     spin = np.array([0.3, -0.5, 0.7])
     velocity = np.cross(spin, s.nodes - s.center_of_mass)
     energy = 0.5 * float((velocity * (s.mass @ velocity)).sum())

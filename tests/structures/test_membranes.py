@@ -18,6 +18,7 @@ from foldyn.mechanics.membranes import MembranesTerm
 from foldyn.structures.membranes import Sides, coupling
 from foldyn.structures.panel_membrane import Kind, _condensed, _even, membrane_stiffness
 from foldyn.structures.panel_plate import outline
+from named_models import named
 from pairwise import beyond
 
 STEEL = fd.Sheet(200e9, 0.3, 3e-4, 7850.0)
@@ -78,7 +79,7 @@ def test_a_membrane_resists_all_but_rigid_motions(name):
 def test_corners_feel_it_softer_than_bars():
     """Ratios, to two digits, of an independent computation with bilinear elements, 32 an edge."""
     corners = SHAPES["lozenge"]
-    bars = fd.discretize(LOZENGE, fd.Sheet(1e9, 0.3, 1e-3), membrane="bars")
+    bars = fd.discretize(LOZENGE, fd.Sheet(1e9, 0.3, 1e-3), membrane="bars", preset="plate")
     tangent = bars.body.tangent(np.zeros(15)) - bars.body.sheet.hinges_alone().tangent(np.zeros(15))
     plane = [3 * i + c for i in range(5) for c in (0, 1)]  # of the corners and the center
     bare = condensed(tangent.toarray()[np.ix_(plane, plane)] / 1e6, 8)  # E t
@@ -161,7 +162,7 @@ def test_a_panel_is_the_same_turned_renumbered_and_of_another_size():
 )
 @pytest.mark.parametrize("pattern", [fd.patterns.miura(), fd.patterns.resch(cells=(1, 1))])
 def test_forces_and_tangents_are_derivatives_of_the_energy(options, pattern):
-    structure = fd.discretize(pattern, RUBBER, membrane="panel", **options)
+    structure = fd.discretize(pattern, RUBBER, membrane="panel", **named(options))
     body = structure.body
     shift = np.random.default_rng(1).standard_normal(structure.nodes.shape)
     q = body.dofs(0.02 * np.ptp(structure.nodes) * shift)
@@ -170,7 +171,7 @@ def test_forces_and_tangents_are_derivatives_of_the_energy(options, pattern):
 
 
 def test_turned_as_a_whole_or_folded_along_diagonals_it_has_no_strain():
-    structure = fd.discretize(LOZENGE, RUBBER, membrane="panel")
+    structure = fd.discretize(LOZENGE, RUBBER, membrane="panel", preset="plate")
     x = structure.nodes
     axis = np.array([1.0, 2.0, -0.5]) / np.linalg.norm([1.0, 2.0, -0.5])
     states = [x @ Rotation.from_rotvec(1.1 * axis).as_matrix()]
@@ -188,7 +189,9 @@ def test_turned_as_a_whole_or_folded_along_diagonals_it_has_no_strain():
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 def test_warmth_that_all_panels_share_only_scales_a_sheet():
     """lambda = 1 + alpha T, without stress; bars by themselves do so in small strains only."""
-    structure = fd.discretize(fd.patterns.miura(cells=(2, 2)), RUBBER, membrane="panel")
+    structure = fd.discretize(
+        fd.patterns.miura(cells=(2, 2)), RUBBER, membrane="panel", preset="plate"
+    )
     case = fd.Case(structure, loads=[fd.Temperature(100.0, expansion=1e-3)])
     path = fd.trace(case, "newton", load_factors=[0.0, 1.0], inertia_relief=True)
     moved = structure.nodes + path.displacement.values[-1]
@@ -218,9 +221,9 @@ def test_held_sheets_vibrate_as_the_shell(pattern, worst):
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
-        found = frequencies(fd.discretize(pattern, STEEL, membrane="panel"))
+        found = frequencies(fd.discretize(pattern, STEEL, membrane="panel", preset="plate"))
         wanted = frequencies(fd.shell(pattern, STEEL, divisions=8))
-        alone = frequencies(fd.discretize(pattern, STEEL, membrane="bars"))
+        alone = frequencies(fd.discretize(pattern, STEEL, membrane="bars", preset="plate"))
     assert np.abs(found / wanted - 1.0).max() < worst
     assert np.abs(alone / wanted - 1.0).max() > 2.0 * worst
 
@@ -233,7 +236,7 @@ METHODS = ("rk4", "central_difference", "dormand_prince", "newmark", "generalize
 @pytest.mark.parametrize("options", [{"mass": "mixed_voronoi"}, {"preset": "n5b8e"}])
 def test_all_methods_find_the_same_motion(options):
     options = {"mass": "mixed_voronoi", **options}
-    structure = fd.discretize(fd.patterns.miura((1, 2)), RUBBER, membrane="panel", **options)
+    structure = fd.discretize(fd.patterns.miura((1, 2)), RUBBER, membrane="panel", **named(options))
     case = fd.Case(structure, [fd.Fix("xmin")], [fd.Force([14], (0, 0, 2e-3))])
     ends = {}
     for method in METHODS:
@@ -251,7 +254,7 @@ def test_a_turning_sheet_takes_few_iterations():
     iterations = []
     for membrane in ("bars", "panel"):
         structure = fd.discretize(
-            fd.patterns.miura((1, 1)), RUBBER, bar_law="linear", membrane=membrane
+            fd.patterns.miura((1, 1)), RUBBER, bar_law="linear", membrane=membrane, preset="plate"
         )
         arm = structure.nodes - structure.nodes.mean(axis=0)
         start = fd.State(velocity=np.cross([0.0, 0.0, 5.0], arm))
@@ -295,7 +298,9 @@ def test_threads_share_panels(monkeypatch):
     sheet = fd.patterns.miura(cells=(80, 4))
     a, b, c, d = sheet.faces[-1]  # cut in two: of triangles some threads have none
     pattern = fd.Pattern(sheet.vertices, [*sheet.faces[:-1], (a, b, c), (a, c, d)])
-    structure = fd.discretize(pattern, RUBBER, membrane="panel", mass="mixed_voronoi")
+    structure = fd.discretize(
+        pattern, RUBBER, membrane="panel", mass="mixed_voronoi", preset="plate"
+    )
     case = fd.Case(structure, [fd.Fix("xmin")], [fd.Gravity((0, 0, -9.81))])
     motions = []
     for count in (1, 2, 3):
@@ -310,9 +315,9 @@ def test_threads_share_panels(monkeypatch):
 def test_what_does_not_go_together_is_refused():
     pattern = fd.patterns.miura()
     with pytest.raises(InputError, match="coupled are linear in Green strain"):
-        fd.discretize(pattern, RUBBER, membrane="panel", bar_law="ogden")
+        fd.discretize(pattern, RUBBER, membrane="panel", bar_law="ogden", preset="plate")
     with pytest.raises(InputError, match='membrane = "panels": did you mean'):
-        fd.discretize(pattern, RUBBER, membrane="panels")  # pyright: ignore[reportArgumentType]
+        fd.discretize(pattern, RUBBER, membrane="panels", preset="plate")  # pyright: ignore[reportArgumentType]
 
 
 def test_panels_that_are_not_convex_have_single_bars():
@@ -327,10 +332,14 @@ def test_panels_that_are_not_convex_have_single_bars():
 
 def test_a_law_of_single_bars_has_single_bars():
     pattern = fd.patterns.miura()
-    assert fd.discretize(pattern, RUBBER).options.membrane == "panel"
-    assert fd.discretize(pattern, RUBBER, bar_law="ogden").options.membrane == "bars"
-    assert fd.discretize(pattern, RUBBER, membrane="bars").bar_law.name == "ogden"
-    assert fd.discretize(pattern, RUBBER, bar_law="linear").options.membrane == "panel"
+    assert fd.discretize(pattern, RUBBER, preset="plate").options.membrane == "panel"
+    assert (
+        fd.discretize(pattern, RUBBER, bar_law="ogden", preset="plate").options.membrane == "bars"
+    )
+    assert fd.discretize(pattern, RUBBER, membrane="bars", preset="plate").bar_law.name == "ogden"
+    assert (
+        fd.discretize(pattern, RUBBER, bar_law="linear", preset="plate").options.membrane == "panel"
+    )
 
 
 @pytest.mark.matrix

@@ -90,7 +90,7 @@ def test_a_crease_between_different_panels_is_two_springs_in_series():
 @pytest.mark.parametrize("mass", [*MASS_RULES, "lumped", "shell"])
 def test_mass_of_each_panel_by_every_rule(mass):
     if mass in MASS_RULES:
-        s = fd.discretize(PAIR, MIXED, mass=mass)
+        s = fd.discretize(PAIR, MIXED, mass=mass, preset="plate")
     else:
         rule = "consistent" if mass == "shell" else mass
         s = fd.shell(PAIR, MIXED, divisions=4, mass=rule)
@@ -192,9 +192,15 @@ AUXETIC = fd.Sheet(E, NU, T, panels=[fd.PanelSheet([1], poissons_ratio=-0.1)])
         (lambda: fd.Sheet(E, NU, T, RHO, panels=BOTH), r"panels\[1\].panels: panel 1 .* already"),
         (lambda: fd.Sheet(E, NU, T, panels=OTHER), "panels = .*must be a list of PanelSheet"),
         (lambda: fd.Sheet(E, NU, T, panels=[3]), r"panels\[0\] = 3: must be a PanelSheet"),
-        (lambda: fd.discretize(PAIR, THIRD), r"\[0\].panels: panel 2 is out of range; .* 0 to 1"),
+        (
+            lambda: fd.discretize(PAIR, THIRD, preset="plate"),
+            r"\[0\].panels: panel 2 is out of range; .* 0 to 1",
+        ),
         (lambda: fd.shell(PAIR, THIRD), "panel 2 is out of range"),
-        (lambda: fd.discretize(PAIR, AUXETIC, membrane="bars"), "= -0.1: N5B8 quadrilaterals need"),
+        (
+            lambda: fd.discretize(PAIR, AUXETIC, membrane="bars", preset="plate"),
+            "= -0.1: N5B8 quadrilaterals need",
+        ),
     ],
 )
 def test_wrong_panels(make, message):

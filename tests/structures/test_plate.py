@@ -11,6 +11,7 @@ from case_texts import HELD_MIURA_TEXT
 from foldyn.errors import InputError
 from foldyn.structures.plate import COMPLIANCE, POLYGON, TRIANGLE
 from foldyn.structures.quad_plates import flexibilities
+from named_models import named
 from verification.fidelity.cases import polygons
 
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=1.0)
@@ -125,7 +126,7 @@ def test_folds_are_in_series_with_the_panels_they_bend():
     pattern = fd.Pattern(x, [[0, 1, 4, 5], [1, 2, 3, 4], [2, 6, 3]])
 
     def soft(**options):
-        return 1.0 / fd.discretize(pattern, SHEET, **options).fold_stiffness
+        return 1.0 / fd.discretize(pattern, SHEET, **named(options)).fold_stiffness
 
     plate = soft(calibration="plate")
     own = [plate - soft(calibration="plate", rigid=[p]) for p in range(3)]  # of each panel
@@ -140,14 +141,14 @@ def test_a_moment_turns_the_edge_of_a_square():
     """By 0.357 M/G in the shell with nu = 0.25, of which 1/6 by way of the center."""
     sheet = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=90)
-    s = fd.discretize(pattern, sheet, crease_stiffness=1e9)
+    s = fd.discretize(pattern, sheet, crease_stiffness=1e9, preset="plate")
     found = sheet.bending_modulus / s.fold_stiffness[0] / 2.0 + 1.0 / 6.0
     assert found == pytest.approx(0.357, rel=0.01)
 
 
 def test_polygons_give_way_by_a_constant():
     pattern = polygons(sides=6, dihedral=90.0)
-    s = fd.discretize(pattern, SHEET, crease_stiffness=1e9)
+    s = fd.discretize(pattern, SHEET, crease_stiffness=1e9, preset="plate")
     soft = 2.0 * COMPLIANCE * pattern.face_areas[0] / G
     assert 1.0 / s.fold_stiffness[0] == pytest.approx(soft, rel=1e-6)
 
@@ -155,7 +156,7 @@ def test_polygons_give_way_by_a_constant():
 def test_folds_of_a_given_stiffness():
     """Creases without stiffness have none, and rigid ones that of their panels."""
     free, rigid, both, own = (
-        fd.discretize(fd.patterns.simple_fold(dihedral=90), SHEET, **options).fold_stiffness
+        fd.discretize(fd.patterns.simple_fold(dihedral=90), SHEET, **named(options)).fold_stiffness
         for options in (
             {"crease_stiffness": 0.0}, {"crease_stiffness": 1e9 * G}, {},
             {"calibration": "standard"},
@@ -169,8 +170,8 @@ def test_folds_of_a_given_stiffness():
 def test_rigid_panels_do_not_give_way_to_their_creases(rigid, bent):
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=90)
     (own,) = fd.discretize(pattern, SHEET, calibration="standard").fold_stiffness
-    (found,) = fd.discretize(pattern, SHEET, rigid=rigid).fold_stiffness
-    (soft,) = fd.discretize(pattern, SHEET).fold_stiffness
+    (found,) = fd.discretize(pattern, SHEET, rigid=rigid, preset="plate").fold_stiffness
+    (soft,) = fd.discretize(pattern, SHEET, preset="plate").fold_stiffness
     assert 1.0 / found == pytest.approx(1.0 / own + 0.5 * bent * (1.0 / soft - 1.0 / own), rel=1e-9)
 
 

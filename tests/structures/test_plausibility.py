@@ -60,14 +60,17 @@ def test_patterns_in_millimeters(model):
 
 def test_a_panel_of_its_own():
     thick = fd.PanelSheet([2], thickness=0.1)
-    (text,) = told(lambda: fd.discretize(SMALL, fd.Sheet(*STEEL, panels=[thick])))
+    (text,) = told(lambda: fd.discretize(SMALL, fd.Sheet(*STEEL, panels=[thick]), preset="plate"))
     assert "thickness = 0.1 m is 2.5 times the shortest edge of panel 2, 0.04 m" in text
 
 
 def test_what_is_not_told():
     for density in (None, 1.0, 1000.0):  # sheets of the paper
         sheet = fd.Sheet(1e6, 0.25, 0.01, density)
-        assert told(lambda sheet=sheet: fd.discretize(fd.patterns.miura(), sheet)) == []
+        assert (
+            told(lambda sheet=sheet: fd.discretize(fd.patterns.miura(), sheet, preset="plate"))
+            == []
+        )
     angles = [0.1, 0.25, 0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4, 5, 5.5, 6, 6.3, 6.45, 7, 9.42478]
     assert told(lambda: [fd.patterns.simple_fold(dihedral=angle) for angle in angles]) == []
     assert told(lambda: [fd.Actuate("all", angle=[angle, 120.0]) for angle in angles]) == []
@@ -96,11 +99,11 @@ def test_shipped_cases(name):
         (lambda: fd.patterns.eggbox(dihedral=np.radians(71)), "dihedral = 1.2392 .* give 71 if"),
         (lambda: fd.Actuate("all", angle=[2.44, 1.67]), "angle = 2.44 is small .* 139.8"),
         (
-            lambda: fd.discretize(SMALL, fd.Sheet(*STEEL), crease_rest=4.01),
+            lambda: fd.discretize(SMALL, fd.Sheet(*STEEL), crease_rest=4.01, preset="plate"),
             "crease_rest = 4.01 .* give 229.8 if",
         ),
         (
-            lambda: fd.discretize(SMALL, fd.Sheet(*STEEL), crease_rest=np.pi / 4),
+            lambda: fd.discretize(SMALL, fd.Sheet(*STEEL), crease_rest=np.pi / 4, preset="plate"),
             "= 0.785.* is pi/4, ",
         ),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -9,8 +10,9 @@ import pytest
 
 import foldyn as fd
 from foldyn.cases.document import from_document, to_document
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import Superlinear
+from foldyn.patterns import GENERATORS
 from foldyn.structures import PRESETS
 from foldyn.structures.presets import implied, resolved
 
@@ -33,11 +35,34 @@ def told(found) -> dict:
     return {name: value for name, value in vars(found).items() if name not in STEPS}
 
 
-def test_the_default_is_plates_with_consistent_mass_and_linear_bends():
-    assert told(options()) == PAPER | {
-        "mass": "consistent", "bend_law": "linear", "calibration": "plate", "bar_law": "linear",
-    }  # fmt: skip
-    assert options() == options(preset="plate") == PRESETS["plate"]
+def test_the_default_is_plates_that_give_way_at_creases():
+    plates = {"bend_law": "linear", "calibration": "plate", "bar_law": "linear"}
+    assert told(options()) == PAPER | plates | {"scheme": "n5b8e", "mass": "condensed"}
+    assert options() == options(preset="n5b8e") == PRESETS["n5b8e"] == PRESETS[next(iter(PRESETS))]
+    assert told(options(preset="plate")) == PAPER | plates | {"mass": "consistent"}
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize("name", [name for name in GENERATORS if name != "simple_fold"])
+def test_every_pattern_takes_the_default(name):
+    """Its modes are those of what floats: six without frequency, of two tubes twelve."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        made = fd.discretize(GENERATORS[name](), SHEET)
+        values = fd.modes(fd.Case(made), 13).eigenvalue.values
+    free = 12 if name == "zipper_tubes" else 6
+    assert made.options.scheme == "n5b8e"
+    assert not values[:free].any() and values[free] > 0.0
+
+
+def test_thick_panels_take_the_default():
+    pattern = fd.thicken(fd.patterns.miura(), SHEET.thickness, offsets=0.0)
+    held = [fd.Fix("xmin")]
+    found = [
+        fd.modes(fd.Case(fd.discretize(pattern, SHEET, **given), held), 1).frequency[0]
+        for given in ({}, {"preset": "plate"})
+    ]
+    assert found[0] != found[1] and abs(found[1] / found[0] - 1.0) < 0.01
 
 
 def test_the_models_of_the_paper_and_of_merlin2_have_names():
@@ -54,9 +79,12 @@ def test_the_models_of_the_paper_and_of_merlin2_have_names():
 @pytest.mark.parametrize(
     ("given", "name"),
     [
-        ({}, "plate"),
+        ({}, "n5b8e"),
+        ({"scheme": "n5b8e"}, "n5b8e"),
+        ({"mass": "circumcenter", "bar_law": "linear", "fold_law": "linear"}, "n5b8e"),
+        ({"scheme": "n5b8"}, "plate"),
         ({"scheme": "n4b5"}, "plate"),
-        ({"mass": "circumcenter", "bar_law": "linear", "fold_law": "linear"}, "plate"),
+        ({"fold_law": "superlinear"}, "plate"),
         ({"bend_law": "linear"}, "plate"),
         ({"bend_law": "plate_superlinear"}, "plate"),
         ({"calibration": "plate"}, "plate"),

@@ -137,7 +137,7 @@ def test_mean_strains_of_a_sheet_that_is_stretched_and_turned():
     """Stretched by 1 % along x, contraction free or not, and turned: the energy of a membrane."""
     flat = fd.patterns.miura(cells=(1, 1), a=0.1, b=0.1, panel_angle=60, dihedral=179.99)
     sheet = fd.Sheet(1e9, 0.25, 1e-3, density=1000.0)
-    s = fd.discretize(flat, sheet)
+    s = fd.discretize(flat, sheet, preset="plate")
     turn = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
     moved = (s.nodes * [1.01, 1.0, 1.0]) @ turn.T - s.nodes
     strain = 0.5 * (1.01**2 - 1.0)

@@ -36,7 +36,7 @@ def test_hinges_turn_as_on_a_paraboloid(scheme: str) -> None:
 
 
 def test_bars_between_panels_take_the_mean() -> None:
-    s = fd.discretize(STRIP, SHEET, bar_law="linear", membrane="bars")
+    s = fd.discretize(STRIP, SHEET, bar_law="linear", membrane="bars", preset="plate")
     both = s.swollen(np.array([1e-3, 3e-3]), np.zeros(2))
     for ends, tension, area, length in zip(
         both.forces.bars.tolist(), both.forces.tension, s.bar_area, s.bar_length, strict=True

@@ -224,7 +224,7 @@ def test_an_edge_is_held_along_its_length_in_the_shell():
     sheet = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
     case = FidelityCase("miura", {"cells": [1, 1]}, "edge", sheet)
     shell = case.case(fd.shell(case.pattern(), sheet, divisions=4))
-    reduced = case.case(fd.discretize(case.pattern(), sheet))
+    reduced = case.case(fd.discretize(case.pattern(), sheet, preset="plate"))
     assert shell.fixed.all(axis=1).sum() == 2 * 4 + 1
     assert np.flatnonzero(reduced.fixed.all(axis=1)).tolist() == [0, 1, 2]
     held = shell.structure.nodes[shell.fixed.all(axis=1)]

@@ -24,6 +24,7 @@ from foldyn.studies.herkal.opensees.stored import (
     write_still,
 )
 from foldyn.studies.herkal.runs import CASES
+from named_models import named
 from pairwise import beyond
 from verification.opensees import compare, model
 from verification.opensees.model import panel_mesh
@@ -230,7 +231,7 @@ def test_what_the_model_does_not_know_is_refused(change, message):
     ],
 )
 def test_folds_that_the_model_does_not_know_are_refused(options, message):
-    structure = fd.discretize(case().structure.pattern, case().structure.sheet, **options)
+    structure = fd.discretize(case().structure.pattern, case().structure.sheet, **named(options))
     with pytest.raises(InputError, match=message):
         model.PanelShells(fd.Case(structure), 4)
 

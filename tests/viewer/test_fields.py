@@ -9,6 +9,7 @@ import xarray as xr
 import foldyn as fd
 from foldyn.structures import hinge_angles
 from foldyn.viewer.states import fields
+from named_models import named
 
 SHEET = fd.Sheet(1e9, 0.3, 1e-3, density=700.0)
 SUPPORTS = [fd.Fix([0, 1, 2], axes="xyz")]
@@ -16,7 +17,7 @@ SUPPORTS = [fd.Fix([0, 1, 2], axes="xyz")]
 
 def structure(**options):
     return fd.discretize(
-        fd.patterns.miura((2, 2), 0.1, b=0.1, panel_angle=60, dihedral=90), SHEET, **options
+        fd.patterns.miura((2, 2), 0.1, b=0.1, panel_angle=60, dihedral=90), SHEET, **named(options)
     )
 
 
@@ -66,7 +67,7 @@ def test_rest_angles_follow_what_folds_them_in_a_motion():
 
 
 MODELS = {
-    "plate": lambda pattern, sheet, **options: fd.discretize(pattern, sheet, **options),
+    "plate": lambda pattern, sheet, **options: fd.discretize(pattern, sheet, **named(options)),
     "n5b8e": lambda pattern, sheet, **o: fd.discretize(pattern, sheet, preset="n5b8e", **o),
     "n5b8e with bars": lambda pattern, sheet, **o: fd.discretize(
         pattern, sheet, preset="n5b8e", membrane="bars", **o

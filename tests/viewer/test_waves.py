@@ -91,7 +91,9 @@ def test_maps_bring_nodes_and_waves_to_their_partners(part):
 def test_bands_without_a_case_file_have_a_page_if_they_have_shapes():
     """The gaps are those of the path; phases of a grid lie on none."""
     pattern = fd.patterns.miura(dihedral=60)
-    structure = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0, length_scale_ratio=10.0))
+    structure = fd.discretize(
+        pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0, length_scale_ratio=10.0), preset="plate"
+    )
     cell = fd.UnitCell(fd.Case(structure))
     path = cell.path("G-X-M-G", 13)
     found = fd.bands(cell, path, count=5, shape=True)

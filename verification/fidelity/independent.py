@@ -43,7 +43,7 @@ class Independent(NamedTuple):
 
 def frequencies(case: FidelityCase, count: int) -> NDArray:
     """Lowest frequencies (count,), Hz, of a case by OpenSees."""
-    held = case.case(discretize(case.pattern(), case.sheet, fold_law=LINEAR))
+    held = case.case(discretize(case.pattern(), case.sheet, fold_law=LINEAR, preset="plate"))
     coarse, fine = (PanelShells(held, n).frequencies(count) for n in MESHES)
     return extrapolated(coarse, fine, MESHES[1] / MESHES[0])
 

@@ -146,9 +146,7 @@ def case_of_document(
         choice = choice_of(schema, pattern, choice)
         model, given = MODELS[choice.kind], schema.model.options(choice.kind)
         with faults.collected(), within("model: "):
-            # the pattern is missing if its table is wrong
-            welds = bool(len(getattr(pattern, "welds", ())))
-            resolved = model.options(welds=welds, **given)
+            resolved = model.options(**given)
         faults.raise_all()
         with within("model: "):
             straight = straightened(resolved, pattern, schema.supports)

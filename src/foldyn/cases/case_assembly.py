@@ -379,7 +379,8 @@ class Damped(Supported):
             with faults.collected():
                 raise InputError(
                     "damping: StrainDamping takes bars and hinges, and the panels of this model "
-                    "bend as plates; take CreaseDamping, or Rayleigh for what hardly turns"
+                    'bend as plates; take preset = "plate", which has hinges in panels, '
+                    "CreaseDamping, or Rayleigh for what hardly turns"
                 )
 
     @cached_property

@@ -26,8 +26,8 @@ class Model:
     make : callable
         ``make(pattern, sheet, **options)`` returns the structure.
     options : callable
-        ``options(welds=..., **given)`` returns all options of the model, with defaults for options
-        that are not given; `welds` is whether the pattern has welds.
+        ``options(**given)`` returns all options of the model, with defaults for options that are
+        not given.
     masses : iterable of str
         Mass rules that the model offers.
     name : str
@@ -45,16 +45,8 @@ class Model:
         return tuple(signature(self.make).parameters)[2:]
 
 
-def _of_shells(welds: bool = False, **given: Any) -> ShellOptions:
-    return ShellOptions(**given)
-
-
-def _of_superelements(welds: bool = False, **given: Any) -> SuperelementsOptions:
-    return SuperelementsOptions(**given)
-
-
 MODELS: Mapping[str, Model] = {
     BARS_AND_HINGES: Model(discretize, resolved, MASS_RULES, "bars and hinges"),
-    SHELL: Model(shell, _of_shells, MASSES, "a shell"),
-    SUPERELEMENTS: Model(superelements, _of_superelements, SUPERELEMENT_MASSES, "superelements"),
+    SHELL: Model(shell, ShellOptions, MASSES, "a shell"),
+    SUPERELEMENTS: Model(superelements, SuperelementsOptions, SUPERELEMENT_MASSES, "superelements"),
 }

@@ -153,8 +153,8 @@ def fidelity(
     >>> pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
     >>> sheet = fd.Sheet(1e6, 0.25, 0.01, density=1000.0)
     >>> case = fd.Case(fd.discretize(pattern, sheet), [fd.Fix([0, 1, 2, 3])])
-    >>> result = fd.fidelity(case, count=3, models=["n5b8e"])
-    >>> [f"{100 * mode.error:+.1f} %" for mode in result.table("n5b8e")]
+    >>> result = fd.fidelity(case, count=3, models=["plate"])
+    >>> [f"{100 * mode.error:+.1f} %" for mode in result.table("plate")]
     ['...', ...]
     """
     checked = comparison(case, count, reference, divisions, models, secant, vertex_radius)

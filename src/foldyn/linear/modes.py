@@ -228,7 +228,7 @@ def trusted(
     """
     frequency, error, holds = np.zeros(0), np.zeros(0), 0.0
     for count in COUNTS:
-        many = count if case.structure.linear else min(count, len(case.free_dofs))
+        many = min(count, most_modes(case))
         found = spectrum_of(case, many, verify=False, compared=compared).result
         elastic = found["frequency"].values > 0.0
         frequency = found["frequency"].values[elastic]
@@ -243,6 +243,12 @@ def trusted(
             break
         holds = float(frequency[-1])
     return holds, frequency, error
+
+
+def most_modes(case: Case) -> int:
+    """Largest number of modes of a case; in superelements edges and panels have mass as well."""
+    between = len(case.elastic_body.hidden) if case.structure.linear else 0
+    return len(case.free_dofs) + between
 
 
 def _variables(
@@ -280,7 +286,7 @@ def _judged(case: Case, found: dict[str, Any], other: Case) -> Judged:
     """Modes of bars and hinges beside those of superelements; warns of large errors."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
-        most = len(found["frequency"]) + SPARE
+        most = min(len(found["frequency"]) + SPARE, most_modes(other))
         true = spectrum_of(other, most, verify=False, errors=False).result
     points = points_of(other, true)
     out = judged(case, found["frequency"], found["shape"], points, *elastic(true, None))

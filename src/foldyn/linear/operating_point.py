@@ -68,7 +68,11 @@ def operating_point(
     """
     case.check_movable()
     if state is not None and case.structure.linear:
-        raise InputError(f": {case.structure.linear} are linear about the rest state only", "state")
+        raise InputError(
+            f": {case.structure.linear} are linear about the rest state only; take bars and "
+            "hinges, or a shell",
+            "state",
+        )
     if state is None:
         point = _judge(case, np.zeros_like(case.structure.nodes), 0.0, "rest")
         if any(getattr(load, "history", None) == STEADY for load in case.loads):

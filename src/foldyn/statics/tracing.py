@@ -201,7 +201,7 @@ def trace(
     >>> case = fd.Case(s, supports, [fd.Force([0, 1], (-1e-3, 0, 0))])
     >>> path = trace(case, load_factors=[0.5, 1.0])
     >>> path.displacement.sel(node=0, axis="x").values.round(4).tolist()
-    [-0.0175, -0.0347]
+    [-0.0176, -0.0348]
     """
     of_kind("case", case, Case)
     choice("method", method, METHODS)

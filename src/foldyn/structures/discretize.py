@@ -63,7 +63,7 @@ def discretize(
     straight: str | Sequence[Sequence[int]] = (),
     guided: Mapping[str, str | Sequence[Sequence[int]]] | Sequence[Guided] = (),
     membrane: Literal["bars", "panel"] | None = None,
-    preset: Literal["plate", "n5b8e", "herkal", "merlin2"] | None = None,
+    preset: Literal["n5b8e", "plate", "herkal", "merlin2"] | None = None,
 ) -> Structure:
     """Discretize a pattern as bars and hinges.
 
@@ -119,10 +119,11 @@ def discretize(
         or bars coupled so that the corners have the panel's membrane stiffness, which is accurate
         for large and for supported sheets (see `foldyn.structures.membranes`). "panel" needs
         `bar_law` "linear"; another bar law, without a given membrane, implies "bars".
-    preset : {"plate", "n5b8e", "herkal", "merlin2"}, optional
-        Model that supplies options that are not given. The default is "plate"; "n5b8e" if the
-        scheme "n5b8e" is given or the pattern has welds; and "herkal", the model of the paper, if a
-        calibration other than "plate" is given, or `bend_law="superlinear"` without a calibration.
+    preset : {"n5b8e", "plate", "herkal", "merlin2"}, optional
+        Model that supplies options that are not given. The default is "n5b8e"; "plate", the fast
+        one, if another scheme, the calibration "plate", another bend law or superlinear folds are
+        given; and "herkal", the model of the paper, if another calibration is given, or
+        `bend_law="superlinear"` without a calibration.
 
     Returns
     -------
@@ -147,14 +148,13 @@ def discretize(
     >>> pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
     >>> sheet = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.25, thickness=0.01)
     >>> fd.discretize(pattern, sheet).fold_stiffness.round(4).tolist()
-    [0.0503]
+    [0.0639]
     """
     pattern, sheet = checked_kinds(pattern, sheet)
     doubt_units(pattern, sheet)
     edges = boundary_edges(clamped, pattern, "clamped")
     options = resolved(
-        preset, welds=len(pattern.welds) > 0, scheme=scheme, mass=mass,
-        bar_law=bar_law, fold_law=fold_law, bend_law=bend_law,
+        preset, scheme=scheme, mass=mass, bar_law=bar_law, fold_law=fold_law, bend_law=bend_law,
         calibration=calibration, crease_stiffness=crease_stiffness, crease_rest=crease_rest,
         clamped=edges, rigid=checked_panels(rigid, len(pattern.faces)),
         straight=boundary_edges(straight, pattern, "straight"),

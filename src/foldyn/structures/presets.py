@@ -1,9 +1,9 @@
 """Named models: sets of options of `discretize`.
 
-A preset supplies the options that are not given. The default is "plate", unless a given option
-implies another: the scheme n5b8e; or, for the model of the paper, a calibration other than "plate",
-or superlinear bends without a calibration. A bar law other than "linear" implies independent bars.
-A pattern with welds gets "n5b8e" instead of "plate": a hinge on a weld cannot bend like a plate.
+A preset supplies the options that are not given. The default is "n5b8e", unless a given option
+implies another: another scheme, the calibration "plate" or a bend law "plate", and so do
+superlinear folds, whose small vibrations "n5b8e" refuses; another calibration, or superlinear bends
+without a calibration, "herkal". A bar law other than "linear" implies independent bars.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from foldyn.structures.structure import MEMBRANES, ModelOptions
 from foldyn.values import choice, show
 
 PLATE, N5B8E, HERKAL, MERLIN2 = "plate", "n5b8e", "herkal", "merlin2"
-AGAINST_PLATES = ("scheme", "calibration", "bend_law")
-"""Options that determine how welds bend."""
+OF_HINGES = {"scheme", "calibration", "bend_law"}
+"""Options of hinges in panels."""
 
 PRESETS: Mapping[str, ModelOptions] = {
-    PLATE: ModelOptions(membrane="panel", bar_law="linear"),
     N5B8E: ModelOptions(scheme="n5b8e", mass="condensed", membrane="panel", bar_law="linear"),
+    PLATE: ModelOptions(membrane="panel", bar_law="linear"),
     HERKAL: ModelOptions(
         mass="mixed_voronoi", bend_law="superlinear", calibration="standard"
     ),
@@ -34,24 +34,22 @@ PRESETS: Mapping[str, ModelOptions] = {
 }  # fmt: skip
 """Options by name of the preset.
 
-- "plate": panels bend and twist as thin plates, and have a thin plate's membrane stiffness at
-  their corners; for frequencies and small displacements close to the shell's (docs/fidelity.md);
-- "n5b8e": the same, but panels give way at their creases; half the distance from the shell;
+- "n5b8e": panels bend and twist as thin plates that give way at their creases, and have a thin
+  plate's membrane stiffness at their corners; the closest to the shell (docs/fidelity.md);
+- "plate": the same, but panels do not give way at their creases: the fast choice;
 - "herkal": the model of Herkal et al., Int. J. Solids Struct. 309, 2025;
 - "merlin2": MERLIN2 as published (Liu and Paulino, 2018), with its order of stiffnesses and with
   moments at rest; it has no mass rule, so that it gets the rule of "herkal".
 """
 
 
-def resolved(preset: str | None = None, welds: bool = False, **given: Any) -> ModelOptions:
+def resolved(preset: str | None = None, **given: Any) -> ModelOptions:
     """All options of a model.
 
     Parameters
     ----------
-    preset : {"plate", "n5b8e", "herkal", "merlin2"}, optional
+    preset : {"n5b8e", "plate", "herkal", "merlin2"}, optional
         The module docstring describes the default.
-    welds : bool
-        Whether the pattern has welds.
     **given
         Fields of `ModelOptions` that override the preset, unless they are None.
 
@@ -62,8 +60,6 @@ def resolved(preset: str | None = None, welds: bool = False, **given: Any) -> Mo
     """
     known = {name: value for name, value in given.items() if value is not None}
     name = implied(known) if preset is None else choice("preset", preset, PRESETS)
-    if preset is None and welds and not any(known.get(key) for key in AGAINST_PLATES):
-        name = N5B8E
     base = PRESETS[name]
     law = known.get("bar_law")
     if law is not None and bar_law(law) != bar_law("linear"):
@@ -88,7 +84,9 @@ def resolved(preset: str | None = None, welds: bool = False, **given: Any) -> Mo
 
 def implied(given: Mapping[str, Any]) -> str:
     """Name of the preset that the given options imply."""
-    if given.get("scheme") == N5B8E:
+    folds = hinge_law(given.get("fold_law", "linear"), "fold_law")
+    plain = not OF_HINGES & {*given} and not isinstance(folds, Superlinear)
+    if plain or given.get("scheme") == N5B8E:
         return N5B8E
     if "calibration" in given:
         return PLATE if given["calibration"] == "plate" else HERKAL
