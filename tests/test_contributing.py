@@ -63,6 +63,7 @@ def test_files_of_an_addition_are_those_of_one_that_is_there(title):
     assert len(listed) <= 3
 
 
+@pytest.mark.matrix
 def test_the_load(tmp_path, monkeypatch):
     """It is read, moves the sheet, is stored and read back, and has its arrows."""
     monkeypatch.setattr(loads, "number", number, raising=False)  # as the file would import it

@@ -172,6 +172,7 @@ def test_the_path_of_the_case_file_page_can_be_followed(tmp_path):
     assert case_file.output.shapes == (0, -1)
 
 
+@pytest.mark.matrix
 def test_the_response_of_the_case_file_page_can_be_computed(tmp_path):
     *_, shaken, _ = blocks("case-file.md", "toml")
     case_file = case_of_page(tmp_path, without_loads() + shaken)
@@ -332,6 +333,7 @@ def test_the_page_on_features_has_the_table_of_what_goes_with_what():
     assert FEW or features.table(said) in text, again
 
 
+@pytest.mark.matrix
 def test_the_example_of_the_readme_is_short_moves_and_saves(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (block,) = blocks("../README.md", "python")

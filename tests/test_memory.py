@@ -141,6 +141,7 @@ steps = 1
 """
 
 
+@pytest.mark.matrix
 def test_the_command_takes_half_of_the_memory_unless_forced(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "case.toml").write_text(CASE)

@@ -103,6 +103,7 @@ def test_every_top_level_name_is_in_the_api_page():
     assert not missing, f"docs/api.md does not show {missing}"
 
 
+@pytest.mark.matrix
 def test_no_module_imports_itself_by_way_of_others():
     """Circles of imports, in functions and for type checkers included."""
     grimp = pytest.importorskip("grimp")  # comes with import-linter

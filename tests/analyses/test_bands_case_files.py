@@ -101,6 +101,7 @@ def test_gaps_are_those_of_the_whole_zone_and_of_legs(found):
     assert {"X-M", "M-Y"} <= directions
 
 
+@pytest.mark.matrix
 def test_waves_decay_where_no_band_is_and_there_alone(found):
     """Without damping, a frequency that a band passes along a leg has a wave that travels."""
     checked = 0

@@ -75,6 +75,7 @@ def test_a_byte_order_mark_is_no_obstacle(read, short) -> None:
     assert read("\ufeff" + short).title == ""
 
 
+@pytest.mark.matrix
 def test_a_list_of_mass_rules_makes_a_case_each(read, short) -> None:
     rules = list(MASS_RULES)
     found = read(changed(short, f"model.mass = {rules}"))

@@ -36,6 +36,7 @@ def test_settings_of_a_path_count(read) -> None:
     assert finer.attrs["status"] == "until not reached"
 
 
+@pytest.mark.matrix
 def test_each_mass_rule_and_other_arguments(read) -> None:
     model = '[model]\npreset = "plate"\nmass = ["panel", "centroid"]\n'
     case_file = read(FOLD + PUSH + MOTION + model)

@@ -32,6 +32,7 @@ def ueda():
     return duffing(0.0, 0.05, 7.5, phase=90.0)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["rk4", "central_difference"])
 def test_a_linear_vibration_decays_with_zeta_omega(method):
     case = duffing(1.0, 0.1, 0.3, omega=1.4, cubic=False)
@@ -53,6 +54,7 @@ def test_a_motion_without_a_drive_has_an_exponent():
     assert float(found.exponent) == pytest.approx(-0.15 + np.sqrt(0.15**2 + 1.0), rel=1e-3)
 
 
+@pytest.mark.matrix
 def test_a_stable_orbit_has_half_the_damping():
     """Its two multipliers are a complex pair with the product exp(-alpha T), by Liouville."""
     case = duffing(1.0, 0.1, 0.3, omega=1.3)

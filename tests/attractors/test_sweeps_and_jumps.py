@@ -136,6 +136,7 @@ def test_levels_of_the_drive_scale_a_linear_motion():
     np.testing.assert_allclose(found.amplitude, [[0.5 * exact, exact, 3.0 * exact]] * 2, rtol=1e-3)
 
 
+@pytest.mark.matrix
 def test_base_motions_and_multiples_of_the_drive_are_swept():
     """A mass on a spring whose foot moves: nothing but its relative motion strains it."""
     case = duffing(0.0, 0.1, cubic=True)

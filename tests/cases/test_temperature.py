@@ -81,6 +81,7 @@ def stored(result, structure) -> np.ndarray:
     return np.sum([result[group].values for group in structure.energy_groups], axis=0)
 
 
+@pytest.mark.matrix
 def test_free_panels_store_nothing() -> None:
     """Whatever causes the strain: two loads on the same panels act as one."""
     cause = [fd.Temperature(12.0, 2e-4, 3e-4), fd.Temperature(4.0, 1e-4, -2e-4)]
@@ -171,6 +172,7 @@ def test_rigid_panels_do_not_curl() -> None:
     assert np.abs(corners).max() < 1e-6 * np.abs(path.displacement[-1]).max()
 
 
+@pytest.mark.matrix
 def test_a_bilayer_bends_as_timoshenko_says() -> None:
     """J. Opt. Soc. Am. 11, 1925, equation 4, for layers as thick as each other.
 

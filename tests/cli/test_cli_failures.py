@@ -35,6 +35,7 @@ def check_partial(file: str, duration: float) -> None:
     assert len(fd.case_of(result).structure.nodes) == result.sizes["node"]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("factor", [1.2, 1.5, 10.0])
 def test_a_forced_step_far_above_the_critical_one(workplace, edited, factor) -> None:
     step = f"analysis.dt = {factor * 8.73e-4}; analysis.force = true"  # critical: 8.73e-4 s

@@ -65,6 +65,7 @@ PRESSED = changed(
 PICTURES = ("structure.png", "laws.png", "energies.png", "shapes.png")
 
 
+@pytest.mark.matrix
 def test_a_case_file_becomes_a_path_that_runs_again_from_itself(workplace) -> None:
     workplace.write(CELL)
     done = workplace.good("run", "case.toml", "--no-figures")

@@ -73,6 +73,7 @@ def test_shipped_cases_say_on_their_page_what_their_model_lacks(tmp_path, capsys
     assert len(told) < 400
 
 
+@pytest.mark.matrix
 def test_sweeps_say_once_what_points_are_warned_of(tmp_path, capsys, monkeypatch):
     """A sheet of 1 m edges is no thin one from 0.2 m on."""
     monkeypatch.chdir(tmp_path)

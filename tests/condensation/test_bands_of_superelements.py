@@ -155,6 +155,7 @@ def joined(panels):
     return np.array(list(places)), faces
 
 
+@pytest.mark.matrix
 def test_matrices_are_hermitian_and_waves_run_both_ways_alike():
     cell = small()
     bloch = linearize_cell(cell).bloch
@@ -166,6 +167,7 @@ def test_matrices_are_hermitian_and_waves_run_both_ways_alike():
     np.testing.assert_allclose(there, back, rtol=1e-9)
 
 
+@pytest.mark.matrix
 def test_damping_and_attenuation_fit_the_bands():
     cell = small(PANEL, vectors=STEPS)
     known = frequencies(cell, [(1.0, 0.0)], 4)

@@ -127,6 +127,7 @@ def test_drag_of_a_turning_panel_is_that_of_its_parts():
     assert_allclose(force.sum(axis=0), [0, 0, PRESSING * rate**2 * SIDE**2 / 3.0], atol=1e-15)
 
 
+@pytest.mark.matrix
 def test_derivative_by_the_velocities():
     case = fd.Case(plate(), air=fd.Air(**FLUID, velocity=(0.1, 0.3, -0.4)))
     v = np.random.default_rng(3).standard_normal((5, 3))

@@ -143,6 +143,7 @@ def test_it_crosses_itself_without_contact_or_without_the_limit_of_steps(monkeyp
         motion.run()
 
 
+@pytest.mark.matrix
 def test_no_step_is_too_long_to_see_what_is_in_its_way(monkeypatch):
     """In a step of 2 ms a sheet flies by more than its distance from another one."""
     lower = ~two_sheets()[1]
@@ -254,6 +255,7 @@ def test_a_strip_sticks_below_the_angle_of_friction(kind, method, duration, dt, 
     assert 0.0 < way[-1] < most and run.attrs["energy_error"] < 1e-2
 
 
+@pytest.mark.matrix
 def test_without_friction_a_sheet_slides_as_it_falls():
     run = fd.simulate(on_slope(20.0, 0.0), 0.1, method="rk4", interval=2e-3)
     distance = run.displacement.values[-1, :, 0].mean()

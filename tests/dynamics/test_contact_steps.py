@@ -138,6 +138,7 @@ def test_in_short_steps_it_is_the_gradient_halfway(kind):
     assert np.median(orders) == pytest.approx(2.0, abs=0.05)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("kind", KINDS)
 def test_tangents_are_exact(kind):
     pair, rng, errors = Pair(kind), np.random.default_rng(3), []

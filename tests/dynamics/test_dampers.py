@@ -204,6 +204,7 @@ def test_a_folded_sheet_that_spins_loses_nothing(method):
     assert float(motion.dissipated[-1]) < 1e-4 * float(motion.kinetic[0])
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("model", "method", "modulus"),
     [*(("bars", method, 1e7) for method in METHODS), ("shell", "newmark", 1e9)],

@@ -286,6 +286,7 @@ def test_they_go_on_with_steps_that_are_chosen_by_their_error(law, tmp_path):
     assert part.attrs["smallest_step"] < 0.5 * part.attrs["largest_step"]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", EXPLICIT)
 @pytest.mark.parametrize("name", LAWS)
 def test_explicit_motions_go_on_from_anywhere_bit_by_bit(name, method, tmp_path):

@@ -47,6 +47,7 @@ def test_order_on_linear_and_duffing_oscillators(method, cubic):
     assert errors[-1] < 10.0 ** (1 - 2 * METHODS[method].order) * a
 
 
+@pytest.mark.matrix
 def test_rk4_loses_energy_with_the_fifth_power_of_the_step():
     """|R(i w h)|^2 = 1 - (w h)^6 / 72 + ...: over a fixed time the loss is T w (w h)^5 / 72."""
     steps, lost = np.array([200, 400, 800]), []

@@ -41,6 +41,7 @@ def test_motion_of_the_golden_miura():
         assert np.linalg.norm(ours - theirs) < 1e-6 * np.linalg.norm(theirs)
 
 
+@pytest.mark.matrix
 def test_energy_of_case_2():
     """Balance below 1e-6 of the energies over 10 s at half the critical step (found: 2e-8)."""
     motion = fd.simulate(case2(mass="circumcenter"), 10.0, method="rk4", interval=0.01)
@@ -104,6 +105,7 @@ def test_runs_are_bit_identical_whatever_is_sampled(method):
         np.testing.assert_allclose(thin.time, dense.time[::every], rtol=1e-14)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
 @pytest.mark.parametrize("method", ["rk4", *IMPLICIT])
 def test_a_motion_goes_on_from_where_it_was_stored(method, mass):
@@ -193,6 +195,7 @@ def test_panels_that_pass_through_each_other_stop_the_motion(method, options):
     assert folds[0] > np.radians(300)
 
 
+@pytest.mark.matrix
 def test_stiffening_is_noticed_or_followed():
     """A bar that stiffens a thousandfold when stretched makes a safe explicit step unsafe."""
     case, fast = oscillator(duffing_law(1e3), 8.0), released(0.0, speed=20.0)
@@ -270,6 +273,7 @@ def test_settles_in_the_static_equilibrium(method, bend_law, expected):
     assert apart(end, path) < 1e-4
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["rk4", *IMPLICIT])
 def test_a_free_fold_comes_to_rest_at_its_new_angle(method):
     """Nothing holds it: the dihedral of the crease becomes the rest angle and no energy stays."""

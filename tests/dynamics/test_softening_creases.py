@@ -63,6 +63,7 @@ def test_stiff_creases_yield_as_in_implicit_motions(ratio, model, method, monkey
         assert apart(heavy, wanted) > 2e-2
 
 
+@pytest.mark.matrix
 def test_steps_are_shorter_by_the_root_of_what_is_lost():
     plain, yielding = (
         [fd.critical_step(case(ratio * AS_STIFF, law)) for ratio in (1e-3, 1e2, 1e3)]

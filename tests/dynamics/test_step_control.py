@@ -48,6 +48,7 @@ def test_the_error_follows_the_tolerance(method, tolerance, power, near, error):
         assert default.attrs["tolerance"] == 1e-5 and default.attrs["steps"] == steps
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_steps_grow_where_the_motion_is_smooth(method):
     """A vibration that has died out under a slow load: few steps for a long time."""

@@ -129,6 +129,7 @@ def test_a_film_that_breaks_off_is_tracked_and_named(sharp, tmp_path):
     assert track_film(str(whole)).sizes["time"] == 12  # without a warning
 
 
+@pytest.mark.matrix
 def test_one_frame_shows_no_motion(sharp, tmp_path):
     with pytest.raises(InputError, match=r"one\.mkv: one frame alone shows no motion"):
         track_film(str(copied(sharp, tmp_path / "one.mkv", 1)))

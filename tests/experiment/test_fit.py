@@ -151,6 +151,7 @@ def test_each_measurement_may_change_the_case(pressed) -> None:
     assert found.estimates[0].value == pytest.approx(1.0, rel=1e-5)
 
 
+@pytest.mark.matrix
 def test_shapes_under_a_force_give_a_stiffness(tmp_path) -> None:
     text = SWUNG.replace('history = { kind = "half_sine", duration = 0.5 }', "")
     text = text[: text.index("[analysis]")] + '[analysis]\nkind = "statics"\n'
@@ -238,6 +239,7 @@ def test_processes_change_nothing(pressed) -> None:
     assert beside.descents == alone.descents
 
 
+@pytest.mark.matrix
 def test_a_search_steps_back_where_the_model_fails(pressed) -> None:
     """Beyond 180 degrees the law refuses theta1: the bounds let the search go there."""
     data = [forces(pressed, 1e-5)]

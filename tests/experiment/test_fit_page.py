@@ -107,6 +107,7 @@ def test_histories_are_drawn_where_they_are_compared(fitted) -> None:
         assert np.mean(misfit) == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.matrix
 def test_shapes_are_drawn_as_positions(fitted) -> None:
     one = fitted.problem.measurements[1]
     run = fitted.problem.runs[0]

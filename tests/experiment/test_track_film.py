@@ -33,6 +33,7 @@ def test_standard_errors_are_of_the_size_of_the_errors(sharp, tracked):
     assert 0.3 < ratio < 3.0
 
 
+@pytest.mark.matrix
 def test_displacements_are_in_metres_along_the_models_axes(sharp, tracked):
     moved = sharp.truth["position"].values[:, FRONT] - sharp.model.rest[FRONT]
     error = tracked["displacement"].values[:, FRONT] - moved

@@ -28,6 +28,7 @@ def test_no_suffix_has_two_formats_and_none_is_taken_for_a_result():
     assert set(BY_SUFFIX) <= set(OTHERS)
 
 
+@pytest.mark.matrix
 def test_a_file_is_exported_as_the_result_in_it(motion, tmp_path):
     fd.save(motion, tmp_path / "run.nc")
     (one,) = fd.export(tmp_path / "run.nc", tmp_path / "one.glb")

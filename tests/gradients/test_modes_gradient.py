@@ -276,6 +276,7 @@ def test_each_has_derivatives_in_one_direction(rates):
     assert found == pytest.approx(one_sided, rel=1e-4, abs=1e-8)
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the rest state is no equilibrium")
 def test_so_they_have_where_dofs_without_mass_move_along():
     """Of a pyramid on guides, whose creases are not at their rest angle."""

@@ -95,6 +95,7 @@ def test_the_remainder_falls_with_the_second_order(seed):
     assert (design.order(seed, lengths) > 1.9).all()
 
 
+@pytest.mark.matrix
 def test_a_limit_load_falls_as_the_force_grows():
     found = fd.sensitivity(tower, {"force": 1.0}, measures=["limit_load", "barrier"], analysis=SNAP)
     value, slope = found["value"].values, found["gradient_force"].values
@@ -168,6 +169,7 @@ def test_barriers_share_the_landscape(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found["gradient_stiffness"].values.all()
 
 
+@pytest.mark.matrix
 def test_the_energy_of_bends_near_the_kink_of_their_law():
     """Turned by a small load far less than differences of their rest angles would turn them."""
     pattern = fd.patterns.simple_fold(b=1.1, dihedral=105.0)

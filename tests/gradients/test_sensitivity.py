@@ -144,6 +144,7 @@ def test_thicknesses_of_panels_share_edges_and_are_changed_one_by_one():
     )
 
 
+@pytest.mark.matrix
 def test_entries_that_are_mixed_are_changed_one_by_one():
     """As a filter mixes them, however much smaller than others the mixed stiffness is."""
 
@@ -183,6 +184,7 @@ def test_entries_are_told_apart_exactly(count):
         assert last[[0, -1]] == pytest.approx([1.0, other], rel=1e-6)
 
 
+@pytest.mark.matrix
 def test_stiffnesses_of_several_decades():
     values = {"stiffness": np.array([2e-5, 0.02, 5.0, 3e-3])}
     found = fd.sensitivity(cell, values, measures="frequency[1]", analysis=MODES)[

@@ -62,6 +62,7 @@ def _read(own):
     return _told(own.part), _told(own.last), own.table.shape[0], own.number
 
 
+@pytest.mark.matrix
 def test_fields_are_those_of_the_tuple():
     line, table, tally = np.array([1.0, 2.0, 3.0]), np.zeros((2, 3)), np.zeros(1, TALLY)[0]
     owner = Owner(Part(True, line, 2.5), -4, table, tally, Part(False, line[1:], 0.5))
@@ -130,6 +131,7 @@ def test_formulas_of_eights_are_those_of_numbers():
         np.testing.assert_allclose(found[2, good], np.cbrt(d) * np.abs(d), rtol=2e-15)
 
 
+@pytest.mark.matrix
 def test_a_guess_of_the_cube_root_is_near():
     x = np.geomspace(1e-200, 1e200, COUNT)
     out = np.empty((4, COUNT))

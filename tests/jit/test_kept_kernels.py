@@ -82,6 +82,7 @@ def test_damaged_files_are_compiled_anew(kernels, damage):
     assert (whole(1.5), sum(whole.stats.cache_hits.values())) == (3.0, 1)
 
 
+@pytest.mark.matrix
 def test_only_the_last_versions_stay(kernels):
     for turn in range(kernel_cache.OTHERS + 3):
         function = kernels(f"return {turn}.0 * x")

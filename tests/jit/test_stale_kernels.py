@@ -93,6 +93,7 @@ def kernels():
                     yield found._cache._source, found.py_func
 
 
+@pytest.mark.matrix
 def test_a_kernel_is_made_from_all_that_it_names():
     for source, function in kernels():
         made = made_from(*source)

@@ -78,6 +78,7 @@ def test_damped_creases_and_dashpots_damp_waves():
     assert attenuation(cell, [600.0]).attenuation.values[0] > 0.0
 
 
+@pytest.mark.matrix
 def test_gaps_are_listed():
     cell = miura()
     b = fd.bands(cell, cell.path("G-X-M-G", 61), count=10)

@@ -130,6 +130,7 @@ def shell_case(*damping):
     return fd.Case(shell, miura_case().supports, damping=fd.Rayleigh(*damping))
 
 
+@pytest.mark.matrix
 def test_a_shell():
     """Its edges' rotations have no mass: they follow, and do not show."""
     case, drive = shell_case(0.5, 1e-3), fd.Force([7], (0.01, 0, 0))

@@ -203,6 +203,7 @@ def test_a_preloaded_state():
     assert largest_error(at_rest.receptance, direct.receptance.values) > 0.02
 
 
+@pytest.mark.matrix
 def test_folds_turned_part_of_the_way():
     """A state on the way of an actuation, with the load factor there."""
     case = miura_case([fd.Actuate("all", angle=100)], alpha=4.0)

@@ -80,6 +80,7 @@ def test_what_is_not_compared_says_so():
     assert "not_compared" not in fd.modes(shell, 1).attrs
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("error::foldyn.errors.StretchWarning")
 def test_responses_hold_up_to_the_first_doubtful_mode():
     case, push = held(), fd.Force([14], (0.0, 0.0, 1.0))

@@ -141,6 +141,7 @@ def test_a_case_with_the_right_model_keeps_it():
     assert "deflection" not in found.result
 
 
+@pytest.mark.matrix
 def test_a_free_sheet_has_no_displacement_under_its_weight():
     case = fd.Case(fold(**PLATE), [], [fd.Gravity((0, 0, -9.81))])
     result = fd.fidelity(case, 2, reference="shell", divisions=(2, 4), models=[]).result
@@ -177,6 +178,7 @@ def test_a_kresling_cell_vibrates_as_plates():
     assert "\n* above 0.6 of the plate frequency, 1.365 Hz" in str(found)
 
 
+@pytest.mark.matrix
 def test_a_legend_says_what_words_of_the_table_mean(quick):
     """Those that occur in it: where nothing is lost, nothing is said of it."""
     result = quick[1].result.copy(deep=True)
@@ -314,6 +316,7 @@ def test_what_n5b8e_does_not_take_leaves_it_out():
     assert list(comparison(clamped, 1).compared) == ["own", "plate", "n5b8e"]
 
 
+@pytest.mark.matrix
 def test_a_rest_state_out_of_balance_is_told():
     case = held(crease_rest=80.0, **STANDARD)
     with pytest.warns(FoldynWarning, match="the rest state is no equilibrium"):
@@ -434,6 +437,7 @@ def test_arguments_that_are_refused(arguments, message):
     assert str(caught.value).startswith(message)
 
 
+@pytest.mark.matrix
 def test_a_model_that_cannot_move_is_refused():
     moving = fd.Case(fd.discretize(SQUARE.pattern, SHEET, bend_law="linear"), CORNERS)
     with pytest.raises(InputError, match=r"^models: cut: supports: hold every node"):

@@ -57,6 +57,7 @@ def test_points_move_rigidly_with_the_mesh():
     np.testing.assert_allclose(RIDE.rest + moved, RIDE.rest @ turn.T + [1.0, 2.0, 3.0], atol=1e-14)
 
 
+@pytest.mark.matrix
 def test_derivatives_of_points_are_those_of_differences():
     motion, h = jacobian(RIDE, U, U.size), 1e-6
     differences = (points(U + h * V) - points(U - h * V)) / (2 * h)

@@ -26,6 +26,7 @@ def balance(x):
     return 2.0 * K * x + 4.0 * K * (length - ARM) * x / length
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["newton", "arc_length"])
 def test_statics(method):
     """Held springs give the force in closed form."""

@@ -149,6 +149,7 @@ def test_every_element_and_node_belongs_to_one_strip(monkeypatch):
             assert (one.fresh[:, 1] - low).max() <= one.rows
 
 
+@pytest.mark.matrix
 def test_work_is_shared_evenly():
     model, _ = sheet((60, 2))
     cuts = shares(model, 4)
@@ -170,6 +171,7 @@ def test_models_that_cannot_be_shared_stay_on_one_thread():
     assert not together(empty, u, works).any()
 
 
+@pytest.mark.matrix
 def test_threads_are_used_for_large_models_as_far_as_allowed(monkeypatch):
     model, _ = sheet((60, 2))
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)

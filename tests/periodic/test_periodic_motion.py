@@ -100,6 +100,7 @@ def test_product_holds_for_a_stiff_sheet_with_drag():
     assert total == pytest.approx(-0.5 * free / 0.4, rel=1e-8)
 
 
+@pytest.mark.matrix
 def test_multipliers_are_those_of_deviations_in_simulated_motion(strong):
     case, far = oscillator(), 1e-5
     start, columns = at_start(strong), []

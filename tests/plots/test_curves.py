@@ -111,6 +111,7 @@ def test_rest_angles_are_marked_without_moment(structure):
     assert all("N m/rad, rest" in text for text in texts)
 
 
+@pytest.mark.matrix
 def test_equal_hinges_share_a_curve_and_many_are_counted(pattern):
     sheet = structures.Sheet(1e6, 0.25, 0.01)
     different = structures.discretize(

@@ -55,6 +55,7 @@ def test_a_limit_far_above_is_not_shown(limit, shown):
     assert figure.axes[0].get_xlim()[1] < 6.0
 
 
+@pytest.mark.matrix
 def test_wide_ranges_are_logarithmic():
     figure = fd.plots.plot_fidelity(made(np.array([1.0, 40.0]), np.zeros((2, 2)), 20.0))
     assert figure.axes[0].get_xscale() == "log"

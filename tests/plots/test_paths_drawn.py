@@ -253,6 +253,7 @@ def test_shapes_are_the_chosen_points(case, path):
     assert "undeformed" in keys(figure)
 
 
+@pytest.mark.matrix
 def test_shapes_tell_what_is_unstable(case, path):
     figure = draw_shapes(case, path, points=[3, 5])
     assert [text.get_text() for text in figure.texts] == [

@@ -170,6 +170,7 @@ def test_a_phase_does_not_run_across_the_frame():
     np.testing.assert_allclose(flat, -180.0)
 
 
+@pytest.mark.matrix
 def test_frequencies_without_a_response_are_left_out(case):
     broken = made(case)
     broken["receptance"][80] = np.nan

@@ -142,6 +142,7 @@ def test_a_shell_without_folds_has_no_laws():
         plot_laws(fd.shell(square, fd.Sheet(1e6, 0.25, 0.01), divisions=2))
 
 
+@pytest.mark.matrix
 def test_energies_of_a_motion(motion):
     figure = plot_energies(motion)
     upper, lower = figure.axes

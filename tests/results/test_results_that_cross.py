@@ -68,6 +68,7 @@ def test_a_motion_says_once_which_panels_cross_and_when(crossed):
     assert motion.attrs["energy_error"] < 1e-2  # which does not see it
 
 
+@pytest.mark.matrix
 def test_samples_with_crossings_are_those_of_an_independent_library(crossed):
     ipctk = pytest.importorskip("ipctk")
     case, motion, _ = crossed

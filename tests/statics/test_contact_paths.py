@@ -111,6 +111,7 @@ def test_what_the_plates_give_is_what_the_sheet_stores(pressed):
     assert np.abs(path.reaction.values).max() < 1e-6 * force.max()
 
 
+@pytest.mark.matrix
 def test_tangents_with_plates_are_exact(pressed):
     case, _, _, path = pressed
     problem, at = OrigamiProblem(case), path.sizes["step"] // 2

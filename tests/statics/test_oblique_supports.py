@@ -60,6 +60,7 @@ def turned_truss(truss) -> tuple[fd.Case, fd.Case]:
     return case, fd.Case(s, supports, loads)
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the path loses stability")
 @pytest.mark.parametrize("method", ["arc_length", "mgdcm"])
 def test_a_turned_truss_buckles_and_snaps_as_before(method) -> None:

@@ -62,6 +62,7 @@ def stored(tmp_path):
     return stored
 
 
+@pytest.mark.matrix
 def test_saved_and_loaded(path, stored):
     again = stored(path)
     assert again.equals(path) and again.point.values.tolist() == ["regular"] * 5

@@ -32,6 +32,7 @@ def path(rest, weight):
     return trace(case, "displacement", steps=28, constant="gravity" if weight else ())
 
 
+@pytest.mark.matrix
 def test_reaches_56_mm(path):
     assert path.attrs["status"] == "complete" and float(path.load_factor[-1]) == 1.0
     pressed = path.displacement.sel(node=range(7), axis="x").values

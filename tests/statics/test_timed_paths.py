@@ -189,6 +189,7 @@ def test_creep_buckling():
     assert 0.0 < slope(theta[-1]) < 0.1 * (1 + g) * STIFFNESS
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 def test_critical_points_have_their_share_of_the_time():
     """A flat strip that is pressed buckles where its crease is as stiff as at this speed."""

@@ -54,6 +54,7 @@ def test_displacement_control():
     assert not path.negative_eigenvalues.values.any()
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", FREE)
 def test_snap_back(method):
     """Through a soft spring the far end's displacement has limit points itself: 1 + P'(v)/k = 0."""

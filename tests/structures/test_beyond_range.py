@@ -185,6 +185,7 @@ def test_the_range_of_models():
     assert range_of(fd.Structure(s.nodes, s.bars, s.bar_area, s.sheet))[0] == np.inf
 
 
+@pytest.mark.matrix
 def test_modes_above_the_range():
     """Those of a unit: the panels' own begin where the models have none."""
     for preset, share in (("plate", 0.6), ("n5b8e", 0.8)):

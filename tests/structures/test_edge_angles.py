@@ -94,6 +94,7 @@ def test_size_and_place_do_not_matter():
     np.testing.assert_allclose(hexagon[np.ix_(rolled, rolled)], hexagon, atol=1e-6)
 
 
+@pytest.mark.matrix
 def test_meshes_converge():
     """Triangles of constant curvature: order 2, less what forces at the corners cost."""
     square = np.c_[np.asarray(PANELS["square"], float), np.zeros(4)]
@@ -167,6 +168,7 @@ def test_rigid_panels_are_those_of_n5b8():
     assert np.isfinite(fd.critical_step(fd.Case(own), "rk4"))
 
 
+@pytest.mark.matrix
 def test_modes_beside_the_shell():
     """A Miura cell on an edge: the plate calibration is off by 2 to 6 %."""
     coarse, fine = (
@@ -190,6 +192,7 @@ def test_statics_and_actuation():
     assert float(path.strain_bends[-1]) < 1e-12
 
 
+@pytest.mark.matrix
 def test_case_files_and_results_keep_it(read, kept):
     found = read(f"""{HELD_MIURA_TEXT}[model]
 scheme = "n5b8e"

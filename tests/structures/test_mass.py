@@ -203,6 +203,7 @@ def test_equi_inertial_shares_and_orientation():
         np.testing.assert_allclose(found, [first, second, first, second, HUB], rtol=1e-13)
 
 
+@pytest.mark.matrix
 def test_equi_inertial_tie_goes_to_corners_0_and_2():
     """Diagonals that differ by less than 1e-9 are equal; by more, the shorter one is heavy."""
     for angle in np.linspace(0, 1, 7):  # also where rounding makes one diagonal longer

@@ -158,6 +158,7 @@ def traced():
     return trace
 
 
+@pytest.mark.matrix
 def test_all_paths_are_known():
     kinds = {name: fd.read_case(path).analysis.kind for name, path in shipped_cases().items()}
     assert {name for name, kind in kinds.items() if kind == "statics"} == PATHS

@@ -86,6 +86,7 @@ def test_impacts_keep_energy_and_momentum(impacts):
         np.testing.assert_allclose(momentum, momentum[0], rtol=1e-11)
 
 
+@pytest.mark.matrix
 def test_gaps_of_sheets_depend_on_their_fold_state():
     found = sheets.fold_states("miura", [60.0, 115.0], count=25, grid=8)
     assert found.sizes["band"] == 12

@@ -137,6 +137,7 @@ def test_gaps_along_stretched_states_are_kept(tmp_path):
     assert abs(values[1] / values[0] - 1.0) > 1e-4
 
 
+@pytest.mark.matrix
 def test_a_response_peaks_and_is_damped_as_its_mode(results):
     """alpha = 0.2 1/s: damping ratio alpha/(2 w) of mass-proportional damping."""
     _, modes = results["modes"]

@@ -265,6 +265,7 @@ def test_another_case_is_computed_anew(case, tmp_path, changed):
     assert told[-1].found == 6
 
 
+@pytest.mark.matrix
 def test_a_file_that_the_case_names_counts_with_its_content(case, tmp_path):
     fd.write_pattern(fd.patterns.miura(dihedral=60), tmp_path / "a.fold")
     start = MODES.index("[sheet]")

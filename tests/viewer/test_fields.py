@@ -130,6 +130,7 @@ def test_turns_that_displacements_do_not_tell_are_left_out(model):
     assert {"turn", "fold_moment", "energy"} <= set(fields(damped, path, still))
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("model", MODELS)
 def test_warm_panels_store_what_they_may_not_do(model):
     pattern = fd.patterns.miura((1, 1), 0.1, b=0.08, panel_angle=60, dihedral=90)

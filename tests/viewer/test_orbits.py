@@ -55,6 +55,7 @@ def test_motions_are_those_of_the_result():
     assert part.about["measured"] == "m"
 
 
+@pytest.mark.matrix
 def test_of_many_points_those_with_names_are_kept(monkeypatch):
     (result,) = results("periodic").values()
     monkeypatch.setattr(import_module("foldyn.viewer.orbits"), "MOST_NUMBERS", 1000)

@@ -53,6 +53,7 @@ def test_of_many_modes_every_kth_is_kept(monkeypatch, part):
     assert off < 2.0 * np.sqrt(2.0) * OF_SHAPES  # of two complex numbers
 
 
+@pytest.mark.matrix
 def test_modes_go_on_smoothly_and_have_one_size():
     (result,) = results("bands").values()
     shapes = smooth(result["shape"].transpose("state", "band", "phase", "node", "axis").values)
@@ -88,6 +89,7 @@ def test_maps_bring_nodes_and_waves_to_their_partners(part):
     assert checked >= 4
 
 
+@pytest.mark.matrix
 def test_bands_without_a_case_file_have_a_page_if_they_have_shapes():
     """The gaps are those of the path; phases of a grid lie on none."""
     pattern = fd.patterns.miura(dihedral=60)
