@@ -170,3 +170,14 @@ def test_tangents_are_derivatives_of_forces(model):
     up, down = (at.forces(x + s * way) for s in (1e-7, -1e-7))
     slope = np.einsum("skl,sl->sk", at.tangents(x), way)
     assert (up - down) / 2e-7 == pytest.approx(slope, rel=1e-5, abs=1e-7 * np.abs(slope).max())
+
+
+@pytest.mark.matrix
+def test_the_exponent_of_a_motion_is_that_of_its_multipliers():
+    case = fold(damping=fd.Rayleigh(alpha=0.05, beta=0.002))
+    one = fd.periodic_motion(case, harmonics=9)
+    start = fd.State(one.displacement.values[0], one.velocity.values[0])
+    found = fd.lyapunov_exponent(case, 24.0 / F, settle=16.0 / F, initial=start)
+    rate = F * np.log(np.abs(one.floquet.values[0]))
+    assert rate < -0.03  # alpha alone: -0.025
+    assert float(found.exponent) == pytest.approx(rate, rel=0.05)
