@@ -339,3 +339,18 @@ def test_models_whose_panels_bend_as_plates_refuse_it():
     for s in (fd.shell(pattern, SHEET, divisions=2), fd.discretize(pattern, SHEET, preset="n5b8e")):
         with pytest.raises(InputError, match="damping: StrainDamping takes bars and hinges"):
             fd.Case(s, damping=fd.StrainDamping(BETA))
+
+
+@pytest.mark.filterwarnings("ignore:damping. beta resists rotations")
+@pytest.mark.parametrize("method", ["newmark", "generalized_alpha"])
+def test_steps_know_that_dofs_without_mass_have_the_mean_velocity(method):
+    """With the velocity at the end in the matrix, each iteration made a new one: 350 and more."""
+    s = fd.shell(
+        fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60),
+        fd.Sheet(1e5, 0.25, 0.01, 1.0),
+        divisions=1,
+    )
+    push = fd.Force([0, 1], (1e-3, 0, 0), history=fd.Harmonic(0.4))
+    case = fd.Case(s, [fd.Fix([4, 5]), fd.Fix([0, 1], "yz")], [push], fd.Rayleigh(0.2, 0.05))
+    run = fd.simulate(case, 2.5, method=method, dt=0.05, interval=2.5)
+    assert run.attrs["factorizations"] < 40

@@ -1,6 +1,7 @@
 """Each kind of damping in each model: analyses agree on it, or refuse it by name."""
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from functools import cache
 from typing import Any
 
@@ -10,7 +11,7 @@ from scipy.linalg import eigvals
 
 import foldyn as fd
 from foldyn.attractors.grid import UNDRIVEN
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.linearized import linearize
 from pairwise import beyond, in_pairs
 
@@ -124,6 +125,30 @@ def test_frequency_responses_modes_and_periodic_motions(kind, model):
     one = fd.periodic_motion(driven, harmonics=2, guess=state)
     expected = -1j * direct[1] * 2e-4
     assert np.abs(one.coefficient.values[1] - expected).max() < 1e-3 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(
+    "model", ["n5b8e", pytest.param("superelements", marks=pytest.mark.matrix)]
+)
+def test_few_modes_have_weak_dampers_and_tell_of_strong_ones(model):
+    """Strong ones hold the creases, which no few modes of free creases do."""
+    pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=100)
+    if model == "n5b8e":
+        s = fd.discretize(pattern, SHEET, preset=model, crease_stiffness=60.0)
+    else:
+        s = fd.superelements(pattern, SHEET, level=1, crease_stiffness=60.0)
+    push, frequencies = fd.Force([8], (0, 0, 1e-3)), [0.3, 3.0]
+    for strength, told in (
+        (2.0, nullcontext()),
+        (400.0, pytest.warns(FoldynWarning, match="left")),
+    ):
+        case = fd.Case(s, [fd.Fix([0, 1, 3])], damping=fd.CreaseDamping(strength))
+        exact = fd.frf(case, push, frequencies=frequencies, check_model=False).receptance.values
+        options = {"method": "modal", "count": 6, "check_model": False}
+        with told:
+            few = fd.frf(case, push, frequencies=frequencies, **options).receptance.values
+        wrong = np.abs(few[1] - exact[1]).max() / np.abs(exact[1]).max()
+        assert wrong < 5e-3 if strength < 10.0 else wrong > 0.02
 
 
 CONSTANT = (

@@ -157,6 +157,7 @@ def test_a_shell_struck():
     assert largest_error(struck.receptance.values, exact.receptance.values) < 3e-3
 
 
+@pytest.mark.filterwarnings("ignore:frequencies. the modes that are left out")
 def test_static_correction_converges_faster():
     case, drive = miura_case(), fd.Force([7], (0.01, 0, 0))
     direct = frf(case, drive, frequencies=F).receptance.values

@@ -170,3 +170,25 @@ def test_tangents_are_derivatives_of_forces(model):
     up, down = (at.forces(x + s * way) for s in (1e-7, -1e-7))
     slope = np.einsum("skl,sl->sk", at.tangents(x), way)
     assert (up - down) / 2e-7 == pytest.approx(slope, rel=1e-5, abs=1e-7 * np.abs(slope).max())
+
+
+@pytest.mark.matrix
+def test_the_exponent_of_a_motion_is_that_of_its_multipliers():
+    case = fold(damping=fd.Rayleigh(alpha=0.05, beta=0.002))
+    one = fd.periodic_motion(case, harmonics=9)
+    start = fd.State(one.displacement.values[0], one.velocity.values[0])
+    found = fd.lyapunov_exponent(case, 24.0 / F, settle=16.0 / F, initial=start)
+    rate = F * np.log(np.abs(one.floquet.values[0]))
+    assert rate < -0.03  # alpha alone: -0.025
+    assert float(found.exponent) == pytest.approx(rate, rel=0.05)
+
+
+@pytest.mark.matrix
+def test_a_response_curve_ends_in_the_motion_that_is_found_there():
+    case = fold([fd.Force([0, 1], (2e-4, 0, 0), history=fd.Harmonic(F))], damping=BOTH)
+    curve = fd.response_curve(case, (0.42, 0.36), harmonics=5, steps=16, longest_step=0.5)
+    last = curve.isel(point=-1)
+    assert curve.attrs["complete"]
+    one = fd.periodic_motion(case, float(last.frequency), harmonics=5, steps=16)
+    assert last.coefficient.values == pytest.approx(one.coefficient.values, abs=1e-7 * size(one))
+    assert abs(last.floquet.values[:2]) == pytest.approx(abs(one.floquet.values[:2]), rel=1e-5)

@@ -32,7 +32,8 @@ def damping_terms(case: Case, start: Origin | None, modal: ModalRows) -> list[Te
     terms, rayleigh = dampers(case), case.rayleigh
     if rayleigh.beta > 0.0:
         state, body = about(case, start if rayleigh.state == "initial" else None)
-        terms.insert(0, DampingMatrix(_tangent(body, body.dofs(state)) * rayleigh.beta))
+        tangent = _tangent(body, body.dofs(state))
+        terms.insert(0, DampingMatrix(tangent * rayleigh.beta, body.hidden))
     modal.warn()
     return [*terms, DampingRows(modal.rows)] if len(modal.rows) else terms
 

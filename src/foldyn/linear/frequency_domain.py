@@ -14,7 +14,7 @@ from scipy import sparse
 
 from foldyn.algebra.complex_symmetric import solve
 from foldyn.algebra.eigen import Pencil, Spectrum, lowest
-from foldyn.algebra.superlu import factorize
+from foldyn.algebra.superlu import Factorization, factorize
 from foldyn.algebra.woodbury import Squared
 from foldyn.arguments import Check, Checked, Flag
 from foldyn.dynamics import Progress
@@ -30,6 +30,11 @@ DIAGONAL = 1e-12  # couplings of modes smaller than this, relative to modal damp
 FOLLOWS = 1e-8  # damping force on a massless dof, relative to its terms, that counts as zero
 COPIES = 3  # copies of the matrix of amplitudes in memory
 BESIDE = 0.01  # shift below 0 for a free body, relative to the lowest positive eigenvalue
+OMITTED = 0.02  # warn if omitted modes would change the response by more than this share of it
+TOO_FEW = (
+    "the modes that are left out would change the response by about {share:.1g} of it or more at "
+    "{{}}: give a higher count, or take the method direct"
+)
 RESONANCE = (
     "there is no response at {} (nan): a resonance without damping, or 0 Hz of a body that is free "
     "to move; give the case damping, as Rayleigh(alpha=...), or leave these frequencies out"
@@ -113,7 +118,8 @@ def modal(
     Warns
     -----
     FoldynWarning
-        There are resonances without damping.
+        There are resonances without damping; omitted modes matter, by their static response to what
+        the response leaves of the equation.
     """
     pencil = Pencil(system.stiffness, system.mass)
     count = pencil.finite if options.count is None else int(options.count)
@@ -123,23 +129,34 @@ def modal(
     if len(system.modal):
         own = system.modal @ basis.shapes
         damping = damping + own.T @ own
-    parts = []
+    parts, few = [], count < pencil.finite
+    shift = _shift(pencil, basis) if few else 0.0
+    factors = pencil.factorize(shift) if few else None
     for term in drive_terms(system, drive):
         load, left = basis.shapes.T @ term.shape, np.zeros(pencil.size)
-        if options.static_correction and count < pencil.finite:
-            left = _residual(pencil, basis, term.shape, load)
-        parts.append((load, left, term.factor))
-    memory = None
+        if options.static_correction and factors is not None:
+            left = _residual(pencil, basis, term.shape, load, factors, shift)
+        parts.append((load, left, term))
+    memory, missing = None, np.zeros(len(frequency))
     response = np.zeros((len(frequency), pencil.size), np.complex128)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
         if system.responding is not None:
             memory = system.responding.between(basis.shapes, 1j * omega)
-        for load, left, factor in parts:
-            q = _amplitudes(basis, damping, omega, load, memory)
-            response[k] += (basis.shapes @ q + left) * factor(omega)
+        for load, left, term in parts:
+            damped = basis.shapes.T @ _damped(system, omega, left)
+            q = _amplitudes(basis, damping, omega, load - damped, memory)
+            response[k] += (basis.shapes @ q + left) * term.factor(omega)
+        if factors is not None:
+            unbalanced: NDArray[np.complex128] = -_resisting(system, omega, response[k])
+            for _, _, term in parts:
+                unbalanced += term.shape * term.factor(omega)
+            change = factors.solve(unbalanced.real) + 1j * factors.solve(unbalanced.imag)
+            missing[k] = np.abs(change).max() / np.abs(response[k]).max()
         report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
     warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
+    if (told := missing > OMITTED).any():
+        warn_at(frequency[told], TOO_FEW.format(share=missing[told].max()))
     facts = {"modes": count, "static_correction": options.static_correction}
     return Answer(response, {}, facts)
 
@@ -209,15 +226,35 @@ def _amplitudes(
     return np.where(resonant, np.nan, amplitudes)
 
 
-def _residual(pencil: Pencil, basis: _Basis, shape: NDArray, load: NDArray) -> NDArray:
-    """Static response (nf,) of the omitted modes."""
+def _resisting(system: Linearized, omega: float, x: NDArray) -> NDArray[np.complex128]:
+    """Forces (nf,), N, that resist an oscillation x (nf,) at an angular frequency (rad/s)."""
+    elastic = system.stiffness @ x - omega**2 * (system.mass @ x)
+    return elastic + _damped(system, omega, x)
+
+
+def _damped(system: Linearized, omega: float, x: NDArray) -> NDArray:
+    """Forces (nf,), N, of damping and of laws with memory in such an oscillation."""
+    force = 1j * omega * (system.damping @ x + system.modal.T @ (system.modal @ x))
+    if system.responding is not None:
+        turns = system.responding.gradient
+        force += turns.T @ (system.responding.weights(1j * omega) * (turns @ x))
+    return force
+
+
+def _shift(pencil: Pencil, basis: _Basis) -> float:
+    """Squared frequency (rad2/s2) at which omitted modes respond statically: 0, or below it."""
     modal = basis.values[basis.inertia > 0.0]
+    if modal[0] > 0.0:
+        return 0.0
     positive = modal[modal > 0.0]
-    shift = 0.0
-    if modal[0] <= 0.0:
-        beside = positive[0] if positive.size else pencil.scale
-        shift = float(modal[0] - BESIDE * beside)
-    factors = pencil.factorize(shift)
+    return float(modal[0] - BESIDE * (positive[0] if positive.size else pencil.scale))
+
+
+def _residual(
+    pencil: Pencil, basis: _Basis, shape: NDArray, load: NDArray, factors: Factorization,
+    shift: float,
+) -> NDArray:  # fmt: skip
+    """Static response (nf,) of the omitted modes."""
     whole = factors.solve(shape)
     left = shape - pencil.stiffness @ whole + shift * (pencil.mass @ whole)
     whole = whole + factors.solve(left)

@@ -97,12 +97,13 @@ def _rows_pullback(own, u, v, t, weight, product, rate):
 
 
 class DampingMatrix(Term):
-    """Damping by a sparse matrix C (m, m), N s/m; see `Term`."""
+    """Damping by a sparse matrix C (m, m), N s/m, of which some dofs are `hidden`; see `Term`."""
 
     damps = shared = True
 
-    def __init__(self, matrix: sparse.csr_array) -> None:
+    def __init__(self, matrix: sparse.csr_array, hidden: NDArray | None = None) -> None:
         self.matrix = matrix
+        self._hidden = np.zeros(0, np.int64) if hidden is None else hidden
 
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
@@ -129,12 +130,16 @@ class DampingMatrix(Term):
         return self.matrix.tocoo().coords
 
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
-        """Damping entries (k,), N s/m; see `Term`."""
-        return self.matrix.data
+        """Damping entries (k,), N s/m; symmetric, as those of `ViscousTerm`. See `Term`."""
+        scale = np.ones(self.matrix.shape[0])
+        scale[self._hidden] = hidden**0.5
+        row, column = self.damping_places
+        return self.matrix.data * scale[row] * scale[column]
 
     def placed(self, order: NDArray, before: Assembly) -> DampingMatrix:
         """The term with nodes in memory order; see `Term`."""
-        return DampingMatrix(before.numbering(order).matrix(self.matrix))
+        numbering = before.numbering(order)
+        return DampingMatrix(numbering.matrix(self.matrix), numbering.dofs(self._hidden))
 
 
 class DampingRows(Term):
