@@ -22,7 +22,9 @@ ALONG = np.array([4, 6, 8, 12, 16, 20])
 def error(ratio: float, coefficient: float, along: int) -> float:
     """Error of the mass of a rectangle of width 1 that moves normal to itself."""
     corners = [(0, 0), (1, 0), (1, ratio), (0, ratio)]
-    plate = fd.discretize(fd.Pattern(corners, [(0, 1, 2, 3)]), fd.Sheet(1e9, 0.3, 1e-3, 700.0))
+    plate = fd.discretize(
+        fd.Pattern(corners, [(0, 1, 2, 3)]), fd.Sheet(1e9, 0.3, 1e-3, 700.0), preset="plate"
+    )
     lift = np.tile([0.0, 0.0, 1.0], len(plate.nodes))
     added = fd.Case(plate, air=fd.Air(density=1.0, resolution=along)).added_mass()
     return 1.0 - float(lift @ (added @ lift)) / (coefficient * np.pi / 4.0 * ratio)

@@ -23,7 +23,7 @@ def sheet() -> fd.Structure:
     """The sheet, 20 mm panels of paper, folded to dihedrals of 70 degrees."""
     paper = fd.Sheet(1.219e9, 0.2, THICKNESS, density=690.0, length_scale_ratio=2.7)
     pattern = fd.patterns.miura(cells=(CELLS, CELLS), a=0.02, b=0.02, panel_angle=60, dihedral=70)
-    return fd.discretize(pattern, paper, fold_law="linear")
+    return fd.discretize(pattern, paper, fold_law="linear", preset="plate")
 
 
 def press() -> fd.Case:

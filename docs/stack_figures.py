@@ -34,7 +34,9 @@ def stack() -> fd.Pattern:
 
 def compute() -> tuple[fd.Case, object]:
     """The case, and its motion."""
-    structure = fd.discretize(stack(), FOAM, crease_stiffness=0.001, membrane="panel")
+    structure = fd.discretize(
+        stack(), FOAM, crease_stiffness=0.001, membrane="panel", preset="plate"
+    )
     held = np.unique(structure.triangles[structure.triangle_panel == 0]).tolist()
     case = fd.Case(
         structure,

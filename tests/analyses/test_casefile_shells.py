@@ -124,8 +124,8 @@ model.kind = "shell"; model.divisions = 0 | model.divisions = 0: must be at leas
 loads =; model.kind = "shell"; analysis.steps =; analysis.kind = "modes"; analysis.secant = 1 |
     analysis.secant = 1.0: is for superlinear bends, which a shell cannot have; leave it out
 model.kind = "shell"; supports[0].nodes = [4, 6] | supports[0].nodes: 6 is no vertex of the
-    pattern, which has 0 to 5; a case file names nodes of a shell by vertex, whatever its
-    divisions
+    pattern, which has 0 to 5; a case file names nodes of a shell, or of
+    superelements, by vertex
 model.kind = "shell"; loads[0].nodes = [8] | loads[0].nodes: 8 is no vertex
 loads =; model.kind = "shell"; drive = [{ nodes = [8], force = [-0.001, 0, 0] }]; analysis = {
     kind = "frf", method = "direct", frequencies = [0.1, 0.2] } | drive[0].nodes: 8 is no vertex

@@ -42,6 +42,9 @@ analysis.secant = 2 | bars and hinges, as superelements do not take analysis.sec
 {BANDS}, stretch = 1.1 }} | bars and hinges, ... take analysis.stretch
 model.fold_law = "superlinear" | bars and hinges, ... refuse the case (fold_law = 'superlinear':
 air.density = 1.2 | superelements, the default
+output.nodes = [11] | bars and hinges, ... case (output.nodes: 11 is no vertex
+drive = [{{ nodes = 9, force = [0, 0, 1] }}]; analysis = {{ kind = "frf", frequencies = [1] }} |
+    bars and hinges, ... case (drive[0].nodes: 9 is no vertex
 contact.planes = [{{ point = [0, 0, -9], normal = [0, 0, 1] }}] | bars and ... (contact: Contact is
 pattern.cells = [10, 11] | bars and hinges, ... take long: 440 panels, more than 400
 {MANY} | bars and hinges, ... take long: 21 different panels, more than 20

@@ -9,6 +9,8 @@ from __future__ import annotations
 import warnings
 from typing import Any
 
+import numpy as np
+
 from foldyn.analyses.keys import parts
 from foldyn.analyses.sections import Choice, shared_keys
 from foldyn.analyses.vibration import VibrationSchema
@@ -60,6 +62,7 @@ def _why_not(schema: VibrationSchema, pattern: Pattern) -> str:
         most = f"{MOST_PANELS / each:.3g}"
         return f"would take long: {len(pattern.faces)} panels{what}, more than {most}"
     try:
+        check_vertices(schema, len(pattern.vertices))
         shapes = different(pattern, schema.sheet)
         if shapes > MOST_DIFFERENT:
             return f"would take long: {shapes} different panels, more than {MOST_DIFFERENT}"
@@ -73,3 +76,27 @@ def _why_not(schema: VibrationSchema, pattern: Pattern) -> str:
     except InputError as error:
         return f"refuse the case ({error})"
     return ""
+
+
+def check_vertices(schema: Any, count: int) -> None:
+    """Refuse nodes between vertices: a case file must hold for every mesh of a shell."""
+    places: dict[str, Any] = {
+        f"{name}[{i}].{key}": np.ravel(given).tolist()
+        for name in ("supports", "loads", "masses", "drive")
+        for i, part in enumerate(getattr(schema, name, ()))
+        for key in ("nodes", "between")
+        if not isinstance(given := getattr(part, key, "") or "", str)
+    }
+    until = getattr(schema.analysis, "until", None)
+    places |= {} if until is None else {"analysis.until.node": (until.node,)}
+    places["output.nodes"] = getattr(schema.output, "nodes", None)
+    for place, nodes in places.items():
+        if nodes is None or isinstance(nodes, str):
+            continue
+        beyond = [node for node in nodes if not 0 <= node < count]
+        if beyond:
+            raise InputError(
+                f": {beyond[0]} is no vertex of the pattern, which has 0 to {count - 1}; a case "
+                "file names nodes of a shell, or of superelements, by vertex",
+                place,
+            )

@@ -14,7 +14,7 @@ import numpy as np
 from foldyn.analyses.casefile import CaseFile, Output
 from foldyn.analyses.conversion import converted, flagged, remodeled
 from foldyn.analyses.keys import dotted, replaced
-from foldyn.analyses.model_choice import choice_of
+from foldyn.analyses.model_choice import check_vertices, choice_of
 from foldyn.analyses.motion import SAMPLING
 from foldyn.analyses.pattern_section import FACES, FACETS, HINGES, READING
 from foldyn.analyses.registry import ANALYSES, schema_of
@@ -153,7 +153,7 @@ def case_of_document(
         options = {**given, **straight}
         masses = list(schema.model.mass or [resolved.mass])[: None if kind.by_mass else 1]
         if choice.kind == SHELL:
-            _check_vertices(schema, len(pattern.vertices))
+            check_vertices(schema, len(pattern.vertices))
         with within("damping"):
             damping = schema.damping.made()
 
@@ -291,27 +291,3 @@ def _thick(pattern: Pattern, sheet: Sheet, offset: Any) -> Pattern:
     except InputError as error:
         own = {"offsets": f"pattern.{HINGES}", "thickness": "sheet.thickness"}
         raise InputError(error.reason, own.get(error.key, "pattern")) from None
-
-
-def _check_vertices(schema: Any, count: int) -> None:
-    """Refuse inner nodes of a shell's mesh: a case file must hold for every mesh."""
-    places: dict[str, Any] = {
-        f"{name}[{i}].{key}": np.ravel(given).tolist()
-        for name in ("supports", "loads", "masses", "drive")
-        for i, part in enumerate(getattr(schema, name, ()))
-        for key in ("nodes", "between")
-        if not isinstance(given := getattr(part, key, "") or "", str)
-    }
-    until = getattr(schema.analysis, "until", None)
-    places |= {} if until is None else {"analysis.until.node": (until.node,)}
-    places["output.nodes"] = getattr(schema.output, "nodes", None)
-    for place, nodes in places.items():
-        if nodes is None or isinstance(nodes, str):
-            continue
-        beyond = [node for node in nodes if not 0 <= node < count]
-        if beyond:
-            raise InputError(
-                f": {beyond[0]} is no vertex of the pattern, which has 0 to {count - 1}; a case "
-                "file names nodes of a shell by vertex, whatever its divisions",
-                place,
-            )
