@@ -209,13 +209,14 @@ class Loaded:
         return _sum_by_history(self._rest_changes())
 
     def _rest_changes(self) -> Summands:
-        count = len(self.structure.body.sheet.rest_angles)
-        for change, history in self.actuation_terms:
-            yield np.pad(change, (0, count - len(change))), history
+        found = list(self.actuation_terms)
         for place, load in self._loads():
             turns = load.turns(self.structure, place)
             if turns is not None and turns.any():
-                yield np.pad(turns, (0, count - len(turns))), load.history
+                found.append((turns, load.history))
+        for change, history in found:  # a body is made only if something turns
+            count = len(self.structure.body.sheet.rest_angles)
+            yield np.pad(change, (0, count - len(change))), history
 
     def _actuations(self) -> Summands:
         first: dict[int, str] = {}  # the load that actuates a crease

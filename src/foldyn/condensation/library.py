@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -73,9 +73,19 @@ def groups(pattern: Pattern, sheets: Sequence[Sheet], meshes: Meshes) -> list[Gr
     out = []
     for (shape, sheet), members in _congruent(pattern, sheets).items():
         numbers, faces, frames = zip(*members, strict=True)
-        panels = _condensed(shape, sheet, meshes)
-        out.append(Group(*panels, np.array(faces), np.array(frames), np.array(numbers)))
+        unit = replace(sheet, youngs_modulus=1.0, density=1.0)  # others differ by factors
+        own, compared = (_of(panel, sheet) for panel in _condensed(shape, unit, meshes))
+        out.append(Group(own, compared, np.array(faces), np.array(frames), np.array(numbers)))
     return out
+
+
+def _of(unit: CondensedPanel, sheet: Sheet) -> CondensedPanel:
+    """A panel of a sheet, from one whose modulus and density are 1."""
+    by = {
+        **dict.fromkeys(("stiffness", "thermal", "held_energy"), sheet.youngs_modulus),
+        **dict.fromkeys(("mass", "products"), sheet.density),
+    }
+    return replace(unit, **{name: factor * getattr(unit, name) for name, factor in by.items()})
 
 
 def different(pattern: Pattern, sheet: Sheet) -> int:
