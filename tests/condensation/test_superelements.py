@@ -444,9 +444,6 @@ def test_what_superelements_leave_out_is_refused(named):
         lambda c: fd.trace(
             c.altered(loads=[fd.Force([TIP], (1.0, 0.0, 0.0))]), "newton", inertia_relief=True
         ),
-        lambda c: fd.sensitivity(
-            lambda x: c, {"x": 1.0}, measures="frequency[1]", analysis={"kind": "modes"}
-        ),
     ],
 )
 def test_analyses_of_what_moves_far_are_refused(analysis):

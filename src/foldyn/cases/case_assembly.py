@@ -209,15 +209,14 @@ class Loaded:
         return _sum_by_history(self._rest_changes())
 
     def _rest_changes(self) -> Summands:
-        for change, history in self.actuation_terms:
-            yield self._of_all_rest_angles(change), history
+        found = list(self.actuation_terms)
         for place, load in self._loads():
             turns = load.turns(self.structure, place)
             if turns is not None and turns.any():
-                yield self._of_all_rest_angles(turns), load.history
-
-    def _of_all_rest_angles(self, change: NDArray) -> NDArray:
-        return np.pad(change, (0, len(self.structure.body.sheet.rest_angles) - len(change)))
+                found.append((turns, load.history))
+        for change, history in found:  # a body is made only if something turns
+            count = len(self.structure.body.sheet.rest_angles)
+            yield np.pad(change, (0, count - len(change))), history
 
     def _actuations(self) -> Summands:
         first: dict[int, str] = {}  # the load that actuates a crease

@@ -23,8 +23,17 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.condensation.library import Group
-from foldyn.condensation.panel import BOW, INNER, TURN, VERTEX, block_diagonal, edge_frame
+from foldyn.condensation.panel import (
+    BOW,
+    INNER,
+    TURN,
+    VERTEX,
+    CondensedPanel,
+    block_diagonal,
+    edge_frame,
+)
 from foldyn.condensation.shapes import ACROSS, ALONG, Level, bows, turns
+from foldyn.condensation.term import Parts, matrix
 from foldyn.mechanics.block_matrix import of_elements
 from foldyn.mechanics.sheet_term import CreaseTurns
 from foldyn.patterns import Pattern
@@ -286,25 +295,58 @@ class Whole:
             out[self.unknowns.turn(edge, side, 0)] = sign * along
         return out
 
-    def crease_turns(self, graded: Grading) -> CreaseTurns:
-        """Turns of both sides of the creases relative to each other.
-
-        Creases turn by what they do at the middles of the pieces of a mesh, as panels do.
-        """
+    @property
+    def _turns(self) -> sparse.csr_array:
+        """Turns (nf * turns, m) of both sides of the creases relative to each other."""
         own, count, creases = self.unknowns, self.level.turns, len(self._pattern.creases)
         first = own.turn(np.arange(creases)[:, None], 0, np.arange(count)).ravel()
         row = np.tile(np.arange(len(first)), 2)
         column = np.concatenate([first, first + count])
-        entries = (np.ones(len(row)), (row, column))
-        amplitudes = sparse.csr_array(entries, (len(first), own.size))
-        roots = np.zeros((creases, count, count))  # of the mean squares
+        return sparse.csr_array((np.ones(len(row)), (row, column)), (len(first), own.size))
+
+    def _roots(self, graded: Grading) -> NDArray[np.float64]:
+        """Roots (nf, turns, turns) of the mean squares of the turns of each crease.
+
+        Creases turn by what they do at the middles of the pieces of a mesh, as panels do.
+        """
+        count, creases = self.level.turns, len(self._pattern.creases)
+        roots = np.zeros((creases, count, count))
         for crease, along in enumerate(self._along[:creases]):
             places = np.append(0.0, graded.places(float(np.linalg.norm(along))))
             share = np.diff(places, append=1.0)
             shapes = turns(places + 0.5 * share, count)
             roots[crease] = np.linalg.cholesky(shapes.T @ (share[:, None] * shapes)).T
-        rows = block_diagonal(roots).tocsr() @ amplitudes if creases else amplitudes
-        return CreaseTurns(sparse.csr_array(rows), np.repeat(np.arange(creases), count))
+        return roots
+
+    def crease_turns(self, graded: Grading) -> CreaseTurns:
+        """Turns of both sides of the creases relative to each other on the finest mesh."""
+        rows, count = self._turns, self.level.turns
+        if rows.shape[0]:
+            rows = sparse.csr_array(block_diagonal(self._roots(graded)).tocsr() @ rows)
+        return CreaseTurns(rows, np.repeat(np.arange(rows.shape[0] // count), count))
+
+    def parts(self, dofs: sparse.csr_array, slope: NDArray, graded: Grading) -> Parts:
+        """Parts of the sheet for dofs (m, d), with creases of stiffness `slope` (nf,), N m/rad."""
+        rows, number, size, stiffness, mass = [], [], [], [], []
+        for k, (group, (kept, placed)) in enumerate(zip(self._groups, self._parts, strict=True)):
+            smooth = _smooth(group.panel, kept)
+            back = sparse.kron(sparse.eye_array(len(group.number)), smooth.T, format="csr")
+            rows.append(back @ placed)
+            number += [k] * len(group.number)
+            size += [len(kept)] * len(group.number)
+            for out, each in (stiffness, group.panel.stiffness), (mass, group.panel.mass):
+                out.append((smooth.T @ each[np.ix_(kept, kept)] @ smooth).ravel())
+        roots = self._roots(graded)
+        squares = slope[:, None, None] * (roots.swapaxes(1, 2) @ roots)
+        number += [len(stiffness) + k for k in range(len(slope))]
+        size += [self.level.turns] * len(slope)
+        stiffness += list(squares.reshape(len(slope), -1))
+        place = np.cumsum([0, *map(len, stiffness)])
+        every = sparse.csr_array(sparse.vstack([*rows, self._turns]) @ dofs)
+        return Parts(
+            matrix(every), np.cumsum([0, *size]), place[number], np.concatenate(stiffness),
+            np.concatenate(mass), self.unknowns.panels, np.zeros((2, max(size))),
+        )  # fmt: skip
 
     # ------------------------------------------------------------------ supports
     @cached_property
@@ -411,6 +453,19 @@ def _by_panel(amplitudes: sparse.csr_array, count: int) -> tuple[NDArray, NDArra
     motion = np.zeros((len(columns), count, len(number)))
     motion[panel, row, place - begin[panel]] = entries.data
     return columns, motion
+
+
+def _smooth(panel: CondensedPanel, kept: NDArray) -> NDArray[np.float64]:
+    """Shapes (c, c) of a panel by its own that change smoothly with its sheet.
+
+    Vibrations have no sign, and those of one frequency are any combination of them: here they are
+    combined so that their mass with some motions of the edges is symmetric and positive.
+    """
+    out, inner = np.eye(len(kept)), panel.kind[kept, 0] == INNER
+    mass = panel.mass[np.ix_(kept[inner], kept[~inner])]
+    left, _, right = np.linalg.svd(mass @ np.random.default_rng(0).standard_normal(mass.shape).T)
+    out[np.ix_(inner, inner)] = left @ right
+    return out
 
 
 class _Columns:

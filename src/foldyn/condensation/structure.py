@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -188,8 +188,9 @@ class Superelements(Discretized):
         parts = dofs.power(2).sum(axis=0)  # unknowns of each dof: two turns at welds, otherwise one
         rotated = (dofs.T @ made.rotated / parts[:, None])[self.nodes.size :]
         return SuperelementsTerm(
-            panels, mass, turns, self._slope, self._fold_hinges, self.nodes, rotated
-        )
+            panels, mass, turns, self._slope, self._fold_hinges, self.nodes, rotated,
+            partial(made.parts, dofs, self._slope, self.meshes.graded[-1]),
+        )  # fmt: skip
 
     def _dofs(self, edges: Mapping[int, NDArray]) -> sparse.csr_array:
         """Unknowns of `whole` as combinations of dofs."""

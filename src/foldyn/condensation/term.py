@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.errors import InputError
-from foldyn.jit.compiled import inner_scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at
+from foldyn.mechanics.pullback import Arrays, Pulled, pullback
 from foldyn.mechanics.sheet_term import Blocks, CreaseTurns, FoldHinges, SheetTerm
 from foldyn.mechanics.term import ENERGIES, FORCES, CompiledTerm, Folds, energies, forces
 from foldyn.mechanics.threads import Team, team
@@ -30,6 +32,33 @@ class _Matrix(NamedTuple):
     indptr: NDArray
     indices: NDArray
     data: NDArray  # N/m
+
+
+def matrix(given: sparse.csr_array) -> _Matrix:
+    """A sparse matrix for compiled functions."""
+    return _Matrix(given.indptr.astype(np.int64), given.indices.astype(np.int64), given.data)
+
+
+class Parts(NamedTuple):
+    """Parts of a sheet, e of them: the stiffness is the sum of A' N A, with N shared by some.
+
+    The first parts are the panels, which alone have mass; creases follow.
+    """
+
+    rows: _Matrix  # the amplitudes A of part after part
+    first: NDArray  # (e + 1,) first row of each part
+    at: NDArray  # (e,) place of its matrix N in `stiffness`
+    stiffness: NDArray  # (k,) all N, flat
+    mass: NDArray  # (l,) those of the panels alone, kg
+    panels: int  # number of the panels
+    scratch: NDArray  # (2, largest number of rows)
+
+
+class _Backward(NamedTuple):
+    parts: Parts
+    stiffness: NDArray  # (k,) derivatives by `Parts.stiffness`
+    panels: _Matrix
+    folds: _Matrix
 
 
 class _Context(NamedTuple):
@@ -55,6 +84,34 @@ def _pull(matrix, q, i):
     for k in range(matrix.indptr[i], matrix.indptr[i + 1]):
         force += matrix.data[k] * q[matrix.indices[k]]
     return force
+
+
+@inner
+def _add_products(parts, count, z, x, by, out):
+    """Add the derivatives of by z' K x by all N to `out`; of the first `count` parts alone."""
+    for e in range(count):
+        first, size = parts.first[e], parts.first[e + 1] - parts.first[e]
+        for i in range(size):
+            parts.scratch[0, i] = by * _pull(parts.rows, z, first + i)
+            parts.scratch[1, i] = _pull(parts.rows, x, first + i)
+        for i in range(size):
+            for j in range(size):
+                out[parts.at[e] + i * size + j] += parts.scratch[0, i] * parts.scratch[1, j]
+
+
+@kernel
+def add_mass_products(parts, z, x, by, out):
+    """Add the derivatives of by z' M x by `Parts.mass` to `out`, with z and x (m,)."""
+    _add_products(parts, parts.panels, z, x, by, out)
+
+
+@pullback
+def _pullback(own, u, v, t, weight, product, rate):
+    size = own.panels.indptr.size - 1
+    q, w, out = numbers_at(u, size), numbers_at(weight, size), numbers_at(product, size)
+    for i in range(size):
+        out[i] += _pull(own.panels, w, i) + _pull(own.folds, w, i)
+    _add_products(own.parts, own.parts.at.size, w, q, 1.0, own.stiffness)
 
 
 @forces
@@ -91,18 +148,20 @@ class SuperelementsTerm(SheetTerm):
         Vertices, m.
     rotated : (h, 3)
         See `SheetTerm`.
+    parts : callable
+        Returns the parts that `panels`, `mass` and the stiffness of the folds are the sum of.
     """
 
     energy_groups = GROUPS
-    undifferentiated = "superelements"
     mass: sparse.csr_array
     crease_turns: CreaseTurns
     rotated: NDArray
 
     def __init__(
         self, panels: sparse.csr_array, mass: sparse.csr_array, turns: CreaseTurns, slope: NDArray,
-        folds: FoldHinges, nodes: NDArray, rotated: NDArray,
+        folds: FoldHinges, nodes: NDArray, rotated: NDArray, parts: Callable[[], Parts],
     ) -> None:  # fmt: skip
+        self._parts_of = parts
         self.mass, self.crease_turns, self._fold_hinges, self._panels = mass, turns, folds, panels
         self.rotated, self._slope, self._changed = rotated, slope, np.zeros(len(slope))
         resisted = turns.rows * slope[turns.fold][:, None]
@@ -117,17 +176,30 @@ class SuperelementsTerm(SheetTerm):
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """See `Term`."""
         turns, moment = self.crease_turns, self._slope * self._changed
-        panels, folds = (
-            _Matrix(m.indptr.astype(np.int64), m.indices.astype(np.int64), m.data)
-            for m in (self._panels, self._folds)
-        )
         own = _Context(
-            panels,
-            folds,
+            matrix(self._panels),
+            matrix(self._folds),
             turns.mean.T @ moment,
             0.5 * float(moment @ self._changed),
         )
         return CompiledTerm(Context(own), {FORCES: _forces, ENERGIES: _energies})
+
+    @cached_property
+    def parts(self) -> Parts:
+        """What the matrices are made of, for gradients."""
+        return self._parts_of()
+
+    def arrays(self) -> Arrays:
+        """See `Term`."""
+        parts = self.parts
+        layout = {"shape of superelements": self._nodes, "first": parts.first, "at": parts.at}
+        return Arrays({"stiffness": parts.stiffness, "mass": parts.mass}, layout)
+
+    def pulled(self) -> Pulled:
+        """See `Term`; the mass is differentiated by `add_mass_products`."""
+        out = {name: np.zeros_like(getattr(self.parts, name)) for name in ("stiffness", "mass")}
+        own = _Backward(self.parts, out["stiffness"], matrix(self._panels), matrix(self._folds))
+        return Pulled(Context(own), _pullback, out)
 
     def scratches(self, threads: int) -> Sequence[_Scratch]:
         """See `SheetTerm`."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.condensation.term import SuperelementsTerm, add_mass_products
 from foldyn.dynamics.modal_damping import soft_at_rest
 from foldyn.gradients.parameters import nothing
 from foldyn.gradients.path import Balance
@@ -50,11 +51,13 @@ class Products:
         self, linear: Linearized, equilibrium: bool, displacement: NDArray | None = None
     ) -> None:
         self._linear, self._case = linear, linear.case
+        case = linear.case
         body, self._factor = linear.case.body, float(equilibrium)
         self.q = body.dofs(linear.displacement if displacement is None else displacement)
         moving = None if equilibrium else body.hidden
         self._balance = Balance(linear.case, self.q, moving)
-        self._moves = equilibrium or len(body.hidden) > 0
+        # the stiffness of a linear model does not depend on the state
+        self._moves = not case.structure.linear and (equilibrium or len(body.hidden) > 0)
         at_rest = soft_at_rest(linear.case, body, self.q)[0]
         self._sheet = body.sheet.weakened(at_rest) if at_rest.any() else body.sheet
         self._soft = at_rest.any() and self._sheet.folds.stiffness != body.sheet.folds.stiffness
@@ -76,6 +79,8 @@ class Products:
         state = np.zeros(len(self.q))
         if by == 0.0 or not motion.any():
             return state
+        if self._case.structure.linear:
+            return self._difference(self._pullback, weight, motion, 1.0, by, total)
         small = SMALL * self._sheet.longest() / np.abs(motion).max()
         step = TURN * small / self._case.body.turn(self.q, self.q + small * motion)
         near = NEAR * _way_to_kinks(self._sheet, self.q, small * motion) * small
@@ -111,6 +116,18 @@ class Products:
 
     def add_mass(self, z: NDArray, x: NDArray, by: float, total: dict[str, NDArray]) -> None:
         """Add the gradient of `by` z' M x, with z and x on free dofs (nf,) or all nodes (n, 3)."""
+        sheet, size = self._case.body.sheet, len(self.q)
+        if isinstance(sheet, SuperelementsTerm):
+            one, other = (
+                np.append(each, np.zeros(size - each.size)) if each.ndim > 1
+                else self._linear.whole(each[:, None])[:, 0]
+                for each in (z, x)
+            )  # fmt: skip
+            add_mass_products(sheet.parts, one, other, by, total["0.mass"])
+            nodes = self._case.structure.nodes.size
+            product = (one * other)[:nodes].reshape(-1, 3).sum(axis=1)
+            total["point_masses"] += by * product
+            return
         one, other = (
             each if each.ndim > 1 else self._linear.expanded(each[:, None]).reshape(-1, 3)
             for each in (z, x)
@@ -139,7 +156,7 @@ def refuse(linear: Linearized, what: str) -> None:
             bool(case.rest_terms) and bool(linear.displacement.any())
         ),
         "loads that depend on the displacement (Pressure, CreaseMoment)": bool(
-            case.following_terms
+            case.following_terms and not case.structure.linear
         ),
     }
     refuse_lacking(what, lacks)

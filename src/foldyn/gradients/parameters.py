@@ -64,6 +64,8 @@ def numbers_of(case: Case) -> Arrays:
         basis = case.constraints.basis
         numbers["constraints"] = basis @ np.random.default_rng(0).uniform(1.0, 2.0, basis.shape[1])
     numbers["alpha"], numbers["beta"] = np.array([[case.rayleigh.alpha], [case.rayleigh.beta]])
+    if case.structure.linear:
+        numbers["point_masses"] = case.point_masses
     with suppress(InputError):  # statics needs no mass
         mass = sparse.csr_array(case.mass)
         mass.sort_indices()
@@ -145,7 +147,8 @@ def nothing(case: Case, pullback: Pullback) -> dict[str, NDArray]:
             total[f"{kind}.{k}"] = np.zeros_like(vector)
     with suppress(InputError):
         total["mass"] = np.zeros(case.mass.nnz)
-    return total | {"alpha": np.zeros(1), "beta": np.zeros(1)}
+    points = {"point_masses": np.zeros_like(case.point_masses)} if case.structure.linear else {}
+    return total | points | {"alpha": np.zeros(1), "beta": np.zeros(1)}
 
 
 class Slope(NamedTuple):

@@ -229,9 +229,8 @@ def _refuse(case: Case, arguments: Mapping[str, Any]) -> None:
         "contact": case.contact is not None,
         "creases that yield, creep or relax": bool(case.remembering),
         "folds that are actuated (Actuate, Temperature)": bool(case.rest_terms),
-        "loads that depend on the displacement (Pressure, CreaseMoment)": bool(
-            case.following_terms
-        ),
+        "loads that depend on the displacement (Pressure, CreaseMoment), or act between the "
+        "vertices of superelements": bool(case.following_terms),
         "an adaptive load": arguments.get("adaptive_load") is not None,
         "constant loads": bool(np.size(arguments.get("constant", ()))),
         "inertia relief": bool(arguments.get("inertia_relief")),

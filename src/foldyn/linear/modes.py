@@ -381,8 +381,8 @@ def unit_translations(linear: Linearized) -> NDArray:
 
 
 def nodes_translated(case: Case) -> NDArray:
-    """Unit translations (3n, 3) of all dofs that are not fixed, regardless of constraints."""
-    moves = ~case.fixed.ravel()
+    """Unit translations (3n, 3) of all dofs that have a part in those of modes."""
+    moves = ~case.fixed.ravel() | bool(case.structure.linear)  # parts move beside held nodes
     unit = moves[:, None] & (np.arange(len(moves))[:, None] % 3 == np.arange(3))
     return unit.astype(float)
 
