@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from case_texts import HELD_MIURA_TEXT, changed
+from case_texts import HELD_MIURA_TEXT, PLATE, changed
 from foldyn import ram_limit
 from foldyn.cli.main import main
 from foldyn.errors import InputError
@@ -131,7 +131,7 @@ def test_estimates_are_right_within_a_factor_of_two():
         assert per / 2.0 < _peak(make) < per * 2.0
 
 
-CASE = f"""{HELD_MIURA_TEXT}[[supports]]
+CASE = f"""{HELD_MIURA_TEXT}{PLATE}[[supports]]
 nodes = "xmax"
 axis = "x"
 displacement = 0.01

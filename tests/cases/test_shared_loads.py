@@ -178,7 +178,7 @@ BAD = [
 def test_bad_loads_are_refused(text, message, read) -> None:
     where = "" if "mean" in message or "leave out angle" in message else r"loads\[0\]"
     with pytest.raises(InputError, match=where + message):
-        read(CASE.format(model="", load=text)).case()
+        read(CASE.format(model='preset = "plate"', load=text)).case()
 
 
 def test_centers() -> None:

@@ -142,7 +142,7 @@ def test_a_free_strip_curls_to_an_arc() -> None:
     ],
 )
 def test_panels_that_are_welded_curl_as_one(cut) -> None:
-    structure = fd.discretize(fd.welded(cut), STEEL, preset="plate")
+    structure = fd.discretize(fd.welded(cut), STEEL)
     assert structure.edge_plates is not None
     assert off_the_paraboloid(structure, fd.Temperature(1.0, curvature=1e-5), 1e-5) < 1e-5
 
