@@ -52,7 +52,7 @@ pattern.cells = [10, 11] | bars and hinges, ... take long: 440 panels, more than
 {BANDS}, points = 101 }} | bars and hinges, ... 4 panels at 101 wave vectors, more than 3.96
 {BANDS}, zone = 20 }} | bars and hinges, ... 4 panels at 260 wave vectors
 {BANDS}, points = 30, vary = {{ "pattern.dihedral" = [90, 80, 70, 60] }} }} | bars ... at 120 wave
-design = {{ minimize = "mass", bounds = {{ "sheet.thickness" = [1, 2] }} }} | bars and ... gradients
+design = {{ minimize = "mass", bounds = {{ "sheet.thickness" = [1, 2] }} }} | bars and ... anew
 sweep.vary = {{ "model.preset" = ["plate"] }} | bars and hinges, ... model.preset, which [sweep]
 """
 
@@ -122,4 +122,7 @@ def test_other_values_keep_the_model_unless_they_name_one(read):
 
 def test_gradients_are_those_of_bars_and_hinges(tmp_path):
     found = case_file_at(tmp_path, tomllib.loads(OPEN), {"pattern.dihedral": 100})
-    assert found.choice.told == "bars and hinges, as superelements have no gradients"
+    assert (
+        found.choice.told
+        == "bars and hinges, as superelements would be condensed anew for each design"
+    )

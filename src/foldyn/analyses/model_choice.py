@@ -25,7 +25,7 @@ MOST_DIFFERENT = 20
 """Most different panels; each takes about a second to condense."""
 MOST_PANELS = 400
 """Most panels times `VibrationSchema.solutions`; each takes about a tenth of a second."""
-NO_GRADIENTS = "have no gradients"
+ANEW = "would be condensed anew for each design"
 
 
 def choice_of(schema: Any, pattern: Pattern | None, before: Choice | None = None) -> Choice:
@@ -53,7 +53,7 @@ def _why_not(schema: VibrationSchema, pattern: Pattern) -> str:
     if schema.beyond_rest:
         return f"do not take {schema.beyond_rest}"
     if schema.design is not None:
-        return f"{NO_GRADIENTS}, which [design] may take"
+        return ANEW
     varied = [one.key for one in schema.sweep.vary if bound(one.key)] if schema.sweep else []
     if varied:
         return f"do not have {varied[0]}, which [sweep] varies"

@@ -96,7 +96,7 @@ def fluid_at(case: Any, displacement: NDArray) -> Fluid:
     catch, lifts = sparse.csc_array(caught(*surface)), None
     if structure.linear:
         centers = points[elements.triangles].mean(axis=1)
-        lifts = structure.lifts(centers, elements.panel, case.held_edges)
+        lifts = structure.lifts(centers, elements.panel, edges=case.held_edges)
     else:
         catch = catch[:, elements.element]
     given = structure.triangles, elements.under, elements.shares, sparse.csr_array(catch)

@@ -223,7 +223,7 @@ class Superelements(Discretized):
         return self._dofs(edges).T @ self.whole.spread(load, self.meshes.graded[-1])
 
     def lifts(
-        self, points: NDArray, panel: NDArray, edges: Mapping[int, NDArray]
+        self, points: NDArray, panel: NDArray, *, edges: Mapping[int, NDArray]
     ) -> sparse.csr_array:
         """See `Discretized`."""
         return sparse.csr_array(self.whole.lifts(points, panel) @ self._dofs(edges))

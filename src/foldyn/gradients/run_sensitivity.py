@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from foldyn.analyses import CaseFile
 from foldyn.analyses.keys import replaced
-from foldyn.analyses.model_choice import NO_GRADIENTS
+from foldyn.analyses.model_choice import ANEW
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.analyses.sections import Choice
 from foldyn.cases import Case
@@ -296,7 +296,7 @@ def _check_acts(structure: Discretized, name: str) -> None:
         )
 
 
-OPEN = Choice(BARS_AND_HINGES, NO_GRADIENTS, open=True)
+OPEN = Choice(BARS_AND_HINGES, ANEW, open=True)
 """The model of case files that leave it open."""
 
 

@@ -228,7 +228,7 @@ class BarsHingesTerm(SheetTerm):
         for start, end, code, row in model.hinge_runs.tolist():
             part, address = slice(start, end), model.addresses[row]
             state = angle[part], model.hinge_rest[part], model.hinge_parameters[part]
-            own, share = HingeLaw.compiled(code, *state, address)[2], model.hinge_share[part]
+            own, share = HingeLaw.slopes(code, *state, address)[0], model.hinge_share[part]
             turn[part] = own / (share + (1.0 - share) * own)  # in series with panels
         return Strains(
             bars, model.bar_vector, model.bar_stiffness * slope,

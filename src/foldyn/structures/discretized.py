@@ -264,7 +264,7 @@ class Discretized:
         raise NotImplementedError
 
     def lifts(
-        self, points: NDArray, panel: NDArray, edges: Mapping[int, NDArray]
+        self, points: NDArray, panel: NDArray, *, edges: Mapping[int, NDArray]
     ) -> sparse.csr_array:
         """Displacements (k, m) normal to panels (k,) at points (k, 3) in them, in linear models.
 
