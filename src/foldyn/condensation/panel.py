@@ -156,7 +156,8 @@ def condense(
     full[:, :-count] = shapes
     full[inside, :-count] = -factors.solve(stiffness[inside][:, held] @ shapes[held])
     inner, on_nodes = np.zeros((mesh.size, count + SPARE)), slice(3 * len(mesh.nodes))
-    inner[inside] = _held_modes(
+    size = np.sqrt(mass[on_nodes, on_nodes].sum() / 3.0)  # modal masses are the panel's mass
+    inner[inside] = size * _held_modes(
         own, sparse.csc_array(mass[inside][:, inside]), factors, inner.shape[1]
     )
     turned = np.eye(len(inner.T), count)
