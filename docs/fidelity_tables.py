@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from verification.fidelity import fresh
 from verification.fidelity import motion_results as motions
 from verification.fidelity.compare import RESULTS, columns, read, summary
 from verification.fidelity.mixed_models import counted, gap_table, mixed_table
@@ -48,6 +49,8 @@ TABLES = {
         "| corners |",
     ),
     "gaps": lambda: gap_table(of("gaps")),
+    "fresh": lambda: fresh.table(fresh.read()),
+    "fresh bars": lambda: fresh.bars_table(fresh.read()),
     "motions": lambda: without(
         motions.summaries(motions.read()),
         "| n5b8e, linear |",

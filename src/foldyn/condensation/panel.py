@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from scipy.interpolate import LinearNDInterpolator
 
 VERTEX, BOW, TURN, INNER = range(4)
+RIGID = 1e-13  # stiffness of rigid motions, relative to the largest
+LOCKED = 0.1  # most that a coarse mesh is stiffer, relative to a fine one, to be extrapolated
 SPARE = 4  # inner modes of a mesh among which those of another mesh are sought
 
 
@@ -109,18 +111,26 @@ class CondensedPanel:
 def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> CondensedPanel:
     """The limit of fine meshes, from two meshes; errors fall with the square of the mesh size.
 
-    Motions that have hardly any mass would get a negative one.
+    Motions that have hardly any mass would get a negative one. Motions that the coarse mesh makes
+    far too stiff are not extrapolated in full: nearly flat sheets would find them, and be too soft.
 
     ratio : mesh size of `coarse` / mesh size of `fine`.
     """
     weight = 1.0 / (ratio**2 - 1.0)
     values, motions = eigh(fine.mass + weight * (fine.mass - coarse.mass))
+    stiffness, ways = eigh(fine.stiffness)
+    strained = stiffness > RIGID * stiffness[-1]
+    ways = ways[:, strained] * np.sqrt(stiffness[strained])
+    unit = ways / stiffness[strained]
+    share, turned = eigh(unit.T @ (fine.stiffness - coarse.stiffness) @ unit)
+    ways = ways @ turned
     return replace(
         fine,
         **{
             name: (1.0 + weight) * getattr(fine, name) - weight * getattr(coarse, name)
-            for name in ("stiffness", "thermal", "held_energy")
+            for name in ("thermal", "held_energy")
         },
+        stiffness=(ways * (1.0 + weight * share.clip(min=-LOCKED))) @ ways.T,
         mass=(motions * values.clip(min=0.0)) @ motions.T,
     )
 
