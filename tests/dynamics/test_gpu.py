@@ -56,7 +56,7 @@ def sheet(**options) -> fd.Case:
     return fd.Case(fd.discretize(PATTERN, SHEET, **named(options)), [HELD])
 
 
-LUMPED = {"mass": "mixed_voronoi"}
+LUMPED = {"mass": "mixed_voronoi", "preset": "plate"}
 REFUSED = {
     "panels bend as plates": lambda: sheet(preset="n5b8e"),
     "not diagonal": lambda: sheet(preset="herkal", mass="consistent"),

@@ -118,7 +118,7 @@ def test_kinds_of_edges_are_those_of_the_script_and_of_figures():
 
 def test_welds_are_not_drawn():
     square = fd.welded(fd.Pattern(CORNERS, TRIANGLES), join=False)
-    made = fd.discretize(square, fd.Sheet(1e9, 0.3, 1e-3, 700.0), preset="plate")
+    made = fd.discretize(square, fd.Sheet(1e9, 0.3, 1e-3, 700.0))
     pairs, kind, _, _ = edge_pieces(made.pattern, made.nodes, made.edge_nodes)
     assert len(pairs) == len(kind) == len(made.pattern.boundary)
 
@@ -126,7 +126,7 @@ def test_welds_are_not_drawn():
 def test_where_supports_move_their_force_is_charted():
     """The load factor is their displacement; at every point their force is minus the springs'."""
     strip = fd.patterns.simple_fold(0.1, 0.1, dihedral=150)
-    made = fd.discretize(strip, fd.Sheet(1e9, 0.3, 1e-3), crease_stiffness=0.2, preset="plate")
+    made = fd.discretize(strip, fd.Sheet(1e9, 0.3, 1e-3), crease_stiffness=0.2)
     supports = [fd.Fix([4, 5]), fd.Fix([0, 1], "z"), fd.Impose([0, 1], "x", -0.02)]
     path = fd.trace(fd.Case(made, supports), method="displacement", steps=3)
     part = stage({"path": path}, {"path": fd.case_of(path)}, "title", [2])
