@@ -1,7 +1,8 @@
 """Errors of bars and hinges at rest: their modes beside those of superelements.
 
 Superelements of a low level on one mesh are within 3 % of a fine shell up to twice the frequency of
-a plate (docs/superelements.md), and take a fraction of a second. Modes of both are paired by their shapes at the nodes that the models share.
+a plate (docs/superelements.md), and take a fraction of a second. Modes of both are paired by their
+shapes at the nodes that the models share.
 """
 
 from __future__ import annotations
