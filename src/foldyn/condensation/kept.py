@@ -34,9 +34,8 @@ HERE = Path(__file__).resolve()
 class Meshes(NamedTuple):
     """Meshes on which panels are condensed, coarse to fine.
 
-    With several meshes the condensed panels are extrapolated from the two finest. For estimates of
-    errors, they are compared with panels extrapolated from the first mesh and the one before the
-    finest, and with those on the finest mesh.
+    With several meshes the condensed panels are extrapolated from the two finest, and compared with
+    the panels extrapolated from the first and the one before the finest.
     """
 
     graded: tuple[Grading, ...]
@@ -75,7 +74,7 @@ def condensed(
         coarse, middle = (condense(corners, smooth, sheet, own, modes)[0] for own in others)
         first, second, third = meshes.divisions
         coarser = extrapolated(coarse, middle, second / first)
-        return beside(extrapolated(middle, fine, third / second), [coarser, fine])
+        return beside(extrapolated(middle, fine, third / second), [coarser])
 
 
 def _read(path: Path, key: str) -> CondensedPanel | None:

@@ -4,8 +4,8 @@ Each level contains the lower ones, so that frequencies fall with the level, tow
 shell. The next level alone is no measure of the error: some numbers of shapes do not rise from one
 level to the next. So each level is compared with the highest one, and that with level 3, and the
 differences are multiplied by `SHARES`, found to be large enough in 97 % of modes of 28 sheets
-(docs/superelements.md). The error of the mesh is the lesser of two bounds, by the difference to
-another extrapolation, from two coarser meshes, and to the finest mesh alone.
+(docs/superelements.md). The error of the mesh is the difference between extrapolations from two
+pairs of meshes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ from foldyn.linear.wave_solver import Waves, WaveSolver
 
 LOWER = 3  # level with which the highest one is compared
 SHARES = (2.0, 2.0, 2.0, 3.0, 1.0)  # error of each level / difference to the other one
-MESHES = (1.0, 4.0)  # error of meshes / differences to coarser meshes, and to the finest alone
 LEAST = 1e-3  # error of every frequency, relative to it, that no comparison shows
 DOUBTFUL = 0.05  # relative error of a frequency up to which results are said to hold
 ROUNDING = 1e-4  # errors below this, relative to the highest frequency, are no reason for doubt
@@ -57,9 +56,7 @@ def frequency_errors(
             eigh(np.diag(values) + stiffness, np.eye(len(values)) + mass, eigvals_only=True)
         )
     own, level, *meshes = (np.sqrt(e.clip(min=0.0)) / TURN for e in (values, other, *meshes))
-    # of long panels, the coarsest mesh tells nothing
-    bounds = [share * np.abs(each - own) for share, each in zip(MESHES, meshes, strict=False)]
-    mesh = np.min(bounds or [0.0 * own], axis=0)
+    mesh = np.max([np.abs(each - own) for each in meshes] or [0.0 * own], axis=0)
     return SHARES[structure.options.level - 1] * np.abs(level - own) + mesh + LEAST * own
 
 

@@ -37,6 +37,7 @@ COARSE, FINE = 4, 8  # pieces per edge in the two meshes; twice as many for tria
 RAYS = 2  # rays of a graded mesh in half a corner
 STIFF = 1e3  # stiffness of rigid corners relative to the rest
 WAVES = 2.0  # number of sine waves in an edge's bow, divided by length/radius
+SLENDER = 2e-4  # radius/length below which no further waves are taken: panels hardly resist bows
 
 
 class Kind(NamedTuple):
@@ -423,7 +424,7 @@ def _waves(points: int, radius: float | None) -> NDArray:
     else:  # bows that are linear between the points
         nodes = np.concatenate([[0.0], Grading(radius, (points + 1) // 4, RAYS).places(1.0), [1.0]])
         at = np.interp(np.arange(0, len(nodes) - 0.75, 0.5), np.arange(len(nodes)), nodes)
-        count = WAVES / radius
+        count = WAVES / max(radius, SLENDER)
         number = np.arange(1, int(np.ceil(1.5 * count)))
         half = np.sin(np.outer(np.pi * number, at[: len(nodes)]))
         mirrored = (-1.0) ** (number[:, None] + 1) * half[:, -2::-1]
