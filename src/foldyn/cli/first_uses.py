@@ -123,6 +123,7 @@ def traced(factor: float, **parts: Any) -> None:
 def waited() -> None:
     """Trace a path whose steps take time, so that creases relax."""
     fd.trace(case(law=PRONY), "newton", load_factors=[1e-3, 1e-3], duration=0.1)
+    fd.EnhancedLinear().moment(1.0, rest=2.0)  # as paths do whose panels meet
 
 
 def vibrating(**parts: Any) -> None:
