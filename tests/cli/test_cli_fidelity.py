@@ -63,7 +63,7 @@ def test_a_motion_beside_the_shell(workplace) -> None:
     assert told.startswith("a fold: 8 nodes, ")
     assert str(found) in told
     page = (workplace.folder / folder / "report.html").read_text()
-    assert "Which model" in page
+    assert "10 % up to (Hz)" in page
     assert "foldyn fidelity case.toml --count 3" in page
     for model in found.models:
         start = "scheme" if model == "n5b8e" else "calibration"

@@ -43,6 +43,7 @@ poissons_ratio = 0.25
 thickness = 0.01
 density = 1.0
 [model]
+preset = "plate"
 mass = "mixed_voronoi"
 [[supports]]
 nodes = [0, 1, 2]

@@ -79,7 +79,7 @@ def lacking(case: Case, packed: PackedCase) -> str:
             return f"{field.name} of the case"
     system, body = packed.system, packed.body
     if type(body.sheet) is not BarsHingesTerm:
-        return "a sheet whose panels bend as plates"
+        return 'a sheet whose panels bend as plates (preset = "plate" has hinges instead)'
     if packed.model.addresses.any():
         return "a law of your own"
     if not packed.mass.lumped:
