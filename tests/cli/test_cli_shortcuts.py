@@ -152,7 +152,7 @@ def test_a_state_from_a_result(workplace, miura) -> None:
 
 @pytest.mark.matrix
 def test_the_bands_of_the_cell_of_a_motion_and_the_table_of_its_gaps(workplace, miura) -> None:
-    workplace.write(changed(miura, 'model = { mass = "panel" }; damping ='))
+    workplace.write(changed(miura, 'model = { preset = "plate", mass = "panel" }; damping ='))
     path = ("--path", "X-M-G", "--points", "9", "--count", "5")
     done = workplace.call("bands", "case.toml", "--no-figures", *path)
     assert done.status == 0
