@@ -107,7 +107,6 @@ class Whole:
         x, faces = pattern.vertices, pattern.faces
         self.unknowns = Unknowns(len(x), len(self.edges), len(faces), level)
         self._along = x[self.edges[:, 1]] - x[self.edges[:, 0]]
-        self.compared = min(len(group.panel.changes) for group in groups)
 
     @cached_property
     def _parts(self) -> list[tuple[NDArray, sparse.csr_array]]:
@@ -169,17 +168,17 @@ class Whole:
         return edge_frame(along, area[:, None])
 
     def matrices(
-        self, dofs: sparse.csr_array, change: int | None = None
+        self, dofs: sparse.csr_array, changes: bool = False
     ) -> tuple[sparse.csr_array, sparse.csr_array]:
         """Stiffness and mass (d, d) of all panels for dofs, of which unknowns (m, d) are made.
 
-        change : which of `CondensedPanel.changes` to give instead.
+        changes : whether to give their changes, see `CondensedPanel`.
         """
         size = dofs.shape[1]
         total = [sparse.csr_array((size, size)) for _ in range(2)]
         for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
             own = group.panel
-            parts = [own.stiffness, own.mass] if change is None else own.changes[change]
+            parts = own.changes if changes else (own.stiffness, own.mass)
             amplitudes, count = sparse.csr_array(placed @ dofs), len(kept)
             for first in range(0, amplitudes.shape[0], AT_ONCE * count):
                 columns, motion = _by_panel(amplitudes[first : first + AT_ONCE * count], count)

@@ -74,7 +74,7 @@ def condensed(
         coarse, middle = (condense(corners, smooth, sheet, own, modes)[0] for own in others)
         first, second, third = meshes.divisions
         coarser = extrapolated(coarse, middle, second / first)
-        return beside(extrapolated(middle, fine, third / second), [coarser])
+        return beside(extrapolated(middle, fine, third / second), coarser)
 
 
 def _read(path: Path, key: str) -> CondensedPanel | None:

@@ -17,7 +17,7 @@ and welds, which connect the turns of edges, are not part of a panel.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -72,8 +72,8 @@ class CondensedPanel:
         Forces of a panel with a unit free strain, or a unit free curvature.
     held_energy : (2,)
         Twice the energy of such a panel with its edges held.
-    changes : (n, 2, c, c)
-        Changes of stiffness and mass if the panel comes from fewer or coarser meshes, in n ways.
+    changes : (2, c, c)
+        Changes of stiffness and mass if the panel comes from coarser meshes; 0 of a single mesh.
     """
 
     stiffness: NDArray
@@ -135,11 +135,10 @@ def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> 
     )
 
 
-def beside(panel: CondensedPanel, others: Sequence[CondensedPanel]) -> CondensedPanel:
-    """The panel, with its changes to others."""
-    own = np.stack([panel.stiffness, panel.mass])
-    changes = [np.stack([other.stiffness, other.mass]) - own for other in others]
-    return replace(panel, changes=np.array(changes))
+def beside(panel: CondensedPanel, other: CondensedPanel) -> CondensedPanel:
+    """The panel, with its changes to another."""
+    changes = other.stiffness - panel.stiffness, other.mass - panel.mass
+    return replace(panel, changes=np.stack(changes))
 
 
 def condense(
@@ -192,7 +191,7 @@ def condense(
         np.array([[a.T @ (nodal @ b) for b in along] for a in along], np.float32),
         np.concatenate([full[:, :-count].T @ forces, np.zeros((count, 2))]),
         energy - np.einsum("mk,mk->k", forces[inside], factors.solve(forces[inside])),
-        np.zeros((0, 2, *reduced.shape)),
+        np.zeros((2, *reduced.shape)),
     )
     modes = full[on_nodes, -count:].reshape(len(mesh.nodes), -1)
     return panel, LinearNDInterpolator(mesh.nodes[:, :2], modes)

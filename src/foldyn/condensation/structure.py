@@ -169,15 +169,12 @@ class Superelements(Discretized):
         """Model for solvers if supports hold edges; see `Discretized`."""
         return Assembly(self._term(edges)) if edges else self.body
 
-    def changes(
-        self, edges: Mapping[int, NDArray]
-    ) -> list[tuple[sparse.csr_array, sparse.csr_array]]:
-        """Changes of stiffness and mass (m, m), each for other meshes; see `CondensedPanel`.
+    def changes(self, edges: Mapping[int, NDArray]) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """Changes of stiffness and mass (m, m) if panels come from coarser meshes.
 
         edges : edges that supports hold, as in `held`.
         """
-        made, dofs = self.whole, self._dofs(edges)
-        return [made.matrices(dofs, k) for k in range(made.compared)]
+        return self.whole.matrices(self._dofs(edges), changes=True)
 
     def _term(self, edges: Mapping[int, NDArray]) -> SuperelementsTerm:
         """The sheet if supports hold edges, as in `held`."""

@@ -39,25 +39,21 @@ def other_level(structure: Superelements) -> Superelements:
 
 
 def frequency_errors(
-    case: Case, values: NDArray, other: NDArray, changes: Iterable[Iterable[NDArray]]
+    case: Case, values: NDArray, other: NDArray, changes: Iterable[NDArray]
 ) -> NDArray[np.float64]:
     """Bounds (k,), Hz, of the errors of frequencies relative to a shell on a fine mesh.
 
     values : (k,) the lowest eigenvalues.
     other : (k,) those with the structure of `other_level`.
-    changes : of stiffness and mass (k, k), in the space of the modes, each for other meshes.
+    changes : of stiffness and mass (k, k), in the space of the modes, by coarser meshes.
     """
     structure = case.structure
     assert isinstance(structure, Superelements)
-    meshes = []
-    for change in changes:
-        stiffness, mass = (0.5 * (each + each.conj().T) for each in change)
-        meshes.append(
-            eigh(np.diag(values) + stiffness, np.eye(len(values)) + mass, eigvals_only=True)
-        )
-    own, level, *meshes = (np.sqrt(e.clip(min=0.0)) / TURN for e in (values, other, *meshes))
-    mesh = np.max([np.abs(each - own) for each in meshes] or [0.0 * own], axis=0)
-    return SHARES[structure.options.level - 1] * np.abs(level - own) + mesh + LEAST * own
+    stiffness, mass = (0.5 * (each + each.conj().T) for each in changes)
+    coarse = eigh(np.diag(values) + stiffness, np.eye(len(values)) + mass, eigvals_only=True)
+    own, level, mesh = (np.sqrt(each.clip(min=0.0)) / TURN for each in (values, other, coarse))
+    share = SHARES[structure.options.level - 1]
+    return share * np.abs(level - own) + np.abs(mesh - own) + LEAST * own
 
 
 def warn_of_errors(structure: Superelements, frequency: NDArray, error: NDArray) -> None:
@@ -88,18 +84,12 @@ def band_errors(
     others = WaveSolver(compared, len(waves[0].values)).at(phases)
     patch = linear.patch.case
     assert isinstance(patch.structure, Superelements)
-    changes = [
-        [linear.reach.hops(part) for part in change]
-        for change in patch.structure.changes(patch.held_edges)
-    ]
+    changes = [linear.reach.hops(part) for part in patch.structure.changes(patch.held_edges)]
     out = np.zeros((len(phases), len(waves[0].values)))
     for row, phase, own, other in zip(out, phases, waves, others, strict=True):
         order, factors = np.argsort(own.values), linear.bloch.factors(phase)
         values, shapes, _ = own.ordered(order)
-        parts = [
-            [shapes.conj().T @ (part.sparse_at(factors) @ shapes) for part in change]
-            for change in changes
-        ]
+        parts = (shapes.conj().T @ (part.sparse_at(factors) @ shapes) for part in changes)
         errors = frequency_errors(case, values, other.values, parts)
         row[order] = np.where(values > 0.0, errors, 0.0)
     return out

@@ -194,10 +194,8 @@ def spectrum_of(
         leveled = case.altered(structure=other_level(case.structure))
         other = _lowest(linearize(leveled), count, solver, verify=False)[-1]
         motion = linear.whole(spectrum.shapes)
-        changes = [
-            [motion.T @ (part @ motion) for part in change]
-            for change in case.structure.changes(case.held_edges)
-        ]
+        parts = case.structure.changes(case.held_edges)
+        changes = (motion.T @ (part @ motion) for part in parts)
         estimate = frequency_errors(case, spectrum.values, other.values, changes)
         variables["frequency_error"] = np.where(variables["rigid"], 0.0, estimate)
     result = modes_dataset(case, variables, statistics)
