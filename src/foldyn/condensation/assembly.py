@@ -99,10 +99,14 @@ class Whole:
     pattern : Pattern
     groups : sequence of Group
     level : Level
+    graded : Grading
+        The finest mesh of the panels.
     """
 
-    def __init__(self, pattern: Pattern, groups: list[Group], level: Level) -> None:
-        self._pattern, self._groups, self.level = pattern, groups, level
+    def __init__(
+        self, pattern: Pattern, groups: list[Group], level: Level, graded: Grading
+    ) -> None:
+        self._pattern, self._groups, self.level, self._graded = pattern, groups, level, graded
         self.edges = pattern.lines
         x, faces = pattern.vertices, pattern.faces
         self.unknowns = Unknowns(len(x), len(self.edges), len(faces), level)
@@ -208,18 +212,15 @@ class Whole:
             total = total + put @ (block_diagonal(shapes).tocsr() @ placed)
         return sparse.csr_array(total)
 
-    def between(self, cut_off: float) -> tuple[NDArray, sparse.csr_array]:
-        """Points (q, 3) on edges and at the means of panels' corners, and their motions (3 q, m).
-
-        cut_off : distance (m) from vertices below which places on edges are not stretched.
-        """
+    def between(self) -> tuple[NDArray, sparse.csr_array]:
+        """Points (q, 3) on edges and at the means of panels' corners; their motions (3 q, m)."""
         own, x, ends = self.unknowns, self._pattern.vertices, self.edges
         axis, edge = np.arange(3), np.arange(own.edges)
         length = np.linalg.norm(self._along, axis=1)
         points, columns = [], _Columns()
         for place in PLACES:
             points.append((1.0 - place) * x[ends[:, 0]] + place * x[ends[:, 1]])
-            values = bows(np.full(own.edges, place), cut_off / length, 1)
+            values = bows(np.full(own.edges, place), self._graded.radius / length, 1)
             vertices = [3 * ends[:, k, None, None] + axis for k in range(2)]
             bowed = [own.bow(edge, k)[:, None, None] + axis for k in range(own.functions)]
             rows = np.concatenate([*vertices, *bowed], axis=1)  # (e, 2 + functions, 3)
@@ -240,11 +241,11 @@ class Whole:
         points.append(np.array([x[list(face)].mean(axis=0) for face in self._pattern.faces]))
         return np.concatenate(points), sparse.csr_array(sparse.vstack([on_edges, centers]))
 
-    def spread(self, load: Distributed, graded: Grading) -> NDArray[np.float64]:
-        """Forces (m,), N, on the unknowns due to a distributed load; `graded`: the finest mesh."""
+    def spread(self, load: Distributed) -> NDArray[np.float64]:
+        """Forces (m,), N, on the unknowns due to a distributed load."""
         own, out = self.unknowns, np.zeros(self.unknowns.size)
         if load.creases is not None:
-            out -= self.crease_turns(graded).mean.T @ load.creases
+            out -= self.crease_turns.mean.T @ load.creases
         if load.edges is not None:
             force = np.linalg.norm(self._along, axis=1)[:, None] * load.edges
             np.add.at(out[: 3 * own.vertices].reshape(-1, 3), self.edges.T, 0.5 * force)
@@ -252,7 +253,9 @@ class Whole:
             places = 0.5 * (1.0 + z)
             for edge in np.flatnonzero(force.any(axis=1)).tolist():
                 length = float(np.linalg.norm(self._along[edge]))
-                mean = 0.5 * share @ bows(places, graded.radius / length, 1)[:, : own.functions]
+                mean = (
+                    0.5 * share @ bows(places, self._graded.radius / length, 1)[:, : own.functions]
+                )
                 first = own.bow(edge, 0)
                 out[first : first + 3 * own.functions] += np.outer(mean, force[edge]).ravel()
         if load.swollen is not None:
@@ -303,7 +306,8 @@ class Whole:
         column = np.concatenate([first, first + count])
         return sparse.csr_array((np.ones(len(row)), (row, column)), (len(first), own.size))
 
-    def _roots(self, graded: Grading) -> NDArray[np.float64]:
+    @cached_property
+    def _roots(self) -> NDArray[np.float64]:
         """Roots (nf, turns, turns) of the mean squares of the turns of each crease.
 
         Creases turn by what they do at the middles of the pieces of a mesh, as panels do.
@@ -311,20 +315,21 @@ class Whole:
         count, creases = self.level.turns, len(self._pattern.creases)
         roots = np.zeros((creases, count, count))
         for crease, along in enumerate(self._along[:creases]):
-            places = np.append(0.0, graded.places(float(np.linalg.norm(along))))
+            places = np.append(0.0, self._graded.places(float(np.linalg.norm(along))))
             share = np.diff(places, append=1.0)
             shapes = turns(places + 0.5 * share, count)
             roots[crease] = np.linalg.cholesky(shapes.T @ (share[:, None] * shapes)).T
         return roots
 
-    def crease_turns(self, graded: Grading) -> CreaseTurns:
-        """Turns of both sides of the creases relative to each other on the finest mesh."""
+    @cached_property
+    def crease_turns(self) -> CreaseTurns:
+        """Turns of both sides of the creases relative to each other."""
         rows, count = self._turns, self.level.turns
         if rows.shape[0]:
-            rows = sparse.csr_array(block_diagonal(self._roots(graded)).tocsr() @ rows)
+            rows = sparse.csr_array(block_diagonal(self._roots).tocsr() @ rows)
         return CreaseTurns(rows, np.repeat(np.arange(rows.shape[0] // count), count))
 
-    def parts(self, dofs: sparse.csr_array, slope: NDArray, graded: Grading) -> Parts:
+    def parts(self, dofs: sparse.csr_array, slope: NDArray) -> Parts:
         """Parts of the sheet for dofs (m, d), with creases of stiffness `slope` (nf,), N m/rad."""
         rows, number, size, stiffness, mass = [], [], [], [], []
         for k, (group, (kept, placed)) in enumerate(zip(self._groups, self._parts, strict=True)):
@@ -335,8 +340,7 @@ class Whole:
             size += [len(kept)] * len(group.number)
             for out, each in (stiffness, group.panel.stiffness), (mass, group.panel.mass):
                 out.append((smooth.T @ each[np.ix_(kept, kept)] @ smooth).ravel())
-        roots = self._roots(graded)
-        squares = slope[:, None, None] * (roots.swapaxes(1, 2) @ roots)
+        squares = slope[:, None, None] * (self._roots.swapaxes(1, 2) @ self._roots)
         number += [len(stiffness) + k for k in range(len(slope))]
         size += [self.level.turns] * len(slope)
         stiffness += list(squares.reshape(len(slope), -1))

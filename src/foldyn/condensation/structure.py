@@ -158,7 +158,7 @@ class Superelements(Discretized):
             replace(kinds[k], density=own) for k, own in zip(kind, density.tolist(), strict=True)
         ]
         made = groups(self.pattern, sheets, self.meshes)
-        return Whole(self.pattern, made, level)
+        return Whole(self.pattern, made, level, self.meshes.graded[-1])
 
     @cached_property
     def body(self) -> Assembly:
@@ -179,14 +179,14 @@ class Superelements(Discretized):
     def _term(self, edges: Mapping[int, NDArray]) -> SuperelementsTerm:
         """The sheet if supports hold edges, as in `held`."""
         made, dofs = self.whole, self._dofs(edges)
-        rows, fold = made.crease_turns(self.meshes.graded[-1])
+        rows, fold = made.crease_turns
         turns = CreaseTurns(sparse.csr_array(rows @ dofs), fold)
         panels, mass = made.matrices(dofs)
         parts = dofs.power(2).sum(axis=0)  # unknowns of each dof: two turns at welds, otherwise one
         rotated = (dofs.T @ made.rotated / parts[:, None])[self.nodes.size :]
         return SuperelementsTerm(
             panels, mass, turns, self._slope, self._fold_hinges, self.nodes, rotated,
-            partial(made.parts, dofs, self._slope, self.meshes.graded[-1]),
+            partial(made.parts, dofs, self._slope),
         )  # fmt: skip
 
     def _dofs(self, edges: Mapping[int, NDArray]) -> sparse.csr_array:
@@ -217,7 +217,7 @@ class Superelements(Discretized):
 
     def spread(self, load: Distributed, edges: Mapping[int, NDArray]) -> NDArray[np.float64]:
         """See `Discretized`."""
-        return self._dofs(edges).T @ self.whole.spread(load, self.meshes.graded[-1])
+        return self._dofs(edges).T @ self.whole.spread(load)
 
     def lifts(
         self, points: NDArray, panel: NDArray, *, edges: Mapping[int, NDArray]
@@ -246,7 +246,7 @@ class Superelements(Discretized):
 
         edges : edges that supports hold, as in `held`.
         """
-        points, motions = self.whole.between(self.meshes.graded[-1].radius)
+        points, motions = self.whole.between()
         return points, sparse.csr_array(motions @ self._dofs(edges))
 
     @property

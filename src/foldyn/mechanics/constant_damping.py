@@ -129,12 +129,15 @@ class DampingMatrix(Term):
         """Rows and columns (k,) of the term's damping entries; see `Term`."""
         return self.matrix.tocoo().coords
 
+    @cached_property
+    def _share(self) -> NDArray:
+        """Power (k,) of `hidden` in each entry: half the number of its dofs that are hidden."""
+        row, column = (np.isin(place, self._hidden) for place in self.damping_places)
+        return 0.5 * (row.astype(float) + column)
+
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
         """Damping entries (k,), N s/m; symmetric, as those of `ViscousTerm`. See `Term`."""
-        scale = np.ones(self.matrix.shape[0])
-        scale[self._hidden] = hidden**0.5
-        row, column = self.damping_places
-        return self.matrix.data * scale[row] * scale[column]
+        return self.matrix.data * hidden**self._share
 
     def placed(self, order: NDArray, before: Assembly) -> DampingMatrix:
         """The term with nodes in memory order; see `Term`."""
