@@ -183,11 +183,14 @@ def test_large_sheets_keep_the_mass_as_rows(monkeypatch):
     held = fd.Case(made, tied, damping=fd.Rayleigh(1.0), air=fd.Air(resolution=2))
     push, loose = fd.Force("xmax", (1e-3, 0.0, 1e-3)), held.altered(supports=())
 
+    def few_modes(drive):
+        with pytest.warns(FoldynWarning, match="modes that are left out .* at 9 Hz"):
+            return fd.frf(held, drive, frequencies=[1.0, 9.0], method="modal", count=12)
+
     def computed():
         return (
             fd.modes(held, 5), fd.modes(loose, 9),
-            fd.frf(held, push, frequencies=[1.0, 9.0], method="modal", count=12),
-            fd.frf(held, fd.BaseMotion("z"), frequencies=[1.0, 9.0], method="modal", count=12),
+            *(few_modes(drive) for drive in (push, fd.BaseMotion("z"))),
         )  # fmt: skip
 
     full = computed()

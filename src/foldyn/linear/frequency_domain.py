@@ -151,8 +151,8 @@ def modal(
             unbalanced: NDArray[np.complex128] = -_resisting(system, omega, response[k])
             for _, _, term in parts:
                 unbalanced += term.shape * term.factor(omega)
-            change = factors.solve(unbalanced.real) + 1j * factors.solve(unbalanced.imag)
-            missing[k] = np.abs(change).max() / np.abs(response[k]).max()
+            change = factors.solve(np.stack([unbalanced.real, unbalanced.imag], axis=1))
+            missing[k] = np.hypot(*change.T).max() / np.abs(response[k]).max()
         report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
     warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
     if (told := missing > OMITTED).any():
