@@ -70,7 +70,7 @@ def end(growth, rest=125.0, method="statics"):
     built = case(Stiffening(growth), rest)
     if method == "statics":
         return float(fd.trace(built, load_factors=[1.0]).displacement[-1].sel(node=0, axis="x"))
-    found = fd.simulate(built, 0.1, method=method, dt=4e-4)
+    found = fd.simulate(built, 0.1, method=method, dt=3e-4)
     return float(found.displacement[-1].sel(node=0, axis="x"))
 
 for method in ("statics", "rk4"):

@@ -109,7 +109,7 @@ def test_the_models_of_case_study_2(miura):
     assert max(m.mac for m in plate if not m.below) < 0.82
     assert all(m.mac > 0.9 and 0.0 < m.error < 0.2 for m in edges[3:7])
     assert any(math.isinf(m.error) and m.mac < 0.5 for m in plate)  # a plate's mode, lost
-    assert found.holds_to() == 0.0 and found.holds_to("n5b8e") > found.limit
+    assert found.holds_to() == 0.0 and found.holds_to("n5b8e") == edges[2].shell
     assert found.notes == (SCOPE,)
     assert repr(found) == "<Fidelity of own, plate, n5b8e: 8 modes, 3 below 3.835 Hz>"
     assert fd.case_of(found.result).loads == case.loads

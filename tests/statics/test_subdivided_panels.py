@@ -67,6 +67,7 @@ def test_letters_that_plane_panels_forbid_fold_by_bending():
 @pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:panels pass through")
 @pytest.mark.filterwarnings("ignore:.* creases stay closed")
+@pytest.mark.filterwarnings("ignore:pattern. its welds")
 def test_a_crane_opens_from_its_folded_state_with_every_crease_its_way():
     flat = fd.read_pattern(CRANE)
     folding = fd.fold(flat, fraction=0.9, initial="folded", steps=2, panels="subdivided")

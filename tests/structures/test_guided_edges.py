@@ -33,8 +33,12 @@ def stiffness(case: fd.Case) -> float:
     return 2.0 * sum(float(path[name][-1]) for name in case.energy_groups) / WAY**2
 
 
-CELLS = [(0.06, 30, 133, 4.0865e6, 0.02), (0.04, 45, 80, 9.0335e5, 0.08)]
-"""Height (m), twist, slenderness, stiffness of superelements of level 5, N/m, and error."""
+CELLS = [(0.06, 30, 133, 4.084e6, 0.02), (0.04, 45, 80, 9.028e5, 0.08)]
+"""Height (m), twist, slenderness, stiffness (N/m), and the error of n5b8e.
+
+The stiffness is the limit of superelements of level 5 with 24, 32, 48 and 64 divisions: pairs of
+them, extrapolated with the square of the mesh size, agree within 0.02 %.
+"""
 
 
 @pytest.mark.parametrize(("height", "twist", "slender", "true", "error"), CELLS)
@@ -50,7 +54,7 @@ def test_a_rim_held_along_z_only(height, twist, slender, true, error):
 @pytest.mark.parametrize(("height", "twist", "slender", "true", "error"), CELLS)
 def test_superelements_with_such_a_rim(height, twist, slender, true, error):
     made = fd.superelements(cell(height, twist), steel(0.04 / slender))
-    assert stiffness(fd.Case(made, pressed())) == pytest.approx(true, rel=1e-3)
+    assert stiffness(fd.Case(made, pressed())) == pytest.approx(true, rel=4e-3)
 
 
 def straight(pattern: fd.Pattern, sheet: fd.Sheet, **options: Any) -> fd.Case:

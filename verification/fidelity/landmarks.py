@@ -57,9 +57,10 @@ def welded(pattern: Pattern) -> Pattern:
 def strip(panels: int) -> Landmark:
     """A cantilever of 1 m x 50 mm, across which the creases are a thousand times as stiff."""
     x = np.linspace(0.0, 1.0, panels + 1)[:, None] * np.eye(3)[0]
-    sheet = Sheet(2e11, 0.0, 2e-3, density=7850.0)  # no Poisson's ratio: a beam exactly
-    k = 1e3 * panels * sheet.youngs_modulus * sheet.thickness**3 / 12.0  # N m/rad per m
-    first = (sheet.youngs_modulus / sheet.density / 12.0) ** 0.5 * sheet.thickness / (2.0 * np.pi)
+    modulus, thickness, density = 2e11, 2e-3, 7850.0
+    sheet = Sheet(modulus, 0.0, thickness, density)  # no Poisson's ratio: a beam exactly
+    k = 1e3 * panels * modulus * thickness**3 / 12.0  # N m/rad per m
+    first = (modulus / density / 12.0) ** 0.5 * thickness / (2.0 * np.pi)
     known = [root**2 * first for root in (1.875104, 4.694091)]
     ends = (0, panels + 1)
     return Landmark(

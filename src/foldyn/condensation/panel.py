@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import LinearNDInterpolator
 
 VERTEX, BOW, TURN, INNER = range(4)
-RIGID = 1e-13  # stiffness of rigid motions, relative to the largest
+RIGID = 1e-13  # stiffness of rigid motions, and of shapes that hardly differ, over the largest
 LOCKED = 0.1  # most that a coarse mesh is stiffer, relative to a fine one, to be extrapolated
 SPARE = 4  # inner modes of a mesh among which those of another mesh are sought
 
@@ -130,7 +130,7 @@ def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> 
             name: (1.0 + weight) * getattr(fine, name) - weight * getattr(coarse, name)
             for name in ("thermal", "held_energy")
         },
-        stiffness=(ways * (1.0 + weight * share.clip(min=-LOCKED))) @ ways.T,
+        stiffness=fine.stiffness + (ways * (weight * share.clip(min=-LOCKED))) @ ways.T,
         mass=(motions * values.clip(min=0.0)) @ motions.T,
     )
 
