@@ -435,7 +435,6 @@ def test_what_superelements_leave_out_is_refused(named):
 @pytest.mark.parametrize(
     "analysis",
     [
-        lambda c: fd.simulate(c, 0.1),
         lambda c: fd.simulate(c, 0.1, method="newmark"),
         lambda c: fd.critical_step(c),
         lambda c: fd.modes(c, state="equilibrium"),
@@ -525,7 +524,6 @@ def test_a_path_has_a_page(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("old", "new", "named"),
     [
-        ('kind = "modes"\ncount = 3', 'kind = "dynamics"\nduration = 1.0', "model.kind"),
         ("level = 2", 'scheme = "n4b5"', "model.scheme"),
         ("level = 2", "level = 9", "model.level"),
         ("count = 3", "count = 3\nsecant = 1.0", "analysis.secant"),

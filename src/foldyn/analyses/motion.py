@@ -23,8 +23,9 @@ from foldyn.analyses.sections import (
 from foldyn.analyses.start import MotionStart
 from foldyn.arguments import Check
 from foldyn.cases import Case
-from foldyn.cases.models import SUPERELEMENTS
 from foldyn.dynamics import METHODS, Keeping, prepare, simulate
+from foldyn.dynamics.driver import prepared
+from foldyn.dynamics.linear_motion import MODAL
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.timing import check_room, check_samples
 from foldyn.errors import InputError
@@ -41,7 +42,7 @@ from foldyn.report.album import (
 from foldyn.report.sections import Charts, Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
 from foldyn.signals.spectrum import MINIMUM_SAMPLES
-from foldyn.values import number, show
+from foldyn.values import number
 
 LOADS = "Loads and imposed motions over time."
 
@@ -56,7 +57,7 @@ class MotionSection(AnalysisSection):
 
     like = (simulate,)
     duration: Positive
-    method: Annotated[str, one_of((AUTO, *METHODS))] = AUTO
+    method: Annotated[str, one_of((AUTO, *METHODS, MODAL))] = AUTO
     dt: Positive | None = None
     force: Switch = False
     tolerance: Positive | None = None
@@ -93,15 +94,6 @@ class MotionSchema(CaseSchema):
     analysis: MotionSection
     output: MotionOutput = MotionOutput()
 
-    def agree(self) -> None:
-        """Refuse linear models."""
-        if self.model.kind == SUPERELEMENTS:
-            raise InputError(
-                f" = {show(SUPERELEMENTS)}: is for linear analyses, and a motion is not; take "
-                '"bars_and_hinges" or "shell"',
-                "model.kind",
-            )
-
 
 class MotionAnalysis(Analysis):
     """The motion from an initial state under loads and moving supports."""
@@ -131,7 +123,7 @@ class MotionAnalysis(Analysis):
         given = {**kept, **changes}
         if "initial" not in given:
             given["initial"] = case_file.start(mass).state
-        return _Prepared(prepare(case_file.case(mass), **given, kept=True))
+        return _Prepared(prepared(case_file.case(mass), **given, kept=True))
 
     def check(self, computations: Sequence[Compute], figures: bool) -> None:
         """Refuse more samples than memory holds, or fewer than spectra need."""
@@ -158,6 +150,9 @@ class MotionAnalysis(Analysis):
         size = f"{a['dt']:.3g} s"
         if "smallest_step" in a:
             size = f"{a['smallest_step']:.3g} to {a['largest_step']:.3g} s"
+        if "modes" in a:
+            off = f"half of them change displacements by {a['left_out']:.2%}"
+            return f"  {name}: {a['modes']} modes ({off}), energy error {a['energy_error']:.1e}"
         detail = f"critical {a['critical_step']:.3g} s"
         if "iterations" in a:
             detail = f"{a['iterations'] / max(a['steps'], 1):.1f} iterations each"

@@ -24,6 +24,7 @@ from foldyn.dynamics.initial import (
     warn_of_standing_in_wind,
     warn_of_unstable_damping,
 )
+from foldyn.dynamics.linear_motion import MODAL, LinearMotion, prepare_linear
 from foldyn.dynamics.method_choice import AUTO, Choice, choose
 from foldyn.dynamics.methods import METHODS, Integrator, method_of, suited, suiting
 from foldyn.dynamics.modal_damping import modal_rows
@@ -161,11 +162,27 @@ def simulate(
     keeping = None if store is None else check_keeping(store, checkpoint, resume)
     if store is None and flag("resume", resume):
         raise InputError(": there is nothing to resume; name the file of the result", "store")
-    motion = prepare(
-        case, duration, method, dt, every_steps, interval, initial, force, tolerance, start,
-        spectral_radius, sample, keeping is not None, device,
+    motion = prepared(
+        case, duration, method, dt=dt, every_steps=every_steps, interval=interval, initial=initial,
+        force=force, tolerance=tolerance, start=start, spectral_radius=spectral_radius,
+        sample=sample, kept=keeping is not None, device=device,
     )  # fmt: skip
     return motion.run(progress) if keeping is None else motion.run_into_file(keeping, progress)
+
+
+def prepared(
+    case: Case, duration: float, method: str = AUTO, **given: Any
+) -> Motion | LinearMotion:
+    """As `prepare`, for linear models, too."""
+    if of_kind("case", case, Case).structure.linear:
+        return prepare_linear(case, duration, method, **given)
+    if method == MODAL:
+        raise InputError(
+            f" = {MODAL!r}: superposes modes of linear models (fd.superelements); this one takes "
+            f"{AUTO} or one of {', '.join(METHODS)}",
+            "method",
+        )
+    return prepare(case, duration, method, **given)
 
 
 def prepare(

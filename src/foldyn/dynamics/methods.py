@@ -277,7 +277,7 @@ def lacking(method: Integrator, case: Case) -> str:
     """Reason why a method does not suit a case; empty if it does."""
     structure = case.structure
     if structure.linear:
-        return f"{structure.linear} serve linear analyses, such as modes and frequency responses"
+        return f"{structure.linear} serve linear analyses, and move by fd.simulate alone"
     if method.implicit and case.air is not None and case.air.added_mass:
         return "only explicit methods take the added mass of air (leave it out: added_mass = false)"
     return ""

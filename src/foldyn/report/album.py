@@ -19,6 +19,11 @@ from foldyn.writing import whole
 ByRule = Mapping[str, xarray.Dataset]
 """Results by mass rule."""
 DPI = 150
+PANELS = (
+    "Superelements: each panel is a small shell, condensed onto shapes of its edges. They are "
+    "linear about the rest state."
+)
+"""Description of superelements."""
 MOST_NODES = 12
 """Largest number of nodes in one figure."""
 MOST_PAIRS = 24
@@ -72,7 +77,7 @@ class Album:
             charts = Charts(law_charts(made), laws)
             sections += self.figure("laws", laws, lambda: plots.plot_laws(made), charts)
         if of_shell:
-            sections.append(Text(described_shell(made)))
+            sections.append(Text(PANELS if made.linear else described_shell(made)))
         return sections
 
 

@@ -33,12 +33,11 @@ from foldyn.statics.equilibrium import OrigamiProblem
 from foldyn.statics.newton import Solver
 from foldyn.statics.path_methods import METHODS
 from foldyn.statics.stepping import REMEDY_COLLISION, REMEDY_LOCKED, PathStoppedError, Point, Walk
-from foldyn.structures.beyond_range import kept_apart, locks
-from foldyn.structures.mesh import double_areas, hinge_angles, lengths
+from foldyn.structures.beyond_range import TURN, kept_apart, locks, panel_turns
+from foldyn.structures.mesh import hinge_angles, lengths
 from foldyn.structures.stretching import remedy, stretch
 
 MOST_STRETCH = 2.0  # stretch of a bar: no sheet can be followed beyond it
-LINEAR = 5.0  # degrees by which panels of a linear model may turn: its strains are off by 0.4 %
 CLOSED = 179.0  # degrees from flat beyond which a fold counts as closed
 MOST_LISTED = 20  # most stability changes listed in the attribute
 
@@ -300,12 +299,9 @@ def _turn_warning(problem: OrigamiProblem, points: Sequence[Point], displacement
     structure = problem.structure
     if not structure.linear:
         return ""
-    normals = [double_areas(structure.nodes + u, structure.triangles) for u in (0.0, *displacement)]
-    rest, *moved = (n / np.linalg.norm(n, axis=1, keepdims=True) for n in normals)
-    apart = np.array([np.linalg.norm(normal - rest, axis=1).max() for normal in moved])
-    turns = np.degrees(2.0 * np.arcsin(0.5 * apart))
-    at = int(np.argmax(turns > LINEAR))
-    if turns[at] <= LINEAR:
+    turns = panel_turns(structure, displacement)
+    at = int(np.argmax(turns > TURN))
+    if turns[at] <= TURN:
         return ""
     return (
         f"panels turn by {turns[at]:.2g} degrees at point {at} (load factor "

@@ -19,7 +19,7 @@ from foldyn.errors import ModelRangeWarning, UnitsWarning, warn
 from foldyn.materials import EnhancedLinear, HingeLaw
 from foldyn.patterns import Pattern
 from foldyn.structures.discretized import Discretized
-from foldyn.structures.mesh import lengths
+from foldyn.structures.mesh import double_areas, lengths
 from foldyn.structures.rigid_plates import rigid_panels
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import ModelOptions
@@ -34,6 +34,7 @@ LOCKING = 1.1  # stiffness, relative to between the locking angles: frequencies 
 SHUT = 100.0  # relative stiffness above which the panels at a crease move as one
 SMOOTH = 1e-3  # rad: a fold with a smaller angle counts as flat
 DIGITS = 6  # decimals in comparisons, so that rounding does not exceed limits
+TURN = 5.0  # degrees by which panels of a linear model may turn: its strains are off by 0.4 %
 LINEAR = "take superelements (fd.superelements, --model superelements)"
 SHELL = f"{LINEAR} in linear analyses, else the shell, fd.shell"
 GIVING = f'{LINEAR} in linear analyses, else preset = "n5b8e"'
@@ -48,6 +49,14 @@ def doubt_range(pattern: Pattern, sheet: Sheet, options: ModelOptions, folds: ND
         return
     for text in _doubts(pattern, sheet, options, folds):
         warn(text, "fidelity.md#beyond-the-range", ModelRangeWarning)
+
+
+def panel_turns(structure: Discretized, displacement: NDArray) -> NDArray[np.float64]:
+    """Largest turns (k,) of the panels, degrees, at displacements (k, n, 3)."""
+    normals = [double_areas(structure.nodes + u, structure.triangles) for u in (0.0, *displacement)]
+    rest, *moved = (n / np.linalg.norm(n, axis=1, keepdims=True) for n in normals)
+    apart = np.array([np.linalg.norm(normal - rest, axis=1).max() for normal in moved])
+    return np.degrees(2.0 * np.arcsin(0.5 * apart))
 
 
 def doubt_locking(structure: Discretized) -> None:

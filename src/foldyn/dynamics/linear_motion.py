@@ -1,0 +1,285 @@
+"""`LinearMotion`: a motion of superelements, with as many modes as it takes."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case, Continuation, State
+from foldyn.cases.air import refuse_wind
+from foldyn.dynamics import timing
+from foldyn.dynamics.audit import audited
+from foldyn.dynamics.initial import check_start, check_steady
+from foldyn.dynamics.method_choice import AUTO
+from foldyn.dynamics.motion_state import Samples, StepPlan, samples
+from foldyn.dynamics.progress import Progress, Reporter, reporter
+from foldyn.dynamics.sampling import Sampler
+from foldyn.dynamics.superposition import (
+    Bases,
+    Matrices,
+    Steps,
+    Superposition,
+    matrices,
+    steps_of,
+)
+from foldyn.errors import InputError, ModelRangeWarning, warn
+from foldyn.results import Quantity, trajectory_dataset
+from foldyn.structures.beyond_range import TURN, panel_turns
+from foldyn.values import number
+
+if TYPE_CHECKING:
+    import xarray
+
+    from foldyn.dynamics.checkpoint import Keeping
+
+MODAL = "modal"
+SAMPLES = 2000  # by default
+WHOLE = 4.0  # a step limit, relative to the duration, that limits no step
+LEFT_OUT = 1e-3  # default share of the displacements that modes may leave out
+FEWEST, MOST = 32, 512  # modes: twice as many each time until the motion no longer changes
+LOOK = 100  # samples between two reports of progress
+
+
+def prepare_linear(
+    case: Case, duration: float, method: str, *, interval: float | None = None,
+    initial: State | None = None, tolerance: float | None = None, start: float = 0.0,
+    sample: Mapping[str, Callable[..., Any] | Quantity] | None = None, kept: bool = False,
+    **others: Any,
+) -> LinearMotion:  # fmt: skip
+    """Check the input of `driver.simulate` for a linear model."""
+    steps = {"method": None if method in (AUTO, MODAL) else method}
+    for name, given in {**steps, **others}.items():
+        if given not in (None, False, "cpu"):
+            raise InputError(
+                f" = {given!r}: motions of {case.structure.linear} superpose modes, and their "
+                "steps are exact: leave it out, and give the interval of the samples",
+                name,
+            )
+    _refuse_nonlinear(case)
+    duration = number("duration", duration, above=0.0)
+    start = float(number("start", start, unit="s"))
+    if tolerance is not None:
+        number("tolerance", tolerance, above=0.0)
+    sampling = timing.sampling(duration, None, interval or duration / SAMPLES)
+    plan = timing.fixed_steps(duration, None, sampling, WHOLE * duration, start)
+    if not kept:
+        size = len(case.structure.nodes), len(case.reaction_dofs)
+        timing.check_samples(timing.expected_samples(plan), *size)
+    check_steady(case, plan.start, plan.end)
+    sampler = Sampler(case, {} if sample is None else sample, *check_start(case, initial), start)
+    return LinearMotion(case, plan, initial, sampler, tolerance or LEFT_OUT)
+
+
+def _refuse_nonlinear(case: Case) -> None:
+    """Refuse what a linear equation of motion leaves out."""
+    refuse_wind(case, "motions of superelements")
+    if case.air is not None and case.air.drag:
+        raise InputError(
+            ".drag: grows with the square of the velocity, and motions of superelements are "
+            "linear: give drag = false, or take bars and hinges",
+            "air",
+        )
+    if case.remembering:
+        raise InputError(
+            f": {case.remembering[0].law.name} has memory, which motions of superelements leave "
+            "out: take an elastic law with CreaseDamping, or bars and hinges",
+            "fold_law",
+        )
+
+
+class LinearMotion:
+    """A motion of superelements that is ready to be computed; see `driver.prepared`."""
+
+    def __init__(
+        self, case: Case, plan: StepPlan, initial: State | None, sampler: Sampler,
+        tolerance: float,
+    ) -> None:  # fmt: skip
+        self.case, self.plan, self._initial, self._sampler = case, plan, initial, sampler
+        self._tolerance = tolerance
+        terms = (
+            *case.load_terms, *case.following_terms, *case.rest_terms, *case.imposed_terms,
+            *case.base_terms,
+        )  # fmt: skip
+        self._histories = list(dict.fromkeys(history for _, history in terms))
+
+    @property
+    def expected_samples(self) -> int:
+        """Number of samples."""
+        return timing.expected_samples(self.plan)
+
+    def finished(self, keeping: Keeping) -> None:
+        """No stored result: a motion that takes seconds is computed again."""
+
+    def run_into_file(
+        self, keeping: Keeping, progress: bool | Reporter | None = None
+    ) -> xarray.Dataset:
+        """Compute the motion and write its result to its file."""
+        with keeping.held():
+            return keeping.save_result(self.run(progress))
+
+    def run(
+        self, progress: bool | Reporter | None = None, keeping: Keeping | None = None
+    ) -> xarray.Dataset:
+        """Compute the motion; see `driver.simulate`. `keeping` has nothing to keep of it."""
+        report, close = reporter(progress)
+        try:
+            return self._computed(report)
+        finally:
+            close()
+
+    def _computed(self, report: Reporter) -> xarray.Dataset:
+        began, case, plan = time.perf_counter(), self.case, self.plan
+        model = matrices(case, self._histories)
+        steps = steps_of(case, self._histories, plan)
+        place, speed = self._beginning(model, *steps.parabolas(0)[:2])
+        bases = Bases(model, place, speed, FEWEST)
+        modes, before, missing = min(FEWEST, bases.most), None, 0.0
+        while True:
+            equation = Superposition(model, bases.basis(modes))
+            if modes == bases.most:
+                break
+            moved = _displacements(equation, steps, model.mass @ speed, case.structure.nodes.size)
+            if before is not None:
+                largest, change = (float(np.abs(one).max()) for one in (moved, moved - before))
+                missing = change / largest if largest else 0.0
+                if missing <= self._tolerance or modes >= MOST:
+                    break
+            modes, before = min(2 * modes, bases.most), moved
+        missing = 0.0 if modes == bases.most else missing
+        out, end = self._sampled(model, equation, steps, speed, report)
+        self._sampler.clear()
+        self._sampler.take(out, len(out.time))
+        self._warn(out, missing)
+        names = audited(case.energy_groups, case.air is not None)
+        values, known = self._sampler.columns(len(out.time)), self._sampler.known
+        facts = {
+            "method": MODAL,
+            "start": plan.start,
+            "duration": plan.end - plan.start,
+            "dt": float(steps.lengths.max()),
+            "steps": len(steps.lengths),
+            "critical_step": math.inf,
+            "modes": modes,
+            "left_out": missing,
+            "wall_seconds": time.perf_counter() - began,
+            "threads": 1,
+            "energy_error": _imbalance(out.energy),
+            "started_from": "rest" if self._initial is None else "state",
+        }
+        continued = {"continuation": (float(out.time[-1]), Continuation(MODAL, end))}
+        if self._continued is not None:
+            continued["continued_from"] = float(out.time[0]), Continuation(MODAL, self._continued)
+        return trajectory_dataset(
+            case, out.time, out.displacement, out.velocity, out.reaction,
+            dict(zip(names, out.energy.T, strict=True)), facts,
+            {name: (known[name], values[name]) for name in known}, continuations=continued,
+        )  # fmt: skip
+
+    @property
+    def _continued(self) -> NDArray | None:
+        """All displacements and velocities (2 m,) from which a motion of superelements goes on."""
+        known = self._initial and self._initial.continuation
+        fits = known and known.method == MODAL and len(known.values) == 2 * self.case.body.size
+        return known.values if known and fits else None
+
+    def _beginning(
+        self, model: Matrices, factor: NDArray, rate: NDArray
+    ) -> tuple[NDArray, NDArray]:
+        """Displacement and velocity (m,) of all dofs at the start, beside S f and S f'.
+
+        Unless the motion goes on from another one, dofs beside those of nodes are in balance: with
+        the nodes, and with the loads unless the sheet is at rest.
+        """
+        body = self.case.elastic_body
+        if self._continued is not None:
+            place, speed = np.split(self._continued, 2)
+        else:
+            u, v = check_start(self.case, self._initial)
+            push = (model.load - model.turned) @ factor
+            place = body.dofs(u, push) if u.any() else np.zeros(body.size)
+            speed = body.dofs(v) if v.any() else np.zeros(body.size)
+        free = np.concatenate([self.case.free_dofs, body.hidden])
+        beside = speed - model.support @ rate if self._continued is not None else speed
+        return place - model.support @ factor, model.ties @ beside[free]
+
+    def _sampled(
+        self, model: Matrices, equation: Superposition, steps: Steps, speed: NDArray,
+        report: Reporter,
+    ) -> tuple[Samples, NDArray]:  # fmt: skip
+        """Samples of the motion in one basis, and all displacements and velocities at the end."""
+        case, plan, basis = self.case, self.plan, equation.basis
+        names = audited(case.energy_groups, case.air is not None)
+        count, size = int(steps.sampled.sum()), case.structure.nodes.size
+        out = samples(count, size // 3, len(case.reaction_dofs), len(names))
+        out.time[:] = steps.ends[steps.sampled]
+        on_nodes, end = equation.both[:size], np.zeros(0)
+        resisted = case.constraints.reactions @ equation.unbalanced[:size]
+        for k, (z, total) in enumerate(
+            equation.steps(steps, basis.motions.T @ (model.mass @ speed))
+        ):
+            place, rate, gain = equation.amplitudes(z)
+            out.displacement[k] = (on_nodes @ place).reshape(-1, 3)
+            out.velocity[k] = (on_nodes @ rate).reshape(-1, 3)
+            out.reaction[k] = resisted @ np.concatenate([place, rate, gain])
+            strain = self._strain(model, equation.both @ place, z[equation.factors])
+            kinetic, carried = equation.kinetic(z)
+            air = [0.0] if case.air is not None else []
+            out.energy[k] = [*strain, *air, kinetic, total[0], total[1] + carried]
+            if k % LOOK == 0 or k == count - 1:
+                done = float(out.time[k]) - plan.start
+                report(Progress(done, plan.end - plan.start, k, _imbalance(out.energy[: k + 1])))
+                end = np.concatenate([equation.both @ place, equation.both @ rate])
+        out.energy[:, -1] -= out.energy[0, -1]
+        return out, end
+
+    def _strain(self, model: Matrices, x: NDArray, factor: NDArray) -> NDArray[np.float64]:
+        """Strain energies (g,), J, at displacements x (m,) and factors (h,)."""
+        case, body = self.case, self.case.elastic_body
+        if case.rest_terms:
+            number = self._histories.index
+            turns = (change * factor[number(history)] for change, history in case.rest_terms)
+            body = body.folded(body.sheet.rest_angles + sum(turns))
+        strain, (push, stored) = body.energies(x), model.heat
+        strain[0] += factor @ (push.T @ x) + 0.5 * factor @ stored @ factor  # see mechanics.heat
+        return strain
+
+    def _warn(self, out: Samples, missing: float) -> None:
+        if missing > self._tolerance:
+            warn(
+                f"{MOST} modes may leave out {missing:.1g} of the displacements, more than the "
+                f"tolerance of {self._tolerance:g}: they answer slower changes of load; give a "
+                "smoother history, or a higher tolerance",
+                "superelements.md#motions",
+            )
+        turns = panel_turns(self.case.structure, out.displacement)
+        at = int(turns.argmax())
+        if turns[at] > TURN:
+            warn(
+                f"panels turn by {turns[at]:.2g} degrees at t = {out.time[at]:.6g} s, and "
+                f"{self.case.structure.linear} are linear: reduce the loads, or take bars and "
+                "hinges or the shell",
+                "superelements.md#motions",
+                ModelRangeWarning,
+            )
+
+
+def _displacements(
+    equation: Superposition, steps: Steps, momentum: NDArray, size: int
+) -> NDArray[np.float64]:
+    """Displacements (nt, size) of nodal dofs at the samples, m."""
+    start, places = equation.basis.motions.T @ momentum, []
+    for z, _ in equation.steps(steps, start, works=False):
+        places.append(equation.amplitudes(z)[0])
+    return np.array(places) @ equation.both[:size].T
+
+
+def _imbalance(energy: NDArray) -> float:
+    """Largest error of the balance of energies (k, columns), relative to the energies at play."""
+    error = energy[:, :-1].sum(axis=1) - energy[:, -1]
+    scale = float(np.abs(energy).max())
+    return float(np.abs(error - error[0]).max()) / scale if scale else 0.0

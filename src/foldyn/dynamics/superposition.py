@@ -1,0 +1,333 @@
+"""Motions of superelements: superposed modes, with steps that are exact for a quadratic load.
+
+Superelements are linear about rest. With the displacements of all dofs
+
+    x = x0 + S (f(t) - f(start)) + Z y,
+
+in which x0 is the start, S has the displacements of moving supports with the histories f, and Z
+maps the free dofs to all, the equation of motion M x'' + C x' + K x = F f(t) is projected onto the
+lowest modes and, in addition, the static responses to every load, to every moving support and to
+the start (modal truncation augmentation: Dickens, Nakagawa and Wittbrodt, Comput. Struct. 62,
+1997). The basis B is M-orthonormal, and every column of S is made M-orthogonal to it, so that
+accelerations of supports, which are infinite where their velocity jumps, do not occur.
+
+Within a step every history is the parabola through its values at the start, middle and end. Then
+
+    (y, y', f, f', f'')' = A (y, y', f, f', f''),
+
+and exp(A h) advances the motion by any step h without error; so do integrals of quadratic forms,
+which give the work and the dissipated energy.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.linalg import eigh, expm, matrix_balance
+
+from foldyn.algebra.eigen import Pencil, lowest
+from foldyn.cases import Case, History
+from foldyn.dynamics.dampers import damping_matrix
+from foldyn.dynamics.modal_damping import mass_of, modal_rows, moving_mass
+from foldyn.dynamics.motion_state import StepPlan
+from foldyn.dynamics.timing import histories, jumps, overlooked
+from foldyn.mechanics.following import Following, following_force, joined
+
+BESIDE = 0.01  # shift below 0 of static responses, relative to the lowest positive eigenvalue
+RIGID = 1e-10  # eigenvalues of rigid motions, relative to the largest of the modes
+APART = 1e-8  # static responses whose share outside the other motions is smaller are left out
+MISSED = 1e-5  # share of a history that parabolas may miss
+SHORTEST = 4096  # most steps between two samples
+LOOKED = (0.0, 0.5, 1.0)  # places of a step through which parabolas go
+SAME = 1e-6  # relative difference of the lengths of equal steps, due to rounding
+SHORT = 0.125  # norm of A h in the step that is doubled
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
+
+
+class Matrices(NamedTuple):
+    """Matrices of a linear model on its m dofs, h histories and nf free dofs."""
+
+    stiffness: sparse.csr_array  # (m, m) N/m
+    mass: sparse.csr_array  # (m, m) kg
+    damping: sparse.csr_array  # (m, m) N s/m, without modal damping
+    rows: NDArray  # (r, m) modal damping
+    ties: sparse.csr_array  # Z (m, nf)
+    load: NDArray  # (m, h) N, forces at factor 1
+    turned: NDArray  # (m, h) N, internal forces of turned rest angles and heat at factor 1
+    stored: NDArray  # (h, h) J, twice the energy of a sheet held at rest against these
+    heat: tuple[NDArray, NDArray]  # the part of heat in the two above
+    support: NDArray  # (m, h) m, displacements of supports at factor 1
+
+    def damped(self, motion: NDArray) -> NDArray:
+        """Damping forces (m, ...) of velocities."""
+        return self.damping @ motion + self.rows.T @ (self.rows @ motion)
+
+
+def matrices(case: Case, varying: list[History]) -> Matrices:
+    """Matrices of a case at rest, with the histories `varying`."""
+    body = case.elastic_body
+    rest, size = np.zeros(body.size), body.size
+    stiffness, mass = body.tangent(rest), moving_mass(case, np.zeros_like(case.structure.nodes))
+    damping = case.rayleigh.matrix(mass_of(case), stiffness) + damping_matrix(case, rest, True)
+    load, turned, support, heat = np.zeros((4, size, len(varying)))
+    stored, warm = np.zeros((2, len(varying), len(varying)))
+    for vector, history in case.load_terms:
+        load[: vector.size, varying.index(history)] += vector.ravel()
+    for part, history in case.following_terms:
+        load[:, varying.index(history)] += _pushed(part, size)
+    for one, history in case.swellings:
+        heat[:, varying.index(history)] -= _pushed(one.forces, size)
+        for other, second in case.swellings:
+            own = sum(float(a @ b) for a, b in zip(one.push, other.free, strict=True))
+            warm[varying.index(history), varying.index(second)] += own
+    angles = body.sheet.rest_angles
+    changes = {varying.index(history): change for change, history in case.rest_terms}
+    for k, change in changes.items():
+        turned[:, k] += body.folded(angles + change).internal(rest)
+        for other, second in changes.items():
+            parts = (change + second, change - second)
+            both, apart = (body.folded(angles + part).energies(rest).sum() for part in parts)
+            stored[k, other] += 0.5 * (both - apart)
+    for vector, history in (*case.imposed_terms, *case.base_terms):
+        support[: vector.size, varying.index(history)] += vector.ravel()
+    free = np.concatenate([case.free_dofs, body.hidden])
+    ties = sparse.eye_array(size, format="csr")
+    if case.constraints:
+        ties = case.constraints.extended(size)
+    return Matrices(
+        stiffness, sparse.csr_array(mass), sparse.csr_array(damping), modal_rows(case).rows,
+        sparse.csr_array(ties[:, free]), load + heat, turned + heat, stored + warm, (heat, warm),
+        support,
+    )  # fmt: skip
+
+
+def _pushed(part: Following, size: int) -> NDArray:
+    """Forces (m,), N, of a load of a linear model at factor 1."""
+    return following_force(joined([(part, 0)]), np.zeros(size), np.ones((1, 1)))
+
+
+class Propagator(NamedTuple):
+    """A step: the state after it, and integrals of quadratic forms of the states within it."""
+
+    state: NDArray  # (k, k) exp(A h)
+    integrals: NDArray  # (2, k, k)
+
+
+def propagator(matrix: NDArray, forms: NDArray, h: float) -> Propagator:
+    """exp(A h), and the integrals of exp(A' t) Q exp(A t) from 0 to h for each form Q (2, k, k).
+
+    A short step is doubled: a sum of bounded terms, unlike an exponential of A and -A' together.
+    """
+    matrix, (scale, _) = matrix_balance(matrix, permute=False, separate=True)
+    forms = forms * np.outer(scale, scale)
+    norm = float(np.abs(matrix).sum(axis=1).max()) * h
+    doublings = max(0, math.ceil(math.log2(max(norm / SHORT, 1e-300))))
+    short = h / 2.0**doublings
+    state, integrals = expm(matrix * short), np.zeros_like(forms)
+    for place, weight in zip(POINTS, WEIGHTS, strict=True):
+        there = expm(matrix * (0.5 * short * (1.0 + place)))
+        integrals += 0.5 * short * weight * (there.T @ forms @ there)
+    for _ in range(doublings):
+        integrals = integrals + state.T @ integrals @ state
+        state = state @ state
+    return Propagator(state * np.outer(scale, 1.0 / scale), integrals / np.outer(scale, scale))
+
+
+class Basis(NamedTuple):
+    """Motions B (m, r), the supports' S, made M-orthogonal to B, and the start x0, all in S.
+
+    The last column of `support` is x0 - S f(start), with the factor 1.
+    """
+
+    motions: NDArray  # (m, r)
+    support: NDArray  # (m, h + 1)
+    shift: NDArray  # (r, h + 1) what `support` lacks of the columns it is made of
+    modes: int
+
+
+class Superposition:
+    """Equation of motion between the motions of a basis; see the module's docstring.
+
+    Attributes
+    ----------
+    both : (m, r + h + 1)
+        B and S.
+    unbalanced : (m, 3 (r + h + 1))
+        Forces of supports, and what the basis leaves unbalanced, for amplitudes of B and S and
+        their first two derivatives, N.
+    factors : (h,)
+        Places of the factors of the histories in a state.
+    """
+
+    def __init__(self, model: Matrices, basis: Basis) -> None:
+        both = np.hstack([basis.motions, basis.support])
+        pulled, slowed = model.stiffness @ both, model.damped(both)
+        count, given = basis.motions.shape[1], basis.support.shape[1]
+        stiffness, damping = both.T @ pulled, both.T @ slowed
+        pad = np.zeros((len(both), 1))
+        load, turned = (both.T @ np.hstack([one, pad]) for one in (model.load, model.turned))
+        self.basis, self._carried = basis, basis.support.T @ (model.mass @ basis.support)
+        own, others = slice(count), slice(count, None)
+        size = 2 * count + 3 * given
+        places = np.split(np.arange(size), np.cumsum([count, count, given, given]))
+        y, v, f, rate, bent = self._places = places
+        self.factors = f[:-1]
+        matrix, forms = np.zeros((size, size)), np.zeros((2, size, size))
+        matrix[y, v] = matrix[f, rate] = matrix[rate, bent] = 1.0
+        matrix[np.ix_(v, y)], matrix[np.ix_(v, v)] = -stiffness[own, own], -damping[own, own]
+        matrix[np.ix_(v, f)] = load[own] - turned[own] - stiffness[own, others]
+        matrix[np.ix_(v, rate)] = -damping[own, others]
+        moving = np.concatenate([v, rate])
+        forms[0][np.ix_(moving, moving)] = damping
+        stored = np.pad(model.stored, (0, 1))
+        work = forms[1]
+        work[np.ix_(v, f)] = load[own]
+        work[np.ix_(rate, v)] = damping[others, own]
+        work[np.ix_(rate, rate)] = damping[others, others]
+        work[np.ix_(rate, y)] = stiffness[others, own] + turned[own].T
+        work[np.ix_(rate, f)] = (
+            stiffness[others, others] + stored + turned[others] + turned[others].T
+        )
+        pulled[:, count:-1] += model.turned - model.load
+        self.both, self.unbalanced = both, np.hstack([pulled, slowed, model.mass @ both])
+        self._matrix, self._forms = matrix, 0.5 * (forms + forms.swapaxes(1, 2))
+
+    def amplitudes(self, z: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Amplitudes (r + h + 1,) of B and S in a state, and their first two derivatives."""
+        y, v, f, rate, bent = self._places
+        pairs = (z[y], z[f]), (z[v], z[rate]), (self._matrix[v] @ z, z[bent])
+        place, speed, gain = (np.concatenate(pair) for pair in pairs)
+        return place, speed, gain
+
+    def kinetic(self, z: NDArray) -> tuple[float, float]:
+        """Kinetic energy, J, and the part of it that belongs to the motion of the supports."""
+        _, v, _, rate, _ = self._places
+        carried = 0.5 * float(z[rate] @ self._carried @ z[rate])
+        return 0.5 * float(z[v] @ z[v]) + carried, carried
+
+    def steps(
+        self, plan: Steps, start: NDArray, works: bool = True
+    ) -> Iterator[tuple[NDArray, NDArray]]:
+        """State, and the energy dissipated and the work (2,), J, at each sample.
+
+        start : (r,) velocities beside those of the supports.
+        works : whether energies are needed.
+        """
+        y, v, f, rate, bent = self._places
+        z, total, known = np.zeros(len(self._matrix)), np.zeros(2), {}
+        z[f[-1]] = 1.0
+        for k, length in enumerate(plan.lengths.tolist()):
+            z[f[:-1]], z[rate[:-1]], z[bent[:-1]] = plan.parabolas(k)
+            if k == 0:
+                z[y] = self.basis.shift @ z[f]
+                z[v] = start + self.basis.shift @ z[rate]
+                yield z, total
+            if length not in known:
+                forms = self._forms if works else self._forms[:0]
+                known[length] = propagator(self._matrix, forms, length)
+            step = known[length]
+            if works:
+                total += z @ step.integrals @ z
+            z = step.state @ z
+            if plan.sampled[k + 1]:
+                yield z, total
+
+
+class Bases:
+    """The bases of a motion: its lowest modes, and the static responses to all that acts.
+
+    Parameters
+    ----------
+    model : Matrices
+    place, speed : (m,)
+        Displacement, m, and velocity, m/s, at the start, beside those of the supports.
+    modes : int
+        Number of modes to begin with.
+    """
+
+    def __init__(self, model: Matrices, place: NDArray, speed: NDArray, modes: int) -> None:
+        self._model, ties = model, model.ties
+        self._support = np.column_stack([model.support, place])
+        stiffness, mass = (
+            sparse.csc_array(ties.T @ one @ ties) for one in (model.stiffness, model.mass)
+        )
+        self._pencil = Pencil(stiffness, mass)
+        self.most = self._pencil.finite
+        self._find(min(modes, self.most))
+        rigid = self._values <= RIGID * np.abs(self._values).max()
+        shift = BESIDE * self._values[~rigid].min(initial=1.0) if rigid.any() else 0.0
+        solve = self._pencil.factorize(-shift).solve
+        forces = np.column_stack(
+            [model.load - model.turned, model.stiffness @ self._support, model.damped(speed)]
+        )
+        static = [solve(force) for force in (ties.T @ forces).T]
+        more = np.column_stack([ties @ np.stack(static, axis=1), speed])
+        size = np.sqrt(np.einsum("mk,mk->k", more, model.mass @ more))
+        self._static = more[:, size > 0.0] / size[size > 0.0]
+
+    def _find(self, modes: int) -> None:
+        found = lowest(self._pencil, modes, np.zeros((self._pencil.size, 0)))
+        self._values, self._modes = found.values, self._model.ties @ found.shapes
+
+    def basis(self, modes: int) -> Basis:
+        """The basis with the lowest modes, as many as given."""
+        if modes > len(self._values):
+            self._find(modes)
+        mass, motions, more = self._model.mass, self._modes[:, :modes], self._static
+        for _ in range(2):  # twice, as rounding leaves a share of the modes after the first time
+            more = more - motions @ (motions.T @ (mass @ more))
+            values, turned = eigh(more.T @ (mass @ more))
+            kept = values > APART**2
+            more = more @ (turned[:, kept] / np.sqrt(values[kept]))
+        motions = np.hstack([motions, more])
+        shift = motions.T @ (mass @ self._support)
+        return Basis(motions, self._support - motions @ shift, shift, modes)
+
+
+class Steps(NamedTuple):
+    """Steps of a motion, with the factors (k, h) of its histories."""
+
+    ends: NDArray  # (k + 1,) s
+    sampled: NDArray  # (k + 1,) whether there is a sample
+    lengths: NDArray  # (k,) s
+    first: NDArray  # at the start of each step, after a jump
+    middle: NDArray
+    last: NDArray  # before a jump
+
+    def parabolas(self, k: int) -> tuple[NDArray, NDArray, NDArray]:
+        """Factors and their first two derivatives (h,) at the start of a step."""
+        h, first, middle, last = self.lengths[k], self.first[k], self.middle[k], self.last[k]
+        rate = (4.0 * middle - 3.0 * first - last) / h
+        return first, rate, 4.0 * (first - 2.0 * middle + last) / h**2
+
+
+def steps_of(case: Case, given: Sequence[History], plan: StepPlan) -> Steps:
+    """Steps between samples and jumps, so short that parabolas follow the histories `given`.
+
+    plan : its steps end at samples.
+    """
+    parts = 1
+    while parts < SHORTEST and _missed(case, plan, parts) > MISSED:
+        parts *= 2
+    step = plan.dt / parts
+    regular = plan.start + step * np.arange(plan.steps * parts + 1)
+    ends = np.union1d(regular, [t for t in jumps(case) if plan.start < t < regular[-1]])
+    lengths = np.diff(ends)
+    lengths[np.abs(lengths - step) < SAME * step] = step  # equal steps share their exponential
+    times = ends[:-1], 0.5 * (ends[:-1] + ends[1:]), np.nextafter(ends[1:], -np.inf)
+    factors = np.empty((3, len(lengths), len(given)))
+    for k, history in enumerate(given):
+        factors[:, :, k] = [history(at) for at in times]
+    return Steps(ends, np.isin(ends, regular[::parts]), lengths, *factors)
+
+
+def _missed(case: Case, plan: StepPlan, parts: int) -> float:
+    """Largest share of a history that parabolas miss, with steps divided into equal parts."""
+    finer = plan._replace(dt=plan.dt / parts, steps=plan.steps * parts)
+    missed = (overlooked(one, finer, LOOKED, finer.steps, True) for _, one in histories(case))
+    return max(missed, default=0.0)
