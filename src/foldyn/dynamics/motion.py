@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from foldyn.dynamics.gpu.engine import BlockEngine
 
 RECHECKS = 20  # number of checks of the critical step during a motion
+RECHECKED = 1000, 4000  # least steps between them: a check costs about 1000 steps with edge angles
 CHUNK = 256  # steps in the first stretch; later stretches last about REPORT_EVERY s
 REPORT_EVERY = 0.25
 BETWEEN = 0.382  # fraction of a sampling interval; a vibration at rest at both its ends moves there
@@ -110,7 +111,8 @@ class Motion:
     @property
     def recheck_after(self) -> int:
         """Number of steps between checks of the critical step."""
-        return max(1000, -(-self.plan.steps // RECHECKS))
+        least = RECHECKED[len(self.packed.mass.hidden) > 0]
+        return max(least, -(-self.plan.steps // RECHECKS))
 
     def run(
         self, progress: bool | Reporter | None = None, keeping: Keeping | None = None

@@ -182,7 +182,8 @@ def damper_rate(case: Case, u: ArrayLike | None = None) -> float:
 def _tangent(case: Case, u: ArrayLike | None) -> sparse.csr_array:
     """Stiffness about u (n, 3) that limits the step."""
     state = _state(case, u)
-    tangent = case.elastic_body.tangent(case.elastic_body.dofs(state), 1.0)
+    balanced = case.elastic_body.dofs(state, kept=[])
+    tangent = case.elastic_body.tangent(balanced, 1.0)
     added = instant_stiffness(case, state)
     return tangent if added is None else sparse.csr_array(tangent + added)
 

@@ -99,24 +99,31 @@ class BarsPlatesTerm(SheetTerm):
 
         gradient : (nh, 12) of the dihedrals, 1/m.
         """
-        model, turns = self.model, self.model.fold_rotations
-        both, rotations = (turns >= 0).all(axis=1), model.rotations
-        own = sparse.lil_array((rotations, rotations))
-        own.setdiag(1.0)
-        share = np.where(both, 0.5, 1.0)
-        fold, side = np.nonzero(turns >= 0)
-        row, first = turns[fold, side], turns.max(axis=1)
-        first[both] = turns[both, 0]
-        own[row, row] = 0.0
-        own[row, first[fold]] = -share[fold]
-        two = both[fold]
-        own[row[two], turns[fold[two], 1]] = np.where(side[two] == 0, 1.0, -1.0)
+        model, (fold, row, share, own) = self.model, self._turned
         columns = 3 * model.hinges[fold][:, :, None] + np.arange(3)
-        entries = gradient[fold] * (share[fold] / model.per_reach)[:, None]
+        entries = gradient[fold] * (share / model.per_reach)[:, None]
         places = (np.repeat(row, 12), columns.ravel())
-        nodal = sparse.coo_array((entries.ravel(), places), shape=(rotations, self._nodal))
+        nodal = sparse.coo_array((entries.ravel(), places), (model.rotations, self._nodal))
         still = sparse.eye_array(self._nodal)
         return sparse.csr_array(sparse.block_array([[still, None], [nodal, own]]))
+
+    @cached_property
+    def _turned(self) -> tuple[NDArray, NDArray, NDArray, sparse.coo_array]:
+        """Rotations beside folds: fold, number, share of the fold's turn (k,); rates by dofs.
+
+        The rates (r, r) of all rotations are those by the dofs of explicit methods.
+        """
+        turns = self.model.fold_rotations
+        both, fold, side = (turns >= 0).all(axis=1), *np.nonzero(turns >= 0)
+        row, first = turns[fold, side], np.where(both, turns[:, 0], turns.max(axis=1))
+        share, two = np.where(both, 0.5, 1.0)[fold], both[fold]
+        alone = np.setdiff1d(np.arange(self.model.rotations), row)
+        rows = np.concatenate([alone, row, row[two]])
+        columns = np.concatenate([alone, first[fold], turns[fold[two], 1]])
+        apart = np.where(side[two] == 0, 1.0, -1.0)
+        values = np.concatenate([np.ones(len(alone)), -share, apart])
+        own = sparse.coo_array((values, (rows, columns)), 2 * (self.model.rotations,))
+        return fold, row, share, own
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
         """See `SheetTerm`."""
