@@ -16,7 +16,6 @@ from foldyn.mechanics.threads import ThreadPart, team
 
 MODELS = {
     "MembranesTerm": "membranes",
-    "EdgeGivesTerm": "gives",
     "BarsPlatesTerm": "model",
     "ShellTerm": "model",
     "SpringsTerm": "springs",

@@ -22,7 +22,6 @@ from foldyn.errors import InputError
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.clamps import ClampsTerm
 from foldyn.mechanics.constant_damping import DampingMatrix, DampingRows
-from foldyn.mechanics.edge_gives import EdgeGivesTerm
 from foldyn.mechanics.membranes import MembranesTerm
 from foldyn.mechanics.pullback import Pullback, arrays_of_body
 from foldyn.mechanics.springs import SpringsTerm
@@ -88,7 +87,7 @@ AXIAL = fd.Dashpot(0.7, between=[(0, 2), (1, 3)])
 TERMS: dict[str, Callable[[], Lone]] = {
     "membranes": lambda: lone(structure("miura, coupled").body, MembranesTerm),
     "membranes of hexagons": lambda: lone(structure("hexagon, coupled").body, MembranesTerm, 2),
-    "gives": lambda: lone(plates(MIXED), EdgeGivesTerm),
+    "gives": lambda: lone(plates(MIXED), MembranesTerm),
     "springs": lambda: lone(supported(*SPRINGS), SpringsTerm),
     "springs without length": lambda: lone(
         supported(fd.Spring(35.0, between=[(1, 2)], rest_length=0.0)), SpringsTerm
@@ -130,7 +129,7 @@ ARRAYS = {  # that count, with a star where forces are linear, with a minus wher
     # difference: of a spring without length at rest, or of dofs that are not there
     "membranes": OF_MEMBRANES,
     "membranes of hexagons": OF_MEMBRANES,
-    "gives": "*vector *per_length2 *across *stiffness",
+    "gives": OF_MEMBRANES,
     "springs": "direction *stiffness vector length *stretch *axial_stiffness",
     "springs without length": "*vector *axial_stiffness -length -stretch",
     "clamps": "points *rest *stiffness",

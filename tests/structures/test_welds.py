@@ -114,9 +114,9 @@ def test_energy_force_and_tangent(pattern):
 def test_both_sides_of_a_weld_share_turn_and_bow():
     made = fd.discretize(fd.welded(cut_across([0.5])), STEEL)
     assert (len(made.folds), len(made.bends)) == (0, 9)
-    assert made.body.size == 3 * len(made.nodes) + 2 + made.edge_gives.count
+    assert made.body.size == 3 * len(made.nodes) + 2 + len(made.edge_gives)
     folded = fd.discretize(fd.welded(half_pipe(2)), STEEL)  # stays straight: no bow
-    assert folded.body.size == 3 * len(folded.nodes) + 1 + folded.edge_gives.count
+    assert folded.body.size == 3 * len(folded.nodes) + 1 + len(folded.edge_gives)
 
 
 @pytest.mark.parametrize(

@@ -341,16 +341,15 @@ def hidden_sites(case: Case, unit: NDArray, step: NDArray, panels: Sequence[Pane
     if structure.edge_plates is not None:
         axes = np.concatenate([structure.folds, structure.bends])[:, :2]
         found += turns(axes[structure.edge_plates.rotation_hinge].tolist())
-    gives = structure.edge_gives
-    if gives is not None:
-        edges = {edge_of(a, b) for a, b in gives.edge.tolist()}
-        of_give: dict[int, Site] = {}
-        for panel, numbers in zip(gives.panel.tolist(), gives.number.tolist(), strict=True):
+    edges = {edge_of(a, b) for a, b in structure.edge_gives.tolist()}
+    of_give: dict[int, Site] = {}
+    for which, own in structure.membranes:
+        for panel, numbers in zip(which.tolist(), own.gives.tolist(), strict=True):
             sides_ = [s for s in around(structure.pattern.faces[panel]) if edge_of(*s) in edges]
             ends_ = [(side, end) for side in sides_ for end in side]  # in the panel's order
             for number, (side, end) in zip(numbers, ends_, strict=False):
                 of_give[number] = site(side, ("give", place[end] == min(place[v] for v in side)))
-        found += [of_give[number] for number in range(gives.count)]
+    found += [of_give[number] for number in range(len(structure.edge_gives))]
     return found
 
 

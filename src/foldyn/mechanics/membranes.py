@@ -5,7 +5,11 @@ positions. Its energy is 1/2 E^T S E with a full matrix S (`structures.membranes
 all bars; independent bars would have a diagonal matrix. A panel that only turns, or folds along
 bars, has no strain.
 
-A term has all panels of one kind: with equal numbers of nodes, and bars between the same nodes.
+Edges that give way near their ends add k gives g (m) to E, by which their points slide along them:
+hidden dofs, which do not turn with the sheet and have no mass.
+
+A term has all panels of one kind: with equal numbers of nodes and gives, and bars between the same
+nodes.
 """
 
 from __future__ import annotations
@@ -47,13 +51,14 @@ GROUP = 0  # energy group of the bars, which membranes replace
 
 
 class Membranes(NamedTuple):
-    """Arrays of p panels with c nodes and b bars each."""
+    """Arrays of p panels with c nodes, b bars and k gives each; e = b + k."""
 
     nodes: NDArray  # (p, c)
     ends: NDArray  # (b, 2) numbers among a panel's nodes
+    gives: NDArray  # (p, k) their dofs; in a structure, their numbers
     vector: NDArray  # (b, 3, p) rest vector from the first end to the second, m
     per_length2: NDArray  # (b, p) 1 / L^2
-    stiffness: NDArray  # (b, b, p) S, J
+    stiffness: NDArray  # (e, e, p) S; J, J/m beside a give, N/m of gives
 
 
 class Packed(NamedTuple):
@@ -63,39 +68,47 @@ class Packed(NamedTuple):
     corners: int  # c
     ends: NDArray  # (b, 2)
     nodes: NDArray  # rows (c, 8) of each group, uint32: signed would be tested for wraparound
+    given: int  # k
+    gives: NDArray  # rows (k, 8), uint32
     vector: NDArray  # rows (3 b, 8)
     per_length2: NDArray  # rows (b, 8)
-    stiffness: NDArray  # rows (b b, 8)
+    stiffness: NDArray  # rows (e (e + 1) / 2, 8), the lower half
     moved: NDArray  # (24 c,) memory of a group: displacements
     along: NDArray  # (24 b,) vectors of the bars
-    strain: NDArray  # (8 b,)
+    strain: NDArray  # (8 e,)
+    stress: NDArray  # (8 e,) S E
     force: NDArray  # (24 c,)
 
 
 def packed(membranes: Membranes) -> Packed:
     """Panels packed for one thread, with work arrays."""
     count, corners = membranes.nodes.shape
-    bars = len(membranes.ends)
+    bars, given = len(membranes.ends), membranes.gives.shape[1]
+    lower = np.tril_indices(bars + given)
 
     def groups(array: NDArray, kind: type = float) -> NDArray:
         """Groups of eight from rows (..., p)."""
         rows = array.reshape(math.prod(array.shape[:-1]), count)
         filled = np.zeros((len(rows), -(-count // WIDTH) * WIDTH), kind)
         filled[:, :count] = rows
-        return filled.reshape(len(rows), -1, WIDTH).transpose(1, 0, 2).ravel()
+        return filled.reshape(len(rows), filled.shape[1] // WIDTH, WIDTH).swapaxes(0, 1).ravel()
 
     return Packed(
         count, corners, membranes.ends, groups(membranes.nodes.T, np.uint32),
-        groups(membranes.vector), groups(membranes.per_length2), groups(membranes.stiffness),
-        *(np.zeros(rows * WIDTH) for rows in (3 * corners, 3 * bars, bars, 3 * corners)),
+        given, groups(membranes.gives.T, np.uint32),
+        groups(membranes.vector), groups(membranes.per_length2), groups(membranes.stiffness[lower]),
+        *(
+            np.zeros(rows * WIDTH)
+            for rows in (3 * corners, 3 * bars, bars + given, bars + given, 3 * corners)
+        ),
     )  # fmt: skip
 
 
 def taken(membranes: Membranes, which: NDArray) -> Membranes:
     """Some of the panels, or all in another order."""
     return Membranes(
-        membranes.nodes[which], membranes.ends,
-        *(np.ascontiguousarray(array[..., which]) for array in membranes[2:]),
+        membranes.nodes[which], membranes.ends, membranes.gives[which],
+        *(np.ascontiguousarray(array[..., which]) for array in membranes[3:]),
     )  # fmt: skip
 
 
@@ -123,6 +136,32 @@ def _gather(own, first, values, out):
                 out[(3 * v + c) * WIDTH + q] = values[row + c]
 
 
+@inner_scalar
+def _gather_gives(own, first, values, out):
+    """Put the values of the gives of a group into out, after those of the bars."""
+    at, bars = own.given * first, own.ends.shape[0]
+    for k in range(own.given):
+        for q in range(min(WIDTH, own.count - first)):
+            out[(bars + k) * WIDTH + q] = values[own.gives[at + k * WIDTH + q]]
+
+
+@inner_scalar
+def _multiply(own, first, strain, stress):
+    """stress = S strain in a group of panels, from the lower half of S."""
+    count = own.ends.shape[0] + own.given
+    row = (first // WIDTH) * (count * (count + 1) // 2) * WIDTH
+    for i in range(count):
+        one = eight(strain, i * WIDTH)
+        total = 0.0 * one
+        for j in range(i):
+            stiffness = eight(own.stiffness, row)
+            total = total + stiffness * eight(strain, j * WIDTH)
+            increase(stress, j * WIDTH, stiffness * one)
+            row += WIDTH
+        put(stress, i * WIDTH, total + eight(own.stiffness, row) * one)
+        row += WIDTH
+
+
 @inner
 def add_membrane_forces(own, u, low, high, force):
     """Add the forces of all panels on the nodes from low to high; u and force are flat."""
@@ -141,13 +180,10 @@ def add_membrane_forces(own, u, low, high, force):
             put(own.along, 3 * i * WIDTH, vx + dx)
             put(own.along, (3 * i + 1) * WIDTH, vy + dy)
             put(own.along, (3 * i + 2) * WIDTH, vz + dz)
+        _gather_gives(own, first, u, own.strain)
+        _multiply(own, first, own.strain, own.stress)
         for i in range(bars):
-            row = (at + i) * bars
-            pull = eight(own.stiffness, row * WIDTH) * eight(own.strain, 0)
-            for j in range(1, bars):
-                one = eight(own.stiffness, (row + j) * WIDTH) * eight(own.strain, j * WIDTH)
-                pull = pull + one
-            pull = pull * eight(own.per_length2, (at + i) * WIDTH)
+            pull = eight(own.stress, i * WIDTH) * eight(own.per_length2, (at + i) * WIDTH)
             x, y, z = take(own.along, i)
             add(own.force, own.ends[i, 0], -pull * x, -pull * y, -pull * z)
             add(own.force, own.ends[i, 1], pull * x, pull * y, pull * z)
@@ -158,6 +194,12 @@ def add_membrane_forces(own, u, low, high, force):
                 if low <= node < high:
                     for c in range(3):
                         force[3 * node + c] += own.force[(3 * v + c) * WIDTH + q]
+        at = own.given * first
+        for k in range(own.given):
+            for q in range(min(WIDTH, own.count - first)):
+                dof = own.gives[at + k * WIDTH + q]
+                if 3 * low <= dof < 3 * high:
+                    force[dof] += own.stress[(bars + k) * WIDTH + q]
 
 
 @kernel
@@ -182,7 +224,7 @@ def strains_toward(membranes, u0, u1):
 
 @kernel
 def membrane_blocks(membranes, u0, u1, strain):
-    """Tangent (p, c, c, 3, 3), N/m, of all panels at u0 = u1, with the stresses of strains (b, p).
+    """Tangent (p, c, c, 3, 3), N/m, of all panels at u0 = u1, with the stresses of strains (e, p).
 
     If u1 differs from u0, this is twice the derivative of the panels' mean forces with respect to
     u1.
@@ -202,9 +244,10 @@ def membrane_blocks(membranes, u0, u1, strain):
                 rate[i, 0, c] = -rate[i, 1, c]
         for i in range(bars):
             pull = 0.0
+            for j in range(strain.shape[0]):
+                pull += membranes.stiffness[i, j, p] * strain[j, p]
             for j in range(bars):
                 stiff = membranes.stiffness[i, j, p]
-                pull += stiff * strain[j, p]
                 for c in range(3):
                     along = stiff * membranes.per_length2[j, p] * last[j, c]
                     pulled[i, membranes.ends[j, 1], c] += along
@@ -221,6 +264,28 @@ def membrane_blocks(membranes, u0, u1, strain):
     return out
 
 
+def give_entries(membranes: Membranes, u0: NDArray, u1: NDArray) -> list[NDArray]:
+    """Tangents (p, 3c, k), (p, k, 3c) and (p, k, k), N/m, between nodes and gives, and of gives.
+
+    See `membrane_blocks`; the first has the forces of nodes, the second those of gives.
+    """
+    count, corners = membranes.nodes.shape
+    bars, ends = len(membranes.ends), membranes.ends
+    ways = np.zeros((bars, corners))  # -1 and 1 at the ends of the bars
+    ways[np.arange(bars), ends[:, 0]], ways[np.arange(bars), ends[:, 1]] = -1.0, 1.0
+    first, last = (
+        membranes.vector + (u[membranes.nodes[:, ends[:, 1]]] - u[membranes.nodes[:, ends[:, 0]]])
+        .transpose(1, 2, 0)
+        for u in (u0, u1)
+    )  # fmt: skip
+    across = membranes.per_length2[:, None] * membranes.stiffness[:bars, bars:]
+    pulls, slides = (
+        np.einsum("bc,bxp,bkp->pcxk", ways, along, across).reshape(count, 3 * corners, -1)
+        for along in (0.5 * (first + last), last)
+    )
+    return [pulls, slides.swapaxes(1, 2), membranes.stiffness[bars:, bars:].transpose(2, 0, 1)]
+
+
 class Back(NamedTuple):
     """Work arrays of the pullback for a group of eight panels, and the gradients."""
 
@@ -228,22 +293,23 @@ class Back(NamedTuple):
     between: NDArray  # (24 b,) differences of the weights at the bars' ends
     excess: NDArray  # (8 b,) squared length minus squared rest length, m2
     growth: NDArray  # (8 b,) rate of `excess` for nodal velocities of half the weights
-    stress: NDArray  # (8 b,) S E
-    pulled: NDArray  # (8 b,) S^T r, r the rates of the strains
+    rate: NDArray  # (8 e,) r, rates of the strains, and weights of the gives
+    pulled: NDArray  # (8 e,) S r
     vector: NDArray  # (3 b, p') gradient, p' the panels with room for whole groups
     per_length2: NDArray  # (b, p')
-    stiffness: NDArray  # (b b, p')
+    stiffness: NDArray  # (e e, p') of the lower half, which stands for both
 
 
 def back(membranes: Membranes) -> Back:
     """Memory for panels."""
     count, corners = membranes.nodes.shape
     bars = len(membranes.ends)
+    both = bars + membranes.gives.shape[1]
     # an odd number of groups: otherwise rows may compete for the same cache lines
     room = WIDTH * (-(-count // WIDTH) | 1)
     return Back(
-        *(np.zeros(rows * WIDTH) for rows in (3 * corners, 3 * bars, bars, bars, bars, bars)),
-        *(np.zeros((rows, room)) for rows in (3 * bars, bars, bars * bars)),
+        *(np.zeros(rows * WIDTH) for rows in (3 * corners, 3 * bars, bars, bars, both, both)),
+        *(np.zeros((rows, room)) for rows in (3 * bars, bars, both * both)),
     )
 
 
@@ -251,11 +317,11 @@ def back(membranes: Membranes) -> Back:
 def pull_membranes(own, back, u, weight, product):
     """Add the derivatives of weight . F = r^T S E to `product` and the gradients; all flat."""
     bars, room = own.ends.shape[0], back.vector.shape[1]
+    both = bars + own.given
     for first in range(0, own.count, WIDTH):
         _gather(own, first, u, own.moved)
         _gather(own, first, weight, back.weight)
         own.force[:] = 0.0
-        back.pulled[:] = 0.0
         at = bars * (first // WIDTH)
         for i in range(bars):
             x1, y1, z1 = take(own.moved, own.ends[i, 0])
@@ -268,7 +334,9 @@ def pull_membranes(own, back, u, weight, product):
             x1, y1, z1 = take(back.weight, own.ends[i, 0])
             x2, y2, z2 = take(back.weight, own.ends[i, 1])
             wx, wy, wz = x2 - x1, y2 - y1, z2 - z1
-            put(back.growth, i * WIDTH, wx * (vx + dx) + wy * (vy + dy) + wz * (vz + dz))
+            growth = wx * (vx + dx) + wy * (vy + dy) + wz * (vz + dz)
+            put(back.growth, i * WIDTH, growth)
+            put(back.rate, i * WIDTH, eight(own.per_length2, (at + i) * WIDTH) * growth)
             row = 3 * i * WIDTH
             put(own.along, row, dx)
             put(own.along, row + WIDTH, dy)
@@ -276,20 +344,19 @@ def pull_membranes(own, back, u, weight, product):
             put(back.between, row, wx)
             put(back.between, row + WIDTH, wy)
             put(back.between, row + 2 * WIDTH, wz)
-        for i in range(bars):
-            row = (at + i) * bars
-            rate = eight(own.per_length2, (at + i) * WIDTH) * eight(back.growth, i * WIDTH)
-            stress = 0.0 * rate
-            for j in range(bars):
-                stiffness = eight(own.stiffness, (row + j) * WIDTH)
-                strain = eight(own.strain, j * WIDTH)
-                stress = stress + stiffness * strain
-                increase(back.pulled, j * WIDTH, stiffness * rate)
-                increase(back.stiffness, (i * bars + j) * room + first, rate * strain)
-            put(back.stress, i * WIDTH, stress)
+        _gather_gives(own, first, u, own.strain)
+        _gather_gives(own, first, weight, back.rate)
+        _multiply(own, first, own.strain, own.stress)
+        _multiply(own, first, back.rate, back.pulled)
+        for i in range(both):
+            rate, strain = eight(back.rate, i * WIDTH), eight(own.strain, i * WIDTH)
+            increase(back.stiffness, (i * both + i) * room + first, rate * strain)
+            for j in range(i):
+                by = rate * eight(own.strain, j * WIDTH) + strain * eight(back.rate, j * WIDTH)
+                increase(back.stiffness, (i * both + j) * room + first, by)
         for i in range(bars):
             per_length2 = eight(own.per_length2, (at + i) * WIDTH)
-            stress, pulled = eight(back.stress, i * WIDTH), eight(back.pulled, i * WIDTH)
+            stress, pulled = eight(own.stress, i * WIDTH), eight(back.pulled, i * WIDTH)
             growth, excess = eight(back.growth, i * WIDTH), eight(back.excess, i * WIDTH)
             increase(back.per_length2, i * room + first, stress * growth + 0.5 * pulled * excess)
             stress, pulled = stress * per_length2, pulled * per_length2
@@ -307,6 +374,10 @@ def pull_membranes(own, back, u, weight, product):
                 row = 3 * own.nodes[at + v * WIDTH + q]
                 for c in range(3):
                     product[row + c] += own.force[(3 * v + c) * WIDTH + q]
+        at = own.given * first
+        for k in range(own.given):
+            for q in range(min(WIDTH, own.count - first)):
+                product[own.gives[at + k * WIDTH + q]] += back.pulled[(bars + k) * WIDTH + q]
 
 
 class _Backward(NamedTuple):
@@ -343,23 +414,25 @@ def _forces(own, u, v, t, force, powers):
 def _energies(own, u, out):
     membranes, moved, energy = own.whole, rows_at(u, own.rows), 0.0
     bars = membranes.ends.shape[0]
-    strain, along = np.empty(bars), np.empty(3)
+    strain, along = np.empty(bars + membranes.gives.shape[1]), np.empty(3)
     for p in range(membranes.nodes.shape[0]):
         for i in range(bars):
             strain[i] = strain_of(membranes, moved, p, i, along)
-        for i in range(bars):
-            for j in range(bars):
+        for k in range(membranes.gives.shape[1]):
+            strain[bars + k] = flat(moved)[membranes.gives[p, k]]
+        for i in range(strain.size):
+            for j in range(strain.size):
                 energy += 0.5 * strain[i] * membranes.stiffness[i, j, p] * strain[j]
     numbers_at(out, GROUP + 1)[GROUP] += energy
 
 
 @mean_forces
 def _mean_forces(own, u0, u1, before, h, t, force, powers):
-    """Uses mean strains and mid-step vectors, because energies are quadratic in strains."""
+    """Uses mean strains and mid-step vectors, as energies are quadratic in strains and gives."""
     membranes, out = own.whole, rows_at(force, own.rows)
     start, end = rows_at(u0, own.rows), rows_at(u1, own.rows)
-    bars, ends = membranes.ends.shape[0], membranes.ends
-    strain, along = np.empty(bars), np.empty((bars, 3))
+    bars, ends, given = membranes.ends.shape[0], membranes.ends, membranes.gives.shape[1]
+    strain, along = np.empty(bars + given), np.empty((bars, 3))
     one, other = np.empty(3), np.empty(3)
     for p in range(membranes.nodes.shape[0]):
         for i in range(bars):
@@ -367,10 +440,16 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
             strain[i] += 0.5 * strain_of(membranes, end, p, i, other)
             for c in range(3):
                 along[i, c] = 0.5 * (one[c] + other[c])
-        for i in range(bars):
+        for k in range(given):
+            dof = membranes.gives[p, k]
+            strain[bars + k] = 0.5 * (flat(start)[dof] + flat(end)[dof])
+        for i in range(bars + given):
             pull = 0.0
-            for j in range(bars):
+            for j in range(bars + given):
                 pull += membranes.stiffness[i, j, p] * strain[j]
+            if i >= bars:
+                flat(out)[membranes.gives[p, i - bars]] += pull
+                continue
             pull *= membranes.per_length2[i, p]
             a, b = membranes.nodes[p, ends[i, 0]], membranes.nodes[p, ends[i, 1]]
             for c in range(3):
@@ -392,6 +471,7 @@ class MembranesTerm(Term):
 
     def __init__(self, membranes: Membranes, rows: int) -> None:
         self.membranes, self.rows = membranes, rows
+        self.owns_hidden = membranes.gives.size > 0
 
     def memories(self, parts: Sequence[Any]) -> list[Packed]:
         """See `Term`: each thread has the panels that its nodes belong to."""
@@ -428,8 +508,17 @@ class MembranesTerm(Term):
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:
-        """See `Term`."""
-        return places_of(pairs_within(self.membranes.nodes))
+        """See `Term`: between nodes, then nodes and gives, gives and nodes, and gives."""
+        membranes = self.membranes
+        row, column = places_of(pairs_within(membranes.nodes))
+        nodal = (3 * membranes.nodes[:, :, None] + np.arange(3)).reshape(len(membranes.nodes), -1)
+        rows, columns = [row], [column]
+        gives = membranes.gives
+        for one, other in ((nodal, gives), (gives, nodal), (gives, gives)):
+            pairs = np.broadcast_arrays(one[:, :, None], other[:, None, :])
+            rows.append(pairs[0].ravel())
+            columns.append(pairs[1].ravel())
+        return np.concatenate(rows), np.concatenate(columns)
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
         """See `Term`."""
@@ -445,17 +534,26 @@ class MembranesTerm(Term):
         return 0.5 * self._entries(q0, q1, strain)
 
     def _strains(self, q0: NDArray, q1: NDArray) -> NDArray:
-        return strains_toward(self.membranes, nodal(q0), nodal(q1))
+        given = np.ravel(q1)[self.membranes.gives.T]
+        return np.concatenate([strains_toward(self.membranes, nodal(q0), nodal(q1)), given])
 
     def _entries(self, q0: NDArray, q1: NDArray, strain: NDArray) -> NDArray:
-        return membrane_blocks(self.membranes, nodal(q0), nodal(q1), strain).ravel()
+        given = self.membranes, nodal(q0), nodal(q1)
+        entries = [membrane_blocks(*given, strain)]
+        if self.membranes.gives.size:
+            entries += give_entries(*given)
+        return np.concatenate([each.ravel() for each in entries])
 
     def unstrained(self, q: NDArray) -> Unstrained:
         """See `Term`."""
-        size = (q.size, q.size)
-        entries = (self._entries(q, q, np.zeros_like(self.membranes.per_length2)), self.places)
+        size, gives = (q.size, q.size), self.membranes.gives
+        strain = np.zeros(self.membranes.stiffness.shape[1:])
+        entries = (self._entries(q, q, strain), self.places)
         tangent = sparse.csr_array(sparse.coo_array(entries, size))
-        return Unstrained(tangent, sparse.csr_array(size), lambda motion: 0.0)
+        first = len(entries[0]) - gives.size * gives.shape[1]  # gives come last
+        alone = entries[0][first:], tuple(place[first:] for place in self.places)
+        kept = sparse.csr_array(sparse.coo_array(alone, size))
+        return Unstrained(tangent, kept, lambda motion: 0.0)
 
     def strains(self, others: Strains) -> Strains:
         """See `Term`."""

@@ -142,7 +142,7 @@ class Term(ABC):
     energy_groups: ClassVar[Mapping[str, str]] = {}
     of_hinges: ClassVar[bool] = False
     shared: ClassVar[bool] = False
-    owns_hidden: ClassVar[bool] = False
+    owns_hidden: bool = False
     damps: ClassVar[bool] = False
     undifferentiated: ClassVar[str] = ""
     without: ClassVar[tuple[str, ...]] = ()

@@ -175,7 +175,7 @@ class Shell(Discretized):
         """
         panel, hinges, (plates, side, share) = self.triangle_panel, self.sides.hinges, self._plates
         bends = ~np.isin(panel, rigid_panels(self.options.rigid, len(self.pattern.faces)))
-        parts, stretched, pushed = swelling(self.membranes, None, self.nodes, strain)
+        parts, stretched, pushed = swelling(self.membranes, self.nodes, strain)
         corners = self.triangles[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]]
         turns = chord_turns(self.nodes[corners.reshape(-1, 3)]).reshape(-1, 3)
         rotated = np.where(bends, -curvature[panel], 0.0)[:, None] * turns  # of sides
@@ -258,6 +258,7 @@ class Shell(Discretized):
         own = Membranes(
             nodes=self.triangles.copy(),
             ends=np.array([[0, 1], [1, 2], [2, 0]]),
+            gives=np.zeros((len(side), 0), np.int64),
             vector=np.ascontiguousarray(side.transpose(1, 2, 0)),
             per_length2=np.ascontiguousarray(1.0 / np.einsum("tki,tki->kt", side, side)),
             stiffness=np.ascontiguousarray(self._stiffness[0].transpose(1, 2, 0)),

@@ -201,7 +201,7 @@ def discretize(
         bends = np.concatenate([plated.bends, welds])
         onset = plate_onset(bends, large)
 
-    coupled, gives = (), None
+    coupled, gives = (), np.zeros((0, 2), np.int64)
     if options.membrane == "panel":
         stiff = rigid_panels(options.rigid, len(pattern.faces))
         held = [*straight_in_plane(options.straight, options.guided, pattern), *edges]

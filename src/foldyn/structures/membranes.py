@@ -18,7 +18,7 @@ displacements near each end of an edge of length L gain
 
 with s the distance from that end, for s between the thickness t and L/2; within t displacements are
 constant. Stresses around a force at a corner fall as 1/s. Panels share the amplitudes g of the edge
-between them (`mechanics.edge_gives`). Near a vertex where the sheet is smooth
+between them, its *gives*. Near a vertex where the sheet is smooth
 (`graded.smooth_vertices`) the gain is g (s/L) (1 - s/L)^2, and the corner is not rigid.
 """
 
@@ -30,9 +30,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from foldyn.algebra.superlu import SingularTangentError
-from foldyn.mechanics.edge_gives import EdgeGives
+from foldyn.mechanics.block_matrix import of_elements
 from foldyn.mechanics.following import Following, tensions
 from foldyn.mechanics.membranes import Membranes
 from foldyn.patterns import Pattern
@@ -66,8 +68,8 @@ class Sides(NamedTuple):
 def membranes(
     mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[Edge], rigid: Collection[int],
     giving: bool = False, guided: Mapping[Edge, NDArray] = MappingProxyType({}),
-) -> tuple[tuple[PanelKind, ...], EdgeGives | None]:  # fmt: skip
-    """Membranes of all panels, and how edges give way near their ends.
+) -> tuple[tuple[PanelKind, ...], NDArray]:  # fmt: skip
+    """Membranes of all panels, and the edges (g, 2) of the gives, by number.
 
     Parameters
     ----------
@@ -78,12 +80,11 @@ def membranes(
     giving : whether other edges give way; never for panels that do not bend or are not convex.
     guided : directions in which boundary edges can bow; see `structures.guided_edges`.
     """
-    kinds: dict[tuple, list[tuple[int, NDArray, NDArray]]] = {}
+    kinds: dict[tuple, list[tuple[int, NDArray, NDArray, NDArray]]] = {}
     sides, stiff = _sides(mesh, pattern, sheet, straight, rigid, guided), set(rigid)
     gives = [giving and own.convex and p not in stiff for p, own in enumerate(sides)]
     numbers = _numbers(pattern, gives)
     loose = {edge_of(a, b) for a, b in pattern.boundary.tolist()} - set(straight)
-    parts: list[tuple] = []
     properties, kind = sheet.kinds(len(pattern.faces))
     first = np.searchsorted(mesh.inner_panel, np.arange(len(pattern.faces) + 1))
     smooth = smooth_vertices(pattern)
@@ -109,14 +110,13 @@ def membranes(
         shared, free = number >= 0, np.array([edge in loose for edge, _ in own_ends])
         part = coupling(panel, ends, own.poissons_ratio, found.get(p), shared, free)
         part *= own.youngs_modulus * own.thickness
-        bars = len(ends)
-        kinds.setdefault((len(nodes), ends), []).append((p, nodes, part[:bars, :bars]))
-        if shared.any():
-            parts.append((p, nodes, ends, number[shared], part[:, bars:]))
+        alike = len(nodes), ends, int(shared.sum())
+        kinds.setdefault(alike, []).append((p, nodes, number[shared], part))
+    edges = np.array([edge for edge, _ in numbers], np.int64).reshape(-1, 2)
     return tuple(
         _packed(mesh.nodes, np.array(ends), *zip(*members, strict=True))
-        for (_, ends), members in kinds.items()
-    ), _gives(mesh.nodes, parts, [edge for edge, _ in numbers]) if parts else None
+        for (_, ends, _), members in kinds.items()
+    ), edges
 
 
 def _known(panel: Sides, sheet: Sheet, area: float, gives: bool, smooth: NDArray) -> Kind:
@@ -135,30 +135,6 @@ def _numbers(pattern: Pattern, gives: Sequence[bool]) -> dict[tuple[Edge, int], 
             beside[edge] = beside.get(edge, 0) + own
     edges = [edge for edge, count in beside.items() if count == 2]
     return {(edge, end): 2 * k + j for k, edge in enumerate(edges) for j, end in enumerate(edge)}
-
-
-def _gives(x: NDArray, parts: list[tuple], edges: list[Edge]) -> EdgeGives:
-    """Gives of panels: nodes (c,), bars (b, 2), give indices (k,), columns (b + k, k), N/m."""
-    panel, size = np.array([p for p, *_ in parts]), len(parts)
-    corners, bars, most = (max(len(part[k]) for part in parts) for k in (1, 2, 3))
-    out = EdgeGives(
-        len(edges), np.array(edges), panel, np.zeros((size, corners), np.int64),
-        np.zeros((size, bars, 2), np.int64), np.zeros((size, bars, 3)), np.zeros((size, bars)),
-        np.zeros((size, most), np.int64),
-        np.zeros((size, bars, most)), np.zeros((size, most, most)), np.zeros(bars),
-        np.zeros((bars, 3)), np.zeros(most), np.zeros(most),
-    )  # fmt: skip
-    for p, (_, nodes, ends, number, columns) in enumerate(parts):
-        b, k = len(ends), len(number)
-        out.nodes[p], out.nodes[p, : len(nodes)] = nodes[0], nodes
-        out.ends[p, :b], out.number[p], out.number[p, :k] = ends, number[0], number
-        rows = nodes[np.array(ends)]
-        out.vector[p, :b] = x[rows[:, 1]] - x[rows[:, 0]]
-        length = np.linalg.norm(out.vector[p, :b], axis=1)
-        out.per_length2[p, :b] = 1.0 / length**2
-        out.across[p, :b, :k] = columns[:b] * length[:, None]
-        out.stiffness[p, :k, :k] = columns[b:]
-    return out
 
 
 def _sides(
@@ -250,15 +226,15 @@ def coupling(
 
 
 def energies(
-    kinds: Sequence[PanelKind], gives: EdgeGives | None, rest: NDArray, u: NDArray, panels: int,
+    kinds: Sequence[PanelKind], rest: NDArray, u: NDArray, panels: int,
     free: NDArray | None = None,
 ) -> NDArray:  # fmt: skip
     """Energy (samples, panels), J, of the membranes at displacements u (samples, n, 3), m.
 
     free : (samples, k) free strains of the bars of all panels in turn, as `swelling` returns them.
     """
-    x, out, first = rest + u, np.zeros((len(u), panels)), 0
-    for which, own in kinds:
+    x, out, first, strains = rest + u, np.zeros((len(u), panels)), 0, []
+    for _, own in kinds:
         start, end = (x[:, own.nodes[:, place]] for place in own.ends.T)
         square = np.einsum("spbc,spbc->bsp", end - start, end - start)
         strain = 0.5 * (square * own.per_length2[:, None] - 1.0)
@@ -267,22 +243,34 @@ def energies(
             end = first + bars * count
             own_free, first = free[:, first:end].reshape(samples, bars, count), end
             strain -= own_free.transpose(1, 0, 2)
+        strains.append(strain)
+    for (which, own), strain in zip(kinds, with_gives(kinds, strains), strict=True):
         energy = 0.5 * np.einsum("isp,ijp,jsp->sp", strain, own.stiffness, strain)
         np.add.at(out.T, which, energy.T)
-    for sample, here in enumerate(u if gives else ()):
-        assert gives is not None
-        strain = gives.strains(here)
-        if free is not None:
-            strain = strain - free[sample, first:].reshape(strain.shape)
-        g = gives.balanced(strain)[gives.number]
-        pull = np.einsum("pb,pbk->pk", strain, gives.across)
-        pull += 0.5 * np.einsum("pj,pjk->pk", g, gives.stiffness)
-        out[sample, gives.panel] += (pull * g).sum(axis=1)
     return out
 
 
+def with_gives(kinds: Sequence[PanelKind], strains: Sequence[NDArray]) -> list[NDArray]:
+    """Strains (b, samples, p) of each kind, followed by the gives (k, samples, p) in balance."""
+    count = 1 + max((int(own.gives.max(initial=-1)) for _, own in kinds), default=-1)
+    if not count:
+        return list(strains)
+    stiffness = sparse.csc_array((count, count))
+    pull = np.zeros((count, strains[0].shape[1]))
+    for (_, own), strain in zip(kinds, strains, strict=True):
+        bars = len(strain)
+        np.add.at(pull, own.gives.T, np.einsum("bkp,bsp->kps", own.stiffness[:bars, bars:], strain))
+        alone = own.stiffness[bars:, bars:].transpose(2, 0, 1)
+        stiffness = stiffness + of_elements(own.gives, alone, count)
+    g = -np.reshape(splu(sparse.csc_array(stiffness)).solve(pull), pull.shape)
+    return [
+        np.concatenate([strain, g[own.gives.T].swapaxes(1, 2)])
+        for (_, own), strain in zip(kinds, strains, strict=True)
+    ]
+
+
 def swelling(
-    kinds: Sequence[PanelKind], gives: EdgeGives | None, x: NDArray, strain: NDArray
+    kinds: Sequence[PanelKind], x: NDArray, strain: NDArray
 ) -> tuple[list[Following], NDArray, NDArray]:
     """Forces of panels that would stretch by `strain` (np,) if they were free.
 
@@ -291,37 +279,30 @@ def swelling(
 
     x : (n, 3) rest positions of the nodes, m.
     """
-    parts, free = [], strain * (1.0 + 0.5 * strain)
-    strains, pushes = [np.zeros(0)], [np.zeros(0)]
-    for which, own in kinds:
-        push = own.stiffness.sum(axis=1) * free[which]
-        tension = -push * own.per_length2
-        strains.append(np.broadcast_to(free[which], push.shape).ravel())
+    free, parts, pushes = strain * (1.0 + 0.5 * strain), [], []
+    strains = [np.broadcast_to(free[which], own.per_length2.shape)[:, None] for which, own in kinds]
+    for (_, own), both in zip(kinds, with_gives(kinds, strains), strict=True):
+        push = np.einsum("ijp,jp->ip", own.stiffness[: len(own.ends)], both[:, 0])
         pushes.append(push.ravel())
         bars = own.nodes[:, own.ends].transpose(1, 0, 2).reshape(-1, 2)
-        parts.append(tensions(x, bars, tension.ravel()))
-    if gives:
-        ends = gives.bars
-        alike = np.repeat(free[gives.panel][:, None], ends.shape[1], axis=1)
-        g = gives.balanced(alike)[gives.number]
-        push = np.einsum("pbk,pk->pb", gives.across, g)
-        tension = -push * gives.per_length2
-        strains.append(alike.ravel())
-        pushes.append(push.ravel())
-        there = gives.per_length2 > 0.0
-        parts.append(tensions(x, ends[there], tension[there]))
-    return parts, np.concatenate(strains), np.concatenate(pushes)
+        parts.append(tensions(x, bars, (-push * own.per_length2).ravel()))
+    return parts, np.concatenate([own.ravel() for own in strains]), np.concatenate(pushes)
 
 
-def _packed(x: NDArray, ends: NDArray, panels: tuple, nodes: tuple, coupled: tuple) -> PanelKind:
-    """Panels of one kind with nodes (c,), and stiffness (b, b), N/m, of elongations."""
+def _packed(
+    x: NDArray, ends: NDArray, panels: tuple, nodes: tuple, gives: tuple, coupled: tuple
+) -> PanelKind:
+    """Panels of one kind with nodes (c,), gives (k,), and stiffness (b + k, b + k), N/m."""
     numbers = np.array(nodes, np.int64)
     vector = x[numbers[:, ends[:, 1]]] - x[numbers[:, ends[:, 0]]]
     length = np.linalg.norm(vector, axis=2)
-    stiffness = np.array(coupled) * length[:, :, None] * length[:, None, :]
+    scale = np.pad(length, ((0, 0), (0, len(gives[0]))), constant_values=1.0)
+    stiffness = np.array(coupled) * scale[:, :, None] * scale[:, None, :]
+    stiffness = 0.5 * (stiffness + stiffness.swapaxes(1, 2))
     own = Membranes(
         nodes=numbers,
         ends=ends,
+        gives=np.array(gives, np.int64).reshape(len(gives), -1),
         vector=np.ascontiguousarray(vector.transpose(1, 2, 0)),
         per_length2=np.ascontiguousarray(1.0 / length.T**2),
         stiffness=np.ascontiguousarray(stiffness.transpose(1, 2, 0)),

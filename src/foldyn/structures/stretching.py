@@ -45,7 +45,7 @@ def most(structure: Discretized) -> float:
         return np.inf
     if not getattr(structure, "membranes", ()):
         return SINGLE
-    if getattr(structure, "edge_gives", None) is not None:
+    if len(getattr(structure, "edge_gives", ())):
         corners = {vertex for face in pattern.faces for vertex in face}
         closed = len(corners) - len(pattern.edges) + len(pattern.faces) < 1
         return GIVING if closed or len(pattern.welds) else np.inf
@@ -59,7 +59,7 @@ def remedy(structure: Discretized, linear: bool = False) -> str:
     """
     if not getattr(structure, "membranes", ()):
         why, better = "single bars are far too stiff", 'membrane = "panel", or '
-    elif getattr(structure, "edge_gives", None) is None:
+    elif not len(getattr(structure, "edge_gives", ())):
         why, better = "edges that stay straight can be too stiff", 'preset = "n5b8e", or '
     else:
         why, better = "closed and welded sheets are often 5 to 20 % off", ""

@@ -24,7 +24,6 @@ from foldyn.materials import (
 )
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.clamps import RIDES, ClampsTerm
-from foldyn.mechanics.edge_gives import EdgeGives, EdgeGivesTerm
 from foldyn.mechanics.following import Following, joined, moments, pushes, tensions
 from foldyn.mechanics.membranes import MembranesTerm
 from foldyn.mechanics.plates import handed_over
@@ -119,8 +118,9 @@ class Structure(Discretized):
         Panels as plates, for the scheme n5b8e.
     membranes : tuple of PanelKind
         Coupling of the bars of panels, for `membrane = "panel"`, which does not use `bar_area`.
-    edge_gives : EdgeGives or None
-        How edges give way near their ends, in the plane of panels; for the scheme n5b8e.
+    edge_gives : (g, 2)
+        Vertices of the edge of each give, by which edges give way near their ends in the plane of
+        panels; for the scheme n5b8e.
     by_folds : bool
         Whether the dofs of edge angles are those of explicit methods; see `mechanics.plates`.
     pattern, sheet, options
@@ -149,7 +149,7 @@ class Structure(Discretized):
     clamp_stiffness: NDArray = field(default_factory=lambda: _none(1, float))
     edge_plates: EdgePlates | None = None
     membranes: tuple[PanelKind, ...] = ()
-    edge_gives: EdgeGives | None = None
+    edge_gives: NDArray = field(default_factory=lambda: _none(2))
     by_folds: bool = False
 
     def __repr__(self) -> str:
@@ -219,14 +219,11 @@ class Structure(Discretized):
         """A body: the sheet, with the membranes of the panels in place of independent bars."""
         if not self.membranes:
             return Assembly(sheet)
-        body = Assembly(
-            sheet.hinges_alone(), *(MembranesTerm(own, sheet.rows) for _, own in self.membranes)
-        )
-        if self.edge_gives is None:
-            return body
         plates = self.edge_plates
         first = self.nodes.size + (0 if plates is None else len(plates.rotation_hinge))
-        return body.with_terms(EdgeGivesTerm(self.edge_gives, sheet.rows, first))
+        coupled = (own._replace(gives=first + own.gives) for _, own in self.membranes)
+        terms = (MembranesTerm(own, sheet.rows) for own in coupled)
+        return Assembly(sheet.hinges_alone(), *terms)
 
     @property
     def massless(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -239,9 +236,9 @@ class Structure(Discretized):
         return np.concatenate([self.folds, self.bends])[:, :2].tolist()
 
     def _plates_term(self, plates: EdgePlates) -> BarsPlatesTerm:
-        if self.edge_gives is not None:  # unlike dofs of plates
+        if len(self.edge_gives):  # unlike dofs of plates
             hinge = {frozenset(axis): k for k, axis in enumerate(self._axes)}
-            gives = [hinge[frozenset(edge)] for edge in self.edge_gives.edge.tolist()]
+            gives = [hinge[frozenset(edge)] for edge in self.edge_gives.tolist()]
             plates = plates._replace(rotation_hinge=np.append(plates.rotation_hinge, gives))
         model = plates_model(
             self.nodes, self.bars, self.bar_stiffness, self.bar_law, self.folds,
@@ -291,8 +288,7 @@ class Structure(Discretized):
         """Effect of swelling; a bar between panels gets their mean strain. See `Discretized`."""
         stress, none = np.zeros(0), np.zeros(0)
         if self.membranes:
-            own = self.membranes, self.edge_gives, self.nodes, strain
-            parts, longer, push = swelling(*own)
+            parts, longer, push = swelling(self.membranes, self.nodes, strain)
         else:
             free = mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
             stress, longer, push = self.bar_law.stress(1.0 + free), none, none

@@ -154,8 +154,8 @@ def energy_density(structure: Discretized, displacement: NDArray, found: States)
     triangle = 0.5 * np.linalg.norm(double_areas(structure.nodes, structure.triangles), axis=1)
     area = np.bincount(panel, triangle)
     panels = membranes.energies(
-        structure.membranes, getattr(structure, "edge_gives", None), structure.nodes, displacement,
-        len(area), found.free if found.free.shape[1] else None,
+        structure.membranes, structure.nodes, displacement, len(area),
+        found.free if found.free.shape[1] else None,
     )  # fmt: skip
     if isinstance(structure, Structure):
         if not structure.membranes:

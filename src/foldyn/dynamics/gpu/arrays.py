@@ -103,7 +103,7 @@ class CaseArrays:
     def _membranes(self, own: Sequence[Membranes]) -> Membranes:
         for v in range(own[0].nodes.shape[1]):
             self._add(own[0].nodes[:, v], 1)
-        return _stacked(own, ("nodes", "ends"))
+        return _stacked(own, ("nodes", "ends", "gives"))
 
     def _springs(self, own: Sequence[Springs]) -> Springs:
         own = own or [NO_SPRINGS]
@@ -209,6 +209,6 @@ def _codes(runs: NDArray, count: int) -> NDArray:
 
 
 def _no_panels() -> Membranes:
-    nodes, ends = np.zeros((0, 1), np.int64), np.zeros((0, 2), np.int64)
+    nodes, ends, gives = (np.zeros((0, k), np.int64) for k in (1, 2, 0))
     shapes = (1, 0, 3, 0), (1, 0, 0), (1, 0, 0, 0)
-    return Membranes(nodes, ends, *map(np.zeros, shapes))  # type: ignore[call-arg]
+    return Membranes(nodes, ends, gives, *map(np.zeros, shapes))  # type: ignore[call-arg]

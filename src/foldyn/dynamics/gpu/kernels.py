@@ -92,7 +92,12 @@ class Span(NamedTuple):
 def panels_to(kind, m, u, slot, size, at_slot, who, crowd, sampled, strain):
     """Write corner forces of the panels of one kind; return the next free slot."""
     own = Membranes(
-        kind.nodes, kind.ends, at(kind.vector, m), at(kind.per_length2, m), at(kind.stiffness, m)
+        kind.nodes,
+        kind.ends,
+        kind.gives,
+        at(kind.vector, m),
+        at(kind.per_length2, m),
+        at(kind.stiffness, m),
     )
     count, corners, bars = own.nodes.shape[0], own.nodes.shape[1], own.ends.shape[0]
     stretch, along = cuda.local.array(MOST_BARS, float64), cuda.local.array(3, float64)
