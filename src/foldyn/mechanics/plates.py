@@ -32,9 +32,16 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment, hinge_slope
-from foldyn.mechanics.bars_hinges import bars_hinges_kernels
+from foldyn.mechanics.bars_hinges import ALL, bars_hinges_kernels
 from foldyn.mechanics.discrete_gradient import discrete_gradient, mean_moment, put_motion
-from foldyn.mechanics.force import ForceScratch, force_scratch, put_dihedral, whole_lanes
+from foldyn.mechanics.force import (
+    ForceScratch,
+    force_scratch,
+    gather,
+    put_dihedral,
+    scatter,
+    whole_lanes,
+)
 from foldyn.mechanics.model import BLOCK, BarsHinges
 from foldyn.mechanics.term import (
     ENERGIES,
@@ -90,10 +97,13 @@ class PlatesScratch(NamedTuple):
     """Scratch of one evaluation; nh = nf + nb."""
 
     bars: ForceScratch
+    corners: NDArray  # (4 nh,) nodes of the hinges, uint32: signed would be tested for wraparound
+    position: NDArray  # (4 n,) rows of four load as vectors
+    sums: NDArray  # (4 n,) forces of hinges
     points: NDArray  # (12 * BLOCK,) of a block of hinges
-    found: NDArray  # (13 * BLOCK,) gradients and, in the last row, angles
+    found: NDArray  # (13 * BLOCK,) for each block: gradients and, in the last row, angles
     angle: NDArray  # (nh,) dihedrals, rad
-    gradient: NDArray  # (nh, 12)
+    gradient: NDArray  # (nh, 12) the same gradients, if `put_gradients` has put them there
     moment: NDArray  # (nh,) N m
     fold_angle: NDArray  # (nf,) rad
     x: NDArray  # (r,) rotations, m
@@ -105,9 +115,11 @@ class PlatesScratch(NamedTuple):
 def plates_scratch(model: BarsPlates) -> PlatesScratch:
     """Scratch for `model`."""
     nh, nf = len(model.hinges), len(model.fold_rest)
-    most = int(np.diff(model.start).max(initial=0))
+    most, blocks = int(np.diff(model.start).max(initial=0)), -(-nh // BLOCK)
+    corners = np.ascontiguousarray(model.hinges, np.uint32).ravel()
     return PlatesScratch(
-        force_scratch(model.bars), np.ones(12 * BLOCK), np.zeros(13 * BLOCK), np.zeros(nh),
+        force_scratch(model.bars), corners, *np.zeros((2, 4 * model.nodes)),
+        np.ones(12 * BLOCK), np.zeros(13 * BLOCK * blocks), np.zeros(nh),
         np.zeros((nh, 12)), np.zeros(nh), np.zeros(nf), np.zeros(model.rotations),
         np.zeros(most), np.array([0, model.rows]), team(1)[0],
     )  # fmt: skip
@@ -116,33 +128,46 @@ def plates_scratch(model: BarsPlates) -> PlatesScratch:
 @kernel
 def turn_hinges(model, u, scratch):
     """Dihedrals and their gradients at displacements u, in blocks of hinges."""
-    x, g, p, rest = scratch.points, scratch.found, np.empty((4, 3)), model.bars.rest
+    x, p, rest, position = scratch.points, np.empty((4, 3)), model.bars.rest, scratch.position
+    for i in range(rest.shape[0]):
+        for c in range(3):
+            position[4 * i + c] = rest[i, c] + u[i, c]
     for first in range(0, model.hinges.shape[0], BLOCK):
         m = min(BLOCK, model.hinges.shape[0] - first)
+        g = scratch.found[13 * first : 13 * (first + BLOCK)]
         for v in range(4):
-            for q in range(m):
-                node, at = model.hinges[first + q, v], 3 * v * BLOCK + q
-                x[at] = rest[node, 0] + u[node, 0]
-                x[at + BLOCK] = rest[node, 1] + u[node, 1]
-                x[at + 2 * BLOCK] = rest[node, 2] + u[node, 2]
-        for q in range(m):
-            if rides(model, first + q):
-                put_points(model, u, first + q, p)
-                for c in range(12):
-                    x[c * BLOCK + q] = flat(p)[c]
+            gather(position, ALL, scratch.corners, 4, v, first, m, x, 3 * v * BLOCK)
+        for q in range(ridden(model, first), m):
+            put_points(model, u, first + q, p)
+            for c in range(12):
+                x[c * BLOCK + q] = flat(p)[c]
         for q in range(whole_lanes(m)):
             put_dihedral(x, q, g)
         for q in range(m):
             scratch.angle[first + q] = g[12 * BLOCK + q]
-            for c in range(12):
-                scratch.gradient[first + q, c] = g[c * BLOCK + q]
-            carry(model, first + q, scratch.gradient)
+        for q in range(ridden(model, first), m):
+            carry(g, q, BLOCK)
+
+
+@kernel
+def put_gradients(model, scratch):
+    """Put the gradients of all hinges into `scratch.gradient`, after `turn_hinges`."""
+    for h in range(model.hinges.shape[0]):
+        first = h // BLOCK * BLOCK
+        for c in range(12):
+            scratch.gradient[h, c] = scratch.found[13 * first + c * BLOCK + h - first]
 
 
 @inner_scalar
 def rides(model, h):
     """Whether hinge h is a clamped edge."""
     return h >= model.hinges.shape[0] - model.wings.shape[0]
+
+
+@inner_scalar
+def ridden(model, first):
+    """Number of the first clamped edge in the block of hinges from `first` on."""
+    return max(0, model.hinges.shape[0] - model.wings.shape[0] - first)
 
 
 @inner_scalar
@@ -169,15 +194,15 @@ def put_points(model, u, h, points):
 
 
 @inner_scalar
-def carry(model, h, gradient):
-    """If hinge h is a clamped edge, distribute the wing's gradient to both ends, half each.
+def carry(gradient, at, stride):
+    """Distribute the gradient of a clamped edge's wing to both ends, half each.
 
-    The first end takes the place of the wing in `hinges`, so its half stays there.
+    The first end takes the place of the wing in `hinges`, so its half stays there. Entries of the
+    flat gradient are `stride` apart, from `at` on.
     """
-    if rides(model, h):
-        for c in range(3):
-            gradient[h, 9 + c] *= 0.5
-            gradient[h, 3 + c] += gradient[h, 9 + c]
+    for c in range(3):
+        gradient[at + (9 + c) * stride] *= 0.5
+        gradient[at + (3 + c) * stride] += gradient[at + (9 + c) * stride]
 
 
 @inner
@@ -253,6 +278,7 @@ def turned_contexts(
     """Contexts of the model and of `turned_plates`."""
     own, room = Context(model), Context(plates_scratch(model))  # one version of each kernel
     turn_hinges(own, u, room)
+    put_gradients(own, room)
     if z is not None:
         _turn_folds_by(own, z, room)
     return own, room
@@ -355,11 +381,17 @@ def plates_force(model, bars, u, z, force, couple, scratch):
 @inner
 def add_hinge_moments(model, scratch, force):
     """Add the forces (n, 3) of the moments of all hinges."""
-    for h in range(model.hinges.shape[0]):
+    sums = scratch.sums
+    sums[:] = 0.0
+    for first in range(0, model.hinges.shape[0], BLOCK):
+        m = min(BLOCK, model.hinges.shape[0] - first)
+        g = scratch.found[13 * first : 13 * (first + BLOCK)]
         for v in range(4):
-            node = model.hinges[h, v]
-            for c in range(3):
-                force[node, c] += scratch.moment[h] * scratch.gradient[h, 3 * v + c]
+            at = 3 * v * BLOCK
+            scatter(sums, ALL, scratch.corners, 4, v, first, m, g, at, scratch.moment, first)
+    for i in range(force.shape[0]):
+        for c in range(3):
+            force[i, c] += sums[4 * i + c]
 
 
 @inner
@@ -463,9 +495,11 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
         ride(model, hinge, 1.0, x)
         ride(model, hinge, 0.0, dx)
         discrete_gradient(x, dx, scratch.angle[hinge] - began[hinge], points, plain, gradient)
+        at = 13 * (hinge // BLOCK * BLOCK) + hinge % BLOCK
         for c in range(12):
-            scratch.gradient[hinge, c] = flat(gradient)[c]
-        carry(model, hinge, scratch.gradient)
+            scratch.found[at + c * BLOCK] = flat(gradient)[c]
+        if rides(model, hinge):
+            carry(scratch.found, at, BLOCK)
     add_hinge_moments(model, scratch, out)
 
 
