@@ -75,12 +75,14 @@ from foldyn.live import View as View, view as view
 from foldyn.gradients import sensitivity as sensitivity
 from foldyn.linear import (
     Fidelity as Fidelity,
+    SpectralDensity as SpectralDensity,
     UnitCell as UnitCell,
     bands as bands,
     fidelity as fidelity,
     frf as frf,
     mac as mac,
     modes as modes,
+    random_response as random_response,
 )
 from foldyn.materials import (
     BarLaw as BarLaw,

@@ -15,7 +15,9 @@ from foldyn.linear.linearized import Linearized, equivalent_slope, linearize
 from foldyn.linear.mac import Pairs, mac, pair_modes
 from foldyn.linear.modes import modes
 from foldyn.linear.peaks_of import Peak, peaks_of
+from foldyn.linear.random_response import random_response
 from foldyn.linear.reference import Refinement, refinement
+from foldyn.linear.spectral_density import SpectralDensity
 from foldyn.linear.time_domain import SteppedSine
 from foldyn.linear.transients import BurstRandom, Impulse
 from foldyn.linear.unit_cell import UnitCell
@@ -33,6 +35,7 @@ __all__ = [
     "Pairs",
     "Peak",
     "Refinement",
+    "SpectralDensity",
     "SteppedSine",
     "UnitCell",
     "absorbing_end",
@@ -51,6 +54,7 @@ __all__ = [
     "modes",
     "pair_modes",
     "peaks_of",
+    "random_response",
     "refinement",
     "relaxed",
     "space_time",

@@ -7,6 +7,7 @@ from foldyn.results.dataset import (
     frf_dataset,
     modes_dataset,
     path_dataset,
+    random_dataset,
     trajectory_dataset,
 )
 from foldyn.results.frames import Shapes, States, frames_of, shapes_of, state_of
@@ -30,6 +31,7 @@ __all__ = [
     "main_effects",
     "modes_dataset",
     "path_dataset",
+    "random_dataset",
     "save",
     "shapes_of",
     "sobol_indices",

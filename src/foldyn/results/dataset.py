@@ -29,6 +29,7 @@ from foldyn.results.quantities import (
     PATH,
     PLACE,
     POINTS,
+    RANDOM,
     RESPONSES,
     Quantity,
     energies_of,
@@ -246,6 +247,34 @@ def frf_dataset(
     data["drive"] = variable(PLACE, drive, driven, "amplitude of the drive")
     along = {"frequency": ("frequency", np.array(frequency, float), {"units": "Hz"})}
     return result_dataset("frf", case, data, along, statistics)
+
+
+def random_dataset(
+    case: Case, place: ArrayLike, displacement: ArrayLike, acceleration: ArrayLike,
+    moving: ArrayLike, accelerating: ArrayLike, statistics: Mapping[str, Any],
+) -> xr.Dataset:  # fmt: skip
+    """Dataset of a random response, including its case; all arrays (n, 3).
+
+    Parameters
+    ----------
+    case : Case
+        The case that responds, without the drives.
+    place : array_like
+        Displacement (m) of the state about which the case moves.
+    displacement, acceleration : array_like
+        Root mean squares, m and m/s2.
+    moving, accelerating : array_like
+        Zero crossings of these with rising values, Hz.
+    statistics : mapping
+        Facts about the run, each stored as an attribute.
+    """
+    values = (displacement, acceleration, moving, accelerating)
+    data = {
+        name: variable(PLACE, value, quantity.units, quantity.text)
+        for (name, quantity), value in zip(RANDOM.items(), values, strict=True)
+    }
+    data["displacement"] = variable(PLACE, place, "m", "displacement of the state")
+    return result_dataset("random", case, data, {}, statistics)
 
 
 def bands_dataset(

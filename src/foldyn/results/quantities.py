@@ -136,6 +136,13 @@ INTERNAL: Mapping[str, Quantity] = {
 }
 """Further variables of modes, of some models or in air. The dimension `between` counts the
 middles of edges and spokes, panel by panel."""
+RANDOM: Mapping[str, Quantity] = {
+    "displacement_rms": Quantity("m", "root mean square displacement, relative to the base"),
+    "acceleration_rms": Quantity("m/s2", "root mean square of the absolute acceleration"),
+    "displacement_crossings": Quantity("Hz", "zero crossings of the displacement, rising"),
+    "acceleration_crossings": Quantity("Hz", "zero crossings of the acceleration, rising"),
+}
+"""Variables of a random response."""
 RESPONSES: Mapping[str, Quantity] = {
     "receptance": Quantity("m/N", "displacement per force", PLACE),
     "mobility": Quantity("m/(N s)", "velocity per force", PLACE),

@@ -1,0 +1,201 @@
+"""Random vibration: mean squares beside closed forms and beside simulated noise."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.linalg import solve_continuous_lyapunov
+
+import foldyn as fd
+from foldyn.errors import InputError, ModelRangeWarning
+
+MASS, ZETA = 0.3, 0.02
+
+
+def chain(stiffness, masses, zeta=ZETA):
+    """Masses on nodes 1, 2, ... that move along x, each on a spring from the node before.
+
+    The sheet around them hardly resists, and has no mass.
+    """
+    soft = fd.Sheet(1e-9, 0.3, 1e-3)
+    made = fd.discretize(fd.patterns.simple_fold(dihedral=120), soft, preset="plate")
+    moving = list(range(1, len(masses) + 1))
+    others = [node for node in range(len(made.nodes)) if node not in moving]
+    supports = [fd.Fix(others, "xyz"), fd.Fix(moving, "yz")]
+    supports += [
+        fd.Spring(k, between=[(node - 1, node)], direction="x")
+        for node, k in zip(moving, stiffness, strict=True)
+    ]
+    points = [fd.PointMass([node], m) for node, m in zip(moving, masses, strict=True)]
+    return fd.Case(made, supports, damping=fd.ModalDamping(zeta), masses=points)
+
+
+def noise(value, low=1e-3, high=1e4, unit="m2/s3"):
+    return fd.SpectralDensity([low, high], [value, value], unit)
+
+
+def test_the_mean_square_of_one_mass_under_white_noise():
+    """pi f S (1 + 4 zeta^2) / (4 zeta) of the absolute acceleration (Crandall and Mark, 1963).
+
+    And S / (64 pi^3 f^3 zeta) of the relative displacement; both for all frequencies from 0.
+    """
+    case, s = chain([500.0], [MASS]), 0.2
+    f = np.sqrt(500.0 / MASS) / (2.0 * np.pi)
+    found = fd.random_response(case, base={"x": noise(s, 1e-6, 1e7)}).sel(node=1, axis="x")
+    accelerated = np.pi * f * s * (1.0 + 4.0 * ZETA**2) / (4.0 * ZETA)
+    np.testing.assert_allclose(found.acceleration_rms**2, accelerated, rtol=1e-6)
+    np.testing.assert_allclose(
+        found.displacement_rms**2, s / (64 * np.pi**3 * f**3 * ZETA), rtol=1e-6
+    )
+    np.testing.assert_allclose(found.displacement_crossings, f, rtol=1e-6)
+
+
+@pytest.mark.parametrize("zeta", [1e-5, 0.3])
+def test_band_limited_noise(zeta):
+    """The integral between two frequencies, one of them on the slope of the peak."""
+    case = chain([500.0], [MASS], zeta)
+    f = np.sqrt(500.0 / MASS) / (2.0 * np.pi)
+    low, high = 0.2 * f, 1.05 * f
+    density = fd.SpectralDensity([low, 0.5 * f, high], [0.1, 0.4, 0.4], "m2/s3")
+    found = fd.random_response(case, base={"x": density}).sel(node=1, axis="x")
+
+    def power(x):
+        return (
+            float(density.at(x))
+            * (1 + (2 * zeta * x / f) ** 2)
+            / ((1 - (x / f) ** 2) ** 2 + (2 * zeta * x / f) ** 2)
+        )
+
+    near = [f * (1 + side * zeta * 4.0**k) for k in range(-3, 9) for side in (-1, 1)]
+    ends = sorted({low, 0.5 * f, high, f, *(x for x in near if low < x < high)})
+    true = sum(quad(power, a, b, epsrel=1e-11)[0] for a, b in pairwise(ends))
+    np.testing.assert_allclose(found.acceleration_rms**2, true, rtol=1e-6)
+
+
+def test_three_masses_beside_the_lyapunov_equation():
+    """With a dashpot that couples the modes, white forces on one mass and on another, alone."""
+    stiffness, masses = np.array([300.0, 200.0, 100.0]), np.array([0.3, 0.2, 0.1])
+    case = chain(stiffness, masses).altered(
+        supports=[*chain(stiffness, masses).supports, fd.Dashpot(0.05, [3])],
+        damping=fd.Rayleigh(0.4),
+    )
+    s = (0.02, 0.05)
+    found = fd.random_response(
+        case,
+        forces=[(fd.Force([2], (1, 0, 0)), noise(s[0], 1e-5, 1e6, "N2/Hz")),
+                (fd.Force([3], (2, 0, 0)), noise(s[1], 1e-5, 1e6, "N2/Hz"))],
+    )  # fmt: skip
+    k = np.diag(stiffness + np.append(stiffness[1:], 0.0)) - np.diag(stiffness[1:], 1)
+    k -= np.diag(stiffness[1:], -1)
+    c = np.diag(0.4 * masses) + np.diag([0.0, 0.0, 0.05])
+    inverse = np.diag(1.0 / masses)
+    a = np.block([[np.zeros((3, 3)), np.eye(3)], [-inverse @ k, -inverse @ c]])
+    b = np.zeros((6, 2))
+    b[4, 0], b[5, 1] = 1.0 / masses[1], 2.0 / masses[2]
+    square = solve_continuous_lyapunov(a, -0.5 * b @ np.diag(s) @ b.T)  # one-sided densities
+    rms = found.displacement_rms.sel(node=[1, 2, 3], axis="x")
+    np.testing.assert_allclose(rms**2, np.diag(square)[:3], rtol=1e-6)
+    rate = np.sqrt(np.diag(square)[3:] / np.diag(square)[:3]) / (2.0 * np.pi)
+    crossings = found.displacement_crossings.sel(node=[1, 2, 3], axis="x")
+    np.testing.assert_allclose(crossings, rate, rtol=1e-4)  # of velocities the tail is longer
+
+
+SHEET = fd.Sheet(3e9, 0.3, 1e-3, density=1000.0)
+PATTERN = fd.patterns.simple_fold(a=0.1, b=0.1, dihedral=120)
+
+
+def folded(structure):
+    return fd.Case(structure, [fd.Fix("xmin")], damping=fd.Rayleigh(20.0))
+
+
+@pytest.mark.matrix
+def test_a_folded_sheet_beside_simulated_noise():
+    """Within three standard errors of the mean square over 40 s."""
+    case = folded(fd.superelements(PATTERN, SHEET, level=1, divisions=8, clamped="xmin"))
+    s, dt, rng = 0.02, 5e-4, np.random.default_rng(4)
+    samples = rng.standard_normal(80_000) * np.sqrt(s / (2.0 * dt))
+    high = 200.0
+    found = fd.random_response(
+        case, forces=[(fd.Force([5], (0, 0, 1)), noise(s, 1e-3, high, "N2/Hz"))]
+    )
+    spectrum = np.fft.rfft(samples)
+    spectrum[np.fft.rfftfreq(len(samples), dt) > high] = 0.0
+    force = np.fft.irfft(spectrum)
+    history = fd.Table(np.arange(len(force)) * dt, force)
+    moved = fd.simulate(
+        fd.Case(case.structure, case.supports, [fd.Force([5], (0, 0, 1), history=history)],
+                case.damping),
+        40.0 - dt, interval=2e-3,
+    )  # fmt: skip
+    late = moved.displacement.sel(node=5, axis="z").values[500:]
+    rms = float(found.displacement_rms.sel(node=5, axis="z"))
+    correlation = 2.0 / 20.0  # s, of an amplitude damped by alpha
+    error = np.sqrt(2.0 * correlation / 40.0)
+    assert np.sqrt((late**2).mean()) == pytest.approx(rms, rel=3.0 * error)
+
+
+def test_models_agree_and_few_modes_nearly_do():
+    base = {"z": noise(0.01, 1.0, 60.0)}
+    panels = folded(fd.superelements(PATTERN, SHEET, level=2, divisions=12, clamped="xmin"))
+    bars = folded(fd.discretize(PATTERN, SHEET, clamped="xmin"))
+    with pytest.warns(ModelRangeWarning, match="modes above 60 Hz"):
+        whole = fd.random_response(panels, base=base)
+    with pytest.warns(ModelRangeWarning):
+        few = fd.random_response(panels, base=base, count=8)
+    with pytest.warns(ModelRangeWarning):
+        other = fd.random_response(bars, base=base)
+    free = {"node": [2, 3, 4, 5], "axis": "z"}
+    for name in ("displacement_rms", "acceleration_rms"):
+        one, two, three = (each[name].sel(free).values for each in (whole, few, other))
+        np.testing.assert_allclose(two, one, rtol=2e-3)
+        np.testing.assert_allclose(three, one, rtol=0.1)
+
+
+def test_the_table_of_a_density():
+    rising = fd.SpectralDensity([20.0, 80.0], [0.01, 0.04], "g2/Hz")
+    assert rising.at([10.0, 40.0, 100.0]) == pytest.approx([0.0, 0.02 * 9.80665**2, 0.0])
+    area = 0.0005 * (80.0**2 - 20.0**2) / 2.0
+    assert rising.rms == pytest.approx(9.80665 * np.sqrt(area))
+    falling = fd.SpectralDensity([20.0, 80.0], [0.04, 0.01], "N2/Hz")  # as 1/f
+    assert falling.rms == pytest.approx(np.sqrt(0.8 * np.log(4.0)))
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"unit": "g/Hz"}, 'unit = "g/Hz": give one of g2/Hz'),
+        ({"frequency": [20.0, 10.0]}, "frequency: give at least two frequencies"),
+        ({"frequency": [0.0, 10.0]}, "frequency: give at least two frequencies"),
+        ({"value": [0.1, -0.1]}, "value: 2 densities for 2 frequencies"),
+        ({"value": [0.1]}, "value: 1 densities for 2 frequencies"),
+    ],
+)
+def test_refused_densities(change, told):
+    given = {"frequency": [10.0, 20.0], "value": [0.1, 0.1], "unit": "g2/Hz", **change}
+    with pytest.raises(InputError, match=told):
+        fd.SpectralDensity(**given)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({}, "base: give a base or forces"),
+        ({"base": {"u": noise(1.0)}}, 'base: "u" is no axis'),
+        ({"base": {"x": noise(1.0, unit="N2/Hz")}}, r"base\['x'\]: its unit is N2/Hz"),
+        ({"forces": [(fd.Force([1], (1, 0, 0)), noise(1.0))]}, r"forces\[0\]: its unit is m2/s3"),
+        ({"forces": [fd.Force([1], (1, 0, 0))]}, r"forces\[0\] = .*give pairs"),
+        ({"base": {"x": 0.1}}, "SpectralDensity"),
+    ],
+)
+def test_refused_drives(given, told):
+    with pytest.raises(InputError, match=told):
+        fd.random_response(chain([500.0], [MASS]), **given)
+
+
+def test_without_damping_there_is_no_response():
+    case = chain([500.0], [MASS]).altered(damping=fd.Rayleigh())
+    with pytest.raises(InputError, match=r"damping: the mode at 6\.49747 Hz has no"):
+        fd.random_response(case, base={"x": noise(1.0)})
