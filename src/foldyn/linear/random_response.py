@@ -128,7 +128,7 @@ def random_response(
     top = max(max(density.frequency) for _, density in drives)
     warn_beyond(case.structure, np.array([top]), linear=True)
     facts = {"modes": modes, "wall_seconds": time.perf_counter() - began}
-    return random_dataset(case, system.displacement, *_rates(Moments(*total)), facts)
+    return random_dataset(case, system.displacement, *_rates(Moments._make(list(total))), facts)
 
 
 def _drives(
@@ -187,7 +187,7 @@ def _moments(
 
 def _mean_squares(motions: NDArray, amplitude: NDArray, power: NDArray) -> NDArray[np.float64]:
     """Mean squares (n, 3) of motions (3n, r) with amplitudes (nf, r) and powers (nf,)."""
-    gram = ((amplitude.conj() * power[:, None]).T @ amplitude).real
+    gram = np.real((amplitude.conj() * power[:, None]).T @ amplitude)
     return np.einsum("ia,ab,ib->i", motions, gram, motions, optimize=True).clip(0.0).reshape(-1, 3)
 
 
