@@ -22,6 +22,7 @@ from foldyn.ram_limit import GIB, check_memory
 from foldyn.values import number, whole
 
 MOST_STEPS = 1e13  # largest number of steps; takes years for any structure
+SHARPEST = 1e-9  # steps below this share of the start time are lost in rounding
 DEFAULT_FRACTION = 0.5  # default step relative to the critical step
 SAME_TIME = 1e-12  # stops closer than this share of the largest time count as one
 NOTICED = 0.01  # share of a load that is missed, above which to warn
@@ -153,6 +154,16 @@ def _check_count(duration: float, dt: float) -> None:
         raise InputError(
             f" = {duration:g} s: takes {duration / dt:.3g} steps of {dt:.3g} s; shorten it",
             "duration",
+        )
+
+
+def check_rounding(plan: StepPlan) -> None:
+    """Refuse steps that rounding of the time removes."""
+    if plan.dt < SHARPEST * abs(plan.start):
+        raise InputError(
+            f" = {plan.start:g} s: steps of {plan.dt:.3g} s are lost in its rounding; start "
+            "nearer to 0",
+            "start",
         )
 
 
