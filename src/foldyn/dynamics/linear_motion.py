@@ -75,6 +75,7 @@ def prepare_linear(
         size = len(case.structure.nodes), len(case.reaction_dofs)
         timing.check_samples(timing.expected_samples(plan), *size)
     check_steady(case, plan.start, plan.end)
+    timing.warn_of_functions(case)
     u, v = check_start(case, initial)
     imposed = ((float(history(start)) * shape) for shape, history in case.imposed_terms)
     check_imposed(case, u, sum(imposed, np.zeros_like(u)))

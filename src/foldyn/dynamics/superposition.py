@@ -36,6 +36,7 @@ from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.modal_damping import mass_of, modal_rows, moving_mass
 from foldyn.dynamics.motion_state import StepPlan
 from foldyn.dynamics.timing import histories, jumps, overlooked
+from foldyn.errors import warn
 from foldyn.mechanics.following import Following, following_force, joined
 
 BESIDE = 0.01  # shift below 0 of static responses, relative to the lowest positive eigenvalue
@@ -45,6 +46,7 @@ MISSED = 1e-5  # share of a history that parabolas may miss
 MOVED = 1e-7  # the same for supports, whose velocities act, too
 SUPPORTED = ("an imposed displacement", "a base motion")
 SHORTEST = 4096  # most steps between two samples
+UNRESOLVED = 100.0  # times the allowed share that is missed, above which to warn
 LOOKED = (0.0, 0.5, 1.0)  # places of a step through which parabolas go
 SAME = 1e-6  # relative difference of the lengths of equal steps, due to rounding
 SHORT = 0.125  # norm of A h in the step that is doubled
@@ -323,8 +325,14 @@ def steps_of(case: Case, given: Sequence[History], plan: StepPlan) -> Steps:
     plan : its steps end at samples.
     """
     parts = 1
-    while parts < SHORTEST and _missed(case, plan, parts) > 1.0:
+    while (missed := _missed(case, plan, parts))[0] > 1.0 and parts < SHORTEST:
         parts *= 2
+    if missed[0] > UNRESOLVED:
+        warn(
+            f"steps of {plan.dt / parts:.3g} s, the shortest between samples {plan.dt:.3g} s "
+            f"apart, do not resolve {missed[1]}: give a shorter interval",
+            "superelements.md#motions",
+        )
     regular = plan.start + plan.dt / parts * np.arange(plan.steps * parts + 1)
     ends, before, after = _ends(regular, plan.dt / parts, np.array(jumps(case)))
     lengths = np.diff(ends)
@@ -341,11 +349,11 @@ def _ends(regular: NDArray, step: float, times: NDArray) -> tuple[NDArray, NDArr
     """Ends of steps, and the times just before and after each between which jumps lie.
 
     regular : ends of steps of equal length `step`.
-    times : times of jumps, s. Those that rounding keeps from an end belong to it.
+    times : times of jumps, s. One that rounding keeps from an end belongs to it.
     """
-    nearest = np.clip(np.rint((times - regular[0]) / step), 0, len(regular) - 1)
-    near = regular[nearest.astype(np.int64)]
-    close = np.abs(near - times) < SAME * step
+    nearest = np.clip(np.rint((times - regular[0]) / step), 0, len(regular) - 1).astype(np.int64)
+    near, alone = regular[nearest], np.bincount(nearest)[nearest] == 1
+    close = alone & (np.abs(near - times) < SAME * step)
     within = (regular[0] < times) & (times < regular[-1]) & ~close
     ends = np.union1d(regular, times[within])
     before, after, at = ends.copy(), ends.copy(), np.searchsorted(ends, near[close])
@@ -354,15 +362,15 @@ def _ends(regular: NDArray, step: float, times: NDArray) -> tuple[NDArray, NDArr
     return ends, before, after
 
 
-def _missed(case: Case, plan: StepPlan, parts: int) -> float:
-    """Largest share of a history that parabolas miss, relative to the share that they may miss.
+def _missed(case: Case, plan: StepPlan, parts: int) -> tuple[float, str]:
+    """Largest share of a history that parabolas miss, relative to the allowed one; its name.
 
     parts : equal parts of each step.
     """
     finer = plan._replace(dt=plan.dt / parts, steps=plan.steps * parts)
-    missed = (
-        overlooked(one, finer, LOOKED, finer.steps, True)
-        / (MOVED if what in SUPPORTED else MISSED)
-        for what, one in histories(case)
-    )
-    return max(missed, default=0.0)
+    missed = [(0.0, "")]
+    for what, one in histories(case):
+        share = overlooked(one, finer, LOOKED, finer.steps, True)
+        allowed = MOVED if what in SUPPORTED else MISSED
+        missed.append((share / allowed, f"the history {one.kind} of {what}"))
+    return max(missed)

@@ -225,7 +225,7 @@ def warn_of_functions(case: Case) -> None:
         if history.knots() is None:
             warn(
                 f"the history of {what} is a function whose jumps and corners are unknown: each "
-                "step evaluates it at eight points and may miss shorter pulses; "
+                "step evaluates it at a few points and may miss shorter pulses; "
                 "give their times: fd.Function(f, at=[0.2, 0.25]), or at=[] if it is smooth",
                 "integrators.md#steps",
             )
