@@ -18,13 +18,14 @@ from foldyn.dynamics.checkpoint import SECONDS, check_keeping
 from foldyn.dynamics.gpu.checks import check_gpu, check_taken
 from foldyn.dynamics.inertia import check_mass, is_lumped
 from foldyn.dynamics.initial import (
+    MODAL,
     check_start,
     check_steady,
     check_touching,
     warn_of_standing_in_wind,
     warn_of_unstable_damping,
 )
-from foldyn.dynamics.linear_motion import MODAL, LinearMotion, prepare_linear
+from foldyn.dynamics.linear_motion import LinearMotion, prepare_linear
 from foldyn.dynamics.method_choice import AUTO, Choice, choose
 from foldyn.dynamics.methods import METHODS, Integrator, method_of, suited, suiting
 from foldyn.dynamics.modal_damping import modal_rows

@@ -31,6 +31,7 @@ from foldyn.results.quantities import CONTINUATIONS, ORIGIN
 from foldyn.values import whole
 
 AXES = "xyz"
+MODAL = "modal"  # the method of motions of superelements
 FIRST = 0.15  # ratio of first to largest step, divided by the fifth root of the tolerance
 SLOW_WIND = 0.05  # a wind below this share of the initial speed is negligible
 LOOKS = 501  # number of times at which supports and planes are checked, apart from knots
@@ -73,8 +74,15 @@ def initial_state(result: Any, at: int = -1) -> State:
         ).to_numpy()
     if "time" not in sample:
         return State(**state)
-    origin = origin_of(sample, "initial_state: ")
-    return State(**state, continuation=_continuation(sample), origin=origin)
+    continuation = _continuation(sample)
+    if continuation is None and result.attrs.get("method") == MODAL:
+        warn(
+            f"initial_state: at = {at}: a motion of superelements keeps the vibrations of panels "
+            "between their vertices at its end only; from other samples panels start in balance "
+            "with their vertices: compute the motion up to there, and continue it from its end",
+            "superelements.md#motions",
+        )
+    return State(**state, continuation=continuation, origin=origin_of(sample, "initial_state: "))
 
 
 def origin_of(sample: Any, place: str) -> Origin | None:

@@ -17,7 +17,7 @@ from foldyn.cases.air import refuse_wind
 from foldyn.cases.constraints import AGREES
 from foldyn.dynamics import timing
 from foldyn.dynamics.audit import audited
-from foldyn.dynamics.initial import check_imposed, check_start, check_steady
+from foldyn.dynamics.initial import MODAL, check_imposed, check_start, check_steady
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.motion_state import Samples, StepPlan, samples
 from foldyn.dynamics.progress import Progress, Reporter, reporter
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 
     from foldyn.dynamics.checkpoint import Keeping
 
-MODAL = "modal"
 SAMPLES = 2000  # by default
 WHOLE = 4.0  # a step limit, relative to the duration, that limits no step
 LEFT_OUT = 1e-3  # default share of the displacements that modes may leave out

@@ -152,7 +152,7 @@ class Basis(NamedTuple):
     motions: NDArray  # (m, r)
     support: NDArray  # (m, h + 1)
     shift: NDArray  # (r, h + 1) what `support` lacks of the columns it is made of
-    modes: int
+    rigid: NDArray  # numbers of rigid motions
 
 
 class Superposition:
@@ -174,6 +174,7 @@ class Superposition:
         pulled, slowed = model.stiffness @ both, model.damped(both)
         count, given = basis.motions.shape[1], basis.support.shape[1]
         stiffness, damping = both.T @ pulled, both.T @ slowed
+        stiffness[basis.rigid] = stiffness[:, basis.rigid] = 0.0  # rounding would turn a free sheet
         pad = np.zeros((len(both), 1))
         load, turned = (both.T @ np.hstack([one, pad]) for one in (model.load, model.turned))
         self.basis, self._carried = basis, basis.support.T @ (model.mass @ basis.support)
@@ -225,12 +226,11 @@ class Superposition:
         """
         y, v, f, rate, bent = self._places
         z, total, known = np.zeros(len(self._matrix)), np.zeros(2), {}
+        z[f[:-1]], z[rate[:-1]], z[bent[:-1]] = plan.parabolas(0)
         z[f[-1]] = 1.0
+        z[y], z[v] = self.basis.shift @ z[f], start
+        yield z, total
         for k, length in enumerate(plan.lengths.tolist()):
-            z[f[:-1]], z[rate[:-1]], z[bent[:-1]] = plan.parabolas(k)
-            if k == 0:
-                z[y], z[v] = self.basis.shift @ z[f], start
-                yield z, total
             if length not in known:
                 forms = self._forms if works else self._forms[:0]
                 known[length] = propagator(self._matrix, forms, length)
@@ -241,6 +241,8 @@ class Superposition:
             if works:
                 total[1] += self._work_of_jump(z, plan.at[k + 1] - plan.last[k])
             z[f[:-1]] = plan.at[k + 1]
+            if k + 1 < len(plan.lengths):
+                _, z[rate[:-1]], z[bent[:-1]] = plan.parabolas(k + 1)
             if plan.sampled[k + 1]:
                 yield z, total
 
@@ -299,7 +301,8 @@ class Bases:
             more = more @ (turned[:, kept] / np.sqrt(values[kept]))
         motions = np.hstack([motions, more])
         shift = motions.T @ (mass @ self._support)
-        return Basis(motions, self._support - motions @ shift, shift, modes)
+        rigid = np.flatnonzero(self._values[:modes] == 0.0)
+        return Basis(motions, self._support - motions @ shift, shift, rigid)
 
 
 class Steps(NamedTuple):
