@@ -16,7 +16,8 @@ Within a step every history is the parabola through its values at the start, mid
     (y, y', f, f', f'')' = A (y, y', f, f', f''),
 
 and exp(A h) advances the motion by any step h without error; so do integrals of quadratic forms,
-which give the work and the dissipated energy.
+which give the work and the dissipated energy. Where velocities of supports jump, y' goes on, which
+is the impulse on the sheet: at the start y' = B' M v, with v what the sheet had before.
 """
 
 from __future__ import annotations
@@ -106,8 +107,8 @@ def matrices(case: Case, varying: list[History]) -> Matrices:
         ties = case.constraints.extended(size)
     return Matrices(
         stiffness, sparse.csr_array(mass), sparse.csr_array(damping), modal_rows(case).rows,
-        free, sparse.csr_array(ties[:, free]), load + heat, turned + heat, stored + warm, (heat, warm),
-        support,
+        free, sparse.csr_array(ties[:, free]), load + heat, turned + heat, stored + warm,
+        (heat, warm), support,
     )  # fmt: skip
 
 
