@@ -25,7 +25,7 @@ from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.dynamics import METHODS, Keeping, prepare, simulate
 from foldyn.dynamics.driver import prepared
-from foldyn.dynamics.linear_motion import MODAL
+from foldyn.dynamics.initial import MODAL
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.timing import check_room, check_samples
 from foldyn.errors import InputError

@@ -18,13 +18,14 @@ from foldyn.dynamics.checkpoint import SECONDS, check_keeping
 from foldyn.dynamics.gpu.checks import check_gpu, check_taken
 from foldyn.dynamics.inertia import check_mass, is_lumped
 from foldyn.dynamics.initial import (
+    MODAL,
     check_start,
     check_steady,
     check_touching,
     warn_of_standing_in_wind,
     warn_of_unstable_damping,
 )
-from foldyn.dynamics.linear_motion import MODAL, LinearMotion, prepare_linear
+from foldyn.dynamics.linear_motion import LinearMotion, prepare_linear
 from foldyn.dynamics.method_choice import AUTO, Choice, choose
 from foldyn.dynamics.methods import METHODS, Integrator, method_of, suited, suiting
 from foldyn.dynamics.modal_damping import modal_rows
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
     import xarray
 
 DAMPING_COST = 10.0  # factor by which beta may shrink the critical step without a warning
-SHARPEST = 1e-9  # steps below this share of the start time are lost in rounding
 MANY_STEPS = 20_000_000  # number of steps above which the user is warned
 TOLERANCE = 1e-6  # default relative error of adaptive steps
 IMPLICIT_TOLERANCE = 1e-5  # default for methods of order 2; gives 130 steps per period
@@ -238,12 +238,7 @@ def prepare(
     _warn_of_damping(case, integrator, u, critical)
     warn_of_unstable_damping(case, origin)
     warn_of_standing_in_wind(case, v)
-    if plan.dt < SHARPEST * abs(plan.start):
-        raise InputError(
-            f" = {plan.start:g} s: steps of {plan.dt:.3g} s are lost in its rounding; start "
-            "nearer to 0",
-            "start",
-        )
+    timing.check_rounding(plan)
     if not force and plan.dt > critical:
         raise InputError(
             f" = {plan.dt:.6g} s is above the critical step of {critical:.6g} s: take a smaller "

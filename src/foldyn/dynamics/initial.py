@@ -31,6 +31,7 @@ from foldyn.results.quantities import CONTINUATIONS, ORIGIN
 from foldyn.values import whole
 
 AXES = "xyz"
+MODAL = "modal"  # the method of motions of superelements
 FIRST = 0.15  # ratio of first to largest step, divided by the fifth root of the tolerance
 SLOW_WIND = 0.05  # a wind below this share of the initial speed is negligible
 LOOKS = 501  # number of times at which supports and planes are checked, apart from knots
@@ -73,8 +74,15 @@ def initial_state(result: Any, at: int = -1) -> State:
         ).to_numpy()
     if "time" not in sample:
         return State(**state)
-    origin = origin_of(sample, "initial_state: ")
-    return State(**state, continuation=_continuation(sample), origin=origin)
+    continuation = _continuation(sample)
+    if continuation is None and result.attrs.get("method") == MODAL:
+        warn(
+            f"initial_state: at = {at}: a motion of superelements keeps the vibrations of panels "
+            "between their vertices at its end only; from other samples panels start in balance "
+            "with their vertices: compute the motion up to there, and continue it from its end",
+            "superelements.md#motions",
+        )
+    return State(**state, continuation=continuation, origin=origin_of(sample, "initial_state: "))
 
 
 def origin_of(sample: Any, place: str) -> Origin | None:
@@ -246,6 +254,25 @@ def following(body: Assembly, q: NDArray) -> Callable[[NDArray], NDArray]:
     return lambda motion: -solve(rows[:, :first] @ motion[:first])
 
 
+def check_imposed(case: Case, u: NDArray, carried: NDArray) -> None:
+    """Refuse displacements u (n, 3) at the start where `Impose` asks for others.
+
+    carried : (n, 3) displacements of moving supports, m.
+    """
+    q = u - carried
+    apart = np.where(case.imposed, np.abs(q), 0.0)
+    slaves = case.imposed_slaves
+    apart.ravel()[slaves] = np.abs(case.constraints.coordinates(q.ravel()))[slaves]
+    if apart.max() > AGREES * case.structure.bar_length.max():
+        node, axis = (int(k) for k in np.unravel_index(apart.argmax(), apart.shape))
+        raise InputError(
+            f"supports: node {node} is imposed {carried[node, axis]:.6g} m along "
+            f"{AXES[axis]} at the start, but stands at {u[node, axis]:.6g} m: give a history that "
+            "begins there, as a ramp does from rest, or start from a state that has been brought "
+            "there"
+        )
+
+
 def begin(
     case: Case, u: NDArray, v: NDArray, remembered: NDArray | str | None,
     continued: Continuation | None, plan: StepPlan, packed: PackedCase,
@@ -268,16 +295,7 @@ def begin(
         values[np.abs(values) <= AGREES * np.abs(v).max()] = 0.0  # or rounding would contradict
         prescribed = ties.moved(prescribed, values, "initial")
     q, w = u - carried, v - by.outward(carry_supports(mass, by.inward(prescribed)))
-    apart = np.where(imposed, np.abs(q), 0.0)
-    apart.ravel()[case.imposed_slaves] = np.abs(ties.coordinates(q.ravel()))[case.imposed_slaves]
-    if apart.max() > AGREES * case.structure.bar_length.max():
-        node, axis = (int(k) for k in np.unravel_index(apart.argmax(), apart.shape))
-        raise InputError(
-            f"supports: node {node} is imposed {carried[node, axis]:.6g} m along "
-            f"{AXES[axis]} at the start, but stands at {u[node, axis]:.6g} m: give a history that "
-            "begins there, as a ramp does from rest, or start from a state that has been brought "
-            "there"
-        )
+    check_imposed(case, u, carried)
     q[imposed] = 0.0
     tally = np.zeros(1, TALLY)[0]
     tally.work = -moving_energy(system.moved_mass, s.factor)

@@ -5,20 +5,23 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from foldyn.cases import Case, Continuation, State
 from foldyn.cases.air import refuse_wind
+from foldyn.cases.constraints import AGREES
 from foldyn.dynamics import timing
 from foldyn.dynamics.audit import audited
-from foldyn.dynamics.initial import check_start, check_steady
+from foldyn.dynamics.initial import MODAL, check_imposed, check_start, check_steady
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.motion_state import Samples, StepPlan, samples
 from foldyn.dynamics.progress import Progress, Reporter, reporter
-from foldyn.dynamics.sampling import Sampler
+from foldyn.dynamics.sampling import Sampler, SamplingError
 from foldyn.dynamics.superposition import (
     Bases,
     Matrices,
@@ -27,7 +30,7 @@ from foldyn.dynamics.superposition import (
     matrices,
     steps_of,
 )
-from foldyn.errors import InputError, ModelRangeWarning, warn
+from foldyn.errors import ComputationError, InputError, ModelRangeWarning, warn
 from foldyn.results import Quantity, trajectory_dataset
 from foldyn.structures.beyond_range import TURN, panel_turns
 from foldyn.values import number
@@ -37,7 +40,6 @@ if TYPE_CHECKING:
 
     from foldyn.dynamics.checkpoint import Keeping
 
-MODAL = "modal"
 SAMPLES = 2000  # by default
 WHOLE = 4.0  # a step limit, relative to the duration, that limits no step
 LEFT_OUT = 1e-3  # default share of the displacements that modes may leave out
@@ -54,7 +56,7 @@ def prepare_linear(
     """Check the input of `driver.simulate` for a linear model."""
     steps = {"method": None if method in (AUTO, MODAL) else method}
     for name, given in {**steps, **others}.items():
-        if given not in (None, False, "cpu"):
+        if given is not None and given is not False and given != "cpu":
             raise InputError(
                 f" = {given!r}: motions of {case.structure.linear} superpose modes, and their "
                 "steps are exact: leave it out, and give the interval of the samples",
@@ -65,13 +67,18 @@ def prepare_linear(
     start = float(number("start", start, unit="s"))
     if tolerance is not None:
         number("tolerance", tolerance, above=0.0)
-    sampling = timing.sampling(duration, None, interval or duration / SAMPLES)
+    sampling = timing.sampling(duration, None, duration / SAMPLES if interval is None else interval)
     plan = timing.fixed_steps(duration, None, sampling, WHOLE * duration, start)
+    timing.check_rounding(plan)
     if not kept:
         size = len(case.structure.nodes), len(case.reaction_dofs)
         timing.check_samples(timing.expected_samples(plan), *size)
     check_steady(case, plan.start, plan.end)
-    sampler = Sampler(case, {} if sample is None else sample, *check_start(case, initial), start)
+    timing.warn_of_functions(case)
+    u, v = check_start(case, initial)
+    imposed = ((float(history(start)) * shape) for shape, history in case.imposed_terms)
+    check_imposed(case, u, sum(imposed, np.zeros_like(u)))
+    sampler = Sampler(case, {} if sample is None else sample, u, v, start)
     return LinearMotion(case, plan, initial, sampler, tolerance or LEFT_OUT)
 
 
@@ -120,12 +127,17 @@ class LinearMotion:
     ) -> xarray.Dataset:
         """Compute the motion and write its result to its file."""
         with keeping.held():
-            return keeping.save_result(self.run(progress))
+            return keeping.save_result(self.run(progress, keeping))
 
     def run(
         self, progress: bool | Reporter | None = None, keeping: Keeping | None = None
     ) -> xarray.Dataset:
-        """Compute the motion; see `driver.simulate`. `keeping` has nothing to keep of it."""
+        """Compute the motion; see `driver.simulate`.
+
+        `keeping` has nothing to keep of it, but refuses to replace an interrupted motion.
+        """
+        if keeping is not None:
+            keeping.begin({"method": MODAL}, {})
         report, close = reporter(progress)
         try:
             return self._computed(report)
@@ -136,14 +148,16 @@ class LinearMotion:
         began, case, plan = time.perf_counter(), self.case, self.plan
         model = matrices(case, self._histories)
         steps = steps_of(case, self._histories, plan)
-        place, speed = self._beginning(model, *steps.parabolas(0)[:2])
-        bases = Bases(model, place, speed, FEWEST)
+        place, speed = self._beginning(model, steps.at[0])
+        momentum = model.mass @ speed
+        beside = place - model.support @ steps.at[0]
+        bases = Bases(model, beside, model.ties @ speed[model.free], FEWEST)
         modes, before, missing = min(FEWEST, bases.most), None, 0.0
         while True:
             equation = Superposition(model, bases.basis(modes))
             if modes == bases.most:
                 break
-            moved = _displacements(equation, steps, model.mass @ speed, case.structure.nodes.size)
+            moved = _displacements(equation, steps, momentum, case.structure.nodes.size)
             if before is not None:
                 largest, change = (float(np.abs(one).max()) for one in (moved, moved - before))
                 missing = change / largest if largest else 0.0
@@ -151,9 +165,8 @@ class LinearMotion:
                     break
             modes, before = min(2 * modes, bases.most), moved
         missing = 0.0 if modes == bases.most else missing
-        out, end = self._sampled(model, equation, steps, speed, report)
-        self._sampler.clear()
-        self._sampler.take(out, len(out.time))
+        out, end = self._sampled(model, equation, steps, momentum, report)
+        self._take(out)
         self._warn(out, missing)
         names = audited(case.energy_groups, case.air is not None)
         values, known = self._sampler.columns(len(out.time)), self._sampler.known
@@ -180,35 +193,44 @@ class LinearMotion:
             {name: (known[name], values[name]) for name in known}, continuations=continued,
         )  # fmt: skip
 
+    def _take(self, out: Samples) -> None:
+        """Evaluate the user's quantities at all samples."""
+        self._sampler.clear()
+        try:
+            self._sampler.take(out, len(out.time))
+        except SamplingError as error:
+            raise ComputationError(str(error)) from error
+
     @property
     def _continued(self) -> NDArray | None:
         """All displacements and velocities (2 m,) from which a motion of superelements goes on."""
-        known = self._initial and self._initial.continuation
-        fits = known and known.method == MODAL and len(known.values) == 2 * self.case.body.size
-        return known.values if known and fits else None
+        known, size = self._initial and self._initial.continuation, self.case.body.size
+        if not known or known.method != MODAL or len(known.values) != 2 * size:
+            return None
+        stored = np.split(known.values, 2)
+        for own, given in zip(stored, check_start(self.case, self._initial), strict=True):
+            apart = np.abs(own[: given.size] - given.ravel()).max()
+            if apart > AGREES * np.abs(own).max():  # a changed state
+                return None
+        return known.values
 
-    def _beginning(
-        self, model: Matrices, factor: NDArray, rate: NDArray
-    ) -> tuple[NDArray, NDArray]:
-        """Displacement and velocity (m,) of all dofs at the start, beside S f and S f'.
+    def _beginning(self, model: Matrices, factor: NDArray) -> tuple[NDArray, NDArray]:
+        """Displacement and velocity (m,) of all dofs at the start.
 
         Unless the motion goes on from another one, dofs beside those of nodes are in balance: with
         the nodes, and with the loads unless the sheet is at rest.
         """
         body = self.case.elastic_body
-        if self._continued is not None:
-            place, speed = np.split(self._continued, 2)
-        else:
-            u, v = check_start(self.case, self._initial)
-            push = (model.load - model.turned) @ factor
-            place = body.dofs(u, push) if u.any() else np.zeros(body.size)
-            speed = body.dofs(v) if v.any() else np.zeros(body.size)
-        free = np.concatenate([self.case.free_dofs, body.hidden])
-        beside = speed - model.support @ rate if self._continued is not None else speed
-        return place - model.support @ factor, model.ties @ beside[free]
+        if (continued := self._continued) is not None:
+            place, speed = np.split(continued, 2)
+            return place, speed
+        u, v = check_start(self.case, self._initial)
+        push = (model.load - model.turned) @ factor
+        place = body.dofs(u, push) if u.any() else np.zeros(body.size)
+        return place, body.dofs(v) if v.any() else np.zeros(body.size)
 
     def _sampled(
-        self, model: Matrices, equation: Superposition, steps: Steps, speed: NDArray,
+        self, model: Matrices, equation: Superposition, steps: Steps, momentum: NDArray,
         report: Reporter,
     ) -> tuple[Samples, NDArray]:  # fmt: skip
         """Samples of the motion in one basis, and all displacements and velocities at the end."""
@@ -219,9 +241,7 @@ class LinearMotion:
         out.time[:] = steps.ends[steps.sampled]
         on_nodes, end = equation.both[:size], np.zeros(0)
         resisted = case.constraints.reactions @ equation.unbalanced[:size]
-        for k, (z, total) in enumerate(
-            equation.steps(steps, basis.motions.T @ (model.mass @ speed))
-        ):
+        for k, (z, total) in enumerate(equation.steps(steps, basis.motions.T @ momentum)):
             place, rate, gain = equation.amplitudes(z)
             out.displacement[k] = (on_nodes @ place).reshape(-1, 3)
             out.velocity[k] = (on_nodes @ rate).reshape(-1, 3)
@@ -245,8 +265,20 @@ class LinearMotion:
             turns = (change * factor[number(history)] for change, history in case.rest_terms)
             body = body.folded(body.sheet.rest_angles + sum(turns))
         strain, (push, stored) = body.energies(x), model.heat
+        for k, added in self._springs:
+            strain[k] = 0.5 * x @ (added @ x)
         strain[0] += factor @ (push.T @ x) + 0.5 * factor @ stored @ factor  # see mechanics.heat
         return strain
+
+    @cached_property
+    def _springs(self) -> list[tuple[int, sparse.csr_array]]:
+        """Stiffness (m, m) at rest of each term that supports add, and the place of its energy."""
+        body, groups = self.case.elastic_body, list(self.case.energy_groups)
+        return [
+            (groups.index(group), term.tangent(np.zeros(body.size)))
+            for term in body.others
+            for group in term.energy_groups
+        ]
 
     def _warn(self, out: Samples, missing: float) -> None:
         if missing > self._tolerance:

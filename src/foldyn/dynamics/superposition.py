@@ -16,7 +16,8 @@ Within a step every history is the parabola through its values at the start, mid
     (y, y', f, f', f'')' = A (y, y', f, f', f''),
 
 and exp(A h) advances the motion by any step h without error; so do integrals of quadratic forms,
-which give the work and the dissipated energy.
+which give the work and the dissipated energy. Where velocities of supports jump, y' goes on, which
+is the impulse on the sheet: at the start y' = B' M v, with v what the sheet had before.
 """
 
 from __future__ import annotations
@@ -36,13 +37,17 @@ from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.modal_damping import mass_of, modal_rows, moving_mass
 from foldyn.dynamics.motion_state import StepPlan
 from foldyn.dynamics.timing import histories, jumps, overlooked
+from foldyn.errors import warn
 from foldyn.mechanics.following import Following, following_force, joined
 
 BESIDE = 0.01  # shift below 0 of static responses, relative to the lowest positive eigenvalue
 RIGID = 1e-10  # eigenvalues of rigid motions, relative to the largest of the modes
 APART = 1e-8  # static responses whose share outside the other motions is smaller are left out
 MISSED = 1e-5  # share of a history that parabolas may miss
+MOVED = 1e-7  # the same for supports, whose velocities act, too
+SUPPORTED = ("an imposed displacement", "a base motion")
 SHORTEST = 4096  # most steps between two samples
+UNRESOLVED = 100.0  # times the allowed share that is missed, above which to warn
 LOOKED = (0.0, 0.5, 1.0)  # places of a step through which parabolas go
 SAME = 1e-6  # relative difference of the lengths of equal steps, due to rounding
 SHORT = 0.125  # norm of A h in the step that is doubled
@@ -56,6 +61,7 @@ class Matrices(NamedTuple):
     mass: sparse.csr_array  # (m, m) kg
     damping: sparse.csr_array  # (m, m) N s/m, without modal damping
     rows: NDArray  # (r, m) modal damping
+    free: NDArray  # (nf,) dofs that determine all others
     ties: sparse.csr_array  # Z (m, nf)
     load: NDArray  # (m, h) N, forces at factor 1
     turned: NDArray  # (m, h) N, internal forces of turned rest angles and heat at factor 1
@@ -101,8 +107,8 @@ def matrices(case: Case, varying: list[History]) -> Matrices:
         ties = case.constraints.extended(size)
     return Matrices(
         stiffness, sparse.csr_array(mass), sparse.csr_array(damping), modal_rows(case).rows,
-        sparse.csr_array(ties[:, free]), load + heat, turned + heat, stored + warm, (heat, warm),
-        support,
+        free, sparse.csr_array(ties[:, free]), load + heat, turned + heat, stored + warm,
+        (heat, warm), support,
     )  # fmt: skip
 
 
@@ -147,7 +153,7 @@ class Basis(NamedTuple):
     motions: NDArray  # (m, r)
     support: NDArray  # (m, h + 1)
     shift: NDArray  # (r, h + 1) what `support` lacks of the columns it is made of
-    modes: int
+    rigid: NDArray  # numbers of rigid motions
 
 
 class Superposition:
@@ -169,9 +175,11 @@ class Superposition:
         pulled, slowed = model.stiffness @ both, model.damped(both)
         count, given = basis.motions.shape[1], basis.support.shape[1]
         stiffness, damping = both.T @ pulled, both.T @ slowed
+        stiffness[basis.rigid] = stiffness[:, basis.rigid] = 0.0  # rounding would turn a free sheet
         pad = np.zeros((len(both), 1))
         load, turned = (both.T @ np.hstack([one, pad]) for one in (model.load, model.turned))
         self.basis, self._carried = basis, basis.support.T @ (model.mass @ basis.support)
+        self._turned, self._stored = turned, np.pad(model.stored, (0, 1))
         own, others = slice(count), slice(count, None)
         size = 2 * count + 3 * given
         places = np.split(np.arange(size), np.cumsum([count, count, given, given]))
@@ -184,14 +192,13 @@ class Superposition:
         matrix[np.ix_(v, rate)] = -damping[own, others]
         moving = np.concatenate([v, rate])
         forms[0][np.ix_(moving, moving)] = damping
-        stored = np.pad(model.stored, (0, 1))
         work = forms[1]
         work[np.ix_(v, f)] = load[own]
         work[np.ix_(rate, v)] = damping[others, own]
         work[np.ix_(rate, rate)] = damping[others, others]
         work[np.ix_(rate, y)] = stiffness[others, own] + turned[own].T
         work[np.ix_(rate, f)] = (
-            stiffness[others, others] + stored + turned[others] + turned[others].T
+            stiffness[others, others] + self._stored + turned[others] + turned[others].T
         )
         pulled[:, count:-1] += model.turned - model.load
         self.both, self.unbalanced = both, np.hstack([pulled, slowed, model.mass @ both])
@@ -215,18 +222,16 @@ class Superposition:
     ) -> Iterator[tuple[NDArray, NDArray]]:
         """State, and the energy dissipated and the work (2,), J, at each sample.
 
-        start : (r,) velocities beside those of the supports.
+        start : (r,) velocities of the motions of the basis.
         works : whether energies are needed.
         """
         y, v, f, rate, bent = self._places
         z, total, known = np.zeros(len(self._matrix)), np.zeros(2), {}
+        z[f[:-1]], z[rate[:-1]], z[bent[:-1]] = plan.parabolas(0)
         z[f[-1]] = 1.0
+        z[y], z[v] = self.basis.shift @ z[f], start
+        yield z, total
         for k, length in enumerate(plan.lengths.tolist()):
-            z[f[:-1]], z[rate[:-1]], z[bent[:-1]] = plan.parabolas(k)
-            if k == 0:
-                z[y] = self.basis.shift @ z[f]
-                z[v] = start + self.basis.shift @ z[rate]
-                yield z, total
             if length not in known:
                 forms = self._forms if works else self._forms[:0]
                 known[length] = propagator(self._matrix, forms, length)
@@ -234,8 +239,19 @@ class Superposition:
             if works:
                 total += z @ step.integrals @ z
             z = step.state @ z
+            if works:
+                total[1] += self._work_of_jump(z, plan.at[k + 1] - plan.last[k])
+            z[f[:-1]] = plan.at[k + 1]
+            if k + 1 < len(plan.lengths):
+                _, z[rate[:-1]], z[bent[:-1]] = plan.parabolas(k + 1)
             if plan.sampled[k + 1]:
                 yield z, total
+
+    def _work_of_jump(self, z: NDArray, jump: NDArray) -> float:
+        """Work, J, that heat and rest angles do in a state as their factors jump by (h,)."""
+        y, _, f, _, _ = self._places
+        place, jump = np.concatenate([z[y], z[f]]), np.append(jump, 0.0)
+        return float(jump @ (self._turned.T @ place + self._stored @ (z[f] + 0.5 * jump)))
 
 
 class Bases:
@@ -245,7 +261,7 @@ class Bases:
     ----------
     model : Matrices
     place, speed : (m,)
-        Displacement, m, and velocity, m/s, at the start, beside those of the supports.
+        Displacement, m, at the start beside S f, and velocity, m/s, of the free dofs.
     modes : int
         Number of modes to begin with.
     """
@@ -286,22 +302,23 @@ class Bases:
             more = more @ (turned[:, kept] / np.sqrt(values[kept]))
         motions = np.hstack([motions, more])
         shift = motions.T @ (mass @ self._support)
-        return Basis(motions, self._support - motions @ shift, shift, modes)
+        rigid = np.flatnonzero(self._values[:modes] == 0.0)
+        return Basis(motions, self._support - motions @ shift, shift, rigid)
 
 
 class Steps(NamedTuple):
-    """Steps of a motion, with the factors (k, h) of its histories."""
+    """Steps of a motion, with the factors of its histories."""
 
     ends: NDArray  # (k + 1,) s
     sampled: NDArray  # (k + 1,) whether there is a sample
     lengths: NDArray  # (k,) s
-    first: NDArray  # at the start of each step, after a jump
-    middle: NDArray
-    last: NDArray  # before a jump
+    at: NDArray  # (k + 1, h) factors at the ends, after a jump
+    middle: NDArray  # (k, h)
+    last: NDArray  # (k, h) at the end of each step, before a jump
 
     def parabolas(self, k: int) -> tuple[NDArray, NDArray, NDArray]:
         """Factors and their first two derivatives (h,) at the start of a step."""
-        h, first, middle, last = self.lengths[k], self.first[k], self.middle[k], self.last[k]
+        h, first, middle, last = self.lengths[k], self.at[k], self.middle[k], self.last[k]
         rate = (4.0 * middle - 3.0 * first - last) / h
         return first, rate, 4.0 * (first - 2.0 * middle + last) / h**2
 
@@ -312,22 +329,52 @@ def steps_of(case: Case, given: Sequence[History], plan: StepPlan) -> Steps:
     plan : its steps end at samples.
     """
     parts = 1
-    while parts < SHORTEST and _missed(case, plan, parts) > MISSED:
+    while (missed := _missed(case, plan, parts))[0] > 1.0 and parts < SHORTEST:
         parts *= 2
-    step = plan.dt / parts
-    regular = plan.start + step * np.arange(plan.steps * parts + 1)
-    ends = np.union1d(regular, [t for t in jumps(case) if plan.start < t < regular[-1]])
+    if missed[0] > UNRESOLVED:
+        warn(
+            f"steps of {plan.dt / parts:.3g} s, the shortest between samples {plan.dt:.3g} s "
+            f"apart, do not resolve {missed[1]}: give a shorter interval",
+            "superelements.md#motions",
+        )
+    regular = plan.start + plan.dt / parts * np.arange(plan.steps * parts + 1)
+    ends, before, after = _ends(regular, plan.dt / parts, np.array(jumps(case)))
     lengths = np.diff(ends)
-    lengths[np.abs(lengths - step) < SAME * step] = step  # equal steps share their exponential
-    times = ends[:-1], 0.5 * (ends[:-1] + ends[1:]), np.nextafter(ends[1:], -np.inf)
-    factors = np.empty((3, len(lengths), len(given)))
-    for k, history in enumerate(given):
-        factors[:, :, k] = [history(at) for at in times]
-    return Steps(ends, np.isin(ends, regular[::parts]), lengths, *factors)
+    equal = np.abs(lengths - plan.dt / parts) < SAME * plan.dt / parts
+    lengths[equal] = plan.dt / parts  # equal steps share their exponential
+    looked = after, 0.5 * (ends[:-1] + ends[1:]), np.nextafter(before[1:], -np.inf)
+    at, middle, last = (
+        np.reshape([history(one) for history in given], (len(given), len(one))).T for one in looked
+    )
+    return Steps(ends, np.isin(ends, regular[::parts]), lengths, at, middle, last)
 
 
-def _missed(case: Case, plan: StepPlan, parts: int) -> float:
-    """Largest share of a history that parabolas miss, with steps divided into equal parts."""
+def _ends(regular: NDArray, step: float, times: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Ends of steps, and the times just before and after each between which jumps lie.
+
+    regular : ends of steps of equal length `step`.
+    times : times of jumps, s. One that rounding keeps from an end belongs to it.
+    """
+    nearest = np.clip(np.rint((times - regular[0]) / step), 0, len(regular) - 1).astype(np.int64)
+    near, alone = regular[nearest], np.bincount(nearest)[nearest] == 1
+    close = alone & (np.abs(near - times) < SAME * step)
+    within = (regular[0] < times) & (times < regular[-1]) & ~close
+    ends = np.union1d(regular, times[within])
+    before, after, at = ends.copy(), ends.copy(), np.searchsorted(ends, near[close])
+    before[at] = np.minimum(before[at], times[close])
+    after[at] = np.maximum(after[at], times[close])
+    return ends, before, after
+
+
+def _missed(case: Case, plan: StepPlan, parts: int) -> tuple[float, str]:
+    """Largest share of a history that parabolas miss, relative to the allowed one; its name.
+
+    parts : equal parts of each step.
+    """
     finer = plan._replace(dt=plan.dt / parts, steps=plan.steps * parts)
-    missed = (overlooked(one, finer, LOOKED, finer.steps, True) for _, one in histories(case))
-    return max(missed, default=0.0)
+    missed = [(0.0, "")]
+    for what, one in histories(case):
+        share = overlooked(one, finer, LOOKED, finer.steps, True)
+        allowed = MOVED if what in SUPPORTED else MISSED
+        missed.append((share / allowed, f"the history {one.kind} of {what}"))
+    return max(missed)

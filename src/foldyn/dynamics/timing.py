@@ -22,6 +22,7 @@ from foldyn.ram_limit import GIB, check_memory
 from foldyn.values import number, whole
 
 MOST_STEPS = 1e13  # largest number of steps; takes years for any structure
+SHARPEST = 1e-9  # steps below this share of the start time are lost in rounding
 DEFAULT_FRACTION = 0.5  # default step relative to the critical step
 SAME_TIME = 1e-12  # stops closer than this share of the largest time count as one
 NOTICED = 0.01  # share of a load that is missed, above which to warn
@@ -156,6 +157,16 @@ def _check_count(duration: float, dt: float) -> None:
         )
 
 
+def check_rounding(plan: StepPlan) -> None:
+    """Refuse steps that rounding of the time removes."""
+    if plan.dt < SHARPEST * abs(plan.start):
+        raise InputError(
+            f" = {plan.start:g} s: steps of {plan.dt:.3g} s are lost in its rounding; start "
+            "nearer to 0",
+            "start",
+        )
+
+
 def check_samples(samples: int, nodes: int, supported: int, motions: int = 1) -> None:
     """Refuse an output that exceeds memory, before anything is computed."""
     together = f" of {motions} mass rules" if motions > 1 else ""
@@ -214,7 +225,7 @@ def warn_of_functions(case: Case) -> None:
         if history.knots() is None:
             warn(
                 f"the history of {what} is a function whose jumps and corners are unknown: each "
-                "step evaluates it at eight points and may miss shorter pulses; "
+                "step evaluates it at a few points and may miss shorter pulses; "
                 "give their times: fd.Function(f, at=[0.2, 0.25]), or at=[] if it is smooth",
                 "integrators.md#steps",
             )

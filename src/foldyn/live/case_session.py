@@ -210,10 +210,11 @@ def computed(path: Path, document: Document, kind: str) -> tuple[CaseFile, xr.Da
     case_file = case_of_document(path, _as_kind(path, document, kind))
     if kind == "response":
         return case_file, _curve_of_motions(case_file)
-    if kind != "dynamics":
+    case = case_file.case()
+    if kind != "dynamics" or case.structure.linear:
         return case_file, case_file.run()
     asked = case_file.analysis.arguments
-    work = prepare(case_file.case(), **asked).plan.steps * case_file.case().body.size
+    work = prepare(case, **asked).plan.steps * case.body.size
     if work <= MOST_WORK:
         return case_file, case_file.run()
     duration = asked["duration"] * MOST_WORK / work
@@ -284,10 +285,13 @@ def _motion(path: Path, document: Document) -> Document:
     """Motion under the file's loads and supports; loads without a history act from the start."""
     duration = PERIODS / float(_frequencies(path, document)[0])
     steps = {"method": "generalized_alpha", "dt": duration / (SAMPLES * STEPS_A_SAMPLE)}
+    sampled: Document = {"every_steps": STEPS_A_SAMPLE}
+    if document.get("model", {}).get("kind") == "superelements":  # which take any step
+        steps, sampled = {}, {"interval": duration / SAMPLES}
     shown = _kept(document)
     return {
         **shown,
-        "output": {**shown["output"], "every_steps": STEPS_A_SAMPLE},
+        "output": {**shown["output"], **sampled},
         "analysis": {"kind": "dynamics", "duration": duration, **steps},
     }
 
