@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from scipy.linalg import solve_continuous_lyapunov
 
 import foldyn as fd
-from foldyn.errors import InputError, ModelRangeWarning
+from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning
 
 MASS, ZETA = 0.3, 0.02
 
@@ -143,6 +143,7 @@ def test_models_agree_and_few_modes_nearly_do():
     bars = folded(fd.discretize(PATTERN, SHEET, clamped="xmin"))
     with pytest.warns(ModelRangeWarning, match="modes above 60 Hz"):
         whole = fd.random_response(panels, base=base)
+    assert whole.attrs["modes"] < 30
     with pytest.warns(ModelRangeWarning):
         few = fd.random_response(panels, base=base, count=8)
     with pytest.warns(ModelRangeWarning):
@@ -152,6 +153,12 @@ def test_models_agree_and_few_modes_nearly_do():
         one, two, three = (each[name].sel(free).values for each in (whole, few, other))
         np.testing.assert_allclose(two, one, rtol=2e-3)
         np.testing.assert_allclose(three, one, rtol=0.1)
+
+
+def test_modes_that_are_left_out_are_told():
+    panels = folded(fd.superelements(PATTERN, SHEET, level=1, divisions=8, clamped="xmin"))
+    with pytest.warns(FoldynWarning, match=r"3 modes are taken of the \d+ below 300 Hz"):
+        fd.random_response(panels, base={"z": noise(0.01, 1.0, 300.0)}, count=3)
 
 
 def test_the_table_of_a_density():

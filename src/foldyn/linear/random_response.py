@@ -20,6 +20,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from foldyn.algebra.eigen import Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError, ModelRangeWarning, warn
@@ -34,6 +35,7 @@ TURN = 2.0 * np.pi
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
 UNDAMPED = 1e-9  # damping ratios below this count as none
 HALVINGS = 60
+FEWEST, BEYOND = 10, 1.5  # least number of modes; their highest frequency over that of densities
 LEFT_OUT = 0.05  # share of the mass in modes above the spectra, of which a warning tells
 
 
@@ -71,7 +73,8 @@ def random_response(
     state : State or "equilibrium", optional
         State to vibrate about, as in `frf`; by default the rest state.
     count : int, optional
-        Number of modes, from the lowest on; all by default. The other modes respond statically.
+        Number of modes, from the lowest on; by default those up to 1.5 times the highest frequency
+        of a density. The other modes respond statically.
     load_factor : float
         As in `frf`.
 
@@ -92,6 +95,8 @@ def random_response(
 
     Warns
     -----
+    FoldynWarning
+        Modes below the highest frequency of a density are left out.
     ModelRangeWarning
         Modes above the highest frequency of a base's density have more than 5 % of the mass, or
         frequencies lie above the range of the model.
@@ -118,16 +123,24 @@ def random_response(
     drives = _drives(of_kind("case", case, Case), base, forces)
     system = linearize(case, state, load_factor=load_factor)
     total = np.zeros((4, *case.structure.nodes.shape))
-    modes = 0
+    top = max(max(density.frequency) for _, density in drives)
+    pencil = Pencil(system.stiffness, system.mass)
+    needed = min(pencil.finite, pencil.below((TURN * top) ** 2))
+    if count is None:
+        count = min(pencil.finite, max(FEWEST, pencil.below((TURN * BEYOND * top) ** 2)))
     for drive, density in drives:
         response = ModalResponse(system, drive, Modal(count))
         total += np.stack(_moments(system, drive, response, density))
-        modes = response.count
         if drive.axis is not None:
             _warn_of_mass(system, response, drive, density)
-    top = max(max(density.frequency) for _, density in drives)
+    if count < needed:
+        warn(
+            f"{count} modes are taken of the {needed} below {top:.4g} Hz, where a density ends: "
+            "the others respond statically, without their resonances; give a higher count",
+            "random-vibration.md",
+        )
     warn_beyond(case.structure, np.array([top]), linear=True)
-    facts = {"modes": modes, "wall_seconds": time.perf_counter() - began}
+    facts = {"modes": count, "wall_seconds": time.perf_counter() - began}
     return random_dataset(case, system.displacement, *_rates(Moments._make(list(total))), facts)
 
 
@@ -234,9 +247,11 @@ def _warn_of_mass(
     """Warn if modes above the density's highest frequency have much of the mass along its axis."""
     axis, basis = AXES.index(drive.axis or "x"), response.basis
     modal = basis.inertia > 0.0
-    effective = (basis.shapes[:, modal].T @ system.inertia[:, axis]) ** 2
-    beyond = np.sqrt(basis.values[modal].clip(0.0)) / TURN > density.frequency[-1]
-    share = effective[beyond].sum() / effective.sum()
+    inertia = system.inertia[:, axis]
+    effective = (basis.shapes[:, modal].T @ inertia) ** 2
+    within = np.sqrt(basis.values[modal].clip(0.0)) / TURN <= density.frequency[-1]
+    along = (system.free < system.displacement.size) & (system.free % 3 == axis)
+    share = 1.0 - effective[within].sum() / inertia[along].sum()
     if share > LEFT_OUT:
         warn(
             f"modes above {density.frequency[-1]:.4g} Hz, where the density along {drive.axis} "
