@@ -23,6 +23,7 @@ from foldyn.signals.preprocessing import (
     subtract_final,
 )
 from foldyn.signals.records import is_uniform, sampling_interval
+from foldyn.signals.shock_spectrum import ShockSpectrum, shock_spectrum
 from foldyn.signals.spectrum import spectrum
 from foldyn.signals.stepped_sine import SineFit, fit_sine, stepped_sine
 from foldyn.signals.wave_field import Pulse, WavenumberSpectrum, pulse, wavenumber_spectrum
@@ -35,6 +36,7 @@ __all__ = [
     "LogDecrement",
     "Peaks",
     "Pulse",
+    "ShockSpectrum",
     "SineFit",
     "WavenumberSpectrum",
     "base_transmissibility",
@@ -55,6 +57,7 @@ __all__ = [
     "pulse",
     "remove_trend",
     "sampling_interval",
+    "shock_spectrum",
     "spectrum",
     "stepped_sine",
     "subtract_final",
