@@ -47,6 +47,7 @@ MISSED = 1e-5  # share of a history that parabolas may miss
 MOVED = 1e-7  # the same for supports, whose velocities act, too
 SUPPORTED = ("an imposed displacement", "a base motion")
 SHORTEST = 4096  # most steps between two samples
+MANY_STEPS = 500_000  # number of steps above which to warn
 UNRESOLVED = 100.0  # times the allowed share that is missed, above which to warn
 LOOKED = (0.0, 0.5, 1.0)  # places of a step through which parabolas go
 SAME = 1e-6  # relative difference of the lengths of equal steps, due to rounding
@@ -331,6 +332,13 @@ def steps_of(case: Case, given: Sequence[History], plan: StepPlan) -> Steps:
     parts = 1
     while (missed := _missed(case, plan, parts))[0] > 1.0 and parts < SHORTEST:
         parts *= 2
+    if parts > 1 and plan.steps * parts > MANY_STEPS:
+        warn(
+            f"{plan.steps * parts:.3g} steps of {plan.dt / parts:.3g} s, which the histories need, "
+            "will take a long time: compute the part with fast changes as a motion of its own, and "
+            "go on from its end",
+            "superelements.md#motions",
+        )
     if missed[0] > UNRESOLVED:
         warn(
             f"steps of {plan.dt / parts:.3g} s, the shortest between samples {plan.dt:.3g} s "
