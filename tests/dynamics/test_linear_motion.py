@@ -187,6 +187,7 @@ def test_a_free_sheet_flies_on():
     np.testing.assert_allclose(result.displacement, expected, atol=1e-6 * np.abs(expected).max())
 
 
+@pytest.mark.matrix
 def test_steps_are_short_during_a_pulse_only():
     """As in a motion with more samples during the pulse, and another one after it."""
     hit = fd.Force(TIP, (0, 0, 1e-3), history=fd.HalfSine(4e-4))
