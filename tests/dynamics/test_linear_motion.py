@@ -187,6 +187,21 @@ def test_a_free_sheet_flies_on():
     np.testing.assert_allclose(result.displacement, expected, atol=1e-6 * np.abs(expected).max())
 
 
+@pytest.mark.matrix
+def test_steps_are_short_during_a_pulse_only():
+    """As in a motion with more samples during the pulse, and another one after it."""
+    hit = fd.Force(TIP, (0, 0, 1e-3), history=fd.HalfSine(4e-4))
+    case = fd.Case(model(1), HELD, [hit], fd.Rayleigh(10.0))
+    whole = fd.simulate(case, 1.0, interval=1e-2, tolerance=1e-12)
+    begun = fd.simulate(case, 1e-2, interval=1e-4, tolerance=1e-12)
+    rest = fd.simulate(
+        case, 0.99, interval=1e-2, start=1e-2, tolerance=1e-12, initial=fd.initial_state(begun)
+    )
+    assert whole.attrs["steps"] < 99 + 4096 + 1 and rest.attrs["steps"] == 99
+    largest = float(np.abs(whole.displacement).max())
+    np.testing.assert_allclose(rest.displacement, whole.displacement[1:], atol=1e-4 * largest)
+
+
 def test_what_short_steps_miss_is_warned_of():
     case = fd.Case(model(1), HELD, [fd.Force(TIP, (0, 0, 1e-3), history=fd.HalfSine(1e-7))])
     with pytest.warns(FoldynWarning, match="do not resolve the history half_sine of a load"):

@@ -304,10 +304,9 @@ def _displacements(
     equation: Superposition, steps: Steps, momentum: NDArray, size: int
 ) -> NDArray[np.float64]:
     """Displacements (nt, size) of nodal dofs at the samples, m."""
-    start, places = equation.basis.motions.T @ momentum, []
-    for z, _ in equation.steps(steps, start, works=False):
-        places.append(equation.amplitudes(z)[0])
-    return np.array(places) @ equation.both[:size].T
+    start, on_nodes = equation.basis.motions.T @ momentum, equation.both[:size]
+    moved = equation.steps(steps, start, works=False)
+    return np.array([on_nodes @ equation.amplitudes(z)[0] for z, _ in moved])
 
 
 def _imbalance(energy: NDArray) -> float:

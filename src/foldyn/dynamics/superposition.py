@@ -36,7 +36,7 @@ from foldyn.cases import Case, History
 from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.modal_damping import mass_of, modal_rows, moving_mass
 from foldyn.dynamics.motion_state import StepPlan
-from foldyn.dynamics.timing import histories, jumps, overlooked
+from foldyn.dynamics.timing import histories, jumps, unfollowed
 from foldyn.errors import warn
 from foldyn.mechanics.following import Following, following_force, joined
 
@@ -46,7 +46,9 @@ APART = 1e-8  # static responses whose share outside the other motions is smalle
 MISSED = 1e-5  # share of a history that parabolas may miss
 MOVED = 1e-7  # the same for supports, whose velocities act, too
 SUPPORTED = ("an imposed displacement", "a base motion")
+WORST = 0.1  # steps that miss more than this share of the largest miss are divided
 SHORTEST = 4096  # most steps between two samples
+MANY_STEPS = 500_000  # number of steps above which to warn
 UNRESOLVED = 100.0  # times the allowed share that is missed, above which to warn
 LOOKED = (0.0, 0.5, 1.0)  # places of a step through which parabolas go
 SAME = 1e-6  # relative difference of the lengths of equal steps, due to rounding
@@ -135,7 +137,7 @@ def propagator(matrix: NDArray, forms: NDArray, h: float) -> Propagator:
     doublings = max(0, math.ceil(math.log2(max(norm / SHORT, 1e-300))))
     short = h / 2.0**doublings
     state, integrals = expm(matrix * short), np.zeros_like(forms)
-    for place, weight in zip(POINTS, WEIGHTS, strict=True):
+    for place, weight in zip(POINTS, WEIGHTS, strict=True) if len(forms) else ():
         there = expm(matrix * (0.5 * short * (1.0 + place)))
         integrals += 0.5 * short * weight * (there.T @ forms @ there)
     for _ in range(doublings):
@@ -328,53 +330,82 @@ def steps_of(case: Case, given: Sequence[History], plan: StepPlan) -> Steps:
 
     plan : its steps end at samples.
     """
-    parts = 1
-    while (missed := _missed(case, plan, parts))[0] > 1.0 and parts < SHORTEST:
-        parts *= 2
-    if missed[0] > UNRESOLVED:
+    parts = _parts(case, plan)
+    regular, samples = _cut(plan, parts), np.concatenate([[0], np.cumsum(parts)])
+    ends, before, after = _ends(regular, np.array(jumps(case)))
+    middle, lengths = 0.5 * (ends[:-1] + ends[1:]), np.diff(ends)
+    equal = (plan.dt / parts)[np.searchsorted(regular[samples], middle) - 1]
+    lengths = np.where(np.abs(lengths - equal) < SAME * equal, equal, lengths)
+    factors = (
+        np.reshape([history(times) for history in given], (len(given), len(times))).T
+        for times in (after, middle, np.nextafter(before[1:], -np.inf))
+    )
+    return Steps(ends, np.isin(ends, regular[samples]), lengths, *factors)
+
+
+def _cut(plan: StepPlan, parts: NDArray) -> NDArray:
+    """Ends of steps that divide each step of a plan into equal parts (k,)."""
+    number = np.repeat(np.arange(len(parts)), parts)
+    within = np.arange(len(number)) - np.repeat(np.cumsum(parts) - parts, parts)
+    return plan.start + plan.dt * np.append(number + within / parts[number], len(parts))
+
+
+def _parts(case: Case, plan: StepPlan) -> NDArray:
+    """Numbers of parts (k,) of each step of a plan, as many as parabolas need."""
+    parts = np.ones(plan.steps, np.int64)
+    while True:
+        missed, what = _missed(case, plan, parts)
+        left = np.where(parts < SHORTEST, missed, 0.0)
+        if left.sum() <= 1.0:
+            break
+        parts[left > WORST * left.max()] *= 2
+    shortest = f"{plan.dt / parts.max():.3g} s"
+    if parts.sum() > max(MANY_STEPS, plan.steps):
         warn(
-            f"steps of {plan.dt / parts:.3g} s, the shortest between samples {plan.dt:.3g} s "
-            f"apart, do not resolve {missed[1]}: give a shorter interval",
+            f"{parts.sum():.3g} steps, the shortest of {shortest}, will take a long time: {what} "
+            "needs them; compute a part with fast changes as a motion of its own, and go on from "
+            "its end",
             "superelements.md#motions",
         )
-    regular = plan.start + plan.dt / parts * np.arange(plan.steps * parts + 1)
-    ends, before, after = _ends(regular, plan.dt / parts, np.array(jumps(case)))
-    lengths = np.diff(ends)
-    equal = np.abs(lengths - plan.dt / parts) < SAME * plan.dt / parts
-    lengths[equal] = plan.dt / parts  # equal steps share their exponential
-    looked = after, 0.5 * (ends[:-1] + ends[1:]), np.nextafter(before[1:], -np.inf)
-    at, middle, last = (
-        np.reshape([history(one) for history in given], (len(given), len(one))).T for one in looked
-    )
-    return Steps(ends, np.isin(ends, regular[::parts]), lengths, at, middle, last)
+    if missed.sum() > UNRESOLVED:
+        warn(
+            f"steps of {shortest}, the shortest between samples {plan.dt:.3g} s apart, do not "
+            f"resolve {what}: give a shorter interval",
+            "superelements.md#motions",
+        )
+    return parts
 
 
-def _ends(regular: NDArray, step: float, times: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+def _missed(case: Case, plan: StepPlan, parts: NDArray) -> tuple[NDArray, str]:
+    """Largest shares (k,) of histories that parabolas miss, relative to the allowed ones.
+
+    Returned with the name of the history of which most is missed. parts : (k,) parts of each step
+    of the plan.
+    """
+    ends, missed, most, name = _cut(plan, parts), np.zeros(plan.steps), 0.0, ""
+    first = np.cumsum(parts) - parts
+    for what, history in histories(case):
+        allowed = MOVED if what in SUPPORTED else MISSED
+        share = np.add.reduceat(unfollowed(history, ends, LOOKED), first) / allowed
+        missed = np.maximum(missed, share)
+        if share.sum() > most:
+            most, name = float(share.sum()), f"the history {history.kind} of {what}"
+    return missed, name
+
+
+def _ends(regular: NDArray, times: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     """Ends of steps, and the times just before and after each between which jumps lie.
 
-    regular : ends of steps of equal length `step`.
+    regular : ends of steps without jumps.
     times : times of jumps, s. One that rounding keeps from an end belongs to it.
     """
-    nearest = np.clip(np.rint((times - regular[0]) / step), 0, len(regular) - 1).astype(np.int64)
+    right = np.clip(np.searchsorted(regular, times), 1, len(regular) - 1)
+    nearest = right - (times - regular[right - 1] < regular[right] - times)
     near, alone = regular[nearest], np.bincount(nearest)[nearest] == 1
-    close = alone & (np.abs(near - times) < SAME * step)
+    close = alone & (np.abs(near - times) < SAME * (regular[right] - regular[right - 1]))
     within = (regular[0] < times) & (times < regular[-1]) & ~close
     ends = np.union1d(regular, times[within])
     before, after, at = ends.copy(), ends.copy(), np.searchsorted(ends, near[close])
     before[at] = np.minimum(before[at], times[close])
     after[at] = np.maximum(after[at], times[close])
     return ends, before, after
-
-
-def _missed(case: Case, plan: StepPlan, parts: int) -> tuple[float, str]:
-    """Largest share of a history that parabolas miss, relative to the allowed one; its name.
-
-    parts : equal parts of each step.
-    """
-    finer = plan._replace(dt=plan.dt / parts, steps=plan.steps * parts)
-    missed = [(0.0, "")]
-    for what, one in histories(case):
-        share = overlooked(one, finer, LOOKED, finer.steps, True)
-        allowed = MOVED if what in SUPPORTED else MISSED
-        missed.append((share / allowed, f"the history {one.kind} of {what}"))
-    return max(missed)

@@ -275,6 +275,18 @@ def overlooked(
     return unseen / whole if whole > 0.0 else 0.0
 
 
+def unfollowed(history: History, ends: NDArray, looks: tuple[float, ...]) -> NDArray:
+    """Share (k,) of the integral of a history that each step between `ends` misses.
+
+    Steps are divided where the history jumps; see `overlooked`.
+    """
+    divided = np.union1d(ends, [t for t in history.jumps() if ends[0] < t < ends[-1]])
+    gap, size = _integrals(history, divided, looks, True)
+    step = np.searchsorted(ends, divided[:-1], side="right") - 1
+    whole = float(size.sum())
+    return np.bincount(step, gap, len(ends) - 1) / whole if whole else np.zeros(len(ends) - 1)
+
+
 def _stretches(history: History, plan: StepPlan, memory: int) -> list[tuple[int, int]]:
     """Stretches of steps (first, last) to check: all, or those likely to matter most."""
     turns = history.knots()
