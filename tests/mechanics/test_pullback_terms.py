@@ -22,7 +22,7 @@ from foldyn.errors import InputError
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.clamps import ClampsTerm
 from foldyn.mechanics.constant_damping import DampingMatrix, DampingRows
-from foldyn.mechanics.membranes import MembranesTerm
+from foldyn.mechanics.membranes_term import MembranesTerm
 from foldyn.mechanics.pullback import Pullback, arrays_of_body
 from foldyn.mechanics.springs import SpringsTerm
 from foldyn.mechanics.viscous import ViscousTerm

@@ -14,7 +14,7 @@ import foldyn as fd
 from foldyn import checks
 from foldyn.errors import FoldynWarning, InputError, StretchWarning
 from foldyn.mechanics import threads
-from foldyn.mechanics.membranes import MembranesTerm
+from foldyn.mechanics.membranes_term import MembranesTerm
 from foldyn.structures.membranes import Sides, coupling
 from foldyn.structures.panel_membrane import Kind, _condensed, _even, membrane_stiffness
 from foldyn.structures.panel_plate import outline

@@ -48,14 +48,12 @@ if TYPE_CHECKING:
 
     from foldyn.dynamics.gpu.engine import BlockEngine
 
-RECHECKS = 20  # number of checks of the critical step during a motion
-RECHECKED = 1000, 4000  # least steps between them: a check costs about 1000 steps with edge angles
+RECHECKS = 20, 1000, 4000  # checks of the critical step; least steps between them, by edge angles
 CHUNK = 256  # steps in the first stretch; later stretches last about REPORT_EVERY s
 REPORT_EVERY = 0.25
 BETWEEN = 0.382  # fraction of a sampling interval; a vibration at rest at both its ends moves there
 EXPLODED = 1.0  # relative energy error at which the motion is stopped
-# Crossing panels are searched for at samples so far apart that the search takes little time
-PER_LOOK = 500  # least force evaluations of an explicit method between two searches
+PER_LOOK = 500  # least force evaluations of an explicit method between searches for crossing panels
 IMPLICIT_WORK = 25  # force evaluations that an implicit evaluation and its solution cost
 LOOKS = 100  # number of samples at which turning panels are checked
 FEW = 1000  # number of triangles that are checked in negligible time
@@ -111,8 +109,8 @@ class Motion:
     @property
     def recheck_after(self) -> int:
         """Number of steps between checks of the critical step."""
-        least = RECHECKED[len(self.packed.mass.hidden) > 0]
-        return max(least, -(-self.plan.steps // RECHECKS))
+        least = RECHECKS[1 + (len(self.packed.mass.hidden) > 0)]
+        return max(least, -(-self.plan.steps // RECHECKS[0]))
 
     def run(
         self, progress: bool | Reporter | None = None, keeping: Keeping | None = None

@@ -137,7 +137,7 @@ def random_response(
         warn(
             f"{count} modes are taken of the {needed} below {top:.4g} Hz, where a density ends: "
             "the others respond statically, without their resonances; give a higher count",
-            "random-vibration.md",
+            "random-vibration.md#how-it-is-computed",
         )
     warn_beyond(case.structure, np.array([top]), linear=True)
     facts = {"modes": count, "wall_seconds": time.perf_counter() - began}
@@ -256,7 +256,7 @@ def _warn_of_mass(
         warn(
             f"modes above {density.frequency[-1]:.4g} Hz, where the density along {drive.axis} "
             f"ends, have {share:.0%} of the moving mass: extend the density if it goes on there",
-            "random-vibration.md",
+            "random-vibration.md#how-it-is-computed",
             ModelRangeWarning,
         )
 

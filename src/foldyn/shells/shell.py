@@ -16,7 +16,8 @@ from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, LinearBar, LinearHinge, hinge_law
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import joined, moments, pushes
-from foldyn.mechanics.membranes import Membranes, MembranesTerm
+from foldyn.mechanics.membranes import Membranes
+from foldyn.mechanics.membranes_term import MembranesTerm
 from foldyn.mechanics.plates import BarsPlates, handed_over
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned

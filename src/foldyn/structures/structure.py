@@ -25,7 +25,7 @@ from foldyn.materials import (
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.clamps import RIDES, ClampsTerm
 from foldyn.mechanics.following import Following, joined, moments, pushes, tensions
-from foldyn.mechanics.membranes import MembranesTerm
+from foldyn.mechanics.membranes_term import MembranesTerm
 from foldyn.mechanics.plates import handed_over
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of

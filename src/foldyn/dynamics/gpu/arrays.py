@@ -14,7 +14,8 @@ from foldyn.dynamics.gpu.elements import Counts, Damping, Elements
 from foldyn.dynamics.gpu.kernels import Nodes
 from foldyn.dynamics.system import PackedCase
 from foldyn.mechanics.constant_damping import DampingMatrix
-from foldyn.mechanics.membranes import Membranes, MembranesTerm
+from foldyn.mechanics.membranes import Membranes
+from foldyn.mechanics.membranes_term import MembranesTerm
 from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.springs import Springs, SpringsTerm
 from foldyn.mechanics.viscous import Viscous, ViscousTerm, viscous

@@ -13,7 +13,7 @@ from foldyn.cases import Case
 from foldyn.dynamics.system import PackedCase
 from foldyn.errors import InputError
 from foldyn.mechanics.constant_damping import DampingMatrix
-from foldyn.mechanics.membranes import MembranesTerm
+from foldyn.mechanics.membranes_term import MembranesTerm
 from foldyn.mechanics.springs import SpringsTerm
 from foldyn.mechanics.viscous import ViscousTerm
 from foldyn.structures.bars_hinges import BarsHingesTerm
