@@ -118,7 +118,8 @@ def plates_scratch(model: BarsPlates) -> PlatesScratch:
     most, blocks = int(np.diff(model.start).max(initial=0)), -(-nh // BLOCK)
     corners = np.ascontiguousarray(model.hinges, np.uint32).ravel()
     return PlatesScratch(
-        force_scratch(model.bars), corners, *np.zeros((2, 4 * model.nodes)),
+        force_scratch(model.bars), corners, np.zeros(4 * model.nodes),
+        np.zeros(4 * model.nodes),
         np.ones(12 * BLOCK), np.zeros(13 * BLOCK * blocks), np.zeros(nh),
         np.zeros((nh, 12)), np.zeros(nh), np.zeros(nf), np.zeros(model.rotations),
         np.zeros(most), np.array([0, model.rows]), team(1)[0],
