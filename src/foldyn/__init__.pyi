@@ -77,6 +77,7 @@ from foldyn.linear import (
     Fidelity as Fidelity,
     UnitCell as UnitCell,
     bands as bands,
+    buckling as buckling,
     fidelity as fidelity,
     frf as frf,
     mac as mac,

@@ -136,6 +136,10 @@ INTERNAL: Mapping[str, Quantity] = {
 }
 """Further variables of modes, of some models or in air. The dimension `between` counts the
 middles of edges and spokes, panel by panel."""
+BUCKLING: Mapping[str, Quantity] = {
+    "load_factor": Quantity("1", "load factor (negative: loads reversed)"),
+    "shape": Quantity("m", "buckling shape with the largest displacement 1 m", PLACE),
+}
 RESPONSES: Mapping[str, Quantity] = {
     "receptance": Quantity("m/N", "displacement per force", PLACE),
     "mobility": Quantity("m/(N s)", "velocity per force", PLACE),

@@ -1,0 +1,338 @@
+"""`buckling`: load factors at which a case's tangent becomes singular, and the shapes.
+
+Linear buckling about a base state: u1 = K0^-1 p is the displacement per unit of the load factor
+there, and K1 the derivative of the exact tangent along (u1, 1), as the loads and u1 grow together.
+The factors f and shapes phi satisfy (K0 + f K1) phi = 0 on the free dofs, hidden dofs among them.
+K1 comes from a central difference of two exact tangents, so that it has every effect of the
+structure: stress, turned panels, following loads, actuated folds, temperature.
+
+The factors are exact where u1 strains the structure, but hardly turns it, as in plates and columns
+pressed in their plane. `departure` says how far the tangent is from singular at the lowest factor
+once the displacement is corrected to second order: about the relative error of this factor.
+
+Bažant and Cedolin, Stability of Structures, 1991, section 4.6; for the projection on the free
+dofs see Brendel and Ramm, Computers and Structures 12, 1980.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.algebra.load_factors import LoadFactors, Softening
+from foldyn.algebra.reduction import Reduction
+from foldyn.algebra.solvers import check_fill, factorizer
+from foldyn.algebra.superlu import Solution, SingularTangentError, Unsymmetric
+from foldyn.cases import LOADS, Case, Load
+from foldyn.cases.air import refuse_air
+from foldyn.dynamics.modal_damping import soft_at_rest
+from foldyn.errors import ComputationError, InputError, warn
+from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
+from foldyn.ram_limit import check_memory
+from foldyn.results.dataset import buckling_dataset
+from foldyn.statics import OrigamiProblem
+from foldyn.statics.equilibrium import drives
+from foldyn.statics.newton import Solver
+from foldyn.statics.stability import oriented
+from foldyn.statics.stepping import PathStoppedError, settle
+from foldyn.statics.tracing import refuse_mechanisms
+from foldyn.values import objects, of_kind, whole
+
+COPIES = 8  # copies of the shapes in memory, while they are found and stored
+STEP = 1e-5  # largest strain or turn in the difference of tangents: errors of 1e-10 and rounding
+DEPARTS = 0.05  # departure from which the lowest factor is doubtful
+TURNS = np.radians(10.0)  # turn of a hinge from which displacements are not small
+PAGE = "buckling.md#when-the-factors-hold"
+
+
+def buckling(
+    case: Case, count: int = 6, *, preload: Load | Sequence[Load] | None = None
+) -> xarray.Dataset:
+    """Load factors at which a case buckles, and the shapes, by linear buckling.
+
+    All loads, imposed displacements, actuated creases and temperatures of the case are scaled
+    together by the factor; histories and base motions are ignored. Relaxing laws with memory count
+    as relaxed, with their elastic part.
+
+    Parameters
+    ----------
+    case : Case
+        Bars and hinges, or a shell.
+    count : int
+        Number of factors of each sign, from the one nearest to zero on.
+    preload : Load or sequence of Load, optional
+        Loads that act in full at every factor, in addition to those of the case. The base state is
+        the equilibrium under them; by default rest.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions mode, node, axis; `mode` counts from 1. `load_factor`: first the positive ones,
+        increasing, then the negative ones (loads reversed), from zero on. `shape`: the largest
+        displacement of a node is 1, its largest component positive. `displacement` (m) of the base
+        state, and `prebuckling` (m), the displacement per unit of the factor from there.
+        Attributes: `positive` and `negative` (numbers of factors), `complete` (number of positive
+        factors proved to be complete), `departure` (estimate of the relative error of the factor
+        nearest to zero, positive if there is one), `turn` (rad, of a hinge or bar up to this
+        factor) and facts about the computation.
+
+    Raises
+    ------
+    InputError
+        Nothing loads the case; it can move freely; it is unstable in the base state; contact, air,
+        creases that yield or creep, superelements; superlinear hinges without a slope.
+    ComputationError
+        No equilibrium is found under the preload; the factors do not converge.
+
+    Warns
+    -----
+    FoldynWarning
+        Displacements are not small at the lowest factor, or the tangent is far from singular there;
+        the load stiffness is not symmetric; no load factor is found.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    """
+    of_kind("case", case, Case)
+    count = whole("count", count, least=1)
+    check_memory(
+        "count", f"{float(count):.3g} modes",
+        8.0 * COPIES * count * case.structure.nodes.size, "take fewer",
+    )  # fmt: skip
+    began = time.perf_counter()
+    given = [] if preload is None else [preload] if isinstance(preload, LOADS) else preload
+    steady = objects("preload", given, LOADS)
+    _check(case)
+    base = _Base(case, steady)
+    positive, negative = base.softening.nearest(count)
+    values = np.concatenate([positive.values, negative.values])
+    shapes = base.problem.dofs(base.all_dofs(np.hstack([positive.shapes, negative.shapes])))
+    shapes = oriented(shapes[: case.structure.nodes.size].reshape(-1, len(values)))
+    shapes = shapes.T.reshape(-1, *case.structure.nodes.shape)
+    sizes = np.linalg.norm(shapes, axis=2).max(axis=1, initial=0.0)
+    departure, turn = _departure(base, positive, negative)
+    _warn(values, departure, turn)
+    found = {
+        "load_factor": values,
+        "shape": shapes / sizes[:, None, None],
+        "displacement": base.problem.displacement(base.u),
+        "prebuckling": base.problem.displacement(base.u + base.slope)
+        - base.problem.displacement(base.u),
+    }
+    statistics = {
+        "count": count,
+        "state": "equilibrium" if steady else "rest",
+        "preloads": len(steady),
+        "free_dofs": len(base.problem.free),
+        "positive": len(positive.values),
+        "negative": len(negative.values),
+        "complete": positive.complete,
+        "departure": departure,
+        "turn": turn,
+        "step": base.step,
+        "solver": base.backend,
+        "wall_seconds": time.perf_counter() - began,
+    }
+    return buckling_dataset(case, found, statistics)
+
+
+class _Base:
+    """The base state, the tangent there, and its change along the path.
+
+    Attributes
+    ----------
+    problem : OrigamiProblem
+        The case, with its preloads constant.
+    u, slope : (m,)
+        The base state, and its derivative with respect to the load factor.
+    step : float
+        Load factor of the central difference.
+    softening : Softening
+        Symmetric parts of the tangent and of its derivative, on the free dofs.
+    """
+
+    def __init__(self, case: Case, preloads: Sequence[Load]) -> None:
+        whole = case.altered(loads=(*preloads, *case.loads)) if preloads else case
+        problem = OrigamiProblem(whole, range(len(preloads)))
+        refuse_mechanisms(problem)
+        try:
+            self.u = settle(Solver(problem), problem.start(), 0.0).point.u
+        except PathStoppedError as stop:
+            raise ComputationError(f"buckling: {stop}") from None
+        self.problem, self._reduce = problem, Reduction(problem.free)
+        self._refuse_soft()
+        self.backend, self._factorize = factorizer("auto", len(problem.free))
+        matrix = self.tangent(self.u, 0.0)
+        block = self._reduce(matrix)
+        try:
+            factors = self._factorize(block.symmetric)
+            negative = factors.negative()
+            exact = factors if block.is_symmetric else Unsymmetric(block.exact)
+        except SingularTangentError:
+            raise _unstable("is singular", bool(preloads)) from None
+        if negative:
+            raise _unstable(f"has {negative} negative eigenvalues", bool(preloads))
+        self._exact: Solution = exact
+        self.slope = self._slope(matrix)
+        self.step = STEP / self._stretch()
+        ahead, behind = (
+            self.tangent(self.u + way * self.slope, way) for way in (self.step, -self.step)
+        )
+        change = self._reduce(sparse.csr_array((ahead - behind) / (2.0 * self.step)))
+        if not change.is_symmetric:
+            _warn_of_asymmetry(asymmetry(change.exact))
+        rounding = 1.0 / self.step
+        self.softening = Softening(
+            block.symmetric, change.symmetric, factors, self._factorize, rounding
+        )
+
+    def tangent(self, u: NDArray, factor: float) -> sparse.csr_array:
+        """Exact tangent (m, m) of a state, N/m, with the load stiffness."""
+        problem, q = self.problem, self.problem.dofs(u)
+        matrix = problem.body(u, factor).tangent(q)
+        if problem.following.acts:
+            matrix = sparse.csr_array(matrix + problem.load_stiffness(q, factor))
+        return sparse.csr_array(problem.case.constraints.matrix(matrix))
+
+    def all_dofs(self, free: NDArray) -> NDArray:
+        """Motions (m, k) of all dofs in motions of the free dofs."""
+        full = np.zeros((len(self.u), free.shape[1]))
+        full[self.problem.free] = free
+        return full
+
+    def moved(self, force: NDArray) -> NDArray:
+        """Motion (m,) under a force (m,) on the free dofs."""
+        motion = np.zeros(len(self.u))
+        motion[self.problem.free] = self._exact.solve(force[self.problem.free])
+        return motion
+
+    def _slope(self, matrix: sparse.csr_array) -> NDArray:
+        problem, given = self.problem, np.zeros(len(self.u))
+        given[problem.held] = problem.prescribed(1.0) - problem.prescribed(0.0)
+        return given + self.moved(-problem.rate(self.u, 0.0) - matrix @ given)
+
+    def _stretch(self) -> float:
+        """Largest strain or turn per unit of the load factor, about.
+
+        Loads on held dofs move nothing, but stress the structure: their forces over those at unit
+        strain count, too.
+        """
+        problem, structure = self.problem, self.problem.structure
+        body = problem.body(self.u, 0.0)
+        moved, q = problem.dofs(self.slope), problem.dofs(self.u)
+        nodes = structure.nodes.size
+        x, v = structure.nodes + q[:nodes].reshape(-1, 3), moved[:nodes].reshape(-1, 3)
+        a, b = structure.bars.T
+        apart = np.linalg.norm(v[b] - v[a], axis=1) / np.linalg.norm(x[b] - x[a], axis=1)
+        turned = body.sheet.per_hidden * np.abs(moved[body.hidden])
+        scale = body.scale()
+        held = np.abs(problem.rate(self.u, 0.0))[: len(scale)]
+        stressed = np.divide(held, scale, out=np.zeros_like(scale), where=scale > 0.0)
+        most = max(float(each.max(initial=0.0)) for each in (apart, turned, stressed))
+        if most == 0.0:
+            raise InputError(
+                ": they load nothing, so that no load factor exists; give loads that deform the "
+                "case",
+                "loads",
+            )
+        return most
+
+    def _refuse_soft(self) -> None:
+        case, problem = self.problem.case, self.problem
+        soft = int(soft_at_rest(case, problem.body(self.u, 0.0), problem.dofs(self.u))[0].sum())
+        if soft:
+            raise InputError(
+                f": {soft} hinges of the superlinear law stand at their rest angle, where their "
+                'slope vanishes and has no derivative; take preset = "plate" or "n5b8e", or a '
+                "preload that turns these hinges",
+                "bend_law",
+            )
+
+
+def _check(case: Case) -> None:
+    """Refuse what has no tangent that changes linearly."""
+    if case.structure.linear:
+        raise InputError(
+            f": {case.structure.linear} are linear and have no geometric stiffness; take fd.shell "
+            "or fd.discretize (bars and hinges)",
+            "structure",
+        )
+    if case.contact is not None:
+        raise InputError(
+            ": closes and opens, so that the tangent jumps; take the case without contact, or "
+            "follow the path with fd.trace",
+            "contact",
+        )
+    refuse_air(case, "buckling")
+    case.check_movable()
+    check_fill(case.structure.fill, case.body.size)
+    if not drives(case, ()):
+        raise InputError(
+            ": nothing to scale by a factor; give the case a Force, Pressure, Gravity, Actuate, "
+            "Temperature or Impose (a preload is not scaled)",
+            "loads",
+        )
+
+
+def _unstable(how: str, preloaded: bool) -> InputError:
+    """Error for a base state in which the tangent is not positive definite."""
+    if preloaded:
+        return InputError(
+            f": the tangent {how} in the equilibrium under it: the case has buckled already; give "
+            "a smaller one",
+            "preload",
+        )
+    return InputError(
+        f"the tangent {how} at rest, before any load acts; hold what moves, or give folds a "
+        "stiffness, or a preload under which the case is stable"
+    )
+
+
+def _departure(base: _Base, positive: LoadFactors, negative: LoadFactors) -> tuple[float, float]:
+    """Departure and turn (rad) at the first factor; nan without one.
+
+    The state there is corrected to second order in the factor, with the tangent in the base state.
+    """
+    first = positive if len(positive.values) else negative
+    if not len(first.values):
+        return float("nan"), float("nan")
+    factor, shape, problem = float(first.values[0]), first.shapes[:, 0], base.problem
+    linear = base.u + factor * base.slope
+    turn = problem.turn(base.u, linear)
+    there = linear - base.moved(problem.residual(linear, factor))
+    with np.errstate(all="ignore"):
+        tangent = base.tangent(there, factor)[problem.free][:, problem.free]
+        left = float(shape @ (tangent @ shape))  # shape' K0 shape is 1
+    return left if np.isfinite(left) else float("inf"), turn
+
+
+def _warn(values: NDArray, departure: float, turn: float) -> None:
+    if not len(values):
+        warn(
+            "no load factor was found: the tangent does not soften along the linear path, whether "
+            "loads are reversed or not",
+            PAGE,
+        )
+    elif abs(departure) > DEPARTS or turn > TURNS:
+        warn(
+            f"at the load factor {values[0]:.4g} displacements are not small: hinges or bars turn "
+            f"by up to {np.degrees(turn):.3g} degrees, and {departure:.2g} of the shape's "
+            "stiffness is left where the linear path is corrected to second order: this factor may "
+            "be off by as much, or mean nothing. fd.trace finds the critical points of the path",
+            PAGE,
+        )
+
+
+def _warn_of_asymmetry(share: float) -> None:
+    if share > ASYMMETRIC:
+        warn(
+            f"{NO_POTENTIAL.format(share)} load factors take its symmetric part, which misses "
+            "flutter: simulated motions include it",
+            "loads.md#pressure",
+        )
