@@ -25,8 +25,9 @@ from foldyn.algebra.superlu import Factorization, Factorizer, SingularTangentErr
 from foldyn.errors import ComputationError
 
 DENSE = 120  # dofs up to which all factors are computed at once
-FARTHEST = 1e4  # largest factor, relative to the one nearest to zero; others mean nothing
-LEAST_BASIS = 20  # least number of Lanczos vectors, as Lanczos breaks down with few
+NEAR = 10.0  # factors up to this many times the one nearest to zero always count
+LEAST_BASIS = 40  # least number of Lanczos vectors, which more than pay where factors are close
+RESTARTS = 500
 TOLERANCE = 1e-10  # relative residual; the error of a factor is its square
 GUARD = 3  # number of additional factors in which to search for a gap
 GAP = 1e-6  # relative distance of factors that a count can separate
@@ -57,15 +58,19 @@ class Softening:
     factorize : callable
         Factorizes K0 + s K1.
     rounding : float
-        Rounding errors of K1's entries, relative to K0's.
+        Rounding errors of K1's entries, relative to K0's, over the machine's precision.
+    farthest : float
+        Size of the largest factor that means anything, unless all are larger. Beyond it factors lie
+        so close together that Lanczos' method finds them slowly.
     """
 
     def __init__(
         self, stiffness: sparse.csc_array, change: sparse.csc_array, factors: Factorization,
-        factorize: Factorizer, rounding: float,
+        factorize: Factorizer, rounding: float, farthest: float,
     ) -> None:  # fmt: skip
         self.stiffness, self.change, self._sizes = stiffness, change, abs(stiffness)
-        self._factors, self._factorize, self._rounding = factors, factorize, rounding
+        self._factors, self._factorize = factors, factorize
+        self._rounding, self._farthest = rounding, farthest
         self.size = stiffness.shape[0]
 
     def nearest(self, count: int) -> tuple[LoadFactors, LoadFactors]:
@@ -78,11 +83,17 @@ class Softening:
         """
         if self.size <= DENSE:
             return self._of_all(count)
-        first, _ = self._lanczos(1, "LM", np.zeros((self.size, 0)))
-        if not len(first):  # nothing but rounding errors
+        first, shape = self._lanczos(1, "LM", np.zeros((self.size, 0)))
+        if not self._real(first, shape).any():
             return self._none, self._none
-        farthest = FARTHEST * abs(float(first[0]))
+        farthest = max(self._farthest, NEAR * abs(float(first[0])))
         return self._of_sign(count, farthest), self._of_sign(count, -farthest)
+
+    def _real(self, values: NDArray, shapes: NDArray) -> NDArray[np.bool_]:
+        """Which factors (k,) are more than rounding errors of K1."""
+        size = np.abs(shapes)
+        noise = self._rounding * ROUNDING * np.einsum("ik,ik->k", size, self._sizes @ size)
+        return np.abs(values) * noise < 1.0
 
     @property
     def _none(self) -> LoadFactors:
@@ -95,10 +106,12 @@ class Softening:
         except LinAlgError as error:
             raise ComputationError(f"buckling: {error}") from error
         values, shapes = self._kept(shapes)
-        near = np.abs(values) <= FARTHEST * np.abs(values[:1]).max(initial=0.0)
+        real = self._real(values, shapes)
+        first = float(np.abs(values[real]).min(initial=np.inf))
+        real &= np.abs(values) <= max(self._farthest, NEAR * first)
         found = []
         for sign in (1.0, -1.0):
-            chosen = np.flatnonzero(near & (sign * values > 0.0))[:count]
+            chosen = np.flatnonzero(real & (sign * values > 0.0))[:count]
             found.append(LoadFactors(values[chosen], shapes[:, chosen], len(chosen)))
         return found[0], found[1]
 
@@ -116,7 +129,8 @@ class Softening:
             at, edge = _gap(values, count)
             wanted = self._within(edge) - at if at else 0
             if wanted <= 0:
-                return LoadFactors(values[:count], shapes[:, :count], min(at, count))
+                real = np.flatnonzero(self._real(values, shapes))[:count]
+                return LoadFactors(values[real], shapes[:, real], min(at, len(real)))
             wanted = min(wanted + GUARD, there)
         raise ComputationError("buckling: load factors were missed; ask for another count")
 
@@ -142,27 +156,27 @@ class Softening:
         start = np.random.default_rng(beside.shape[1]).standard_normal(self.size)
         start = self._factors.solve(apart(self.stiffness @ start))
         count = min(count, self.size - 2)
+        basis = min(max(2 * count + 1, LEAST_BASIS), self.size - 1)
         try:
             _, shapes = eigsh(
                 operator, k=count, M=self.stiffness, Minv=inverse, which=which, v0=start,
-                ncv=min(max(2 * count + 1, LEAST_BASIS), self.size - 1), tol=TOLERANCE,
+                ncv=basis, tol=TOLERANCE, maxiter=RESTARTS,
             )  # fmt: skip
-        except ArpackNoConvergence as error:
-            raise ComputationError(
-                f"buckling: {len(error.eigenvalues)} of {count} load factors converged; ask for "
-                "another count"
-            ) from error
+        except ArpackNoConvergence as error:  # the others are searched for again if they count
+            shapes = error.eigenvectors
+            if not shapes.shape[1]:
+                raise ComputationError(
+                    f"buckling: none of {count} load factors converged; ask for another count"
+                ) from error
         return self._kept(shapes)
 
     def _kept(self, shapes: NDArray) -> tuple[NDArray, NDArray]:
-        """Factors and their shapes, sorted, without those of rounding errors."""
+        """Factors and their shapes with phi' K0 phi = 1, sorted."""
         shapes = shapes / np.sqrt(np.einsum("ik,ik->k", shapes, self.stiffness @ shapes))
-        size = np.abs(shapes)
         # quotients are more accurate than eigenvalues of a full matrix
         inverse = -np.einsum("ik,ik->k", shapes, self.change @ shapes)
-        noise = self._rounding * ROUNDING * np.einsum("ik,ik->k", size, self._sizes @ size)
-        real = np.abs(inverse) > noise
-        return _sorted(1.0 / inverse[real], shapes[:, real])
+        finite = inverse != 0.0
+        return _sorted(1.0 / inverse[finite], shapes[:, finite])
 
 
 def _sorted(values: NDArray, shapes: NDArray) -> tuple[NDArray, NDArray]:

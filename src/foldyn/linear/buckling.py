@@ -27,7 +27,7 @@ from scipy import sparse
 from foldyn.algebra.load_factors import LoadFactors, Softening
 from foldyn.algebra.reduction import Reduction
 from foldyn.algebra.solvers import check_fill, factorizer
-from foldyn.algebra.superlu import Solution, SingularTangentError, Unsymmetric
+from foldyn.algebra.superlu import SingularTangentError, Solution, Unsymmetric
 from foldyn.cases import LOADS, Case, Load
 from foldyn.cases.air import refuse_air
 from foldyn.dynamics.modal_damping import soft_at_rest
@@ -45,6 +45,7 @@ from foldyn.values import objects, of_kind, whole
 
 COPIES = 8  # copies of the shapes in memory, while they are found and stored
 STEP = 1e-5  # largest strain or turn in the difference of tangents: errors of 1e-10 and rounding
+FARTHEST = 0.1  # strain or turn along the linear path beyond which no factor means anything
 DEPARTS = 0.05  # departure from which the lowest factor is doubtful
 TURNS = np.radians(10.0)  # turn of a hinge from which displacements are not small
 PAGE = "buckling.md#when-the-factors-hold"
@@ -73,13 +74,15 @@ def buckling(
     -------
     xarray.Dataset
         Dimensions mode, node, axis; `mode` counts from 1. `load_factor`: first the positive ones,
-        increasing, then the negative ones (loads reversed), from zero on. `shape`: the largest
-        displacement of a node is 1, its largest component positive. `displacement` (m) of the base
-        state, and `prebuckling` (m), the displacement per unit of the factor from there.
-        Attributes: `positive` and `negative` (numbers of factors), `complete` (number of positive
-        factors proved to be complete), `departure` (estimate of the relative error of the factor
-        nearest to zero, positive if there is one), `turn` (rad, of a hinge or bar up to this
-        factor) and facts about the computation.
+        increasing, then the negative ones (loads reversed), from zero on; without those that take
+        strains or turns of more than 10 % and are more than ten times as far from zero as the
+        nearest. `shape`: the largest displacement of a node is 1, the largest component positive.
+        `displacement` (m) of the base state, and `prebuckling` (m), the displacement from there per
+        unit of the factor. The case of the result has the preloads first among its loads.
+        Attributes: `positive` and `negative` (numbers of factors), `complete` (number of factors
+        that counts prove to be complete), `constant` (numbers of the preloads), and for the first
+        factor `departure`, an estimate of its relative error, and `turn` (rad), the largest turn of
+        a hinge or bar up to it; facts about the computation.
 
     Raises
     ------
@@ -98,6 +101,12 @@ def buckling(
     Examples
     --------
     >>> import foldyn as fd
+    >>> pattern = fd.Pattern([(0, 0), (1, 0), (1, 0.1), (0, 0.1)], [(0, 1, 2, 3)])
+    >>> strip = fd.shell(pattern, fd.Sheet(1e9, 0.0, 1e-3), divisions=16)
+    >>> held = [fd.Fix("xmin", "xz", along=True), fd.Fix("xmax", "z", along=True), fd.Fix([0], "y")]
+    >>> case = fd.Case(strip, held, [fd.LineLoad("xmax", (-1.0, 0, 0))])
+    >>> round(float(buckling(case, 1).load_factor[0]), 3)  # Euler: pi^2 E t^3 / 12 L^2 = 0.822
+    0.82
     """
     of_kind("case", case, Case)
     count = whole("count", count, least=1)
@@ -128,18 +137,18 @@ def buckling(
     statistics = {
         "count": count,
         "state": "equilibrium" if steady else "rest",
-        "preloads": len(steady),
+        "constant": list(range(len(steady))) or None,
         "free_dofs": len(base.problem.free),
         "positive": len(positive.values),
         "negative": len(negative.values),
-        "complete": positive.complete,
+        "complete": positive.complete + negative.complete,
         "departure": departure,
         "turn": turn,
         "step": base.step,
         "solver": base.backend,
         "wall_seconds": time.perf_counter() - began,
     }
-    return buckling_dataset(case, found, statistics)
+    return buckling_dataset(base.problem.case, found, statistics)
 
 
 class _Base:
@@ -187,10 +196,10 @@ class _Base:
         change = self._reduce(sparse.csr_array((ahead - behind) / (2.0 * self.step)))
         if not change.is_symmetric:
             _warn_of_asymmetry(asymmetry(change.exact))
-        rounding = 1.0 / self.step
         self.softening = Softening(
-            block.symmetric, change.symmetric, factors, self._factorize, rounding
-        )
+            block.symmetric, change.symmetric, factors, self._factorize,
+            rounding=1.0 / self.step, farthest=FARTHEST * self.step / STEP,
+        )  # fmt: skip
 
     def tangent(self, u: NDArray, factor: float) -> sparse.csr_array:
         """Exact tangent (m, m) of a state, N/m, with the load stiffness."""
