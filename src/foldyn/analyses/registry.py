@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from foldyn import __version__, tables
 from foldyn.analyses.bands import BandsAnalysis
+from foldyn.analyses.buckling import BucklingAnalysis
 from foldyn.analyses.casefile import Analysis
 from foldyn.analyses.fidelity import FidelityAnalysis
 from foldyn.analyses.frf import FrfAnalysis
@@ -26,6 +27,7 @@ ANALYSES: Mapping[str, type[Analysis]] = {
     for analysis in (
         MotionAnalysis,
         PathAnalysis,
+        BucklingAnalysis,
         ModesAnalysis,
         FrfAnalysis,
         ResponseAnalysis,
