@@ -27,12 +27,12 @@ ANALYSES: Mapping[str, type[Analysis]] = {
     for analysis in (
         MotionAnalysis,
         PathAnalysis,
-        BucklingAnalysis,
         ModesAnalysis,
         FrfAnalysis,
         ResponseAnalysis,
         BandsAnalysis,
         FidelityAnalysis,
+        BucklingAnalysis,
     )
 }
 """Analyses by `analysis.kind`."""

@@ -48,7 +48,6 @@ STEP = 1e-5  # largest strain or turn in the difference of tangents: errors of 1
 FARTHEST = 0.1  # strain or turn along the linear path beyond which no factor means anything
 DEPARTS = 0.05  # departure from which the lowest factor is doubtful
 TURNS = np.radians(10.0)  # turn of a hinge from which displacements are not small
-PAGE = "buckling.md#when-the-factors-hold"
 
 
 def buckling(
@@ -326,7 +325,7 @@ def _warn(values: NDArray, departure: float, turn: float) -> None:
         warn(
             "no load factor was found: the tangent does not soften along the linear path, whether "
             "loads are reversed or not",
-            PAGE,
+            "buckling.md#when-the-factors-hold",
         )
     elif abs(departure) > DEPARTS or turn > TURNS:
         warn(
@@ -334,7 +333,7 @@ def _warn(values: NDArray, departure: float, turn: float) -> None:
             f"by up to {np.degrees(turn):.3g} degrees, and {departure:.2g} of the shape's "
             "stiffness is left where the linear path is corrected to second order: this factor may "
             "be off by as much, or mean nothing. fd.trace finds the critical points of the path",
-            PAGE,
+            "buckling.md#when-the-factors-hold",
         )
 
 
