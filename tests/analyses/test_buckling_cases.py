@@ -101,3 +101,9 @@ def test_times_are_refused(file):
     file.write_text(text, "utf-8")
     with pytest.raises(InputError, match="load factors have no time"):
         fd.read_case(file)
+
+
+def test_a_load_that_buckles_the_sheet_by_itself(file):
+    file.write_text(CASE.replace("-0.01, 0, 0]\n[[loads]]", "-9.81, 0, 0]\n[[loads]]"), "utf-8")
+    with pytest.raises(InputError, match=r"analysis\.constant: the tangent has .* buckled already"):
+        fd.read_case(file).run()

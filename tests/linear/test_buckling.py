@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 from scipy.linalg import eigh
+from scipy.spatial.transform import Rotation
 
 import foldyn as fd
 from foldyn.algebra.load_factors import Softening
@@ -314,7 +315,7 @@ def two_links(preset):
 
 @pytest.mark.parametrize("preset", ["n5b8e", "plate", "shell"])
 def test_two_links_with_a_spring(preset):
-    """P = 4 k / L for two rigid links of length L / 2: Bazant and Cedolin, section 4.1."""
+    """Rigid links turn by a each: k (2 a)^2 / 2 = P L a^2 / 2, so that P = 4 k / L."""
     found = buckling(two_links(preset), 1)
     assert float(found.load_factor[0]) == pytest.approx(4.0 * CREASE / 2.0, rel=1e-3)
 
@@ -384,6 +385,57 @@ def test_the_change_is_that_along_the_path(model, load):
     found = buckling(case, 4)
     np.testing.assert_allclose(found.load_factor, of_two_equilibria(case, found), rtol=1e-3)
     assert len(found.load_factor) >= 4
+
+
+@pytest.mark.filterwarnings("ignore:at the load factor:foldyn.errors.FoldynWarning")
+def test_pressure_without_a_potential_is_told():
+    with pytest.warns(FoldynWarning, match="not symmetric; load factors take its symmetric part"):
+        buckling(loaded("plate", "pressure"), 1)
+
+
+def test_turned_supports():
+    """Held and tied along oblique directions, a strip buckles as along the axes."""
+    expected = buckling(strip(), 2)
+    turn = Rotation.from_euler("zyx", [20.0, 35.0, -50.0], degrees=True).as_matrix()
+    pattern = fd.Pattern(rectangle().vertices @ turn.T, rectangle().faces)
+    structure = fd.shell(pattern, fd.Sheet(MODULUS, 0.0, THICKNESS), divisions=8)
+    rest = strip().structure
+    np.testing.assert_allclose(structure.nodes, rest.nodes @ turn.T, atol=1e-12)
+    start, end = at(rest, 0, 0.0), at(rest, 0, LENGTH)
+    x, y, z = turn.T
+    supports = [fd.Fix(start, direction=x), fd.Fix([*start, *end], direction=z),
+                fd.Fix(start[:1], direction=y)]  # fmt: skip
+    loads = [fd.Force(one.nodes, turn @ one.vector) for one in pressed(rest)]
+    found = buckling(fd.Case(structure, supports, loads), 2)
+    np.testing.assert_allclose(found.load_factor, expected.load_factor, rtol=1e-6)
+    shape = expected["shape"].values @ turn.T
+    for one, other in zip(found["shape"].values, shape, strict=True):
+        assert abs((one * other).sum()) == pytest.approx((one**2).sum(), rel=1e-6)
+
+
+def test_a_folded_tube_is_told():
+    """Its panels turn from the start: the path buckles at 30.5 (docs/buckling.md)."""
+    pattern = fd.patterns.kresling(sides=6, radius=0.05, height=0.04, twist=30, storeys=2)
+    structure = fd.discretize(pattern, fd.Sheet(2e9, 0.3, 0.25e-3, 900.0), preset="n5b8e")
+    load = fd.Force("zmax", (0.0, 0.0, -1.0 / 6.0))
+    with pytest.warns(FoldynWarning, match=r"0\.39 of the shape's stiffness is left"):
+        found = buckling(fd.Case(structure, [fd.Fix("zmin")], [load]), 1)
+    assert float(found.load_factor[0]) == pytest.approx(14.33, rel=1e-3)
+
+
+def test_springs_alone_have_no_factor():
+    """Springs along fixed directions keep their stiffness."""
+    structure = fd.Structure(
+        nodes=np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1]], float),
+        bars=np.array([[0, 1]]), bar_area=np.array([1e-4]), sheet=fd.Sheet(1e8, 0.3, 0.01),
+        options=ModelOptions(bar_law="linear"),
+    )  # fmt: skip
+    springs = [fd.Spring(10.0, nodes=[2], direction=each) for each in "xyz"]
+    case = fd.Case(structure, [fd.Fix([0, 1]), *springs], [fd.Force([2], (0.0, 0.0, -1.0))])
+    with pytest.warns(FoldynWarning, match="no load factor was found"):
+        found = buckling(case, 1)
+    assert found.sizes["mode"] == 0
+    np.testing.assert_allclose(found["prebuckling"][2], [0.0, 0.0, -0.1])
 
 
 # ------------------------------------------------------------------ none missed

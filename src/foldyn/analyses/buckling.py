@@ -17,6 +17,7 @@ from foldyn.analyses.vibration import bar_closed
 from foldyn.arguments import Check
 from foldyn.cases.loads import LOAD
 from foldyn.cases.supports import SUPPORT
+from foldyn.errors import InputError
 from foldyn.linear import buckling
 from foldyn.linear.buckling import DEPARTS
 from foldyn.report.album import Album, ByRule, by_mass_rule
@@ -82,7 +83,11 @@ class BucklingAnalysis(Analysis):
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
             with bar_closed(bar(progress, bar_format="load factors")):
-                result = buckling(scaled, preload=preload, **given)
+                try:
+                    result = buckling(scaled, preload=preload, **given)
+                except InputError as error:
+                    field = "analysis.constant" if error.field == "preload" else error.field
+                    raise InputError(error.reason, field) from None
             begun()
             return result
 

@@ -10,8 +10,8 @@ The factors are exact where u1 strains the structure, but hardly turns it, as in
 pressed in their plane. `departure` says how far the tangent is from singular at the lowest factor
 once the displacement is corrected to second order: about the relative error of this factor.
 
-Bažant and Cedolin, Stability of Structures, 1991, section 4.6; for the projection on the free
-dofs see Brendel and Ramm, Computers and Structures 12, 1980.
+Brendel and Ramm, Linear and nonlinear stability analysis of cylindrical shells, Computers and
+Structures 12, 1980.
 """
 
 from __future__ import annotations
@@ -120,22 +120,18 @@ def buckling(
     base = _Base(case, steady)
     positive, negative = base.softening.nearest(count)
     values = np.concatenate([positive.values, negative.values])
-    shapes = base.problem.dofs(base.all_dofs(np.hstack([positive.shapes, negative.shapes])))
-    shapes = oriented(shapes[: case.structure.nodes.size].reshape(-1, len(values)))
-    shapes = shapes.T.reshape(-1, *case.structure.nodes.shape)
-    sizes = np.linalg.norm(shapes, axis=2).max(axis=1, initial=0.0)
+    shapes = _nodal(base, np.hstack([positive.shapes, negative.shapes]))
     departure, turn = _departure(base, positive, negative)
     _warn(values, departure, turn)
     found = {
         "load_factor": values,
-        "shape": shapes / sizes[:, None, None],
+        "shape": shapes,
         "displacement": base.problem.displacement(base.u),
-        "prebuckling": base.problem.displacement(base.u + base.slope)
-        - base.problem.displacement(base.u),
+        "prebuckling": base.problem.displacement(base.slope),
     }
     statistics = {
         "count": count,
-        "state": "equilibrium" if steady else "rest",
+        "state": "equilibrium" if found["displacement"].any() else "rest",
         "constant": list(range(len(steady))) or None,
         "free_dofs": len(base.problem.free),
         "positive": len(positive.values),
@@ -194,7 +190,10 @@ class _Base:
         )
         change = self._reduce(sparse.csr_array((ahead - behind) / (2.0 * self.step)))
         if not change.is_symmetric:
-            _warn_of_asymmetry(asymmetry(change.exact))
+            loads = problem.case.constraints.matrix(
+                problem.load_stiffness(problem.dofs(self.u), 1.0)
+            )
+            _warn_of_asymmetry(asymmetry(Reduction(problem.free)(sparse.csr_array(loads)).exact))
         self.softening = Softening(
             block.symmetric, change.symmetric, factors, self._factorize,
             rounding=1.0 / self.step, farthest=FARTHEST * self.step / STEP,
@@ -243,6 +242,8 @@ class _Base:
         held = np.abs(problem.rate(self.u, 0.0))[: len(scale)]
         stressed = np.divide(held, scale, out=np.zeros_like(scale), where=scale > 0.0)
         most = max(float(each.max(initial=0.0)) for each in (apart, turned, stressed))
+        if most == 0.0:  # springs alone resist the loads
+            most = float(np.linalg.norm(v)) / problem.length
         if most == 0.0:
             raise InputError(
                 ": they load nothing, so that no load factor exists; give loads that deform the "
@@ -300,6 +301,17 @@ def _unstable(how: str, preloaded: bool) -> InputError:
         f"the tangent {how} at rest, before any load acts; hold what moves, or give folds a "
         "stiffness, or a preload under which the case is stable"
     )
+
+
+def _nodal(base: _Base, free: NDArray) -> NDArray:
+    """Shapes (k, n, 3) of the nodes, the largest displacement 1, from motions of the free dofs."""
+    case = base.problem.case
+    shapes = base.problem.dofs(base.all_dofs(free))[: case.structure.nodes.size]
+    if not shapes.shape[1]:
+        return np.zeros((0, *case.structure.nodes.shape))
+    shapes = oriented(shapes).T.reshape(-1, *case.structure.nodes.shape)
+    sizes = np.linalg.norm(shapes, axis=2).max(axis=1)
+    return shapes / np.where(sizes > 0.0, sizes, 1.0)[:, None, None]
 
 
 def _departure(base: _Base, positive: LoadFactors, negative: LoadFactors) -> tuple[float, float]:
