@@ -262,6 +262,9 @@ def solved(folder: Path) -> Calls:
             "case": case(), "count": 2, "state": None, "secant": 2.0, "load_factor": 1.0,
             "verify": True, "solver": "superlu", "check_model": True,
         }),
+        "buckling": (fd.buckling, {
+            "case": case(), "count": 2, "preload": [fd.Force([5], (0, 0, 1e-4))],
+        }),
         "frf": (fd.frf, {
             "case": case(), "drive": fd.Force([4], (0, 0, 1.0)), "frequencies": [1.0, 2.0],
             "state": None, "method": "direct", "secant": None, "amplitude": 1.0,

@@ -157,6 +157,13 @@ def test_the_loads_page_shows_a_case_that_can_be_made_and_creases_that_are_actua
     assert all(f"`fd.{kind.__name__}(" in listed for kind in LOADS)
 
 
+def test_the_buckling_page_gives_eulers_loads_and_ten_more(capsys):
+    names = executed(*blocks("buckling.md", "python"))
+    assert names["found"].load_factor.values == pytest.approx([0.822, 3.29, 7.40], rel=0.03)
+    printed = [float(word) for word in re.findall(r"[\d.]+", capsys.readouterr().out)]
+    assert printed[-1] - printed[0] == pytest.approx(10.0, rel=1e-3)
+
+
 def test_the_laws_page_shows_one_model_in_python_and_in_a_case_file():
     (block,), (toml,) = blocks("laws.md", "python"), blocks("laws.md", "toml")
     law = law_from(tomllib.loads(toml)["model"]["fold_law"], fd.materials.HINGE_LAWS)

@@ -78,6 +78,7 @@ from foldyn.linear import (
     SpectralDensity as SpectralDensity,
     UnitCell as UnitCell,
     bands as bands,
+    buckling as buckling,
     fidelity as fidelity,
     frf as frf,
     mac as mac,

@@ -155,7 +155,8 @@ def test_a_bad_file_gets_one_message(read, edits, message) -> None:
 
 
 def test_keys_of_a_path_in_a_motion_are_told_as_such(read, short) -> None:
-    for key, kinds in (("output.shapes", '"statics" or "modes"'), ("analysis.steps", '"statics"')):
+    shaped = '"statics", "modes" or "buckling"'
+    for key, kinds in (("output.shapes", shaped), ("analysis.steps", '"statics"')):
         text = changed(short, f"{key} = 3")
         check(read, text, f"{key}: only for analysis.kind = {kinds}; leave it out")
 
@@ -164,5 +165,5 @@ def test_a_file_that_does_not_say_its_kind(read) -> None:
     with pytest.raises(InputError) as caught:
         read(changed(PATH, "analysis.kind =; analysis.load_factors = [1]; output.shapes = 3"))
     (line,) = str(caught.value).splitlines()  # what depends on the kind is not complained about
-    known = "dynamics, statics, modes, frf, response, bands, fidelity"
+    known = "dynamics, statics, modes, frf, response, bands, fidelity, buckling"
     assert line.endswith(f"analysis.kind: missing; choose one of {known}")

@@ -59,7 +59,8 @@ def _one_mass(name: str, value: Any, beside: Mapping[str, Any]) -> list[str]:
     return [check_mass(name, value, beside)]
 
 
-def _constant(name: str, value: Any) -> str | tuple[int, ...]:
+def constant_loads(name: str, value: Any) -> str | tuple[int, ...]:
+    """Return "gravity", or numbers of loads as a tuple."""
     if value == "gravity":
         return "gravity"
     if isinstance(value, str):
@@ -92,7 +93,7 @@ class PathSection(AnalysisSection):
         float | Sequence[float] | None, Check(number_or_list, what="interval", least=0.0, unit="s")
     ] = None
     first_step: Annotated[float | None, Check(number)] = None
-    constant: Annotated[str | Sequence[int], Check(_constant)] = ()
+    constant: Annotated[str | Sequence[int], Check(constant_loads)] = ()
     until: Annotated[Reached | None, UNTIL] = None
     inertia_relief: Switch = False
     tolerance: Annotated[float, Check(number, least=1e-14, most=1e-2)] = Settings.tolerance

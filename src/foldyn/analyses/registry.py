@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from foldyn import __version__, tables
 from foldyn.analyses.bands import BandsAnalysis
+from foldyn.analyses.buckling import BucklingAnalysis
 from foldyn.analyses.casefile import Analysis
 from foldyn.analyses.fidelity import FidelityAnalysis
 from foldyn.analyses.frf import FrfAnalysis
@@ -31,6 +32,7 @@ ANALYSES: Mapping[str, type[Analysis]] = {
         ResponseAnalysis,
         BandsAnalysis,
         FidelityAnalysis,
+        BucklingAnalysis,
     )
 }
 """Analyses by `analysis.kind`."""

@@ -176,7 +176,7 @@ def prepared(
     """As `prepare`, for linear models, too."""
     if of_kind("case", case, Case).structure.linear:
         return prepare_linear(case, duration, method, **given)
-    if method == MODAL:
+    if isinstance(method, str) and method == MODAL:
         raise InputError(
             f" = {MODAL!r}: superposes modes of linear models (fd.superelements); this one takes "
             f"{AUTO} or one of {', '.join(METHODS)}",

@@ -2,6 +2,7 @@
 
 from foldyn.linear.absorbing_ends import LongWaves, absorbing_end, long_waves
 from foldyn.linear.band_structure import band_gaps, bands, damped_bands
+from foldyn.linear.buckling import buckling
 from foldyn.linear.cell_equilibrium import relaxed
 from foldyn.linear.cell_motions import space_time, transmission, wave_spectrum
 from foldyn.linear.character import character
@@ -42,6 +43,7 @@ __all__ = [
     "attenuation",
     "band_gaps",
     "bands",
+    "buckling",
     "character",
     "convert",
     "damped_bands",

@@ -29,6 +29,7 @@ from foldyn.plots.landscape import (
 )
 from foldyn.plots.laws import plot_laws as plot_laws
 from foldyn.plots.loads import plot_load_history as plot_load_history
+from foldyn.plots.buckling import draw_buckling as draw_buckling
 from foldyn.plots.modes import draw_modes as draw_modes, plot_mac as plot_mac
 from foldyn.plots.nyquist import plot_nyquist as plot_nyquist
 from foldyn.plots.path import (

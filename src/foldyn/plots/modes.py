@@ -118,7 +118,7 @@ class ShownModes:
         state = "undeformed" if not moved.any() else "equilibrium"
         sheet = replace(sheet, nodes=sheet.nodes + moved)
         shapes = modes["shape"].transpose("mode", "node", "axis").sel(mode=numbers).values
-        swings = np.array([_readable(sheet, shape, amplitude) for shape in shapes])
+        swings = np.array([readable(sheet, shape, amplitude) for shape in shapes])
         named = mode_names(sheet, modes, names)
         captions = [describe_mode(modes, number, named.get(number, "")) for number in numbers]
         return cls(sheet, swings, captions, rest_keys(state=state))
@@ -168,7 +168,7 @@ def hertz(frequency: float) -> str:
     return f"{frequency:#.4g}".rstrip(".") if frequency else "0"
 
 
-def _readable(sheet: Sheet3D, shape: Points, amplitude: float | None) -> Points:
+def readable(sheet: Sheet3D, shape: Points, amplitude: float | None) -> Points:
     """Scale a shape to an amplitude (m), or by default to a legible amplitude."""
     largest = float(np.linalg.norm(shape, axis=1).max())
     if largest == 0.0:

@@ -16,6 +16,7 @@ from foldyn.patterns import Pattern
 from foldyn.results.attributes import facts, own_attributes
 from foldyn.results.quantities import (
     BANDS,
+    BUCKLING,
     CONTINUATIONS,
     CROSSINGS,
     ESTIMATES,
@@ -201,6 +202,36 @@ def modes_dataset(
     numbers = 1 + np.arange(len(np.asarray(values["frequency"])))
     along = {"mode": ("mode", numbers, {"long_name": "mode"})}
     return result_dataset("modes", case, data, along, statistics)
+
+
+def buckling_dataset(
+    case: Case, values: Mapping[str, ArrayLike], statistics: Mapping[str, Any]
+) -> xr.Dataset:
+    """Dataset of load factors and buckling shapes, including its case.
+
+    Parameters
+    ----------
+    case : Case
+        Case that buckles.
+    values : mapping of str to array_like
+        Variables of `quantities.BUCKLING`, the `displacement` (n, 3) of the base state, m, and the
+        displacement `prebuckling` (n, 3) per unit of the load factor, m.
+    statistics : mapping
+        Facts about the computation, each stored as an attribute.
+
+    Returns
+    -------
+    xarray.Dataset
+        As from `modes_dataset`.
+    """
+    data = variables(BUCKLING, "mode", {name: values[name] for name in BUCKLING})
+    text = "displacement of the base state from the rest position"
+    data["displacement"] = variable(PLACE, values["displacement"], "m", text)
+    text = "displacement per unit of the load factor from the base state"
+    data["prebuckling"] = variable(PLACE, values["prebuckling"], "m", text)
+    numbers = 1 + np.arange(len(np.asarray(values["load_factor"])))
+    along = {"mode": ("mode", numbers, {"long_name": "mode"})}
+    return result_dataset("buckling", case, data, along, statistics)
 
 
 def frf_dataset(

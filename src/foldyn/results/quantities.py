@@ -143,6 +143,10 @@ RANDOM: Mapping[str, Quantity] = {
     "acceleration_crossings": Quantity("Hz", "zero crossings of the acceleration, rising"),
 }
 """Variables of a random response."""
+BUCKLING: Mapping[str, Quantity] = {
+    "load_factor": Quantity("1", "load factor (negative: loads reversed)"),
+    "shape": Quantity("m", "buckling shape with the largest displacement 1 m", PLACE),
+}
 RESPONSES: Mapping[str, Quantity] = {
     "receptance": Quantity("m/N", "displacement per force", PLACE),
     "mobility": Quantity("m/(N s)", "velocity per force", PLACE),

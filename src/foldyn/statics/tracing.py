@@ -208,7 +208,7 @@ def trace(
     if steps is not None:
         check_steps(steps, case.structure.nodes.size)
     plan, timed = plan_path(method, load_factors, steps, first_step, duration), duration is not None
-    steady = _constant_loads(case, constant)
+    steady = constant_numbers(case, constant)
     displacement = None if initial is None else displacement_of(initial, case, "initial")
     _check_case(case, plan, steady, adaptive_load is not None)
     until = until_of(until, case.structure)
@@ -263,7 +263,7 @@ def check_steps(steps: Any, dofs: int) -> None:
     )
 
 
-def _constant_loads(case: Case, constant: Any) -> tuple[int, ...]:
+def constant_numbers(case: Case, constant: Any) -> tuple[int, ...]:
     """Numbers of the loads that are constant along the path."""
     if isinstance(constant, str):
         if constant != "gravity":

@@ -25,7 +25,7 @@ from foldyn.viewer.states import bar_strain
 
 F = TypeVar("F", bound=Callable[..., Any])
 MOTION, PATH, MODES, FRF, FIDELITY = "dynamics", "statics", "modes", "frf", "fidelity"
-BANDS = "bands"
+BANDS, BUCKLING = "bands", "buckling"
 PROMINENT = 0.05
 """Least prominence of a peak of a spectrum, relative to its maximum."""
 NEAR = 1e-5
@@ -99,6 +99,13 @@ def _unstable_modes(result: xr.Dataset, case: Case) -> int:
 @_measure(MODES, doc="rigid modes")
 def _rigid_modes(result: xr.Dataset, case: Case) -> int:
     return int(result["rigid"].sum())
+
+
+# ------------------------------------------------------------------------- buckling
+@_measure(BUCKLING, doc="lowest positive load factor of linear buckling (nan: none)")
+def _buckling_load(result: xr.Dataset, case: Case) -> float:
+    factors = result["load_factor"].values
+    return float(factors[0]) if len(factors) and factors[0] > 0.0 else np.nan
 
 
 # ------------------------------------------------------- responses, and spectra of motions

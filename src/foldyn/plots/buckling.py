@@ -1,0 +1,94 @@
+"""Buckling shapes side by side, with the base state behind them in gray."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from foldyn.cases import Case
+from foldyn.errors import InputError
+from foldyn.plots.modes import readable
+from foldyn.plots.readings import MOST_MODES, case_from_result
+from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.sheet import rest_keys, side_by_side
+from foldyn.structures import Structure
+from foldyn.values import length
+
+NEEDED = "load_factor", "shape", "displacement"
+
+
+@case_from_result
+def draw_buckling(
+    case_or_structure: Case | Structure,
+    buckling: xr.Dataset,
+    *,
+    which: Sequence[int] | None = None,
+    amplitude: float | None = None,
+    view: tuple[float, float] = (28.0, -60.0),
+    title: str = "",
+) -> Figure:
+    """Draw buckling shapes, each with the base state behind it in gray and its load factor.
+
+    Parameters
+    ----------
+    case_or_structure : Case or Structure
+        The structure that buckles; by default from the result: ``draw_buckling(buckling)``.
+    buckling : xarray.Dataset
+        A result of `foldyn.buckling`.
+    which : sequence of int, optional
+        Mode numbers, from 1; by default the first, at most 12.
+    amplitude : float, optional
+        Largest displacement (m) in each picture; by default 12 % of the sheet's size, or less if
+        neighboring nodes would move too far apart for a legible shape.
+    view : tuple of float
+        Elevation above the xy plane and azimuth around z (degrees).
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One orthographic view for each shape.
+
+    Raises
+    ------
+    InputError
+        The result belongs to another structure, has no shapes, or a mode does not exist.
+    """
+    sheet = Sheet3D.of(case_or_structure)
+    numbers = shown_shapes(buckling, which)
+    if amplitude is not None:
+        length("amplitude", amplitude)
+    moved = buckling["displacement"].transpose("node", "axis").values
+    sheet.check_nodes("buckling: its shapes have", moved)
+    state = "undeformed" if not moved.any() else "equilibrium"
+    sheet = replace(sheet, nodes=sheet.nodes + moved)
+    shapes = buckling["shape"].transpose("mode", "node", "axis").sel(mode=numbers).values
+    positions = sheet.nodes + np.array([readable(sheet, shape, amplitude) for shape in shapes])
+    factors = buckling["load_factor"].sel(mode=numbers).values.tolist()
+    captions = [
+        f"mode {number}: load factor {factor:.4g}"
+        for number, factor in zip(numbers, factors, strict=True)
+    ]
+    return side_by_side(sheet, positions, captions, View(*view), rest_keys(state=state), title)[0]
+
+
+def shown_shapes(buckling: xr.Dataset, which: Sequence[int] | None) -> list[int]:
+    """Numbers of the shapes to draw: as asked for, or the first."""
+    missing = [key for key in NEEDED if key not in buckling]
+    if missing:
+        raise InputError(f"buckling: has no {missing[0]}; give a result of fd.buckling")
+    stored = buckling["mode"].values.tolist()
+    if not stored:
+        raise InputError("buckling: found no load factor, so that there is no shape to draw")
+    numbers = stored[:MOST_MODES] if which is None else [int(number) for number in which]
+    if not 0 < len(numbers) <= MOST_MODES:
+        raise InputError(f"which: {len(numbers)} modes; one figure shows 1 to {MOST_MODES}")
+    for number in numbers:
+        if number not in stored:
+            raise InputError(f"which: {number}; there are modes {stored[0]} to {stored[-1]}")
+    return numbers
