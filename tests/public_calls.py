@@ -130,6 +130,9 @@ DATA: Calls = {
         "theta1": 45.0, "theta2": 315.0, "rest": "as_published",
     }),
     "PlateSuperlinear": (fd.PlateSuperlinear, {"onset": 0.5}),
+    "SpectralDensity": (fd.SpectralDensity, {
+        "frequency": [1.0, 20.0], "value": [0.5, 0.25], "unit": "g2/Hz",
+    }),
     "Prony": (fd.Prony, {"ratios": [0.5, 0.25], "times": [1.0, 2.0], "law": "linear"}),
     "Plastic": (fd.Plastic, {
         "yield_moment": 0.5, "isotropic": 0.25, "kinematic": 0.125, "law": "linear",
@@ -269,6 +272,12 @@ def solved(folder: Path) -> Calls:
             "case": case(), "drive": fd.Force([4], (0, 0, 1.0)), "frequencies": [1.0, 2.0],
             "state": None, "method": "direct", "secant": None, "amplitude": 1.0,
             "load_factor": 1.0, "progress": None, "check_model": True,
+        }),
+        "random_response": (fd.random_response, {
+            "case": case().altered(damping=fd.ModalDamping(0.02)),
+            "base": {"z": fd.SpectralDensity([1.0, 50.0], [0.1, 0.1], "m2/s3")},
+            "forces": [(fd.Force([4], (0, 0, 1.0)), fd.SpectralDensity([1, 9], [1, 2], "N2/Hz"))],
+            "state": None, "count": 3, "load_factor": 1.0,
         }),
         "bands": (fd.bands, {
             "cell": cell(), "phases": [[0.5]], "count": 2, "state": fd.State(), "secant": 2.0,

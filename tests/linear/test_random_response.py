@@ -173,7 +173,7 @@ def test_the_table_of_a_density():
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ({"unit": "g/Hz"}, 'unit = "g/Hz": give one of g2/Hz'),
+        ({"unit": "g/Hz"}, 'unit = "g/Hz"'),
         ({"frequency": [20.0, 10.0]}, "frequency: give at least two frequencies"),
         ({"frequency": [0.0, 10.0]}, "frequency: give at least two frequencies"),
         ({"value": [0.1, -0.1]}, "value: 2 densities for 2 frequencies"),

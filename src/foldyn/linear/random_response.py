@@ -29,7 +29,7 @@ from foldyn.linear.frequency_domain import Modal, ModalResponse
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
 from foldyn.linear.spectral_density import SpectralDensity
 from foldyn.results import random_dataset
-from foldyn.values import of_kind, show
+from foldyn.values import number, of_kind, show, whole
 
 TURN = 2.0 * np.pi
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -120,6 +120,8 @@ def random_response(
     13.95
     """
     began = time.perf_counter()
+    count = None if count is None else whole("count", count, least=1, what="modes")
+    load_factor = number("load_factor", load_factor)
     drives = _drives(of_kind("case", case, Case), base, forces)
     system = linearize(case, state, load_factor=load_factor)
     total = np.zeros((4, *case.structure.nodes.shape))
@@ -150,8 +152,12 @@ def _drives(
 ) -> list[tuple[Drive, SpectralDensity]]:  # fmt: skip
     """Drives of unit base displacement, or of the given forces, each with its density."""
     out = []
+    if base is not None and not isinstance(base, Mapping):
+        raise InputError(f' = {show(base)}: give densities by axis, as {{"z": density}}', "base")
+    if not isinstance(forces, Sequence) or isinstance(forces, str | bytes):
+        raise InputError(f" = {show(forces)}: give a list of pairs (force, density)", "forces")
     for axis, density in (base or {}).items():
-        if axis not in AXES:
+        if axis not in (*AXES,):
             raise InputError(f': {show(axis)} is no axis; give "x", "y" or "z"', "base")
         out.append((_density(density, "acceleration", f"base[{axis!r}]"), BaseMotion(axis)))
     for k, pair in enumerate(forces):

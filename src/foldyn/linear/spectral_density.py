@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.arguments import Check, Checked
 from foldyn.errors import InputError
-from foldyn.values import numbers, show
+from foldyn.values import choice, numbers
 
 STANDARD_GRAVITY = 9.80665  # m/s2, ISO 80000-3
 UNITS = {"g2/Hz": ("acceleration", STANDARD_GRAVITY**2), "m2/s3": ("acceleration", 1.0),
@@ -21,12 +21,6 @@ UNITS = {"g2/Hz": ("acceleration", STANDARD_GRAVITY**2), "m2/s3": ("acceleration
 
 def _column(name: str, value: Any) -> tuple[float, ...]:
     return tuple(np.atleast_1d(numbers(name, value)).tolist())
-
-
-def _unit(name: str, value: Any) -> str:
-    if value not in UNITS:
-        raise InputError(f" = {show(value)}: give one of {', '.join(UNITS)}", name)
-    return value
 
 
 @dataclass(frozen=True)
@@ -53,7 +47,7 @@ class SpectralDensity(Checked):
 
     frequency: Annotated[Sequence[float], Check(_column)]
     value: Annotated[Sequence[float], Check(_column)]
-    unit: Annotated[str, Check(_unit)]
+    unit: Annotated[str, Check(choice, known=tuple(UNITS))]
 
     def agree(self) -> None:
         """Check the table."""
