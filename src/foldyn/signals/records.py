@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -28,7 +29,7 @@ def real_numbers(name: str, x: ArrayLike) -> NDArray[np.float64]:
         values = np.asarray(x)
         if not np.iscomplexobj(values):
             return values.astype(np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name}: not an array of numbers ({error})") from error
     raise InputError(f"{name}: complex samples; a real record is needed here")
 
@@ -61,7 +62,7 @@ def checked_record(name: str, x: ArrayLike, fewest: int) -> NDArray[np.float64]:
 
 def checked_interval(dt: float) -> float:
     """Return the sampling interval as a positive float."""
-    if np.ndim(dt):
+    if isinstance(dt, Sequence) or np.ndim(dt):
         raise InputError("dt: is not one number; for sample times use signals.sampling_interval")
     return number("dt", dt, above=0.0)
 
