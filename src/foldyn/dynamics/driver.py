@@ -79,7 +79,8 @@ def simulate(
     method : str, default "auto"
         Name of an integrator in the list of `foldyn info`. "auto" picks the one expected to be
         fastest, and switches to another if the energies do not balance; the documentation has a
-        page on integrators.
+        page on integrators. For superelements it is "modal", which superposes modes with exact
+        steps: give `interval` and, at most, `tolerance`.
     dt : float, optional
         Time step (s). Explicit methods: by default half the critical step, shortened to divide
         `interval`. Implicit methods and `dormand_prince` choose their steps by error control: `dt`
