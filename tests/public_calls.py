@@ -277,7 +277,7 @@ def solved(folder: Path) -> Calls:
             "case": case().altered(damping=fd.ModalDamping(0.02)),
             "base": {"z": fd.SpectralDensity([1.0, 50.0], [0.1, 0.1], "m2/s3")},
             "forces": [(fd.Force([4], (0, 0, 1.0)), fd.SpectralDensity([1, 9], [1, 2], "N2/Hz"))],
-            "state": None, "count": 3, "load_factor": 1.0,
+            "state": None, "count": 3, "load_factor": 1.0, "frequencies": [1.0, 2.0],
         }),
         "bands": (fd.bands, {
             "cell": cell(), "phases": [[0.5]], "count": 2, "state": fd.State(), "secant": 2.0,

@@ -137,6 +137,27 @@ def test_a_folded_sheet_beside_simulated_noise():
     assert np.sqrt((late**2).mean()) == pytest.approx(rms, rel=3.0 * error)
 
 
+def test_densities_integrate_to_mean_squares():
+    """And are those of the frequency response: displacements by forces, accelerations by a base."""
+    case = chain([500.0, 200.0], [0.3, 0.2], 0.05)
+    f = np.linspace(1.0, 30.0, 4001)
+    push = noise(0.2, 1.0, 30.0, "N2/Hz")
+    one = fd.random_response(case, forces=[(fd.Force([2], (2, 0, 0)), push)], frequencies=f)
+    two = fd.random_response(case, base={"x": noise(0.3, 1.0, 30.0)}, frequencies=f)
+    for found in (one, two):
+        for name in ("displacement", "acceleration"):
+            area = np.trapezoid(found[f"{name}_psd"].sel(node=[1, 2], axis="x"), f, axis=0)
+            rms = found[f"{name}_rms"].sel(node=[1, 2], axis="x")
+            np.testing.assert_allclose(area, rms**2, rtol=1e-4)
+    at = {"frequency": f[[10, 900]], "node": 1, "axis": "x"}
+    response = fd.frf(case, fd.Force([2], (2, 0, 0)), frequencies=at["frequency"])
+    moved = np.abs(2.0 * response.receptance.sel(node=1, axis="x")) ** 2 * 0.2
+    np.testing.assert_allclose(one.displacement_psd.sel(at), moved, rtol=1e-9)
+    response = fd.frf(case, fd.BaseMotion("x"), frequencies=at["frequency"])
+    shaken = np.abs(response.transmissibility.sel(node=1, axis="x")) ** 2 * 0.3
+    np.testing.assert_allclose(two.acceleration_psd.sel(at), shaken, rtol=1e-9)
+
+
 def test_models_agree_and_few_modes_nearly_do():
     base = {"z": noise(0.01, 1.0, 60.0)}
     panels = folded(fd.superelements(PATTERN, SHEET, level=2, divisions=12, clamped="xmin"))
@@ -195,6 +216,8 @@ def test_refused_densities(change, told):
         ({"forces": [(fd.Force([1], (1, 0, 0)), noise(1.0))]}, r"forces\[0\]: its unit is m2/s3"),
         ({"forces": [fd.Force([1], (1, 0, 0))]}, r"forces\[0\] = .*give pairs"),
         ({"base": {"x": 0.1}}, "SpectralDensity"),
+        ({"base": {"x": noise(1.0)}, "frequencies": [2.0, 1.0]}, "frequencies: must increase"),
+        ({"base": {"x": noise(1.0)}, "frequencies": [0.0]}, "frequencies: give a list"),
     ],
 )
 def test_refused_drives(given, told):

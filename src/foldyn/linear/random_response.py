@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from foldyn.algebra.eigen import Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
@@ -28,8 +28,9 @@ from foldyn.linear.excitation import Drive, drive_of
 from foldyn.linear.frequency_domain import Modal, ModalResponse
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
 from foldyn.linear.spectral_density import SpectralDensity
+from foldyn.ram_limit import check_memory
 from foldyn.results import random_dataset
-from foldyn.values import number, of_kind, show, whole
+from foldyn.values import number, numbers, of_kind, show, whole
 
 TURN = 2.0 * np.pi
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -56,6 +57,7 @@ def random_response(
     state: State | str | None = None,
     count: int | None = None,
     load_factor: float = 1.0,
+    frequencies: ArrayLike | None = None,
 ) -> xarray.Dataset:
     """Root mean square response of a case to random vibration, linearized about a state.
 
@@ -77,13 +79,17 @@ def random_response(
         of a density. The other modes respond statically.
     load_factor : float
         As in `frf`.
+    frequencies : array_like, optional
+        Frequencies (Hz), increasing, at which the densities of the response are wanted.
 
     Returns
     -------
     xarray.Dataset
         Over node and axis: `displacement_rms` (m), relative to the base, `acceleration_rms` (m/s2),
         absolute, and the mean numbers of zero crossings per second with rising values,
-        `displacement_crossings` and `acceleration_crossings` (Hz; 0 where nothing moves).
+        `displacement_crossings` and `acceleration_crossings` (Hz; 0 where nothing moves). With
+        `frequencies`, over frequency, node and axis: `displacement_psd` (m2/Hz) and
+        `acceleration_psd` (m2/s3), one-sided.
         `displacement` of the state. Largest values of a normal process are three times the root
         mean square in 99.7 % of time.
 
@@ -122,6 +128,7 @@ def random_response(
     began = time.perf_counter()
     count = None if count is None else whole("count", count, least=1, what="modes")
     load_factor = number("load_factor", load_factor)
+    at = None if frequencies is None else _increasing("frequencies", frequencies)
     drives = _drives(of_kind("case", case, Case), base, forces)
     system = linearize(case, state, load_factor=load_factor)
     total = np.zeros((4, *case.structure.nodes.shape))
@@ -130,9 +137,15 @@ def random_response(
     needed = min(pencil.finite, pencil.below((TURN * top) ** 2))
     if count is None:
         count = min(pencil.finite, max(FEWEST, pencil.below((TURN * BEYOND * top) ** 2)))
+    shape = 2, 0 if at is None else len(at), *case.structure.nodes.shape
+    check_memory("frequencies", f"densities at {shape[1]} frequencies", 16.0 * np.prod(shape),
+                 "take fewer")  # fmt: skip
+    curves = np.zeros(shape)
     for drive, density in drives:
         response = ModalResponse(system, drive, Modal(count))
         total += np.stack(_moments(system, drive, response, density))
+        if at is not None:
+            curves += _densities(system, drive, response, density, at)
         if drive.axis is not None:
             _warn_of_mass(system, response, drive, density)
     if count < needed:
@@ -143,7 +156,8 @@ def random_response(
         )
     warn_beyond(case.structure, np.array([top]), linear=True)
     facts = {"modes": count, "wall_seconds": time.perf_counter() - began}
-    return random_dataset(case, system.displacement, *_rates(Moments._make(list(total))), facts)
+    rates = _rates(Moments._make(list(total)))
+    return random_dataset(case, system.displacement, *rates, facts, at, curves)
 
 
 def _drives(
@@ -202,6 +216,22 @@ def _moments(
         _mean_squares(both, absolute, power),
         _mean_squares(both, absolute, power * omega**2),
     )
+
+
+def _densities(
+    system: Linearized, drive: Drive, response: ModalResponse, density: SpectralDensity, at: NDArray
+) -> NDArray[np.float64]:
+    """Densities (2, nf, n, 3) of displacement and absolute acceleration due to one drive."""
+    amplitude, omega = np.array([response.amplitudes(TURN * f) for f in at]), TURN * at
+    moved = (amplitude @ system.expanded(response.motions).T).reshape(len(at), -1, 3)
+    accelerated = moved * (omega**2)[:, None, None]
+    if drive.axis is None:
+        moved, accelerated = moved * drive.value, accelerated * drive.value
+    else:
+        accelerated = moved.copy()
+        accelerated[..., AXES.index(drive.axis)] += 1.0
+        moved = moved / (omega**2)[:, None, None]
+    return np.abs(np.stack([moved, accelerated])) ** 2 * density.at(at)[:, None, None]
 
 
 def _mean_squares(motions: NDArray, amplitude: NDArray, power: NDArray) -> NDArray[np.float64]:
@@ -265,6 +295,16 @@ def _warn_of_mass(
             "random-vibration.md#how-it-is-computed",
             ModelRangeWarning,
         )
+
+
+def _increasing(name: str, given: ArrayLike) -> NDArray[np.float64]:
+    """Frequencies (nf,), Hz, above 0 and increasing."""
+    frequency = np.atleast_1d(numbers(name, given))
+    if frequency.ndim != 1 or not len(frequency) or frequency[0] <= 0.0:
+        raise InputError(": give a list of frequencies (Hz) above 0", name)
+    if (np.diff(frequency) <= 0.0).any():
+        raise InputError(": must increase; sort them and drop doubles", name)
+    return frequency
 
 
 def _rates(moments: Moments) -> tuple[NDArray, NDArray, NDArray, NDArray]:

@@ -31,6 +31,7 @@ from foldyn.results.quantities import (
     PLACE,
     POINTS,
     RANDOM,
+    RANDOM_CURVES,
     RESPONSES,
     Quantity,
     energies_of,
@@ -283,8 +284,9 @@ def frf_dataset(
 def random_dataset(
     case: Case, place: ArrayLike, displacement: ArrayLike, acceleration: ArrayLike,
     moving: ArrayLike, accelerating: ArrayLike, statistics: Mapping[str, Any],
+    frequency: ArrayLike | None = None, densities: ArrayLike | None = None,
 ) -> xr.Dataset:  # fmt: skip
-    """Dataset of a random response, including its case; all arrays (n, 3).
+    """Dataset of a random response, including its case; arrays (n, 3) unless stated otherwise.
 
     Parameters
     ----------
@@ -298,6 +300,8 @@ def random_dataset(
         Zero crossings of these with rising values, Hz.
     statistics : mapping
         Facts about the run, each stored as an attribute.
+    frequency, densities : array_like, shapes (nf,) and (2, nf, n, 3), optional
+        Frequencies (Hz), and densities of displacement and acceleration there.
     """
     values = (displacement, acceleration, moving, accelerating)
     data = {
@@ -305,7 +309,13 @@ def random_dataset(
         for (name, quantity), value in zip(RANDOM.items(), values, strict=True)
     }
     data["displacement"] = variable(PLACE, place, "m", "displacement of the state")
-    return result_dataset("random", case, data, {}, statistics)
+    along: dict[str, Any] = {}
+    if frequency is not None and densities is not None:
+        data |= variables(
+            RANDOM_CURVES, "frequency", dict(zip(RANDOM_CURVES, np.asarray(densities), strict=True))
+        )
+        along = {"frequency": ("frequency", np.array(frequency, float), {"units": "Hz"})}
+    return result_dataset("random", case, data, along, statistics)
 
 
 def bands_dataset(

@@ -142,7 +142,12 @@ RANDOM: Mapping[str, Quantity] = {
     "displacement_crossings": Quantity("Hz", "zero crossings of the displacement, rising"),
     "acceleration_crossings": Quantity("Hz", "zero crossings of the acceleration, rising"),
 }
-"""Variables of a random response."""
+"""Variables of a random response,"""
+RANDOM_CURVES: Mapping[str, Quantity] = {
+    "displacement_psd": Quantity("m2/Hz", "density of the displacement", PLACE),
+    "acceleration_psd": Quantity("m2/s3", "density of the absolute acceleration", PLACE),
+}
+"""and those over frequency."""
 BUCKLING: Mapping[str, Quantity] = {
     "load_factor": Quantity("1", "load factor (negative: loads reversed)"),
     "shape": Quantity("m", "buckling shape with the largest displacement 1 m", PLACE),
