@@ -121,13 +121,14 @@ def modal(
         There are resonances without damping; omitted modes matter, by their static response to what
         the response leaves of the equation.
     """
-    modes = ModalResponse(system, drive, options)
+    modes = SuperposedModes(system, Pencil(system.stiffness, system.mass), options.count)
+    driven = ModalResponse(modes, drive, options.static_correction)
     missing = np.zeros(len(frequency))
     response = np.zeros((len(frequency), len(system.free)), np.complex128)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
-        response[k] = modes.motions @ modes.amplitudes(omega)
-        missing[k] = modes.missing(omega, response[k])
+        response[k] = driven.motions @ driven.amplitudes(omega)
+        missing[k] = driven.missing(omega, response[k])
         report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
     warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
     if (told := missing > OMITTED).any():
@@ -136,57 +137,65 @@ def modal(
     return Answer(response, {}, facts)
 
 
-class ModalResponse:
-    """Superposed modes of a linearized case under a drive; see `modal`.
+class SuperposedModes:
+    """Modes of a linearized case and its massless motions, to answer any drive; see `modal`.
 
-    Attributes
-    ----------
-    count : int
-        Number of modes.
-    motions : (nf, r + t)
-        Motions that are superposed: modes, massless motions, and the static response of all other
-        modes to each of the t parts of the drive.
+    count : number of modes; all by default.
     """
 
-    def __init__(self, system: Linearized, drive: Drive, options: Modal) -> None:
-        pencil = Pencil(system.stiffness, system.mass)
-        self.count = pencil.finite if options.count is None else int(options.count)
+    def __init__(self, system: Linearized, pencil: Pencil, count: int | None) -> None:
+        self.system, self.pencil = system, pencil
+        self.count = pencil.finite if count is None else int(count)
         modes = lowest(pencil, self.count, unresisted(system, rigid_space(system)))
-        self._system = system
         self.basis = basis = _with_massless(system, pencil, modes)
         self.damping = basis.shapes.T @ (system.damping @ basis.shapes)
         if len(system.modal):
             own = system.modal @ basis.shapes
             self.damping = self.damping + own.T @ own
         few = self.count < pencil.finite
-        shift = _shift(pencil, basis) if few else 0.0
-        self._factors = factors = pencil.factorize(shift) if few else None
-        self._terms = drive_terms(system, drive)
+        self.shift = _shift(pencil, basis) if few else 0.0
+        self.factors = pencil.factorize(self.shift) if few else None
+
+
+class ModalResponse:
+    """Superposed modes of a linearized case under a drive; see `modal`.
+
+    Attributes
+    ----------
+    modes : SuperposedModes
+    motions : (nf, r + t)
+        Motions that are superposed: modes, massless motions, and the static response of all other
+        modes to each of the t parts of the drive.
+    """
+
+    def __init__(self, modes: SuperposedModes, drive: Drive, correction: bool = True) -> None:
+        self.modes, basis, factors = modes, modes.basis, modes.factors
+        self._terms = drive_terms(modes.system, drive)
         self._loads, left = [], []
         for term in self._terms:
             load = basis.shapes.T @ term.shape
             self._loads.append(load)
-            if options.static_correction and factors is not None:
-                left.append(_residual(pencil, basis, term.shape, load, factors, shift))
+            if correction and factors is not None:
+                left.append(_residual(modes.pencil, basis, term.shape, load, factors, modes.shift))
             else:
-                left.append(np.zeros(pencil.size))
+                left.append(np.zeros(modes.pencil.size))
         self._left = left
         self.motions = np.column_stack([basis.shapes, *left])
 
     @property
     def remembers(self) -> bool:
         """Whether laws with memory act, whose damping depends on the frequency."""
-        return self._system.responding is not None
+        return self.modes.system.responding is not None
 
     def amplitudes(self, omega: float) -> NDArray[np.complex128]:
         """Amplitudes (r + t,) of `motions`, per unit of the drive, at a frequency (rad/s)."""
-        system, basis, memory = self._system, self.basis, None
+        system, basis, memory = self.modes.system, self.modes.basis, None
         if system.responding is not None:
             memory = system.responding.between(basis.shapes, 1j * omega)
         own, factors = np.zeros(len(basis.values), np.complex128), []
         for load, left, term in zip(self._loads, self._left, self._terms, strict=True):
             damped = basis.shapes.T @ _damped(system, omega, left)
-            q = _amplitudes(basis, self.damping, omega, load - damped, memory)
+            q = _amplitudes(basis, self.modes.damping, omega, load - damped, memory)
             factors.append(term.factor(omega))
             own += q * factors[-1]
         return np.append(own, factors)
@@ -196,12 +205,12 @@ class ModalResponse:
 
         The response leaves forces unbalanced, to which they respond statically.
         """
-        if self._factors is None:
+        if self.modes.factors is None:
             return 0.0
-        unbalanced: NDArray[np.complex128] = -_resisting(self._system, omega, response)
+        unbalanced: NDArray[np.complex128] = -_resisting(self.modes.system, omega, response)
         for term in self._terms:
             unbalanced += term.shape * term.factor(omega)
-        change = self._factors.solve(np.stack([unbalanced.real, unbalanced.imag], axis=1))
+        change = self.modes.factors.solve(np.stack([unbalanced.real, unbalanced.imag], axis=1))
         return float(np.hypot(*change.T).max() / np.abs(response).max())
 
 

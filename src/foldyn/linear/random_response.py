@@ -25,7 +25,7 @@ from foldyn.cases import BaseMotion, Case, Force, State
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError, ModelRangeWarning, warn
 from foldyn.linear.excitation import Drive, drive_of
-from foldyn.linear.frequency_domain import Modal, ModalResponse
+from foldyn.linear.frequency_domain import ModalResponse, SuperposedModes
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
 from foldyn.linear.spectral_density import SpectralDensity
 from foldyn.ram_limit import check_memory
@@ -141,8 +141,9 @@ def random_response(
     check_memory("frequencies", f"densities at {shape[1]} frequencies", 16.0 * np.prod(shape),
                  "take fewer")  # fmt: skip
     curves = np.zeros(shape)
+    modes = SuperposedModes(system, pencil, count)
     for drive, density in drives:
-        response = ModalResponse(system, drive, Modal(count))
+        response = ModalResponse(modes, drive)
         total += np.stack(_moments(system, drive, response, density))
         if at is not None:
             curves += _densities(system, drive, response, density, at)
@@ -262,9 +263,9 @@ def _quadrature(response: ModalResponse, density: SpectralDensity) -> tuple[NDAr
 
 def _poles(response: ModalResponse, density: SpectralDensity) -> NDArray[np.complex128]:
     """Poles (k,), Hz: natural frequencies, and half widths of their peaks as imaginary parts."""
-    basis, modal = response.basis, response.basis.inertia > 0.0
+    basis, modal = response.modes.basis, response.modes.basis.inertia > 0.0
     frequency = np.sqrt(basis.values[modal].clip(0.0)) / TURN
-    width = response.damping.diagonal()[modal] / (2.0 * TURN)
+    width = response.modes.damping.diagonal()[modal] / (2.0 * TURN)
     low, high = density.frequency[0], density.frequency[-1]
     free = (width <= UNDAMPED * frequency) & (frequency >= low) & (frequency <= high)
     if free.any() and not response.remembers:
@@ -281,7 +282,7 @@ def _warn_of_mass(
     system: Linearized, response: ModalResponse, drive: Drive, density: SpectralDensity
 ) -> None:
     """Warn if modes above the density's highest frequency have much of the mass along its axis."""
-    axis, basis = AXES.index(drive.axis or "x"), response.basis
+    axis, basis = AXES.index(drive.axis or "x"), response.modes.basis
     modal = basis.inertia > 0.0
     inertia = system.inertia[:, axis]
     effective = (basis.shapes[:, modal].T @ inertia) ** 2
