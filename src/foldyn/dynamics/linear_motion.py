@@ -16,7 +16,7 @@ from foldyn.cases import Case, Continuation, State
 from foldyn.cases.air import refuse_wind
 from foldyn.cases.constraints import AGREES
 from foldyn.dynamics import timing
-from foldyn.dynamics.audit import audited
+from foldyn.dynamics.audit import audited, energy_error
 from foldyn.dynamics.initial import MODAL, check_imposed, check_start, check_steady
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.motion_state import Samples, StepPlan, samples
@@ -32,7 +32,7 @@ from foldyn.dynamics.superposition import (
 )
 from foldyn.errors import ComputationError, InputError, ModelRangeWarning, warn
 from foldyn.results import Quantity, trajectory_dataset
-from foldyn.structures.beyond_range import TURN, panel_turns
+from foldyn.structures.beyond_range import TURN, far_turn, panel_turns
 from foldyn.values import number
 
 if TYPE_CHECKING:
@@ -291,13 +291,9 @@ class LinearMotion:
         turns = panel_turns(self.case.structure, out.displacement)
         at = int(turns.argmax())
         if turns[at] > TURN:
-            warn(
-                f"panels turn by {turns[at]:.2g} degrees at t = {out.time[at]:.6g} s, and "
-                f"{self.case.structure.linear} are linear: reduce the loads, or take bars and "
-                "hinges or the shell",
-                "superelements.md#motions",
-                ModelRangeWarning,
-            )
+            where = f"t = {out.time[at]:.6g} s"
+            message = far_turn(self.case.structure, turns[at], where)
+            warn(message, "superelements.md#motions", ModelRangeWarning)
 
 
 def _displacements(
@@ -311,6 +307,5 @@ def _displacements(
 
 def _imbalance(energy: NDArray) -> float:
     """Largest error of the balance of energies (k, columns), relative to the energies at play."""
-    error = energy[:, :-1].sum(axis=1) - energy[:, -1]
     scale = float(np.abs(energy).max())
-    return float(np.abs(error - error[0]).max()) / scale if scale else 0.0
+    return float(np.abs(energy_error(energy)).max()) / scale if scale else 0.0

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
-import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.plots.modes import readable
+from foldyn.plots.modes import about_state
 from foldyn.plots.readings import MOST_MODES, case_from_result
 from foldyn.plots.scene import Sheet3D, View
-from foldyn.plots.sheet import rest_keys, side_by_side
+from foldyn.plots.sheet import side_by_side
 from foldyn.structures import Structure
-from foldyn.values import length
 
 NEEDED = "load_factor", "shape", "displacement"
 
@@ -59,22 +56,15 @@ def draw_buckling(
     InputError
         The result belongs to another structure, has no shapes, or a mode does not exist.
     """
-    sheet = Sheet3D.of(case_or_structure)
+    drawn, whose = Sheet3D.of(case_or_structure), "buckling: its shapes have"
     numbers = shown_shapes(buckling, which)
-    if amplitude is not None:
-        length("amplitude", amplitude)
-    moved = buckling["displacement"].transpose("node", "axis").values
-    sheet.check_nodes("buckling: its shapes have", moved)
-    state = "undeformed" if not moved.any() else "equilibrium"
-    sheet = replace(sheet, nodes=sheet.nodes + moved)
-    shapes = buckling["shape"].transpose("mode", "node", "axis").sel(mode=numbers).values
-    positions = sheet.nodes + np.array([readable(sheet, shape, amplitude) for shape in shapes])
+    sheet, swings, notes = about_state(drawn, buckling, numbers, amplitude, whose)
     factors = buckling["load_factor"].sel(mode=numbers).values.tolist()
     captions = [
         f"mode {number}: load factor {factor:.4g}"
         for number, factor in zip(numbers, factors, strict=True)
     ]
-    return side_by_side(sheet, positions, captions, View(*view), rest_keys(state=state), title)[0]
+    return side_by_side(sheet, sheet.nodes + swings, captions, View(*view), notes, title)[0]
 
 
 def shown_shapes(buckling: xr.Dataset, which: Sequence[int] | None) -> list[int]:

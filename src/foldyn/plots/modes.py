@@ -109,19 +109,30 @@ class ShownModes:
         names: Mapping[int, str] | xr.Dataset | None,
     ) -> ShownModes:
         """Choose and scale modes."""
-        sheet = Sheet3D.of(case_or_structure)
+        drawn = Sheet3D.of(case_or_structure)
         numbers = chosen_modes(modes, which)
-        if amplitude is not None:
-            length("amplitude", amplitude)
-        moved = modes["displacement"].transpose("node", "axis").values
-        sheet.check_nodes("modes: they have", moved)
-        state = "undeformed" if not moved.any() else "equilibrium"
-        sheet = replace(sheet, nodes=sheet.nodes + moved)
-        shapes = modes["shape"].transpose("mode", "node", "axis").sel(mode=numbers).values
-        swings = np.array([readable(sheet, shape, amplitude) for shape in shapes])
+        sheet, swings, notes = about_state(drawn, modes, numbers, amplitude, "modes: they have")
         named = mode_names(sheet, modes, names)
         captions = [describe_mode(modes, number, named.get(number, "")) for number in numbers]
-        return cls(sheet, swings, captions, rest_keys(state=state))
+        return cls(sheet, swings, captions, notes)
+
+
+def about_state(
+    sheet: Sheet3D, found: xr.Dataset, numbers: Sequence[int], amplitude: float | None, whose: str
+) -> tuple[Sheet3D, Points, list[Line2D]]:
+    """Sheet in the state about which shapes were found, scaled shapes (k, n, 3) and legend.
+
+    whose : begins the message if the result belongs to another structure.
+    """
+    if amplitude is not None:
+        length("amplitude", amplitude)
+    moved = found["displacement"].transpose("node", "axis").values
+    sheet.check_nodes(whose, moved)
+    state = "undeformed" if not moved.any() else "equilibrium"
+    sheet = replace(sheet, nodes=sheet.nodes + moved)
+    shapes = found["shape"].transpose("mode", "node", "axis").sel(mode=numbers).values
+    swings = np.array([readable(sheet, shape, amplitude) for shape in shapes])
+    return sheet, swings, rest_keys(state=state)
 
 
 def mode_names(

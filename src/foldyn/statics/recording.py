@@ -33,7 +33,7 @@ from foldyn.statics.equilibrium import OrigamiProblem
 from foldyn.statics.newton import Solver
 from foldyn.statics.path_methods import METHODS
 from foldyn.statics.stepping import REMEDY_COLLISION, REMEDY_LOCKED, PathStoppedError, Point, Walk
-from foldyn.structures.beyond_range import TURN, kept_apart, locks, panel_turns
+from foldyn.structures.beyond_range import TURN, far_turn, kept_apart, locks, panel_turns
 from foldyn.structures.mesh import hinge_angles, lengths
 from foldyn.structures.stretching import remedy, stretch
 
@@ -303,11 +303,8 @@ def _turn_warning(problem: OrigamiProblem, points: Sequence[Point], displacement
     at = int(np.argmax(turns > TURN))
     if turns[at] <= TURN:
         return ""
-    return (
-        f"panels turn by {turns[at]:.2g} degrees at point {at} (load factor "
-        f"{points[at].factor:.6g}), and {structure.linear} are linear: reduce the loads, or take "
-        "bars and hinges or the shell"
-    )
+    where = f"point {at} (load factor {points[at].factor:.6g})"
+    return far_turn(structure, turns[at], where)
 
 
 def _recorded(

@@ -59,6 +59,14 @@ def panel_turns(structure: Discretized, displacement: NDArray) -> NDArray[np.flo
     return np.degrees(2.0 * np.arcsin(0.5 * apart))
 
 
+def far_turn(structure: Discretized, turn: float, where: str) -> str:
+    """Warning that panels of a linear model turn too far, in degrees, at a point of a result."""
+    return (
+        f"panels turn by {turn:.2g} degrees at {where}, and {structure.linear} are linear: reduce "
+        "the loads, or take bars and hinges or the shell"
+    )
+
+
 def doubt_locking(structure: Discretized) -> None:
     """Warn of creases whose rest angle lies in the locking range of the default fold law."""
     law, rest = structure.options.fold_law, structure.fold_rest
