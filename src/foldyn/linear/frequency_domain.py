@@ -127,7 +127,7 @@ def modal(
     response = np.zeros((len(frequency), len(system.free)), np.complex128)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
-        response[k] = driven.motions @ driven.amplitudes(omega)
+        response[k] = driven.motions @ driven.amplitudes(np.array([omega]))[0]
         missing[k] = driven.missing(omega, response[k])
         report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
     warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
@@ -152,6 +152,10 @@ class SuperposedModes:
         if len(system.modal):
             own = system.modal @ basis.shapes
             self.damping = self.damping + own.T @ own
+        diagonal = self.damping.diagonal()
+        scale = np.sqrt(np.abs(np.outer(diagonal, diagonal)))
+        off = np.abs(self.damping - np.diag(diagonal)) > DIAGONAL * scale.max(initial=0.0)
+        self.coupled = system.responding is not None or bool(off.any())
         few = self.count < pencil.finite
         self.shift = _shift(pencil, basis) if few else 0.0
         self.factors = pencil.factorize(self.shift) if few else None
@@ -179,26 +183,47 @@ class ModalResponse:
                 left.append(_residual(modes.pencil, basis, term.shape, load, factors, modes.shift))
             else:
                 left.append(np.zeros(modes.pencil.size))
-        self._left = left
         self.motions = np.column_stack([basis.shapes, *left])
+        self._damped = [basis.shapes.T @ _damping_force(modes.system, own) for own in left]
+        if modes.system.responding is not None:
+            self._turns = modes.system.responding.gradient @ self.motions
 
     @property
     def remembers(self) -> bool:
         """Whether laws with memory act, whose damping depends on the frequency."""
         return self.modes.system.responding is not None
 
-    def amplitudes(self, omega: float) -> NDArray[np.complex128]:
-        """Amplitudes (r + t,) of `motions`, per unit of the drive, at a frequency (rad/s)."""
-        system, basis, memory = self.modes.system, self.modes.basis, None
-        if system.responding is not None:
-            memory = system.responding.between(basis.shapes, 1j * omega)
-        own, factors = np.zeros(len(basis.values), np.complex128), []
-        for load, left, term in zip(self._loads, self._left, self._terms, strict=True):
-            damped = basis.shapes.T @ _damped(system, omega, left)
-            q = _amplitudes(basis, self.modes.damping, omega, load - damped, memory)
-            factors.append(term.factor(omega))
-            own += q * factors[-1]
-        return np.append(own, factors)
+    def amplitudes(self, omega: NDArray) -> NDArray[np.complex128]:
+        """Amplitudes (m, r + t) of `motions`, per unit of the drive, at frequencies (m,) in rad/s.
+
+        nan at resonances without damping.
+        """
+        factors = np.array(
+            [[term.factor(each) for each in omega.tolist()] for term in self._terms], complex
+        ).T
+        left = 1j * omega[:, None] * (factors @ self._damped)
+        load = factors @ self._loads - left
+        if self.modes.coupled:
+            each = zip(omega, load, factors, strict=True)
+            own = np.array([self._coupled(*at) for at in each]).reshape(load.shape)
+        else:
+            own = _uncoupled(self.modes.basis, self.modes.damping.diagonal(), omega, load)
+        return np.hstack([own, factors])
+
+    def _coupled(self, omega: float, load: NDArray, factor: NDArray) -> NDArray:
+        """Amplitudes (r,) of coupled motions under loads (r,) with factors (t,), or nan."""
+        basis, responding = self.modes.basis, self.modes.system.responding
+        matrix = 1j * omega * self.modes.damping
+        matrix[np.diag_indices(len(load))] += basis.values - omega**2 * basis.inertia
+        if responding is not None:
+            turns, followed = np.hsplit(self._turns, [len(load)])
+            push = turns.T * responding.weights(1j * omega)
+            matrix += push @ turns
+            load = load - push @ (followed @ factor)
+        try:
+            return np.linalg.solve(matrix, load)
+        except np.linalg.LinAlgError:
+            return np.full(len(load), np.nan, complex)
 
     def missing(self, omega: float, response: NDArray) -> float:
         """Share of a response (nf,) by which the modes that are left out would change it, or more.
@@ -257,25 +282,12 @@ def _with_massless(system: Linearized, pencil: Pencil, modes: Spectrum) -> _Basi
     )
 
 
-def _amplitudes(
-    basis: _Basis, damping: NDArray, omega: float, load: NDArray, memory: NDArray | None
-) -> NDArray:
-    """Amplitudes (r,) of the basis at an angular frequency (rad/s).
-
-    memory : complex stiffness of memory laws at this frequency, in the basis.
-    """
-    own, noise = damping.diagonal(), basis.noise
-    detuned = basis.values - omega**2 * basis.inertia
-    scale = np.sqrt(np.abs(np.outer(own, own)))
-    if memory is not None or (np.abs(damping - np.diag(own)) > DIAGONAL * scale.max()).any():
-        try:
-            matrix = np.diag(detuned) + 1j * omega * damping
-            matrix = matrix if memory is None else matrix + memory
-            return np.linalg.solve(matrix, load.astype(complex))
-        except np.linalg.LinAlgError:
-            return np.full(len(load), np.nan, complex)
-    resonant = (np.abs(detuned) <= noise) & (omega * own == 0.0)
-    amplitudes = load / np.where(resonant, 1.0, detuned + 1j * omega * own)
+def _uncoupled(basis: _Basis, damping: NDArray, omega: NDArray, load: NDArray) -> NDArray:
+    """Amplitudes (m, r) of motions with damping (r,) under loads (m, r), or nan."""
+    resistance = basis.values - np.outer(omega**2, basis.inertia)
+    damped = np.outer(omega, damping)
+    resonant = (np.abs(resistance) <= basis.noise) & (damped == 0.0)
+    amplitudes = load / np.where(resonant, 1.0, resistance + 1j * damped)
     return np.where(resonant, np.nan, amplitudes)
 
 
@@ -287,11 +299,16 @@ def _resisting(system: Linearized, omega: float, x: NDArray) -> NDArray[np.compl
 
 def _damped(system: Linearized, omega: float, x: NDArray) -> NDArray:
     """Forces (nf,), N, of damping and of laws with memory in such an oscillation."""
-    force = 1j * omega * (system.damping @ x + system.modal.T @ (system.modal @ x))
+    force = 1j * omega * _damping_force(system, x)
     if system.responding is not None:
         turns = system.responding.gradient
         force += turns.T @ (system.responding.weights(1j * omega) * (turns @ x))
     return force
+
+
+def _damping_force(system: Linearized, x: NDArray) -> NDArray:
+    """Forces (nf,), N, of damping at velocities x (nf,), m/s."""
+    return system.damping @ x + system.modal.T @ (system.modal @ x)
 
 
 def _shift(pencil: Pencil, basis: _Basis) -> float:

@@ -66,11 +66,6 @@ class Branches:
         weights = sparse.diags_array(self.weights(s))
         return sparse.csc_array(self.gradient.T @ weights @ self.gradient)
 
-    def between(self, shapes: NDArray, s: complex) -> NDArray:
-        """Stiffness of the branches between shapes (nf, k), as a matrix (k, k)."""
-        turns = self.gradient @ shapes
-        return turns.T @ (self.weights(s)[:, None] * turns)
-
 
 def branches_of(case: Case, q: NDArray, free: NDArray, dampers: bool = False) -> Branches | None:
     """Branches of a case about the dofs q (m,), on the free dofs of all unknowns.

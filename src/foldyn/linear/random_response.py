@@ -36,6 +36,7 @@ TURN = 2.0 * np.pi
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
 UNDAMPED = 1e-9  # damping ratios below this count as none
 HALVINGS = 60
+AT_ONCE = 2048  # frequencies whose amplitudes are in memory
 FEWEST, BEYOND = 10, 1.5  # least number of modes; their highest frequency over that of densities
 LEFT_OUT = 0.05  # share of the mass in modes above the spectra, of which a warning tells
 
@@ -200,30 +201,31 @@ def _moments(
 ) -> Moments:
     """Mean squares of the response to one drive."""
     frequency, weight = _quadrature(response, density)
-    amplitude = np.array([response.amplitudes(TURN * f) for f in frequency])
-    omega, power = TURN * frequency, weight * density.at(frequency)
-    motions = system.expanded(response.motions)
-    if drive.axis is None:
-        amplitude, powers = amplitude * drive.value, [power * omega ** (2 * k) for k in range(4)]
-        squares = [_mean_squares(motions, amplitude, own) for own in powers]
-        return Moments(*squares)
-    whole = np.zeros_like(system.displacement)
-    whole[:, AXES.index(drive.axis)] = 1.0
-    both = np.column_stack([motions, whole.ravel()])
-    absolute = np.column_stack([amplitude, np.ones(len(omega))])
-    return Moments(
-        _mean_squares(motions, amplitude, power / omega**4),
-        _mean_squares(motions, amplitude, power / omega**2),
-        _mean_squares(both, absolute, power),
-        _mean_squares(both, absolute, power * omega**2),
-    )
+    motions, squares = system.expanded(response.motions), np.zeros((4, system.displacement.size))
+    if drive.axis is not None:
+        whole = np.zeros_like(system.displacement)
+        whole[:, AXES.index(drive.axis)] = 1.0
+        motions = np.column_stack([motions, whole.ravel()])
+    for first in range(0, len(frequency), AT_ONCE):
+        part = slice(first, first + AT_ONCE)
+        omega = TURN * frequency[part]
+        power, amplitude = weight[part] * density.at(frequency[part]), response.amplitudes(omega)
+        powers = power * omega ** (2 * np.arange(4)[:, None])
+        if drive.axis is None:
+            squares += _mean_squares(motions, amplitude * drive.value, powers)
+            continue
+        relative = np.pad(amplitude, ((0, 0), (0, 1)))
+        absolute = np.pad(amplitude, ((0, 0), (0, 1)), constant_values=1.0)
+        squares[:2] += _mean_squares(motions, relative, powers[:2] / omega**4)
+        squares[2:] += _mean_squares(motions, absolute, powers[:2])
+    return Moments(*squares.clip(0.0).reshape(4, -1, 3))
 
 
 def _densities(
     system: Linearized, drive: Drive, response: ModalResponse, density: SpectralDensity, at: NDArray
 ) -> NDArray[np.float64]:
     """Densities (2, nf, n, 3) of displacement and absolute acceleration due to one drive."""
-    amplitude, omega = np.array([response.amplitudes(TURN * f) for f in at]), TURN * at
+    amplitude, omega = response.amplitudes(TURN * at), TURN * at
     moved = (amplitude @ system.expanded(response.motions).T).reshape(len(at), -1, 3)
     accelerated = moved * (omega**2)[:, None, None]
     if drive.axis is None:
@@ -235,10 +237,18 @@ def _densities(
     return np.abs(np.stack([moved, accelerated])) ** 2 * density.at(at)[:, None, None]
 
 
-def _mean_squares(motions: NDArray, amplitude: NDArray, power: NDArray) -> NDArray[np.float64]:
-    """Mean squares (n, 3) of motions (3n, r) with amplitudes (nf, r) and powers (nf,)."""
-    gram = np.real((amplitude.conj() * power[:, None]).T @ amplitude)
-    return np.einsum("ia,ab,ib->i", motions, gram, motions, optimize=True).clip(0.0).reshape(-1, 3)
+def _mean_squares(
+    motions: NDArray, amplitude: NDArray[np.complex128], powers: NDArray
+) -> NDArray[np.float64]:
+    """Mean squares (k, 3n) of motions (3n, r) with amplitudes (nf, r) and powers (k, nf)."""
+    if len(motions) <= motions.shape[1]:  # what moves is less than what is superposed
+        moved: NDArray[np.complex128] = amplitude @ motions.T
+        return powers @ (moved.real**2 + moved.imag**2)
+    found = []
+    for power in powers:
+        gram = sum(part.T @ (power[:, None] * part) for part in (amplitude.real, amplitude.imag))
+        found.append(np.einsum("ia,ia->i", motions @ gram, motions))
+    return np.array(found)
 
 
 def _quadrature(response: ModalResponse, density: SpectralDensity) -> tuple[NDArray, NDArray]:
