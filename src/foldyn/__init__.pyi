@@ -82,8 +82,10 @@ from foldyn.linear import (
     fidelity as fidelity,
     frf as frf,
     mac as mac,
+    margins as margins,
     modes as modes,
     random_response as random_response,
+    stresses as stresses,
 )
 from foldyn.materials import (
     BarLaw as BarLaw,

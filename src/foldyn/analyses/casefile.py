@@ -79,6 +79,8 @@ class Output:
         drawn modes, or their numbers.
     quantity : str or None
         For frequency responses: "receptance", "mobility" or "accelerance"; None: as computed.
+    stresses : bool
+        For paths and motions: whether the page shows stresses.
     """
 
     nodes: NDArray[np.int64]
@@ -88,6 +90,7 @@ class Output:
     max_frequency: float | None = None
     shapes: int | tuple[int, ...] | None = None
     quantity: str | None = None
+    stresses: bool = False
 
 
 class Analysis(ABC):

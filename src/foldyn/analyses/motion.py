@@ -21,6 +21,7 @@ from foldyn.analyses.sections import (
     one_of,
 )
 from foldyn.analyses.start import MotionStart
+from foldyn.analyses.stress_page import FILES, stress_sections
 from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.dynamics import METHODS, Keeping, prepare, simulate
@@ -29,6 +30,7 @@ from foldyn.dynamics.initial import MODAL
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.timing import check_room, check_samples
 from foldyn.errors import InputError
+from foldyn.linear.stresses import check_stresses
 from foldyn.plots.load_curves import load_charts
 from foldyn.report.album import (
     Album,
@@ -79,12 +81,15 @@ class MotionOutput(ShownSection):
         Upper end of drawn spectra (Hz).
     animation : {"gif", "mp4"}, optional
         Film of the motion next to the page.
+    stresses : bool
+        Whether the page shows stresses of panels and moments of creases.
     """
 
     every_steps: Count | None = None
     interval: Positive | None = None
     max_frequency: Positive | None = None
     animation: Animation = None
+    stresses: Switch = False
 
 
 class MotionSchema(CaseSchema):
@@ -103,12 +108,14 @@ class MotionAnalysis(Analysis):
     schema = MotionSchema
     needs_density = "a motion needs"
     takes = arguments_of(prepare)
-    files = ("load", "motion", "motion.gif", "motion.mp4", "energies")
+    files = ("load", "motion", "motion.gif", "motion.mp4", "energies", *FILES)
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
         """See `Analysis`; the sampling in [output] becomes arguments of `simulate`, too."""
         analysis, output = super().of(schema, case), schema.output
+        if output.stresses:
+            check_stresses(case, True, "output.stresses")
         own = {name: getattr(output, name) for name in SAMPLING}
         given = {name: value for name, value in own.items() if value is not None}
         default = {"interval": schema.analysis.duration / SAMPLES}
@@ -202,6 +209,8 @@ class MotionAnalysis(Analysis):
             f"Energies over time and the error of their balance, mass rule {first}.",
             lambda: plots.plot_energies(trajectory),
         )
+        if shown.stresses:
+            yield from stress_sections(trajectory, album)
         yield Heading("The numbers")
         yield _table(case_file, results, nodes)
         yield from crossing_panels(results)

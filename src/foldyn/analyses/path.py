@@ -29,12 +29,14 @@ from foldyn.analyses.sections import (
     still,
 )
 from foldyn.analyses.start import StoredStart
+from foldyn.analyses.stress_page import FILES, stress_sections
 from foldyn.arguments import Check
 from foldyn.cases import Case, Contact, resolve_nodes
 from foldyn.cases.directions import DIRECTIONS
 from foldyn.cases.loads import LOAD
 from foldyn.cases.supports import SUPPORT
 from foldyn.errors import ComputationError, InputError
+from foldyn.linear.stresses import check_stresses
 from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.readings import along, critical_word, evenly, is_loose, main_direction
 from foldyn.report.album import Album, ByRule, crossing_panels, listed, shown_nodes, visible_scale
@@ -112,11 +114,14 @@ class PathOutput(ShownSection):
         Number of drawn shapes, or the numbers of their points.
     animation : {"gif", "mp4"}, optional
         Film of the path next to the page.
+    stresses : bool
+        Whether the page shows stresses of panels and moments of creases.
     """
 
     axis: Annotated[str | None, one_of(DIRECTIONS)] = None
     shapes: Annotated[int | Sequence[int], Check(some_shapes, drawn="shapes", what="point")] = 4
     animation: Animation = None
+    stresses: Switch = False
 
 
 class PathModel(ModelSection):
@@ -144,7 +149,7 @@ class PathAnalysis(Analysis):
     moving = True
     schema = PathSchema
     files = (
-        "reaction", "curve", "energies", "landscape", "shapes", "path.gif", "path.mp4",
+        "reaction", "curve", "energies", "landscape", "shapes", "path.gif", "path.mp4", *FILES,
     )  # fmt: skip
     needs_density = ""
     takes = (*arguments_of(trace), *SETTINGS)
@@ -154,6 +159,8 @@ class PathAnalysis(Analysis):
         """See `Analysis`."""
         given = super().of(schema, case).arguments
         until = schema.analysis.until
+        if schema.output.stresses:
+            check_stresses(case, False, "output.stresses")
         if until is not None:
             resolve_nodes(case.structure, (until.node,), "analysis.until.node")
         settings = Settings(**{name: given.pop(name) for name in SETTINGS})
@@ -264,6 +271,8 @@ class PathAnalysis(Analysis):
             film = album.folder / f"path.{case_file.output.animation}"
             plots.animate(case, path, path=film, frames=FRAMES, fps=FPS, scale=scale)
             yield Picture(film, f"Along the path{enlarged}; at rest in gray.")
+        if case_file.output.stresses:
+            yield from stress_sections(path, album)
         yield Heading("The numbers")
         yield _points(case_file, path, nodes[:MOST_COLUMNS], direction, moved)
         if found is not None:

@@ -106,7 +106,7 @@ class Whole:
     def __init__(
         self, pattern: Pattern, groups: list[Group], level: Level, graded: Grading
     ) -> None:
-        self._pattern, self._groups, self.level, self._graded = pattern, groups, level, graded
+        self._pattern, self.groups, self.level, self._graded = pattern, groups, level, graded
         self.edges = pattern.lines
         x, faces = pattern.vertices, pattern.faces
         self.unknowns = Unknowns(len(x), len(self.edges), len(faces), level)
@@ -118,7 +118,7 @@ class Whole:
 
         The rows of the matrix (p c, m) are amplitudes of panel after panel.
         """
-        return [self._placed(group) for group in self._groups]
+        return [self._placed(group) for group in self.groups]
 
     def _placed(self, group: Group) -> tuple[NDArray, sparse.csr_array]:
         """See `_parts`."""
@@ -180,7 +180,7 @@ class Whole:
         """
         size = dofs.shape[1]
         total = [sparse.csr_array((size, size)) for _ in range(2)]
-        for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
+        for group, (kept, placed) in zip(self.groups, self._parts, strict=True):
             own = group.panel
             parts = own.changes if changes else (own.stiffness, own.mass)
             amplitudes, count = sparse.csr_array(placed @ dofs), len(kept)
@@ -193,7 +193,7 @@ class Whole:
 
     def along_axes(self, chosen: NDArray) -> Iterator[tuple[sparse.csr_array, list[Any]]]:
         """Amplitudes (a, m) of shapes of chosen panels, and their masses along x, y, z (a, a)."""
-        for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
+        for group, (kept, placed) in zip(self.groups, self._parts, strict=True):
             there = np.isin(group.number, chosen)
             frames, own = group.frames[there], group.panel.products[:, :, kept[:, None], kept]
             masses = np.einsum("pad,pbd,abij->dpij", frames, frames, own, optimize=True)
@@ -202,7 +202,7 @@ class Whole:
     def lifts(self, points: NDArray, panel: NDArray) -> sparse.csr_array:
         """Displacements (k, m) normal to panels (k,) at points (k, 3) in them."""
         total = sparse.csr_array((len(points), self.unknowns.size))
-        for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
+        for group, (kept, placed) in zip(self.groups, self._parts, strict=True):
             own = np.stack([np.flatnonzero(panel == number) for number in group.number])
             away = points[own] - self._pattern.vertices[group.faces[:, :1]]
             local = np.einsum("pei,pdi->ped", away, group.frames[:, :2])
@@ -232,7 +232,7 @@ class Whole:
                         np.moveaxis(weights, 2, 1).reshape(-1, rows.shape[1]))  # fmt: skip
         on_edges = columns.matrix(own.size).T
         centers = sparse.csr_array((3 * own.panels, own.size))
-        for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
+        for group, (kept, placed) in zip(self.groups, self._parts, strict=True):
             local = np.einsum("pad,ac->pdc", group.frames, group.panel.center[:, kept])
             rows = (3 * group.number[:, None] + axis).ravel()
             entries = (np.ones(len(rows)), (rows, np.arange(len(rows))))
@@ -259,32 +259,84 @@ class Whole:
                 first = own.bow(edge, 0)
                 out[first : first + 3 * own.functions] += np.outer(mean, force[edge]).ravel()
         if load.swollen is not None:
-            for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
+            for group, (kept, placed) in zip(self.groups, self._parts, strict=True):
                 forces = load.swollen[group.number] @ group.panel.thermal[kept].T
                 out += placed.T @ forces.ravel()
         return out if load.panels is None else out + self._on_panels(load.panels)
 
     def _on_panels(self, density: NDArray) -> NDArray[np.float64]:
-        """Forces (m,), N, on the unknowns due to forces on panels (np, 3), N/m2.
+        """Forces (m,), N, on the unknowns due to forces on panels (np, 3), N/m2."""
+        out = np.zeros(self.unknowns.size)
+        for group, (kept, placed) in zip(self.groups, self._parts, strict=True):
+            own = np.einsum("pad,pd->pa", group.frames, density[group.number])
+            out += placed.T @ (own @ self._per_area(group, kept).T).ravel()
+        return out
+
+    def _per_area(self, group: Group, kept: NDArray) -> NDArray[np.float64]:
+        """Forces (c, 3) on a panel's shapes due to unit forces per area along its axes.
 
         They follow from the inertia forces of a translation, which are evenly spread, too.
         """
-        out = np.zeros(self.unknowns.size)
-        for group, (kept, placed) in zip(self._groups, self._parts, strict=True):
-            what, _, axis = group.panel.kind[kept].T
-            moved = (what == VERTEX)[:, None] & (axis[:, None] == np.arange(3))
-            inertia = group.panel.mass[np.ix_(kept, kept)] @ moved
-            area = self._pattern.face_areas[group.number[0]]
-            per_area = inertia * area / (moved[:, 0] @ inertia[:, 0])
-            own = np.einsum("pad,pd->pa", group.frames, density[group.number])
-            out += placed.T @ (own @ per_area.T).ravel()
-        return out
+        what, _, axis = group.panel.kind[kept].T
+        moved = (what == VERTEX)[:, None] & (axis[:, None] == np.arange(3))
+        inertia = group.panel.mass[np.ix_(kept, kept)] @ moved
+        area = self._pattern.face_areas[group.number[0]]
+        return inertia * area / (moved[:, 0] @ inertia[:, 0])
+
+    @cached_property
+    def resultants(self) -> sparse.csr_array:
+        """Membrane forces and moments (6 p, m) at the p points of all panels in turn, per unknown.
+
+        Rows of a point: forces xx, yy, xy, N/m, then moments, N, in the panel's own axes.
+        """
+        blocks: list[Any] = [None] * self.unknowns.panels
+        for group, (kept, placed) in zip(self.groups, self._parts, strict=True):
+            shapes = group.panel.resultants[..., kept]
+            for k, (number, turned) in enumerate(self.turned(group, shapes)):
+                own = placed[k * len(kept) : (k + 1) * len(kept)]
+                blocks[number] = sparse.csr_array(turned.reshape(-1, len(kept)) @ own)
+        return sparse.csr_array(sparse.vstack(blocks))
+
+    def held_resultants(self, load: Distributed) -> NDArray[np.float64]:
+        """What a load adds to `resultants` (6 p,) beside the motions of the unknowns."""
+        parts: list[Any] = [None] * self.unknowns.panels
+        for group, (kept, _) in zip(self.groups, self._parts, strict=True):
+            panel, inner = group.panel, kept[group.panel.kind[kept, 0] == INNER]
+            held = panel.held_resultants.copy()
+            if len(inner):  # vibrations count as unknowns
+                push = self._per_area(group, kept)[-len(inner) :]
+                moved = np.linalg.solve(panel.stiffness[np.ix_(inner, inner)], push)
+                held[..., :3] -= panel.resultants[..., inner] @ moved
+            amount = np.zeros((len(group.number), 5))
+            if load.panels is not None:
+                amount[:, :3] = np.einsum("pad,pd->pa", group.frames, load.panels[group.number])
+            if load.swollen is not None:
+                amount[:, 3:] = load.swollen[group.number]
+            for k, (number, turned) in enumerate(self.turned(group, held)):
+                parts[number] = (turned @ amount[k]).ravel()
+        return np.concatenate(parts)
+
+    def turned(self, group: Group, local: NDArray) -> Iterator[tuple[int, NDArray]]:
+        """Numbers of a group's panels, and tensors (2, p, 3, c) of its frame in their own axes.
+
+        The first axis of a panel is along its first edge. The result is (p, 2, 3, c).
+        """
+        for number, face, frame in zip(group.number, group.faces, group.frames, strict=True):
+            own = self._pattern.faces[number]
+            first, corners = own.index(int(face[0])), len(own)
+            along = frame[:2] @ (np.diff(self._pattern.vertices[[*own[:2]]], axis=0)[0])
+            c, s = along / np.linalg.norm(along)
+            turn = np.array([[c * c, s * s, 2 * c * s], [s * s, c * c, -2 * c * s],
+                             [-c * s, c * s, c * c - s * s]])  # fmt: skip
+            order = np.roll(np.arange(corners), first)
+            points = np.concatenate([[0], 1 + order, 1 + corners + order])
+            yield int(number), np.einsum("ab,kpbc->pkac", turn, local[:, points])
 
     @property
     def held_energies(self) -> NDArray[np.float64]:
         """`CondensedPanel.held_energy` of each panel (np, 2)."""
         out = np.zeros((self.unknowns.panels, 2))
-        for group in self._groups:
+        for group in self.groups:
             out[group.number] = group.panel.held_energy
         return out
 
@@ -332,7 +384,7 @@ class Whole:
     def parts(self, dofs: sparse.csr_array, slope: NDArray) -> Parts:
         """Parts of the sheet for dofs (m, d), with creases of stiffness `slope` (nf,), N m/rad."""
         rows, number, size, stiffness, mass = [], [], [], [], []
-        for k, (group, (kept, placed)) in enumerate(zip(self._groups, self._parts, strict=True)):
+        for k, (group, (kept, placed)) in enumerate(zip(self.groups, self._parts, strict=True)):
             smooth = _smooth(group.panel, kept)
             back = sparse.kron(sparse.eye_array(len(group.number)), smooth.T, format="csr")
             rows.append(back @ placed)
@@ -356,7 +408,7 @@ class Whole:
     def _across(self) -> NDArray:
         """Directions (e, 3, 3) along each edge, and two across it, which turn with its panels."""
         up = np.zeros((self.unknowns.edges, 2, 3))
-        for group in self._groups:
+        for group in self.groups:
             edge, backwards = self._edges_of(group.faces)
             up[edge, backwards.astype(int)] = group.frames[:, None, 2]
         return edge_frame(
@@ -403,7 +455,7 @@ class Whole:
             np.zeros((self.unknowns.edges, 2), bool),
             np.full((self.unknowns.edges, 2), -1),
         )
-        for group in self._groups:
+        for group in self.groups:
             edge, backwards = self._edges_of(group.faces)
             stiff = np.isin(group.number, list(rigid))
             bends[edge, backwards.astype(int)] = ~stiff[:, None]

@@ -20,6 +20,7 @@ import scipy
 from numpy.typing import NDArray
 
 from foldyn.condensation.panel import CondensedPanel, beside, condense, extrapolated
+from foldyn.condensation.shapes import HIGHEST, Level
 from foldyn.jit.kernel_cache import folder_for
 from foldyn.jit.sources import digest
 from foldyn.structures.graded import Grading
@@ -40,6 +41,7 @@ class Meshes(NamedTuple):
 
     graded: tuple[Grading, ...]
     divisions: tuple[int, ...]
+    level: Level = HIGHEST  # shapes onto which panels are condensed
 
 
 def kept(
@@ -68,10 +70,12 @@ def condensed(
     *others, finest = meshes.graded
     sheet = Sheet(1.0, poissons_ratio, thickness, 1.0)
     with one_thread():  # bits that do not depend on the number of threads
-        fine, modes = condense(corners, smooth, sheet, finest)
+        fine, modes = condense(corners, smooth, sheet, finest, meshes.level)
         if not others:
             return fine
-        coarse, middle = (condense(corners, smooth, sheet, own, modes)[0] for own in others)
+        coarse, middle = (
+            condense(corners, smooth, sheet, own, meshes.level, modes)[0] for own in others
+        )
         first, second, third = meshes.divisions
         coarser = extrapolated(coarse, middle, second / first)
         return beside(extrapolated(middle, fine, third / second), coarser)

@@ -28,12 +28,13 @@ from scipy.linalg import eigh
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from foldyn.algebra.superlu import factorize
-from foldyn.condensation.shapes import HIGHEST, bows, turns
+from foldyn.condensation.shapes import Level, bows, turns
 from foldyn.mechanics.block_matrix import of_elements
 from foldyn.mechanics.triangle import triangle_stiffness
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import around
 from foldyn.shells.mesh import shell_mesh, side_between
+from foldyn.shells.recovery import forces, recovery, stress_points
 from foldyn.shells.shell import STIFF
 from foldyn.structures.graded import Grading
 from foldyn.structures.panel_plate import TRIANGLE_MASS
@@ -74,6 +75,11 @@ class CondensedPanel:
         Twice the energy of such a panel with its edges held.
     changes : (2, c, c)
         Changes of stiffness and mass if the panel comes from coarser meshes; 0 of a single mesh.
+    resultants : (2, p, 3, c)
+        Membrane forces, N/m, and moments, N, at the panel's `stress_points`: xx, yy, xy.
+    held_resultants : (2, p, 3, 5)
+        The same of a panel with its edges held, under unit forces per area along the three axes of
+        its frame, and with a unit free strain or curvature.
     """
 
     stiffness: NDArray
@@ -86,6 +92,8 @@ class CondensedPanel:
     thermal: NDArray
     held_energy: NDArray
     changes: NDArray
+    resultants: NDArray
+    held_resultants: NDArray
 
     def of(self, sheet: Sheet) -> CondensedPanel:
         """The panel of a sheet, from that of a sheet of unit modulus and density."""
@@ -99,6 +107,8 @@ class CondensedPanel:
             thermal=modulus * self.thermal,
             held_energy=modulus * self.held_energy,
             changes=self.changes * np.array([modulus, density])[:, None, None],
+            resultants=modulus * self.resultants,
+            held_resultants=self.held_resultants * np.array([1.0, 1.0, 1.0, modulus, modulus]),
         )
 
     def lift(self, points: NDArray) -> NDArray[np.float64]:
@@ -128,7 +138,7 @@ def extrapolated(coarse: CondensedPanel, fine: CondensedPanel, ratio: float) -> 
         fine,
         **{
             name: (1.0 + weight) * getattr(fine, name) - weight * getattr(coarse, name)
-            for name in ("thermal", "held_energy")
+            for name in ("thermal", "held_energy", "resultants", "held_resultants")
         },
         stiffness=fine.stiffness + (ways * (weight * share.clip(min=-LOCKED))) @ ways.T,
         mass=(motions * values.clip(min=0.0)) @ motions.T,
@@ -142,10 +152,10 @@ def beside(panel: CondensedPanel, other: CondensedPanel) -> CondensedPanel:
 
 
 def condense(
-    corners: NDArray, smooth: Collection[int], sheet: Sheet, graded: Grading,
+    corners: NDArray, smooth: Collection[int], sheet: Sheet, graded: Grading, level: Level,
     like: LinearNDInterpolator | None = None,
 ) -> tuple[CondensedPanel, LinearNDInterpolator]:  # fmt: skip
-    """Condense a panel with corners (k, 3), m, onto the shapes of the highest level.
+    """Condense a panel with corners (k, 3), m, onto the shapes of a level.
 
     Also returns the displacements (p, 3 q) of its inner modes at points (p, 2) of its plane.
 
@@ -156,11 +166,11 @@ def condense(
     from scipy.interpolate import LinearNDInterpolator  # loads slowly: not for other models
 
     mesh = _Mesh(corners, smooth, sheet, graded)
-    shapes, kind, held = _edge_shapes(mesh, graded.radius)
+    shapes, kind, held = _edge_shapes(mesh, graded.radius, level)
     inside = np.setdiff1d(np.arange(mesh.size), held)
     stiffness, mass = mesh.stiffness, mesh.mass
     own = sparse.csc_array(stiffness[inside][:, inside])
-    factors, count = factorize(own), HIGHEST.inner
+    factors, count = factorize(own), level.inner
     full = np.zeros((mesh.size, shapes.shape[1] + count))
     full[:, :-count] = shapes
     full[inside, :-count] = -factors.solve(stiffness[inside][:, held] @ shapes[held])
@@ -176,7 +186,10 @@ def condense(
         left, _, right = np.linalg.svd(common, full_matrices=False)
         turned = left @ right
     full[:, -count:] = inner @ turned
-    forces, energy = mesh.thermal
+    warm, energy = mesh.thermal
+    pushed = np.concatenate([mesh.pressed, warm], axis=1)
+    held_motion = np.zeros_like(pushed)
+    held_motion[inside] = factors.solve(pushed[inside])
     reduced, carried = mesh.stiffness_of(full), full.T @ (mass @ full)
     along = full[on_nodes].reshape(len(mesh.nodes), 3, -1).swapaxes(0, 1)
     nodal = mass[on_nodes, on_nodes][::3, ::3]
@@ -189,9 +202,11 @@ def condense(
         full[on_nodes][2::3].astype(np.float32),
         full[3 * middle + np.arange(3)],
         np.array([[a.T @ (nodal @ b) for b in along] for a in along], np.float32),
-        np.concatenate([full[:, :-count].T @ forces, np.zeros((count, 2))]),
-        energy - np.einsum("mk,mk->k", forces[inside], factors.solve(forces[inside])),
+        np.concatenate([full[:, :-count].T @ warm, np.zeros((count, 2))]),
+        energy - np.einsum("mk,mk->k", warm[inside], held_motion[inside, 3:]),
         np.zeros((2, *reduced.shape)),
+        mesh.resultants(full),
+        mesh.resultants(held_motion, thermal=True),
     )
     modes = full[on_nodes, -count:].reshape(len(mesh.nodes), -1)
     return panel, LinearNDInterpolator(mesh.nodes[:, :2], modes)
@@ -213,8 +228,11 @@ class _Mesh:
         stretching = sheet.youngs_modulus * sheet.thickness / (1.0 - nu**2)
         membrane, bending = triangle_stiffness(x, nu, stretching, sheet.bending_modulus)
         stiff = np.setdiff1d(face, list(smooth))
-        membrane[np.isin(tri, stiff).any(axis=1)] *= STIFF
-        self._elastic = membrane, bending
+        rigid = np.asarray(np.isin(tri, stiff).any(axis=1))
+        membrane[rigid] *= STIFF
+        self._elastic, self._stretching, self._nu = (membrane, bending), stretching, nu
+        near = stress_points(self.nodes[: self.corners], sheet.thickness)
+        self._recovery = recovery(near, x, np.eye(3)[:2], rigid)
         side = np.roll(x, -1, axis=1) - x
         length2 = np.einsum("tki,tki->tk", side, side)
         normal = np.cross(side[:, 0], side[:, 1])
@@ -240,6 +258,7 @@ class _Mesh:
         self._rotations = _rows(self.size, 3 * nt, phi, psi)
         curled = [chord_turns(x[:, (k, k - 2, k - 1)]) for k in range(3)]
         self._free = np.ones((nt, 3)), np.stack(curled, axis=1)  # see `structures.swelling`
+        self._area = 0.5 * twice
 
     @property
     def stiffness(self) -> sparse.csc_array:
@@ -263,6 +282,26 @@ class _Mesh:
         rows = self._strains, self._rotations
         forces = [own.T @ each.ravel() for own, each in zip(rows, held, strict=True)]
         return np.stack(forces, axis=1), np.einsum("ktl,ktl->k", self._free, held)
+
+    @property
+    def pressed(self) -> NDArray:
+        """Forces (m, 3) of unit forces per area along the axes."""
+        on_nodes = np.bincount(self.triangles.ravel(), np.repeat(self._area / 3.0, 3))
+        return np.pad(np.kron(on_nodes[:, None], np.eye(3)), ((0, len(self.sides)), (0, 0)))
+
+    def resultants(self, shapes: NDArray, thermal: bool = False) -> NDArray:
+        """Membrane forces and moments (2, p, 3, c) at the stress points, of shapes (m, c).
+
+        thermal : whether the last two shapes have a unit free strain and a unit free curvature.
+        """
+        strain, rotation = self._strains @ shapes, self._rotations @ shapes
+        if thermal:
+            strain[:, -2] -= self._free[0].ravel()
+            rotation[:, -1] -= self._free[1].ravel()
+        moment = -self._recovery.moment @ (block_diagonal(self._elastic[1]) @ rotation)
+        found = (self._recovery.strain @ strain).reshape(-1, 3, strain.shape[1])
+        force = forces(found.swapaxes(1, 2), self._stretching, self._nu).swapaxes(1, 2)
+        return np.stack([force, moment.reshape(found.shape)])
 
     @property
     def mass(self) -> sparse.csr_array:
@@ -306,7 +345,7 @@ def _sides(tri: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     return sides, number, np.where(first[number] == np.arange(tri.size).reshape(-1, 3), 1.0, -1.0)
 
 
-def _edge_shapes(mesh: _Mesh, cut_off: float) -> tuple[NDArray, NDArray, NDArray]:
+def _edge_shapes(mesh: _Mesh, cut_off: float, level: Level) -> tuple[NDArray, NDArray, NDArray]:
     """Shapes (m, c) on the edges, their kinds (c, 3), and the unknowns (b,) that they determine."""
     n, columns, kinds, held = len(mesh.nodes), [], [], []
     number = {(int(a), int(b)): i for i, (a, b) in enumerate(mesh.sides)}
@@ -336,14 +375,15 @@ def _edge_shapes(mesh: _Mesh, cut_off: float) -> tuple[NDArray, NDArray, NDArray
         held.append(dofs.ravel())
         frame = edge_frame(mesh.nodes[own[-1]] - mesh.nodes[own[0]], up)
         for axis in range(3):
-            for shape, values in enumerate(bows(places[edge], cut_off / lengths[edge], axis).T):
+            own_bows = bows(places[edge], cut_off / lengths[edge], axis, level.on_edge[axis])
+            for shape, values in enumerate(own_bows.T):
                 put(dofs, values[:, None] * frame[axis], (BOW, 3 * edge + axis, shape))
     for edge, own in enumerate(mesh.edges):
         pairs = np.sort(np.stack([own[:-1], own[1:]], axis=1), axis=1)
         sides = 3 * n + np.array([number[int(a), int(b)] for a, b in pairs])
         held.append(sides)
         middle = 0.5 * (places[edge][1:] + places[edge][:-1])
-        for shape, values in enumerate(turns(middle, HIGHEST.turns).T):
+        for shape, values in enumerate(turns(middle, level.turns).T):
             put(sides, values, (TURN, edge, shape))
     return np.stack(columns, axis=1), np.array(kinds), np.unique(np.concatenate(held))
 

@@ -19,11 +19,12 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 STRETCHED, PLAIN = True, False
-ALONG = tuple((STRETCHED, k) for k in range(6))
+ALONG = tuple((STRETCHED, k) for k in range(9))
 """Shapes of displacements along an edge; a level has the first of them."""
 ACROSS = (
     (STRETCHED, 0), (STRETCHED, 1), (PLAIN, 0), (PLAIN, 1), (STRETCHED, 2), (STRETCHED, 3),
-    (PLAIN, 2), (PLAIN, 3), (STRETCHED, 4), (STRETCHED, 5),
+    (PLAIN, 2), (PLAIN, 3), (STRETCHED, 4), (STRETCHED, 5), (STRETCHED, 6), (PLAIN, 4),
+    (STRETCHED, 7), (PLAIN, 5), (STRETCHED, 8), (PLAIN, 6), (STRETCHED, 9), (PLAIN, 7),
 )  # fmt: skip
 """Shapes of displacements across an edge, in the plane of the panel and normal to it."""
 
@@ -47,10 +48,14 @@ LEVELS = (
 )  # fmt: skip
 """Levels 1 to 5; each contains the lower ones."""
 HIGHEST = LEVELS[-1]
+FOR_STRESSES = Level(9, 18, 16, 6)
+"""Shapes with which stresses near the corners converge; energies hardly change beyond level 5."""
 SHAPES = (ALONG, ACROSS, ACROSS)
 
 
-def bows(place: NDArray, cut_off: NDArray | float, axis: int) -> NDArray[np.float64]:
+def bows(
+    place: NDArray, cut_off: NDArray | float, axis: int, count: int | None = None
+) -> NDArray[np.float64]:
     """Shapes (p, s) of the displacements in a direction at places (p,) of an edge.
 
     Parameters
@@ -62,11 +67,13 @@ def bows(place: NDArray, cut_off: NDArray | float, axis: int) -> NDArray[np.floa
         stretched; of one edge, or of an edge for each place.
     axis : {0, 1, 2}
         0 is along the edge.
+    count : int, optional
+        Number s of the shapes; all by default.
     """
     plain, far = 2.0 * place - 1.0, np.log1p(1.0 / cut_off)
     stretched = (np.log1p(place / cut_off) - np.log1p((1.0 - place) / cut_off)) / far
     columns = []
-    for kind, degree in SHAPES[axis]:
+    for kind, degree in SHAPES[axis][:count]:
         z = stretched if kind == STRETCHED else plain
         columns.append((1.0 - z * z) * legendre.legval(z, np.eye(degree + 1)[degree]))
     return np.stack(columns, axis=1)

@@ -16,7 +16,7 @@ from foldyn.algebra.solvers import Fill
 from foldyn.condensation.assembly import Whole
 from foldyn.condensation.library import ALIKE, Meshes, groups
 from foldyn.condensation.panel import BOW
-from foldyn.condensation.shapes import LEVELS
+from foldyn.condensation.shapes import FOR_STRESSES, LEVELS, Level
 from foldyn.condensation.term import GROUPS, SuperelementsTerm
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, Superlinear, hinge_law
@@ -87,6 +87,8 @@ class Superelements(Discretized):
         Input from which it was made.
     meshes : Meshes
         How the panels are meshed.
+    stressed : bool
+        Whether the panels have the shapes for stresses instead of those of the level.
     """
 
     nodes: NDArray
@@ -99,6 +101,7 @@ class Superelements(Discretized):
     sheet: Sheet
     options: SuperelementsOptions
     meshes: Meshes
+    stressed: bool = False
 
     kind: ClassVar[str] = "superelements"
     linear: ClassVar[str] = "superelements"
@@ -116,6 +119,11 @@ class Superelements(Discretized):
     def at_level(self, level: int) -> Superelements:
         """The same with panels of another level."""
         return replace(self, options=replace(self.options, level=level)).marked()
+
+    @cached_property
+    def for_stresses(self) -> Superelements:
+        """The same with the shapes for stresses, or as many as the mesh can have."""
+        return replace(self, stressed=True).marked()
 
     @cached_property
     def bars(self) -> NDArray:
@@ -145,7 +153,12 @@ class Superelements(Discretized):
     def whole(self) -> Whole:
         """The condensed panels on all of their unknowns."""
         # the coarsest of several meshes is only for estimates of errors
-        level, arcs = LEVELS[self.options.level - 1], min(m.arcs for m in self.meshes.graded[-2:])
+        arcs = min(m.arcs for m in self.meshes.graded[-2:])
+        level, meshes = LEVELS[self.options.level - 1], self.meshes
+        if self.stressed:
+            across = max(level.across, min(FOR_STRESSES.across, 2 * arcs - 1))
+            level = Level(FOR_STRESSES.along, across, *FOR_STRESSES[2:])
+            meshes = meshes._replace(level=level)
         if level.across >= 2 * arcs:
             raise InputError(
                 f" = {self.options.divisions}: edges have {2 * arcs - 1} points, and a level to "
@@ -157,8 +170,8 @@ class Superelements(Discretized):
         sheets = [
             replace(kinds[k], density=own) for k, own in zip(kind, density.tolist(), strict=True)
         ]
-        made = groups(self.pattern, sheets, self.meshes)
-        return Whole(self.pattern, made, level, self.meshes.graded[-1])
+        made = groups(self.pattern, sheets, meshes)
+        return Whole(self.pattern, made, level, meshes.graded[-1])
 
     @cached_property
     def body(self) -> Assembly:
@@ -185,8 +198,8 @@ class Superelements(Discretized):
         parts = dofs.power(2).sum(axis=0)  # unknowns of each dof: two turns at welds, otherwise one
         rotated = (dofs.T @ made.rotated / parts[:, None])[self.nodes.size :]
         return SuperelementsTerm(
-            panels, mass, turns, self._slope, self._fold_hinges, self.nodes, rotated,
-            partial(made.parts, dofs, self._slope),
+            panels, mass, turns, self.slope, self._fold_hinges, self.nodes, rotated,
+            partial(made.parts, dofs, self.slope),
         )  # fmt: skip
 
     def _dofs(self, edges: Mapping[int, NDArray]) -> sparse.csr_array:
@@ -218,6 +231,13 @@ class Superelements(Discretized):
     def spread(self, load: Distributed, edges: Mapping[int, NDArray]) -> NDArray[np.float64]:
         """See `Discretized`."""
         return self._dofs(edges).T @ self.whole.spread(load)
+
+    def resultants(self, edges: Mapping[int, NDArray]) -> sparse.csr_array:
+        """Membrane forces and moments (6 p, m) of the dofs; see `Whole.resultants`.
+
+        edges : edges that supports hold, as in `held`.
+        """
+        return sparse.csr_array(self.whole.resultants @ self._dofs(edges))
 
     def lifts(
         self, points: NDArray, panel: NDArray, *, edges: Mapping[int, NDArray]
@@ -265,7 +285,7 @@ class Superelements(Discretized):
         )
 
     @property
-    def _slope(self) -> NDArray:
+    def slope(self) -> NDArray:
         """Stiffness of the folds at rest, N m/rad."""
         law = _elastic(self.fold_law)
         return self.fold_stiffness * law.slope(self.pattern.dihedrals, self.fold_rest)

@@ -14,11 +14,13 @@ from foldyn.linear.frf import METHODS, convert, frf
 from foldyn.linear.harmonic import HarmonicBalance
 from foldyn.linear.linearized import Linearized, equivalent_slope, linearize
 from foldyn.linear.mac import Pairs, mac, pair_modes
+from foldyn.linear.margins import margins
 from foldyn.linear.modes import modes
 from foldyn.linear.peaks_of import Peak, peaks_of
 from foldyn.linear.random_response import random_response
 from foldyn.linear.reference import Refinement, refinement
 from foldyn.linear.spectral_density import SpectralDensity
+from foldyn.linear.stresses import stresses
 from foldyn.linear.time_domain import SteppedSine
 from foldyn.linear.transients import BurstRandom, Impulse
 from foldyn.linear.unit_cell import UnitCell
@@ -53,6 +55,7 @@ __all__ = [
     "linearize",
     "long_waves",
     "mac",
+    "margins",
     "modes",
     "pair_modes",
     "peaks_of",
@@ -60,6 +63,7 @@ __all__ = [
     "refinement",
     "relaxed",
     "space_time",
+    "stresses",
     "transmission",
     "wave_spectrum",
 ]

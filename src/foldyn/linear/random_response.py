@@ -12,6 +12,7 @@ no fine grid, and the error does not depend on the damping.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -28,9 +29,12 @@ from foldyn.linear.excitation import Drive, drive_of
 from foldyn.linear.frequency_domain import ModalResponse, SuperposedModes
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
 from foldyn.linear.spectral_density import SpectralDensity
+from foldyn.linear.stresses import small_motions
 from foldyn.ram_limit import check_memory
 from foldyn.results import random_dataset
-from foldyn.values import number, numbers, of_kind, show, whole
+from foldyn.strength.dataset import MISES, face_stresses, point_coordinates
+from foldyn.strength.resultants import for_stresses, has_stresses, resultants_of
+from foldyn.values import flag, number, numbers, of_kind, show, whole
 
 TURN = 2.0 * np.pi
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -59,6 +63,7 @@ def random_response(
     count: int | None = None,
     load_factor: float = 1.0,
     frequencies: ArrayLike | None = None,
+    stresses: bool = False,
 ) -> xarray.Dataset:
     """Root mean square response of a case to random vibration, linearized about a state.
 
@@ -82,6 +87,8 @@ def random_response(
         As in `frf`.
     frequencies : array_like, optional
         Frequencies (Hz), increasing, at which the densities of the response are wanted.
+    stresses : bool
+        Whether to find stresses, too, at the points that `stresses` has, and moments of creases.
 
     Returns
     -------
@@ -90,7 +97,8 @@ def random_response(
         absolute, and the mean numbers of zero crossings per second with rising values,
         `displacement_crossings` and `acceleration_crossings` (Hz; 0 where nothing moves). With
         `frequencies`, over frequency, node and axis: `displacement_psd` (m2/Hz) and
-        `acceleration_psd` (m2/s3), one-sided.
+        `acceleration_psd` (m2/s3), one-sided. With `stresses`, root mean squares of
+        `membrane_force`, `bending_moment`, `von_mises` and `crease_moment`, named `..._rms`.
         `displacement` of the state. Largest values of a normal process are three times the root
         mean square in 99.7 % of time.
 
@@ -131,7 +139,8 @@ def random_response(
     load_factor = number("load_factor", load_factor)
     at = None if frequencies is None else _increasing("frequencies", frequencies)
     drives = _drives(of_kind("case", case, Case), base, forces)
-    system = linearize(case, state, load_factor=load_factor)
+    own = for_stresses(case) if flag("stresses", stresses) else case
+    system = linearize(own, state, load_factor=load_factor)
     total = np.zeros((4, *case.structure.nodes.shape))
     top = max(max(density.frequency) for _, density in drives)
     pencil = Pencil(system.stiffness, system.mass)
@@ -143,9 +152,13 @@ def random_response(
                  "take fewer")  # fmt: skip
     curves = np.zeros(shape)
     modes = SuperposedModes(system, pencil, count)
+    squares: dict[str, NDArray] = {}
     for drive, density in drives:
         response = ModalResponse(modes, drive)
         total += np.stack(_moments(system, drive, response, density))
+        if stresses:
+            for name, added in _stresses(system, drive, response, density, state).items():
+                squares[name] = squares.get(name, 0.0) + added
         if at is not None:
             curves += _densities(system, drive, response, density, at)
         if drive.axis is not None:
@@ -159,7 +172,14 @@ def random_response(
     warn_beyond(case.structure, np.array([top]), linear=True)
     facts = {"modes": count, "wall_seconds": time.perf_counter() - began}
     rates = _rates(Moments._make(list(total)))
-    return random_dataset(case, system.displacement, *rates, facts, at, curves)
+    more, points = {}, None
+    if stresses:
+        points = resultants_of(own).points if has_stresses(own.structure) else None
+        more = {name: np.sqrt(square) for name, square in squares.items()}
+    return random_dataset(
+        case, system.displacement, *rates, facts, at, curves, more,
+        {} if points is None else point_coordinates(points),
+    )  # fmt: skip
 
 
 def _drives(
@@ -219,6 +239,38 @@ def _moments(
         squares[:2] += _mean_squares(motions, relative, powers[:2] / omega**4)
         squares[2:] += _mean_squares(motions, absolute, powers[:2])
     return Moments(*squares.clip(0.0).reshape(4, -1, 3))
+
+
+def _stresses(
+    system: Linearized, drive: Drive, response: ModalResponse, density: SpectralDensity,
+    state: State | str | None,
+) -> dict[str, NDArray]:  # fmt: skip
+    """Mean squares of forces, moments and von Mises stresses of panels, and of creases' moments."""
+    motions = system.whole(response.motions)
+    panels, creases = small_motions(system.case, system.displacement, motions, state is None)
+    rows = {"crease_moment": creases.T}
+    if panels is not None:
+        points = resultants_of(system.case).points
+        force, moment = np.moveaxis(panels, (2, 0), (0, -1))
+        stress = np.moveaxis(face_stresses(panels, points.thickness), 0, -1)
+        equivalent = np.einsum("ca,pfas->pfcs", np.linalg.cholesky(MISES).T, stress)
+        rows |= {"membrane_force": force, "bending_moment": moment, "von_mises": equivalent}
+    shapes = {name: own.shape[:-1] for name, own in rows.items()}
+    flat = np.concatenate([own.reshape(-1, motions.shape[1]) for own in rows.values()])
+    frequency, weight = _quadrature(response, density)
+    found = np.zeros(len(flat))
+    for first in range(0, len(frequency), AT_ONCE):
+        part = slice(first, first + AT_ONCE)
+        omega = TURN * frequency[part]
+        power = weight[part] * density.at(frequency[part])
+        power = power * drive.value**2 if drive.axis is None else power / omega**4
+        found += _mean_squares(flat, response.amplitudes(omega), power[None])[0]
+    ends = np.cumsum([math.prod(shape) for shape in shapes.values()])[:-1]
+    parts = zip(shapes.items(), np.split(found.clip(0.0), ends), strict=True)
+    out = {name: own.reshape(shape) for (name, shape), own in parts}
+    if "von_mises" in out:
+        out["von_mises"] = out["von_mises"].sum(axis=-1)
+    return out
 
 
 def _densities(

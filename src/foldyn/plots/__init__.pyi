@@ -53,6 +53,7 @@ from foldyn.plots.space_time import (
     plot_transmission as plot_transmission,
     plot_wave_spectrum as plot_wave_spectrum,
 )
+from foldyn.plots.stresses import draw_stresses as draw_stresses
 from foldyn.plots.structure import draw_structure as draw_structure
 from foldyn.plots.sweeps import (
     plot_main_effects as plot_main_effects,

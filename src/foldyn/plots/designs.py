@@ -82,9 +82,17 @@ def draw_sensitivity(
         raise InputError(f": shape {shown.shape}; give one value for each of the {known}", "values")
     reach = float(np.abs(shown).max(initial=0.0)) or 1.0
     scale = ScalarMappable(Normalize(-reach, reach), colormaps[COLORS])
+    return draw_colored(sheet, fits[0], shown, scale, label, sight, title)
+
+
+def draw_colored(
+    sheet: Sheet3D, on: str, shown: NDArray, scale: ScalarMappable, label: str, sight: View,
+    title: str,
+) -> Figure:  # fmt: skip
+    """Color the creases or the panels of a sheet by their values, with a color bar."""
     figure, axes = scene.view_figure(sheet.nodes, sight, title, legend_rows=ROWS)
     DrawnSheet(axes, sheet, sheet.nodes, sight)
-    if fits[0] == "crease":
+    if on == "crease":
         _color_creases(axes, sheet, sight, scale.to_rgba(shown))
     else:
         own = scale.to_rgba(shown[_panels(sheet)])[:, :3]

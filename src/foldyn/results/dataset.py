@@ -33,6 +33,7 @@ from foldyn.results.quantities import (
     RANDOM,
     RANDOM_CURVES,
     RESPONSES,
+    STRESSES,
     Quantity,
     energies_of,
     variable,
@@ -285,6 +286,7 @@ def random_dataset(
     case: Case, place: ArrayLike, displacement: ArrayLike, acceleration: ArrayLike,
     moving: ArrayLike, accelerating: ArrayLike, statistics: Mapping[str, Any],
     frequency: ArrayLike | None = None, densities: ArrayLike | None = None,
+    stresses: Mapping[str, ArrayLike] | None = None, points: Mapping[str, Any] | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Dataset of a random response, including its case; arrays (n, 3) unless stated otherwise.
 
@@ -302,6 +304,8 @@ def random_dataset(
         Facts about the run, each stored as an attribute.
     frequency, densities : array_like, shapes (nf,) and (2, nf, n, 3), optional
         Frequencies (Hz), and densities of displacement and acceleration there.
+    stresses, points : mapping, optional
+        Root mean squares of variables of `quantities.STRESSES`, and the coordinates of points.
     """
     values = (displacement, acceleration, moving, accelerating)
     data = {
@@ -309,12 +313,16 @@ def random_dataset(
         for (name, quantity), value in zip(RANDOM.items(), values, strict=True)
     }
     data["displacement"] = variable(PLACE, place, "m", "displacement of the state")
-    along: dict[str, Any] = {}
+    for name, value in (stresses or {}).items():
+        own = STRESSES[name]
+        text = f"root mean square: {own.text}"
+        data[f"{name}_rms"] = variable(own.dims, value, own.units, text)
+    along: dict[str, Any] = dict(points or {})
     if frequency is not None and densities is not None:
         data |= variables(
             RANDOM_CURVES, "frequency", dict(zip(RANDOM_CURVES, np.asarray(densities), strict=True))
         )
-        along = {"frequency": ("frequency", np.array(frequency, float), {"units": "Hz"})}
+        along["frequency"] = ("frequency", np.array(frequency, float), {"units": "Hz"})
     return result_dataset("random", case, data, along, statistics)
 
 

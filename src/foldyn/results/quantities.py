@@ -148,6 +148,28 @@ RANDOM_CURVES: Mapping[str, Quantity] = {
     "acceleration_psd": Quantity("m2/s3", "density of the absolute acceleration", PLACE),
 }
 """and those over frequency."""
+STRESSES: Mapping[str, Quantity] = {
+    "membrane_force": Quantity("N/m", "membrane force", ("point", "component")),
+    "bending_moment": Quantity(
+        "N", "moment per length, positive if the front is stretched", ("point", "component")
+    ),
+    "stress": Quantity("Pa", "stress at the faces", ("point", "face", "component")),
+    "von_mises": Quantity("Pa", "von Mises stress", ("point", "face")),
+    "principal_stress": Quantity(
+        "Pa", "largest and smallest principal stress", ("point", "face", "principal")
+    ),
+    "crease_moment": Quantity(
+        "N", "moment of the crease per length, positive if it is too far open", ("crease",)
+    ),
+}
+"""Variables of stresses, in addition along the states of a result."""
+MARGINS: Mapping[str, Quantity] = {
+    "panel_margin": Quantity("1", "least margin of safety of the panel", ("panel",)),
+    "panel_point": Quantity(text="point of the stresses at which it is least", dims=("panel",)),
+    "panel_state": Quantity(text="load factor or time (s) at which it is least", dims=("panel",)),
+    "crease_margin": Quantity("1", "least margin of safety of the crease", ("crease",)),
+    "crease_state": Quantity(text="load factor or time (s) at which it is least", dims=("crease",)),
+}
 BUCKLING: Mapping[str, Quantity] = {
     "load_factor": Quantity("1", "load factor (negative: loads reversed)"),
     "shape": Quantity("m", "buckling shape with the largest displacement 1 m", PLACE),

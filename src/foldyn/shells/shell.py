@@ -31,6 +31,7 @@ from foldyn.shells.mesh import (
     triangle_plates,
     without_free_sides,
 )
+from foldyn.shells.recovery import Recovery, StressPoints, forces, recovery
 from foldyn.shells.term import GROUPS, ShellTerm
 from foldyn.structures import Sheet
 from foldyn.structures.beyond_range import doubt_locking, doubt_units
@@ -284,6 +285,48 @@ class Shell(Discretized):
             hinge_angles(self.nodes, bends), self._plates[0], clamps[:, :3], self.by_folds,
         )  # fmt: skip
         return model._replace(bars=model.bars._replace(bar_runs=model.bars.bar_runs[:0]))
+
+    @cached_property
+    def _recoveries(self) -> Recovery:
+        """Tensors at the stress points of all panels in turn."""
+        x, panel = self.nodes[self.triangles], self.triangle_panel
+        stiff = np.flatnonzero(~smooth_vertices(self.pattern)) if self.graded else []
+        rigid = np.asarray(np.isin(self.triangles, stiff).any(axis=1))
+        parts = []
+        points = StressPoints.of(self.pattern, self.sheet)
+        for number in range(len(self.pattern.faces)):
+            own, at = np.flatnonzero(panel == number), points.panel == number
+            found = recovery(points.position[at], x[own], points.axes[number], rigid[own])
+            sides = (3 * own[:, None] + np.arange(3)).ravel()
+            put = sparse.csr_array(
+                (np.ones(len(sides)), (np.arange(len(sides)), sides)), (len(sides), panel.size * 3)
+            )
+            parts.append([each @ put for each in found])
+        return Recovery(
+            *(sparse.csr_array(sparse.vstack(each)) for each in zip(*parts, strict=True))
+        )
+
+    def resultants(self, q: NDArray, free: tuple[NDArray, NDArray] | None) -> NDArray[np.float64]:
+        """Membrane forces, N/m, and moments, N, (p, 2, 3) at the stress points, xx, yy, xy.
+
+        q : (m,) dofs of `body`.
+        free : strains and angles at which panels have no stress, as `Swelling.free`.
+        """
+        x = self.nodes + q[: self.nodes.size].reshape(-1, 3)
+        square = lengths(x, self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)) ** 2
+        strain = 0.5 * (square.reshape(-1, 3) * self.membranes[0].membranes.per_length2.T - 1.0)
+        sheet, (_, side, share) = self.body.sheet, self._plates
+        assert isinstance(sheet, ShellTerm)
+        angle = sheet.plate_angles(q)
+        if free is not None:
+            strain = strain - free[0].reshape(3, -1).T
+            angle = angle - free[1]
+        turned = np.bincount(side, share * angle, 3 * len(self.triangles)).reshape(-1, 3)
+        moment = np.einsum("tkl,tl->tk", self._stiffness[1], turned)
+        points, recovered = StressPoints.of(self.pattern, self.sheet), self._recoveries
+        stretching, nu = points.elastic(self.sheet)
+        force = forces((recovered.strain @ strain.ravel()).reshape(-1, 3), stretching, nu)
+        return np.stack([force, (recovered.moment @ moment.ravel()).reshape(-1, 3)], axis=1)
 
     @property
     def _scale(self) -> NDArray:

@@ -217,15 +217,19 @@ class BarsPlatesTerm(SheetTerm):
         bars = self._bars.turn(q[: self._nodal], other[: self._nodal])
         return largest_turn(bars, self.angles(q), self.angles(other))
 
-    def plate_energies(self, q: NDArray, turn: NDArray) -> NDArray:
-        """See `SheetTerm`."""
+    def plate_angles(self, q: NDArray) -> NDArray[np.float64]:
+        """Angles (nq,), rad, of all plates, from rest."""
         model, (displacement, rotation) = self.model, self._split(q)
         scratch = turned_plates(model, displacement, rotation)
         from_rest = scratch.angle
         from_rest[len(model.fold_rest) :] -= model.bend_rest
         turned = np.append(from_rest, (self.per_hidden * scratch.x)[::-1])  # number -1 comes last
-        angle, size = turned[model.angle], np.diff(model.start)
-        angle = angle - turn if turn.size else angle
+        return turned[model.angle]
+
+    def plate_energies(self, q: NDArray, turn: NDArray) -> NDArray:
+        """See `SheetTerm`."""
+        model, angle = self.model, self.plate_angles(q)
+        size, angle = np.diff(model.start), angle - turn if turn.size else angle
         plate = np.repeat(np.arange(len(size)), size**2)
         row, column = np.divmod(np.arange(len(plate)) - model.entry[plate], size[plate])
         first = model.start[plate]

@@ -40,7 +40,7 @@ Modulus = Annotated[float, Check(number, above=0.0, unit="Pa")]
 Ratio = Annotated[float, Check(_ratio)]
 Length = Annotated[float, Check(length, unit="m")]
 Density = Annotated[float, Check(number, above=0.0, unit="kg/m3")]
-MATERIAL = ("youngs_modulus", "poissons_ratio", "thickness", "density")
+MATERIAL = ("youngs_modulus", "poissons_ratio", "thickness", "density", "strength")
 """Values that may differ from panel to panel."""
 
 
@@ -52,7 +52,7 @@ class PanelSheet(Checked):
     ----------
     panels : int or sequence of int
         Indices of the panels, in the order of `pattern.faces`.
-    youngs_modulus, poissons_ratio, thickness, density : float, optional
+    youngs_modulus, poissons_ratio, thickness, density, strength : float, optional
         As in `Sheet`. Give at least one; the sheet's values apply to the rest.
 
     Raises
@@ -66,6 +66,7 @@ class PanelSheet(Checked):
     poissons_ratio: Ratio | None = None
     thickness: Length | None = None
     density: Density | None = None
+    strength: Modulus | None = None
 
     def agree(self) -> None:
         """Refuse panels without a value that differs."""
@@ -97,6 +98,8 @@ class Sheet(Checked):
         L*/L_F, positive: determines the stiffness of calibrated creases; larger is softer.
     panels : sequence of PanelSheet, optional
         Panels that differ from the rest.
+    strength : float, optional
+        Largest von Mises stress that the sheet bears, Pa, positive; only `margins` needs it.
 
     Raises
     ------
@@ -121,6 +124,7 @@ class Sheet(Checked):
         Check(objects, kinds=(PanelSheet,)),
         Read(ListOf(TableOf(PanelSheet))),
     ] = ()
+    strength: Modulus | None = None
 
     place = "sheet: "
 

@@ -15,7 +15,9 @@ from foldyn.cases.directions import AXES
 from foldyn.errors import InputError, warn
 from foldyn.linear.band_structure import ALL, frequencies_of, legs
 from foldyn.linear.frf import quantity_of
+from foldyn.linear.margins import margins
 from foldyn.linear.peaks_of import kind_of, resonances
+from foldyn.linear.stresses import stresses
 from foldyn.mechanics.contact.clearance import Clearance, clearance
 from foldyn.signals import Peaks, find_peaks, half_power, log_decrement, sampling_interval, spectrum
 from foldyn.statics import Landscape, landscape
@@ -276,6 +278,24 @@ def _strain(result: xr.Dataset, case: Case) -> float:
         raise InputError("needs bars, and a shell has none")
     moved = sampled(result, "displacement").transpose(..., "node", "axis").values
     return float(np.abs(bar_strain(case.structure, moved)).max())
+
+
+@_measure(*MOVED, units="Pa", doc="largest von Mises stress of a panel", whole=True)
+def _von_mises(result: xr.Dataset, case: Case) -> float:
+    found = stresses(result)
+    if "von_mises" not in found:
+        raise InputError("needs panels with stresses, which this model has none of")
+    return float(found["von_mises"].max())
+
+
+@_measure(*MOVED, units="N", doc="largest moment of a crease per length", whole=True)
+def _crease_moment(result: xr.Dataset, case: Case) -> float:
+    return float(np.abs(stresses(result)["crease_moment"].values).max(initial=0.0))
+
+
+@_measure(*MOVED, doc="least margin of safety of a panel", whole=True)
+def _margin(result: xr.Dataset, case: Case) -> float:
+    return float(margins(result).attrs["least_margin"])
 
 
 @_measure(MODES, *MOVED, units="m", doc="least distance of panels that share no vertex", whole=True)

@@ -1,0 +1,174 @@
+"""`margins`: how far the stresses of a result stay below what the sheet and its creases bear."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import xarray
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.errors import InputError
+from foldyn.linear.stresses import stresses
+from foldyn.patterns import Pattern
+from foldyn.patterns.crease_data import crease_values
+from foldyn.results import case_of
+from foldyn.results.dataset import result_dataset
+from foldyn.results.quantities import MARGINS, variables
+from foldyn.values import number, numbers, show
+
+WORDS = {
+    "center": "at its center",
+    "edge": "at the middle of its edge {}",
+    "corner": "at its corner {}",
+}
+
+
+def margins(
+    result: xarray.Dataset,
+    *,
+    strength: float | None = None,
+    crease_strength: float | Mapping[str, float] | ArrayLike | None = None,
+    factor_of_safety: float = 1.0,
+    sigmas: float = 3.0,
+) -> xarray.Dataset:
+    """Least margins of safety of panels and creases over all states of a result.
+
+    The margin is strength / (factor of safety x stress) - 1: below 0, a panel or crease fails. In
+    panels the von Mises stress counts, at both faces; in creases the moment per length.
+
+    Parameters
+    ----------
+    result : xarray.Dataset
+        A path or a motion; a result of `stresses` of one; or a random response with stresses.
+    strength : float, optional
+        Largest von Mises stress of all panels, Pa; by default that of the sheet
+        (`Sheet.strength`).
+    crease_strength : float, mapping of str to float, or sequence of float, optional
+        Largest moment per length, N, of all creases, by name ("valley", a family), or of each one.
+        Without it, creases have no margin.
+    factor_of_safety : float
+    sigmas : float
+        For random responses: stresses are this number times their root mean square.
+
+    Returns
+    -------
+    xarray.Dataset
+        `panel_margin` (panel), with `panel_point`, the point (as in `stresses`) where it is least,
+        and `panel_state`, the load factor or time (nan in random responses); `crease_margin`
+        (crease) and `crease_state`. A margin is inf without stress, and nan without a strength.
+        Attributes: `least_margin`, and in words `least_where`.
+
+    Raises
+    ------
+    InputError
+        No strength at all; stresses per unit (of modes and frequency responses), which have none.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
+    >>> sheet = fd.Sheet(1e9, 0.3, thickness=0.01, density=1000.0, strength=1e6)
+    >>> held = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
+    >>> push = fd.Force([0, 1], (0.1, 0.0, 0.0))
+    >>> path = fd.trace(fd.Case(fd.superelements(pattern, sheet), held, [push]), steps=1)
+    >>> fd.margins(path, factor_of_safety=1.5).attrs["least_margin"] > 0.0
+    True
+    """
+    safety = number("factor_of_safety", factor_of_safety, above=0.0)
+    case = case_of(result)
+    pattern, sheet = case.structure.pattern, case.structure.sheet
+    found, when, moment = _stressed(result, number("sigmas", sigmas, above=0.0))
+    bears = sheet.values("strength", len(pattern.faces))
+    if strength is not None:
+        bears = np.full(len(bears), number("strength", strength, above=0.0, unit="Pa"))
+    values: dict[str, NDArray] = {}
+    words: list[tuple[float, str]] = []
+    if "von_mises" in found and np.isfinite(bears).any():
+        values |= _panels(found, bears / safety, when)
+        p = int(np.nan_to_num(values["panel_margin"], nan=np.inf).argmin())
+        point = values["panel_point"][p]
+        place = WORDS[str(found["point_place"].values[point])]
+        where = place.format(found["point_number"].values[point])
+        where = f"panel {p} {where}{moment(float(values['panel_state'][p]))}"
+        words.append((values["panel_margin"][p], where))
+    creases = _crease_strengths(crease_strength, pattern)
+    if creases is not None and len(creases):
+        margin = _margin(creases / safety, np.abs(found["crease_moment"].values))
+        at = np.nan_to_num(margin, nan=np.inf).argmin(axis=0)
+        values["crease_margin"], values["crease_state"] = margin.min(axis=0), when[at]
+        k = int(np.nan_to_num(values["crease_margin"], nan=np.inf).argmin())
+        words.append((values["crease_margin"][k], f"crease {k}{moment(float(when[at[k]]))}"))
+    if not words:
+        raise InputError(
+            ": the sheet has none; give Sheet(strength=...), or strength and crease_strength here",
+            "strength",
+        )
+    least, where = min(words)
+    facts = {"factor_of_safety": safety, "least_margin": least, "least_where": where}
+    return result_dataset("margins", case, variables(MARGINS, (), values), {}, facts)
+
+
+def _stressed(
+    result: xarray.Dataset, sigmas: float
+) -> tuple[xarray.Dataset, NDArray, Callable[[float], str]]:
+    """Stresses along states, where these are (s,), and words for such a place."""
+    if result.attrs["foldyn_result"] == "random":
+        if "crease_moment_rms" not in result:
+            raise InputError(
+                ": this random response has no stresses; compute it with stresses = True", "result"
+            )
+        names = {f"{name}_rms": name for name in ("von_mises", "crease_moment")}
+        kept = [name for name in names if name in result]
+        found = sigmas * result[kept].rename({name: names[name] for name in kept})
+        return found.expand_dims("state"), np.array([np.nan]), lambda _: ""
+    found = result if result.attrs["foldyn_result"] == "stresses" else stresses(result)
+    kind = str(found.attrs["of"])
+    if kind == "path":
+        return found, found["load_factor"].values, lambda at: f", load factor {at:.6g}"
+    if "time" in found.dims:
+        return found, found["time"].values, lambda at: f", t = {at:.6g} s"
+    raise InputError(
+        f": stresses of {kind} are per unit, and have no margin; give a path, a motion or a random "
+        "response",
+        "result",
+    )
+
+
+def _panels(found: xarray.Dataset, bears: NDArray, when: NDArray) -> dict[str, NDArray]:
+    """Least margins of panels that bear (np,), Pa, and where they are."""
+    panel = found["point_panel"].values
+    margin = _margin(bears[panel][:, None], found["von_mises"].values).min(axis=2)
+    at = np.nan_to_num(margin, nan=np.inf).argmin(axis=0)  # of each point
+    least = margin[at, np.arange(len(panel))]
+    order = np.lexsort((np.nan_to_num(least, nan=np.inf), panel))
+    point = order[np.searchsorted(panel[order], np.arange(len(bears)))]
+    return {"panel_margin": least[point], "panel_point": point, "panel_state": when[at[point]]}
+
+
+def _margin(strength: NDArray, stress: NDArray) -> NDArray[np.float64]:
+    with np.errstate(divide="ignore"):
+        return strength / stress - 1.0
+
+
+def _crease_strengths(given: Any, pattern: Pattern) -> NDArray[np.float64] | None:
+    """Strength of each crease (nf,), N, nan where it has none; None if none is given."""
+    count = len(pattern.creases)
+    if given is None:
+        return None
+    if isinstance(given, Mapping):
+        checked = {
+            word: number(f"crease_strength.{word}", value, above=0.0, unit="N")
+            for word, value in given.items()
+        }
+        values, chosen = crease_values("crease_strength", checked, pattern)
+        return np.where(chosen, values, np.nan)
+    listed = np.asarray(numbers("crease_strength", given), float)
+    if listed.shape not in ((), (1,), (count,)) or not (listed > 0.0).all():
+        raise InputError(
+            f" = {show(given)}: give one number (N) above 0, one for each of the {count} creases, "
+            "or numbers by name",
+            "crease_strength",
+        )
+    return np.broadcast_to(listed, (count,)).copy()
