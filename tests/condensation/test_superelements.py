@@ -415,7 +415,7 @@ def test_no_motion_has_a_negative_mass():
 @pytest.mark.matrix
 def test_congruent_panels_are_condensed_once():
     sheet = fd.superelements(fd.patterns.miura(cells=(2, 2)), SHEET, level=1)
-    assert len(sheet.whole._groups) == 1
+    assert len(sheet.whole.groups) == 1
 
 
 MOVES_FAR = {

@@ -106,14 +106,14 @@ class Whole:
     def __init__(
         self, pattern: Pattern, groups: list[Group], level: Level, graded: Grading
     ) -> None:
-        self._pattern, self.groups, self.level, self._graded = pattern, groups, level, graded
+        self.pattern, self.groups, self.level, self._graded = pattern, groups, level, graded
         self.edges = pattern.lines
         x, faces = pattern.vertices, pattern.faces
         self.unknowns = Unknowns(len(x), len(self.edges), len(faces), level)
         self._along = x[self.edges[:, 1]] - x[self.edges[:, 0]]
 
     @cached_property
-    def _parts(self) -> list[tuple[NDArray, sparse.csr_array]]:
+    def amplitudes(self) -> list[tuple[NDArray, sparse.csr_array]]:
         """Shapes (c,) of each group that the level has, and their amplitudes as unknowns.
 
         The rows of the matrix (p c, m) are amplitudes of panel after panel.
@@ -121,7 +121,7 @@ class Whole:
         return [self._placed(group) for group in self.groups]
 
     def _placed(self, group: Group) -> tuple[NDArray, sparse.csr_array]:
-        """See `_parts`."""
+        """See `amplitudes`."""
         kind, level, own = group.panel.kind, self.level, self.unknowns
         most = {VERTEX: 3, TURN: level.turns, INNER: level.inner}
         counts = np.array(
@@ -166,7 +166,7 @@ class Whole:
 
     def _edge_frames(self, group: Group, edge: NDArray, backwards: NDArray) -> NDArray:
         """Directions (p, k, 3, 3) along edges, across them in the plane, and normal to both."""
-        x = self._pattern.vertices[group.faces]
+        x = self.pattern.vertices[group.faces]
         area = np.cross(x, np.roll(x, -1, axis=1)).sum(axis=1)
         along = np.where(backwards[:, :, None], -1.0, 1.0) * self._along[edge]
         return edge_frame(along, area[:, None])
@@ -180,7 +180,7 @@ class Whole:
         """
         size = dofs.shape[1]
         total = [sparse.csr_array((size, size)) for _ in range(2)]
-        for group, (kept, placed) in zip(self.groups, self._parts, strict=True):
+        for group, (kept, placed) in zip(self.groups, self.amplitudes, strict=True):
             own = group.panel
             parts = own.changes if changes else (own.stiffness, own.mass)
             amplitudes, count = sparse.csr_array(placed @ dofs), len(kept)
@@ -193,7 +193,7 @@ class Whole:
 
     def along_axes(self, chosen: NDArray) -> Iterator[tuple[sparse.csr_array, list[Any]]]:
         """Amplitudes (a, m) of shapes of chosen panels, and their masses along x, y, z (a, a)."""
-        for group, (kept, placed) in zip(self.groups, self._parts, strict=True):
+        for group, (kept, placed) in zip(self.groups, self.amplitudes, strict=True):
             there = np.isin(group.number, chosen)
             frames, own = group.frames[there], group.panel.products[:, :, kept[:, None], kept]
             masses = np.einsum("pad,pbd,abij->dpij", frames, frames, own, optimize=True)
@@ -202,9 +202,9 @@ class Whole:
     def lifts(self, points: NDArray, panel: NDArray) -> sparse.csr_array:
         """Displacements (k, m) normal to panels (k,) at points (k, 3) in them."""
         total = sparse.csr_array((len(points), self.unknowns.size))
-        for group, (kept, placed) in zip(self.groups, self._parts, strict=True):
+        for group, (kept, placed) in zip(self.groups, self.amplitudes, strict=True):
             own = np.stack([np.flatnonzero(panel == number) for number in group.number])
-            away = points[own] - self._pattern.vertices[group.faces[:, :1]]
+            away = points[own] - self.pattern.vertices[group.faces[:, :1]]
             local = np.einsum("pei,pdi->ped", away, group.frames[:, :2])
             shapes = group.panel.lift(local)[:, :, kept]
             entries = (np.ones(own.size), (own.ravel(), np.arange(own.size)))
@@ -214,7 +214,7 @@ class Whole:
 
     def between(self) -> tuple[NDArray, sparse.csr_array]:
         """Points (q, 3) on edges and at the means of panels' corners; their motions (3 q, m)."""
-        own, x, ends = self.unknowns, self._pattern.vertices, self.edges
+        own, x, ends = self.unknowns, self.pattern.vertices, self.edges
         axis, edge = np.arange(3), np.arange(own.edges)
         length = np.linalg.norm(self._along, axis=1)
         points, columns = [], _Columns()
@@ -232,13 +232,13 @@ class Whole:
                         np.moveaxis(weights, 2, 1).reshape(-1, rows.shape[1]))  # fmt: skip
         on_edges = columns.matrix(own.size).T
         centers = sparse.csr_array((3 * own.panels, own.size))
-        for group, (kept, placed) in zip(self.groups, self._parts, strict=True):
+        for group, (kept, placed) in zip(self.groups, self.amplitudes, strict=True):
             local = np.einsum("pad,ac->pdc", group.frames, group.panel.center[:, kept])
             rows = (3 * group.number[:, None] + axis).ravel()
             entries = (np.ones(len(rows)), (rows, np.arange(len(rows))))
             put = sparse.csr_array(entries, shape=(3 * own.panels, len(rows)))
             centers = centers + put @ (block_diagonal(local).tocsr() @ placed)
-        points.append(np.array([x[list(face)].mean(axis=0) for face in self._pattern.faces]))
+        points.append(np.array([x[list(face)].mean(axis=0) for face in self.pattern.faces]))
         return np.concatenate(points), sparse.csr_array(sparse.vstack([on_edges, centers]))
 
     def spread(self, load: Distributed) -> NDArray[np.float64]:
@@ -259,7 +259,7 @@ class Whole:
                 first = own.bow(edge, 0)
                 out[first : first + 3 * own.functions] += np.outer(mean, force[edge]).ravel()
         if load.swollen is not None:
-            for group, (kept, placed) in zip(self.groups, self._parts, strict=True):
+            for group, (kept, placed) in zip(self.groups, self.amplitudes, strict=True):
                 forces = load.swollen[group.number] @ group.panel.thermal[kept].T
                 out += placed.T @ forces.ravel()
         return out if load.panels is None else out + self._on_panels(load.panels)
@@ -267,12 +267,12 @@ class Whole:
     def _on_panels(self, density: NDArray) -> NDArray[np.float64]:
         """Forces (m,), N, on the unknowns due to forces on panels (np, 3), N/m2."""
         out = np.zeros(self.unknowns.size)
-        for group, (kept, placed) in zip(self.groups, self._parts, strict=True):
+        for group, (kept, placed) in zip(self.groups, self.amplitudes, strict=True):
             own = np.einsum("pad,pd->pa", group.frames, density[group.number])
-            out += placed.T @ (own @ self._per_area(group, kept).T).ravel()
+            out += placed.T @ (own @ self.per_area(group, kept).T).ravel()
         return out
 
-    def _per_area(self, group: Group, kept: NDArray) -> NDArray[np.float64]:
+    def per_area(self, group: Group, kept: NDArray) -> NDArray[np.float64]:
         """Forces (c, 3) on a panel's shapes due to unit forces per area along its axes.
 
         They follow from the inertia forces of a translation, which are evenly spread, too.
@@ -280,57 +280,8 @@ class Whole:
         what, _, axis = group.panel.kind[kept].T
         moved = (what == VERTEX)[:, None] & (axis[:, None] == np.arange(3))
         inertia = group.panel.mass[np.ix_(kept, kept)] @ moved
-        area = self._pattern.face_areas[group.number[0]]
+        area = self.pattern.face_areas[group.number[0]]
         return inertia * area / (moved[:, 0] @ inertia[:, 0])
-
-    @cached_property
-    def resultants(self) -> sparse.csr_array:
-        """Membrane forces and moments (6 p, m) at the p points of all panels in turn, per unknown.
-
-        Rows of a point: forces xx, yy, xy, N/m, then moments, N, in the panel's own axes.
-        """
-        blocks: list[Any] = [None] * self.unknowns.panels
-        for group, (kept, placed) in zip(self.groups, self._parts, strict=True):
-            shapes = group.panel.resultants[..., kept]
-            for k, (number, turned) in enumerate(self.turned(group, shapes)):
-                own = placed[k * len(kept) : (k + 1) * len(kept)]
-                blocks[number] = sparse.csr_array(turned.reshape(-1, len(kept)) @ own)
-        return sparse.csr_array(sparse.vstack(blocks))
-
-    def held_resultants(self, load: Distributed) -> NDArray[np.float64]:
-        """What a load adds to `resultants` (6 p,) beside the motions of the unknowns."""
-        parts: list[Any] = [None] * self.unknowns.panels
-        for group, (kept, _) in zip(self.groups, self._parts, strict=True):
-            panel, inner = group.panel, kept[group.panel.kind[kept, 0] == INNER]
-            held = panel.held_resultants.copy()
-            if len(inner):  # vibrations count as unknowns
-                push = self._per_area(group, kept)[-len(inner) :]
-                moved = np.linalg.solve(panel.stiffness[np.ix_(inner, inner)], push)
-                held[..., :3] -= panel.resultants[..., inner] @ moved
-            amount = np.zeros((len(group.number), 5))
-            if load.panels is not None:
-                amount[:, :3] = np.einsum("pad,pd->pa", group.frames, load.panels[group.number])
-            if load.swollen is not None:
-                amount[:, 3:] = load.swollen[group.number]
-            for k, (number, turned) in enumerate(self.turned(group, held)):
-                parts[number] = (turned @ amount[k]).ravel()
-        return np.concatenate(parts)
-
-    def turned(self, group: Group, local: NDArray) -> Iterator[tuple[int, NDArray]]:
-        """Numbers of a group's panels, and tensors (2, p, 3, c) of its frame in their own axes.
-
-        The first axis of a panel is along its first edge. The result is (p, 2, 3, c).
-        """
-        for number, face, frame in zip(group.number, group.faces, group.frames, strict=True):
-            own = self._pattern.faces[number]
-            first, corners = own.index(int(face[0])), len(own)
-            along = frame[:2] @ (np.diff(self._pattern.vertices[[*own[:2]]], axis=0)[0])
-            c, s = along / np.linalg.norm(along)
-            turn = np.array([[c * c, s * s, 2 * c * s], [s * s, c * c, -2 * c * s],
-                             [-c * s, c * s, c * c - s * s]])  # fmt: skip
-            order = np.roll(np.arange(corners), first)
-            points = np.concatenate([[0], 1 + order, 1 + corners + order])
-            yield int(number), np.einsum("ab,kpbc->pkac", turn, local[:, points])
 
     @property
     def held_energies(self) -> NDArray[np.float64]:
@@ -352,7 +303,7 @@ class Whole:
     @property
     def _turns(self) -> sparse.csr_array:
         """Turns (nf * turns, m) of both sides of the creases relative to each other."""
-        own, count, creases = self.unknowns, self.level.turns, len(self._pattern.creases)
+        own, count, creases = self.unknowns, self.level.turns, len(self.pattern.creases)
         first = own.turn(np.arange(creases)[:, None], 0, np.arange(count)).ravel()
         row = np.tile(np.arange(len(first)), 2)
         column = np.concatenate([first, first + count])
@@ -364,7 +315,7 @@ class Whole:
 
         Creases turn by what they do at the middles of the pieces of a mesh, as panels do.
         """
-        count, creases = self.level.turns, len(self._pattern.creases)
+        count, creases = self.level.turns, len(self.pattern.creases)
         roots = np.zeros((creases, count, count))
         for crease, along in enumerate(self._along[:creases]):
             places = np.append(0.0, self._graded.places(float(np.linalg.norm(along))))
@@ -384,7 +335,7 @@ class Whole:
     def parts(self, dofs: sparse.csr_array, slope: NDArray) -> Parts:
         """Parts of the sheet for dofs (m, d), with creases of stiffness `slope` (nf,), N m/rad."""
         rows, number, size, stiffness, mass = [], [], [], [], []
-        for k, (group, (kept, placed)) in enumerate(zip(self.groups, self._parts, strict=True)):
+        for k, (group, (kept, placed)) in enumerate(zip(self.groups, self.amplitudes, strict=True)):
             smooth = _smooth(group.panel, kept)
             back = sparse.kron(sparse.eye_array(len(group.number)), smooth.T, format="csr")
             rows.append(back @ placed)
@@ -435,7 +386,7 @@ class Whole:
         straight = {int(edge): np.eye(3) for edge in np.flatnonzero((turned >= 0).any(axis=1))}
         self._add_bows(columns, {**held, **straight})
         sides[clamped] = False
-        welds = len(self._pattern.creases) + len(self._pattern.boundary)  # the first of them
+        welds = len(self.pattern.creases) + len(self.pattern.boundary)  # the first of them
         number = np.arange(level.turns)
         edge, side = np.nonzero(sides[:welds])
         columns.add(own.turn(edge[:, None], side[:, None], number).reshape(-1, 1))
@@ -464,14 +415,14 @@ class Whole:
 
     def _facet_turn(self, panel: int, edge: int, side: int) -> tuple[NDArray, NDArray]:
         """Dofs (9,) of vertices and factors (9,), 1/m, of the turn of a panel about an edge."""
-        x, face = self._pattern.vertices, np.array(self._pattern.faces[panel])
+        x, face = self.pattern.vertices, np.array(self.pattern.faces[panel])
         a, b = self.edges[edge][::-1] if side else self.edges[edge]
         along = (x[b] - x[a]) / np.linalg.norm(x[b] - x[a])
         away = x[face] - x[a]
         height = np.linalg.norm(away - np.outer(away @ along, along), axis=1)
         c = face[height.argmax()]
         foot = float((x[c] - x[a]) @ along / np.linalg.norm(x[b] - x[a]))
-        up = self._pattern.face_normals[panel] / height.max()
+        up = self.pattern.face_normals[panel] / height.max()
         dofs = 3 * np.array([c, a, b])[:, None] + np.arange(3)
         return dofs.ravel(), np.outer(np.array([1.0, foot - 1.0, -foot]), up).ravel()
 
@@ -528,7 +479,7 @@ class _Columns:
 
     def __init__(self) -> None:
         self.count = 0
-        self._parts: list[tuple[NDArray, NDArray, NDArray]] = []
+        self.amplitudes: list[tuple[NDArray, NDArray, NDArray]] = []
 
     def add(self, rows: NDArray, values: NDArray | float = 1.0) -> None:
         """Add a column for each row of `rows` (c, r), with `values` in these rows."""
@@ -538,11 +489,11 @@ class _Columns:
 
     def put(self, rows: NDArray, columns: NDArray, values: NDArray) -> None:
         """Put entries (k,) into columns."""
-        self._parts.append((rows, columns, values))
+        self.amplitudes.append((rows, columns, values))
 
     def matrix(self, rows: int) -> sparse.csr_array:
         """The matrix (rows, count), without zeros."""
-        row, column, value = (np.concatenate(part) for part in zip(*self._parts, strict=True))
+        row, column, value = (np.concatenate(part) for part in zip(*self.amplitudes, strict=True))
         there = value != 0.0
         entries = (value[there], (row[there], column[there]))
         return sparse.csr_array(sparse.coo_array(entries, shape=(rows, self.count)))

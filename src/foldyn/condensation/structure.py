@@ -16,6 +16,7 @@ from foldyn.algebra.solvers import Fill
 from foldyn.condensation.assembly import Whole
 from foldyn.condensation.library import ALIKE, Meshes, groups
 from foldyn.condensation.panel import BOW
+from foldyn.condensation.resultants import resultants
 from foldyn.condensation.shapes import FOR_STRESSES, LEVELS, Level
 from foldyn.condensation.term import GROUPS, SuperelementsTerm
 from foldyn.errors import InputError
@@ -233,11 +234,11 @@ class Superelements(Discretized):
         return self._dofs(edges).T @ self.whole.spread(load)
 
     def resultants(self, edges: Mapping[int, NDArray]) -> sparse.csr_array:
-        """Membrane forces and moments (6 p, m) of the dofs; see `Whole.resultants`.
+        """Membrane forces and moments (6 p, m) of the dofs; see `condensation.resultants`.
 
         edges : edges that supports hold, as in `held`.
         """
-        return sparse.csr_array(self.whole.resultants @ self._dofs(edges))
+        return sparse.csr_array(resultants(self.whole) @ self._dofs(edges))
 
     def lifts(
         self, points: NDArray, panel: NDArray, *, edges: Mapping[int, NDArray]

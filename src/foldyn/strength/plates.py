@@ -20,6 +20,7 @@ from foldyn.condensation import superelements
 from foldyn.condensation.assembly import Whole
 from foldyn.condensation.library import Group
 from foldyn.condensation.panel import BOW, TURN, VERTEX, CondensedPanel
+from foldyn.condensation.resultants import in_own_axes
 from foldyn.errors import InputError
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
 from foldyn.shells.recovery import StressPoints
@@ -137,7 +138,7 @@ class PlateResultants:
         if center:
             away = structure.nodes[centers[0]] - structure.nodes[faces[0, 0]]
             rise = group.panel.lift((group.frames[0, :2] @ away)[None]).reshape(1, -1)
-        maps = [own for _, own in whole.turned(group, _map(group.panel, edges, rise))]
+        maps = [own for _, own in in_own_axes(self._pattern, group, _map(group.panel, edges, rise))]
         pairs = [[edge_of(a, b) for a, b in around(face)] for face in faces.tolist()]
         numbers = np.array([[creases.get(edge, -1) for edge in row] for row in pairs])
         return _Kind(group.number, faces, centers, group.frames, numbers, np.array(maps))

@@ -11,6 +11,7 @@ from scipy import sparse
 
 from foldyn.cases import Case
 from foldyn.condensation import Superelements
+from foldyn.condensation.resultants import held_resultants
 from foldyn.errors import InputError
 from foldyn.shells import Shell
 from foldyn.shells.recovery import StressPoints
@@ -86,7 +87,7 @@ class SuperelementResultants:
 
     def at(self, q: NDArray, factors: NDArray) -> NDArray[np.float64]:
         """See `Resultants`."""
-        held = self.structure.whole.held_resultants(self._sheet.distributed(factors))
+        held = held_resultants(self.structure.whole, self._sheet.distributed(factors))
         return (self.rows @ q + held).reshape(-1, 2, 3)
 
 
