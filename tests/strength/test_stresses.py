@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from foldyn.shells.recovery import recovery, stress_points
 from foldyn.strength.dataset import MISES, von_mises
 from foldyn.strength.loaded import LoadedSheet
 from foldyn.strength.resultants import resultants_of
+from verification.stresses import RESULTS
 
 MODULUS, NU, THICKNESS = 7e10, 0.3, 0.005
 SHEET = fd.Sheet(MODULUS, NU, THICKNESS, 2700.0)
@@ -303,3 +306,20 @@ def test_what_is_refused():
     )
     with pytest.raises(InputError, match="a mobility by the method 'direct'"):
         fd.stresses(mobility)
+
+
+def test_stored_comparison_with_shells():
+    """What docs/stresses.md says of the table that verification/stresses.py has written."""
+    lines = list(csv.reader(RESULTS.read_text().splitlines()))[1:]
+    own, anywhere, crease, bars, bars_crease = np.abs(
+        np.array([line[2:] for line in lines], float)
+    ).T
+    assert len(lines) == 20
+    assert (own < 0.05).mean() >= 0.95
+    assert own.max() < 0.052
+    assert np.median(anywhere) < 0.035
+    assert anywhere.max() < 0.16
+    assert crease.max() < 0.002
+    assert (bars < 0.05).mean() >= 0.6
+    assert np.median(bars_crease) < 0.025
+    assert bars_crease.max() < 0.11

@@ -27,7 +27,8 @@ GIVEN = {
 def results(tmp_path_factory):
     folder, made = tmp_path_factory.mktemp("cases"), {}
     for kind, text in TEXTS.items():
-        (folder / f"{kind}.toml").write_text(text)
+        strong = text.replace("\nthickness =", "\nstrength = 1e6\nthickness =", 1)
+        (folder / f"{kind}.toml").write_text(strong)
         case_file = fd.read_case(folder / f"{kind}.toml")
         made[kind] = case_file, case_file.run()
     return made
@@ -54,6 +55,7 @@ def test_every_measure_can_be_taken_of_all_its_kinds(results, one, kind):
     never = (
         "limit_load",
         "bifurcation_load",
+        "first_maximum",
         "barrier",
         "barrier_back",
         "limit_interval",
@@ -197,7 +199,7 @@ def test_the_barriers_of_a_tower_that_snaps(tmp_path):
     names = ["stable_states", "barrier", "barrier_back", "state_strokes", "state_energies"]
     case_file = fd.read_case(case)
     as_it_is = {"sheet.thickness": [case_file.sheet.thickness]}
-    found = fd.sweep(case, as_it_is, measures=[*names, "limit_load"], processes=1).isel(thickness=0)
+    found = fd.sweep(case, as_it_is, measures=[*names, "limit_load", "first_maximum"], processes=1).isel(thickness=0)
     assert str(found["failure"].values) == ""
     known = fd.landscape(case_file.run(), case_file.case())
     assert int(found["stable_states"]) == len(known.stable) == 2
@@ -205,6 +207,9 @@ def test_the_barriers_of_a_tower_that_snaps(tmp_path):
     assert float(found["barrier_back"]) == pytest.approx(known.barrier(1, 0), rel=1e-9)
     strokes = [state.stroke for state in known.stable]
     np.testing.assert_allclose(found["state_strokes"], strokes, rtol=1e-9)
+    tops = np.flatnonzero((np.diff(known.force)[:-1] > 0.0) & (np.diff(known.force)[1:] <= 0.0))
+    top = known.force[1 + tops[0]]
+    assert top <= float(found["first_maximum"]) < 1.01 * top
     assert np.isnan(found["limit_load"])  # the top is moved, so no load has a limit
 
 

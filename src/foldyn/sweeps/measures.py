@@ -398,6 +398,17 @@ def _final_stiffness(found: Landscape, case: Case) -> float:
     return _secant(found, slice(-2, None))
 
 
+@_measure(PATH, units="N", doc="first maximum of the driving force", through=landscape)
+def _first_maximum(found: Landscape, case: Case) -> float:
+    rise = np.diff(found.force)
+    tops = 1 + np.flatnonzero((rise[:-1] > 0.0) & (rise[1:] <= 0.0))
+    if not len(tops):
+        return np.nan
+    near = slice(tops[0] - 1, tops[0] + 2)
+    a, b, c = np.polyfit(found.stroke[near] - found.stroke[tops[0]], found.force[near], 2)
+    return float(c - 0.25 * b * b / a)
+
+
 def _secant(found: Landscape, part: slice) -> float:
     return float(np.diff(found.force[part])[0] / np.diff(found.stroke[part])[0])
 
