@@ -112,29 +112,43 @@ def folded(structure):
 
 
 @pytest.mark.matrix
-def test_a_folded_sheet_beside_simulated_noise():
+@pytest.mark.parametrize("driven", ["force", "base"])
+def test_a_folded_sheet_beside_simulated_noise(driven):
     """Within three standard errors of the mean square over 40 s."""
     case = folded(fd.superelements(PATTERN, SHEET, level=1, divisions=8, clamped="xmin"))
-    s, dt, rng = 0.02, 5e-4, np.random.default_rng(4)
-    samples = rng.standard_normal(80_000) * np.sqrt(s / (2.0 * dt))
-    high = 200.0
-    found = fd.random_response(
-        case, forces=[(fd.Force([5], (0, 0, 1)), noise(s, 1e-3, high, "N2/Hz"))]
-    )
-    spectrum = np.fft.rfft(samples)
-    spectrum[np.fft.rfftfreq(len(samples), dt) > high] = 0.0
-    force = np.fft.irfft(spectrum)
-    history = fd.Table(np.arange(len(force)) * dt, force)
-    moved = fd.simulate(
-        fd.Case(case.structure, case.supports, [fd.Force([5], (0, 0, 1), history=history)],
-                case.damping),
-        40.0 - dt, interval=2e-3,
-    )  # fmt: skip
-    late = moved.displacement.sel(node=5, axis="z").values[500:]
+    if driven == "force":
+        density = noise(0.02, 1.0, 200.0, "N2/Hz")
+        found = fd.random_response(case, forces=[(fd.Force([5], (0, 0, 1)), density)])
+        push = fd.Force([5], (0, 0, 1), history=density.history(40.0, seed=4))
+        shaken = case.altered(loads=[push])
+    else:
+        density = noise(0.02, 1.0, 200.0)
+        found = fd.random_response(case, base={"z": density})
+        base = fd.BaseMotion("z", history=density.history(40.0, seed=4))
+        shaken = case.altered(supports=[*case.supports, base])
+    moved = fd.simulate(shaken, 40.0, interval=2e-3).displacement.sel(axis="z")
+    late = (moved.sel(node=5) - (moved.sel(node=0) if driven == "base" else 0.0)).values[500:]
     rms = float(found.displacement_rms.sel(node=5, axis="z"))
     correlation = 2.0 / 20.0  # s, of an amplitude damped by alpha
     error = np.sqrt(2.0 * correlation / 40.0)
-    assert np.sqrt((late**2).mean()) == pytest.approx(rms, rel=3.0 * error)
+    assert late.std() == pytest.approx(rms, rel=3.0 * error)
+
+
+@pytest.mark.parametrize("unit", ["m2/s3", "N2/Hz"])
+def test_histories_have_their_density(unit):
+    density = fd.SpectralDensity([5.0, 20.0, 100.0], [0.1, 0.4, 0.05], unit)
+    made = density.history(100.0, seed=1)
+    again = density.history(100.0, seed=1)
+    np.testing.assert_array_equal(made.values, again.values)
+    assert np.abs(made.values - density.history(100.0, seed=2).values).max() > 0.0
+    value, dt = made.values, float(np.diff(made.times).mean())
+    if unit == "m2/s3":
+        assert value[0] == value[-1] == 0.0
+        value = np.diff(np.append(value, value[1]), 2) / dt**2
+    lines = 100 * 95  # within the density: each has two random numbers
+    assert value.std() == pytest.approx(density.rms, rel=0.01 + 3.0 / np.sqrt(lines))
+    with pytest.raises(InputError, match=r"duration = 0.1: must be at least 0\.2 s"):
+        density.history(0.1)
 
 
 def test_densities_integrate_to_mean_squares():

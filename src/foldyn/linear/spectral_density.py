@@ -10,9 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.arguments import Check, Checked
+from foldyn.cases import Table
 from foldyn.errors import InputError
-from foldyn.values import choice, numbers
+from foldyn.ram_limit import check_memory
+from foldyn.values import choice, number, numbers, whole
 
+PER_PERIOD = 20  # numbers of a history per period of the highest frequency
 STANDARD_GRAVITY = 9.80665  # m/s2, ISO 80000-3
 UNITS = {"g2/Hz": ("acceleration", STANDARD_GRAVITY**2), "m2/s3": ("acceleration", 1.0),
          "N2/Hz": ("force", 1.0)}  # fmt: skip
@@ -86,3 +89,44 @@ class SpectralDensity(Checked):
         power = np.where(flat, 0.0, slope + 1.0)
         area = np.where(flat, np.log(ratio), (ratio**power - 1.0) / np.where(flat, 1.0, power))
         return float(np.sqrt((value[:-1] * f[:-1] * area).sum()))
+
+    def history(self, duration: float, *, seed: int = 0) -> Table:
+        """A normal process with this density, as the history of a load or of a base motion.
+
+        Of accelerations it is the displacement (m) of a `BaseMotion`, from 0 at the start; of
+        forces, their factor (N). It repeats after the duration; at its start the velocity of a base
+        jumps, and motions take some time to forget this.
+
+        Parameters
+        ----------
+        duration : float
+            Time (s), at least one period of the lowest frequency.
+        seed : int
+            Seed of the random numbers; equal seeds give equal histories.
+
+        Raises
+        ------
+        InputError
+            A duration that is too short, or longer than memory holds.
+
+        Examples
+        --------
+        >>> import foldyn as fd
+        >>> noise = fd.SpectralDensity([5.0, 50.0], [0.01, 0.01], "g2/Hz")
+        >>> base = fd.BaseMotion("z", history=noise.history(10.0, seed=1))
+        """
+        least = 1.0 / self.frequency[0]
+        duration = number("duration", duration, least=least, unit="s")
+        seed = whole("seed", seed, least=0)
+        count = int(np.ceil(PER_PERIOD * self.frequency[-1] * duration))
+        check_memory("duration", f"{count:.3g} numbers", 80.0 * count, "take a shorter one")
+        f = np.fft.rfftfreq(count, duration / count)
+        normal = np.random.default_rng(seed).standard_normal((2, len(f)))
+        line = 0.5 * count * np.sqrt(self.at(f) / duration) * (normal[0] + 1j * normal[1])
+        shaken = self.measures == "acceleration"
+        if shaken:
+            line /= -((2.0 * np.pi * np.maximum(f, 0.5 / duration)) ** 2)
+        value = np.fft.irfft(line, count)
+        value = np.append(value, value[0])
+        start = value[0] if shaken else 0.0
+        return Table(np.linspace(0.0, duration, count + 1), value - start, smooth=shaken)
