@@ -200,6 +200,6 @@ def test_a_bad_file_of_a_response_gets_one_message(read, edits, message) -> None
 
 
 def test_keys_of_vibrations_in_a_motion_are_told_as_such(read, short) -> None:
-    kinds = '"modes", "frf", "bands", "fidelity" or "buckling"'
+    kinds = '"modes", "frf", "bands", "fidelity", "buckling" or "random"'
     text = changed(short, "analysis.count = 5")
     check(read, text, f"analysis.count: only for analysis.kind = {kinds}; leave it out")

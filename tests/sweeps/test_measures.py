@@ -199,7 +199,9 @@ def test_the_barriers_of_a_tower_that_snaps(tmp_path):
     names = ["stable_states", "barrier", "barrier_back", "state_strokes", "state_energies"]
     case_file = fd.read_case(case)
     as_it_is = {"sheet.thickness": [case_file.sheet.thickness]}
-    found = fd.sweep(case, as_it_is, measures=[*names, "limit_load", "first_maximum"], processes=1).isel(thickness=0)
+    found = fd.sweep(
+        case, as_it_is, measures=[*names, "limit_load", "first_maximum"], processes=1
+    ).isel(thickness=0)
     assert str(found["failure"].values) == ""
     known = fd.landscape(case_file.run(), case_file.case())
     assert int(found["stable_states"]) == len(known.stable) == 2

@@ -42,7 +42,8 @@ OPTIONS = frozenset(key for method in METHODS.values() for key in arguments(meth
 """Options of all methods."""
 
 
-def _frequencies(name: str, value: Any) -> NDArray[np.float64]:
+def frequencies_of(name: str, value: Any) -> NDArray[np.float64]:
+    """Frequencies (m,), Hz, from a list, or from the first, the last and their count."""
     if isinstance(value, dict):
         return _range(name, value)
     if not isinstance(value, list) or not value:
@@ -79,7 +80,7 @@ class FrfSection(*(method.options for method in METHODS.values()), AnalysisSecti
     """[analysis] of kind "frf"."""
 
     like = (frf,)
-    frequencies: Annotated[Sequence[float] | Mapping[str, float], Check(_frequencies)]
+    frequencies: Annotated[Sequence[float] | Mapping[str, float], Check(frequencies_of)]
     method: Annotated[str, one_of(METHODS)] = "direct"
     state: About = "rest"
     secant: Secant = None

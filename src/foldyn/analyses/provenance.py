@@ -209,7 +209,7 @@ def _written(value: Any) -> str:
     if is_dataclass(value):
         return f"({_said(value)})"
     if isinstance(value, Mapping):
-        return ", ".join(f"{word} {number:.6g}" for word, number in value.items())
+        return ", ".join(f"{word} {_written(one)}" for word, one in value.items())
     if isinstance(value, tuple) and all(isinstance(part, PanelSheet) for part in value):
         text = ", ".join(f"{_written(part.panels)} with {_listed(part.own)}" for part in value)
     else:

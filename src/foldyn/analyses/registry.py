@@ -14,6 +14,7 @@ from foldyn.analyses.frf import FrfAnalysis
 from foldyn.analyses.modes import ModesAnalysis
 from foldyn.analyses.motion import MotionAnalysis
 from foldyn.analyses.path import PathAnalysis
+from foldyn.analyses.random import RandomAnalysis
 from foldyn.analyses.response import ResponseAnalysis
 from foldyn.analyses.sections import CaseSchema
 from foldyn.arguments import Check
@@ -33,6 +34,7 @@ ANALYSES: Mapping[str, type[Analysis]] = {
         BandsAnalysis,
         FidelityAnalysis,
         BucklingAnalysis,
+        RandomAnalysis,
     )
 }
 """Analyses by `analysis.kind`."""

@@ -27,7 +27,7 @@ from foldyn.viewer.states import bar_strain
 
 F = TypeVar("F", bound=Callable[..., Any])
 MOTION, PATH, MODES, FRF, FIDELITY = "dynamics", "statics", "modes", "frf", "fidelity"
-BANDS, BUCKLING = "bands", "buckling"
+BANDS, BUCKLING, RANDOM = "bands", "buckling", "random"
 PROMINENT = 0.05
 """Least prominence of a peak of a spectrum, relative to its maximum."""
 NEAR = 1e-5
@@ -108,6 +108,16 @@ def _rigid_modes(result: xr.Dataset, case: Case) -> int:
 def _buckling_load(result: xr.Dataset, case: Case) -> float:
     factors = result["load_factor"].values
     return float(factors[0]) if len(factors) and factors[0] > 0.0 else np.nan
+
+
+@_measure(RANDOM, units="m", doc="root mean square displacement")
+def _rms(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
+    return float(result["displacement_rms"].sel(node=node, axis=axis))
+
+
+@_measure(RANDOM, units="m/s2", doc="root mean square of the absolute acceleration")
+def _acceleration_rms(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
+    return float(result["acceleration_rms"].sel(node=node, axis=axis))
 
 
 # ------------------------------------------------------- responses, and spectra of motions

@@ -1,0 +1,178 @@
+"""Random vibration: [analysis] of kind "random", with the densities of a moving base."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, Self
+
+import numpy as np
+import xarray
+
+from foldyn import plots
+from foldyn.analyses.bars import bar
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
+from foldyn.analyses.frf import frequencies_of
+from foldyn.analyses.sections import AnalysisSection, Count, ShownSection, Switch
+from foldyn.analyses.vibration import About, VibrationSchema, about, bar_closed
+from foldyn.arguments import Check
+from foldyn.cases import Case
+from foldyn.cases.directions import AXES
+from foldyn.errors import InputError, within
+from foldyn.linear import SpectralDensity, margins, random_response
+from foldyn.plots.charts import Chart, Curve
+from foldyn.report.album import Album, ByRule, by_mass_rule, shown_nodes
+from foldyn.report.sections import Charts, Heading, Section, Table, Text, cell
+from foldyn.tables import check_keys, check_table
+from foldyn.values import choice
+
+KEYS = ("frequency", "value", "unit")
+
+
+def _base(name: str, value: Any) -> dict[str, SpectralDensity]:
+    """Densities of a base by axis, from tables."""
+    found = {}
+    for axis, table in check_table(name, value).items():
+        place = f"{name}.{choice(name, axis, AXES)}"
+        given = check_keys(check_table(place, table), KEYS, place) or table
+        for key in KEYS:
+            if key not in given:
+                raise InputError(
+                    ": missing; give frequency (Hz), value, and their unit", f"{place}.{key}"
+                )
+        with within(f"{place}."):
+            found[axis] = SpectralDensity(**given)
+    if not found:
+        raise InputError(": give an axis, as [analysis.base.z]", name)
+    return found
+
+
+class RandomSection(AnalysisSection):
+    """[analysis] of kind "random"."""
+
+    like = (random_response,)
+    base: Annotated[Mapping[str, Any], Check(_base)]
+    count: Count | None = None
+    state: About = "rest"
+    frequencies: Annotated[Sequence[float] | Mapping[str, float] | None, Check(frequencies_of)] = (
+        None
+    )
+    stresses: Switch = False
+    secant = None
+
+
+class RandomSchema(VibrationSchema):
+    """A case file of kind "random"."""
+
+    analysis: RandomSection
+    output: ShownSection = ShownSection()
+
+
+class RandomAnalysis(Analysis):
+    """Root mean square response to a base that moves at random."""
+
+    kind = "random"
+    schema = RandomSchema
+    needs_density = "random vibration needs"
+    takes = arguments_of(random_response)
+    files = ("densities", "stresses", "crease-moments")
+
+    @classmethod
+    def of(cls, schema: Any, case: Case) -> Self:
+        """See `Analysis`."""
+        given = super().of(schema, case).arguments
+        return cls({**given, "state": None if given["state"] == "rest" else given["state"]})
+
+    def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
+        """See `Analysis`."""
+        given = {**self.arguments, **about(case_file, mass), **changes}
+        case = case_file.case(mass)
+
+        def compute(progress: bool, begun: Begun) -> xarray.Dataset:
+            with bar_closed(bar(progress, bar_format=f"random response, mass rule {mass}")):
+                result = random_response(case, **given)
+            begun()
+            return result
+
+        return compute
+
+    def line(self, name: str, result: xarray.Dataset) -> str:
+        """Largest root mean squares, and effort."""
+        moved, shaken = (_largest(result, what) for what in ("displacement", "acceleration"))
+        return (
+            f"  {name}: {counted(result.attrs['modes'], 'mode')}, up to {moved:.3g} m and "
+            f"{shaken:.3g} m/s2 rms, {result.attrs['wall_seconds']:.1f} s"
+        )
+
+    @staticmethod
+    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[Section]:
+        """See `Analysis`."""
+        first, result = next(iter(results.items()))
+        yield from album.structure(case_file.case(first))
+        if "frequency" in result:
+            nodes, some = shown_nodes(case_file.output.nodes.tolist())
+            yield Charts(_charts(result, nodes), f"Densities of the chosen nodes{some}.")
+        if "von_mises_rms" in result:
+            yield from album.figure(
+                "stresses",
+                "Root mean square of the von Mises stress, the largest of each panel.",
+                lambda: plots.draw_stresses(result, "von_mises"),
+            )
+        yield Heading("The numbers")
+        yield _table(result)
+        columns = {
+            "modes": "modes",
+            "largest displacement (m rms)": lambda one: cell(_largest(one, "displacement")),
+            "largest acceleration (m/s2 rms)": lambda one: cell(_largest(one, "acceleration")),
+            "time (s)": "wall_seconds",
+        }
+        yield by_mass_rule(results, columns, f"{case_file.path.name}: the computation")
+        yield Text(
+            "Displacements are relative to the base, accelerations absolute. A normal process is "
+            "within three times its root mean square 99.7 % of the time."
+        )
+
+
+def _largest(result: xarray.Dataset, what: str) -> float:
+    return float(np.linalg.norm(result[f"{what}_rms"].values, axis=-1).max())
+
+
+def _charts(result: xarray.Dataset, nodes: Sequence[int]) -> list[Chart]:
+    charts = []
+    for what, unit in (("displacement", "m2/Hz"), ("acceleration", "(m/s2)2/Hz")):
+        density = result[f"{what}_psd"].sel(node=nodes).sum("axis")
+        curves = [
+            Curve(f"node {node}", result["frequency"].values, density.sel(node=node).values)
+            for node in nodes
+        ]
+        charts.append(Chart("frequency (Hz)", f"{what} ({unit})", curves, by_ratio=True))
+    return charts
+
+
+def _table(result: xarray.Dataset) -> Table:
+    """Where the response is largest, and the least margin if the strength is known."""
+    rows = []
+    for what, unit in (("displacement", "m"), ("acceleration", "m/s2")):
+        rms, rate = (result[f"{what}_{name}"].values for name in ("rms", "crossings"))
+        node, axis = np.unravel_index(rms.argmax(), rms.shape)
+        most, swings = float(rms[node, axis]), float(rate[node, axis])
+        where = f"node {node} along {AXES[axis]}"
+        rows.append([f"{what} ({unit})", cell(most), cell(3.0 * most), where, cell(swings)])
+    for name, label, part in (
+        ("von_mises_rms", "von Mises stress (Pa)", "panel"),
+        ("crease_moment_rms", "moment of a crease (N)", "crease"),
+    ):
+        if name in result and result[name].size:
+            value = result[name].values
+            at = int(np.unravel_index(value.argmax(), value.shape)[0])
+            at = int(result["point_panel"].values[at]) if part == "panel" else at
+            most = float(value.max())
+            rows.append([label, cell(most), cell(3.0 * most), f"{part} {at}", ""])
+    if "von_mises_rms" in result:
+        try:
+            found = margins(result).attrs
+            least = cell(found["least_margin"])
+            rows.append(["least margin of a panel", "", least, found["least_where"], ""])
+        except InputError:
+            pass  # no strength is known
+    header = ["largest", "root mean square", "three times that", "where", "swings per second"]
+    return Table(header, rows, "Where the response is largest.")
