@@ -70,11 +70,11 @@ def shaken() -> fd.Case:
 DATA: Calls = {
     "Sheet": (fd.Sheet, {
         "youngs_modulus": 1e6, "poissons_ratio": 0.25, "thickness": 0.5, "density": 1000.0,
-        "length_scale_ratio": 2.0, "panels": [fd.PanelSheet([0], thickness=0.25)],
+        "length_scale_ratio": 2.0, "strength": 2e6, "panels": [fd.PanelSheet([0], thickness=0.25)],
     }),
     "PanelSheet": (fd.PanelSheet, {
         "panels": [0, 1], "youngs_modulus": 1e6, "poissons_ratio": 0.25, "thickness": 0.5,
-        "density": 1000.0,
+        "density": 1000.0, "strength": 2e6,
     }),
     "Laminate": (fd.Laminate, {"layers": [(0.5, 1e9, 0.125), (0.25, 2e9, 0.25)]}),
     "Fix": (fd.Fix, {"nodes": [0, 1], "axes": "xy", "along": False}),
@@ -278,6 +278,16 @@ def solved(folder: Path) -> Calls:
             "base": {"z": fd.SpectralDensity([1.0, 50.0], [0.1, 0.1], "m2/s3")},
             "forces": [(fd.Force([4], (0, 0, 1.0)), fd.SpectralDensity([1, 9], [1, 2], "N2/Hz"))],
             "state": None, "count": 3, "load_factor": 1.0, "frequencies": [1.0, 2.0],
+            "stresses": False,
+        }),
+        "stresses": (fd.stresses, {"result": path}),
+        "margins": (fd.margins, {
+            "result": path, "strength": 1e6, "crease_strength": {"all": 2.0},
+            "factor_of_safety": 1.5, "sigmas": 3.0,
+        }),
+        "imperfect": (fd.imperfect, {
+            "pattern": pattern(), "amplitude": 1e-3, "shapes": None, "modes": 1,
+            "correlation": 0.5, "seed": 1,
         }),
         "bands": (fd.bands, {
             "cell": cell(), "phases": [[0.5]], "count": 2, "state": fd.State(), "secant": 2.0,

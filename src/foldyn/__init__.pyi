@@ -103,6 +103,7 @@ from foldyn.patterns import (
     Screw as Screw,
     convex as convex,
     flat_foldable as flat_foldable,
+    imperfect as imperfect,
     thicken as thicken,
     welded as welded,
 )

@@ -31,7 +31,7 @@ from foldyn.results import frf_dataset
 from foldyn.results.quantities import RESPONSES, variable
 from foldyn.signals import convert_response
 from foldyn.structures.stretching import most, remedy, stretching
-from foldyn.values import choice, number, numbers, of_kind, suggest
+from foldyn.values import choice, flag, number, numbers, of_kind, suggest
 
 
 class ResponseMethod(NamedTuple):
@@ -184,12 +184,12 @@ def frf(
             "of the drive instead",
             "secant",
         )
-    began, compared = time.perf_counter(), ALONE
+    began, compared, judged = time.perf_counter(), ALONE, flag("check_model", check_model)
     with reported(progress) as report:
         if way.linear:
             system = linearize(case, state, secant=way.secant or secant, load_factor=load_factor)
             _warn_of_instability(system)
-            compared = beside(case, check_model and not way.by_amplitude, state, secant)
+            compared = beside(case, judged and not way.by_amplitude, state, secant)
             answer = way.compute(system, driven, frequency, chosen, report)
             if compared.case is None:
                 _warn_of_stretch(system, frequency, answer.response)

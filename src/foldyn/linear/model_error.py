@@ -22,6 +22,7 @@ from foldyn.linear.mac import pairs, same_places
 from foldyn.linear.shell_of import check_reduced, superelements_of
 from foldyn.structures import Structure
 from foldyn.structures.beyond_range import LINEAR
+from foldyn.values import flag
 
 LEVEL, DIVISIONS = 3, 12
 """The superelements to compare with."""
@@ -55,7 +56,7 @@ ALONE = Beside()
 def beside(case: Case, asked: bool, state: Any, secant: float | None) -> Beside:
     """What a case is compared with, if asked for; at rest, and with the slopes of its laws only."""
     structure = case.structure
-    if not asked or state is not None or secant is not None:
+    if not flag("check_model", asked) or state is not None or secant is not None:
         return ALONE
     if structure.kind != Structure.kind or structure.pattern is None:
         return ALONE

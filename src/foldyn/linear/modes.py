@@ -39,7 +39,7 @@ from foldyn.results import modes_dataset
 from foldyn.statics.rigid import free_rigid_motions, of_all_dofs, rigid_motions
 from foldyn.statics.stability import oriented
 from foldyn.structures.stretching import most, remedy, stretching
-from foldyn.values import of_kind, whole
+from foldyn.values import flag, of_kind, whole
 
 COPIES = 4  # copies of the shapes in memory, while they are found and stored
 RIGID = 1.0 - 1e-6  # share in the space of rigid motions above which a shape counts as rigid
@@ -127,6 +127,7 @@ def modes(
         Modes are not compared, and panels that stretch hold much of the strain energy of one.
     """
     of_kind("case", case, Case)
+    check_model = flag("check_model", check_model)
     found = spectrum_of(
         case, count, state, secant, load_factor=load_factor, verify=verify,
         solver=solver, compared=beside(case, check_model, state, secant),

@@ -19,6 +19,7 @@ from foldyn.patterns.generators.simple_fold import simple_fold
 from foldyn.patterns.generators.square_twist import square_twist
 from foldyn.patterns.generators.waterbomb import waterbomb
 from foldyn.patterns.generators.yoshimura import yoshimura
+from foldyn.patterns.imperfection import imperfect
 from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.screw import Screw
 from foldyn.patterns.selection import select
@@ -56,6 +57,7 @@ __all__ = [
     "eggbox",
     "flasher",
     "flat_foldable",
+    "imperfect",
     "kresling",
     "miura",
     "miura_tube",
