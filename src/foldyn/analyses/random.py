@@ -74,7 +74,7 @@ class RandomAnalysis(Analysis):
     schema = RandomSchema
     needs_density = "random vibration needs"
     takes = arguments_of(random_response)
-    files = ("densities", "stresses", "crease-moments")
+    files = ("stresses",)
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
