@@ -111,6 +111,22 @@ def test_what_is_refused():
         fd.margins(random)
 
 
+@pytest.mark.matrix
+def test_hinged_panels_have_margins_of_creases_only():
+    case = fd.Case(
+        fd.discretize(PATTERN, SHEET, preset="merlin2"), [fd.Fix("xmin")],
+        [fd.Force([8], (0.0, 0.0, -1e-5))],
+    )  # fmt: skip
+    path = fd.trace(case, steps=1)
+    with pytest.raises(InputError, match="panels of this model have no stresses"):
+        fd.margins(path)
+    with pytest.raises(InputError, match="crease_strength: names no crease"):
+        fd.margins(path, crease_strength={})
+    found = fd.margins(path, crease_strength=0.01)
+    assert "panel_margin" not in found
+    assert found.attrs["least_where"].startswith("crease")
+
+
 CASE = """
 [pattern]
 kind = "simple_fold"

@@ -147,7 +147,7 @@ def test_a_crease_carries_the_moment_that_opens_it(kind):
     length = np.linalg.norm(np.subtract(*pattern.vertices[pattern.creases[0]]))
     assert found.crease_moment.item() == pytest.approx(moment / length, rel=2e-3)
     assert ("von_mises" in found) == (kind != "merlin2")
-    if kind in ("shell", "superelements"):
+    if kind != "merlin2":  # no moment goes through the free panel
         assert found.von_mises.values.max() < 1e-3 * 6 * moment / length / THICKNESS**2
 
 
@@ -226,7 +226,7 @@ def test_slow_responses_equal_static_ones(kind):
     one, other = fd.stresses(slow).isel(frequency=0), last(case.altered(loads=[tip]))
     for name in ("membrane_force", "bending_moment", "crease_moment"):
         true = other[name].values / 1e-4
-        np.testing.assert_allclose(one[name].values, true, atol=0.01 * np.abs(true).max())
+        np.testing.assert_allclose(one[name].values, true, atol=0.02 * np.abs(true).max())
     np.testing.assert_allclose(
         one.von_mises, other.von_mises / 1e-4, atol=0.01 * float(other.von_mises.max()) / 1e-4
     )
@@ -267,7 +267,7 @@ def test_random_responses_have_the_stresses_of_frequency_responses():
     stress = curve.stress.values
     square = np.einsum("fpsa,ab,fpsb->fps", stress.conj(), MISES, stress).real
     by_frf = np.sqrt(np.trapezoid(square * power[:, None, None], f, axis=0))
-    np.testing.assert_allclose(found.von_mises_rms, by_frf, rtol=0.01)
+    np.testing.assert_allclose(found.von_mises_rms, by_frf, atol=0.01 * by_frf.max())
     moment = np.abs(curve.crease_moment.values) ** 2 * power[:, None]
     np.testing.assert_allclose(
         found.crease_moment_rms, np.sqrt(np.trapezoid(moment, f, axis=0)), rtol=1e-3
@@ -306,6 +306,123 @@ def test_what_is_refused():
     )
     with pytest.raises(InputError, match="a mobility by the method 'direct'"):
         fd.stresses(mobility)
+
+
+SIDES = [fd.Fix(side, "z", along=True) for side in ("xmin", "xmax", "ymin", "ymax")]
+
+
+@pytest.mark.matrix
+def test_modes_of_panels_between_vertices_that_rest():
+    """Modes 2 and 3 of a supported square are twins; all vertices and edges rest."""
+    held = [fd.Fix([0, 1, 2, 3], "xyz"), *SIDES]
+    most = []
+    for own in (fd.superelements(SQUARE, SHEET), fd.shell(SQUARE, SHEET, divisions=24)):
+        modes = fd.modes(fd.Case(own, held), 4, check_model=False)
+        square = fd.stresses(modes).von_mises.values ** 2
+        square[1] += square[2]  # twins may turn into each other
+        most.append(np.sqrt(square[[0, 1, 3]].max(axis=(1, 2))))
+    np.testing.assert_allclose(*most, rtol=0.07)
+
+
+@pytest.mark.matrix
+def test_one_state_has_the_stresses_that_it_has_among_all():
+    case = fd.Case(fd.superelements(MIURA, PAPER), HELD, damping=fd.Rayleigh(5.0))
+    push = fd.Force([8], (0.0, 0.0, 1e-4))
+    results = {
+        "mode": fd.modes(case, 6),
+        "frequency": fd.frf(case, [push], frequencies=[5.0, 12.0]),
+        "step": fd.trace(case.altered(loads=[push]), steps=2),
+    }
+    for along, result in results.items():
+        every = fd.stresses(result)
+        for place in ([-1], -1):
+            one = fd.stresses(result.isel({along: place}))
+            assert (along in one.dims) == isinstance(place, list)
+            same = every.isel({along: place})
+            for name in ("von_mises", "crease_moment"):
+                np.testing.assert_allclose(one[name], same[name], rtol=1e-9)
+    path = fd.stresses(results["step"])
+    last_only = fd.margins(path.isel(step=-1), strength=1e6).attrs
+    assert last_only["least_margin"] == fd.margins(path, strength=1e6).attrs["least_margin"]
+
+
+@pytest.mark.matrix
+def test_paths_of_superelements_keep_what_they_start_from():
+    case = fd.Case(fd.superelements(MIURA, PAPER), [*HELD, fd.Impose([8], "z", -1e-5)])
+    first = fd.trace(case, steps=1)
+    push = fd.Force([7], (0.0, 0.0, -1e-5))
+    further = case.altered(supports=[*HELD, fd.Fix([8], "z")], loads=[push])
+    start = fd.initial_state(first)
+    path = fd.trace(further, load_factors=[0.0, 1.0], initial=start)
+    one, other = fd.stresses(path).isel(step=0), fd.stresses(first).isel(step=-1)
+    np.testing.assert_allclose(one.von_mises, other.von_mises, rtol=1e-6)
+    weight = case.altered(supports=HELD, loads=[fd.Gravity((0.0, 0.0, -0.01))])
+    alone = fd.trace(weight, load_factors=[0.0], constant=[0])
+    most = float(fd.stresses(alone).von_mises.max())
+    assert most == pytest.approx(float(last(weight).von_mises.max()), rel=1e-6)
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize("level", [1, 5])
+def test_responses_at_a_resonance_are_their_mode(level):
+    case = fd.Case(
+        fd.superelements(MIURA, PAPER, level=level), HELD, damping=fd.ModalDamping(1e-3, count=6)
+    )
+    modes = fd.modes(case, 1)
+    push = [fd.Force([8], (0.0, 0.0, 1.0))]
+    response = fd.frf(case, push, frequencies=modes.frequency.values)
+    size = np.abs(response.receptance.values).max() / np.abs(modes["shape"].values).max()
+    one, other = fd.stresses(response).crease_moment, fd.stresses(modes).crease_moment
+    true = size * np.abs(other.values)
+    np.testing.assert_allclose(np.abs(one), true, atol=0.05 * true.max())  # other modes answer, too
+
+
+@pytest.mark.matrix
+def test_a_base_that_moves_slowly_is_a_weight():
+    panels = fd.superelements(SQUARE, SHEET, clamped=EDGES)
+    case = fd.Case(panels, [fd.Fix([0, 1, 2, 3], "xyz"), *SIDES], damping=fd.Rayleigh(0.01))
+    slow = fd.stresses(fd.frf(case, [fd.BaseMotion("z")], frequencies=[0.5])).isel(frequency=0)
+    weight = last(case.altered(loads=[fd.Gravity((0.0, 0.0, np.pi**2))]))
+    np.testing.assert_allclose(
+        np.abs(slow.bending_moment), np.abs(weight.bending_moment), atol=0.01
+    )
+    density = fd.SpectralDensity([0.4, 0.6], [1.0, 1.0], "m2/s3")
+    random = fd.random_response(case, base={"z": density}, stresses=True)
+    rms = np.abs(weight.von_mises.values) / np.pi**2 * density.rms
+    np.testing.assert_allclose(random.von_mises_rms, rms, atol=0.003 * rms.max())
+
+
+def test_rigid_panels_have_no_stresses():
+    warm = fd.Temperature(1.0, expansion=0.0, curvature=1e-3)
+    for structure in (
+        fd.superelements(MIURA, PAPER, level=1, divisions=8, rigid=[1]),
+        fd.shell(MIURA, PAPER, divisions=4, rigid=[1]),
+    ):
+        found = last(fd.Case(structure, HELD, [warm]))
+        assert np.all(found.von_mises.values[found.point_panel.values == 1] == 0.0)
+        assert found.von_mises.values.max() > 0.0
+
+
+@pytest.mark.matrix
+def test_superlinear_laws_and_memory_in_linear_analyses_are_refused():
+    fold = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
+    rigid = fd.discretize(fold, PAPER, fold_law="superlinear", rigid="all")
+    held = [fd.Fix(list(fold.faces[0]))]
+    with pytest.raises(InputError, match="the slopes of an amplitude"):
+        fd.stresses(fd.modes(fd.Case(rigid, held), 1, secant=5.0))
+    relaxing = fd.superelements(MIURA, PAPER, fold_law=fd.Prony([0.5], [1.0], law="linear"))
+    density = fd.SpectralDensity([20.0, 60.0], [0.1, 0.1], "m2/s3")
+    with pytest.raises(InputError, match="stresses: the creases have a law with memory"):
+        fd.random_response(fd.Case(relaxing, HELD), base={"z": density}, stresses=True)
+    welded = fd.Pattern(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0]],
+        [(0, 1, 2, 3), (1, 4, 5, 2)], welds=[(1, 2)],
+    )  # fmt: skip
+    case = fd.Case(
+        fd.discretize(welded, PAPER), [fd.Fix([0, 1, 2, 3])], [fd.Force([4], (0, 0, 1e-6))]
+    )
+    with pytest.raises(InputError, match="stresses across welds"):
+        last(case)
 
 
 def test_stored_comparison_with_shells():

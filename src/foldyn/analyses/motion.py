@@ -30,7 +30,7 @@ from foldyn.dynamics.initial import MODAL
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.timing import check_room, check_samples
 from foldyn.errors import InputError
-from foldyn.linear.stresses import check_stresses
+from foldyn.linear.stresses import check_motion
 from foldyn.plots.load_curves import load_charts
 from foldyn.report.album import (
     Album,
@@ -44,6 +44,7 @@ from foldyn.report.album import (
 from foldyn.report.sections import Charts, Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
 from foldyn.signals.spectrum import MINIMUM_SAMPLES
+from foldyn.strength.resultants import check_stresses
 from foldyn.values import number
 
 LOADS = "Loads and imposed motions over time."
@@ -115,7 +116,8 @@ class MotionAnalysis(Analysis):
         """See `Analysis`; the sampling in [output] becomes arguments of `simulate`, too."""
         analysis, output = super().of(schema, case), schema.output
         if output.stresses:
-            check_stresses(case, True, "output.stresses")
+            check_stresses(case, "output.stresses")
+            check_motion(case, "output.stresses")
         own = {name: getattr(output, name) for name in SAMPLING}
         given = {name: value for name, value in own.items() if value is not None}
         default = {"interval": schema.analysis.duration / SAMPLES}

@@ -36,7 +36,6 @@ from foldyn.cases.directions import DIRECTIONS
 from foldyn.cases.loads import LOAD
 from foldyn.cases.supports import SUPPORT
 from foldyn.errors import ComputationError, InputError
-from foldyn.linear.stresses import check_stresses
 from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.readings import along, critical_word, evenly, is_loose, main_direction
 from foldyn.report.album import Album, ByRule, crossing_panels, listed, shown_nodes, visible_scale
@@ -44,6 +43,7 @@ from foldyn.report.sections import Charts, Heading, Picture, Section, Table, Tex
 from foldyn.statics import METHODS, Landscape, Point, Settings, landscape, trace
 from foldyn.statics.newton import settings_of
 from foldyn.statics.tracing import UNTIL, Reached
+from foldyn.strength.resultants import check_stresses
 from foldyn.tables import ListOf, TableOf
 from foldyn.values import indices, number, number_or_list, show
 
@@ -160,7 +160,7 @@ class PathAnalysis(Analysis):
         given = super().of(schema, case).arguments
         until = schema.analysis.until
         if schema.output.stresses:
-            check_stresses(case, False, "output.stresses")
+            check_stresses(case, "output.stresses")
         if until is not None:
             resolve_nodes(case.structure, (until.node,), "analysis.until.node")
         settings = Settings(**{name: given.pop(name) for name in SETTINGS})

@@ -80,6 +80,16 @@ class Unknowns(NamedTuple):
         """A vibration of a panel."""
         return self.turn(self.edges, 0, 0) + panel * self.level.inner + mode
 
+    def places_in(self, other: Unknowns) -> NDArray[np.int64]:
+        """Index (m,) of each unknown among those of a level that contains this one."""
+        edge, side, panel = np.arange(self.edges), np.arange(2), np.arange(self.panels)
+        vertices = np.arange(3 * self.vertices)
+        bows = other.bow(edge[:, None, None], np.arange(self.functions)[:, None]) + np.arange(3)
+        number = np.arange(self.level.turns)
+        turned = other.turn(edge[:, None, None], side[:, None], number)
+        inner = other.inner(panel[:, None], np.arange(self.level.inner))
+        return np.concatenate([vertices, bows.ravel(), turned.ravel(), inner.ravel()])
+
     def owners(self, unknown: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Kinds (k,) of unknowns, `BOW`, `TURN` or `INNER`; their edges or panels; their numbers.
 
@@ -479,7 +489,7 @@ class _Columns:
 
     def __init__(self) -> None:
         self.count = 0
-        self.amplitudes: list[tuple[NDArray, NDArray, NDArray]] = []
+        self._parts: list[tuple[NDArray, NDArray, NDArray]] = []
 
     def add(self, rows: NDArray, values: NDArray | float = 1.0) -> None:
         """Add a column for each row of `rows` (c, r), with `values` in these rows."""
@@ -489,11 +499,11 @@ class _Columns:
 
     def put(self, rows: NDArray, columns: NDArray, values: NDArray) -> None:
         """Put entries (k,) into columns."""
-        self.amplitudes.append((rows, columns, values))
+        self._parts.append((rows, columns, values))
 
     def matrix(self, rows: int) -> sparse.csr_array:
         """The matrix (rows, count), without zeros."""
-        row, column, value = (np.concatenate(part) for part in zip(*self.amplitudes, strict=True))
+        row, column, value = (np.concatenate(part) for part in zip(*self._parts, strict=True))
         there = value != 0.0
         entries = (value[there], (row[there], column[there]))
         return sparse.csr_array(sparse.coo_array(entries, shape=(rows, self.count)))

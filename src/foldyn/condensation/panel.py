@@ -231,7 +231,7 @@ class _Mesh:
         rigid = np.asarray(np.isin(tri, stiff).any(axis=1))
         membrane[rigid] *= STIFF
         self._elastic, self._stretching, self._nu = (membrane, bending), stretching, nu
-        near = stress_points(self.nodes[: self.corners], sheet.thickness)
+        near = stress_points(self.nodes[: self.corners], max(sheet.thickness, graded.radius))
         self._recovery = recovery(near, x, np.eye(3)[:2], rigid)
         side = np.roll(x, -1, axis=1) - x
         length2 = np.einsum("tki,tki->tk", side, side)

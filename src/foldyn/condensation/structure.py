@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.algebra.solvers import Fill
+from foldyn.algebra.superlu import factorize
 from foldyn.condensation.assembly import Whole
 from foldyn.condensation.library import ALIKE, Meshes, groups
 from foldyn.condensation.panel import BOW
@@ -28,6 +29,7 @@ from foldyn.mechanics.sheet_term import NO_DOF, CreaseTurns, FoldHinges
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned
 from foldyn.patterns.topology import Edge, edge_lookup
+from foldyn.shells.recovery import StressPoints
 from foldyn.shells.shell import LEAST, PER_DOUBLING
 from foldyn.structures import Sheet
 from foldyn.structures.beyond_range import doubt_units
@@ -232,6 +234,28 @@ class Superelements(Discretized):
     def spread(self, load: Distributed, edges: Mapping[int, NDArray]) -> NDArray[np.float64]:
         """See `Discretized`."""
         return self._dofs(edges).T @ self.whole.spread(load)
+
+    @cached_property
+    def stress_points(self) -> StressPoints:
+        """Points of the panels at which stresses are found."""
+        return StressPoints.of(self.pattern, self.sheet, self.meshes.graded[-1].radius)
+
+    def embedded(
+        self, finer: Superelements, motions: NDArray, edges: Mapping[int, NDArray]
+    ) -> NDArray:
+        """The same motions (m, k) on the dofs of a structure with more shapes.
+
+        edges : edges that supports hold, as in `held`.
+        """
+        own, other = self.whole.unknowns, finer.whole.unknowns
+        places = own.places_in(other)
+        unknown = np.zeros((other.size, motions.shape[1]), motions.dtype)
+        unknown[places] = self._dofs(edges) @ motions
+        dofs = finer._dofs(edges)
+        solve = factorize(sparse.csc_array(dofs.T @ dofs)).solve
+        parts = [np.real(dofs.T @ unknown), np.imag(dofs.T @ unknown)]
+        real, imaginary = (solve(np.ascontiguousarray(part)) for part in parts)
+        return real + 1j * imaginary if np.iscomplexobj(motions) else real
 
     def resultants(self, edges: Mapping[int, NDArray]) -> sparse.csr_array:
         """Membrane forces and moments (6 p, m) of the dofs; see `condensation.resultants`.

@@ -294,10 +294,10 @@ def _uncoupled(basis: _Basis, damping: NDArray, omega: NDArray, load: NDArray) -
 def _resisting(system: Linearized, omega: float, x: NDArray) -> NDArray[np.complex128]:
     """Forces (nf,), N, that resist an oscillation x (nf,) at an angular frequency (rad/s)."""
     elastic = system.stiffness @ x - omega**2 * (system.mass @ x)
-    return elastic + _damped(system, omega, x)
+    return elastic + damped(system, omega, x)
 
 
-def _damped(system: Linearized, omega: float, x: NDArray) -> NDArray:
+def damped(system: Linearized, omega: float, x: NDArray) -> NDArray:
     """Forces (nf,), N, of damping and of laws with memory in such an oscillation."""
     force = 1j * omega * _damping_force(system, x)
     if system.responding is not None:

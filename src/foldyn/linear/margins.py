@@ -101,10 +101,10 @@ def margins(
         k = int(np.nan_to_num(values["crease_margin"], nan=np.inf).argmin())
         words.append((values["crease_margin"][k], f"crease {k}{moment(float(when[at[k]]))}"))
     if not words:
-        raise InputError(
-            ": the sheet has none; give Sheet(strength=...), or strength and crease_strength here",
-            "strength",
-        )
+        reason = ": the sheet has none; give Sheet(strength=...), or strength and crease_strength"
+        if np.isfinite(bears).any():
+            reason = ": the panels of this model have no stresses; give crease_strength as well"
+        raise InputError(reason, "strength")
     least, where = min(words)
     facts = {"factor_of_safety": safety, "least_margin": least, "least_where": where}
     return result_dataset("margins", case, variables(MARGINS, (), values), {}, facts)
@@ -125,6 +125,10 @@ def _stressed(
         return found.expand_dims("state"), np.array([np.nan]), lambda _: ""
     found = result if result.attrs["foldyn_result"] == "stresses" else stresses(result)
     kind = str(found.attrs["of"])
+    states = {"path": ("step", "load_factor"), "trajectory": ("time", "time")}
+    first, name = states.get(kind, ("time", "time"))
+    if name in found.coords and first not in found.dims:  # of one state
+        found = found.expand_dims(first).assign_coords({name: (first, [float(found[name])])})
     if kind == "path":
         return found, found["load_factor"].values, lambda at: f", load factor {at:.6g}"
     if "time" in found.dims:
@@ -154,7 +158,7 @@ def _margin(strength: NDArray, stress: NDArray) -> NDArray[np.float64]:
 
 def _crease_strengths(given: Any, pattern: Pattern) -> NDArray[np.float64] | None:
     """Strength of each crease (nf,), N, nan where it has none; None if none is given."""
-    count = len(pattern.creases)
+    count, field = len(pattern.creases), "crease_strength"
     if given is None:
         return None
     if isinstance(given, Mapping):
@@ -163,6 +167,8 @@ def _crease_strengths(given: Any, pattern: Pattern) -> NDArray[np.float64] | Non
             for word, value in given.items()
         }
         values, chosen = crease_values("crease_strength", checked, pattern)
+        if not chosen.any():
+            raise InputError(": names no crease; give a number (N), or leave it out", field)
         return np.where(chosen, values, np.nan)
     listed = np.asarray(numbers("crease_strength", given), float)
     if listed.shape not in ((), (1,), (count,)) or not (listed > 0.0).all():

@@ -192,12 +192,14 @@ def spectrum_of(
         variables["model_error"] = found.error
         statistics["missing_frequencies"] = found.lost if len(found.lost) else None
     if errors and isinstance(case.structure, Superelements):
-        leveled = case.altered(structure=other_level(case.structure))
-        other = _lowest(linearize(leveled), count, solver, verify=False)[-1]
+        leveled = linearize(case.altered(structure=other_level(case.structure)))
+        most = min(count, Pencil(leveled.stiffness, leveled.mass).finite)
+        other = np.full(len(spectrum.values), np.nan)  # a lower level may have fewer modes
+        other[:most] = _lowest(leveled, most, solver, verify=False)[-1].values[: len(other)]
         motion = linear.whole(spectrum.shapes)
         parts = case.structure.changes(case.held_edges)
         changes = (motion.T @ (part @ motion) for part in parts)
-        estimate = frequency_errors(case, spectrum.values, other.values, changes)
+        estimate = frequency_errors(case, spectrum.values, other, changes)
         variables["frequency_error"] = np.where(variables["rigid"], 0.0, estimate)
     result = modes_dataset(case, variables, statistics)
     return Found(linear, spectrum, result)

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.algebra.eigen import Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
 from foldyn.cases.directions import AXES
+from foldyn.condensation import Superelements
 from foldyn.errors import InputError, ModelRangeWarning, warn
 from foldyn.linear.excitation import Drive, drive_of
 from foldyn.linear.frequency_domain import ModalResponse, SuperposedModes
@@ -33,7 +34,14 @@ from foldyn.linear.stresses import small_motions
 from foldyn.ram_limit import check_memory
 from foldyn.results import random_dataset
 from foldyn.strength.dataset import MISES, face_stresses, point_coordinates
-from foldyn.strength.resultants import for_stresses, has_stresses, resultants_of
+from foldyn.strength.resultants import (
+    SuperelementResultants,
+    check_stresses,
+    for_stresses,
+    has_stresses,
+    resultants_of,
+    without_rigid,
+)
 from foldyn.values import flag, number, numbers, of_kind, show, whole
 
 TURN = 2.0 * np.pi
@@ -139,7 +147,10 @@ def random_response(
     load_factor = number("load_factor", load_factor)
     at = None if frequencies is None else _increasing("frequencies", frequencies)
     drives = _drives(of_kind("case", case, Case), base, forces)
-    own = for_stresses(case) if flag("stresses", stresses) else case
+    own = case
+    if flag("stresses", stresses):
+        check_stresses(case, "stresses")
+        own = for_stresses(case)
     system = linearize(own, state, load_factor=load_factor)
     total = np.zeros((4, *case.structure.nodes.shape))
     top = max(max(density.frequency) for _, density in drives)
@@ -248,29 +259,47 @@ def _stresses(
     """Mean squares of forces, moments and von Mises stresses of panels, and of creases' moments."""
     motions = system.whole(response.motions)
     panels, creases = small_motions(system.case, system.displacement, motions, state is None)
+    if drive.axis is not None:  # and what panels add, per unit of the acceleration of the base
+        creases = np.pad(creases, ((0, 1), (0, 0)))
+        if panels is not None:
+            carried = _carried(system.case, drive.axis).reshape(1, *panels.shape[1:])
+            panels = np.concatenate([panels, carried])
     rows = {"crease_moment": creases.T}
     if panels is not None:
         points = resultants_of(system.case).points
+        panels = without_rigid(system.case, points, panels)
         force, moment = np.moveaxis(panels, (2, 0), (0, -1))
         stress = np.moveaxis(face_stresses(panels, points.thickness), 0, -1)
         equivalent = np.einsum("ca,pfas->pfcs", np.linalg.cholesky(MISES).T, stress)
         rows |= {"membrane_force": force, "bending_moment": moment, "von_mises": equivalent}
     shapes = {name: own.shape[:-1] for name, own in rows.items()}
-    flat = np.concatenate([own.reshape(-1, motions.shape[1]) for own in rows.values()])
+    flat = np.concatenate([own.reshape(-1, len(creases)) for own in rows.values()])
     frequency, weight = _quadrature(response, density)
     found = np.zeros(len(flat))
     for first in range(0, len(frequency), AT_ONCE):
         part = slice(first, first + AT_ONCE)
         omega = TURN * frequency[part]
         power = weight[part] * density.at(frequency[part])
-        power = power * drive.value**2 if drive.axis is None else power / omega**4
-        found += _mean_squares(flat, response.amplitudes(omega), power[None])[0]
+        amplitude = response.amplitudes(omega)
+        if drive.axis is None:
+            power = power * drive.value**2
+        else:
+            amplitude = np.array(np.hstack([amplitude, -(omega[:, None] ** 2)]), np.complex128)
+            power = power / omega**4
+        found += _mean_squares(flat, amplitude, power[None])[0]
     ends = np.cumsum([math.prod(shape) for shape in shapes.values()])[:-1]
     parts = zip(shapes.items(), np.split(found.clip(0.0), ends), strict=True)
     out = {name: own.reshape(shape) for (name, shape), own in parts}
     if "von_mises" in out:
         out["von_mises"] = out["von_mises"].sum(axis=-1)
     return out
+
+
+def _carried(case: Case, axis: str) -> NDArray[np.float64]:
+    """Forces and moments that panels add to their vibrations if all is accelerated, (6 p,)."""
+    if isinstance(case.structure, Superelements):
+        return SuperelementResultants(case).accelerated(AXES.index(axis))
+    return np.zeros(6 * len(resultants_of(case).points.panel))
 
 
 def _densities(
@@ -350,7 +379,8 @@ def _warn_of_mass(
     effective = (basis.shapes[:, modal].T @ inertia) ** 2
     within = np.sqrt(basis.values[modal].clip(0.0)) / TURN <= density.frequency[-1]
     along = (system.free < system.displacement.size) & (system.free % 3 == axis)
-    share = 1.0 - effective[within].sum() / inertia[along].sum()
+    whole = inertia[along].sum()  # 0 if only edges and panels between held nodes move
+    share = 1.0 - effective[within].sum() / whole if whole > 0.0 else 0.0
     if share > LEFT_OUT:
         warn(
             f"modes above {density.frequency[-1]:.4g} Hz, where the density along {drive.axis} "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,30 +11,30 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.superlu import factorize
 from foldyn.cases import Case
+from foldyn.cases.directions import AXES
 from foldyn.condensation import Superelements
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError
 from foldyn.linear.excitation import Drive
+from foldyn.linear.finer_shapes import FinerShapes
 from foldyn.linear.frequency_domain import Direct, direct
 from foldyn.linear.frf import quantity_of
 from foldyn.linear.linearized import linearize
 from foldyn.linear.modes import spectrum_of
 from foldyn.results import case_of
-from foldyn.statics import Settings, trace
 from foldyn.statics.stability import oriented
 from foldyn.strength.creases import crease_moments
 from foldyn.strength.dataset import stress_dataset
 from foldyn.strength.loaded import LoadedSheet
 from foldyn.strength.resultants import (
     SuperelementResultants,
-    for_stresses,
+    check_stresses,
     has_stresses,
     resultants_of,
 )
 
 STEP = 1e-4  # largest displacement in differences about a state, relative to the size of the sheet
 TINY = 1e-300
-SPARE = 2  # modes that are computed in addition, among which those of a result are sought
-MOVING = ("trajectory", "periodic_motion")
+AGREES = 1e-6  # relative difference of modes that are computed again
 LINEAR = ("direct", "modal")  # methods of frequency responses
 
 
@@ -94,42 +94,28 @@ def stresses(result: xarray.Dataset) -> xarray.Dataset:
     >>> found.von_mises.max().item() > 0.0
     True
     """
-    case = case_of(result)
-    kind = result.attrs["foldyn_result"]
-    check_stresses(case, kind in MOVING, "result")
-    if kind == "path":
-        found, along = _path(case, result), ("step", "load_factor")
-    elif kind in MOVING:
-        found, along = _motion(case, result), ("time", "time")
-    elif kind == "modes":
-        found, along = _modes(case, result), ("mode", "mode")
-    elif kind == "frf":
-        found, along = _response(case, result), ("frequency", "frequency")
-    else:
+    case, kind = case_of(result), str(result.attrs["foldyn_result"])
+    if kind not in ALONG:
         raise InputError(
             f": a result of the kind {kind!r} has no stresses of its own; give a path, a motion, "
             "modes or a frequency response (fd.random_response(..., stresses=True) has those of "
             "random vibration)",
             "result",
         )
-    first, name = along
-    coordinate = {name: (first, result[name].values, result[name].attrs)}
+    check_stresses(case, "result")
+    first, name, compute = ALONG[kind]
+    single = first not in result.dims
+    result = result.expand_dims(first) if single else result
+    found = compute(case, result)
+    coordinate = {name: (first, np.ravel(result[name].values), result[name].attrs)}
     points = resultants_of(case).points if found.panels is not None else None
-    facts = {"of": kind}
-    return stress_dataset(case, points, found.panels, found.creases, coordinate, facts)
+    made = stress_dataset(case, points, found.panels, found.creases, coordinate, {"of": kind})
+    return made.isel({first: 0}) if single else made
 
 
-def check_stresses(case: Case, moving: bool, field: str) -> None:
-    """Refuse a case whose results, or motions, have no stresses."""
-    if case.structure.pattern is None:
-        raise InputError(": the structure has no pattern, and so no panels", field)
-    if case.remembering:
-        raise InputError(
-            ": the creases have a law with memory, which stresses do not follow: take an elastic "
-            "law",
-            field,
-        )
-    if moving and case.structure.linear:
+def check_motion(case: Case, field: str) -> None:
+    """Refuse a case whose motions do not tell stresses."""
+    if case.structure.linear:
         raise InputError(
             f": motions of {case.structure.linear} keep the displacements of vertices only, from "
             "which stresses do not follow; take a frequency response, modes or random vibration, "
@@ -141,21 +127,14 @@ def check_stresses(case: Case, moving: bool, field: str) -> None:
 def _path(case: Case, result: xarray.Dataset) -> SmallStresses:
     """Stresses at the points of a path."""
     constant = np.isin(np.arange(len(case.loads)), np.ravel(result.attrs.get("constant", ())))
-    at, place = result["load_factor"].values, result["displacement"].values
-    if isinstance(case.structure, Superelements):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)  # the path has told them
-            again = trace(
-                for_stresses(case), load_factors=[0.0, 1.0], settings=Settings(stability=False),
-                constant=np.flatnonzero(constant).tolist(),
-            )["displacement"].values  # fmt: skip
-        place = again[0] + at[:, None, None] * (again[1] - again[0])
+    at, place = np.ravel(result["load_factor"].values), result["displacement"].values
     return _at(case, place, np.where(constant, 1.0, at[:, None]))
 
 
 def _motion(case: Case, result: xarray.Dataset) -> SmallStresses:
     """Stresses at the samples of a motion."""
-    time = result["time"].values
+    check_motion(case, "result")
+    time = np.ravel(result["time"].values)
     factors = [np.asarray(own.history(time), float) for own in case.loads]
     factors = np.stack(factors, axis=1) if factors else np.zeros((len(time), 0))
     return _at(case, result["displacement"].values, factors)
@@ -174,27 +153,35 @@ def _at(case: Case, displacement: NDArray, factors: NDArray) -> SmallStresses:
     return SmallStresses(np.array(panels) if model is not None else None, np.array(creases))
 
 
+def _state(result: xarray.Dataset, along: str) -> NDArray[np.float64]:
+    """Displacement (n, 3), m, about which a result vibrates."""
+    return result["displacement"].isel({along: 0}, missing_dims="ignore").values
+
+
 def _modes(case: Case, result: xarray.Dataset) -> SmallStresses:
     """Stresses of mode shapes."""
-    shape = result["shape"].values
+    _refuse_secant(result)
+    shape, place = result["shape"].transpose("mode", "node", "axis").values, _state(result, "mode")
     if not isinstance(case.structure, Superelements):
-        return _about(case, result, shape.reshape(len(shape), -1))
-    stressed = for_stresses(case)
-    again = spectrum_of(
-        stressed, min(len(shape) + SPARE, result.attrs["free_dofs"]), verify=False, errors=False
-    )
-    names = "shape", "between_shape"
-    given, found = (
-        np.concatenate([own[name].values.reshape(len(own["mode"]), -1) for name in names], axis=1)
-        for own in (result, again.result)
-    )
-    share = np.linalg.lstsq(found.T, given.T, rcond=None)[0]  # modes of one frequency may be turned
-    motions = again.linear.whole(oriented(again.spectrum.shapes)) @ share
-    return small_motions(stressed, result["displacement"].values, motions)
+        return _about(case, result, place, shape.reshape(len(shape), -1))
+    numbers = np.ravel(result["mode"].values)
+    again = spectrum_of(case, int(numbers.max()), verify=False, errors=False)
+    own = again.result.sel(mode=numbers)
+    apart = np.abs(own["shape"].values - shape).max(initial=0.0)
+    if apart > AGREES * np.abs(shape).max(initial=0.0):
+        raise InputError(
+            ": its modes come out differently here (modes of one frequency may turn, and other "
+            "processors round otherwise); compute them again with fd.modes",
+            "result",
+        )
+    finer = FinerShapes(again.linear)
+    shapes = oriented(again.spectrum.shapes)[:, numbers - 1]
+    return small_motions(finer.case, place, finer.modes(own["eigenvalue"].values, shapes))
 
 
 def _response(case: Case, result: xarray.Dataset) -> SmallStresses:
     """Stresses per unit of the drive of a frequency response."""
+    _refuse_secant(result)
     method, quantity = result.attrs["method"], quantity_of(result)
     if method not in LINEAR or quantity not in ("receptance", "transmissibility"):
         raise InputError(
@@ -202,16 +189,33 @@ def _response(case: Case, result: xarray.Dataset) -> SmallStresses:
             f"{' or '.join(LINEAR)}",
             "result",
         )
-    moved = result[quantity].values
+    moved = result[quantity].transpose("frequency", "node", "axis").values
+    place = _state(result, "frequency")
     if not isinstance(case.structure, Superelements):
-        return _about(case, result, moved.reshape(len(moved), -1))
+        return _about(case, result, place, moved.reshape(len(moved), -1))
     base = quantity == "transmissibility"
     value = float(result.attrs["drive_displacement" if base else "drive_force"])
     axis = str(result.attrs["base_axis"]) if base else None
-    drive = Drive(float(result.attrs["amplitude"]), result["drive"].values, value, axis)
-    system = linearize(for_stresses(case))
-    answer = direct(system, drive, result["frequency"].values, Direct(), lambda _: None)
-    return small_motions(system.case, system.displacement, system.whole(answer.response.T))
+    vector = result["drive"].isel({"frequency": 0}, missing_dims="ignore").values
+    drive = Drive(float(result.attrs["amplitude"]), vector, value, axis)
+    system, frequency = linearize(case), np.ravel(result["frequency"].values)
+    answer = direct(system, drive, frequency, Direct(), lambda _: None)
+    finer = FinerShapes(system)
+    found = small_motions(finer.case, place, finer.driven(drive, frequency, answer.response.T))
+    if axis is None or found.panels is None:
+        return found
+    carried = SuperelementResultants(finer.case).accelerated(AXES.index(axis)).reshape(-1, 2, 3)
+    square = (2.0 * np.pi * frequency) ** 2
+    return found._replace(panels=found.panels - square[:, None, None, None] * carried)
+
+
+def _refuse_secant(result: xarray.Dataset) -> None:
+    if result.attrs.get("secant") is not None:
+        raise InputError(
+            ": its superlinear hinges have the slopes of an amplitude (secant), which stresses do "
+            "not take; take a law with a slope at rest",
+            "result",
+        )
 
 
 def small_motions(
@@ -236,6 +240,9 @@ def small_motions(
 
     def change(motion: NDArray[Any]) -> list[NDArray]:
         """Changes of creases, and of forces and moments, with a motion (m,)."""
+        if not np.isfinite(motion).all():
+            whole = change(np.zeros(len(motion)))
+            return [np.full(own.shape, np.nan, motion.dtype) for own in whole]
         if np.iscomplexobj(motion):
             both = change(np.real(motion).copy()), change(np.imag(motion).copy())
             return [one + 1j * other for one, other in zip(*both, strict=True)]
@@ -250,11 +257,12 @@ def small_motions(
     return SmallStresses(panels[0] if panels else None, creases)
 
 
-def _about(case: Case, result: xarray.Dataset, motions: NDArray[Any]) -> SmallStresses:
+def _about(
+    case: Case, result: xarray.Dataset, place: NDArray, motions: NDArray[Any]
+) -> SmallStresses:
     """Stresses in small motions (s, 3 n) of nodes about the state of a result."""
     at_rest = str(result.attrs.get("state", "rest")) == "rest"
-    sheet, place = LoadedSheet(case), result["displacement"].values
-    factors = np.full(len(case.loads), 0.0 if at_rest else 1.0)
+    sheet, factors = LoadedSheet(case), np.full(len(case.loads), 0.0 if at_rest else 1.0)
     body = sheet.body(factors)
     hidden, first, motion = np.zeros((0, len(motions))), place.size, motions.T
     if len(body.hidden):
@@ -265,3 +273,13 @@ def _about(case: Case, result: xarray.Dataset, motions: NDArray[Any]) -> SmallSt
         real, *other = (-follows.solve(np.ascontiguousarray(across @ part)) for part in parts)
         hidden = real + 1j * other[0] if other else real
     return small_motions(case, place, np.concatenate([motion, hidden]), at_rest)
+
+
+ALONG: Mapping[str, tuple[str, str, Callable[[Case, xarray.Dataset], SmallStresses]]] = {
+    "path": ("step", "load_factor", _path),
+    "trajectory": ("time", "time", _motion),
+    "periodic_motion": ("time", "time", _motion),
+    "modes": ("mode", "mode", _modes),
+    "frf": ("frequency", "frequency", _response),
+}
+"""Of each kind of result: the dimension of its states, their coordinate, and their stresses."""

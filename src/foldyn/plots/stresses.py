@@ -73,7 +73,9 @@ def draw_stresses(
         colors = ScalarMappable(scale, colormaps[MARGINS])
     else:
         shown = _of_parts(found, name, on, state)
-        colors = ScalarMappable(Normalize(0.0, float(shown.max()) or 1.0), colormaps[RISING])
+        colors = ScalarMappable(
+            Normalize(0.0, float(shown.max(initial=0.0)) or 1.0), colormaps[RISING]
+        )
     return draw_colored(sheet, on, shown, colors, label, View(*view), title)
 
 

@@ -45,7 +45,7 @@ class StressPoints(NamedTuple):
     """Points of a pattern's panels at which stresses are found, panel by panel.
 
     A panel with k corners has 2k + 1 of them, see `stress_points`; the points at its corners are
-    one thickness away from them.
+    one thickness away from them, or as far as these are rigid.
     """
 
     position: NDArray  # (p, 3) m, at rest
@@ -56,13 +56,16 @@ class StressPoints(NamedTuple):
     thickness: NDArray  # (p,) m
 
     @classmethod
-    def of(cls, pattern: Pattern, sheet: Sheet) -> StressPoints:
-        """The points of a pattern."""
+    def of(cls, pattern: Pattern, sheet: Sheet, radius: float = 0.0) -> StressPoints:
+        """The points of a pattern.
+
+        radius : distance (m) from the vertices up to which corners are rigid.
+        """
         count, thickness = len(pattern.faces), sheet.values("thickness", len(pattern.faces))
         position, panel, place, number, axes = [], [], [], [], np.zeros((count, 2, 3))
         for p, face in enumerate(pattern.faces):
             corners, normal = pattern.vertices[[*face]], pattern.face_normals[p]
-            position.append(stress_points(corners, float(thickness[p])))
+            position.append(stress_points(corners, max(float(thickness[p]), radius)))
             panel += [p] * len(position[-1])
             place += [PLACES[0], *len(face) * [PLACES[1]], *len(face) * [PLACES[2]]]
             number += [0, *range(len(face)), *range(len(face))]

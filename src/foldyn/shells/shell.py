@@ -287,13 +287,19 @@ class Shell(Discretized):
         return model._replace(bars=model.bars._replace(bar_runs=model.bars.bar_runs[:0]))
 
     @cached_property
+    def stress_points(self) -> StressPoints:
+        """Points of the panels at which stresses are found."""
+        radius = self.graded.radius if self.graded else 0.0
+        return StressPoints.of(self.pattern, self.sheet, radius)
+
+    @cached_property
     def _recoveries(self) -> Recovery:
         """Tensors at the stress points of all panels in turn."""
         x, panel = self.nodes[self.triangles], self.triangle_panel
         stiff = np.flatnonzero(~smooth_vertices(self.pattern)) if self.graded else []
         rigid = np.asarray(np.isin(self.triangles, stiff).any(axis=1))
         parts = []
-        points = StressPoints.of(self.pattern, self.sheet)
+        points = self.stress_points
         for number in range(len(self.pattern.faces)):
             own, at = np.flatnonzero(panel == number), points.panel == number
             found = recovery(points.position[at], x[own], points.axes[number], rigid[own])
@@ -323,7 +329,7 @@ class Shell(Discretized):
             angle = angle - free[1]
         turned = np.bincount(side, share * angle, 3 * len(self.triangles)).reshape(-1, 3)
         moment = np.einsum("tkl,tl->tk", self._stiffness[1], turned)
-        points, recovered = StressPoints.of(self.pattern, self.sheet), self._recoveries
+        points, recovered = self.stress_points, self._recoveries
         stretching, nu = points.elastic(self.sheet)
         force = forces((recovered.strain @ strain.ravel()).reshape(-1, 3), stretching, nu)
         return np.stack([force, (recovered.moment @ moment.ravel()).reshape(-1, 3)], axis=1)

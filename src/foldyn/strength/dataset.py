@@ -13,6 +13,7 @@ from foldyn.cases import Case
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import STRESSES, variable
 from foldyn.shells.recovery import StressPoints
+from foldyn.strength.resultants import without_rigid
 
 MISES = np.array([[1.0, -0.5, 0.0], [-0.5, 1.0, 0.0], [0.0, 0.0, 3.0]])
 """s' MISES s is the square of the von Mises stress, with s = (xx, yy, xy) in plane stress."""
@@ -67,6 +68,7 @@ def stress_dataset(
     values: dict[str, NDArray] = {"crease_moment": crease}
     coordinates = dict(along)
     if points is not None and resultants is not None:
+        resultants = without_rigid(case, points, resultants)
         stress = face_stresses(resultants, points.thickness)
         values["membrane_force"], values["bending_moment"] = np.moveaxis(resultants, -2, 0)
         values |= {"stress": stress, "von_mises": von_mises(stress)}

@@ -9,6 +9,7 @@ these models.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,12 +19,11 @@ from scipy.spatial.transform import Rotation
 from foldyn.cases import Case
 from foldyn.condensation import superelements
 from foldyn.condensation.assembly import Whole
-from foldyn.condensation.library import Group
+from foldyn.condensation.library import ALIKE, Group
 from foldyn.condensation.panel import BOW, TURN, VERTEX, CondensedPanel
 from foldyn.condensation.resultants import in_own_axes
 from foldyn.errors import InputError
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
-from foldyn.shells.recovery import StressPoints
 from foldyn.strength.creases import crease_moments
 from foldyn.strength.loaded import LoadedSheet
 from foldyn.structures.edge_angles import straight_creases
@@ -32,6 +32,7 @@ from foldyn.structures.rigid_plates import rigid_panels
 from foldyn.structures.structure import Structure
 
 DIVISIONS = 12  # of the mesh of a panel
+FLAT = 1e-9  # singular values of elongations, relative to the largest, that are rigid motions
 FREE, STRAIGHT, CREASED, CLAMPED = range(4)  # conditions of an edge
 
 
@@ -40,6 +41,21 @@ def has_plates(structure: Structure) -> bool:
     options = structure.options
     plates = options.scheme == "n5b8e" or options.calibration == "plate"
     return plates and options.membrane == "panel" and structure.pattern is not None
+
+
+def check_plates(case: Case, field: str) -> None:
+    """Refuse what the stresses of plates do not follow."""
+    structure, reason = case.structure, ""
+    if len(structure.pattern.welds):
+        reason = "across welds"
+    elif any(load.swelling(structure, "loads") is not None for load in case.loads):
+        reason = "of warm panels"
+    if reason:
+        raise InputError(
+            f": stresses {reason} are not computed for bars and hinges; take superelements or the "
+            "shell",
+            field,
+        )
 
 
 class _Kind(NamedTuple):
@@ -62,27 +78,19 @@ class PlateResultants:
         assert structure.pattern is not None
         self.case, self._sheet = case, LoadedSheet(case)
         self._structure, self._pattern = structure, structure.pattern
-        if len(self._pattern.welds):
-            raise InputError(
-                ": stresses across welds are not computed for bars and hinges; take superelements "
-                "or the shell",
-                "model",
-            )
-        if any(own.swelling(structure, "loads") is not None for own in case.loads):
-            raise InputError(
-                ": stresses of warm panels are not computed for bars and hinges; take "
-                "superelements or the shell",
-                "model",
-            )
-        self.points = StressPoints.of(self._pattern, structure.sheet)
-        self._kinds = self._found()
+        sheet = structure.sheet
+        if sheet.density is None:  # of panels that do not vibrate here
+            sheet = replace(sheet, density=1.0)
+        panels = superelements(self._pattern, sheet, divisions=DIVISIONS)
+        self.points, self._kinds = panels.stress_points, self._found(panels.whole)
 
     def at(self, q: NDArray, factors: NDArray) -> NDArray[np.float64]:
         """See `strength.resultants.Resultants`."""
         structure = self._structure
         x = structure.nodes + q[: structure.nodes.size].reshape(-1, 3)
-        moment = crease_moments(structure, self._sheet.body(factors), q)
-        moment = np.append(moment * self._lengths, 0.0)
+        moment = crease_moments(structure, self._sheet.body(factors), q) * self._lengths
+        opened = self._sheet.distributed(factors).creases  # acts on the panels beside a crease
+        moment = np.append(moment if opened is None else moment - opened, 0.0)
         out = np.zeros((len(self.points.panel), 2, 3))
         for kind in self._kinds:
             place, turned = _moved(structure.nodes, x, kind)
@@ -97,15 +105,11 @@ class PlateResultants:
     def _lengths(self) -> NDArray:
         return lengths(self._pattern.vertices, self._pattern.creases)
 
-    def _found(self) -> list[_Kind]:
+    def _found(self, whole: Whole) -> list[_Kind]:
         """The panels by kind, without rigid ones."""
         structure, pattern = self._structure, self._pattern
-        sheet = structure.sheet
-        if sheet.density is None:
-            raise InputError("sheet: density is missing: panels are condensed with their mass")
-        whole = superelements(pattern, sheet, divisions=DIVISIONS).whole
         rigid = set(rigid_panels(structure.options.rigid, len(pattern.faces)))
-        straight = straight_creases(structure.nodes, structure.folds, pattern, sheet)
+        straight = straight_creases(structure.nodes, structure.folds, pattern, structure.sheet)
         creases, condition = edge_lookup(pattern.creases), {}
         for edge, k in creases.items():
             condition[edge] = CREASED if straight[k] else FREE
@@ -118,8 +122,7 @@ class PlateResultants:
             for k, (number, face) in enumerate(zip(group.number, group.faces, strict=True)):
                 edges = tuple(condition.get(edge_of(a, b), FREE) for a, b in around(face.tolist()))
                 if int(number) not in rigid:
-                    center = bool(structure.centers[number] >= 0)
-                    alike.setdefault((edges, center), []).append(k)
+                    alike.setdefault((edges, self._center(group, k)), []).append(k)
             for (edges, center), members in alike.items():
                 chosen = Group(
                     group.panel,
@@ -128,16 +131,24 @@ class PlateResultants:
                 found.append(self._kind(whole, chosen, edges, center, creases))
         return found
 
+    def _center(self, group: Group, k: int) -> tuple[float, ...] | None:
+        """Where the center of panel k of a group is in its frame, relative to its size."""
+        center = int(self._structure.centers[group.number[k]])
+        if center < 0:
+            return None
+        nodes, size = self._structure.nodes, self._pattern.size
+        away = group.frames[k, :2] @ (nodes[center] - nodes[group.faces[k, 0]])
+        return tuple((np.round(away / size, ALIKE) * size).tolist())
+
     def _kind(
-        self, whole: Whole, group: Group, edges: Sequence[int], center: bool,
+        self, whole: Whole, group: Group, edges: Sequence[int], center: tuple[float, ...] | None,
         creases: Mapping[Edge, int],
     ) -> _Kind:  # fmt: skip
-        """Panels of a group with the same conditions of their edges."""
-        structure, faces = self._structure, group.faces
-        centers, rise = structure.centers[group.number], np.zeros((0, len(group.panel.kind)))
-        if center:
-            away = structure.nodes[centers[0]] - structure.nodes[faces[0, 0]]
-            rise = group.panel.lift((group.frames[0, :2] @ away)[None]).reshape(1, -1)
+        """Panels of a group with the same conditions of their edges, and center."""
+        faces, centers = group.faces, self._structure.centers[group.number]
+        rise = np.zeros((0, len(group.panel.kind)))
+        if center is not None:
+            rise = group.panel.lift(np.array([center])).reshape(1, -1)
         maps = [own for _, own in in_own_axes(self._pattern, group, _map(group.panel, edges, rise))]
         pairs = [[edge_of(a, b) for a, b in around(face)] for face in faces.tolist()]
         numbers = np.array([[creases.get(edge, -1) for edge in row] for row in pairs])
@@ -199,8 +210,31 @@ def _moved(rest: NDArray, x: NDArray, kind: _Kind) -> tuple[NDArray, NDArray]:
     left[:, :, 2] *= sign[:, None]
     rotation = np.swapaxes(left @ right, 1, 2)  # from rest to now
     local = np.einsum("pki,pij->pkj", after, rotation) - before
+    local = np.einsum("pad,pkd->pka", kind.frames, local)
+    local[..., :2] = _stretched(np.einsum("pad,pkd->pka", kind.frames, before), after, corners)
     angle = Rotation.from_matrix(rotation).as_rotvec()
     along = np.roll(before[:, :corners], -1, axis=1) - before[:, :corners]
     along /= np.linalg.norm(along, axis=2)[:, :, None]
     turned = -np.einsum("pi,pki->pk", angle, along)
-    return np.einsum("pad,pkd->pka", kind.frames, local), turned
+    return local, turned
+
+
+def _stretched(rest: NDArray, after: NDArray, corners: int) -> NDArray[np.float64]:
+    """Displacements (p, k, 2) in the plane that stretch a panel as its edges and spokes are.
+
+    Those of a panel that bends contain the shortening of its chords, which strains nothing.
+
+    rest, after : (p, k, 3) corners, then maybe the center; `rest` in the frame of the panel.
+    """
+    ring = np.arange(corners)
+    ends = np.stack([ring, np.roll(ring, -1)], axis=1)
+    if rest.shape[1] > corners:
+        ends = np.concatenate([ends, np.stack([ring, np.full(corners, corners)], axis=1)])
+    before, now = (x[:, ends[:, 1]] - x[:, ends[:, 0]] for x in (rest, after))
+    square = np.einsum("pbi,pbi->pb", before, before)
+    strain = 0.5 * (np.einsum("pbi,pbi->pb", now, now) / square - 1.0)
+    rows = np.zeros((*square.shape, rest.shape[1], 2))
+    for sign, end in ((1.0, 1), (-1.0, 0)):
+        rows[:, np.arange(len(ends)), ends[:, end]] += sign * before[..., :2] / square[..., None]
+    inverse = np.linalg.pinv(rows.reshape(*square.shape, -1), rcond=FLAT)
+    return np.einsum("pub,pb->pu", inverse, strain).reshape(len(rest), -1, 2)

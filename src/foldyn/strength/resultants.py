@@ -17,9 +17,10 @@ from foldyn.shells import Shell
 from foldyn.shells.recovery import StressPoints
 from foldyn.strength.creases import crease_lengths
 from foldyn.strength.loaded import LoadedSheet
-from foldyn.strength.plates import PlateResultants, has_plates
+from foldyn.strength.plates import PlateResultants, check_plates, has_plates
 from foldyn.structures import Structure
-from foldyn.structures.discretized import Discretized
+from foldyn.structures.discretized import Discretized, Distributed
+from foldyn.structures.rigid_plates import rigid_panels
 
 HINGES = (
     ": panels that bend by single hinges and stretch by single bars have no stresses; their forces "
@@ -54,7 +55,8 @@ class ShellResultants:
 
     def __init__(self, case: Case) -> None:
         self.case, self._sheet = case, LoadedSheet(case)
-        self.points = StressPoints.of(case.structure.pattern, case.structure.sheet)
+        assert isinstance(case.structure, Shell)
+        self.points = case.structure.stress_points
 
     def at(self, q: NDArray, factors: NDArray) -> NDArray[np.float64]:
         """See `Resultants`."""
@@ -69,7 +71,7 @@ class SuperelementResultants:
         self.case = for_stresses(case)
         assert isinstance(self.case.structure, Superelements)
         self.structure = self.case.structure
-        self.points = StressPoints.of(self.structure.pattern, self.structure.sheet)
+        self.points = self.structure.stress_points
         self._sheet = LoadedSheet(self.case)
 
     @cached_property
@@ -90,6 +92,14 @@ class SuperelementResultants:
         held = held_resultants(self.structure.whole, self._sheet.distributed(factors))
         return (self.rows @ q + held).reshape(-1, 2, 3)
 
+    def accelerated(self, axis: int) -> NDArray[np.float64]:
+        """What panels with held edges add (6 p,) if all moves with 1 m/s2 along an axis."""
+        structure = self.structure
+        mass = structure.sheet.values("areal_density", len(structure.pattern.faces))
+        force = np.zeros((len(mass), 3))
+        force[:, axis] = -mass * structure.board_share
+        return held_resultants(structure.whole, Distributed(panels=force))
+
 
 def for_stresses(case: Case) -> Case:
     """The case with the model that its stresses are computed with."""
@@ -103,6 +113,27 @@ def has_stresses(structure: Discretized) -> bool:
     """Whether the panels of a structure have stresses."""
     hinged = isinstance(structure, Structure) and not has_plates(structure)
     return structure.pattern is not None and not hinged
+
+
+def without_rigid(case: Case, points: StressPoints, resultants: NDArray) -> NDArray:
+    """Forces and moments (..., p, 2, 3), which are 0 in rigid panels."""
+    structure = case.structure
+    rigid = rigid_panels(structure.options.rigid, len(structure.pattern.faces))
+    return np.where(np.isin(points.panel, list(rigid))[:, None, None], 0.0, resultants)
+
+
+def check_stresses(case: Case, field: str) -> None:
+    """Refuse a case that has no stresses, or moments of creases, for any of its results."""
+    if case.structure.pattern is None:
+        raise InputError(": the structure has no pattern, and so no panels", field)
+    if case.remembering:
+        raise InputError(
+            ": the creases have a law with memory, which stresses do not follow: take an elastic "
+            "law",
+            field,
+        )
+    if isinstance(case.structure, Structure) and has_stresses(case.structure):
+        check_plates(case, field)
 
 
 def resultants_of(case: Case) -> Resultants:
