@@ -241,7 +241,7 @@ class Superelements(Discretized):
         return StressPoints.of(self.pattern, self.sheet, self.meshes.graded[-1].radius)
 
     def embedded(
-        self, finer: Superelements, motions: NDArray, edges: Mapping[int, NDArray]
+        self, finer: Superelements, motions: NDArray, *, edges: Mapping[int, NDArray]
     ) -> NDArray:
         """The same motions (m, k) on the dofs of a structure with more shapes.
 

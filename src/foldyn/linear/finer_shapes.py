@@ -56,7 +56,7 @@ class FinerShapes:
         own, finer = self._coarse.case.structure, self.case.structure
         assert isinstance(own, Superelements)
         assert isinstance(finer, Superelements)
-        whole = own.embedded(finer, self._coarse.whole(motions), self.case.held_edges)
+        whole = own.embedded(finer, self._coarse.whole(motions), edges=self.case.held_edges)
         return whole[self._fine.free]
 
     def _solved(self, loads: NDArray) -> NDArray:

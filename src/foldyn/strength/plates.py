@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from foldyn.cases import Case
 from foldyn.condensation import superelements
@@ -201,6 +200,8 @@ def _moved(rest: NDArray, x: NDArray, kind: _Kind) -> tuple[NDArray, NDArray]:
 
     Corners, then the center, relative to the place to which the panel moves as a rigid body.
     """
+    from scipy.spatial.transform import Rotation  # loads slowly: not for other models
+
     nodes = np.column_stack([kind.nodes, kind.center]) if (kind.center >= 0).all() else kind.nodes
     corners = kind.nodes.shape[1]
     before, after = (place[nodes] - place[kind.nodes].mean(axis=1)[:, None] for place in (rest, x))
