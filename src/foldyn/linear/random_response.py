@@ -24,7 +24,6 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.algebra.eigen import Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
 from foldyn.cases.directions import AXES
-from foldyn.condensation import Superelements
 from foldyn.errors import InputError, ModelRangeWarning, warn
 from foldyn.linear.excitation import Drive, drive_of
 from foldyn.linear.frequency_domain import ModalResponse, SuperposedModes
@@ -35,6 +34,7 @@ from foldyn.ram_limit import check_memory
 from foldyn.results import random_dataset
 from foldyn.strength.dataset import MISES, face_stresses, point_coordinates
 from foldyn.strength.resultants import (
+    Resultants,
     SuperelementResultants,
     check_stresses,
     for_stresses,
@@ -147,10 +147,11 @@ def random_response(
     load_factor = number("load_factor", load_factor)
     at = None if frequencies is None else _increasing("frequencies", frequencies)
     drives = _drives(of_kind("case", case, Case), base, forces)
-    own = case
+    own, model = case, None
     if flag("stresses", stresses):
         check_stresses(case, "stresses")
         own = for_stresses(case)
+        model = resultants_of(own) if has_stresses(own.structure) else None
     system = linearize(own, state, load_factor=load_factor)
     total = np.zeros((4, *case.structure.nodes.shape))
     top = max(max(density.frequency) for _, density in drives)
@@ -168,7 +169,7 @@ def random_response(
         response = ModalResponse(modes, drive)
         total += np.stack(_moments(system, drive, response, density))
         if stresses:
-            for name, added in _stresses(system, drive, response, density, state).items():
+            for name, added in _stresses(system, model, drive, response, density, state).items():
                 squares[name] = squares.get(name, 0.0) + added
         if at is not None:
             curves += _densities(system, drive, response, density, at)
@@ -185,7 +186,7 @@ def random_response(
     rates = _rates(Moments._make(list(total)))
     more, points = {}, None
     if stresses:
-        points = resultants_of(own).points if has_stresses(own.structure) else None
+        points = None if model is None else model.points
         more = {name: np.sqrt(square) for name, square in squares.items()}
     return random_dataset(
         case, system.displacement, *rates, facts, at, curves, more,
@@ -253,20 +254,22 @@ def _moments(
 
 
 def _stresses(
-    system: Linearized, drive: Drive, response: ModalResponse, density: SpectralDensity,
-    state: State | str | None,
+    system: Linearized, model: Resultants | None, drive: Drive, response: ModalResponse,
+    density: SpectralDensity, state: State | str | None,
 ) -> dict[str, NDArray]:  # fmt: skip
     """Mean squares of forces, moments and von Mises stresses of panels, and of creases' moments."""
     motions = system.whole(response.motions)
-    panels, creases = small_motions(system.case, system.displacement, motions, state is None)
+    panels, creases = small_motions(system.case, model, system.displacement, motions, state is None)
     if drive.axis is not None:  # and what panels add, per unit of the acceleration of the base
         creases = np.pad(creases, ((0, 1), (0, 0)))
         if panels is not None:
-            carried = _carried(system.case, drive.axis).reshape(1, *panels.shape[1:])
+            carried = np.zeros((1, *panels.shape[1:]))
+            if isinstance(model, SuperelementResultants):
+                carried = model.accelerated(AXES.index(drive.axis)).reshape(carried.shape)
             panels = np.concatenate([panels, carried])
     rows = {"crease_moment": creases.T}
-    if panels is not None:
-        points = resultants_of(system.case).points
+    if panels is not None and model is not None:
+        points = model.points
         panels = without_rigid(system.case, points, panels)
         force, moment = np.moveaxis(panels, (2, 0), (0, -1))
         stress = np.moveaxis(face_stresses(panels, points.thickness), 0, -1)
@@ -293,13 +296,6 @@ def _stresses(
     if "von_mises" in out:
         out["von_mises"] = out["von_mises"].sum(axis=-1)
     return out
-
-
-def _carried(case: Case, axis: str) -> NDArray[np.float64]:
-    """Forces and moments that panels add to their vibrations if all is accelerated, (6 p,)."""
-    if isinstance(case.structure, Superelements):
-        return SuperelementResultants(case).accelerated(AXES.index(axis))
-    return np.zeros(6 * len(resultants_of(case).points.panel))
 
 
 def _densities(

@@ -26,6 +26,7 @@ from foldyn.strength.creases import crease_moments
 from foldyn.strength.dataset import stress_dataset
 from foldyn.strength.loaded import LoadedSheet
 from foldyn.strength.resultants import (
+    Resultants,
     SuperelementResultants,
     check_stresses,
     has_stresses,
@@ -106,9 +107,10 @@ def stresses(result: xarray.Dataset) -> xarray.Dataset:
     first, name, compute = ALONG[kind]
     single = first not in result.dims
     result = result.expand_dims(first) if single else result
-    found = compute(case, result)
+    model = resultants_of(case) if has_stresses(case.structure) else None
+    found = compute(case, model, result)
     coordinate = {name: (first, np.ravel(result[name].values), result[name].attrs)}
-    points = resultants_of(case).points if found.panels is not None else None
+    points = None if model is None else model.points
     made = stress_dataset(case, points, found.panels, found.creases, coordinate, {"of": kind})
     return made.isel({first: 0}) if single else made
 
@@ -124,25 +126,26 @@ def check_motion(case: Case, field: str) -> None:
         )
 
 
-def _path(case: Case, result: xarray.Dataset) -> SmallStresses:
+def _path(case: Case, model: Resultants | None, result: xarray.Dataset) -> SmallStresses:
     """Stresses at the points of a path."""
     constant = np.isin(np.arange(len(case.loads)), np.ravel(result.attrs.get("constant", ())))
     at, place = np.ravel(result["load_factor"].values), result["displacement"].values
-    return _at(case, place, np.where(constant, 1.0, at[:, None]))
+    return _at(case, model, place, np.where(constant, 1.0, at[:, None]))
 
 
-def _motion(case: Case, result: xarray.Dataset) -> SmallStresses:
+def _motion(case: Case, model: Resultants | None, result: xarray.Dataset) -> SmallStresses:
     """Stresses at the samples of a motion."""
     check_motion(case, "result")
     time = np.ravel(result["time"].values)
     factors = [np.asarray(own.history(time), float) for own in case.loads]
     factors = np.stack(factors, axis=1) if factors else np.zeros((len(time), 0))
-    return _at(case, result["displacement"].values, factors)
+    return _at(case, model, result["displacement"].values, factors)
 
 
-def _at(case: Case, displacement: NDArray, factors: NDArray) -> SmallStresses:
+def _at(
+    case: Case, model: Resultants | None, displacement: NDArray, factors: NDArray
+) -> SmallStresses:
     """Stresses in states with displacements (s, n, 3), m, and factors (s, k) of the loads."""
-    model = resultants_of(case) if has_stresses(case.structure) else None
     case = case if model is None else model.case
     sheet, panels, creases = LoadedSheet(case), [], []
     for place, own in zip(displacement, factors, strict=True):
@@ -158,12 +161,12 @@ def _state(result: xarray.Dataset, along: str) -> NDArray[np.float64]:
     return result["displacement"].isel({along: 0}, missing_dims="ignore").values
 
 
-def _modes(case: Case, result: xarray.Dataset) -> SmallStresses:
+def _modes(case: Case, model: Resultants | None, result: xarray.Dataset) -> SmallStresses:
     """Stresses of mode shapes."""
     _refuse_secant(result)
     shape, place = result["shape"].transpose("mode", "node", "axis").values, _state(result, "mode")
     if not isinstance(case.structure, Superelements):
-        return _about(case, result, place, shape.reshape(len(shape), -1))
+        return _about(case, model, result, place, shape.reshape(len(shape), -1))
     numbers = np.ravel(result["mode"].values)
     again = spectrum_of(case, int(numbers.max()), verify=False, errors=False)
     own = again.result.sel(mode=numbers)
@@ -176,10 +179,10 @@ def _modes(case: Case, result: xarray.Dataset) -> SmallStresses:
         )
     finer = FinerShapes(again.linear)
     shapes = oriented(again.spectrum.shapes)[:, numbers - 1]
-    return small_motions(finer.case, place, finer.modes(own["eigenvalue"].values, shapes))
+    return small_motions(finer.case, model, place, finer.modes(own["eigenvalue"].values, shapes))
 
 
-def _response(case: Case, result: xarray.Dataset) -> SmallStresses:
+def _response(case: Case, model: Resultants | None, result: xarray.Dataset) -> SmallStresses:
     """Stresses per unit of the drive of a frequency response."""
     _refuse_secant(result)
     method, quantity = result.attrs["method"], quantity_of(result)
@@ -192,7 +195,7 @@ def _response(case: Case, result: xarray.Dataset) -> SmallStresses:
     moved = result[quantity].transpose("frequency", "node", "axis").values
     place = _state(result, "frequency")
     if not isinstance(case.structure, Superelements):
-        return _about(case, result, place, moved.reshape(len(moved), -1))
+        return _about(case, model, result, place, moved.reshape(len(moved), -1))
     base = quantity == "transmissibility"
     value = float(result.attrs["drive_displacement" if base else "drive_force"])
     axis = str(result.attrs["base_axis"]) if base else None
@@ -201,10 +204,12 @@ def _response(case: Case, result: xarray.Dataset) -> SmallStresses:
     system, frequency = linearize(case), np.ravel(result["frequency"].values)
     answer = direct(system, drive, frequency, Direct(), lambda _: None)
     finer = FinerShapes(system)
-    found = small_motions(finer.case, place, finer.driven(drive, frequency, answer.response.T))
+    motions = finer.driven(drive, frequency, answer.response.T)
+    found = small_motions(finer.case, model, place, motions)
     if axis is None or found.panels is None:
         return found
-    carried = SuperelementResultants(finer.case).accelerated(AXES.index(axis)).reshape(-1, 2, 3)
+    assert isinstance(model, SuperelementResultants)
+    carried = model.accelerated(AXES.index(axis)).reshape(-1, 2, 3)
     square = (2.0 * np.pi * frequency) ** 2
     return found._replace(panels=found.panels - square[:, None, None, None] * carried)
 
@@ -219,22 +224,22 @@ def _refuse_secant(result: xarray.Dataset) -> None:
 
 
 def small_motions(
-    case: Case, place: NDArray, motions: NDArray[Any], at_rest: bool = True
-) -> SmallStresses:
+    case: Case, model: Resultants | None, place: NDArray, motions: NDArray[Any],
+    at_rest: bool = True,
+) -> SmallStresses:  # fmt: skip
     """Stresses in small motions (m, s) of all dofs about a state (n, 3), m.
 
     Superelements have those with the shapes for stresses.
 
+    model : how panels have their forces; None if they have none.
     at_rest : whether no load acts in the state.
     """
     structure = case.structure
-    if isinstance(structure, Superelements):
-        assert structure.stressed
-        model = SuperelementResultants(case)
+    if isinstance(model, SuperelementResultants):
         panels = (model.rows @ motions).T.reshape(motions.shape[1], -1, 2, 3)
         return SmallStresses(panels, (model.crease_rows @ motions).T)
     factors = np.full(len(case.loads), 0.0 if at_rest else 1.0)
-    sheet, model = LoadedSheet(case), resultants_of(case) if has_stresses(structure) else None
+    sheet = LoadedSheet(case)
     body, q = sheet.body(factors), sheet.dofs(place, factors)
     size = STEP * float(np.linalg.norm(np.ptp(structure.nodes, axis=0)))
 
@@ -258,8 +263,9 @@ def small_motions(
 
 
 def _about(
-    case: Case, result: xarray.Dataset, place: NDArray, motions: NDArray[Any]
-) -> SmallStresses:
+    case: Case, model: Resultants | None, result: xarray.Dataset, place: NDArray,
+    motions: NDArray[Any],
+) -> SmallStresses:  # fmt: skip
     """Stresses in small motions (s, 3 n) of nodes about the state of a result."""
     at_rest = str(result.attrs.get("state", "rest")) == "rest"
     sheet, factors = LoadedSheet(case), np.full(len(case.loads), 0.0 if at_rest else 1.0)
@@ -272,10 +278,11 @@ def _about(
         across = tangent[first:, :first]
         real, *other = (-follows.solve(np.ascontiguousarray(across @ part)) for part in parts)
         hidden = real + 1j * other[0] if other else real
-    return small_motions(case, place, np.concatenate([motion, hidden]), at_rest)
+    return small_motions(case, model, place, np.concatenate([motion, hidden]), at_rest)
 
 
-ALONG: Mapping[str, tuple[str, str, Callable[[Case, xarray.Dataset], SmallStresses]]] = {
+Compute = Callable[[Case, Resultants | None, xarray.Dataset], SmallStresses]
+ALONG: Mapping[str, tuple[str, str, Compute]] = {
     "path": ("step", "load_factor", _path),
     "trajectory": ("time", "time", _motion),
     "periodic_motion": ("time", "time", _motion),

@@ -98,6 +98,17 @@ class Landscape:
         """The stable states."""
         return tuple(state for state in self.states if state.stable)
 
+    @property
+    def first_maximum(self) -> float:
+        """First maximum of the force (N), by a parabola through three points; nan if none."""
+        rise = np.diff(self.force)
+        tops = 1 + np.flatnonzero((rise[:-1] > 0.0) & (rise[1:] <= 0.0))
+        if not len(tops):
+            return np.nan
+        near = slice(tops[0] - 1, tops[0] + 2)
+        a, b, c = np.polyfit(self.stroke[near] - self.stroke[tops[0]], self.force[near], 2)
+        return float(c - 0.25 * b * b / a)
+
     def barrier(self, source: int = 0, target: int = 1) -> float:
         """Energy barrier (J) from one stable state to another, given by their numbers.
 

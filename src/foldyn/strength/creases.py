@@ -48,6 +48,4 @@ def crease_moments(structure: Discretized, body: Assembly, q: NDArray) -> NDArra
 
 def crease_lengths(structure: Discretized) -> NDArray[np.float64]:
     """Lengths (nf,) of the creases, m."""
-    if structure.pattern is None:
-        return lengths(structure.nodes, structure.folds[:, :2])
     return lengths(structure.pattern.vertices, structure.pattern.creases)

@@ -81,9 +81,7 @@ def stress_dataset(
         )
         for name, own in values.items()
     }
-    pattern = case.structure.pattern
-    if pattern is not None:
-        coordinates["crease_vertices"] = (("crease", "end"), pattern.creases)
+    coordinates["crease_vertices"] = (("crease", "end"), case.structure.pattern.creases)
     return result_dataset("stresses", case, data, coordinates, statistics)
 
 

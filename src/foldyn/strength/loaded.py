@@ -23,8 +23,7 @@ class LoadedSheet:
 
     def __init__(self, case: Case) -> None:
         self.case = case
-        self._loads = [SomeLoads(case, [i]) for i in range(len(case.loads))]
-        each = list(enumerate(self._loads))
+        each = [(i, SomeLoads(case, [i])) for i in range(len(case.loads))]
         self._following = joined((part, i) for i, own in each for part, _ in own.following_terms)
         self._turns = [(i, change) for i, own in each for change, _ in own.rest_terms]
         self._swellings = [(i, swelling) for i, own in each for swelling, _ in own.swellings]

@@ -23,10 +23,9 @@ from foldyn.condensation.panel import BOW, TURN, VERTEX, CondensedPanel
 from foldyn.condensation.resultants import in_own_axes
 from foldyn.errors import InputError
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
-from foldyn.strength.creases import crease_moments
+from foldyn.strength.creases import crease_lengths, crease_moments
 from foldyn.strength.loaded import LoadedSheet
 from foldyn.structures.edge_angles import straight_creases
-from foldyn.structures.mesh import lengths
 from foldyn.structures.rigid_plates import rigid_panels
 from foldyn.structures.structure import Structure
 
@@ -87,7 +86,7 @@ class PlateResultants:
         """See `strength.resultants.Resultants`."""
         structure = self._structure
         x = structure.nodes + q[: structure.nodes.size].reshape(-1, 3)
-        moment = crease_moments(structure, self._sheet.body(factors), q) * self._lengths
+        moment = crease_moments(structure, self._sheet.body(factors), q) * crease_lengths(structure)
         opened = self._sheet.distributed(factors).creases  # acts on the panels beside a crease
         moment = np.append(moment if opened is None else moment - opened, 0.0)
         out = np.zeros((len(self.points.panel), 2, 3))
@@ -99,10 +98,6 @@ class PlateResultants:
             for number, own, given in zip(kind.number, kind.maps, inputs, strict=True):
                 out[self.points.panel == number] = own @ given
         return out
-
-    @property
-    def _lengths(self) -> NDArray:
-        return lengths(self._pattern.vertices, self._pattern.creases)
 
     def _found(self, whole: Whole) -> list[_Kind]:
         """The panels by kind, without rigid ones."""

@@ -290,22 +290,28 @@ def _strain(result: xr.Dataset, case: Case) -> float:
     return float(np.abs(bar_strain(case.structure, moved)).max())
 
 
-@_measure(*MOVED, units="Pa", doc="largest von Mises stress of a panel", whole=True)
-def _von_mises(result: xr.Dataset, case: Case) -> float:
-    found = stresses(result)
+def _stressed(result: xr.Dataset, case: Case) -> xr.Dataset:
+    return stresses(result)
+
+
+_ONCE = {"whole": True, "through": _stressed}
+
+
+@_measure(*MOVED, units="Pa", doc="largest von Mises stress of a panel", **_ONCE)
+def _von_mises(found: xr.Dataset, case: Case) -> float:
     if "von_mises" not in found:
         raise InputError("needs panels with stresses, which this model has none of")
     return float(found["von_mises"].max())
 
 
-@_measure(*MOVED, units="N", doc="largest moment of a crease per length", whole=True)
-def _crease_moment(result: xr.Dataset, case: Case) -> float:
-    return float(np.abs(stresses(result)["crease_moment"].values).max(initial=0.0))
+@_measure(*MOVED, units="N", doc="largest moment of a crease per length", **_ONCE)
+def _crease_moment(found: xr.Dataset, case: Case) -> float:
+    return float(np.abs(found["crease_moment"].values).max(initial=0.0))
 
 
-@_measure(*MOVED, doc="least margin of safety of a panel", whole=True)
-def _margin(result: xr.Dataset, case: Case) -> float:
-    return float(margins(result).attrs["least_margin"])
+@_measure(*MOVED, doc="least margin of safety of a panel", **_ONCE)
+def _margin(found: xr.Dataset, case: Case) -> float:
+    return float(margins(found).attrs["least_margin"])
 
 
 @_measure(MODES, *MOVED, units="m", doc="least distance of panels that share no vertex", whole=True)
@@ -410,13 +416,7 @@ def _final_stiffness(found: Landscape, case: Case) -> float:
 
 @_measure(PATH, units="N", doc="first maximum of the driving force", through=landscape)
 def _first_maximum(found: Landscape, case: Case) -> float:
-    rise = np.diff(found.force)
-    tops = 1 + np.flatnonzero((rise[:-1] > 0.0) & (rise[1:] <= 0.0))
-    if not len(tops):
-        return np.nan
-    near = slice(tops[0] - 1, tops[0] + 2)
-    a, b, c = np.polyfit(found.stroke[near] - found.stroke[tops[0]], found.force[near], 2)
-    return float(c - 0.25 * b * b / a)
+    return found.first_maximum
 
 
 def _secant(found: Landscape, part: slice) -> float:
