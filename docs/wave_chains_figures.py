@@ -1,6 +1,6 @@
 """Figures of the page on waves in chains, from a full study.
 
-    foldyn study waves --out FOLDER
+    python -m verification.waves --out FOLDER
     python docs/wave_chains_figures.py FOLDER
 
 writes images/wave-chains-*.png. The first figure of the page is that of examples/kresling_chain.py.
@@ -17,7 +17,7 @@ from PIL import Image
 from foldyn import plots
 from foldyn.cases import BaseMotion, Case, Fix, PointMass
 from foldyn.linear import UnitCell, attenuation, frf, transmission
-from foldyn.studies.waves.kresling import SIDES, Unit
+from verification.waves.kresling import SIDES, Unit
 
 IMAGES = Path(__file__).with_name("images")
 COPIED = ("arrivals", "dispersion", "miura-gaps")

@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 import foldyn as fd
-from foldyn.studies.waves.kresling import SIDES, Unit
+from verification.waves.kresling import SIDES, Unit
 
 UNIT = Unit()
 TRUSS = replace(UNIT, crease=0.0, plate_stiffness=1e6)

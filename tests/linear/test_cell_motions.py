@@ -10,7 +10,7 @@ import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.linear import attenuation, space_time, transmission, wave_spectrum
 from foldyn.linear.cell_motions import cells_of
-from foldyn.studies.waves.kresling import guided
+from verification.waves.kresling import guided
 
 SHEET = fd.Sheet(1e9, 0.3, 1e-3, 1000.0)
 TIME = np.linspace(0.0, 1.0, 41)

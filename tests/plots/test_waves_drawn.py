@@ -9,7 +9,7 @@ import xarray as xr
 from foldyn import plots
 from foldyn.errors import InputError
 from foldyn.linear import wave_spectrum
-from foldyn.studies.waves.kresling import Unit
+from verification.waves.kresling import Unit
 
 CELLS, TIMES = 9, 40
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import replace
 from functools import cache
@@ -416,3 +417,29 @@ def test_the_command_takes_half_of_the_memory_unless_forced(tmp_path, monkeypatc
     assert main(command) == 2
     assert "a structure of 13 nodes needs about" in capsys.readouterr().err
     assert main([*command, "--force"]) == 0
+
+
+@pytest.mark.matrix
+def test_an_interrupted_study_goes_on(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(
+        studies, "QUICK", StudyPlan(replace(SHORT, dt=0.01), ("case1",), ("panel",))
+    )
+    monkeypatch.setattr(StudyPlan, "stiffnesses", lambda _: [])
+    monkeypatch.setattr("foldyn.cli.study._data", lambda *_: None)
+    monkeypatch.setattr("foldyn.cli.study.PROCESSES", 1)
+    command = ["study", "herkal", "--quick", "--out", str(tmp_path / "out")]
+
+    class Bar(contextlib.nullcontext):
+        def __enter__(self):
+            return self
+
+        def update(self):
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as first:
+        first.setattr("foldyn.cli.study.progress_bar", lambda *_, **__: Bar())
+        assert main(command) == 130
+    kept = f"foldyn: kept what was computed: {tmp_path / 'out' / 'runs'}; the same command"
+    assert kept in capsys.readouterr().err
+    assert main(command) == 0
+    assert "skipped 1 of " in capsys.readouterr().out

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from foldyn.cli.main import main
-from foldyn.studies.waves import kresling, report, sheets
-from foldyn.studies.waves import study as studies
-from foldyn.studies.waves.kresling import SIDES, Unit
-from foldyn.studies.waves.study import Plan, Study
+from verification.waves import __main__ as command
+from verification.waves import kresling, report, sheets
+from verification.waves import study as studies
+from verification.waves.kresling import SIDES, Unit
+from verification.waves.study import Plan, Study
 
 CELLS = 64
 
@@ -104,37 +103,15 @@ def test_gaps_of_sheets_depend_on_their_fold_state():
 @pytest.mark.matrix
 def test_the_study_writes_its_page_and_goes_on(tmp_path, monkeypatch, capsys):
     plan = Plan(dihedrals=2, phases=9, cells=16)
-    monkeypatch.setattr(studies, "QUICK", plan)
-    monkeypatch.setattr("foldyn.cli.study.PROCESSES", 1)
-    command = ["study", "waves", "--quick", "--out", str(tmp_path / "out")]
-
-    class Bar(contextlib.nullcontext):
-        def __enter__(self):
-            return self
-
-        def update(self):
-            raise KeyboardInterrupt
-
-    with monkeypatch.context() as first:
-        first.setattr("foldyn.cli.study.progress_bar", lambda *_, **__: Bar())
-        assert main(command) == 130
-    kept = f"foldyn: kept what was computed: {tmp_path / 'out' / 'runs'}; the same command"
-    assert kept in capsys.readouterr().err
-    assert main(command) == 0
-    assert "skipped 1 of 5 runs" in capsys.readouterr().out
-    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    monkeypatch.setattr(command, "QUICK", plan)
+    given = ["--quick", "--processes", "1", "--out", str(tmp_path)]
+    assert command.main(given) == 0
+    assert "0 runs were there" in capsys.readouterr().out
+    page = (tmp_path / "report.html").read_text("utf-8")
     for words in ("a coarse run", "two degrees of freedom", "Miura sheet", "eggbox sheet"):
         assert words in page
-    assert main(command) == 0
-    assert "skipped 5 of 5 runs" in capsys.readouterr().out
-    study = Study(plan, tmp_path / "out")
+    assert command.main(given) == 0
+    assert "5 runs were there" in capsys.readouterr().out
+    study = Study(plan, tmp_path)
     assert study.result("impact") is not None
     assert Study(replace(plan, velocity=1.0), study.folder).result("impact") is None
-
-
-def test_options_of_another_study_are_refused(tmp_path, capsys):
-    given = ["study", "waves", "--out", str(tmp_path / "out")]
-    assert main([*given, "--sensitivity"]) == 2
-    assert "belongs to the study herkal" in capsys.readouterr().err
-    assert main([*given, "--data", "film.mp4"]) == 2
-    assert not (tmp_path / "out").exists()

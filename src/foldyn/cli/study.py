@@ -32,8 +32,8 @@ def add_study(commands: Any) -> None:
     )
     study.add_argument(
         "name",
-        choices=("herkal", "waves"),
-        help="which: herkal (Herkal et al.), or waves (Yasuda et al., Pratapa et al.)",
+        choices=("herkal",),
+        help="which: herkal (Herkal, Nagarajaiah and Paulino)",
     )
     flag(study, "--quick", "coarser: a preview, no measure")
     sensitivity = "instead: the same under other pulses, loads, bends and calibrations"
@@ -61,9 +61,6 @@ def study(given: Namespace) -> Path:
     from tqdm import tqdm
 
     say = speech(True) if given.quiet else tqdm.write
-    if given.name != "herkal" and (given.sensitivity or given.data):
-        option = "--sensitivity" if given.sensitivity else "--data"
-        raise InputError(f"{option}: belongs to the study herkal; leave it out")
     if given.sensitivity and given.data:
         raise InputError("--data: belongs to the study; leave out --sensitivity")
     plan = "quick" if given.quick else "study"
@@ -71,7 +68,7 @@ def study(given: Namespace) -> Path:
     page = "sensitivity.html" if given.sensitivity else "report.html"
     owner = Owner("study --quick" if given.quick else "study", given.name)
     with held(folder, given.out, [page], owner, given.replace, [page], INSIDE) as results:
-        compute = _vary if given.sensitivity else _waves if given.name == "waves" else _study
+        compute = _vary if given.sensitivity else _study
         written, ended = compute(given, results, say)
         say(f"wrote {written}")
         failed = [done for done in ended if done.failure]
@@ -118,20 +115,6 @@ def _study(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence
     ended = _computed(one.compute, one.count, results, RESULTS, say, given.quiet)
     say("drawing figures")
     return report.write(one, Call(given.typed, (), **clock.spent())), ended
-
-
-def _waves(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence[Done]]:
-    from foldyn.studies.waves import report
-    from foldyn.studies.waves.study import FULL, QUICK, RESULTS, Study
-
-    one = Study(QUICK if given.quick else FULL, results.folder)
-    say(
-        f"a Kresling chain of {one.plan.cells} cells, and bands of Miura and eggbox sheets in "
-        f"{one.plan.dihedrals} fold states"
-    )
-    ended = _computed(one.compute, one.count, results, RESULTS, say, given.quiet)
-    say("drawing figures")
-    return report.write(one), ended
 
 
 def _vary(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence[Done]]:

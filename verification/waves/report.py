@@ -15,8 +15,8 @@ from foldyn.plots.space_time import drawn_cells, plot_wave_spectrum
 from foldyn.report import Heading, Section, Table, Text, write_report
 from foldyn.report.album import Album
 from foldyn.signals import Pulse, sampling_interval, wavenumber_spectrum
-from foldyn.studies.waves import kresling, sheets
-from foldyn.studies.waves.study import FULL, Study
+from verification.waves import kresling, sheets
+from verification.waves.study import FULL, Study
 
 TITLE = "Waves in periodic origami"
 STATES = 4  # number of fold states with drawn bands

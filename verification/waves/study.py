@@ -11,13 +11,14 @@ from typing import Any, Literal
 import numpy as np
 import xarray
 
+from foldyn.input_files import file_digest
 from foldyn.results.netcdf import read, write
 from foldyn.store import program
 from foldyn.studies.pool import Done, Task, datasets, run
-from foldyn.studies.waves import kresling, sheets
+from verification.waves import kresling, sheets
 
 RESULTS = "runs"
-COMPUTING = tuple(f"studies/waves/{name}.py" for name in ("kresling", "sheets"))
+COMPUTING = tuple(Path(__file__).with_name(f"{name}.py") for name in ("kresling", "sheets"))
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,8 @@ class Part(Task):
 
     def settings(self) -> dict[str, Any]:
         """Everything that its result depends on."""
-        return {"kind": self.kind, "program": program(*COMPUTING), **asdict(self.plan)}
+        sources = [program(), *map(file_digest, COMPUTING)]
+        return {"kind": self.kind, "program": sources, **asdict(self.plan)}
 
     def compute(self, folder: Path) -> xarray.Dataset:
         """Compute its result."""
