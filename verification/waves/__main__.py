@@ -13,6 +13,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from foldyn.studies.pool import Done
 from verification.waves import report
 from verification.waves.study import FULL, QUICK, Study
 
@@ -26,7 +27,11 @@ def main(arguments: list[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     study = Study(QUICK if given.quick else FULL, given.out)
     with tqdm(total=study.count, unit="run") as bar:
-        ended = study.compute(lambda done: bar.update(), given.processes)
+
+        def tell(done: Done) -> None:
+            bar.update()
+
+        ended = study.compute(tell, given.processes)
     failed = [done for done in ended if done.failure]
     for done in failed:
         print(f"{done.task.name}: failed: {done.failure}", file=sys.stderr)
