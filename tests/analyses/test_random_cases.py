@@ -60,6 +60,46 @@ def test_a_case_file_is_the_function(file):
         np.testing.assert_array_equal(found[name], expected[name])
 
 
+FORCES = """
+[[analysis.forces]]
+nodes = [4]
+force = [0, 0, 1]
+frequency = [5, 600]
+value = [0.1, 0.1]
+unit = "N2/Hz"
+[[analysis.forces]]
+nodes = [5]
+force = [0, 0, 2]
+frequency = [5, 600]
+value = [0.1, 0.2]
+unit = "N2/Hz"
+"""
+
+
+def test_forces_of_a_case_file(file):
+    text = CASE[: CASE.index("[analysis.base.z]")].replace("true", "false") + "coherence = 0.5\n"
+    file.write_text(text + FORCES, "utf-8")
+    read = fd.read_case(file)
+    expected = fd.random_response(
+        read.case(),
+        forces=[
+            (fd.Force([4], (0, 0, 1)), fd.SpectralDensity([5, 600], [0.1, 0.1], "N2/Hz")),
+            (fd.Force([5], (0, 0, 2)), fd.SpectralDensity([5, 600], [0.1, 0.2], "N2/Hz")),
+        ],
+        coherence=0.5,
+    )
+    found = read.run().displacement_rms
+    np.testing.assert_allclose(found, expected.displacement_rms, rtol=1e-9)
+    for old, new, told in (
+        ("force = [0, 0, 2]", "", r"analysis\.forces\[1\]"),
+        ('unit = "N2/Hz"\n[[', "[[", r"analysis\.forces\[0\]\.unit: missing"),
+        ("force = [0, 0, 2]", "force = [0, 0, 2]\nbase = 2", r"analysis\.forces\[1\].*base"),
+    ):
+        file.write_text(text + FORCES.replace(old, new), "utf-8")
+        with pytest.raises(InputError, match=told):
+            fd.read_case(file).run()
+
+
 @pytest.mark.matrix
 def test_the_page_and_the_measures(file, tmp_path, capsys):
     text = CASE + '[sweep]\nmeasures = ["rms[5,z]", "acceleration_rms[5,z]"]\n'

@@ -172,6 +172,91 @@ def test_densities_integrate_to_mean_squares():
     np.testing.assert_allclose(two.acceleration_psd.sel(at), shaken, rtol=1e-9)
 
 
+def test_what_lies_below_a_frequency_grows_to_the_root_mean_square():
+    case = chain([500.0, 200.0], [0.3, 0.2], 0.01)
+    f = np.linspace(0.5, 31.0, 62)
+    found = fd.random_response(case, base={"x": noise(0.3, 1.0, 30.0)}, frequencies=f)
+    plain = fd.random_response(case, base={"x": noise(0.3, 1.0, 30.0)})
+    for name in ("displacement", "acceleration"):
+        below = found[f"{name}_cumulative"].sel(node=[1, 2], axis="x").values
+        assert (np.diff(below, axis=0) >= 0.0).all()
+        rms = plain[f"{name}_rms"].sel(node=[1, 2], axis="x").values
+        np.testing.assert_allclose(below[-1], rms, rtol=1e-9)
+        np.testing.assert_allclose(found[f"{name}_rms"], plain[f"{name}_rms"], rtol=1e-9)
+        assert (below[0] == 0.0).all()
+        half = fd.random_response(case, base={"x": noise(0.3, 1.0, float(f[20]))}, count=2)
+        cut = half[f"{name}_rms"].sel(node=[1, 2], axis="x").values
+        np.testing.assert_allclose(below[20], cut, rtol=1e-6)
+
+
+def test_coherent_forces_beside_frequency_responses():
+    """S = |H1|2 S1 + |H2|2 S2 + 2 c Re(H1 H2*) sqrt(S1 S2); with c = 1 forces are in phase."""
+    case, f = chain([500.0, 200.0], [0.3, 0.2], 0.03), np.linspace(2.0, 20.0, 7)
+    pushes = [fd.Force([1], (1, 0, 0)), fd.Force([2], (1, 0, 0))]
+    densities = [noise(0.2, 1.0, 30.0, "N2/Hz"), noise(0.05, 2.0, 40.0, "N2/Hz")]
+    one, two = (
+        fd.frf(case, push, frequencies=f).receptance.sel(node=2, axis="x").values for push in pushes
+    )
+    forces = list(zip(pushes, densities, strict=True))
+    for given, c in ((0.0, 0.0), (0.6, 0.6), ([[1.0, -0.8], [-0.8, 1.0]], -0.8), (1.0, 1.0)):
+        found = fd.random_response(case, forces=forces, coherence=given, frequencies=f)
+        own = np.abs(one) ** 2 * 0.2 + np.abs(two) ** 2 * 0.05
+        own = own + 2.0 * c * (one * two.conj()).real * np.sqrt(0.2 * 0.05)
+        np.testing.assert_allclose(found.displacement_psd.sel(node=2, axis="x"), own, rtol=1e-7)
+    alike = [(push, densities[0]) for push in pushes]
+    apart = fd.random_response(case, forces=alike, coherence=1.0)
+    phase = fd.random_response(case, forces=[(pushes, densities[0])])
+    np.testing.assert_allclose(apart.displacement_rms, phase.displacement_rms, rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (2.0, "from -1 to 1"),
+        ([[1.0, 0.5], [0.4, 1.0]], "symmetric 3 x 3 matrix"),
+        (-0.9, "no forces have these coherences"),
+    ],
+)
+def test_refused_coherences(given, told):
+    forces = [(fd.Force([1], (1, 0, 0)), noise(1.0, unit="N2/Hz"))] * 3
+    with pytest.raises(InputError, match=f"coherence: .*{told}"):
+        fd.random_response(chain([500.0], [MASS]), forces=forces, coherence=given)
+
+
+@pytest.mark.parametrize("drive", ["base", "force"])
+def test_reactions_are_what_moves_the_masses(drive):
+    """Their sum is that of mass times acceleration, less the force; damping acts between nodes."""
+    structure = fd.discretize(PATTERN, SHEET, clamped="xmin", mass="panel")
+    case = fd.Case(structure, [fd.Fix("xmin")], damping=fd.Rayleigh(0.0, 1e-4))
+    f = np.linspace(5.0, 60.0, 4)
+    if drive == "base":
+        given, driver, density, push = (
+            {"base": {"z": noise(0.2, 1.0, 90.0)}},
+            fd.BaseMotion("z"),
+            0.2,
+            0,
+        )
+    else:
+        driver, density, push = fd.Force([5], (0, 0, 1)), 0.1, 1.0
+        given = {"forces": [(driver, noise(0.1, 1.0, 90.0, "N2/Hz"))]}
+    with np.errstate(all="ignore"):
+        found = fd.random_response(case, **given, frequencies=f, reactions=True, count=18)
+    response = fd.frf(case, driver, frequencies=f)
+    name = "transmissibility" if drive == "base" else "receptance"
+    moved = response[name].sel(axis="z").values
+    if drive == "force":
+        moved = -((2 * np.pi * f[:, None]) ** 2) * moved
+    total = moved @ np.asarray(structure.mass.sum(axis=0)).ravel() - push
+    own = found.total_reaction_psd.sel(axis="z").values
+    np.testing.assert_allclose(own, np.abs(total) ** 2 * density, rtol=1e-6)
+    assert set(found.reaction_rms.dims) == {"support"}
+    with pytest.raises(InputError, match="reactions: no support"):
+        fd.random_response(
+            case.altered(supports=[]), forces=[(fd.Force([5], (0, 0, 1)), noise(1, 1, 9, "N2/Hz"))],
+            reactions=True,
+        )  # fmt: skip
+
+
 def test_models_agree_and_few_modes_nearly_do():
     base = {"z": noise(0.01, 1.0, 60.0)}
     panels = folded(fd.superelements(PATTERN, SHEET, level=2, divisions=12, clamped="xmin"))

@@ -260,15 +260,19 @@ def test_random_responses_have_the_stresses_of_frequency_responses():
     case = fd.Case(fd.superelements(MIURA, PAPER), HELD, damping=fd.Rayleigh(alpha=30.0, beta=1e-4))
     noise = fd.SpectralDensity([6, 12, 20], [0.001, 0.004, 0.004], "g2/Hz")
     with pytest.warns(fd.errors.ModelRangeWarning):
-        found = fd.random_response(case, base={"z": noise}, stresses=True)
-    f = np.linspace(6.0, 20.0, 57)
+        f = np.linspace(6.0, 20.0, 57)
+        found = fd.random_response(case, base={"z": noise}, stresses=True, frequencies=f)
     curve = fd.stresses(fd.frf(case, [fd.BaseMotion("z")], frequencies=f, check_model=False))
     power = noise.at(f) / (2.0 * np.pi * f) ** 4
     stress = curve.stress.values
     square = np.einsum("fpsa,ab,fpsb->fps", stress.conj(), MISES, stress).real
     by_frf = np.sqrt(np.trapezoid(square * power[:, None, None], f, axis=0))
     np.testing.assert_allclose(found.von_mises_rms, by_frf, atol=0.01 * by_frf.max())
+    density = square * power[:, None, None]
+    np.testing.assert_allclose(found.von_mises_psd, density, atol=0.02 * density.max())
+    np.testing.assert_allclose(found.von_mises_cumulative[-1], found.von_mises_rms, rtol=1e-9)
     moment = np.abs(curve.crease_moment.values) ** 2 * power[:, None]
+    np.testing.assert_allclose(found.crease_moment_psd, moment, rtol=2e-2)
     np.testing.assert_allclose(
         found.crease_moment_rms, np.sqrt(np.trapezoid(moment, f, axis=0)), rtol=1e-3
     )

@@ -11,11 +11,12 @@ import xarray
 from foldyn import plots
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
-from foldyn.analyses.frf import frequencies_of
+from foldyn.analyses.frf import NO_HISTORY, frequencies_of
 from foldyn.analyses.sections import AnalysisSection, Count, ShownSection, Switch
 from foldyn.analyses.vibration import About, VibrationSchema, about, bar_closed
 from foldyn.arguments import Check
-from foldyn.cases import Case
+from foldyn.cases import Case, Force
+from foldyn.cases.decode import PartOf
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError, within
 from foldyn.linear import SpectralDensity, margins, random_response
@@ -23,7 +24,7 @@ from foldyn.plots.charts import Chart, Curve
 from foldyn.report.album import Album, ByRule, by_mass_rule, shown_nodes
 from foldyn.report.sections import Charts, Heading, Section, Table, Text, cell
 from foldyn.tables import check_keys, check_table
-from foldyn.values import choice
+from foldyn.values import choice, show
 
 KEYS = ("frequency", "value", "unit")
 
@@ -33,16 +34,35 @@ def _base(name: str, value: Any) -> dict[str, SpectralDensity]:
     found = {}
     for axis, table in check_table(name, value).items():
         place = f"{name}.{choice(name, axis, AXES)}"
-        given = check_keys(check_table(place, table), KEYS, place) or table
-        for key in KEYS:
-            if key not in given:
-                raise InputError(
-                    ": missing; give frequency (Hz), value, and their unit", f"{place}.{key}"
-                )
-        with within(f"{place}."):
-            found[axis] = SpectralDensity(**given)
+        check_keys(check_table(place, table), KEYS, place)
+        found[axis] = _density(place, table)
     if not found:
         raise InputError(": give an axis, as [analysis.base.z]", name)
+    return found
+
+
+def _density(place: str, table: Mapping[str, Any]) -> SpectralDensity:
+    for key in KEYS:
+        if key not in table:
+            raise InputError(
+                ": missing; give frequency (Hz), value, and their unit", f"{place}.{key}"
+            )
+    with within(f"{place}."):
+        return SpectralDensity(**{key: table[key] for key in KEYS})
+
+
+FORCE = PartOf((Force,), "force", "nodes and force", history=NO_HISTORY)
+
+
+def _forces(name: str, value: Any) -> list[tuple[Force, SpectralDensity]]:
+    """Forces with their densities, from tables."""
+    if not isinstance(value, list):
+        raise InputError(f" = {show(value)}: must be tables, written [[analysis.forces]]", name)
+    found = []
+    for i, table in enumerate(value):
+        place = f"{name}[{i}]"
+        own = {key: each for key, each in check_table(place, table).items() if key not in KEYS}
+        found.append((FORCE(place, own), _density(place, table)))
     return found
 
 
@@ -50,13 +70,16 @@ class RandomSection(AnalysisSection):
     """[analysis] of kind "random"."""
 
     like = (random_response,)
-    base: Annotated[Mapping[str, Any], Check(_base)]
+    base: Annotated[Mapping[str, Any] | None, Check(_base)] = None
+    forces: Annotated[Sequence[Any], Check(_forces)] = ()
+    coherence: float | Sequence[Sequence[float]] = 0.0
     count: Count | None = None
     state: About = "rest"
     frequencies: Annotated[Sequence[float] | Mapping[str, float] | None, Check(frequencies_of)] = (
         None
     )
     stresses: Switch = False
+    reactions: Switch = False
     secant = None
 
 
@@ -110,7 +133,11 @@ class RandomAnalysis(Analysis):
         yield from album.structure(case_file.case(first))
         if "frequency" in result:
             nodes, some = shown_nodes(case_file.output.nodes.tolist())
-            yield Charts(_charts(result, nodes), f"Densities of the chosen nodes{some}.")
+            text = (
+                f"Densities of the chosen nodes{some}, and root mean squares of the part below "
+                "each frequency."
+            )
+            yield Charts(_charts(result, nodes), text)
         if "von_mises_rms" in result:
             yield from album.figure(
                 "stresses",
@@ -137,14 +164,16 @@ def _largest(result: xarray.Dataset, what: str) -> float:
 
 
 def _charts(result: xarray.Dataset, nodes: Sequence[int]) -> list[Chart]:
-    charts = []
-    for what, unit in (("displacement", "m2/Hz"), ("acceleration", "(m/s2)2/Hz")):
+    """Densities, and what has come together up to each frequency."""
+    charts, f = [], result["frequency"].values
+    for what, unit in (("displacement", "m"), ("acceleration", "m/s2")):
         density = result[f"{what}_psd"].sel(node=nodes).sum("axis")
-        curves = [
-            Curve(f"node {node}", result["frequency"].values, density.sel(node=node).values)
-            for node in nodes
-        ]
-        charts.append(Chart("frequency (Hz)", f"{what} ({unit})", curves, by_ratio=True))
+        below = (result[f"{what}_cumulative"].sel(node=nodes) ** 2).sum("axis") ** 0.5
+        for label, values, ratio in (
+            (f"{what} (({unit})2/Hz)", density, True), (f"{what} ({unit} rms)", below, False),
+        ):  # fmt: skip
+            curves = [Curve(f"node {node}", f, values.sel(node=node).values) for node in nodes]
+            charts.append(Chart("frequency (Hz)", label, curves, by_ratio=ratio))
     return charts
 
 
@@ -160,13 +189,15 @@ def _table(result: xarray.Dataset) -> Table:
     for name, label, part in (
         ("von_mises_rms", "von Mises stress (Pa)", "panel"),
         ("crease_moment_rms", "moment of a crease (N)", "crease"),
+        ("total_reaction_rms", "sum of the reactions (N)", "along"),
     ):
         if name in result and result[name].size:
             value = result[name].values
             at = int(np.unravel_index(value.argmax(), value.shape)[0])
             at = int(result["point_panel"].values[at]) if part == "panel" else at
+            where = f"{part} {AXES[at] if part == 'along' else at}"
             most = float(value.max())
-            rows.append([label, cell(most), cell(3.0 * most), f"{part} {at}", ""])
+            rows.append([label, cell(most), cell(3.0 * most), where, ""])
     if "von_mises_rms" in result:
         try:
             found = margins(result).attrs

@@ -24,6 +24,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,6 +58,22 @@ ROUNDING = 1e-12  # forces below this, relative to the sum of their terms, count
 POWER = 4.0 / 3.0
 AT_REST = 0.9411457706782074
 """2/sqrt(pi) Gamma(POWER/2 + 1)/Gamma(POWER/2 + 3/2)."""
+
+
+class Reacting(NamedTuple):
+    """Forces of supports on `case.reaction_dofs` in motions of all m dofs."""
+
+    held: sparse.csr_array  # (s, 3 n) from forces on the nodes
+    matrices: tuple[sparse.csr_array, ...]  # (s, m) per displacement, velocity and acceleration
+    modal: NDArray  # (r, m) rows of modal damping
+    pushed: NDArray  # (r, m) rows of a fluid that is no matrix
+
+    def of(self, motions: NDArray) -> NDArray[np.float64]:
+        """Forces (3, s, k), N, per unit of displacement, velocity and acceleration."""
+        found = np.stack([own @ motions for own in self.matrices])
+        for k, rows in ((1, self.modal), (2, self.pushed)):
+            found[k] += self.held @ (rows[:, : self.held.shape[1]].T @ (rows @ motions))
+        return found
 
 
 @brief
@@ -103,6 +120,8 @@ class Linearized:
         Residual of the state, as a fraction of the forces that act.
     unbalanced : float
         Residual of the state, N.
+    reacting : Reacting
+        Forces of supports.
     branches : Branches or None
         Branches of laws with memory. `stiffness` excludes them, as their stiffness depends on the
         frequency.
@@ -127,6 +146,7 @@ class Linearized:
     secant: float | None
     residual: float
     unbalanced: float
+    reacting: Reacting
     branches: Branches | None = field(default=None, repr=False)
     responding: Branches | None = field(default=None, repr=False)
 
@@ -246,9 +266,22 @@ def linearize(
         secant=None if secant is None else float(secant),
         residual=point.relative,
         unbalanced=point.balance.residual,
+        reacting=_reacting(case, stiffness, damping + more, mass, modal),
         branches=branches_of(case, point.dofs, free),
         responding=branches_of(case, point.dofs, free, dampers=True),
     )
+
+
+def _reacting(case: Case, stiffness: Mass, damping: Mass, mass: Mass, modal: NDArray) -> Reacting:
+    """How supports push back, with modal rows (r, m)."""
+    held = case.constraints.reactions
+    if isinstance(mass, Squared):
+        mass, pushed = mass.matrix, mass.rows
+    else:
+        pushed = np.zeros((0, modal.shape[1]))
+    own = (sparse.csr_array(held @ sparse.csr_array(each)[: held.shape[1]])
+           for each in (stiffness, damping, mass))  # fmt: skip
+    return Reacting(held, tuple(own), modal, pushed)
 
 
 def _symmetric(loads: sparse.csr_array, free: NDArray) -> sparse.csr_array:

@@ -4,18 +4,17 @@ The response to independent random drives with the densities S has the mean squa
 
     sum over drives of int |H(f)|^2 S(f) df .
 
-With H a sum of a few motions times amplitudes a(f), the integrals of a a* S give the mean squares
-at all nodes. They are computed by Gauss quadrature on intervals that are no longer than twice their
-distance from any pole: close to a resonance they shrink with its width, so that narrow peaks need
-no fine grid, and the error does not depend on the damping.
+H is a sum of a few motions times amplitudes. The integrals are computed by Gauss quadrature on
+intervals that are no longer than twice their distance from any pole: close to a resonance they
+shrink with its width, so that narrow peaks need no fine grid, and the error does not depend on the
+damping (`mean_squares`).
 """
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray
@@ -28,6 +27,7 @@ from foldyn.errors import InputError, ModelRangeWarning, warn
 from foldyn.linear.excitation import Drive, drive_of
 from foldyn.linear.frequency_domain import ModalResponse, SuperposedModes
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
+from foldyn.linear.mean_squares import TURN, Amounts, Driven, Found, Source, mean_squares
 from foldyn.linear.spectral_density import SpectralDensity
 from foldyn.linear.stresses import small_motions
 from foldyn.ram_limit import check_memory
@@ -44,22 +44,10 @@ from foldyn.strength.resultants import (
 )
 from foldyn.values import flag, number, numbers, of_kind, show, whole
 
-TURN = 2.0 * np.pi
-POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
-UNDAMPED = 1e-9  # damping ratios below this count as none
-HALVINGS = 60
-AT_ONCE = 2048  # frequencies whose amplitudes are in memory
 FEWEST, BEYOND = 10, 1.5  # least number of modes; their highest frequency over that of densities
 LEFT_OUT = 0.05  # share of the mass in modes above the spectra, of which a warning tells
-
-
-class Moments(NamedTuple):
-    """Mean squares of a response: its displacement and its first three derivatives, (n, 3)."""
-
-    displacement: NDArray
-    velocity: NDArray
-    acceleration: NDArray
-    jerk: NDArray
+FULL = 1e-9  # negative eigenvalues of a coherence, relative to 1, that are rounding
+COPIES = 3  # densities and mean squares over frequency in memory, about
 
 
 def random_response(
@@ -67,11 +55,13 @@ def random_response(
     *,
     base: Mapping[str, SpectralDensity] | None = None,
     forces: Sequence[tuple[Force | Sequence[Force], SpectralDensity]] = (),
+    coherence: ArrayLike = 0.0,
     state: State | str | None = None,
     count: int | None = None,
     load_factor: float = 1.0,
     frequencies: ArrayLike | None = None,
     stresses: bool = False,
+    reactions: bool = False,
 ) -> xarray.Dataset:
     """Root mean square response of a case to random vibration, linearized about a state.
 
@@ -85,7 +75,11 @@ def random_response(
     forces : sequence of (Force or sequence of Force, SpectralDensity)
         Forces without histories, with the density of a factor: the force times a random number of
         unit density would be the force itself. Forces in one sequence are in phase; others are
-        independent of each other and of the base.
+        independent of the base.
+    coherence : float or array_like
+        Of the pairs of `forces`: the real part of the cross density of two of them over the root of
+        the product of their densities, from -1 to 1; one number for all, or a symmetric matrix with
+        ones on its diagonal. By default 0: they are independent of each other.
     state : State or "equilibrium", optional
         State to vibrate about, as in `frf`; by default the rest state.
     count : int, optional
@@ -97,6 +91,8 @@ def random_response(
         Frequencies (Hz), increasing, at which the densities of the response are wanted.
     stresses : bool
         Whether to find stresses, too, at the points that `stresses` has, and moments of creases.
+    reactions : bool
+        Whether to find the forces of supports, too, and their sums.
 
     Returns
     -------
@@ -105,16 +101,18 @@ def random_response(
         absolute, and the mean numbers of zero crossings per second with rising values,
         `displacement_crossings` and `acceleration_crossings` (Hz; 0 where nothing moves). With
         `frequencies`, over frequency, node and axis: `displacement_psd` (m2/Hz) and
-        `acceleration_psd` (m2/s3), one-sided. With `stresses`, root mean squares of
-        `membrane_force`, `bending_moment`, `von_mises` and `crease_moment`, named `..._rms`.
-        `displacement` of the state. Largest values of a normal process are three times the root
-        mean square in 99.7 % of time.
+        `acceleration_psd` (m2/s3), one-sided, and `displacement_cumulative` and
+        `acceleration_cumulative`, the root mean squares of the part below each frequency.
+        With `stresses` the same of `membrane_force`, `bending_moment`, `von_mises` (without
+        crossings) and `crease_moment`; with `reactions` of `reaction` (support) and
+        `total_reaction` (axis), N. `displacement` of the state. Largest values of a normal process
+        are three times the root mean square in 99.7 % of time.
 
     Raises
     ------
     InputError
         No drive; a density of another kind than its drive; a mode without damping in the range of
-        the densities; an argument out of range, as in `frf`.
+        the densities; reactions of laws with memory; an argument out of range, as in `frf`.
 
     Warns
     -----
@@ -145,36 +143,41 @@ def random_response(
     began = time.perf_counter()
     count = None if count is None else whole("count", count, least=1, what="modes")
     load_factor = number("load_factor", load_factor)
-    at = None if frequencies is None else _increasing("frequencies", frequencies)
+    at = np.zeros(0) if frequencies is None else _increasing("frequencies", frequencies)
     drives = _drives(of_kind("case", case, Case), base, forces)
+    together = _coherence(coherence, len(forces))
     own, model = case, None
     if flag("stresses", stresses):
         check_stresses(case, "stresses")
         own = for_stresses(case)
         model = resultants_of(own) if has_stresses(own.structure) else None
     system = linearize(own, state, load_factor=load_factor)
-    total = np.zeros((4, *case.structure.nodes.shape))
+    if flag("reactions", reactions):
+        _check_reactions(system)
     top = max(max(density.frequency) for _, density in drives)
     pencil = Pencil(system.stiffness, system.mass)
     needed = min(pencil.finite, pencil.below((TURN * top) ** 2))
     if count is None:
         count = min(pencil.finite, max(FEWEST, pencil.below((TURN * BEYOND * top) ** 2)))
-    shape = 2, 0 if at is None else len(at), *case.structure.nodes.shape
-    check_memory("frequencies", f"densities at {shape[1]} frequencies", 16.0 * np.prod(shape),
-                 "take fewer")  # fmt: skip
-    curves = np.zeros(shape)
     modes = SuperposedModes(system, pencil, count)
-    squares: dict[str, NDArray] = {}
-    for drive, density in drives:
-        response = ModalResponse(modes, drive)
-        total += np.stack(_moments(system, drive, response, density))
-        if stresses:
-            for name, added in _stresses(system, model, drive, response, density, state).items():
-                squares[name] = squares.get(name, 0.0) + added
-        if at is not None:
-            curves += _densities(system, drive, response, density, at)
-        if drive.axis is not None:
-            _warn_of_mass(system, response, drive, density)
+    driven = [Driven(drive, ModalResponse(modes, drive), density) for drive, density in drives]
+    amounts = [
+        _moving(system, one)
+        | (_reacting(system, one) if reactions else {})
+        | (_stressed(system, model, one, state) if stresses else {})
+        for one in driven
+    ]
+    parts = sum(own.rows.shape[1] for own in amounts[0].values())
+    check_memory("frequencies", f"densities at {len(at)} frequencies",
+                 8.0 * COPIES * len(at) * parts, "take fewer")  # fmt: skip
+    total: dict[str, Found] = {}
+    for source in _sources(driven, amounts, together):
+        for name, found in mean_squares(source, at).items():
+            known = total.get(name)
+            total[name] = found if known is None else Found(*map(np.add, known, found))
+    for one in driven:
+        if one.drive.axis is not None:
+            _warn_of_mass(system, one)
     if count < needed:
         warn(
             f"{count} modes are taken of the {needed} below {top:.4g} Hz, where a density ends: "
@@ -182,16 +185,26 @@ def random_response(
             "random-vibration.md#how-it-is-computed",
         )
     warn_beyond(case.structure, np.array([top]), linear=True)
-    facts = {"modes": count, "wall_seconds": time.perf_counter() - began}
-    rates = _rates(Moments._make(list(total)))
-    more, points = {}, None
-    if stresses:
-        points = None if model is None else model.points
-        more = {name: np.sqrt(square) for name, square in squares.items()}
+    points = None if model is None else model.points
     return random_dataset(
-        case, system.displacement, *rates, facts, at, curves, more,
+        case, system.displacement, {name: _values(name, own) for name, own in total.items()},
+        {"modes": count, "wall_seconds": time.perf_counter() - began}, at,
         {} if points is None else point_coordinates(points),
     )  # fmt: skip
+
+
+def _values(name: str, found: Found) -> dict[str, NDArray]:
+    """Root mean squares and the like of a quantity, flat."""
+    if name == "von_mises":  # the mean squares of three combinations of components add up
+        found = Found(*(own[..., ::3] + own[..., 1::3] + own[..., 2::3] for own in found))
+    ratio = np.divide(found.rate, found.square, out=np.zeros_like(found.rate),
+                      where=found.square > 0.0)  # fmt: skip
+    out = {"rms": np.sqrt(found.square), "crossings": np.sqrt(ratio) / TURN}
+    if name == "von_mises":
+        del out["crossings"]  # it has no sign
+    if len(found.density):
+        out |= {"psd": found.density, "cumulative": np.sqrt(found.below)}
+    return out
 
 
 def _drives(
@@ -228,159 +241,121 @@ def _density(given: Any, measures: str, place: str) -> SpectralDensity:
     return density
 
 
-def _moments(
-    system: Linearized, drive: Drive, response: ModalResponse, density: SpectralDensity
-) -> Moments:
-    """Mean squares of the response to one drive."""
-    frequency, weight = _quadrature(response, density)
-    motions, squares = system.expanded(response.motions), np.zeros((4, system.displacement.size))
-    if drive.axis is not None:
-        whole = np.zeros_like(system.displacement)
-        whole[:, AXES.index(drive.axis)] = 1.0
-        motions = np.column_stack([motions, whole.ravel()])
-    for first in range(0, len(frequency), AT_ONCE):
-        part = slice(first, first + AT_ONCE)
-        omega = TURN * frequency[part]
-        power, amplitude = weight[part] * density.at(frequency[part]), response.amplitudes(omega)
-        powers = power * omega ** (2 * np.arange(4)[:, None])
-        if drive.axis is None:
-            squares += _mean_squares(motions, amplitude * drive.value, powers)
-            continue
-        relative = np.pad(amplitude, ((0, 0), (0, 1)))
-        absolute = np.pad(amplitude, ((0, 0), (0, 1)), constant_values=1.0)
-        squares[:2] += _mean_squares(motions, relative, powers[:2] / omega**4)
-        squares[2:] += _mean_squares(motions, absolute, powers[:2])
-    return Moments(*squares.clip(0.0).reshape(4, -1, 3))
+def _coherence(given: ArrayLike, count: int) -> NDArray[np.float64]:
+    """Factors (n, k) of n forces on k independent white noises, from their coherence."""
+    own = np.asarray(numbers("coherence", given), float)
+    if own.ndim == 0:
+        own = np.full((count, count), own)
+        own[np.diag_indices(count)] = 1.0
+    alike = own.shape == (count, count) and np.allclose(own, own.T)
+    if not alike or not np.allclose(np.diag(own), 1.0) or (np.abs(own) > 1.0).any():
+        raise InputError(
+            f": give a number from -1 to 1, or a symmetric {count} x {count} matrix with ones on "
+            "its diagonal",
+            "coherence",
+        )
+    if not own.size:
+        return own
+    values, vectors = np.linalg.eigh(own)
+    if values[0] < -FULL:
+        raise InputError(
+            ": no forces have these coherences (the matrix has a negative eigenvalue, "
+            f"{values[0]:.3g}); give smaller ones",
+            "coherence",
+        )
+    if np.array_equal(own, np.eye(count)):
+        return own
+    kept = values > FULL
+    return vectors[:, kept] * np.sqrt(values[kept])
 
 
-def _stresses(
-    system: Linearized, model: Resultants | None, drive: Drive, response: ModalResponse,
-    density: SpectralDensity, state: State | str | None,
-) -> dict[str, NDArray]:  # fmt: skip
-    """Mean squares of forces, moments and von Mises stresses of panels, and of creases' moments."""
-    motions = system.whole(response.motions)
-    panels, creases = small_motions(system.case, model, system.displacement, motions, state is None)
-    if drive.axis is not None:  # and what panels add, per unit of the acceleration of the base
-        creases = np.pad(creases, ((0, 1), (0, 0)))
-        if panels is not None:
-            carried = np.zeros((1, *panels.shape[1:]))
-            if isinstance(model, SuperelementResultants):
-                carried = model.accelerated(AXES.index(drive.axis)).reshape(carried.shape)
-            panels = np.concatenate([panels, carried])
-    rows = {"crease_moment": creases.T}
-    if panels is not None and model is not None:
-        points = model.points
-        panels = without_rigid(system.case, points, panels)
-        force, moment = np.moveaxis(panels, (2, 0), (0, -1))
-        stress = np.moveaxis(face_stresses(panels, points.thickness), 0, -1)
-        equivalent = np.einsum("ca,pfas->pfcs", np.linalg.cholesky(MISES).T, stress)
-        rows |= {"membrane_force": force, "bending_moment": moment, "von_mises": equivalent}
-    shapes = {name: own.shape[:-1] for name, own in rows.items()}
-    flat = np.concatenate([own.reshape(-1, len(creases)) for own in rows.values()])
-    frequency, weight = _quadrature(response, density)
-    found = np.zeros(len(flat))
-    for first in range(0, len(frequency), AT_ONCE):
-        part = slice(first, first + AT_ONCE)
-        omega = TURN * frequency[part]
-        power = weight[part] * density.at(frequency[part])
-        amplitude = response.amplitudes(omega)
-        if drive.axis is None:
-            power = power * drive.value**2
-        else:
-            amplitude = np.array(np.hstack([amplitude, -(omega[:, None] ** 2)]), np.complex128)
-            power = power / omega**4
-        found += _mean_squares(flat, amplitude, power[None])[0]
-    ends = np.cumsum([math.prod(shape) for shape in shapes.values()])[:-1]
-    parts = zip(shapes.items(), np.split(found.clip(0.0), ends), strict=True)
-    out = {name: own.reshape(shape) for (name, shape), own in parts}
-    if "von_mises" in out:
-        out["von_mises"] = out["von_mises"].sum(axis=-1)
+def _sources(
+    driven: Sequence[Driven], amounts: Sequence[dict[str, Amounts]], together: NDArray
+) -> list[Source]:
+    """Independent sources: each axis of the base, and the noises from which forces are mixed."""
+    shaken = len(driven) - len(together)
+    out = [Source((driven[k],), (1.0,), (amounts[k],)) for k in range(shaken)]
+    for noise in together.T:
+        acting = np.flatnonzero(noise).tolist()
+        out.append(
+            Source(
+                tuple(driven[shaken + k] for k in acting),
+                tuple(float(noise[k]) for k in acting),
+                tuple(amounts[shaken + k] for k in acting),
+            )
+        )
     return out
 
 
-def _densities(
-    system: Linearized, drive: Drive, response: ModalResponse, density: SpectralDensity, at: NDArray
-) -> NDArray[np.float64]:
-    """Densities (2, nf, n, 3) of displacement and absolute acceleration due to one drive."""
-    amplitude, omega = response.amplitudes(TURN * at), TURN * at
-    moved = (amplitude @ system.expanded(response.motions).T).reshape(len(at), -1, 3)
-    accelerated = moved * (omega**2)[:, None, None]
-    if drive.axis is None:
-        moved, accelerated = moved * drive.value, accelerated * drive.value
-    else:
-        accelerated = moved.copy()
-        accelerated[..., AXES.index(drive.axis)] += 1.0
-        moved = moved / (omega**2)[:, None, None]
-    return np.abs(np.stack([moved, accelerated])) ** 2 * density.at(at)[:, None, None]
+def _moving(system: Linearized, driven: Driven) -> dict[str, Amounts]:
+    """Displacements relative to the base, and absolute accelerations, of all nodes."""
+    motions = np.pad(system.expanded(driven.response.motions), ((0, 0), (0, 2)))
+    absolute = motions
+    if driven.drive.axis is not None:
+        absolute = motions.copy()
+        absolute[AXES.index(driven.drive.axis) :: 3, -2] = 1.0
+    return {"displacement": Amounts(motions[None]), "acceleration": Amounts(absolute[None], (2,))}
 
 
-def _mean_squares(
-    motions: NDArray, amplitude: NDArray[np.complex128], powers: NDArray
-) -> NDArray[np.float64]:
-    """Mean squares (k, 3n) of motions (3n, r) with amplitudes (nf, r) and powers (k, nf)."""
-    if len(motions) <= motions.shape[1]:  # what moves is less than what is superposed
-        moved: NDArray[np.complex128] = amplitude @ motions.T
-        return powers @ (moved.real**2 + moved.imag**2)
-    found = []
-    for power in powers:
-        gram = sum(part.T @ (power[:, None] * part) for part in (amplitude.real, amplitude.imag))
-        found.append(np.einsum("ia,ia->i", motions @ gram, motions))
-    return np.array(found)
-
-
-def _quadrature(response: ModalResponse, density: SpectralDensity) -> tuple[NDArray, NDArray]:
-    """Frequencies and weights (nf,), Hz, that integrate a response between a density's points."""
-    poles = _poles(response, density)
-    ends = [(a, b) for a, b in zip(density.frequency[:-1], density.frequency[1:], strict=True)]
-    first, last = (np.array(column) for column in zip(*ends, strict=True))
-    kept: list[tuple[NDArray, NDArray]] = []
-    for _ in range(HALVINGS):
-        nearest = np.clip(poles.real[:, None], first, last)
-        distance = np.hypot(poles.real[:, None] - nearest, poles.imag[:, None])
-        distance = np.minimum(distance.min(axis=0, initial=np.inf), first)  # 0 Hz is a pole, too
-        done = last - first <= 2.0 * distance
-        kept.append((first[done], last[done]))
-        middle = 0.5 * (first[~done] + last[~done])
-        first, last = np.append(first[~done], middle), np.append(middle, last[~done])
-    first, last = (np.concatenate(column) for column in zip(*kept, strict=True))
-    half = 0.5 * (last - first)
-    frequency = (first + half)[:, None] + half[:, None] * POINTS
-    return frequency.ravel(), (half[:, None] * WEIGHTS).ravel()
-
-
-def _poles(response: ModalResponse, density: SpectralDensity) -> NDArray[np.complex128]:
-    """Poles (k,), Hz: natural frequencies, and half widths of their peaks as imaginary parts."""
-    basis, modal = response.modes.basis, response.modes.basis.inertia > 0.0
-    frequency = np.sqrt(basis.values[modal].clip(0.0)) / TURN
-    width = response.modes.damping.diagonal()[modal] / (2.0 * TURN)
-    low, high = density.frequency[0], density.frequency[-1]
-    free = (width <= UNDAMPED * frequency) & (frequency >= low) & (frequency <= high)
-    if free.any() and not response.remembers:
-        k = int(free.argmax())
+def _check_reactions(system: Linearized) -> None:
+    if system.responding is not None:
         raise InputError(
-            f": the mode at {frequency[k]:.6g} Hz has no damping, so that its random response is "
-            "unbounded: give some, as ModalDamping(0.01)",
-            "damping",
+            ": creases with memory, or with dampers between compliant panels, push back with a "
+            "force that depends on the frequency, which reactions leave out; take reactions = "
+            "False, or an elastic law and Rayleigh or ModalDamping",
+            "reactions",
         )
-    return frequency + 1j * np.maximum(width, UNDAMPED * frequency)
+    if not system.reacting.held.shape[0]:
+        raise InputError(": no support holds the case; take reactions = False", "reactions")
 
 
-def _warn_of_mass(
-    system: Linearized, response: ModalResponse, drive: Drive, density: SpectralDensity
-) -> None:
+def _reacting(system: Linearized, driven: Driven) -> dict[str, Amounts]:
+    """Forces of supports: K x + C x' + M x'' of the absolute motion, less what drives them."""
+    motions = np.pad(system.whole(driven.response.motions), ((0, 0), (0, 2)))
+    nodes = system.displacement.size
+    if driven.drive.axis is not None:
+        motions[AXES.index(driven.drive.axis) : nodes : 3, -2] = 1.0
+    rows = system.reacting.of(motions)
+    if driven.drive.axis is None:
+        rows[0, :, -1] -= system.reacting.held @ driven.drive.vector.ravel()
+    along = np.arange(3)[:, None] == system.case.reaction_dofs % 3
+    total = along.astype(float) @ rows
+    return {"reaction": Amounts(rows, (0, 1, 2)), "total_reaction": Amounts(total, (0, 1, 2))}
+
+
+def _stressed(
+    system: Linearized, model: Resultants | None, driven: Driven, state: State | str | None
+) -> dict[str, Amounts]:
+    """Forces and moments of panels, what makes up von Mises stresses, and creases' moments."""
+    motions, axis = system.whole(driven.response.motions), driven.drive.axis
+    panels, creases = small_motions(system.case, model, system.displacement, motions, state is None)
+    rows = {"crease_moment": np.pad(creases, ((0, 2), (0, 0))).T}
+    if panels is not None and model is not None:
+        carried = np.zeros((2, *panels.shape[1:]))
+        if axis is not None and isinstance(model, SuperelementResultants):
+            carried[1] = model.accelerated(AXES.index(axis)).reshape(carried.shape[1:])
+        panels = without_rigid(system.case, model.points, np.concatenate([panels, carried]))
+        force, moment = np.moveaxis(panels, (2, 0), (0, -1))
+        stress = np.moveaxis(face_stresses(panels, model.points.thickness), 0, -1)
+        equivalent = np.einsum("ca,pfas->pfcs", np.linalg.cholesky(MISES).T, stress)
+        rows |= {"membrane_force": force, "bending_moment": moment, "von_mises": equivalent}
+    return {name: Amounts(own.reshape(1, -1, own.shape[-1])) for name, own in rows.items()}
+
+
+def _warn_of_mass(system: Linearized, driven: Driven) -> None:
     """Warn if modes above the density's highest frequency have much of the mass along its axis."""
-    axis, basis = AXES.index(drive.axis or "x"), response.modes.basis
-    modal = basis.inertia > 0.0
+    axis, basis = AXES.index(driven.drive.axis or "x"), driven.response.modes.basis
+    modal, top = basis.inertia > 0.0, driven.density.frequency[-1]
     inertia = system.inertia[:, axis]
     effective = (basis.shapes[:, modal].T @ inertia) ** 2
-    within = np.sqrt(basis.values[modal].clip(0.0)) / TURN <= density.frequency[-1]
+    within = np.sqrt(basis.values[modal].clip(0.0)) / TURN <= top
     along = (system.free < system.displacement.size) & (system.free % 3 == axis)
     whole = inertia[along].sum()  # 0 if only edges and panels between held nodes move
     share = 1.0 - effective[within].sum() / whole if whole > 0.0 else 0.0
     if share > LEFT_OUT:
         warn(
-            f"modes above {density.frequency[-1]:.4g} Hz, where the density along {drive.axis} "
-            f"ends, have {share:.0%} of the moving mass: extend the density if it goes on there",
+            f"modes above {top:.4g} Hz, where the density along {driven.drive.axis} ends, have "
+            f"{share:.0%} of the moving mass: extend the density if it goes on there",
             "random-vibration.md#how-it-is-computed",
             ModelRangeWarning,
         )
@@ -394,13 +369,3 @@ def _increasing(name: str, given: ArrayLike) -> NDArray[np.float64]:
     if (np.diff(frequency) <= 0.0).any():
         raise InputError(": must increase; sort them and drop doubles", name)
     return frequency
-
-
-def _rates(moments: Moments) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Root mean squares of displacement and acceleration (n, 3), and their zero crossings, Hz."""
-    pairs = (moments.displacement, moments.velocity), (moments.acceleration, moments.jerk)
-    out = [np.sqrt(square) for square, _ in pairs]
-    for square, rate in pairs:
-        ratio = np.divide(rate, square, out=np.zeros_like(rate), where=square > 0.0)
-        out.append(np.sqrt(ratio) / TURN)
-    return out[0], out[1], out[2], out[3]

@@ -31,9 +31,8 @@ from foldyn.results.quantities import (
     PLACE,
     POINTS,
     RANDOM,
-    RANDOM_CURVES,
     RESPONSES,
-    STRESSES,
+    STATISTICS,
     Quantity,
     energies_of,
     variable,
@@ -283,47 +282,46 @@ def frf_dataset(
 
 
 def random_dataset(
-    case: Case, place: ArrayLike, displacement: ArrayLike, acceleration: ArrayLike,
-    moving: ArrayLike, accelerating: ArrayLike, statistics: Mapping[str, Any],
-    frequency: ArrayLike | None = None, densities: ArrayLike | None = None,
-    stresses: Mapping[str, ArrayLike] | None = None, points: Mapping[str, Any] | None = None,
+    case: Case, place: ArrayLike, found: Mapping[str, Mapping[str, NDArray]],
+    statistics: Mapping[str, Any], frequency: NDArray, points: Mapping[str, Any],
 ) -> xr.Dataset:  # fmt: skip
-    """Dataset of a random response, including its case; arrays (n, 3) unless stated otherwise.
+    """Dataset of a random response, including its case.
 
     Parameters
     ----------
     case : Case
         The case that responds, without the drives.
-    place : array_like
+    place : array_like, shape (n, 3)
         Displacement (m) of the state about which the case moves.
-    displacement, acceleration : array_like
-        Root mean squares, m and m/s2.
-    moving, accelerating : array_like
-        Zero crossings of these with rising values, Hz.
+    found : mapping
+        Of each quantity in `quantities.RANDOM`, its `STATISTICS`, whose last dimension has all
+        parts.
     statistics : mapping
         Facts about the run, each stored as an attribute.
-    frequency, densities : array_like, shapes (nf,) and (2, nf, n, 3), optional
-        Frequencies (Hz), and densities of displacement and acceleration there.
-    stresses, points : mapping, optional
-        Root mean squares of variables of `quantities.STRESSES`, and the coordinates of points.
+    frequency : (nf,)
+        Frequencies (Hz) of densities; none without these.
+    points : mapping
+        Coordinates of the points of stresses.
     """
-    values = (displacement, acceleration, moving, accelerating)
-    data = {
-        name: variable(PLACE, value, quantity.units, quantity.text)
-        for (name, quantity), value in zip(RANDOM.items(), values, strict=True)
-    }
-    data["displacement"] = variable(PLACE, place, "m", "displacement of the state")
-    for name, value in (stresses or {}).items():
-        own = STRESSES[name]
-        text = f"root mean square: {own.text}"
-        data[f"{name}_rms"] = variable(own.dims, value, own.units, text)
-    along: dict[str, Any] = dict(points or {})
-    if frequency is not None and densities is not None:
-        data |= variables(
-            RANDOM_CURVES, "frequency", dict(zip(RANDOM_CURVES, np.asarray(densities), strict=True))
-        )
-        along["frequency"] = ("frequency", np.array(frequency, float), {"units": "Hz"})
-    return result_dataset("random", case, data, along, statistics)
+    data = {"displacement": variable(PLACE, place, "m", "displacement of the state")}
+    sizes = {
+        "node": len(case.structure.nodes), "axis": 3, "support": len(case.reaction_dofs),
+        "component": 3, "face": 2, "crease": len(case.structure.pattern.creases), "point": -1,
+    }  # fmt: skip
+    for name, parts in found.items():
+        own = RANDOM[name]
+        shape = [sizes[dim] for dim in own.dims]
+        for kind, value in parts.items():
+            unit, text, along = STATISTICS[kind]
+            data[f"{name}_{kind}"] = variable(
+                (*along, *own.dims), value.reshape(*value.shape[:-1], *shape),
+                unit.format(f"({own.units})" if "/" in own.units else own.units),
+                text.format(own.text),
+            )  # fmt: skip
+    coordinates: dict[str, Any] = dict(points)
+    if len(frequency):
+        coordinates["frequency"] = ("frequency", frequency, {"units": "Hz"})
+    return result_dataset("random", case, data, coordinates, statistics)
 
 
 def bands_dataset(

@@ -136,18 +136,6 @@ INTERNAL: Mapping[str, Quantity] = {
 }
 """Further variables of modes, of some models or in air. The dimension `between` counts the
 middles of edges and spokes, panel by panel."""
-RANDOM: Mapping[str, Quantity] = {
-    "displacement_rms": Quantity("m", "root mean square displacement, relative to the base"),
-    "acceleration_rms": Quantity("m/s2", "root mean square of the absolute acceleration"),
-    "displacement_crossings": Quantity("Hz", "zero crossings of the displacement, rising"),
-    "acceleration_crossings": Quantity("Hz", "zero crossings of the acceleration, rising"),
-}
-"""Variables of a random response,"""
-RANDOM_CURVES: Mapping[str, Quantity] = {
-    "displacement_psd": Quantity("m2/Hz", "density of the displacement", PLACE),
-    "acceleration_psd": Quantity("m2/s3", "density of the absolute acceleration", PLACE),
-}
-"""and those over frequency."""
 STRESSES: Mapping[str, Quantity] = {
     "membrane_force": Quantity("N/m", "membrane force", ("point", "component")),
     "bending_moment": Quantity(
@@ -163,6 +151,22 @@ STRESSES: Mapping[str, Quantity] = {
     ),
 }
 """Variables of stresses, in addition along the states of a result."""
+RANDOM: Mapping[str, Quantity] = {
+    "displacement": Quantity("m", "displacement, relative to the base", PLACE),
+    "acceleration": Quantity("m/s2", "absolute acceleration", PLACE),
+    "reaction": Quantity("N", "force of the support", ("support",)),
+    "total_reaction": Quantity("N", "sum of the forces of the supports", ("axis",)),
+    **{name: STRESSES[name] for name in ("membrane_force", "bending_moment", "von_mises")},
+    "crease_moment": STRESSES["crease_moment"],
+}
+"""What responds at random, with its unit; of each there are"""
+STATISTICS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
+    "rms": ("{}", "root mean square: {}", ()),
+    "crossings": ("Hz", "zero crossings, rising: {}", ()),
+    "psd": ("{}2/Hz", "one-sided spectral density: {}", ("frequency",)),
+    "cumulative": ("{}", "root mean square of the part below the frequency: {}", ("frequency",)),
+}
+"""variables of the form "displacement_rms": unit, text and further dimensions."""
 MARGINS: Mapping[str, Quantity] = {
     "panel_margin": Quantity("1", "least margin of safety of the panel", ("panel",)),
     "panel_point": Quantity(text="point of the stresses at which it is least", dims=("panel",)),
