@@ -278,7 +278,12 @@ def solved(folder: Path) -> Calls:
             "base": {"z": fd.SpectralDensity([1.0, 50.0], [0.1, 0.1], "m2/s3")},
             "forces": [(fd.Force([4], (0, 0, 1.0)), fd.SpectralDensity([1, 9], [1, 2], "N2/Hz"))],
             "state": None, "count": 3, "load_factor": 1.0, "frequencies": [1.0, 2.0],
-            "stresses": False,
+            "stresses": False, "reactions": True, "coherence": 0.0,
+        }),
+        "spectrum_response": (fd.spectrum_response, {
+            "case": case().altered(damping=fd.ModalDamping(0.02)),
+            "base": {"z": ([0.1, 50.0], [1.0, 2.0])}, "combine": "cqc", "count": 3, "state": None,
+            "load_factor": 1.0, "stresses": False, "reactions": True,
         }),
         "stresses": (fd.stresses, {"result": path}),
         "margins": (fd.margins, {

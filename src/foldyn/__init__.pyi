@@ -85,6 +85,7 @@ from foldyn.linear import (
     margins as margins,
     modes as modes,
     random_response as random_response,
+    spectrum_response as spectrum_response,
     stresses as stresses,
 )
 from foldyn.materials import (

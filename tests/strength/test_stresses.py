@@ -259,8 +259,8 @@ def test_stresses_do_not_change_if_the_sheet_turns():
 def test_random_responses_have_the_stresses_of_frequency_responses():
     case = fd.Case(fd.superelements(MIURA, PAPER), HELD, damping=fd.Rayleigh(alpha=30.0, beta=1e-4))
     noise = fd.SpectralDensity([6, 12, 20], [0.001, 0.004, 0.004], "g2/Hz")
+    f = np.linspace(6.0, 20.0, 57)
     with pytest.warns(fd.errors.ModelRangeWarning):
-        f = np.linspace(6.0, 20.0, 57)
         found = fd.random_response(case, base={"z": noise}, stresses=True, frequencies=f)
     curve = fd.stresses(fd.frf(case, [fd.BaseMotion("z")], frequencies=f, check_model=False))
     power = noise.at(f) / (2.0 * np.pi * f) ** 4

@@ -20,6 +20,7 @@ from foldyn.linear.peaks_of import Peak, peaks_of
 from foldyn.linear.random_response import random_response
 from foldyn.linear.reference import Refinement, refinement
 from foldyn.linear.spectral_density import SpectralDensity
+from foldyn.linear.spectrum_response import spectrum_response
 from foldyn.linear.stresses import stresses
 from foldyn.linear.time_domain import SteppedSine
 from foldyn.linear.transients import BurstRandom, Impulse
@@ -63,6 +64,7 @@ __all__ = [
     "refinement",
     "relaxed",
     "space_time",
+    "spectrum_response",
     "stresses",
     "transmission",
     "wave_spectrum",

@@ -18,6 +18,7 @@ from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import MARGINS, variables
 from foldyn.values import number, numbers, show
 
+LARGEST = {"random": "rms", "spectrum": "peak"}  # results that hold one value for all times
 WORDS = {
     "center": "at its center",
     "edge": "at the middle of its edge {}",
@@ -41,7 +42,8 @@ def margins(
     Parameters
     ----------
     result : xarray.Dataset
-        A path or a motion; a result of `stresses` of one; or a random response with stresses.
+        A path or a motion; a result of `stresses` of one; or a response to a random base or a
+        shock with stresses.
     strength : float, optional
         Largest von Mises stress of all panels, Pa; by default that of the sheet
         (`Sheet.strength`).
@@ -56,9 +58,9 @@ def margins(
     -------
     xarray.Dataset
         `panel_margin` (panel), with `panel_point`, the point (as in `stresses`) where it is least,
-        and `panel_state`, the load factor or time (nan in random responses); `crease_margin`
-        (crease) and `crease_state`. A margin is inf without stress, and nan without a strength.
-        Attributes: `least_margin`, and in words `least_where`.
+        and `panel_state`, the load factor or time (nan in random responses and shocks);
+        `crease_margin` (crease) and `crease_state`. A margin is inf without stress, and nan without
+        a strength. Attributes: `least_margin`, and in words `least_where`.
 
     Raises
     ------
@@ -114,14 +116,16 @@ def _stressed(
     result: xarray.Dataset, sigmas: float
 ) -> tuple[xarray.Dataset, NDArray, Callable[[float], str]]:
     """Stresses along states, where these are (s,), and words for such a place."""
-    if result.attrs["foldyn_result"] == "random":
-        if "crease_moment_rms" not in result:
+    if result.attrs["foldyn_result"] in LARGEST:
+        kind = LARGEST[result.attrs["foldyn_result"]]
+        if f"crease_moment_{kind}" not in result:
             raise InputError(
-                ": this random response has no stresses; compute it with stresses = True", "result"
+                ": this response has no stresses; compute it with stresses = True", "result"
             )
-        names = {f"{name}_rms": name for name in ("von_mises", "crease_moment")}
+        names = {f"{name}_{kind}": name for name in ("von_mises", "crease_moment")}
         kept = [name for name in names if name in result]
-        found = sigmas * result[kept].rename({name: names[name] for name in kept})
+        found = result[kept].rename({name: names[name] for name in kept})
+        found = sigmas * found if kind == "rms" else found
         return found.expand_dims("state"), np.array([np.nan]), lambda _: ""
     found = result if result.attrs["foldyn_result"] == "stresses" else stresses(result)
     kind = str(found.attrs["of"])

@@ -1,8 +1,7 @@
 """Mean squares, densities and zero crossings of what moves linearly with random drives.
 
-A quantity is the sum over powers p of (i w)^p R_p a(w), in which a has the amplitudes of the
-motions that a drive superposes, with two more columns: the displacement of the base, and the drive
-itself. Drives of one source act together, with the amplitudes of a unit white noise.
+Quantities and columns are those of `amounts`. Drives of one source act together, with the
+amplitudes of a unit white noise.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.linear.amounts import Amounts
 from foldyn.linear.excitation import Drive
 from foldyn.linear.frequency_domain import ModalResponse
 from foldyn.linear.spectral_density import SpectralDensity
@@ -44,18 +44,6 @@ class Driven(NamedTuple):
         root = np.sqrt(self.density.at(omega / TURN))
         columns = root[:, None] * np.column_stack([own, base, unit])
         return np.array(columns, np.complex128)
-
-
-class Amounts(NamedTuple):
-    """How much of a quantity belongs to each column of one drive.
-
-    rows : (powers, k, c)
-        R_p of the k parts of the quantity.
-    powers : tuple of int
-    """
-
-    rows: NDArray
-    powers: tuple[int, ...] = (0,)
 
 
 class Source(NamedTuple):

@@ -24,24 +24,14 @@ from foldyn.algebra.eigen import Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError, ModelRangeWarning, warn
+from foldyn.linear.amounts import Amounts, Parts, squared_parts
 from foldyn.linear.excitation import Drive, drive_of
 from foldyn.linear.frequency_domain import ModalResponse, SuperposedModes
-from foldyn.linear.linearized import Linearized, linearize, warn_beyond
-from foldyn.linear.mean_squares import TURN, Amounts, Driven, Found, Source, mean_squares
+from foldyn.linear.linearized import Linearized, warn_beyond
+from foldyn.linear.mean_squares import TURN, Driven, Found, Source, mean_squares
 from foldyn.linear.spectral_density import SpectralDensity
-from foldyn.linear.stresses import small_motions
 from foldyn.ram_limit import check_memory
 from foldyn.results import random_dataset
-from foldyn.strength.dataset import MISES, face_stresses, point_coordinates
-from foldyn.strength.resultants import (
-    Resultants,
-    SuperelementResultants,
-    check_stresses,
-    for_stresses,
-    has_stresses,
-    resultants_of,
-    without_rigid,
-)
 from foldyn.values import flag, number, numbers, of_kind, show, whole
 
 FEWEST, BEYOND = 10, 1.5  # least number of modes; their highest frequency over that of densities
@@ -146,14 +136,11 @@ def random_response(
     at = np.zeros(0) if frequencies is None else _increasing("frequencies", frequencies)
     drives = _drives(of_kind("case", case, Case), base, forces)
     together = _coherence(coherence, len(forces))
-    own, model = case, None
-    if flag("stresses", stresses):
-        check_stresses(case, "stresses")
-        own = for_stresses(case)
-        model = resultants_of(own) if has_stresses(own.structure) else None
-    system = linearize(own, state, load_factor=load_factor)
-    if flag("reactions", reactions):
-        _check_reactions(system)
+    parts = Parts(
+        case, state, load_factor=load_factor, stresses=flag("stresses", stresses),
+        reactions=flag("reactions", reactions),
+    )  # fmt: skip
+    system = parts.system
     top = max(max(density.frequency) for _, density in drives)
     pencil = Pencil(system.stiffness, system.mass)
     needed = min(pencil.finite, pencil.below((TURN * top) ** 2))
@@ -161,15 +148,10 @@ def random_response(
         count = min(pencil.finite, max(FEWEST, pencil.below((TURN * BEYOND * top) ** 2)))
     modes = SuperposedModes(system, pencil, count)
     driven = [Driven(drive, ModalResponse(modes, drive), density) for drive, density in drives]
-    amounts = [
-        _moving(system, one)
-        | (_reacting(system, one) if reactions else {})
-        | (_stressed(system, model, one, state) if stresses else {})
-        for one in driven
-    ]
-    parts = sum(own.rows.shape[1] for own in amounts[0].values())
+    amounts = [parts.amounts(one.drive, one.response) for one in driven]
+    size = sum(own.rows.shape[1] for own in amounts[0].values())
     check_memory("frequencies", f"densities at {len(at)} frequencies",
-                 8.0 * COPIES * len(at) * parts, "take fewer")  # fmt: skip
+                 8.0 * COPIES * len(at) * size, "take fewer")  # fmt: skip
     total: dict[str, Found] = {}
     for source in _sources(driven, amounts, together):
         for name, found in mean_squares(source, at).items():
@@ -185,18 +167,15 @@ def random_response(
             "random-vibration.md#how-it-is-computed",
         )
     warn_beyond(case.structure, np.array([top]), linear=True)
-    points = None if model is None else model.points
     return random_dataset(
         case, system.displacement, {name: _values(name, own) for name, own in total.items()},
-        {"modes": count, "wall_seconds": time.perf_counter() - began}, at,
-        {} if points is None else point_coordinates(points),
+        {"modes": count, "wall_seconds": time.perf_counter() - began}, at, parts.coordinates,
     )  # fmt: skip
 
 
 def _values(name: str, found: Found) -> dict[str, NDArray]:
     """Root mean squares and the like of a quantity, flat."""
-    if name == "von_mises":  # the mean squares of three combinations of components add up
-        found = Found(*(own[..., ::3] + own[..., 1::3] + own[..., 2::3] for own in found))
+    found = Found(*(squared_parts(name, own) for own in found))
     ratio = np.divide(found.rate, found.square, out=np.zeros_like(found.rate),
                       where=found.square > 0.0)  # fmt: skip
     out = {"rms": np.sqrt(found.square), "crossings": np.sqrt(ratio) / TURN}
@@ -285,61 +264,6 @@ def _sources(
             )
         )
     return out
-
-
-def _moving(system: Linearized, driven: Driven) -> dict[str, Amounts]:
-    """Displacements relative to the base, and absolute accelerations, of all nodes."""
-    motions = np.pad(system.expanded(driven.response.motions), ((0, 0), (0, 2)))
-    absolute = motions
-    if driven.drive.axis is not None:
-        absolute = motions.copy()
-        absolute[AXES.index(driven.drive.axis) :: 3, -2] = 1.0
-    return {"displacement": Amounts(motions[None]), "acceleration": Amounts(absolute[None], (2,))}
-
-
-def _check_reactions(system: Linearized) -> None:
-    if system.responding is not None:
-        raise InputError(
-            ": creases with memory, or with dampers between compliant panels, push back with a "
-            "force that depends on the frequency, which reactions leave out; take reactions = "
-            "False, or an elastic law and Rayleigh or ModalDamping",
-            "reactions",
-        )
-    if not system.reacting.held.shape[0]:
-        raise InputError(": no support holds the case; take reactions = False", "reactions")
-
-
-def _reacting(system: Linearized, driven: Driven) -> dict[str, Amounts]:
-    """Forces of supports: K x + C x' + M x'' of the absolute motion, less what drives them."""
-    motions = np.pad(system.whole(driven.response.motions), ((0, 0), (0, 2)))
-    nodes = system.displacement.size
-    if driven.drive.axis is not None:
-        motions[AXES.index(driven.drive.axis) : nodes : 3, -2] = 1.0
-    rows = system.reacting.of(motions)
-    if driven.drive.axis is None:
-        rows[0, :, -1] -= system.reacting.held @ driven.drive.vector.ravel()
-    along = np.arange(3)[:, None] == system.case.reaction_dofs % 3
-    total = along.astype(float) @ rows
-    return {"reaction": Amounts(rows, (0, 1, 2)), "total_reaction": Amounts(total, (0, 1, 2))}
-
-
-def _stressed(
-    system: Linearized, model: Resultants | None, driven: Driven, state: State | str | None
-) -> dict[str, Amounts]:
-    """Forces and moments of panels, what makes up von Mises stresses, and creases' moments."""
-    motions, axis = system.whole(driven.response.motions), driven.drive.axis
-    panels, creases = small_motions(system.case, model, system.displacement, motions, state is None)
-    rows = {"crease_moment": np.pad(creases, ((0, 2), (0, 0))).T}
-    if panels is not None and model is not None:
-        carried = np.zeros((2, *panels.shape[1:]))
-        if axis is not None and isinstance(model, SuperelementResultants):
-            carried[1] = model.accelerated(AXES.index(axis)).reshape(carried.shape[1:])
-        panels = without_rigid(system.case, model.points, np.concatenate([panels, carried]))
-        force, moment = np.moveaxis(panels, (2, 0), (0, -1))
-        stress = np.moveaxis(face_stresses(panels, model.points.thickness), 0, -1)
-        equivalent = np.einsum("ca,pfas->pfcs", np.linalg.cholesky(MISES).T, stress)
-        rows |= {"membrane_force": force, "bending_moment": moment, "von_mises": equivalent}
-    return {name: Amounts(own.reshape(1, -1, own.shape[-1])) for name, own in rows.items()}
 
 
 def _warn_of_mass(system: Linearized, driven: Driven) -> None:

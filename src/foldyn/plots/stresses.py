@@ -40,8 +40,8 @@ def draw_stresses(
     Parameters
     ----------
     found : xarray.Dataset
-        A result of `foldyn.stresses`, of `foldyn.margins`, or of `foldyn.random_response` with
-        stresses.
+        A result of `foldyn.stresses`, of `foldyn.margins`, or of `foldyn.random_response` or
+        `foldyn.spectrum_response` with stresses.
     quantity : {"von_mises", "crease_moment", "panel_margin", "crease_margin"}, optional
         By default the first of these that the result has. Of stresses, the largest of a panel.
     state : int, optional
@@ -60,7 +60,9 @@ def draw_stresses(
         A result without such a quantity; a state that it does not have.
     """
     of_kind("found", found, xr.Dataset)
-    named = {name.removesuffix("_rms"): name for name in map(str, found.data_vars)}
+    named = {
+        name.removesuffix("_rms").removesuffix("_peak"): name for name in map(str, found.data_vars)
+    }
     known = [name for name in QUANTITIES if name in named]
     if not known:
         raise InputError(": has no stresses; give a result of fd.stresses or fd.margins", "found")

@@ -284,8 +284,9 @@ def frf_dataset(
 def random_dataset(
     case: Case, place: ArrayLike, found: Mapping[str, Mapping[str, NDArray]],
     statistics: Mapping[str, Any], frequency: NDArray, points: Mapping[str, Any],
+    of: str = "random",
 ) -> xr.Dataset:  # fmt: skip
-    """Dataset of a random response, including its case.
+    """Dataset of a response to a random base or to a shock, including its case.
 
     Parameters
     ----------
@@ -302,6 +303,8 @@ def random_dataset(
         Frequencies (Hz) of densities; none without these.
     points : mapping
         Coordinates of the points of stresses.
+    of : {"random", "spectrum"}
+        Kind of the result.
     """
     data = {"displacement": variable(PLACE, place, "m", "displacement of the state")}
     sizes = {
@@ -321,7 +324,7 @@ def random_dataset(
     coordinates: dict[str, Any] = dict(points)
     if len(frequency):
         coordinates["frequency"] = ("frequency", frequency, {"units": "Hz"})
-    return result_dataset("random", case, data, coordinates, statistics)
+    return result_dataset(of, case, data, coordinates, statistics)
 
 
 def bands_dataset(

@@ -159,9 +159,10 @@ RANDOM: Mapping[str, Quantity] = {
     **{name: STRESSES[name] for name in ("membrane_force", "bending_moment", "von_mises")},
     "crease_moment": STRESSES["crease_moment"],
 }
-"""What responds at random, with its unit; of each there are"""
+"""What responds to a random base or a shock, with its unit; of each there are"""
 STATISTICS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
     "rms": ("{}", "root mean square: {}", ()),
+    "peak": ("{}", "largest value in a shock: {}", ()),
     "crossings": ("Hz", "zero crossings, rising: {}", ()),
     "psd": ("{}2/Hz", "one-sided spectral density: {}", ("frequency",)),
     "cumulative": ("{}", "root mean square of the part below the frequency: {}", ("frequency",)),
