@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -289,11 +290,77 @@ def test_motions_have_the_stresses_of_paths():
     np.testing.assert_allclose(found.von_mises[1], path.von_mises, rtol=0.05)
 
 
+PANELS = {"divisions": 12}
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize("load", ["force", "gravity", "crease", "heat"])
+def test_slow_motions_of_superelements_have_the_stresses_of_paths(load):
+    """A load that rises within a hundred of the longest periods, and stays."""
+    loads = {
+        "force": lambda **own: fd.Force([8], (0.0, 0.0, -1e-3), **own),
+        "gravity": lambda **own: fd.Gravity((0.0, 0.0, -0.1), **own),
+        "crease": lambda **own: fd.Actuate([0], 112.0, **own),
+        "heat": lambda **own: fd.Temperature(1.0, expansion=1e-5, curvature=1e-3, **own),
+    }
+    case = fd.Case(fd.superelements(MIURA, PAPER, **PANELS), HELD, damping=fd.Rayleigh(60.0, 1e-4))
+    path = last(case.altered(loads=[loads[load]()]))
+    slow = fd.simulate(
+        case.altered(loads=[loads[load](history=fd.Ramp(2.0, smooth=True))]), 2.5, interval=0.05
+    )
+    found = fd.stresses(slow).isel(time=-1)
+    stress, moment = path.stress.values, path.crease_moment.values
+    np.testing.assert_allclose(found.stress, stress, atol=0.012 * np.abs(stress).max())
+    np.testing.assert_allclose(found.crease_moment, moment, atol=5e-3 * np.abs(moment).max())
+    assert np.abs(fd.stresses(slow).stress.isel(time=0)).max() == 0.0
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize("driven", ["force", "base"])
+def test_settled_motions_of_superelements_have_the_stresses_of_responses(driven):
+    case = fd.Case(fd.superelements(MIURA, PAPER, **PANELS), HELD, damping=fd.Rayleigh(60.0, 1e-4))
+    f = 1.3 * float(fd.modes(case, 1).frequency[0])
+    if driven == "force":
+        drive = fd.Force([8], (0.0, 0.0, 1e-3))
+        shaken = case.altered(loads=[replace(drive, history=fd.Harmonic(f))])
+        scale = 1e-3
+    else:
+        drive, scale = fd.BaseMotion("z"), 1e-5
+        base = fd.BaseMotion("z", value=scale, history=fd.Harmonic(f))
+        shaken = case.altered(supports=[*case.supports, base])
+    response = fd.stresses(fd.frf(case, [drive], frequencies=[f], check_model=False))
+    count = 40
+    motion = fd.simulate(shaken, 24.0 / f, interval=1.0 / (count * f))
+    found = fd.stresses(motion).isel(time=slice(-count, None))
+    turn = np.exp(-2j * np.pi * f * found.time.values)
+    for name in ("stress", "crease_moment"):
+        own = 2.0 * np.tensordot(turn, found[name].values, (0, 0)) / count
+        true = scale * response[name].isel(frequency=0).values * -1j
+        np.testing.assert_allclose(own, true, atol=0.01 * np.abs(true).max())
+    with pytest.raises(InputError, match="from its first sample only"):
+        fd.stresses(motion.isel(time=slice(3, None)))
+    with pytest.raises(InputError, match="comes out differently"):
+        fd.stresses(motion.assign(displacement=1.5 * motion.displacement))
+
+
+@pytest.mark.matrix
+def test_motions_of_superelements_that_go_on_have_the_same_stresses():
+    push = fd.Force([8], (0.0, 0.0, -1e-3), history=fd.Harmonic(20.0))
+    case = fd.Case(fd.superelements(MIURA, PAPER, **PANELS), HELD, [push])
+    whole = fd.simulate(case, 0.2, interval=0.01)
+    half = fd.simulate(case, 0.1, interval=0.01)
+    rest = fd.simulate(case, 0.1, interval=0.01, initial=fd.initial_state(half), start=0.1)
+    found, expected = fd.stresses(rest).isel(time=-1), fd.stresses(whole).isel(time=-1)
+    start = fd.State(displacement=whole.displacement.values[-1])
+    freed = fd.simulate(case.altered(loads=[]), 0.1, interval=0.01, initial=start)
+    assert float(fd.stresses(freed).von_mises.isel(time=0).max()) > 0.0
+    most = float(expected.von_mises.max())
+    np.testing.assert_allclose(found.von_mises, expected.von_mises, atol=0.02 * most)
+
+
 @pytest.mark.matrix
 def test_what_is_refused():
     case = fd.Case(fd.superelements(MIURA, PAPER), HELD, [fd.Force([8], (0.0, 0.0, -1e-3))])
-    with pytest.raises(InputError, match="keep the displacements of vertices only"):
-        fd.stresses(fd.trace(case, steps=1).assign_attrs(foldyn_result="trajectory"))
     hinged = fd.Case(fd.discretize(MIURA, PAPER), HELD, case.loads)
     with pytest.warns(fd.errors.FoldynWarning):
         buckled = fd.buckling(hinged)

@@ -30,7 +30,6 @@ from foldyn.dynamics.initial import MODAL
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.timing import check_room, check_samples
 from foldyn.errors import InputError
-from foldyn.linear.stresses import check_motion
 from foldyn.plots.load_curves import load_charts
 from foldyn.report.album import (
     Album,
@@ -117,7 +116,6 @@ class MotionAnalysis(Analysis):
         analysis, output = super().of(schema, case), schema.output
         if output.stresses:
             check_stresses(case, "output.stresses")
-            check_motion(case, "output.stresses")
         own = {name: getattr(output, name) for name in SAMPLING}
         given = {name: value for name, value in own.items() if value is not None}
         default = {"interval": schema.analysis.duration / SAMPLES}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -112,7 +112,7 @@ class LinearMotion:
             *case.load_terms, *case.following_terms, *case.rest_terms, *case.imposed_terms,
             *case.base_terms,
         )  # fmt: skip
-        self._histories = list(dict.fromkeys(history for _, history in terms))
+        self.histories = list(dict.fromkeys(history for _, history in terms))
 
     @property
     def expected_samples(self) -> int:
@@ -146,12 +146,7 @@ class LinearMotion:
 
     def _computed(self, report: Reporter) -> xarray.Dataset:
         began, case, plan = time.perf_counter(), self.case, self.plan
-        model = matrices(case, self._histories)
-        steps = steps_of(case, self._histories, plan)
-        place, speed = self._beginning(model, steps.at[0])
-        momentum = model.mass @ speed
-        beside = place - model.support @ steps.at[0]
-        bases = Bases(model, beside, model.ties @ speed[model.free], FEWEST)
+        model, steps, momentum, bases = self._begun(FEWEST)
         modes, before, missing = min(FEWEST, bases.most), None, 0.0
         while True:
             equation = Superposition(model, bases.basis(modes))
@@ -175,6 +170,7 @@ class LinearMotion:
             "start": plan.start,
             "duration": plan.end - plan.start,
             "dt": float(steps.lengths.max()),
+            "interval": plan.interval or (plan.end - plan.start) / max(len(out.time) - 1, 1),
             "steps": len(steps.lengths),
             "critical_step": math.inf,
             "modes": modes,
@@ -192,6 +188,22 @@ class LinearMotion:
             dict(zip(names, out.energy.T, strict=True)), facts,
             {name: (known[name], values[name]) for name in known}, continuations=continued,
         )  # fmt: skip
+
+    def _begun(self, modes: int) -> tuple[Matrices, Steps, NDArray, Bases]:
+        """Matrices, steps, momentum (m,) at the start, and bases with so many modes found."""
+        model = matrices(self.case, self.histories)
+        steps = steps_of(self.case, self.histories, self.plan)
+        place, speed = self._beginning(model, steps.at[0])
+        beside = place - model.support @ steps.at[0]
+        bases = Bases(model, beside, model.ties @ speed[model.free], modes)
+        return model, steps, model.mass @ speed, bases
+
+    def again(self, modes: int) -> tuple[Superposition, Iterator[NDArray]]:
+        """The superposition with so many modes, and its states at all samples."""
+        model, steps, momentum, bases = self._begun(modes)
+        equation = Superposition(model, bases.basis(modes))
+        start = equation.basis.motions.T @ momentum
+        return equation, (z for z, _ in equation.steps(steps, start, works=False))
 
     def _take(self, out: Samples) -> None:
         """Evaluate the user's quantities at all samples."""
@@ -261,7 +273,7 @@ class LinearMotion:
         """Strain energies (g,), J, at displacements x (m,) and factors (h,)."""
         case, body = self.case, self.case.elastic_body
         if case.rest_terms:
-            number = self._histories.index
+            number = self.histories.index
             turns = (change * factor[number(history)] for change, history in case.rest_terms)
             body = body.folded(body.sheet.rest_angles + sum(turns))
         strain, (push, stored) = body.energies(x), model.heat

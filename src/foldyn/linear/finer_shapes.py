@@ -6,16 +6,22 @@ y is the static response to the loads and to the inertia and damping of x:
     K y = f + w^2 M x - i w C x .
 
 So it has the resonances of x, and the shapes that the level lacks are in balance. Bodies that are
-free to move take K - s M in place of K, and w^2 - s in place of w^2, with s below 0.
+free to move take K - s M in place of K, and w^2 - s in place of w^2, with s below 0. In a motion
+over time x'' is in place of -w^2 x, and x' in place of i w x.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from foldyn.algebra.eigen import Pencil
+from foldyn.cases import Case, History
 from foldyn.condensation import Superelements
+from foldyn.dynamics.superposition import Superposition, matrices
 from foldyn.linear.excitation import Drive, drive_terms
 from foldyn.linear.frequency_domain import damped
 from foldyn.linear.linearized import Linearized, linearize
@@ -63,3 +69,39 @@ class FinerShapes:
         if not np.iscomplexobj(loads):
             return self._factors.solve(np.ascontiguousarray(loads))
         return self._solved(np.real(loads)) + 1j * self._solved(np.imag(loads))
+
+
+class FinerMotion:
+    """The motion of a superposition on the dofs of the finer shapes, in balance with it."""
+
+    def __init__(self, case: Case, equation: Superposition, varying: list[History]) -> None:
+        self.case = for_stresses(case)
+        own, finer = case.structure, self.case.structure
+        assert isinstance(own, Superelements)
+        assert isinstance(finer, Superelements)
+        fine, self._equation = matrices(self.case, varying), equation
+        both = own.embedded(finer, equation.both, edges=case.held_edges)
+        ties = fine.ties
+        stiffness, mass = (
+            sparse.csc_array(ties.T @ one @ ties) for one in (fine.stiffness, fine.mass)
+        )
+        pencil = Pencil(stiffness, mass)
+        shift = -BELOW * pencil.scale if len(equation.basis.rigid) else 0.0
+        factors = pencil.factorize(shift)
+
+        def moved(forces: NDArray) -> NDArray[np.float64]:
+            """Static motions (m, k) under forces (m, k)."""
+            return ties @ factors.solve(np.ascontiguousarray(ties.T @ forces))
+
+        pulled = fine.load - fine.turned - fine.stiffness @ fine.support
+        carried = moved(fine.mass @ both)
+        self._acting = fine.support + moved(pulled)
+        self._motion = np.hstack([-shift * carried, -moved(fine.damped(both)), -carried])
+
+    def at(self, states: Iterator[NDArray]) -> Iterator[tuple[NDArray, NDArray]]:
+        """All displacements (m,), m, and second derivatives (h,) of the histories, in states."""
+        place_of_factors, count = self._equation.factors, self._acting.shape[1]
+        for z in states:
+            place, rate, gain = self._equation.amplitudes(z)
+            y = self._acting @ z[place_of_factors]
+            yield y + self._motion @ np.concatenate([place, rate, gain]), gain[-count - 1 : -1]

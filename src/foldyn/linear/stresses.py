@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -13,9 +14,11 @@ from foldyn.algebra.superlu import factorize
 from foldyn.cases import Case
 from foldyn.cases.directions import AXES
 from foldyn.condensation import Superelements
-from foldyn.errors import InputError
+from foldyn.dynamics.initial import MODAL, initial_state
+from foldyn.dynamics.linear_motion import prepare_linear
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.excitation import Drive
-from foldyn.linear.finer_shapes import FinerShapes
+from foldyn.linear.finer_shapes import FinerMotion, FinerShapes
 from foldyn.linear.frequency_domain import Direct, direct
 from foldyn.linear.frf import quantity_of
 from foldyn.linear.linearized import linearize
@@ -52,8 +55,8 @@ def stresses(result: xarray.Dataset) -> xarray.Dataset:
     Parameters
     ----------
     result : xarray.Dataset
-        A path, a motion, modes, or a linear frequency response, with the model superelements (not
-        motions), the shell, or bars and hinges.
+        A path, a motion, modes, or a linear frequency response, of superelements, a shell, or bars
+        and hinges. Of a motion of superelements from its first sample on.
 
     Returns
     -------
@@ -75,7 +78,7 @@ def stresses(result: xarray.Dataset) -> xarray.Dataset:
     Raises
     ------
     InputError
-        A result of another kind; a law with memory; a motion of superelements.
+        A result of another kind; a law with memory; a part of a motion of superelements.
 
     Notes
     -----
@@ -115,17 +118,6 @@ def stresses(result: xarray.Dataset) -> xarray.Dataset:
     return made.isel({first: 0}) if single else made
 
 
-def check_motion(case: Case, field: str) -> None:
-    """Refuse a case whose motions do not tell stresses."""
-    if case.structure.linear:
-        raise InputError(
-            f": motions of {case.structure.linear} keep the displacements of vertices only, from "
-            "which stresses do not follow; take a frequency response, modes or random vibration, "
-            "or a motion of the shell",
-            field,
-        )
-
-
 def _path(case: Case, model: Resultants | None, result: xarray.Dataset) -> SmallStresses:
     """Stresses at the points of a path."""
     constant = np.isin(np.arange(len(case.loads)), np.ravel(result.attrs.get("constant", ())))
@@ -135,11 +127,64 @@ def _path(case: Case, model: Resultants | None, result: xarray.Dataset) -> Small
 
 def _motion(case: Case, model: Resultants | None, result: xarray.Dataset) -> SmallStresses:
     """Stresses at the samples of a motion."""
-    check_motion(case, "result")
     time = np.ravel(result["time"].values)
     factors = [np.asarray(own.history(time), float) for own in case.loads]
     factors = np.stack(factors, axis=1) if factors else np.zeros((len(time), 0))
+    if isinstance(model, SuperelementResultants):
+        return _superposed(case, model, result, factors)
     return _at(case, model, result["displacement"].values, factors)
+
+
+def _superposed(
+    case: Case, model: SuperelementResultants, result: xarray.Dataset, factors: NDArray
+) -> SmallStresses:
+    """Stresses at the samples of a motion of superelements, which is computed again."""
+    facts, time = result.attrs, np.ravel(result["time"].values)
+    if len(time) < 2 or time[0] != facts["start"] or facts["method"] != MODAL:
+        raise InputError(
+            ": keeps the displacements of vertices only, and the motion can be computed again from "
+            "its first sample only; find the stresses of the whole motion, then choose samples",
+            "result",
+        )
+    initial = None
+    if facts["started_from"] != "rest":
+        with warnings.catch_warnings():  # without more, panels did start in balance
+            warnings.simplefilter("ignore", FoldynWarning)
+            initial = initial_state(result, 0)
+    motion = prepare_linear(
+        case, facts["duration"], MODAL, interval=facts["interval"], start=facts["start"],
+        initial=initial, kept=True,
+    )  # fmt: skip
+    equation, states = motion.again(int(facts["modes"]))
+    nodes, chosen = case.structure.nodes.size, iter(np.rint((time - time[0]) / facts["interval"]))
+    wanted, kept, apart = next(chosen, None), [], 0.0
+    moved = result["displacement"].values.reshape(len(time), -1)
+    for k, z in enumerate(states):
+        if k == wanted:
+            place = equation.both[:nodes] @ equation.amplitudes(z)[0]
+            apart = max(apart, float(np.abs(place - moved[len(kept)]).max()))
+            kept.append(z.copy())
+            wanted = next(chosen, None)
+    if len(kept) < len(time) or apart > AGREES * np.abs(moved).max(initial=0.0):
+        raise InputError(
+            ": its motion comes out differently here, as if another case had moved; compute it "
+            "again with fd.simulate",
+            "result",
+        )
+    finer = FinerMotion(case, equation, motion.histories)
+    sheet, panels, creases = LoadedSheet(finer.case), [], []
+    unit = np.eye(len(case.loads))
+    held = np.array([model.at(np.zeros(finer.case.body.size), one).ravel() for one in unit])
+    held = held.reshape(len(case.loads), model.rows.shape[0])
+    carried = np.zeros((len(motion.histories), model.rows.shape[0]))
+    for vector, history in case.base_terms:
+        for axis in np.flatnonzero(vector.any(axis=0)):
+            size = vector[:, axis][np.abs(vector[:, axis]).argmax()]
+            carried[motion.histories.index(history)] += size * model.accelerated(int(axis))
+    for (y, bent), own in zip(finer.at(iter(kept)), factors, strict=True):
+        panels.append((model.rows @ y + own @ held + bent @ carried).reshape(-1, 2, 3))
+        creases.append(crease_moments(finer.case.structure, sheet.body(own), y))
+    return SmallStresses(np.array(panels), np.array(creases))
 
 
 def _at(
