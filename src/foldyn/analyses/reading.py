@@ -18,15 +18,16 @@ from foldyn.analyses.model_choice import check_vertices, choice_of
 from foldyn.analyses.motion import SAMPLING
 from foldyn.analyses.pattern_section import FACES, FACETS, HINGES, READING
 from foldyn.analyses.registry import ANALYSES, schema_of
-from foldyn.analyses.sections import Choice
+from foldyn.analyses.sections import Choice, ImperfectionSection
 from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.clamped_edges import straightened
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
 from foldyn.errors import Faults, FoldynWarning, InputError, warn, within
 from foldyn.input_files import from_toml, path_of, read_text
-from foldyn.patterns import GENERATORS, Pattern, convex, thicken, welded
+from foldyn.patterns import GENERATORS, Pattern, convex, imperfect, thicken, welded
 from foldyn.patterns.facets import HINGE, LINE, WELD, what_was_cut
+from foldyn.results import load
 from foldyn.structures import Sheet
 from foldyn.tables import read, told
 from foldyn.values import LARGEST, MOST, SMALLEST, show
@@ -137,6 +138,9 @@ def case_of_document(
     sheet, resolved = schema.sheet, None
     with faults.collected():
         pattern = pattern if made else _pattern(schema.pattern, path.parent)
+    if schema.imperfection is not None and not made and not faults.found:
+        with faults.collected(), within("imperfection."):
+            pattern = _imperfect(pattern, schema.imperfection, path.parent)
     if HINGES in schema.pattern and not made and not faults.found:
         with faults.collected():
             pattern = _thick(pattern, sheet, schema.pattern[HINGES])
@@ -281,6 +285,22 @@ def _facets(pattern: Pattern, table: Mapping[str, Any]) -> Pattern:
     if parts is not pattern:
         warn(f"pattern: {what_was_cut(pattern, parts)}", "facets.md#panels-that-are-not-convex")
     return parts
+
+
+def _imperfect(pattern: Pattern, section: ImperfectionSection, folder: Path) -> Pattern:
+    """The pattern with the imperfection of a section."""
+    if section.file is None:
+        return imperfect(
+            pattern, section.amplitude, correlation=section.correlation, seed=section.seed
+        )
+    place = f"file = {show(section.file)}"
+    with within(f"{place}: "):
+        shapes = load(folder / section.file)
+    try:
+        return imperfect(pattern, section.amplitude, shapes=shapes, modes=section.modes)
+    except InputError as error:
+        field = place if error.key == "shapes" else error.field
+        raise InputError(error.reason, field) from None
 
 
 def _thick(pattern: Pattern, sheet: Sheet, offset: Any) -> Pattern:

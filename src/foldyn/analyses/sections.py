@@ -34,7 +34,17 @@ from foldyn.structures.calibration import per_crease
 from foldyn.structures.rigid_plates import checked_panels
 from foldyn.structures.structure import CALIBRATIONS, MEMBRANES, SCHEMES
 from foldyn.tables import ListOf, Section, TableOf, check_table
-from foldyn.values import MOST, choice, indices, number, number_or_list, show, vector, whole
+from foldyn.values import (
+    MOST,
+    choice,
+    indices,
+    number,
+    number_or_list,
+    numbers,
+    show,
+    vector,
+    whole,
+)
 
 RULES = [name for model in MODELS.values() for name in model.masses]
 MOST_SHAPES = 12
@@ -45,6 +55,13 @@ def text(name: str, value: Any) -> str:
     """Return `value` if it is a text."""
     if not isinstance(value, str):
         raise InputError(f" = {show(value)}: must be text", name)
+    return value
+
+
+def result_file(name: str, value: Any) -> str:
+    """Return `value` if it can be the path of a result."""
+    if not isinstance(value, str) or not value:
+        raise InputError(f" = {show(value)}: must be the path of a result, such as result.nc", name)
     return value
 
 
@@ -332,6 +349,47 @@ class DesignSection(Section):
     max_evaluations: Count = 1000
 
 
+def _amplitudes(name: str, value: Any) -> float | tuple[float, ...]:
+    given = numbers(name, value)
+    if given.ndim > 1 or not given.size:
+        raise InputError(f" = {show(value)}: give a number (m), or a list with one a shape", name)
+    return float(given) if given.ndim == 0 else tuple(given.tolist())
+
+
+class ImperfectionSection(Section):
+    """[imperfection]: vertices that are a little off; arguments of `imperfect`.
+
+    Parameters
+    ----------
+    amplitude : float or sequence of float
+        Standard deviation of a random field, or largest displacements of shapes (m).
+    correlation : float, optional
+        Length (m) over which a random field is alike.
+    seed : int
+        Of the random field.
+    file : str, optional
+        Result of buckling or of modes with shapes, relative to the case file.
+    modes : int or sequence of int
+        Numbers of its modes, from 1.
+    """
+
+    amplitude: Annotated[float | Sequence[float], Check(_amplitudes)]
+    correlation: Positive | None = None
+    seed: Seed = 0
+    file: Annotated[str | None, Check(result_file)] = None
+    modes: Annotated[int | Sequence[int], Check(some_shapes, drawn="modes", what="mode")] = 1
+
+    def agree(self) -> None:
+        """Require either a random field or shapes."""
+        given = self.stated
+        if ("correlation" in given) == ("file" in given):
+            raise InputError(": give correlation (of a random field) or file (with shapes)")
+        other = "seed" if "file" in given else "modes"
+        if other in given:
+            why = "shapes of a file" if other == "seed" else "a random field"
+            raise InputError(f": is not for {why}; leave it out", other)
+
+
 class CaseSchema(Section):
     """The tables that every case file may have.
 
@@ -343,6 +401,7 @@ class CaseSchema(Section):
 
     title: Text = ""
     pattern: Annotated[Mapping[str, Any], PatternOf()]
+    imperfection: ImperfectionSection | None = None
     sheet: Annotated[Sheet, TableOf(Sheet)]
     model: ModelSection = ModelSection()
     damping: DampingSection = DampingSection()

@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from foldyn.analyses.sections import Vector, Whole
+from foldyn.analyses.sections import Vector, Whole, result_file
 from foldyn.arguments import Check
 from foldyn.cases import Case, State
 from foldyn.cases.directions import AXES
@@ -22,12 +22,6 @@ TOLERANCE = 1e-9
 """Velocity of a supported node, relative to the largest velocity, that counts as rounding error."""
 
 
-def _result_file(name: str, value: Any) -> str:
-    if not isinstance(value, str) or not value:
-        raise InputError(f" = {show(value)}: must be the path of a result, such as result.nc", name)
-    return value
-
-
 class StoredStart(Section):
     """[initial]: a state of a stored result.
 
@@ -39,7 +33,7 @@ class StoredStart(Section):
         Number of its sample; the last by default.
     """
 
-    file: Annotated[str, Check(_result_file)]
+    file: Annotated[str, Check(result_file)]
     at: Whole = -1
 
 
@@ -58,7 +52,7 @@ class MotionStart(Section):
 
     velocity: Vector = None
     spin: Vector = None
-    file: Annotated[Any, Check(_result_file)] = None
+    file: Annotated[Any, Check(result_file)] = None
     at: Whole = -1
 
     def agree(self) -> None:
