@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from inspect import signature
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
@@ -161,13 +162,14 @@ class Analysis(ABC):
         figures : file format of figures, "png", "svg" or "pdf"; None: no figures.
         """
         cases = {mass: case_file.case(mass) for mass in results}
-        shown = case_file.output.nodes.tolist()
+        title, output = case_file.heading, case_file.output
+        drawn = partial(stage, results, cases, title, output.nodes.tolist())
         sections = [
-            *([stage(results, cases, case_file.heading, shown)] if self.moving else []),
+            *([drawn(stressed=output.stresses)] if self.moving else []),
             *filled(self.sections(case_file, results, Album(folder, figures))),
             *provenance(case_file, results, call),
         ]
-        return write_report(sections, folder / "report.html", title=case_file.heading)
+        return write_report(sections, folder / "report.html", title=title)
 
     def check(self, computations: Sequence[Compute], figures: bool) -> None:  # noqa: B027
         """Refuse computations of several mass rules that cannot be run or drawn together."""

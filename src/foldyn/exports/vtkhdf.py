@@ -22,12 +22,14 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.exports.chosen import ALONG
 from foldyn.formats.writers import warn_of_boards
+from foldyn.linear import stresses as find_stresses
 from foldyn.results import shapes_of
 from foldyn.results.netcdf import fill
 from foldyn.structures import Structure
 from foldyn.structures.discretized import Discretized
+from foldyn.values import flag
 from foldyn.viewer.sheet import KINDS, edge_pieces
-from foldyn.viewer.states import Field, fields, folding_fields
+from foldyn.viewer.states import Field, fields, folding_fields, stress_fields
 from foldyn.writing import whole
 
 VERSION = (2, 0)
@@ -64,6 +66,7 @@ def write(
     *,
     every: int | None = None,
     frames: int | None = None,
+    stresses: bool | None = None,
 ) -> list[Path]:
     """Write a result with its fields at all samples.
 
@@ -78,6 +81,9 @@ def write(
     every, frames : int, optional
         Take every n-th sample and the last one, or this many samples, evenly spread; all by
         default.
+    stresses : bool, optional
+        Whether panels and creases have fields of `foldyn.stresses`, too: `von_mises`, the largest
+        of the panel, and `crease_moment`, per length. Of motions, paths and modes.
     """
     warn_of_boards(case.structure.pattern)
     shapes = shapes_of(result, every, frames=frames)
@@ -91,6 +97,9 @@ def write(
     else:
         points = shapes.nodes + shapes.displacement
         cells |= _cell_fields(mesh, _known(case, some, shapes.displacement))
+    if flag("stresses", bool(stresses) if stresses is None else stresses):
+        found = find_stresses(result).isel({dimension: shapes.samples})
+        cells |= _cell_fields(mesh, stress_fields(found))
 
     def put(sink: Any) -> None:
         with h5py.File(sink, "w") as file:

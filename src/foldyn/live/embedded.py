@@ -21,7 +21,7 @@ from foldyn.report.page import report_html, write_report
 from foldyn.results import case_of, check_result
 from foldyn.statics import Folding
 from foldyn.structures.discretized import Discretized
-from foldyn.values import of_kind, whole
+from foldyn.values import flag, of_kind, whole
 from foldyn.viewer import Stage, rest_stage, stage
 
 HEIGHT = 820
@@ -78,7 +78,7 @@ class View:
         )
 
 
-def view(what: Any, title: str = "", *, height: int = HEIGHT) -> View:
+def view(what: Any, title: str = "", *, height: int = HEIGHT, stresses: bool = False) -> View:
     """Show something in three dimensions: in a notebook, as the last line of a cell.
 
     Parameters
@@ -90,6 +90,9 @@ def view(what: Any, title: str = "", *, height: int = HEIGHT) -> View:
         Title above the view; by default it names the object shown.
     height : int
         Height of the frame in a notebook (pixels).
+    stresses : bool
+        Whether von Mises stresses and moments of creases (`foldyn.stresses`) can color motions and
+        paths.
 
     Returns
     -------
@@ -108,12 +111,12 @@ def view(what: Any, title: str = "", *, height: int = HEIGHT) -> View:
     View(title='miura', height=820)
     """
     height = whole("height", height, least=100, most=10_000, what="pixels")
-    named, make = _maker(what)
+    named, make = _maker(what, flag("stresses", stresses))
     title = of_kind("title", title, str) or named
     return View(title, make(title), height)
 
 
-def _maker(what: Any) -> tuple[str, Callable[[str], Stage]]:
+def _maker(what: Any, stresses: bool) -> tuple[str, Callable[[str], Stage]]:
     """Name of an object's kind, and the function that makes its stage from a title."""
     if isinstance(what, CaseFile):
         return what.heading, partial(rest_stage, what.case())
@@ -126,7 +129,7 @@ def _maker(what: Any) -> tuple[str, Callable[[str], Stage]]:
     if isinstance(what, Folding):
         return what.pattern.name or "Folding", partial(results_stage, {"folding": what.path})
     results = {"result": what} if isinstance(what, xr.Dataset) else what
-    return check_results(results), partial(results_stage, results)
+    return check_results(results), partial(results_stage, results, stresses=stresses)
 
 
 def check_results(results: Any) -> str:
@@ -156,11 +159,12 @@ def check_results(results: Any) -> str:
     return TITLES[kind]
 
 
-def results_stage(results: Mapping[str, xr.Dataset], title: str) -> Stage:
+def results_stage(results: Mapping[str, xr.Dataset], title: str, stresses: bool = False) -> Stage:
     """Stage of results of one kind by name, with their cases; foldings have no cases."""
     if next(iter(results.values())).attrs["foldyn_result"] == "folding":
         return stage(results, {}, title, [])
     cases = {name: case_of(result) for name, result in results.items()}
     first = next(iter(cases.values()))
     moved = moved_supports(first)
-    return stage(results, cases, title, first.loaded_nodes.tolist() or (moved[0] if moved else [0]))
+    nodes = first.loaded_nodes.tolist() or (moved[0] if moved else [0])
+    return stage(results, cases, title, nodes, stressed=stresses)

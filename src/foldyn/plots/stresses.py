@@ -14,6 +14,7 @@ from foldyn.errors import InputError
 from foldyn.plots.designs import draw_colored
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.results import case_of
+from foldyn.strength.dataset import largest_of_panels
 from foldyn.values import choice, of_kind, whole
 
 QUANTITIES = {
@@ -84,13 +85,7 @@ def draw_stresses(
 def _of_parts(found: xr.Dataset, name: str, on: str, state: int | None) -> NDArray[np.float64]:
     """Largest magnitude of each panel or crease, in one state."""
     size = np.abs(found[name].values)
-    if on == "panel":
-        panel = found["point_panel"].values
-        points = np.moveaxis(size.max(axis=-1), -1, 0)
-        size = np.zeros((panel.max() + 1, *points.shape[1:]))
-        np.maximum.at(size, panel, points)
-    else:
-        size = np.moveaxis(size, -1, 0)
+    size = np.moveaxis(largest_of_panels(found, size) if on == "panel" else size, -1, 0)
     if size.ndim == 1:
         return size
     count = int(size.shape[-1])

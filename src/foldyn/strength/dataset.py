@@ -85,6 +85,15 @@ def stress_dataset(
     return result_dataset("stresses", case, data, coordinates, statistics)
 
 
+def largest_of_panels(found: xarray.Dataset, values: NDArray) -> NDArray[np.float64]:
+    """Largest magnitudes (..., np) of panels, of values (..., p, 2) at both faces of the points."""
+    panel = found["point_panel"].values
+    points = np.moveaxis(np.abs(values).max(axis=-1), -1, 0)
+    out = np.zeros((panel.max() + 1, *points.shape[1:]))
+    np.maximum.at(out, panel, points)
+    return np.moveaxis(out, 0, -1)
+
+
 def point_coordinates(points: StressPoints) -> dict[str, Any]:
     """Coordinates of the points of panels, and of components and faces."""
     return {

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from foldyn import __version__
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear import character, mac
+from foldyn.linear import character, mac, stresses
 from foldyn.patterns import Pattern
 from foldyn.plots.readings import displacements, moved_supports, stretches, total_reaction, way
 from foldyn.results.contents import pattern_of
@@ -25,7 +25,7 @@ from foldyn.viewer.backdrop import Backdrop
 from foldyn.viewer.orbits import about_orbits, orbits
 from foldyn.viewer.scripts import in_page
 from foldyn.viewer.sheet import bare_sheet, sheet
-from foldyn.viewer.states import Field, energies, fields, folding_fields
+from foldyn.viewer.states import Field, energies, fields, folding_fields, stress_fields
 from foldyn.viewer.waves import about_waves, waves
 
 OF_SIZE, OF_LARGEST, OF_COLORS = 5e-5, 1e-3, 4e-3
@@ -75,13 +75,14 @@ class Stage:
 
 def stage(
     results: Results, cases: Mapping[str, Case], title: str, nodes: list[int],
-    backdrop: Backdrop | None = None,
+    backdrop: Backdrop | None = None, stressed: bool = False,
 ) -> Stage:  # fmt: skip
     """Show results of one kind by name: motions, paths, modes, bands or others that move.
 
     cases : cases of the results; foldings have no cases.
     nodes : nodes listed at the start; the first is selected.
     backdrop : photographs behind the sheets.
+    stressed : whether stresses color the panels and creases of motions and paths.
     """
     arrays, sheets, listed = Arrays(), {}, []
     kind = _kind(next(iter(results.values())))
@@ -95,7 +96,8 @@ def stage(
             if key not in sheets:
                 sheets[key] = sheet(arrays, key, case)
             alone = len(results) == 1
-            one = _Shown(arrays, f"r{len(listed)}", case, result, name, alone)
+            found = stresses(result) if stressed and kind in ("motion", "path") else None
+            one = _Shown(arrays, f"r{len(listed)}", case, result, name, alone, found)
             own = {"name": name, "sheet": key, "alone": alone}
             listed += [own | about for about in _LISTED[kind](one)]
     about |= {"sheets": sheets, "results": listed, **_more(kind, results, cases, nodes)}
@@ -134,6 +136,7 @@ class _Shown(NamedTuple):
     result: xr.Dataset
     name: str
     alone: bool
+    stresses: xr.Dataset | None
 
 
 def _kind(result: xr.Dataset) -> str:
@@ -156,8 +159,9 @@ def _kind(result: xr.Dataset) -> str:
 
 def _motion(one: _Shown) -> Iterator[dict[str, Any]]:
     every = slice(None, None, -(-one.result["displacement"].size // MOST))
-    some = one.result.isel(time=every)
-    yield _changing(one, some, displacements(some, "time"), some["time"].values)
+    some, found = one.result.isel(time=every), one.stresses
+    own = {} if found is None else stress_fields(found.isel(time=every))
+    yield _changing(one, some, displacements(some, "time"), some["time"].values, own)
 
 
 def _path(one: _Shown) -> Iterator[dict[str, Any]]:
@@ -167,7 +171,8 @@ def _path(one: _Shown) -> Iterator[dict[str, Any]]:
     for start, stop, good in stretches(result):
         stable[start + 1 : stop] &= good
         stable[[start, stop]] &= good
-    about = _changing(one, result, u, way(result))
+    own = {} if one.stresses is None else stress_fields(one.stresses)
+    about = _changing(one, result, u, way(result), own)
     about["load"] = arrays.exact(f"{key}.load", result["load_factor"].values, "f4")
     if (moved := moved_supports(case)) is not None:  # the load factor is the supports' displacement
         force = total_reaction(result, moved[0], direction=moved[1])
@@ -185,10 +190,11 @@ def _folding(one: _Shown) -> Iterator[dict[str, Any]]:
 
 def _changing(
     one: _Shown, result: xr.Dataset, u: NDArray, moments: NDArray,
-    own_fields: Mapping[str, Field] | None = None,
+    more: Mapping[str, Field],
 ) -> dict[str, Any]:  # fmt: skip
     """Shared description of motions, paths and foldings, at some of their samples."""
     arrays, key, case, *_ = one
+    known = more if "share" in result.coords else fields(case, result, u) | {**more}
     error = allowed(case.structure.pattern.size, float(np.abs(u).max(initial=0.0)))
     return {
         "displacement": arrays.changing(f"{key}.u", u, error),
@@ -198,7 +204,7 @@ def _changing(
                 "label": field.label, "unit": field.unit, "on": field.on, "signed": field.signed,
                 "values": arrays.changing(f"{key}.{name}", field.values, OF_COLORS),
             }
-            for name, field in (own_fields or fields(case, result, u)).items()
+            for name, field in known.items()
             if field.on == "panel" or field.values.shape[1] <= MOST_LINES
         },
         "energies": {

@@ -19,6 +19,7 @@ from foldyn.materials.series import in_series
 from foldyn.mechanics import angles
 from foldyn.mechanics.following import following_force, joined
 from foldyn.mechanics.heat import free_energies
+from foldyn.strength.dataset import largest_of_panels
 from foldyn.structures import Structure, membranes
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.mesh import double_areas
@@ -242,6 +243,17 @@ def fields(case: Case, result: xr.Dataset, displacement: NDArray) -> dict[str, F
         out["fold_moment"] = Field("moment of creases", "N m", "crease", found.moment, True)
         density = energy_density(structure, displacement, found)
         out["energy"] = Field("strain energy per area", "J/m²", "panel", density, False)
+    return out
+
+
+def stress_fields(found: xr.Dataset) -> dict[str, Field]:
+    """Fields of stresses along a motion or a path: the largest of each panel, and of creases."""
+    out = {}
+    if "von_mises" in found:
+        values = largest_of_panels(found, found["von_mises"].values)
+        out["von_mises"] = Field("von Mises stress", "Pa", "panel", values, False)
+    moment = found["crease_moment"].values
+    out["crease_moment"] = Field("moment of creases per length", "N", "crease", moment, True)
     return out
 
 
