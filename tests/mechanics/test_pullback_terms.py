@@ -136,7 +136,7 @@ ARRAYS = {  # that count, with a star where forces are linear, with a minus wher
     "dashpots": "axial corners *coefficient -hidden_turn",
     "damped sides": "corners hidden_turn *coefficient",
     "damped strains": "axial corners *coefficient -hidden_turn",
-    "damped panels": "vector per_length2 *resistance",
+    "damped panels": OF_MEMBRANES,
     "damping matrix": "*data",
     "damping rows": "rows",
     "shell": f"{OF_PLATES} *fold_rest *fold_parameters",
