@@ -4,8 +4,8 @@ A plate has angles phi: the turns of its hinges from rest, and rotations beta of
 to the facets there. Its energy is 1/2 phi^T K phi. A fold is a hinge between two plates; its angle
 is the dihedral of the facets minus the two adjacent rotations. At a clamped edge the sheet keeps
 its direction in space: the angle of the plate is the angle between its facet and the facet's mirror
-image at rest. The last point of this hinge is no node but rides on the ends of the edge
-(`mechanics.clamps`).
+image at rest. The last point of this hinge is no node but follows the mean displacement of the ends
+of the edge: translating the edge causes no strain.
 
 Rotations are massless dofs in addition to the displacements u (n, 3). The dofs x (r,) of rotations
 are lengths, too (m), so that norms over all dofs do not depend on the unit of length: beta is x
@@ -54,6 +54,8 @@ from foldyn.mechanics.term import (
     parted_rows,
 )
 from foldyn.mechanics.threads import Team, team
+
+RIDES = -1  # stands for the node of a virtual wing
 
 
 class BarsPlates(NamedTuple):
@@ -322,25 +324,26 @@ class Bars(NamedTuple):
 
     context: NDArray  # slots of their context
     kernels: NDArray  # (3,) addresses of `FORCES`, `ENERGIES` and `MEAN_FORCES`, 0 without bars
+    first: bool  # whether the term comes first, and overwrites forces and energies
 
 
-def bars_of(model: BarsPlates, scratch: PlatesScratch) -> Bars:
+def bars_of(model: BarsPlates, scratch: PlatesScratch, first: bool) -> Bars:
     """The kernels of the bars, with scratch of the plates."""
     term = bars_hinges_kernels(model.bars, scratch.bars, 3)
     kernels = np.zeros(3, np.int64)
     if len(model.bars.bar_runs):
         kernels[:] = [term.kernels[k].at(term.context) for k in (FORCES, ENERGIES, MEAN_FORCES)]
-    return Bars(term.context.slots, kernels)
+    return Bars(term.context.slots, kernels, first)
 
 
 @inner_scalar
 def put_bar_forces(bars, u, force):
     """Write the forces (n, 3) of the bars."""
-    if bars.kernels[0] == 0:
+    if bars.kernels[0] != 0:
+        run_at(bars.kernels[0], (bars.context, u, u, 0.0, force, force))
+    elif bars.first:
         for k in range(force.size):
             flat(force)[k] = 0.0
-    else:
-        run_at(bars.kernels[0], (bars.context, u, u, 0.0, force, force))
 
 
 @inner
@@ -435,6 +438,7 @@ class _Context(NamedTuple):
     rows: int
     groups: NDArray  # (3,) energy groups of bars, folds and bends
     energy: NDArray  # (3,) energies of bars, folds and bends, J
+    place: int  # index of the first hinge among those of all terms
 
 
 @forces
@@ -454,13 +458,17 @@ def _energies(own, u, out):
     here, x = parted_rows(moved, n, r)
     plates_energy(model, own.bars, here, x, own.scratch, own.energy)
     for k in range(3):
-        numbers_at(out, 3)[own.groups[k]] = own.energy[k]
+        group = own.groups[k]
+        numbers_at(out, 3)[group] = own.energy[k] + (
+            0.0 if own.bars.first else numbers_at(out, 3)[group]
+        )
 
 
 @mean_forces
 def _mean_forces(own, u0, u1, before, h, t, force, powers):
     model, scratch, folds = own.model, own.scratch, own.model.fold_rest.size
-    n, r, began = model.bars.rest.shape[0], model.rotations, numbers_at(before, scratch.angle.size)
+    n, r = model.bars.rest.shape[0], model.rotations
+    began = numbers_at(before, own.place + scratch.angle.size)[own.place :]
     start, x0 = parted_rows(rows_at(u0, own.rows), n, r)
     end, x1 = parted_rows(rows_at(u1, own.rows), n, r)
     out, couple = parted_rows(rows_at(force, own.rows), n, r)
@@ -505,9 +513,13 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
 
 
 def plates_kernels(
-    model: BarsPlates, scratch: PlatesScratch, rows: int, groups: tuple[int, int, int]
-) -> CompiledTerm:
-    """Kernels of bars, folds and plates with dofs in `rows` rows, and their energy groups."""
-    bars = bars_of(model, scratch)
-    own = Context(_Context(model, bars, scratch, rows, np.array(groups), np.zeros(3)))
+    model: BarsPlates, scratch: PlatesScratch, rows: int, groups: tuple[int, int, int],
+    place: int | None = None,
+) -> CompiledTerm:  # fmt: skip
+    """Kernels of bars, folds and plates with dofs in `rows` rows, and their energy groups.
+
+    place : index of the first hinge among those of all terms, for a term that is not the first.
+    """
+    bars = bars_of(model, scratch, place is None)
+    own = Context(_Context(model, bars, scratch, rows, np.array(groups), np.zeros(3), place or 0))
     return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
