@@ -227,7 +227,7 @@ def put_rotations(model, z, share, angle, out):
             out[only] = turn - z[only]
 
 
-@inner
+@kernel
 def hand_over(model, couple, moment):
     """Turn forces on rotations into those on dofs, in place; the rest adds to moments of hinges."""
     for f in range(model.unmoved.size):
@@ -242,16 +242,11 @@ def hand_over(model, couple, moment):
             couple[only] = -couple[only]
 
 
-@kernel
-def _hand_over(model, couple, moment):
-    hand_over(model, couple, moment)
-
-
 def handed_over(model: BarsPlates, push: NDArray) -> tuple[NDArray, NDArray]:
     """Moments (nf,), N m, on folds, and forces (k,), N, on dofs, of forces (k,) on rotations."""
     moment, handed = np.zeros(len(model.fold_rest)), np.zeros(model.rotations)
     handed[: len(push)] = push
-    _hand_over(Context(model), handed, moment)
+    hand_over(Context(model), handed, moment)
     return moment, handed[: len(push)]
 
 
@@ -405,15 +400,20 @@ def turn_moments(model, x, couple, scratch):
     couple[:] = 0.0
     scratch.moment[:] = 0.0
     for f in range(model.fold_rest.size):
-        moment = fold_moment(model, scratch, f)
-        scratch.moment[f] = moment
-        for side in range(2):
-            rotation = model.fold_rotations[f, side]
-            if rotation >= 0:
-                couple[rotation] -= model.per_reach * moment
+        scratch.moment[f] = fold_moment(model, scratch, f)
+    turn_rotations(model, couple, scratch)
     for p in range(model.start.size - 1):
         turn_plate(model, x, scratch, p)
         add_plate_moments(model, couple, scratch, p)
+
+
+@inner
+def turn_rotations(model, couple, scratch):
+    """Add the forces of the folds' moments on the rotations beside them."""
+    for f in range(model.fold_rest.size):
+        for rotation in model.fold_rotations[f]:
+            if rotation >= 0:
+                couple[rotation] -= model.per_reach * scratch.moment[f]
 
 
 @inner
@@ -485,9 +485,7 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
             model.code, model.addresses, model.fold_parameters[f], 1.0, model.fold_rest[f], angle,
             scratch.fold_angle[f] - angle,
         )[0]  # fmt: skip
-        for rotation in model.fold_rotations[f]:
-            if rotation >= 0:
-                couple[rotation] -= model.per_reach * scratch.moment[f]
+    turn_rotations(model, couple, scratch)
     for p in range(model.start.size - 1):
         for k in range(model.start[p + 1] - model.start[p]):
             hinge = model.angle[model.start[p] + k]

@@ -330,89 +330,58 @@ class BarsPlatesTerm(SheetTerm):
         )
 
 
-class ClampsTerm(Term):
+class ClampsTerm(BarsPlatesTerm):
     """Clamped edges of bars and hinges, as plates of one angle each; see `Term`.
 
-    Their energy is that of bends.
-
-    Parameters
-    ----------
-    clamps : BarsPlates
-        A model with clamped edges alone.
+    A model of these alone, which adds to a sheet. Their energy is that of bends.
     """
 
+    energy_groups: ClassVar = {}
     of_hinges = True
-
-    def __init__(self, clamps: BarsPlates) -> None:
-        self.clamps = clamps
-        self._plates = BarsPlatesTerm(clamps, (LinearHinge(), LinearHinge()))
+    shared = False
+    tangent = Term.tangent
 
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """See `Term`; the clamps' dihedrals are last among those of the thread."""
-        place = len(part.angle) - len(self.clamps.hinges)
-        scratch = plates_scratch(self.clamps)._replace(angle=part.angle[place:])
-        return plates_kernels(self.clamps, scratch, self.clamps.rows, (0, 1, 2), place)
-
-    def arrays(self) -> Arrays:
-        """See `Term`."""
-        return self._plates.arrays()
-
-    def pulled(self) -> Pulled:
-        """See `Term`."""
-        return self._plates.pulled()
+        place = len(part.angle) - len(self.model.hinges)
+        scratch = plates_scratch(self.model)._replace(angle=part.angle[place:])
+        return plates_kernels(self.model, scratch, self.rows, self._groups, place)
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:
         """See `Term`."""
-        pattern = self._plates.sparsity
-        return np.repeat(np.arange(self._plates.size), np.diff(pattern.indptr)), pattern.indices
+        indptr, indices = self.sparsity[:2]
+        return np.repeat(np.arange(self.size), np.diff(indptr)), indices
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
         """See `Term`."""
-        return self._plates.tangent(np.ravel(q), floor).data
+        return super().tangent(np.ravel(q), floor).data
 
     def unstrained(self, q: NDArray) -> Unstrained:
         """See `Term`."""
         tangent = self.nominal(q).tangent(q)
         return Unstrained(tangent, tangent, lambda motion: 0.0)
 
-    @property
-    def hinges(self) -> NDArray:
-        """See `Term`."""
-        return self._plates.hinges
-
-    def angles(self, q: NDArray) -> NDArray:
-        """See `Term`."""
-        return self._plates.angles(q)
-
-    def holds(self, q: NDArray) -> sparse.csr_array:
-        """See `Term`: clamps hold their dihedrals."""
-        return self._plates.holds(q)
-
-    def turning_moments(self) -> float:
-        """See `Term`."""
-        return self._plates.turning_moments()
-
     def strains(self, others: Strains) -> Strains:
         """See `Term`; a wing repeats the first node of the axis (`viscous.hinge_gradient`)."""
-        rest, nodes = self.clamps.bars.rest, self.clamps.hinges
+        rest, nodes = self.model.bars.rest, self.model.hinges
         corners = rest[nodes]
-        corners[:, 3] = rest[nodes[:, :2]].mean(axis=1) + self.clamps.wings
+        corners[:, 3] = rest[nodes[:, :2]].mean(axis=1) + self.model.wings
         return others._replace(
             hinges=np.concatenate([others.hinges, nodes]),
             corners=np.concatenate([others.corners, corners]),
-            hinge_stiffness=np.concatenate([others.hinge_stiffness, self.clamps.stiffness]),
+            hinge_stiffness=np.concatenate([others.hinge_stiffness, self.model.stiffness]),
         )
 
     def placed(self, order: NDArray, before: Any) -> ClampsTerm:
         """See `Term`."""
-        bars = self.clamps.bars._replace(rest=self.clamps.bars.rest[order])
-        hinges = ranks(order)[self.clamps.hinges]
-        return ClampsTerm(self.clamps._replace(bars=bars, hinges=hinges))
+        bars = self.model.bars._replace(rest=self.model.bars.rest[order])
+        hinges = ranks(order)[self.model.hinges]
+        return ClampsTerm(self.model._replace(bars=bars, hinges=hinges), self._laws)
 
     def nominal(self, q: NDArray) -> ClampsTerm:
         """See `Term`."""
-        return ClampsTerm(self.clamps._replace(bend_rest=self.angles(q)))
+        return self._with(self.model._replace(bend_rest=self.angles(q)))
 
 
 def positions(model: BarsPlates) -> NDArray:

@@ -18,6 +18,7 @@ from foldyn.materials import (
     BarLaw,
     EnhancedLinear,
     HingeLaw,
+    LinearHinge,
     PlateSuperlinear,
     bar_law,
     hinge_law,
@@ -211,7 +212,7 @@ class Structure(Discretized):
         if not len(self.clamps):
             return body
         clamps = clamps_model(self.nodes, self.clamps, self.clamp_stiffness)
-        return body.with_terms(ClampsTerm(clamps))
+        return body.with_terms(ClampsTerm(clamps, (LinearHinge(), LinearHinge())))
 
     def _coupled(self, sheet: BarsHingesTerm | BarsPlatesTerm) -> Assembly:
         """A body: the sheet, with the membranes of the panels in place of independent bars."""
