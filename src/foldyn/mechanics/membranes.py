@@ -108,7 +108,7 @@ def strain_of(membranes, u, p, i, along):
 def _put_differences(own, first, values, apart, strain):
     """Put what the group of eight panels from `first` on has of values (flat) of dofs.
 
-    That are the differences between the ends of bars, into `apart`, and the values of the gives,
+    These are the differences between the ends of bars, into `apart`, and the values of the gives,
     into `strain` after the strains of the bars.
     """
     at, bars = own.corners * first, own.ends.shape[0]

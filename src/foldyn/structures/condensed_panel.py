@@ -93,7 +93,7 @@ def panel_moments(panel: Outline, poissons_ratio: float) -> NDArray:
 def least_heights(panel: Outline, size: int) -> NDArray:
     """Matrix (size, q) from angles to the least heights with the spoke turns, and other angles."""
     points, corners = _points(panel), len(panel.corners)
-    spokes = _spoke_turns(points, corners) if panel.center else np.zeros((0, len(points)))
+    spokes = spoke_turns(points, corners) if panel.center else np.zeros((0, len(points)))
     out = np.zeros((size, len(spokes) + size - len(points)))
     out[: len(points), : len(spokes)] = np.linalg.pinv(spokes, rcond=1e-9)
     out[len(points) :, len(spokes) :] = np.eye(size - len(points))
@@ -132,7 +132,7 @@ def _facet_slopes(points: NDArray, corners: int) -> NDArray:
     return _across(-along, _planes(points, corners))
 
 
-def _spoke_turns(points: NDArray, corners: int) -> NDArray:
+def spoke_turns(points: NDArray, corners: int) -> NDArray:
     """Turns (m, points) of the spokes, for heights of the points."""
     slopes = _planes(points, corners)
     along = points[:corners] - points[corners]
