@@ -283,15 +283,18 @@ def turned_contexts(
 
 
 @inner
-def turn_plate(model, x, scratch, p):
-    """Angles phi of plate p, into scratch.turn."""
+def turn_plate(model, angle, share, x, p, out):
+    """Put angles phi of plate p, for dihedrals `angle` and rotations x, into `out`; or rates.
+
+    share : factor of the dihedrals at rest, 0 for rates.
+    """
     folds = model.fold_rest.size
     for k in range(model.start[p + 1] - model.start[p]):
         h = model.angle[model.start[p] + k]
         if h >= 0:
-            scratch.turn[k] = scratch.angle[h] - model.bend_rest[h - folds]
+            out[k] = angle[h] - share * model.bend_rest[h - folds]
         else:
-            scratch.turn[k] = model.per_reach * x[-1 - h]
+            out[k] = model.per_reach * x[-1 - h]
 
 
 @inner
@@ -358,7 +361,7 @@ def plates_energy(model, bars, u, z, scratch, out):
         )  # fmt: skip
         out[1] += model.fold_stiffness[f] * w
     for plate in range(model.start.size - 1):
-        turn_plate(model, scratch.x, scratch, plate)
+        turn_plate(model, scratch.angle, 1.0, scratch.x, plate, scratch.turn)
         count = model.start[plate + 1] - model.start[plate]
         for k in range(count):
             for m in range(count):
@@ -403,7 +406,7 @@ def turn_moments(model, x, couple, scratch):
         scratch.moment[f] = fold_moment(model, scratch, f)
     turn_rotations(model, couple, scratch)
     for p in range(model.start.size - 1):
-        turn_plate(model, x, scratch, p)
+        turn_plate(model, scratch.angle, 1.0, x, p, scratch.turn)
         add_plate_moments(model, couple, scratch, p)
 
 
@@ -466,7 +469,7 @@ def _energies(own, u, out):
 
 @mean_forces
 def _mean_forces(own, u0, u1, before, h, t, force, powers):
-    model, scratch, folds = own.model, own.scratch, own.model.fold_rest.size
+    model, scratch, first = own.model, own.scratch, np.empty(own.scratch.turn.size)
     n, r = model.bars.rest.shape[0], model.rotations
     began = numbers_at(before, own.place + scratch.angle.size)[own.place :]
     start, x0 = parted_rows(rows_at(u0, own.rows), n, r)
@@ -477,7 +480,7 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
     turn_hinges(model, end, scratch)
     turn_folds(model, x1, scratch)
     scratch.moment[:] = 0.0
-    for f in range(folds):
+    for f in range(model.fold_rest.size):
         angle = began[f]
         for rotation in model.fold_rotations[f]:
             angle -= model.per_reach * x0[rotation] if rotation >= 0 else 0.0
@@ -487,13 +490,10 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
         )[0]  # fmt: skip
     turn_rotations(model, couple, scratch)
     for p in range(model.start.size - 1):
-        for k in range(model.start[p + 1] - model.start[p]):
-            hinge = model.angle[model.start[p] + k]
-            if hinge >= 0:
-                mean = 0.5 * (began[hinge] + scratch.angle[hinge])
-                scratch.turn[k] = mean - model.bend_rest[hinge - folds]
-            else:
-                scratch.turn[k] = 0.5 * model.per_reach * (x0[-1 - hinge] + x1[-1 - hinge])
+        turn_plate(model, began, 1.0, x0, p, first)
+        turn_plate(model, scratch.angle, 1.0, x1, p, scratch.turn)
+        for k in range(first.size):
+            scratch.turn[k] = 0.5 * (first[k] + scratch.turn[k])
         add_plate_moments(model, couple, scratch, p)
     x, dx, points = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
     plain, gradient = np.empty((4, 3)), np.empty((4, 3))

@@ -152,7 +152,7 @@ def _put_fold(model, scratch, f, floor, moment, stiffness):
 @inner_scalar
 def _put_plate(model, x, scratch, p, moment, stiffness):
     """Put moments and matrix of the angles of plate p with rotations x."""
-    turn_plate(model, x, scratch, p)
+    turn_plate(model, scratch.angle, 1.0, x, p, scratch.turn)
     count = model.start[p + 1] - model.start[p]
     for k in range(count):
         moment[k] = 0.0
