@@ -251,7 +251,8 @@ def plates_model(
 def clamps_model(nodes: NDArray, clamps: NDArray, stiffness: NDArray) -> BarsPlates:
     """Clamped edges (c, 3) alone, as plates of one angle each with the given stiffness (c,)."""
     none, number = np.zeros((0, 4), np.int64), np.arange(len(clamps) + 1)
-    plates = EdgePlates(none[:, 0], none[:, :2], number, number[:-1], number, stiffness)
+    entries = np.array(stiffness)  # writable, for which the kernels of plates are compiled
+    plates = EdgePlates(none[:, 0], none[:, :2], number, number[:-1], number, entries)
     model = plates_model(
         nodes, none[:, :2], np.zeros(0), LinearBar(), none, np.zeros(0), np.zeros(0), LinearHinge(),
         none, np.zeros(0), plates, clamps, False,
