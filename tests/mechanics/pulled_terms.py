@@ -19,7 +19,7 @@ MODELS = {
     "BarsPlatesTerm": "model",
     "ShellTerm": "model",
     "SpringsTerm": "springs",
-    "ClampsTerm": "clamps",
+    "ClampsTerm": "model",
     "ViscousTerm": "elements",
     "ViscousPanelsTerm": "panels",
 }

@@ -20,7 +20,6 @@ from foldyn.dynamics.dampers import dampers
 from foldyn.dynamics.driver import prepare
 from foldyn.errors import InputError
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.clamps import ClampsTerm
 from foldyn.mechanics.constant_damping import DampingMatrix, DampingRows
 from foldyn.mechanics.membranes_term import MembranesTerm
 from foldyn.mechanics.pullback import Pullback, arrays_of_body
@@ -28,7 +27,7 @@ from foldyn.mechanics.springs import SpringsTerm
 from foldyn.mechanics.viscous import ViscousTerm
 from foldyn.mechanics.viscous_panels import ViscousPanelsTerm
 from foldyn.shells.term import ShellTerm
-from foldyn.structures.bars_plates import BarsPlatesTerm
+from foldyn.structures.bars_plates import BarsPlatesTerm, ClampsTerm
 
 THICK = fd.Sheet(1e6, 0.25, 0.1, density=1000.0, length_scale_ratio=2.0)
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.3], [0, 1, 0.3], [0.5, -0.8, 0.4]])
@@ -132,11 +131,11 @@ ARRAYS = {  # that count, with a star where forces are linear, with a minus wher
     "gives": OF_MEMBRANES,
     "springs": "direction *stiffness vector length *stretch *axial_stiffness",
     "springs without length": "*vector *axial_stiffness -length -stretch",
-    "clamps": "points *rest *stiffness",
+    "clamps": "bars.rest wings *bend_rest *stiffness",
     "dashpots": "axial corners *coefficient -hidden_turn",
     "damped sides": "corners hidden_turn *coefficient",
     "damped strains": "axial corners *coefficient -hidden_turn",
-    "damped panels": "vector per_length2 *resistance",
+    "damped panels": OF_MEMBRANES,
     "damping matrix": "*data",
     "damping rows": "rows",
     "shell": f"{OF_PLATES} *fold_rest *fold_parameters",

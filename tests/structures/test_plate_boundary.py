@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from whole_plates import PanelPlate
 
 from foldyn.structures.condensed_panel import condensed
-from foldyn.structures.panel_plate import Outline, PanelPlate
+from foldyn.structures.panel_plate import Outline
 
 TRIANGLE = ((0.0, 0.0), (1.1, 0.1), (0.4, 0.9))
 QUAD = ((0.0, 0.0), (1.2, 0.0), (1.0, 0.8), (0.1, 0.6))

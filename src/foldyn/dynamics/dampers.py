@@ -24,7 +24,7 @@ from foldyn.mechanics.constant_damping import DampingMatrix, DampingRows
 from foldyn.mechanics.sheet_term import NO_DOF, no_fold_hinges
 from foldyn.mechanics.term import Term
 from foldyn.mechanics.viscous import Viscous, ViscousTerm, viscous
-from foldyn.mechanics.viscous_panels import ViscousPanelsTerm, viscous_panels
+from foldyn.mechanics.viscous_panels import ViscousPanelsTerm
 
 
 def damping_terms(case: Case, start: Origin | None, modal: ModalRows) -> list[Term]:
@@ -107,8 +107,9 @@ def dampers(case: Case, quasi_static: bool = False) -> list[Term]:
     if len(elements.coefficient):
         terms.append(ViscousTerm(elements))
     strains = body.strains() if case.strain_damping else None
-    if strains is not None and strains.membranes:
-        terms.append(ViscousPanelsTerm(viscous_panels(strains.membranes, case.strain_damping)))
+    for own in () if strains is None else strains.membranes:
+        resisting = own._replace(stiffness=case.strain_damping * own.stiffness)
+        terms.append(ViscousPanelsTerm(resisting))
     return terms
 
 

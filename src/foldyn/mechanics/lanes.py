@@ -52,6 +52,15 @@ def take(array, row, columns=3):
 
 
 @inner_scalar
+def place(array, row, x, y, z):
+    """Store three eights as those of a node or an element."""
+    at = 3 * WIDTH * np.int64(row)
+    put(array, at, x)
+    put(array, at + WIDTH, y)
+    put(array, at + 2 * WIDTH, z)
+
+
+@inner_scalar
 def add(array, row, x, y, z):
     """Add three eights to a node."""
     at = 3 * WIDTH * np.int64(row)

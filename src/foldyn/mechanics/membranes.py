@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.eights import eight, put
-from foldyn.mechanics.lanes import WIDTH, add, increase, take
+from foldyn.mechanics.block_matrix import pairs_within
+from foldyn.mechanics.lanes import WIDTH, add, increase, place, take
 
 
 class Membranes(NamedTuple):
@@ -48,11 +49,14 @@ class Packed(NamedTuple):
     vector: NDArray  # rows (3 b, 8)
     per_length2: NDArray  # rows (b, 8)
     stiffness: NDArray  # rows (e (e + 1) / 2, 8), the lower half
-    moved: NDArray  # (24 c,) memory of a group: displacements
-    along: NDArray  # (24 b,) vectors of the bars
+    moved: NDArray  # (24 c,) memory of a group: values of the nodes
+    force: NDArray  # (24 c,)
+    apart: NDArray  # (24 b,) differences of displacements at the ends of the bars
     strain: NDArray  # (8 e,)
     stress: NDArray  # (8 e,) S E
-    force: NDArray  # (24 c,)
+    other_apart: NDArray  # the same of another state, of velocities or of weights
+    other_strain: NDArray
+    other_stress: NDArray
 
 
 def packed(membranes: Membranes) -> Packed:
@@ -74,7 +78,7 @@ def packed(membranes: Membranes) -> Packed:
         groups(membranes.vector), groups(membranes.per_length2), groups(membranes.stiffness[lower]),
         *(
             np.zeros(rows * WIDTH)
-            for rows in (3 * corners, 3 * bars, bars + given, bars + given, 3 * corners)
+            for rows in (3 * corners, 3 * corners, *(3 * bars, bars + given, bars + given) * 2)
         ),
     )  # fmt: skip
 
@@ -101,27 +105,64 @@ def strain_of(membranes, u, p, i, along):
 
 
 @inner_scalar
-def _gather(own, first, values, out):
-    """Put the values of the nodes (flat) of the group of eight panels from `first` on into out."""
-    at = own.corners * first
+def _put_differences(own, first, values, apart, strain):
+    """Put what the group of eight panels from `first` on has of values (flat) of dofs.
+
+    These are the differences between the ends of bars, into `apart`, and the values of the gives,
+    into `strain` after the strains of the bars.
+    """
+    at, bars = own.corners * first, own.ends.shape[0]
     for v in range(own.corners):
         for q in range(min(WIDTH, own.count - first)):
             row = 3 * own.nodes[at + v * WIDTH + q]
             for c in range(3):
-                out[(3 * v + c) * WIDTH + q] = values[row + c]
-
-
-@inner_scalar
-def _gather_gives(own, first, values, out):
-    """Put the values of the gives of a group into out, after those of the bars."""
-    at, bars = own.given * first, own.ends.shape[0]
+                own.moved[(3 * v + c) * WIDTH + q] = values[row + c]
+    for i in range(bars):
+        x1, y1, z1 = take(own.moved, own.ends[i, 0])
+        x2, y2, z2 = take(own.moved, own.ends[i, 1])
+        place(apart, i, x2 - x1, y2 - y1, z2 - z1)
+    at = own.given * first
     for k in range(own.given):
         for q in range(min(WIDTH, own.count - first)):
-            out[(bars + k) * WIDTH + q] = values[own.gives[at + k * WIDTH + q]]
+            strain[(bars + k) * WIDTH + q] = values[own.gives[at + k * WIDTH + q]]
 
 
 @inner_scalar
-def _multiply(own, first, strain, stress):
+def put_strains(own, first, u, apart, strain):
+    """Put the strains of a group at displacements u (flat), and their gives, into `strain`."""
+    _put_differences(own, first, u, apart, strain)
+    at = own.ends.shape[0] * (first // WIDTH)
+    for i in range(own.ends.shape[0]):
+        excess = _excess(take(own.vector, at + i), take(apart, i))
+        put(strain, i * WIDTH, 0.5 * eight(own.per_length2, (at + i) * WIDTH) * excess)
+
+
+@inner_scalar
+def put_rates(own, first, v, apart, strain):
+    """Put the rates of the strains for velocities v (flat), at own.apart; see `put_strains`."""
+    _put_differences(own, first, v, apart, strain)
+    at = own.ends.shape[0] * (first // WIDTH)
+    for i in range(own.ends.shape[0]):
+        half = growth(take(own.vector, at + i), take(own.apart, i), take(apart, i))
+        put(strain, i * WIDTH, eight(own.per_length2, (at + i) * WIDTH) * half)
+
+
+@inner_scalar
+def _excess(v, d):
+    """Squared length minus squared rest length of the vector v + d, without cancellation."""
+    (vx, vy, vz), (dx, dy, dz) = v, d
+    return dx * (2.0 * vx + dx) + dy * (2.0 * vy + dy) + dz * (2.0 * vz + dz)
+
+
+@inner_scalar
+def growth(v, d, w):
+    """Half the rate of this for rates w of d."""
+    (vx, vy, vz), (dx, dy, dz), (wx, wy, wz) = v, d, w
+    return wx * (vx + dx) + wy * (vy + dy) + wz * (vz + dz)
+
+
+@inner_scalar
+def multiply(own, first, strain, stress):
     """stress = S strain in a group of panels, from the lower half of S."""
     count = own.ends.shape[0] + own.given
     row = (first // WIDTH) * (count * (count + 1) // 2) * WIDTH
@@ -138,43 +179,70 @@ def _multiply(own, first, strain, stress):
 
 
 @inner
+def add_pulls(own, first, apart, low, high, force):
+    """Add the forces (flat) of own.stress in a group on the nodes from low to high, and on gives.
+
+    apart : differences of displacements, as `put_strains` puts them.
+    """
+    bars, at = own.ends.shape[0], own.ends.shape[0] * (first // WIDTH)
+    own.force[:] = 0.0
+    for i in range(bars):
+        (vx, vy, vz), (dx, dy, dz) = take(own.vector, at + i), take(apart, i)
+        pull = eight(own.stress, i * WIDTH) * eight(own.per_length2, (at + i) * WIDTH)
+        along = pull * (vx + dx), pull * (vy + dy), pull * (vz + dz)
+        pull_apart(own.force, own.ends, i, along)
+    scatter(own, first, own.force, own.stress, low, high, force)
+
+
+@inner_scalar
+def pull_apart(force, ends, i, pull):
+    """Add a force at the second end of bar i, and the opposite one at its first end."""
+    x, y, z = pull
+    add(force, ends[i, 0], -x, -y, -z)
+    add(force, ends[i, 1], x, y, z)
+
+
+@inner_scalar
+def scatter(own, first, force, stress, low, high, out):
+    """Add the forces of a group on the nodes from low to high, and on gives, to `out` (flat)."""
+    at = own.corners * first
+    for v in range(own.corners):
+        for q in range(min(WIDTH, own.count - first)):
+            node = own.nodes[at + v * WIDTH + q]
+            if low <= node < high:
+                for c in range(3):
+                    out[3 * node + c] += force[(3 * v + c) * WIDTH + q]
+    at, bars = own.given * first, own.ends.shape[0]
+    for k in range(own.given):
+        for q in range(min(WIDTH, own.count - first)):
+            dof = own.gives[at + k * WIDTH + q]
+            if 3 * low <= dof < 3 * high:
+                out[dof] += stress[(bars + k) * WIDTH + q]
+
+
+@inner_scalar
+def work_of(own):
+    """Sum of the strains of a group times their stresses."""
+    total = 0.0
+    for k in range(own.strain.size):
+        total += own.strain[k] * own.stress[k]
+    return total
+
+
+@inner
 def add_membrane_forces(own, u, low, high, force):
     """Add the forces of all panels on the nodes from low to high; u and force are flat."""
-    bars = own.ends.shape[0]
     for first in range(0, own.count, WIDTH):
-        _gather(own, first, u, own.moved)
-        own.force[:] = 0.0
-        at = bars * (first // WIDTH)
-        for i in range(bars):
-            x1, y1, z1 = take(own.moved, own.ends[i, 0])
-            x2, y2, z2 = take(own.moved, own.ends[i, 1])
-            vx, vy, vz = take(own.vector, at + i)
-            dx, dy, dz = x2 - x1, y2 - y1, z2 - z1
-            excess = dx * (2.0 * vx + dx) + dy * (2.0 * vy + dy) + dz * (2.0 * vz + dz)
-            put(own.strain, i * WIDTH, 0.5 * eight(own.per_length2, (at + i) * WIDTH) * excess)
-            put(own.along, 3 * i * WIDTH, vx + dx)
-            put(own.along, (3 * i + 1) * WIDTH, vy + dy)
-            put(own.along, (3 * i + 2) * WIDTH, vz + dz)
-        _gather_gives(own, first, u, own.strain)
-        _multiply(own, first, own.strain, own.stress)
-        for i in range(bars):
-            pull = eight(own.stress, i * WIDTH) * eight(own.per_length2, (at + i) * WIDTH)
-            x, y, z = take(own.along, i)
-            add(own.force, own.ends[i, 0], -pull * x, -pull * y, -pull * z)
-            add(own.force, own.ends[i, 1], pull * x, pull * y, pull * z)
-        at = own.corners * first
-        for v in range(own.corners):
-            for q in range(min(WIDTH, own.count - first)):
-                node = own.nodes[at + v * WIDTH + q]
-                if low <= node < high:
-                    for c in range(3):
-                        force[3 * node + c] += own.force[(3 * v + c) * WIDTH + q]
-        at = own.given * first
-        for k in range(own.given):
-            for q in range(min(WIDTH, own.count - first)):
-                dof = own.gives[at + k * WIDTH + q]
-                if 3 * low <= dof < 3 * high:
-                    force[dof] += own.stress[(bars + k) * WIDTH + q]
+        put_strains(own, first, u, own.apart, own.strain)
+        multiply(own, first, own.strain, own.stress)
+        add_pulls(own, first, own.apart, low, high, force)
+
+
+def strain_places(membranes: Membranes) -> tuple[NDArray, NDArray]:
+    """Rows and columns (k,) of the entries of `membrane_blocks`."""
+    nodal = (3 * membranes.nodes[:, :, None] + np.arange(3)).reshape(len(membranes.nodes), -1)
+    row, column = pairs_within(np.concatenate([nodal, membranes.gives], axis=1)).T
+    return row, column
 
 
 @kernel
@@ -199,157 +267,130 @@ def strains_toward(membranes, u0, u1):
 
 @kernel
 def membrane_blocks(membranes, u0, u1, strain):
-    """Tangent (p, c, c, 3, 3), N/m, of all panels at u0 = u1, with the stresses of strains (e, p).
+    """Tangent (p, m, m), N/m, of all panels at u0 = u1, with the stresses of strains (e, p).
 
-    If u1 differs from u0, this is twice the derivative of the panels' mean forces with respect to
-    u1.
+    The m dofs of a panel are those of its nodes, then its gives. If u1 differs from u0, this is
+    twice the derivative of the panels' mean forces with respect to u1.
     """
-    count, bars = membranes.nodes.shape[1], membranes.ends.shape[0]
-    out = np.zeros((membranes.nodes.shape[0], count, count, 3, 3))
+    bars, given = membranes.ends.shape[0], membranes.gives.shape[1]
+    nodal = 3 * membranes.nodes.shape[1]
+    size = nodal + given
+    out = np.zeros((membranes.nodes.shape[0], size, size))
     first, last = np.empty((bars, 3)), np.empty((bars, 3))
-    rate, pulled = np.empty((bars, 2, 3)), np.empty((bars, count, 3))
+    pulled = np.empty((bars + given, size))  # rates of the stresses
     for p in range(out.shape[0]):
         pulled[:] = 0.0
-        for i in range(bars):
-            strain_of(membranes, u0, p, i, first[i])
-            strain_of(membranes, u1, p, i, last[i])
-            for c in range(3):
-                middle = 0.5 * (first[i, c] + last[i, c])
-                rate[i, 1, c] = membranes.per_length2[i, p] * middle
-                rate[i, 0, c] = -rate[i, 1, c]
+        for j in range(bars):
+            strain_of(membranes, u0, p, j, first[j])
+            strain_of(membranes, u1, p, j, last[j])
+            one, other = 3 * membranes.ends[j, 0], 3 * membranes.ends[j, 1]
+            for i in range(bars + given):
+                stiff = membranes.stiffness[i, j, p] * membranes.per_length2[j, p]
+                for c in range(3):
+                    pulled[i, other + c] += stiff * last[j, c]
+                    pulled[i, one + c] -= stiff * last[j, c]
+        for i in range(bars + given):
+            for k in range(given):
+                pulled[i, nodal + k] = membranes.stiffness[i, bars + k, p]
         for i in range(bars):
             pull = 0.0
             for j in range(strain.shape[0]):
                 pull += membranes.stiffness[i, j, p] * strain[j, p]
-            for j in range(bars):
-                stiff = membranes.stiffness[i, j, p]
-                for c in range(3):
-                    along = stiff * membranes.per_length2[j, p] * last[j, c]
-                    pulled[i, membranes.ends[j, 1], c] += along
-                    pulled[i, membranes.ends[j, 0], c] -= along
             pull *= membranes.per_length2[i, p]
-            for end in range(2):
-                v, w = membranes.ends[i, end], membranes.ends[i, 1 - end]
-                for c in range(3):
-                    out[p, v, v, c, c] += pull
-                    out[p, v, w, c, c] -= pull
-                    for k in range(count):
-                        for d in range(3):
-                            out[p, v, k, c, d] += rate[i, end, c] * pulled[i, k, d]
+            for c in range(3):
+                one, other = 3 * membranes.ends[i, 0] + c, 3 * membranes.ends[i, 1] + c
+                out[p, one, one] += pull
+                out[p, other, other] += pull
+                out[p, one, other] -= pull
+                out[p, other, one] -= pull
+                rate = 0.5 * membranes.per_length2[i, p] * (first[i, c] + last[i, c])
+                for d in range(size):
+                    out[p, other, d] += rate * pulled[i, d]
+                    out[p, one, d] -= rate * pulled[i, d]
+        for k in range(given):
+            for d in range(size):
+                out[p, nodal + k, d] = pulled[bars + k, d]
     return out
 
 
-def give_entries(membranes: Membranes, u0: NDArray, u1: NDArray) -> list[NDArray]:
-    """Tangents (p, 3c, k), (p, k, 3c) and (p, k, k), N/m, between nodes and gives, and of gives.
-
-    See `membrane_blocks`; the first has the forces of nodes, the second those of gives.
-    """
-    count, corners = membranes.nodes.shape
-    bars, ends = len(membranes.ends), membranes.ends
-    ways = np.zeros((bars, corners))  # -1 and 1 at the ends of the bars
-    ways[np.arange(bars), ends[:, 0]], ways[np.arange(bars), ends[:, 1]] = -1.0, 1.0
-    first, last = (
-        membranes.vector + (u[membranes.nodes[:, ends[:, 1]]] - u[membranes.nodes[:, ends[:, 0]]])
-        .transpose(1, 2, 0)
-        for u in (u0, u1)
-    )  # fmt: skip
-    across = membranes.per_length2[:, None] * membranes.stiffness[:bars, bars:]
-    pulls, slides = (
-        np.einsum("bc,bxp,bkp->pcxk", ways, along, across).reshape(count, 3 * corners, -1)
-        for along in (0.5 * (first + last), last)
-    )
-    return [pulls, slides.swapaxes(1, 2), membranes.stiffness[bars:, bars:].transpose(2, 0, 1)]
-
-
 class Back(NamedTuple):
-    """Work arrays of the pullback for a group of eight panels, and the gradients."""
+    """Gradients that pullbacks add to; p' are the panels with room for whole groups."""
 
-    weight: NDArray  # (24 c,) of the nodes
-    between: NDArray  # (24 b,) differences of the weights at the bars' ends
-    excess: NDArray  # (8 b,) squared length minus squared rest length, m2
-    growth: NDArray  # (8 b,) rate of `excess` for nodal velocities of half the weights
-    rate: NDArray  # (8 e,) r, rates of the strains, and weights of the gives
-    pulled: NDArray  # (8 e,) S r
-    vector: NDArray  # (3 b, p') gradient, p' the panels with room for whole groups
+    vector: NDArray  # (3 b, p')
     per_length2: NDArray  # (b, p')
     stiffness: NDArray  # (e e, p') of the lower half, which stands for both
 
+    def of(self, membranes: Membranes) -> dict[str, NDArray]:
+        """The gradients with the shapes of the arrays of panels, by name."""
+        return {
+            name: rows.reshape(*getattr(membranes, name).shape[:-1], -1)[
+                ..., : len(membranes.nodes)
+            ]
+            for name, rows in self._asdict().items()
+        }
+
 
 def back(membranes: Membranes) -> Back:
-    """Memory for panels."""
-    count, corners = membranes.nodes.shape
-    bars = len(membranes.ends)
-    both = bars + membranes.gives.shape[1]
+    """Gradients of zeros."""
+    count, bars = len(membranes.nodes), len(membranes.ends)
     # an odd number of groups: otherwise rows may compete for the same cache lines
     room = WIDTH * (-(-count // WIDTH) | 1)
     return Back(
-        *(np.zeros(rows * WIDTH) for rows in (3 * corners, 3 * bars, bars, bars, both, both)),
-        *(np.zeros((rows, room)) for rows in (3 * bars, bars, both * both)),
+        *(np.zeros((rows, room)) for rows in (3 * bars, bars, len(membranes.stiffness) ** 2))
     )
 
 
+@inner_scalar
+def combined(a, x, b, y):
+    """The vector a x + b y."""
+    return a * x[0] + b * y[0], a * x[1] + b * y[1], a * x[2] + b * y[2]
+
+
+@inner_scalar
+def pull_stiffness(own, back, first):
+    """Multiply strains E and other strains r by S; add the derivatives of r^T S E by S."""
+    size, room = own.ends.shape[0] + own.given, back.vector.shape[1]
+    multiply(own, first, own.strain, own.stress)
+    multiply(own, first, own.other_strain, own.other_stress)
+    for i in range(size):
+        rate, strain = eight(own.other_strain, i * WIDTH), eight(own.strain, i * WIDTH)
+        increase(back.stiffness, (i * size + i) * room + first, rate * strain)
+        for j in range(i):
+            by = rate * eight(own.strain, j * WIDTH) + strain * eight(own.other_strain, j * WIDTH)
+            increase(back.stiffness, (i * size + j) * room + first, by)
+
+
+@inner_scalar
+def pull_vector(back, first, i, by):
+    """Add derivatives by the vector of bar i."""
+    room = back.vector.shape[1]
+    at = 3 * i * room + first
+    increase(back.vector, at, by[0])
+    increase(back.vector, at + room, by[1])
+    increase(back.vector, at + 2 * room, by[2])
+
+
 @inner
-def pull_membranes(own, back, u, weight, product):
-    """Add the derivatives of weight . F = r^T S E to `product` and the gradients; all flat."""
-    bars, room = own.ends.shape[0], back.vector.shape[1]
-    both = bars + own.given
+def pull_membranes(own, back, u, weight, high, product):
+    """Add the derivatives of weight . F = r^T S E to `product` and the gradients; all flat.
+
+    r : rates of the strains for velocities `weight`.
+    high : number of rows.
+    """
     for first in range(0, own.count, WIDTH):
-        _gather(own, first, u, own.moved)
-        _gather(own, first, weight, back.weight)
+        put_strains(own, first, u, own.apart, own.strain)
+        put_rates(own, first, weight, own.other_apart, own.other_strain)
+        pull_stiffness(own, back, first)
         own.force[:] = 0.0
-        at = bars * (first // WIDTH)
-        for i in range(bars):
-            x1, y1, z1 = take(own.moved, own.ends[i, 0])
-            x2, y2, z2 = take(own.moved, own.ends[i, 1])
-            vx, vy, vz = take(own.vector, at + i)
-            dx, dy, dz = x2 - x1, y2 - y1, z2 - z1
-            excess = dx * (2.0 * vx + dx) + dy * (2.0 * vy + dy) + dz * (2.0 * vz + dz)
-            put(back.excess, i * WIDTH, excess)
-            put(own.strain, i * WIDTH, 0.5 * eight(own.per_length2, (at + i) * WIDTH) * excess)
-            x1, y1, z1 = take(back.weight, own.ends[i, 0])
-            x2, y2, z2 = take(back.weight, own.ends[i, 1])
-            wx, wy, wz = x2 - x1, y2 - y1, z2 - z1
-            growth = wx * (vx + dx) + wy * (vy + dy) + wz * (vz + dz)
-            put(back.growth, i * WIDTH, growth)
-            put(back.rate, i * WIDTH, eight(own.per_length2, (at + i) * WIDTH) * growth)
-            row = 3 * i * WIDTH
-            put(own.along, row, dx)
-            put(own.along, row + WIDTH, dy)
-            put(own.along, row + 2 * WIDTH, dz)
-            put(back.between, row, wx)
-            put(back.between, row + WIDTH, wy)
-            put(back.between, row + 2 * WIDTH, wz)
-        _gather_gives(own, first, u, own.strain)
-        _gather_gives(own, first, weight, back.rate)
-        _multiply(own, first, own.strain, own.stress)
-        _multiply(own, first, back.rate, back.pulled)
-        for i in range(both):
-            rate, strain = eight(back.rate, i * WIDTH), eight(own.strain, i * WIDTH)
-            increase(back.stiffness, (i * both + i) * room + first, rate * strain)
-            for j in range(i):
-                by = rate * eight(own.strain, j * WIDTH) + strain * eight(back.rate, j * WIDTH)
-                increase(back.stiffness, (i * both + j) * room + first, by)
-        for i in range(bars):
+        at = own.ends.shape[0] * (first // WIDTH)
+        for i in range(own.ends.shape[0]):
+            v, d, w = take(own.vector, at + i), take(own.apart, i), take(own.other_apart, i)
+            stress, pulled = eight(own.stress, i * WIDTH), eight(own.other_stress, i * WIDTH)
+            by = stress * growth(v, d, w) + 0.5 * pulled * _excess(v, d)
+            increase(back.per_length2, i * back.per_length2.shape[1] + first, by)
             per_length2 = eight(own.per_length2, (at + i) * WIDTH)
-            stress, pulled = eight(own.stress, i * WIDTH), eight(back.pulled, i * WIDTH)
-            growth, excess = eight(back.growth, i * WIDTH), eight(back.excess, i * WIDTH)
-            increase(back.per_length2, i * room + first, stress * growth + 0.5 * pulled * excess)
             stress, pulled = stress * per_length2, pulled * per_length2
-            one, other = own.ends[i, 0], own.ends[i, 1]
-            for c in range(3):
-                by = stress * eight(back.between, (3 * i + c) * WIDTH)
-                by = by + pulled * eight(own.along, (3 * i + c) * WIDTH)
-                increase(back.vector, (3 * i + c) * room + first, by)
-                by = by + pulled * eight(own.vector, (3 * (at + i) + c) * WIDTH)
-                increase(own.force, (3 * other + c) * WIDTH, by)
-                increase(own.force, (3 * one + c) * WIDTH, -by)
-        at = own.corners * first
-        for v in range(own.corners):
-            for q in range(min(WIDTH, own.count - first)):
-                row = 3 * own.nodes[at + v * WIDTH + q]
-                for c in range(3):
-                    product[row + c] += own.force[(3 * v + c) * WIDTH + q]
-        at = own.given * first
-        for k in range(own.given):
-            for q in range(min(WIDTH, own.count - first)):
-                product[own.gives[at + k * WIDTH + q]] += back.pulled[(bars + k) * WIDTH + q]
+            by = combined(stress, w, pulled, d)
+            pull_vector(back, first, i, by)
+            pull_apart(own.force, own.ends, i, combined(pulled, v, 1.0, by))
+        scatter(own, first, own.force, own.other_stress, 0, high, product)

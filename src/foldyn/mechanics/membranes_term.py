@@ -10,22 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.jit.compiled import inner_scalar
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.block_matrix import pairs_within, places_of
+from foldyn.mechanics.lanes import WIDTH
 from foldyn.mechanics.membranes import (
     Back,
     Membranes,
     Packed,
     add_membrane_forces,
+    add_pulls,
     back,
-    give_entries,
     membrane_blocks,
+    multiply,
     packed,
     pull_membranes,
-    strain_of,
+    put_strains,
+    strain_places,
     strains_toward,
     taken,
+    work_of,
 )
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
@@ -59,12 +63,12 @@ def _pullback(own, u, v, t, weight, product, rate):
     moved, weights, out = (
         rows_at(u, own.rows), rows_at(weight, own.rows), rows_at(product, own.rows)
     )  # fmt: skip
-    pull_membranes(own.own, own.back, flat(moved), flat(weights), flat(out))
+    pull_membranes(own.own, own.back, flat(moved), flat(weights), own.rows, flat(out))
 
 
 class _Context(NamedTuple):
     own: Packed  # with nodes of the thread
-    whole: Membranes
+    whole: Packed
     low: int  # first and last + 1 of the thread's nodes
     high: int
     rows: int
@@ -80,49 +84,33 @@ def _forces(own, u, v, t, force, powers):
 
 @energies
 def _energies(own, u, out):
-    membranes, moved, energy = own.whole, rows_at(u, own.rows), 0.0
-    bars = membranes.ends.shape[0]
-    strain, along = np.empty(bars + membranes.gives.shape[1]), np.empty(3)
-    for p in range(membranes.nodes.shape[0]):
-        for i in range(bars):
-            strain[i] = strain_of(membranes, moved, p, i, along)
-        for k in range(membranes.gives.shape[1]):
-            strain[bars + k] = flat(moved)[membranes.gives[p, k]]
-        for i in range(strain.size):
-            for j in range(strain.size):
-                energy += 0.5 * strain[i] * membranes.stiffness[i, j, p] * strain[j]
+    panels, moved, energy = own.whole, flat(rows_at(u, own.rows)), 0.0
+    for first in range(0, panels.count, WIDTH):
+        put_strains(panels, first, moved, panels.apart, panels.strain)
+        multiply(panels, first, panels.strain, panels.stress)
+        energy += 0.5 * work_of(panels)
     numbers_at(out, GROUP + 1)[GROUP] += energy
 
 
 @mean_forces
 def _mean_forces(own, u0, u1, before, h, t, force, powers):
     """Uses mean strains and mid-step vectors, as energies are quadratic in strains and gives."""
-    membranes, out = own.whole, rows_at(force, own.rows)
-    start, end = rows_at(u0, own.rows), rows_at(u1, own.rows)
-    bars, ends, given = membranes.ends.shape[0], membranes.ends, membranes.gives.shape[1]
-    strain, along = np.empty(bars + given), np.empty((bars, 3))
-    one, other = np.empty(3), np.empty(3)
-    for p in range(membranes.nodes.shape[0]):
-        for i in range(bars):
-            strain[i] = 0.5 * strain_of(membranes, start, p, i, one)
-            strain[i] += 0.5 * strain_of(membranes, end, p, i, other)
-            for c in range(3):
-                along[i, c] = 0.5 * (one[c] + other[c])
-        for k in range(given):
-            dof = membranes.gives[p, k]
-            strain[bars + k] = 0.5 * (flat(start)[dof] + flat(end)[dof])
-        for i in range(bars + given):
-            pull = 0.0
-            for j in range(bars + given):
-                pull += membranes.stiffness[i, j, p] * strain[j]
-            if i >= bars:
-                flat(out)[membranes.gives[p, i - bars]] += pull
-                continue
-            pull *= membranes.per_length2[i, p]
-            a, b = membranes.nodes[p, ends[i, 0]], membranes.nodes[p, ends[i, 1]]
-            for c in range(3):
-                out[b, c] += pull * along[i, c]
-                out[a, c] -= pull * along[i, c]
+    panels, out = own.whole, flat(rows_at(force, own.rows))
+    start, end = flat(rows_at(u0, own.rows)), flat(rows_at(u1, own.rows))
+    for first in range(0, panels.count, WIDTH):
+        put_strains(panels, first, start, panels.apart, panels.strain)
+        put_strains(panels, first, end, panels.other_apart, panels.other_strain)
+        _take_mean(panels.apart, panels.other_apart)
+        _take_mean(panels.strain, panels.other_strain)
+        multiply(panels, first, panels.strain, panels.stress)
+        add_pulls(panels, first, panels.apart, 0, own.rows, out)
+
+
+@inner_scalar
+def _take_mean(one, other):
+    """Put the mean of both into the first."""
+    for k in range(one.size):
+        one[k] = 0.5 * (one[k] + other[k])
 
 
 class MembranesTerm(Term):
@@ -154,11 +142,11 @@ class MembranesTerm(Term):
 
     def compiled(self, part: Any, kept: Packed, group: int) -> CompiledTerm:
         """See `Term`."""
+        whole = kept if kept.count == len(self.membranes.nodes) else packed(self.membranes)
         low, high = (int(end) for end in part.own)
-        context = _Context(kept, self.membranes, low, high, self.rows, part.team)
-        return CompiledTerm(
-            Context(context), {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
-        )
+        context = Context(_Context(kept, whole, low, high, self.rows, part.team))
+        kernels = {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
+        return CompiledTerm(context, kernels)
 
     def arrays(self) -> Arrays:
         """See `Term`."""
@@ -166,27 +154,14 @@ class MembranesTerm(Term):
 
     def pulled(self) -> Pulled:
         """See `Term`."""
-        own = back(self.membranes)
-        gradient = {  # without the padding
-            name: getattr(own, name).reshape(*array.shape[:-1], -1)[..., : array.shape[-1]]
-            for name, array in self.arrays().numbers.items()
-        }
-        context = Context(_Backward(packed(self.membranes), own, self.rows))
-        return Pulled(context, _pullback, gradient)
+        out = back(self.membranes)
+        context = Context(_Backward(packed(self.membranes), out, self.rows))
+        return Pulled(context, _pullback, out.of(self.membranes))
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:
-        """See `Term`: between nodes, then nodes and gives, gives and nodes, and gives."""
-        membranes = self.membranes
-        row, column = places_of(pairs_within(membranes.nodes))
-        nodal = (3 * membranes.nodes[:, :, None] + np.arange(3)).reshape(len(membranes.nodes), -1)
-        rows, columns = [row], [column]
-        gives = membranes.gives
-        for one, other in ((nodal, gives), (gives, nodal), (gives, gives)):
-            pairs = np.broadcast_arrays(one[:, :, None], other[:, None, :])
-            rows.append(pairs[0].ravel())
-            columns.append(pairs[1].ravel())
-        return np.concatenate(rows), np.concatenate(columns)
+        """See `Term`."""
+        return strain_places(self.membranes)
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
         """See `Term`."""
@@ -206,21 +181,17 @@ class MembranesTerm(Term):
         return np.concatenate([strains_toward(self.membranes, nodal(q0), nodal(q1)), given])
 
     def _entries(self, q0: NDArray, q1: NDArray, strain: NDArray) -> NDArray:
-        given = self.membranes, nodal(q0), nodal(q1)
-        entries = [membrane_blocks(*given, strain)]
-        if self.membranes.gives.size:
-            entries += give_entries(*given)
-        return np.concatenate([each.ravel() for each in entries])
+        return membrane_blocks(self.membranes, nodal(q0), nodal(q1), strain).ravel()
 
     def unstrained(self, q: NDArray) -> Unstrained:
         """See `Term`."""
-        size, gives = (q.size, q.size), self.membranes.gives
-        strain = np.zeros(self.membranes.stiffness.shape[1:])
-        entries = (self._entries(q, q, strain), self.places)
-        tangent = sparse.csr_array(sparse.coo_array(entries, size))
-        first = len(entries[0]) - gives.size * gives.shape[1]  # gives come last
-        alone = entries[0][first:], tuple(place[first:] for place in self.places)
-        kept = sparse.csr_array(sparse.coo_array(alone, size))
+        size, places = (q.size, q.size), np.array(self.places)
+        entries = self._entries(q, q, np.zeros(self.membranes.stiffness.shape[1:]))
+        alone = np.isin(places, self.membranes.gives).all(axis=0)
+        tangent, kept = (
+            sparse.csr_array(sparse.coo_array((entries[own], tuple(places[:, own])), size))
+            for own in (slice(None), alone)
+        )
         return Unstrained(tangent, kept, lambda motion: 0.0)
 
     def strains(self, others: Strains) -> Strains:

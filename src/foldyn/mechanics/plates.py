@@ -4,8 +4,8 @@ A plate has angles phi: the turns of its hinges from rest, and rotations beta of
 to the facets there. Its energy is 1/2 phi^T K phi. A fold is a hinge between two plates; its angle
 is the dihedral of the facets minus the two adjacent rotations. At a clamped edge the sheet keeps
 its direction in space: the angle of the plate is the angle between its facet and the facet's mirror
-image at rest. The last point of this hinge is no node but rides on the ends of the edge
-(`mechanics.clamps`).
+image at rest. The last point of this hinge is no node but follows the mean displacement of the ends
+of the edge: translating the edge causes no strain.
 
 Rotations are massless dofs in addition to the displacements u (n, 3). The dofs x (r,) of rotations
 are lengths, too (m), so that norms over all dofs do not depend on the unit of length: beta is x
@@ -54,6 +54,8 @@ from foldyn.mechanics.term import (
     parted_rows,
 )
 from foldyn.mechanics.threads import Team, team
+
+RIDES = -1  # stands for the node of a virtual wing
 
 
 class BarsPlates(NamedTuple):
@@ -225,7 +227,7 @@ def put_rotations(model, z, share, angle, out):
             out[only] = turn - z[only]
 
 
-@inner
+@kernel
 def hand_over(model, couple, moment):
     """Turn forces on rotations into those on dofs, in place; the rest adds to moments of hinges."""
     for f in range(model.unmoved.size):
@@ -240,16 +242,11 @@ def hand_over(model, couple, moment):
             couple[only] = -couple[only]
 
 
-@kernel
-def _hand_over(model, couple, moment):
-    hand_over(model, couple, moment)
-
-
 def handed_over(model: BarsPlates, push: NDArray) -> tuple[NDArray, NDArray]:
     """Moments (nf,), N m, on folds, and forces (k,), N, on dofs, of forces (k,) on rotations."""
     moment, handed = np.zeros(len(model.fold_rest)), np.zeros(model.rotations)
     handed[: len(push)] = push
-    _hand_over(Context(model), handed, moment)
+    hand_over(Context(model), handed, moment)
     return moment, handed[: len(push)]
 
 
@@ -286,15 +283,18 @@ def turned_contexts(
 
 
 @inner
-def turn_plate(model, x, scratch, p):
-    """Angles phi of plate p, into scratch.turn."""
+def turn_plate(model, angle, share, x, p, out):
+    """Put angles phi of plate p, for dihedrals `angle` and rotations x, into `out`; or rates.
+
+    share : factor of the dihedrals at rest, 0 for rates.
+    """
     folds = model.fold_rest.size
     for k in range(model.start[p + 1] - model.start[p]):
         h = model.angle[model.start[p] + k]
         if h >= 0:
-            scratch.turn[k] = scratch.angle[h] - model.bend_rest[h - folds]
+            out[k] = angle[h] - share * model.bend_rest[h - folds]
         else:
-            scratch.turn[k] = model.per_reach * x[-1 - h]
+            out[k] = model.per_reach * x[-1 - h]
 
 
 @inner
@@ -322,25 +322,26 @@ class Bars(NamedTuple):
 
     context: NDArray  # slots of their context
     kernels: NDArray  # (3,) addresses of `FORCES`, `ENERGIES` and `MEAN_FORCES`, 0 without bars
+    first: bool  # whether the term comes first, and overwrites forces and energies
 
 
-def bars_of(model: BarsPlates, scratch: PlatesScratch) -> Bars:
+def bars_of(model: BarsPlates, scratch: PlatesScratch, first: bool) -> Bars:
     """The kernels of the bars, with scratch of the plates."""
     term = bars_hinges_kernels(model.bars, scratch.bars, 3)
     kernels = np.zeros(3, np.int64)
     if len(model.bars.bar_runs):
         kernels[:] = [term.kernels[k].at(term.context) for k in (FORCES, ENERGIES, MEAN_FORCES)]
-    return Bars(term.context.slots, kernels)
+    return Bars(term.context.slots, kernels, first)
 
 
 @inner_scalar
 def put_bar_forces(bars, u, force):
     """Write the forces (n, 3) of the bars."""
-    if bars.kernels[0] == 0:
+    if bars.kernels[0] != 0:
+        run_at(bars.kernels[0], (bars.context, u, u, 0.0, force, force))
+    elif bars.first:
         for k in range(force.size):
             flat(force)[k] = 0.0
-    else:
-        run_at(bars.kernels[0], (bars.context, u, u, 0.0, force, force))
 
 
 @inner
@@ -360,7 +361,7 @@ def plates_energy(model, bars, u, z, scratch, out):
         )  # fmt: skip
         out[1] += model.fold_stiffness[f] * w
     for plate in range(model.start.size - 1):
-        turn_plate(model, scratch.x, scratch, plate)
+        turn_plate(model, scratch.angle, 1.0, scratch.x, plate, scratch.turn)
         count = model.start[plate + 1] - model.start[plate]
         for k in range(count):
             for m in range(count):
@@ -402,15 +403,20 @@ def turn_moments(model, x, couple, scratch):
     couple[:] = 0.0
     scratch.moment[:] = 0.0
     for f in range(model.fold_rest.size):
-        moment = fold_moment(model, scratch, f)
-        scratch.moment[f] = moment
-        for side in range(2):
-            rotation = model.fold_rotations[f, side]
-            if rotation >= 0:
-                couple[rotation] -= model.per_reach * moment
+        scratch.moment[f] = fold_moment(model, scratch, f)
+    turn_rotations(model, couple, scratch)
     for p in range(model.start.size - 1):
-        turn_plate(model, x, scratch, p)
+        turn_plate(model, scratch.angle, 1.0, x, p, scratch.turn)
         add_plate_moments(model, couple, scratch, p)
+
+
+@inner
+def turn_rotations(model, couple, scratch):
+    """Add the forces of the folds' moments on the rotations beside them."""
+    for f in range(model.fold_rest.size):
+        for rotation in model.fold_rotations[f]:
+            if rotation >= 0:
+                couple[rotation] -= model.per_reach * scratch.moment[f]
 
 
 @inner
@@ -435,6 +441,7 @@ class _Context(NamedTuple):
     rows: int
     groups: NDArray  # (3,) energy groups of bars, folds and bends
     energy: NDArray  # (3,) energies of bars, folds and bends, J
+    place: int  # index of the first hinge among those of all terms
 
 
 @forces
@@ -454,13 +461,17 @@ def _energies(own, u, out):
     here, x = parted_rows(moved, n, r)
     plates_energy(model, own.bars, here, x, own.scratch, own.energy)
     for k in range(3):
-        numbers_at(out, 3)[own.groups[k]] = own.energy[k]
+        group = own.groups[k]
+        numbers_at(out, 3)[group] = own.energy[k] + (
+            0.0 if own.bars.first else numbers_at(out, 3)[group]
+        )
 
 
 @mean_forces
 def _mean_forces(own, u0, u1, before, h, t, force, powers):
-    model, scratch, folds = own.model, own.scratch, own.model.fold_rest.size
-    n, r, began = model.bars.rest.shape[0], model.rotations, numbers_at(before, scratch.angle.size)
+    model, scratch, first = own.model, own.scratch, np.empty(own.scratch.turn.size)
+    n, r = model.bars.rest.shape[0], model.rotations
+    began = numbers_at(before, own.place + scratch.angle.size)[own.place :]
     start, x0 = parted_rows(rows_at(u0, own.rows), n, r)
     end, x1 = parted_rows(rows_at(u1, own.rows), n, r)
     out, couple = parted_rows(rows_at(force, own.rows), n, r)
@@ -469,7 +480,7 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
     turn_hinges(model, end, scratch)
     turn_folds(model, x1, scratch)
     scratch.moment[:] = 0.0
-    for f in range(folds):
+    for f in range(model.fold_rest.size):
         angle = began[f]
         for rotation in model.fold_rotations[f]:
             angle -= model.per_reach * x0[rotation] if rotation >= 0 else 0.0
@@ -477,17 +488,12 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
             model.code, model.addresses, model.fold_parameters[f], 1.0, model.fold_rest[f], angle,
             scratch.fold_angle[f] - angle,
         )[0]  # fmt: skip
-        for rotation in model.fold_rotations[f]:
-            if rotation >= 0:
-                couple[rotation] -= model.per_reach * scratch.moment[f]
+    turn_rotations(model, couple, scratch)
     for p in range(model.start.size - 1):
-        for k in range(model.start[p + 1] - model.start[p]):
-            hinge = model.angle[model.start[p] + k]
-            if hinge >= 0:
-                mean = 0.5 * (began[hinge] + scratch.angle[hinge])
-                scratch.turn[k] = mean - model.bend_rest[hinge - folds]
-            else:
-                scratch.turn[k] = 0.5 * model.per_reach * (x0[-1 - hinge] + x1[-1 - hinge])
+        turn_plate(model, began, 1.0, x0, p, first)
+        turn_plate(model, scratch.angle, 1.0, x1, p, scratch.turn)
+        for k in range(first.size):
+            scratch.turn[k] = 0.5 * (first[k] + scratch.turn[k])
         add_plate_moments(model, couple, scratch, p)
     x, dx, points = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
     plain, gradient = np.empty((4, 3)), np.empty((4, 3))
@@ -505,9 +511,13 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
 
 
 def plates_kernels(
-    model: BarsPlates, scratch: PlatesScratch, rows: int, groups: tuple[int, int, int]
-) -> CompiledTerm:
-    """Kernels of bars, folds and plates with dofs in `rows` rows, and their energy groups."""
-    bars = bars_of(model, scratch)
-    own = Context(_Context(model, bars, scratch, rows, np.array(groups), np.zeros(3)))
+    model: BarsPlates, scratch: PlatesScratch, rows: int, groups: tuple[int, int, int],
+    place: int | None = None,
+) -> CompiledTerm:  # fmt: skip
+    """Kernels of bars, folds and plates with dofs in `rows` rows, and their energy groups.
+
+    place : index of the first hinge among those of all terms, for a term that is not the first.
+    """
+    bars = bars_of(model, scratch, place is None)
+    own = Context(_Context(model, bars, scratch, rows, np.array(groups), np.zeros(3), place or 0))
     return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})

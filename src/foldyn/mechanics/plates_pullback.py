@@ -98,14 +98,6 @@ def rate_hinges(model, u, w, scratch, back):
 
 
 @inner
-def rate_plate(model, y, back, p):
-    """Put the rates of the angles of plate p, for rates y of rotations, into back.turned."""
-    for k in range(model.start[p + 1] - model.start[p]):
-        h = model.angle[model.start[p] + k]
-        back.turned[k] = back.rate[h] if h >= 0 else model.per_reach * y[-1 - h]
-
-
-@inner
 def pull_folds(model, x, y, scratch, back, by_x):
     """Compute the moments of folds; add to gradients, back moments and by_x (r,)."""
     turn_folds(model, x, scratch)
@@ -138,8 +130,8 @@ def pull_folds(model, x, y, scratch, back, by_x):
 def pull_plate(model, x, y, scratch, back, by_x, p):
     """Compute the moments of plate p; add to gradients, back moments and by_x (r,)."""
     count, folds, out = model.start[p + 1] - model.start[p], model.fold_rest.size, back.out
-    turn_plate(model, x, scratch, p)
-    rate_plate(model, y, back, p)
+    turn_plate(model, scratch.angle, 1.0, x, p, scratch.turn)
+    turn_plate(model, back.rate, 0.0, y, p, back.turned)
     for k in range(count):
         back.resisted[k] = 0.0
     for k in range(count):

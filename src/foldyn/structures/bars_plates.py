@@ -14,8 +14,9 @@ from scipy.sparse.linalg import splu
 from foldyn import mechanics
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, LinearHinge, Superlinear
-from foldyn.mechanics.clamps import RIDES
+from foldyn.mechanics.model import ranks
 from foldyn.mechanics.plates import (
+    RIDES,
     BarsPlates,
     PlatesScratch,
     plates_kernels,
@@ -35,7 +36,7 @@ from foldyn.mechanics.sheet_term import (
 )
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
-from foldyn.mechanics.term import CompiledTerm, Folds, Unstrained
+from foldyn.mechanics.term import CompiledTerm, Folds, Strains, Term, Unstrained
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm, stretch
 from foldyn.values import writable
 
@@ -327,6 +328,60 @@ class BarsPlatesTerm(SheetTerm):
             sheet.hinges_alone().tangent(rest),
             lambda motion: stretch(bars, motion[: self._nodal]),
         )
+
+
+class ClampsTerm(BarsPlatesTerm):
+    """Clamped edges of bars and hinges, as plates of one angle each; see `Term`.
+
+    A model of these alone, which adds to a sheet. Their energy is that of bends.
+    """
+
+    energy_groups: ClassVar = {}
+    of_hinges = True
+    shared = False
+    tangent = Term.tangent
+
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
+        """See `Term`; the clamps' dihedrals are last among those of the thread."""
+        place = len(part.angle) - len(self.model.hinges)
+        scratch = plates_scratch(self.model)._replace(angle=part.angle[place:])
+        return plates_kernels(self.model, scratch, self.rows, self._groups, place)
+
+    @cached_property
+    def places(self) -> tuple[NDArray, NDArray]:
+        """See `Term`."""
+        indptr, indices = self.sparsity[:2]
+        return np.repeat(np.arange(self.size), np.diff(indptr)), indices
+
+    def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
+        """See `Term`."""
+        return super().tangent(np.ravel(q), floor).data
+
+    def unstrained(self, q: NDArray) -> Unstrained:
+        """See `Term`."""
+        tangent = self.nominal(q).tangent(q)
+        return Unstrained(tangent, tangent, lambda motion: 0.0)
+
+    def strains(self, others: Strains) -> Strains:
+        """See `Term`; a wing repeats the first node of the axis (`viscous.hinge_gradient`)."""
+        rest, nodes = self.model.bars.rest, self.model.hinges
+        corners = rest[nodes]
+        corners[:, 3] = rest[nodes[:, :2]].mean(axis=1) + self.model.wings
+        return others._replace(
+            hinges=np.concatenate([others.hinges, nodes]),
+            corners=np.concatenate([others.corners, corners]),
+            hinge_stiffness=np.concatenate([others.hinge_stiffness, self.model.stiffness]),
+        )
+
+    def placed(self, order: NDArray, before: Any) -> ClampsTerm:
+        """See `Term`."""
+        bars = self.model.bars._replace(rest=self.model.bars.rest[order])
+        hinges = ranks(order)[self.model.hinges]
+        return ClampsTerm(self.model._replace(bars=bars, hinges=hinges), self._laws)
+
+    def nominal(self, q: NDArray) -> ClampsTerm:
+        """See `Term`."""
+        return self._with(self.model._replace(bend_rest=self.angles(q)))
 
 
 def positions(model: BarsPlates) -> NDArray:

@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.mechanics.clamps import Clamps
 from foldyn.patterns import Pattern
 from foldyn.patterns.selection import given_as, select
 from foldyn.patterns.topology import Edge, edge_lookup
@@ -90,20 +89,10 @@ def clamp_stiffness(x: NDArray, rows: NDArray, modulus: NDArray) -> NDArray:
     return 2.0 * modulus * squared / area
 
 
-def clamps(x: NDArray, rows: NDArray, stiffness: NDArray, group: int) -> Clamps:
-    """Clamps of triangles (c, 3) of points x (n, 3), without moment at x.
-
-    group : energy group of the clamps.
-    """
-    points = x[rows]
-    wings = np.array([opposite(corners) for corners in points]).reshape(-1, 1, 3)
-    return Clamps(
-        nodes=np.array(rows),
-        points=np.ascontiguousarray(np.concatenate([points, wings], axis=1) - x.mean(axis=0)),
-        rest=np.full(len(rows), np.pi),
-        stiffness=np.array(stiffness),
-        group=group,
-    )
+def clamp_points(x: NDArray, rows: NDArray) -> NDArray:
+    """Points (c, 4, 3) of the hinges at triangles (c, 3) of points x (n, 3), with virtual wings."""
+    wings = np.array([opposite(corners) for corners in x[rows]]).reshape(-1, 1, 3)
+    return np.concatenate([x[rows], wings], axis=1)
 
 
 def opposite(corners: NDArray) -> NDArray:

@@ -9,19 +9,20 @@ into the next panel, also has a bow: the mean distance of the sheet from the lin
 divided by its length. The plate is made of triangles of constant curvature (Morley; in
 `mechanics.triangle`), in two sizes, and K is extrapolated in the size.
 
-`PanelPlate` cuts each facet of a panel evenly: all its triangles are the same, half of them turned
-by 180 degrees. So each entry of a panel's stiffness is a sum of entries for its facets, as single
+Each facet of a panel is cut evenly: all its triangles are the same, half of them turned by 180
+degrees. So each entry of a panel's stiffness is a sum of entries for its facets, as single
 triangles, with factors that are equal for all panels with the same number of corners. A scale of
 1/n multiplies the stiffness of heights by n^2, and leaves the stiffness of slopes unchanged.
 
 The unknowns at an edge of n pieces, for any edge condition:
 
-    heights   w_i = (1 - i/n) w_0 + i/n w_n + n/(n - 1) L b + e_i - e_(i-1),    i = 1 ... n - 1
-    slopes    s_i = s + d_i - d_(i-1),                                          i = 1 ... n
+    heights   w_i = (1 - i/n) w_0 + i/n w_n + a_i L b + e_i - e_(i-1),    i = 1 ... n - 1
+    slopes    s_i = s + d_i - d_(i-1),                                    i = 1 ... n
 
-with the bow b, the mean slope s, and e and d, which are 0 at both ends of the edge. On a straight
-edge, b and all e are 0; on a clamped edge all d are 0. Unknowns that are 0 are uncoupled in the
-matrix, with the stiffness 1.
+with the bow b, which is a parabola, a_i = 6 i (n - i)/(n^2 - 1), the mean slope s, and e and d,
+which are 0 at both ends of the edge. On a straight edge, b and all e are 0; on a clamped edge all d
+are 0. Such e and d are uncoupled in the matrix, with the stiffness 1. The paraboloid r^2 / 2 has
+no e and d: what it would do to straight edges is in their b.
 """
 
 from __future__ import annotations
@@ -34,13 +35,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import null_space
+from scipy.sparse.linalg import splu
 
 from foldyn.algebra.condensing import Condensing
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.mechanics.block_matrix import pairs_within
 from foldyn.structures.panel_plate import (
     Outline,
-    PanelPlate,
     across_edges,
     facets_of,
     mass_of,
@@ -85,17 +86,14 @@ def panel_moments(panel: Outline, poissons_ratio: float) -> NDArray:
     the energy is 1/2 phi^T K phi - kappa phi^T m, up to terms in kappa alone.
     """
     coarse, fine = (_curled(panel, poissons_ratio, n) for n in (COARSE, FINE))
-    stiffness, held_back = (
-        extrapolated(a, b, FINE / COARSE) for a, b in zip(coarse, fine, strict=True)
-    )
-    moments = heights_and_slopes(panel).T @ (stiffness @ _paraboloid(panel) - held_back)
+    moments = heights_and_slopes(panel).T @ extrapolated(coarse, fine, FINE / COARSE)
     return least_heights(panel, len(moments)).T @ moments
 
 
 def least_heights(panel: Outline, size: int) -> NDArray:
     """Matrix (size, q) from angles to the least heights with the spoke turns, and other angles."""
     points, corners = _points(panel), len(panel.corners)
-    spokes = _spoke_turns(points, corners) if panel.center else np.zeros((0, len(points)))
+    spokes = spoke_turns(points, corners) if panel.center else np.zeros((0, len(points)))
     out = np.zeros((size, len(spokes) + size - len(points)))
     out[: len(points), : len(spokes)] = np.linalg.pinv(spokes, rcond=1e-9)
     out[len(points) :, len(spokes) :] = np.eye(size - len(points))
@@ -134,7 +132,7 @@ def _facet_slopes(points: NDArray, corners: int) -> NDArray:
     return _across(-along, _planes(points, corners))
 
 
-def _spoke_turns(points: NDArray, corners: int) -> NDArray:
+def spoke_turns(points: NDArray, corners: int) -> NDArray:
     """Turns (m, points) of the spokes, for heights of the points."""
     slopes = _planes(points, corners)
     along = points[:corners] - points[corners]
@@ -148,27 +146,20 @@ def _across(along: NDArray, slopes: NDArray) -> NDArray:
 
 
 def _paraboloid(panel: Outline) -> NDArray:
-    """Heights, crease slopes and bows of the paraboloid r^2 / 2."""
+    """Heights, and slopes and bows of all edges, of the paraboloid r^2 / 2."""
     corners = np.array(panel.corners)
     along = np.roll(corners, -1, axis=0) - corners
     length, middle = np.linalg.norm(along, axis=1), corners + 0.5 * along
     slopes = (along[:, 1] * middle[:, 0] - along[:, 0] * middle[:, 1]) / length
-    heights = 0.5 * (_points(panel) ** 2).sum(axis=1)
-    creased, bowed = (np.flatnonzero(which) for which in (panel.creased, panel.bowed))
-    return np.concatenate([heights, slopes[creased], -length[bowed] / 12.0])
+    return np.concatenate([0.5 * (_points(panel) ** 2).sum(axis=1), slopes, -length / 12.0])
 
 
-def _curled(panel: Outline, poissons_ratio: float, n: int) -> tuple[NDArray, NDArray]:
-    """Stiffness of heights, slopes and bows, and additional forces that hold the paraboloid.
-
-    Only edges that stay straight need such forces.
-    """
-    plate = PanelPlate(panel, poissons_ratio, n)
-    held = [*plate.heights, *plate.slopes, *plate.bows]
-    shapes, stiffness = plate.solved(held)
-    whole = plate.paraboloid
-    there = [sum(share * whole[k] for k, share in entries.items()) for entries in held]
-    return stiffness, stiffness @ there - shapes.T @ (plate.stiffness @ whole)
+def _curled(panel: Outline, poissons_ratio: float, n: int) -> NDArray:
+    """Forces on heights, slopes and bows that hold the paraboloid r^2 / 2."""
+    (stiffness,), (held,), (straight,) = _balanced([panel], poissons_ratio, n)
+    # the mean over the points of a straight edge is less than that along the edge
+    shape = _paraboloid(panel) * np.where(straight, 1.0 - 1.0 / n**2, 1.0)
+    return (stiffness[:, held | straight] @ shape[held | straight])[held]
 
 
 @lru_cache(maxsize=4096)
@@ -179,15 +170,8 @@ def panel_mass(panel: Outline, poissons_ratio: float) -> NDArray:
     edges level; exact for motions that are linear over the panel and level at clamped edges. Only
     clamped edges may be creased.
     """
-    coarse, fine = (PanelPlate(panel, poissons_ratio, n) for n in (COARSE, FINE))
+    less, more = (mass_of(*_followed(panel, poissons_ratio, n)) for n in (COARSE, FINE))
     x = _points(panel)
-    less, more = (
-        mass_of(
-            plate.points, plate.triangles,
-            plate.solved([*plate.heights, *plate.slopes])[0][:, : len(x)],
-        )
-        for plate in (coarse, fine)
-    )  # fmt: skip
     out = extrapolated(less, more, FINE / COARSE)
     # functions that are linear over the panel stay exact to the last digit, as on its facets
     edges = np.roll(x[: len(panel.corners)], -1, axis=0) - x[: len(panel.corners)]
@@ -202,11 +186,30 @@ def panel_mass(panel: Outline, poissons_ratio: float) -> NDArray:
     return out
 
 
+def _followed(panel: Outline, poissons_ratio: float, n: int) -> tuple[NDArray, NDArray, NDArray]:
+    """Points and triangles of the mesh, and heights (points, k) for heights 1 of `_points`."""
+    cut, entries, _ = _entries([panel], poissons_ratio, n)
+    x, size = _points(panel), len(cut.edge)
+    lower = sparse.coo_array((entries[:, 0], tuple(cut.pairs.T)), (size, size)).tocsc()
+    matrix = sparse.csc_array(lower + sparse.tril(lower, -1).T)
+    given = np.concatenate([np.ones(len(x), bool), panel.creased, panel.straight])
+    kept = np.arange(size - len(given), size)
+    loose, corners = np.setdiff1d(np.arange(size), kept[given]), kept[: len(x)]
+    found = np.zeros((size, len(x)))
+    found[corners] = np.eye(len(x))
+    found[loose] = -splu(matrix[loose][:, loose]).solve(matrix[loose][:, corners].toarray())
+    return cut.weights @ x, cut.triangles, (cut.basis @ found)[: len(cut.weights)]
+
+
 class Cut(NamedTuple):
     """How plates of panels with m corners are cut and condensed.
 
     Attributes
     ----------
+    weights, triangles : (p, corners and center), (nt, 3)
+        Weights of corners and center that give each point; points of the triangles.
+    basis : (size, size)
+        Heights of the points, and slopes, for the unknowns.
     pairs : (k, 2)
         Unknowns with an entry in the stiffness. The last unknowns are kept: heights of corners and
         center, s of the edges, L b of the edges.
@@ -217,6 +220,9 @@ class Cut(NamedTuple):
     condensing : Condensing
     """
 
+    weights: NDArray
+    triangles: NDArray
+    basis: sparse.csr_array
     pairs: NDArray
     factors: sparse.csr_array
     edge: NDArray
@@ -227,16 +233,17 @@ class Cut(NamedTuple):
 def _cut(m: int, center: bool, n: int) -> Cut:
     """Cut of panels with or without a center, with n pieces per edge, at least 2."""
     unit, facets = np.eye(m + center), m if center else 1
-    points, triangles, at, edges = meshed(unit[:m], unit[-1] if center else None, n)
+    weights, triangles, at, edges = meshed(unit[:m], unit[-1] if center else None, n)
+    points = len(weights)
     # inverted triangles start at another corner, so that their sides match the facet's numbering
     triangles = triangles.reshape(facets, n * n, 3)
     turned = n * (n + 1) // 2
     triangles[:, turned:] = np.roll(triangles[:, turned:], -1, axis=2)
     triangles = triangles.reshape(-1, 3)
     side, sign, ends = sides_of(triangles)
-    basis, edge = _basis(at, edges, across_edges(edges, ends, len(points)), len(points) + len(ends))
+    basis, edge = _basis(at, edges, across_edges(edges, ends, points), points + len(ends))
     size, count = len(edge), 36 * facets
-    dofs = np.concatenate([triangles, len(points) + side], axis=1)
+    dofs = np.concatenate([triangles, points + side], axis=1)
     scale = np.concatenate([np.full(triangles.shape, float(n)), sign], axis=1)
     value = (scale[:, :, None] * scale[:, None, :]).ravel()
     row, column = pairs_within(dofs).T
@@ -251,7 +258,8 @@ def _cut(m: int, center: bool, n: int) -> Cut:
     keys, place = np.unique(row[lower] * size + column[lower], return_inverse=True)
     pairs = np.stack(np.divmod(keys, size), axis=1)
     factors = sparse.csr_array((value[lower], (place, source[lower])), (len(pairs), count))
-    return Cut(pairs, factors, edge, Condensing(pairs, size, len(at) + 2 * m))
+    condensing = Condensing(pairs, size, len(at) + 2 * m)
+    return Cut(weights, triangles, basis, pairs, factors, edge, condensing)
 
 
 def _basis(
@@ -266,7 +274,7 @@ def _basis(
     first = size - len(at) - 2 * m  # first of the kept unknowns
     own = 2 * n - 3  # e and d of an edge
     steps = np.arange(1, n) / n
-    where = np.full(size, 2 * m)
+    parabola, where = 6.0 * steps * (1.0 - steps) / (1.0 - 1.0 / n**2), np.full(size, 2 * m)
     inside = np.setdiff1d(np.arange(size), np.concatenate([at, *edges, *(s for s, _ in sides)]))
     stay = np.arange(first, size)
     parts = [(inside, np.arange(len(inside)), 1.0), (at, stay[: len(at)], 1.0)]
@@ -274,10 +282,10 @@ def _basis(
         between = points[1:-1]
         e, d = np.split(len(inside) + own * k + np.arange(own), [n - 2])
         mean, bow = stay[len(at) + k], stay[len(at) + m + k]
-        where[[*e, bow]], where[d] = k, m + k
+        where[e], where[d] = k, m + k
         parts += [
             (between, stay[k], 1.0 - steps), (between, stay[(k + 1) % m], steps),
-            (between, bow, n / (n - 1.0)), (between[:-1], e, 1.0), (between[1:], e, -1.0),
+            (between, bow, parabola), (between[:-1], e, 1.0), (between[1:], e, -1.0),
             (across, mean, sign), (across[:-1], d, sign[:-1]), (across[1:], d, -sign[1:]),
         ]  # fmt: skip
     rows, columns, values = (
@@ -294,31 +302,45 @@ def condensed(panels: Sequence[Outline], poissons_ratio: float, n: int) -> list[
 
     n : pieces of each edge.
     """
+    stiffness, held, _ = _balanced(panels, poissons_ratio, n)
+    return [own[np.ix_(kept, kept)] for own, kept in zip(stiffness, held, strict=True)]
+
+
+def _entries(
+    panels: Sequence[Outline], poissons_ratio: float, n: int
+) -> tuple[Cut, NDArray, NDArray]:
+    """The cut of panels, the entries (k, c) of their stiffness, and their `_points` (c, ., 2)."""
     m, center = len(panels[0].corners), panels[0].center is not None
-    cut = _cut(m, center, n)
-    corners = np.array([[*panel.corners, *([panel.center] if center else [])] for panel in panels])
-    facets = corners[:, facets_of(corners[0], m)[: None if center else 1]].reshape(-1, 3, 2)
+    cut, points = _cut(m, center, n), np.array([_points(panel) for panel in panels])
+    facets = points[:, facets_of(points[0], m)[: None if center else 1]].reshape(-1, 3, 2)
     blocks = plate_blocks(facets, np.ones((len(facets), 3)), poissons_ratio)
-    straight, bowed, creased, clamped = (
-        np.array([getattr(panel, name) for panel in panels])
-        for name in ("straight", "bowed", "creased", "clamped")
-    )
-    free = 1.0 - np.concatenate([straight, clamped, np.zeros((len(panels), 1))], axis=1).T[cut.edge]
+    none = (False,)
+    free = 1.0 - np.array([[*own.straight, *own.clamped, *none] for own in panels]).T[cut.edge]
     row, column = cut.pairs.T
     values = cut.factors @ blocks.reshape(len(panels), -1).T * (free[row] * free[column])
     values[row == column] += 1.0 - free
-    stiffness = cut.condensing(values)
-    lengths = np.linalg.norm(np.roll(corners[:, :m], -1, axis=1) - corners[:, :m], axis=2)
-    scale = np.concatenate([np.ones((len(panels), len(corners[0]) + m)), lengths], axis=1)
+    return cut, values, points
+
+
+def _balanced(
+    panels: Sequence[Outline], poissons_ratio: float, n: int
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Stiffness (c, k, k) of heights, slopes and bows; which are held, and which of straight edges.
+
+    Slopes and bows that are neither are in balance.
+    """
+    cut, entries, points = _entries(panels, poissons_ratio, n)
+    m = len(panels[0].corners)
+    stiffness = cut.condensing(entries)
+    lengths = np.linalg.norm(np.roll(points[:, :m], -1, axis=1) - points[:, :m], axis=2)
+    scale = np.concatenate([np.ones((len(panels), stiffness.shape[1] - m)), lengths], axis=1)
     stiffness *= scale[:, :, None] * scale[:, None, :]
-    held = np.concatenate([np.ones((len(panels), len(corners[0])), bool), creased, bowed], axis=1)
-    return _held(stiffness, held)
-
-
-def _held(stiffness: NDArray, held: NDArray) -> list[NDArray]:
-    """Stiffness of the held unknowns (c, k), with the others in balance."""
-    rows, columns = held[:, :, None], held[:, None, :]
-    loose = np.where(rows | columns, 0.0, stiffness) + held[:, :, None] * np.eye(held.shape[1])
+    corners = (True,) * points.shape[1]
+    held = np.array([[*corners, *own.creased, *own.bowed] for own in panels])
+    straight = np.zeros(held.shape, bool)
+    straight[:, -m:] = [own.straight for own in panels]
+    known = held | straight
+    rows, columns = known[:, :, None], known[:, None, :]
+    loose = np.where(rows | columns, 0.0, stiffness) + rows * np.eye(held.shape[1])
     across = np.where(~rows & columns, stiffness, 0.0)
-    found = stiffness - np.swapaxes(across, 1, 2) @ np.linalg.solve(loose, across)
-    return [own[np.ix_(kept, kept)] for own, kept in zip(found, held, strict=True)]
+    return stiffness - np.swapaxes(across, 1, 2) @ np.linalg.solve(loose, across), held, straight

@@ -30,11 +30,11 @@ from scipy.linalg import block_diag
 
 from foldyn import mechanics
 from foldyn.algebra.superlu import SingularTangentError
-from foldyn.materials import BarLaw, HingeLaw
+from foldyn.materials import BarLaw, HingeLaw, LinearBar, LinearHinge
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
-from foldyn.structures.clamps import opposite
+from foldyn.structures.clamps import clamp_points
 from foldyn.structures.condensed_panel import panel_moments, panel_stiffness
 from foldyn.structures.mesh import Mesh, hinge_angles, lengths, too_narrow
 from foldyn.structures.panel_plate import Outline, outline
@@ -230,14 +230,13 @@ def plates_model(
     clamps : (c, 3) nodes of the triangles at clamped edges.
     by_folds : whether the dofs beside a fold are those of explicit methods.
     """
-    length, middle = lengths(nodes, bars), nodes[clamps[:, :2]].mean(axis=1)
-    wings = np.array([opposite(corners) for corners in nodes[clamps]]).reshape(-1, 3) - middle
+    length = lengths(nodes, bars)
     return BarsPlates(
         bars=mechanics.build(nodes, bars, bar_stiffness, bar_law, ()),
         rotations=len(plates.rotation_hinge),
-        per_reach=1.0 / float(np.sqrt((length**2).mean())),
+        per_reach=1.0 / float(np.sqrt((length**2).mean())) if len(bars) else 1.0,
         hinges=np.concatenate([folds, bends, clamps[:, [0, 1, 2, 0]]]).astype(np.int64),
-        wings=wings,
+        wings=clamp_points(nodes, clamps)[:, 3] - nodes[clamps[:, :2]].mean(axis=1),
         unmoved=hinge_angles(nodes, folds) if by_folds else np.zeros(0),
         fold_stiffness=np.array(fold_stiffness, float),
         fold_rest=np.array(fold_rest, float),
@@ -247,6 +246,18 @@ def plates_model(
         bend_rest=np.append(bend_rest, np.full(len(clamps), np.pi)),
         **plates._asdict(),
     )
+
+
+def clamps_model(nodes: NDArray, clamps: NDArray, stiffness: NDArray) -> BarsPlates:
+    """Clamped edges (c, 3) alone, as plates of one angle each with the given stiffness (c,)."""
+    none, number = np.zeros((0, 4), np.int64), np.arange(len(clamps) + 1)
+    entries = np.array(stiffness)  # writable, for which the kernels of plates are compiled
+    plates = EdgePlates(none[:, 0], none[:, :2], number, number[:-1], number, entries)
+    model = plates_model(
+        nodes, none[:, :2], np.zeros(0), LinearBar(), none, np.zeros(0), np.zeros(0), LinearHinge(),
+        none, np.zeros(0), plates, clamps, False,
+    )  # fmt: skip
+    return model._replace(bars=model.bars._replace(bar_runs=model.bars.bar_runs[:0]))
 
 
 def spoke_stiffness(plates: EdgePlates, folds: int, bends: int) -> NDArray:

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import around, edge_lookup, edge_of
+from foldyn.structures.condensed_panel import spoke_turns
 from foldyn.structures.edge_angles import straight_creases
 from foldyn.structures.mesh import Mesh, double_areas, lengths, quad_centers
 from foldyn.structures.quad_plates import quad_bends
@@ -145,19 +146,7 @@ def _wings(x: NDArray, bends: NDArray) -> NDArray:
 def _twisted(spokes: NDArray) -> float:
     """Sum of the squared turns (m^2) of spokes (m, 3) for the curvatures diag(1, -1) and xy."""
     _, _, axes = np.linalg.svd(spokes - spokes.mean(axis=0))
-    x, y = (spokes @ axes[:2].T).T
-    total = 0.0
-    for height in (0.5 * (x**2 - y**2), x * y):
-        tilt = _slopes(x, y, height)
-        turn = tilt - np.roll(tilt, 1, axis=0)
-        total += float((turn**2).sum())
-    return total
-
-
-def _slopes(x: NDArray, y: NDArray, height: NDArray) -> NDArray:
-    """Gradient (m, 2) of the heights (m,) over each triangle (center, corner, next corner)."""
-    after = [np.roll(value, -1) for value in (x, y, height)]
-    cross = x * after[1] - y * after[0]
-    along = (height * after[1] - after[2] * y) / cross
-    across = (after[2] * x - height * after[0]) / cross
-    return np.column_stack([along, across])
+    points = np.concatenate([spokes @ axes[:2].T, np.zeros((1, 2))])
+    x, y = points.T
+    turns = spoke_turns(points, len(spokes)) @ np.column_stack([0.5 * (x**2 - y**2), x * y])
+    return float((turns**2).sum())

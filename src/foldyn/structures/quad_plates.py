@@ -325,13 +325,17 @@ def _jacobian(x: NDArray, at: NDArray) -> NDArray:
     )
 
 
+def _gradients(x: NDArray, edge: int | None) -> tuple[NDArray, NDArray, NDArray]:
+    """Jacobians and their inverses (p, n, 2, 2), and gradients (p, n, 2, k) of all shapes."""
+    heights, jacobian = twists(x), _jacobian(x, _points(edge))
+    inverse = np.linalg.inv(jacobian)  # rows xi, eta; columns x, y
+    slopes = np.stack([_shapes(heights, edge, 1, 0), _shapes(heights, edge, 0, 1)], axis=2)
+    return jacobian, inverse, np.swapaxes(inverse, 2, 3) @ slopes
+
+
 def _curvatures(x: NDArray) -> tuple[NDArray, NDArray]:
     """Second derivatives (p, n, 3, k) of all shapes, xx, yy and xy; areas (p, n) at the points."""
-    heights = twists(x)
-    jacobian = _jacobian(x, _points(None))
-    inverse = np.linalg.inv(jacobian)  # rows xi, eta; columns x, y
-    slopes = np.stack([_shapes(heights, None, 1, 0), _shapes(heights, None, 0, 1)], axis=2)
-    by = np.swapaxes(inverse, 2, 3) @ slopes  # with respect to x, y
+    heights, (jacobian, inverse, by) = twists(x), _gradients(x, None)
     # d2 w/d xi2 etc., minus the effect of curved coordinates: x, y are bilinear
     mixed = 0.25 * np.einsum("v,pva->pa", SIGNS[:, 0] * SIGNS[:, 1], x)
     xi, eta = _shapes(heights, None, 2, 0), _shapes(heights, None, 0, 2)
@@ -348,9 +352,7 @@ def _curvatures(x: NDArray) -> tuple[NDArray, NDArray]:
 
 def _mean_slope(x: NDArray, k: int, weights: NDArray) -> NDArray:
     """Mean outward slopes (p, k) of all shapes at edge k."""
-    heights = twists(x)
-    slopes = np.stack([_shapes(heights, k, 1, 0), _shapes(heights, k, 0, 1)], axis=2)
-    by = np.swapaxes(np.linalg.inv(_jacobian(x, _points(k))), 2, 3) @ slopes
+    _, _, by = _gradients(x, k)
     along = x[:, (k + 1) % 4] - x[:, k]
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
     outward /= np.linalg.norm(along, axis=1)[:, None]

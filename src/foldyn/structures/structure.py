@@ -18,24 +18,25 @@ from foldyn.materials import (
     BarLaw,
     EnhancedLinear,
     HingeLaw,
+    LinearHinge,
     PlateSuperlinear,
     bar_law,
     hinge_law,
 )
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.clamps import RIDES, ClampsTerm
 from foldyn.mechanics.following import Following, joined, moments, pushes, tensions
 from foldyn.mechanics.membranes_term import MembranesTerm
-from foldyn.mechanics.plates import handed_over
+from foldyn.mechanics.plates import RIDES, handed_over
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm
-from foldyn.structures.bars_plates import BarsPlatesTerm, balanced
+from foldyn.structures.bars_plates import BarsPlatesTerm, ClampsTerm, balanced
 from foldyn.structures.calibration import PerCrease, per_crease
-from foldyn.structures.clamps import clamps
+from foldyn.structures.clamps import clamp_points
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.edge_angles import (
     EdgePlates,
+    clamps_model,
     curl_moments,
     free_angles,
     outlines,
@@ -210,10 +211,8 @@ class Structure(Discretized):
         body = self._coupled(BarsHingesTerm(self.model, np.concatenate(rows), laws, self._softness))
         if not len(self.clamps):
             return body
-        bends = tuple(GROUPS).index("strain_bends")
-        return body.with_terms(
-            ClampsTerm(clamps(self.nodes, self.clamps, self.clamp_stiffness, bends))
-        )
+        clamps = clamps_model(self.nodes, self.clamps, self.clamp_stiffness)
+        return body.with_terms(ClampsTerm(clamps, (LinearHinge(), LinearHinge())))
 
     def _coupled(self, sheet: BarsHingesTerm | BarsPlatesTerm) -> Assembly:
         """A body: the sheet, with the membranes of the panels in place of independent bars."""
@@ -316,7 +315,7 @@ class Structure(Discretized):
 
     def _clamping(self, moment: NDArray) -> Following:
         """Moments (c,), N m, on the hinges of clamped edges."""
-        points = clamps(self.nodes, self.clamps, self.clamp_stiffness, 0).points
+        points = clamp_points(self.nodes - self.nodes.mean(axis=0), self.clamps)
         return moments(points, np.column_stack([self.clamps, np.full(len(moment), RIDES)]), moment)
 
     def _curled(self, plates: EdgePlates, curvature: NDArray) -> tuple[Following, NDArray, NDArray]:
