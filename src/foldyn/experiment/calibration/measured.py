@@ -11,9 +11,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.cases.directions import AXES
+from foldyn.cases.directions import AXES, check_axes
 from foldyn.errors import InputError
-from foldyn.experiment.calibration.measurement import AtNodes, NodeValues, check_axes, column
+from foldyn.experiment.calibration.measurement import AtNodes, NodeValues, column
 from foldyn.values import choice
 
 IMPOSED = "imposed"  # as `nodes`: all nodes that supports of the case move along the axis

@@ -12,12 +12,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases import BaseMotion, Case
-from foldyn.cases.directions import AXES
+from foldyn.cases.directions import AXES, check_axes
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment.calibration.measurement import (
     Measurement,
     NodeValues,
-    check_axes,
     column,
     plain_array,
 )

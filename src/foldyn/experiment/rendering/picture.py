@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
 
 from foldyn.experiment.camera import Camera, opencv
 from foldyn.patterns.pattern import Pattern
@@ -98,22 +99,12 @@ class Paper:
 
 def two_colors(pattern: Pattern) -> NDArray[np.bool_]:
     """Color of each panel; neighbors differ wherever the pattern allows."""
-    neighbors: list[list[int]] = [[] for _ in pattern.faces]
-    for a, b in np.asarray(pattern.crease_faces).tolist():
-        neighbors[a].append(b)
-        neighbors[b].append(a)
-    color = np.full(len(neighbors), -1)
-    for start in range(len(neighbors)):
-        if color[start] >= 0:
-            continue
-        color[start], queue = 0, deque([start])
-        while queue:
-            panel = queue.popleft()
-            for other in neighbors[panel]:
-                if color[other] < 0:
-                    color[other] = 1 - color[panel]
-                    queue.append(other)
-    return color == 1
+    pairs, count = np.reshape(pattern.crease_faces, (-1, 2)), len(pattern.faces)
+    beside = sparse.csr_array((np.ones(len(pairs)), pairs.T), (count, count))
+    part = csgraph.connected_components(beside, directed=False)[1]
+    starts = np.unique(part, return_index=True)[1]
+    steps = csgraph.dijkstra(beside, directed=False, indices=starts, unweighted=True, min_only=True)
+    return steps % 2 == 1
 
 
 def grain_tile(look: Look, rng: np.random.Generator) -> NDArray[np.float32]:
