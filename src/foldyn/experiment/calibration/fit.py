@@ -445,8 +445,7 @@ def _width(finer: Finer, doubt: float) -> str:
 def _warn_of_pairing(made: Problem, values: NDArray[np.float64]) -> None:
     """Warn if the pairing of modes has become ambiguous during the fit."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)
+        with warnings.catch_warnings(action="ignore", category=FoldynWarning):
             made.examine(values)
     except InputError as error:
         _warn(f"at the values found: {error}")

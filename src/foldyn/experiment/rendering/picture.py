@@ -4,23 +4,28 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from foldyn.arguments import Check, Checked
 from foldyn.experiment.camera import Camera, opencv
 from foldyn.patterns.pattern import Pattern
 from foldyn.structures.discretized import Discretized
 from foldyn.values import number, whole
+
+Share = Annotated[float, Check(number, least=0.0, most=1.0)]
+NotNegative = Annotated[float, Check(number, least=0.0)]
 
 _TILE = 512  # side of the grain tile in texels, repeated over the paper
 _MARGIN = 6  # pixels around the structure that are redrawn in each picture
 
 
 @dataclass(frozen=True)
-class Look:
+class Look(Checked):
     """Appearance of specimen, light and background; reflectances from 0 to 1.
 
     Attributes
@@ -42,22 +47,15 @@ class Look:
         Part of the brightness that is missing in the corners of the image.
     """
 
-    paper: float = 0.85
-    ink: float = 0.3
-    background: float = 0.03
-    marker: float = 5e-3
-    grain: float = 0.02
-    grain_size: float = 1.5e-4
+    paper: Share = 0.85
+    ink: Share = 0.3
+    background: Share = 0.03
+    marker: NotNegative = 5e-3
+    grain: NotNegative = 0.02
+    grain_size: Annotated[float, Check(number, above=0.0, unit="m")] = 1.5e-4
     light: tuple[float, float, float] = (-0.45, -0.65, -0.6)
-    ambient: float = 0.45
-    vignette: float = 0.1
-
-    def __post_init__(self) -> None:
-        for name in ("paper", "ink", "background", "ambient", "vignette"):
-            number(name, getattr(self, name), least=0.0, most=1.0)
-        for name in ("marker", "grain"):
-            number(name, getattr(self, name), least=0.0)
-        number("grain_size", self.grain_size, above=0.0, unit="m")
+    ambient: Share = 0.45
+    vignette: Share = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +130,7 @@ def shading(
 
 
 @dataclass(frozen=True)
-class Sensor:
+class Sensor(Checked):
     """Effects of lens and sensor.
 
     Attributes
@@ -150,16 +148,11 @@ class Sensor:
         Number of rays per pixel, each with its own place and time.
     """
 
-    exposure: float = 0.0
-    softness: float = 0.6
-    read_noise: float = 0.0
-    shot_noise: float = 0.0
-    samples: int = 16
-
-    def __post_init__(self) -> None:
-        for name in ("exposure", "softness", "read_noise", "shot_noise"):
-            number(name, getattr(self, name), least=0.0)
-        whole("samples", self.samples, least=4, what="rays in each pixel")
+    exposure: NotNegative = 0.0
+    softness: NotNegative = 0.6
+    read_noise: NotNegative = 0.0
+    shot_noise: NotNegative = 0.0
+    samples: Annotated[int, Check(whole, least=4, what="rays in each pixel")] = 16
 
     @cached_property
     def places(self) -> NDArray[np.float64]:
