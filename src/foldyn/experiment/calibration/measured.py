@@ -137,10 +137,6 @@ class Shapes(NodeValues):
             raise InputError(f"{self._of('values')}: must be numbers, NaN where a node is not seen")
         self._set(load_factor=factors, values=values)
 
-    def observed(self) -> NDArray[np.float64]:
-        """Measured values, flattened."""
-        return self.values[np.isfinite(self.values)]
-
     def factors(self, case: Case) -> NDArray[np.float64]:
         """Load factors at which the path is needed."""
         return self.load_factor

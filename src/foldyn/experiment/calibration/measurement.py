@@ -127,6 +127,10 @@ class NodeValues(AtNodes):
 
     values: Any = ()
 
+    def observed(self) -> NDArray[np.float64]:
+        """Measured values, flattened."""
+        return self.values[np.isfinite(self.values)]
+
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
         """Refuse a case that cannot predict these values."""
         named, known = len(self.where(case)), self.values.shape[1]

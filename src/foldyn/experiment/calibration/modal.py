@@ -103,10 +103,6 @@ class ModeShapes(NodeValues):
         """Number of modes of the model needed, without modes of zero stiffness."""
         return len(self.values)
 
-    def observed(self) -> NDArray[np.float64]:
-        """Measured values, flattened."""
-        return self.values[np.isfinite(self.values)]
-
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
         """Refuse a case that cannot predict these values."""
         super().check(case, arguments)
