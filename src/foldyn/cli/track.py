@@ -221,6 +221,11 @@ def _are_photos(inputs: Sequence[str]) -> bool:
         raise InputError(f"{inputs[1]}: one film at a time")
     for name in inputs:
         check_file(name, "a film, or all photographs in it")
+    if photos == [True]:
+        raise InputError(
+            f"{inputs[0]}: one photograph alone shows no displacement; give at least two, the "
+            "first one unloaded"
+        )
     return all(photos)
 
 
