@@ -11,10 +11,11 @@ from scipy import sparse
 import foldyn as fd
 from foldyn.errors import ComputationError, CrossingWarning
 from foldyn.statics import OrigamiProblem, Settings, Solver, trace
+from foldyn.statics.newton import Problem
 from foldyn.structures import ModelOptions
 
 
-class Spring:
+class Spring(Problem):
     """One dof pulled by a force f on a spring with a force g(u)."""
 
     def __init__(self, force, slope):

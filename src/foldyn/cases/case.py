@@ -193,8 +193,7 @@ class Case(Loaded, Damped):
 
     def altered(self, **changes: Any) -> Case:
         """Copy with other fields, without repeating the warnings of this case."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)
+        with warnings.catch_warnings(action="ignore", category=FoldynWarning):
             return replace(self, **changes)
 
     @cached_property

@@ -325,34 +325,12 @@ class SomeLoads(Loaded):
     case: Loaded
     numbers: Sequence[int]
 
-    @property
-    def structure(self) -> Any:
-        """The structure of the case."""
-        return self.case.structure
-
-    @property
-    def nodal_mass(self) -> NDArray[np.float64]:
-        """Mass (n,) that moves with each node in the case, kg."""
-        return self.case.nodal_mass
-
-    @property
-    def point_masses(self) -> NDArray[np.float64]:
-        """Sum (n,) of the point masses on each node, kg."""
-        return self.case.point_masses
-
-    @property
-    def held_edges(self) -> dict[int, NDArray[np.float64]]:
-        """Edges that are held along their whole length; see `Supported`."""
-        return self.case.held_edges
-
-    @property
-    def loads(self) -> Sequence[Load]:
-        """The chosen loads."""
-        return tuple(self.case.loads[i] for i in self.numbers)
+    def __getattr__(self, name: str) -> Any:
+        """Structure and masses, which are those of the case."""
+        return getattr(self.case, name)
 
     def _loads(self) -> Iterator[tuple[str, Load]]:
-        pairs = zip(self.numbers, self.loads, strict=True)
-        return ((f"loads[{i}]", load) for i, load in pairs)
+        return ((f"loads[{i}]", self.case.loads[i]) for i in self.numbers)
 
 
 class Damped(Supported):

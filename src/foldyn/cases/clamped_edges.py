@@ -104,12 +104,8 @@ def held_edges(
     for support in supports:
         if not getattr(support, "along", False):
             continue
-        axes = getattr(support, "axes", None) or getattr(support, "axis", None)
-        held = (
-            np.eye(3)[[AXES.index(axis) for axis in axes]]
-            if axes
-            else unit_vector(support.direction)[None]
-        )
+        units = _axes(support) or [support.direction]
+        held = np.array([unit_vector(unit) for unit in units])
         for edge in edges_between(structure, resolve_nodes(structure, support.nodes, "nodes")):
             found.setdefault(number[edge_of(int(edge[0]), int(edge[-1]))], []).append(held)
     for low, high in structure.options.clamped:

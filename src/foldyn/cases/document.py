@@ -114,8 +114,7 @@ def pattern_from_document(sections: Mapping[str, Any], arrays: Mapping[str, NDAr
     """
     if not sections.get("pattern"):
         raise InputError("the stored case has no pattern")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with warnings.catch_warnings(action="ignore", category=FoldynWarning):
         return _undamaged(_stored_pattern, sections["pattern"], arrays)
 
 
@@ -322,8 +321,9 @@ def _read(sections: Mapping[str, Any]) -> Case:
     contact = read(Contact, "", sections["contact"]) if "contact" in sections else None
     air = read(Air, "", sections["air"]) if "air" in sections else None
     structure = _structure(sections)
-    with warnings.catch_warnings():  # warnings were issued when the case was first made
-        warnings.simplefilter("ignore", FoldynWarning)
+    with warnings.catch_warnings(
+        action="ignore", category=FoldynWarning
+    ):  # warnings were issued when the case was first made
         damping = read(DampingSection, "", sections["damping"]).made()
         return Case(structure, supports, loads, damping, masses, contact, air)
 
@@ -334,8 +334,7 @@ def _structure(sections: Mapping[str, Any]) -> Any:
         if name in model:
             model[name] = law_from(model[name], laws)
     nodes = sections["nodes"]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with warnings.catch_warnings(action="ignore", category=FoldynWarning):
         pattern = _stored_pattern(sections["pattern"])
         sheet = read(Sheet, "sheet", sections["sheet"])
         kind = model.pop("kind", BARS_AND_HINGES)

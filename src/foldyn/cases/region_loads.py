@@ -292,11 +292,16 @@ class CreaseMoment(Load):
         creases = resolve_creases(structure, self.creases, f"{place}.creases")
         return creases, one_or_each(f"{place}.moment", self.moment, len(creases), "creases")
 
-    def following(self, structure: Discretized, place: str) -> Following:
-        """See `Load`; in a shell, pieces of a crease share its moment in proportion to length."""
+    def _each(self, structure: Discretized, place: str) -> NDArray[np.float64]:
+        """Moment (nf,), N m, of each fold."""
         creases, moment = self.of_creases(structure, place)
         each = np.zeros(len(structure.folds))
         each[creases] = moment
+        return each
+
+    def following(self, structure: Discretized, place: str) -> Following:
+        """See `Load`; in a shell, pieces of a crease share its moment in proportion to length."""
+        (creases, _), each = self.of_creases(structure, place), self._each(structure, place)
         pieces = structure.body.sheet.fold_hinges()
         chosen = np.isin(pieces.fold, creases)
         part = (each[pieces.fold] * pieces.share)[chosen]
@@ -308,21 +313,15 @@ class CreaseMoment(Load):
 
     def distributed(self, structure: Discretized, place: str) -> Distributed:
         """See `Load`."""
-        creases, moment = self.of_creases(structure, place)
-        each = np.zeros(len(structure.folds))
-        each[creases] = moment
-        return Distributed(creases=each)
+        return Distributed(creases=self._each(structure, place))
 
     def turns(self, structure: Discretized, place: str) -> NDArray | None:
         """See `Load`: compliant panels at a crease turn under the whole moment."""
         sheet = structure.body.sheet
         if not sheet.offsets:
             return None
-        creases, moment = self.of_creases(structure, place)
-        each = np.zeros(len(structure.folds))
-        each[creases] = moment
         angles = np.zeros(len(sheet.rest_angles) - sheet.offsets)
-        return np.append(angles, sheet.offsets_under(each))
+        return np.append(angles, sheet.offsets_under(self._each(structure, place)))
 
     def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse moments of creases between held panels."""

@@ -253,8 +253,10 @@ def count_compiled() -> Iterator[Callable[[], int]]:
 def use(name: str) -> int:
     """Run one of `STAGES` by name; return the number of functions it compiled."""
     (uses,) = (stage[name] for stage in STAGES if name in stage)
-    with count_compiled() as compiled, warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with (
+        count_compiled() as compiled,
+        warnings.catch_warnings(action="ignore", category=FoldynWarning),
+    ):
         for compute in uses:
             compute()
         return compiled()

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import Owner, Results, drawing, held
-from foldyn.cli.options import add_figures, add_results, integer, number
+from foldyn.cli.options import add_figures, add_results, halves, integer, number
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import InputError
 from foldyn.plots import FIGURES
@@ -181,16 +181,9 @@ def _of_case(path: Path, given: argparse.Namespace) -> FitFile:
         recognize(Path(file), given.axis, name=Path(file).stem, sigma=sigma)
         for file, sigma in zip(given.data, sigmas, strict=True)
     ]
-    ties = dict(_halves(text, "--tie") for text in given.tie)
+    ties = dict(halves(text, "--tie") for text in given.tie)
     parameters = tuple(map(_parameter, given.vary))
     return FitFile(path, "", path, tuple(data), parameters, ties, {})
-
-
-def _halves(text: str, option: str) -> tuple[str, str]:
-    key, equals, rest = text.partition("=")
-    if not equals or not rest.strip():
-        raise InputError(f'{option} "{text}": write KEY=..., with a key of the case file')
-    return key.strip(), rest.strip()
 
 
 def _parameter(text: str) -> Any:
@@ -198,7 +191,7 @@ def _parameter(text: str) -> Any:
 
     if "=" not in text:
         return Parameter(text.strip())
-    key, rest = _halves(text, "--vary")
+    key, rest = halves(text, "--vary")
     try:
         numbers = [parsed(part) for part in rest.split(":")]
     except ValueError:

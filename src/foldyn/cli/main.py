@@ -292,8 +292,7 @@ def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
         for name, level in SILENT.items():
             os.environ.setdefault(name, level)
         os.environ["MPLBACKEND"] = "Agg"  # figures only go to files
-        with warnings.catch_warnings():
-            warnings.simplefilter("always", FoldynWarning)
+        with warnings.catch_warnings(action="always", category=FoldynWarning):
             warnings.showwarning = _Warnings(getattr(given, "case", ""))
             if getattr(given, "figures", None) and given.no_figures:
                 raise InputError("--figures: draws figures; leave out --no-figures")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from foldyn.errors import InputError
 from foldyn.plots import ANIMATIONS, FIGURES
 from foldyn.values import parsed
 
@@ -17,6 +18,14 @@ def number(text: str) -> float:
 def integer(text: str) -> int:
     """Parse a whole number."""
     return parsed(text, int)
+
+
+def halves(text: str, option: str) -> tuple[str, str]:
+    """Parse a key of a case file and the text after its "="."""
+    key, equals, rest = text.partition("=")
+    if not equals or not rest.strip():
+        raise InputError(f'{option} "{text}": write KEY=..., with a key of the case file')
+    return key.strip(), rest.strip()
 
 
 def flag(command: argparse.ArgumentParser, name: str, text: str) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import Owner, Results, drawing, held
-from foldyn.cli.options import add_figures, add_results, integer
+from foldyn.cli.options import add_figures, add_results, halves, integer
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import ComputationError, InputError
 from foldyn.plots import FIGURES
@@ -164,12 +164,10 @@ def _table(texts: Sequence[str], option: str) -> dict[str, str]:
     """Parse keys and the text after their "="."""
     table: dict[str, str] = {}
     for text in texts:
-        key, equals, rest = text.partition("=")
-        if not equals or not rest.strip():
-            raise InputError(f'{option} "{text}": write KEY=..., with a key of the case file')
-        if key.strip() in table:
-            raise InputError(f'{option} "{text}": {key.strip()} is named twice')
-        table[key.strip()] = rest.strip()
+        key, rest = halves(text, option)
+        if key in table:
+            raise InputError(f'{option} "{text}": {key} is named twice')
+        table[key] = rest
     return table
 
 

@@ -110,12 +110,6 @@ def turn_part(actuators, factor, first, last):
 
 
 @inner
-def actuator_power(actuators, factor, angle):
-    """Power (W) that the actuators put into the structure at dihedrals `angle` (nh,), rad."""
-    return power_of_part(actuators, factor, angle, 0, actuators.hinge.size)
-
-
-@inner
 def power_of_part(actuators, factor, angle, first, last):
     """Power (W) of actuators first to last - 1, without offsets; `angle` (nh,) has all hinges."""
     folds = actuators.folds

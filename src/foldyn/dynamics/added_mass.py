@@ -306,19 +306,13 @@ def flux(own, area, v, out):
 
 
 @inner
-def put_through(own, jump):
-    """Put the force per area vector at each corner, due to pressure jumps (u,), N/m2."""
+def add_push(own, area, jump, force):
+    """Add the nodal forces (rows, 3) of pressure jumps (u,), N/m2, through area vectors (t, 3)."""
     for e in range(own.through.size):
-        own.through[e] = 0.0
+        own.through[e] = 0.0  # force per area vector at each corner
     for i in range(jump.size):
         for e in range(own.start[i], own.start[i + 1]):
             own.through[own.corner[e]] += own.catch[e] * jump[i]
-
-
-@inner
-def add_push(own, area, jump, force):
-    """Add the nodal forces (rows, 3) of pressure jumps (u,) through area vectors (t, 3)."""
-    put_through(own, jump)
     for t in range(area.shape[0]):
         for k in range(3):
             for c in range(3):

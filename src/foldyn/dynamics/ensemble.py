@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case, Origin, State
 from foldyn.dynamics import timing
-from foldyn.dynamics.audit import audited
 from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.gpu.choice import DEVICES, choose
 from foldyn.dynamics.initial import check_start, check_touching
@@ -141,7 +140,7 @@ def simulate_many(
     nodes, supported = len(case.structure.nodes), len(case.reaction_dofs)
     times = plan.start + plan.dt * plan.every * np.arange(timing.expected_samples(plan))
     timing.check_samples(len(cases) * len(times), nodes, supported)
-    names = audited(case.energy_groups, case.air is not None)
+    names = motions[0].output.names
     memory = _shape(case)["branches of laws"], VARIABLES
     shapes = (nodes, 3), (nodes, 3), (supported,), (len(names),), memory
     out = Samples._make([times, *(np.empty((len(cases), len(times), *s)) for s in shapes), 0])
@@ -165,7 +164,7 @@ def simulate_many(
         facts["device_reason"] = reason
     outcome = [ended.get(k, "done") for k in range(len(motions))]
     beyond = _origins(motions, out.time) | _continuations(motions)
-    return _dataset(case, out, outcome, beyond, facts)
+    return _dataset(motions[0], out, outcome, beyond, facts)
 
 
 def _origins(motions: Sequence[Motion], times: NDArray) -> dict[str, Any]:
@@ -319,7 +318,7 @@ def _warn(motions: Sequence[Motion], ended: Mapping[int, str], out: Samples) -> 
         rank = f" (the worst of {_cases(doubts)})" if len(doubts) > 1 else ""
         warn(f"cases[{worst}]{rank}: {doubts[worst]}", "integrators.md#accuracy")
     first = motions[0].case
-    names = audited(first.energy_groups, first.air is not None)
+    names = motions[0].output.names
     found = [
         stretch(motion.case.structure, dict(zip(names, energy.T, strict=True)), displacement)
         for motion, energy, displacement in zip(motions, out.energy, out.displacement, strict=True)
@@ -338,16 +337,12 @@ def _warn(motions: Sequence[Motion], ended: Mapping[int, str], out: Samples) -> 
 
 
 def _dataset(
-    case: Case, out: Samples, outcome: list[str], beyond: dict, facts: dict
+    like: Motion, out: Samples, outcome: list[str], beyond: dict, facts: dict
 ) -> xarray.Dataset:
     """The dataset that `simulate_many` returns."""
-    known = {**MOTION, **energies_of(case)}
+    case, known = like.case, {**MOTION, **energies_of(like.case)}
     values = {"displacement": out.displacement, "reaction": out.reaction, "velocity": out.velocity}
-    values |= zip(
-        audited(case.energy_groups, case.air is not None),
-        np.moveaxis(out.energy, 2, 0),
-        strict=True,
-    )
+    values |= zip(like.output.names, np.moveaxis(out.energy, 2, 0), strict=True)
     if out.memory.size:
         values["memory"] = out.memory
     timed = variables(known, "time", values).items()

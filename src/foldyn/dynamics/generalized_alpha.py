@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.algebra.banded import substitute
-from foldyn.dynamics.actuation import actuator_power, offset_work, turn
+from foldyn.dynamics.actuation import offset_work, power_of_part, turn
 from foldyn.dynamics.equation import LoopHandle, acceleration, advance_clock
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import (
@@ -291,10 +291,10 @@ def _taken_by(step, numbers, before, after):
 def _actuation(step, angle0, angle1):
     """Work (J) of the actuators in a step from the dihedrals angle0 to angle1."""
     actuators, old, new = step.case.system.actuators, step.old, step.new
-    change = np.zeros_like(new.factor)
+    change, count = np.zeros_like(new.factor), actuators.hinge.size
     change[:, 1] = 0.5 * (new.factor[:, 0] - old.factor[:, 0])
     turn(actuators, old.factor)
-    done = actuator_power(actuators, change, angle0)
+    done = power_of_part(actuators, change, angle0, 0, count)
     turn(actuators, new.factor)
-    done += actuator_power(actuators, change, angle1)
-    return done + offset_work(actuators, angle1, 0, actuators.hinge.size, True)
+    done += power_of_part(actuators, change, angle1, 0, count)
+    return done + offset_work(actuators, angle1, 0, count, True)

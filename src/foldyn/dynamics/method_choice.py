@@ -8,6 +8,7 @@ estimated here, to the requested tolerance, and that end at samples.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from scipy import sparse
 
 from foldyn.algebra.solvers import factorized
 from foldyn.algebra.superlu import SingularTangentError
-from foldyn.cases import Case
+from foldyn.cases import Case, History
 from foldyn.dynamics.audit import INACCURATE
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.dynamics.methods import METHODS, lacking
@@ -208,14 +209,19 @@ def vibrating_share(
     return min(share, 1.0)
 
 
+def _loads(case: Case, u: NDArray) -> Iterator[tuple[NDArray, History]]:
+    """Loads (n, 3), N, at u and factor 1, with their histories."""
+    yield from case.load_terms
+    for part, history in case.following_terms:
+        yield following_force(part, u.ravel(), np.ones((1, 1))).reshape(u.shape), history
+
+
 def _applied(case: Case, u: NDArray) -> NDArray:
     """Forces (3n,), N, that loads and actuated folds apply at u, without internal forces."""
     body = case.elastic_body
     force = -body.internal(u)
-    for load, _ in case.load_terms:
+    for load, _ in _loads(case, u):
         force += load.ravel()
-    for part, _ in case.following_terms:
-        force += following_force(part, u.ravel(), np.ones((1, 1)))
     change = np.zeros_like(body.sheet.rest_angles)
     for turn, _ in case.rest_terms:
         change += turn
@@ -237,11 +243,7 @@ def _out_of_balance(case: Case, u: NDArray, start: float) -> bool:
     """Whether forces at the start set the structure in motion immediately."""
     internal = case.elastic_body.internal(u).reshape(u.shape)
     force, size = -internal, float(np.abs(internal[case.fixed]).max(initial=0.0))
-    for load, history in case.load_terms:
-        force = force + history(start) * load
-        size = max(size, float(np.abs(load).max()))
-    for part, history in case.following_terms:
-        load = following_force(part, u.ravel(), np.ones((1, 1))).reshape(u.shape)
+    for load, history in _loads(case, u):
         force = force + history(start) * load
         size = max(size, float(np.abs(load).max()))
     free = case.constraints.force(force.ravel())[case.free_dofs]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case, Continuation, Origin, State
 from foldyn.dynamics.added_mass import LOOK_EVERY, begin_flow, renewed_flow
-from foldyn.dynamics.audit import INACCURATE, Rounding, audited, doubts, is_off
+from foldyn.dynamics.audit import INACCURATE, Rounding, doubts, is_off
 from foldyn.dynamics.checkpoint import KEY, Keeping, identity, identity_digest
 from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.failures import failure, smaller_step
@@ -167,8 +167,7 @@ class Motion:
 
     def _stretch(self, result: xarray.Dataset) -> str:
         """Warning if stretching panels hold much of the strain energy; empty if not."""
-        names = audited(self.case.energy_groups, self.case.air is not None)
-        energies = {name: result[name].values for name in names}
+        energies = {name: result[name].values for name in self.output.names}
         found = stretch(self.case.structure, energies, result["displacement"])
         if found is None:
             return ""
@@ -519,8 +518,7 @@ class Motion:
         """Dataset of the samples so far, with the case, the statistics and crossing panels."""
         crossings = crossings or self._crossings()
         out, sampled = self.output.first(self.stored)
-        names = audited(self.case.energy_groups, self.case.air is not None)
-        energies: dict[str, NDArray] = dict(zip(names, out.energy.T, strict=True))
+        energies: dict[str, NDArray] = dict(zip(self.output.names, out.energy.T, strict=True))
         result = trajectory_dataset(
             self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
             self._statistics(), sampled, out.memory if self._branches else None,

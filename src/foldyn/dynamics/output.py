@@ -47,6 +47,8 @@ class Output:
         Room that compiled loops write to.
     balance : EnergyBalance
         Energy balance of all samples so far.
+    names : tuple of str
+        Names of the energies.
     """
 
     def __init__(
@@ -56,7 +58,7 @@ class Output:
         self._heat = heat
         self._case, self._plan, self._sampler, self._branches = case, plan, sampler, branches
         self._keeping, self._air = keeping, case.air is not None
-        self._names = audited(case.energy_groups, self._air)
+        self.names = audited(case.energy_groups, self._air)
         at_once = 1  # largest number of samples in a step
         if not plan.steps and not plan.every:
             at_once = math.floor(plan.dt / plan.interval) + 2
@@ -68,7 +70,7 @@ class Output:
     def _room(self, count: int) -> Samples:
         structure = self._case.structure
         return samples(
-            count, len(structure.nodes), len(self._case.reaction_dofs), len(self._names),
+            count, len(structure.nodes), len(self._case.reaction_dofs), len(self.names),
             self._branches,
         )  # fmt: skip
 
@@ -224,9 +226,9 @@ class Output:
         for name, variable in result.data_vars.items():
             if "time" not in variable.dims:
                 continue
-            if name in self._names:
+            if name in self.names:
                 every = columns.variable("energy", ("time", "column"))
-                found = every[:, self._names.index(str(name))]
+                found = every[:, self.names.index(str(name))]
             else:
                 found = columns.variable(str(name), tuple(map(str, variable.dims)))
             found.attrs = variable.attrs

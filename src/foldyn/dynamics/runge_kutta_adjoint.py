@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.adjoint import Adjoint
 from foldyn.dynamics.equation import EquationOfMotion, acceleration
+from foldyn.dynamics.implicit.scheme import copy
 from foldyn.dynamics.runge_kutta import next_stage
 from foldyn.dynamics.system import carried
-from foldyn.jit.compiled import inner_scalar, kernel
+from foldyn.jit.compiled import kernel
 from foldyn.jit.context import Context, run_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.pullback import pulled_back
@@ -34,13 +35,6 @@ if TYPE_CHECKING:
     import xarray
 
 ROOM = 1e6, 4e6  # memory for stage states of a segment and for stored states, bytes
-
-
-@inner_scalar
-def _into(source, out):
-    one, other = flat(source), flat(out)
-    for i in range(one.size):
-        other[i] = one[i]
 
 
 @kernel
@@ -58,14 +52,14 @@ def retrace(handle, u, v, plan, method, first, count, stages):
     others = np.zeros(((last + 1) * method.mixed, 2, un.size))
     for k in range(count):
         now = plan.start + (first + k) * dt
-        _into(u, at_u)
-        _into(v, at_v)
+        copy(u, at_u)
+        copy(v, at_v)
         for s in range(last + 1):
             acceleration(handle, at_u, at_v, now + method.time[s] * dt, a)
             if stages.shape[0] > 0:
-                _into(at_u, stages[k, s, 0])
-                _into(at_v, stages[k, s, 1])
-                _into(a, stages[k, s, 2])
+                copy(at_u, stages[k, s, 0])
+                copy(at_v, stages[k, s, 1])
+                copy(a, stages[k, s, 2])
             if s < last:
                 next_stage(method, s, dt, un, vn, ut, vt, fa, du, dv, others)
         share, weight = dt / method.whole, method.weight[last]

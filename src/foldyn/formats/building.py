@@ -164,8 +164,7 @@ def _lines(drawing: Drawing, unit: float, notes: Notes) -> Lines:
 
 def _pattern(panels: Panels, drawing: Drawing, notes: Notes) -> Pattern:
     """Pattern of panels with open cuts."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with warnings.catch_warnings(action="ignore", category=FoldynWarning):
         bare = Pattern(panels.points, panels.faces)
     creases = {(a, b): k for k, (a, b) in enumerate(bare.creases.tolist())}
     given = np.array([panels.letters.get(edge, "") for edge in creases], dtype="<U1")
@@ -189,8 +188,7 @@ def _pattern(panels: Panels, drawing: Drawing, notes: Notes) -> Pattern:
         for edge in creases
         if np.isfinite(panels.angles.get(edge, np.nan))
     }
-    with warnings.catch_warnings(record=True) as doubts:
-        warnings.simplefilter("always", FoldynWarning)
+    with warnings.catch_warnings(record=True, action="always", category=FoldynWarning) as doubts:
         pattern = Pattern(
             panels.points, faces, letters, drawing.name, fold_angles=angles, custom=drawing.custom
         )

@@ -29,6 +29,7 @@ ASSIGNMENT, ANGLE = "data-assignment", "data-foldangle"
 """Attributes in which programs for FOLD files store the kind of a line."""
 _SELECTOR = re.compile(r"(\*|[A-Za-z][\w-]*)?((?:[.#][\w-]+)*)")
 _HEX = re.compile(r"#(?:[0-9a-f]{3,4}|[0-9a-f]{6}|[0-9a-f]{8})")
+_COMMENT = re.compile(r"/\*.*?(?:\*/|\Z)", re.DOTALL)
 _LONGEST = 200  # longest value, in characters
 
 
@@ -84,7 +85,7 @@ def rules_of(text: str) -> tuple[Rules, int]:
     """Rules of a style sheet, weakest first, and the number of unsupported rules."""
     rules: Rules = []
     left = 0
-    for order, block in enumerate(_without_comments(text).split("}")):
+    for order, block in enumerate(_COMMENT.sub("", text).split("}")):
         selectors, brace, body = block.rpartition("{")
         found = declarations(body)
         if not brace or not found:
@@ -101,17 +102,6 @@ def rules_of(text: str) -> tuple[Rules, int]:
             weight = 100 * len(ids) + 10 * len(classes) + (1 if tag else 0)
             rules.append(((weight, order), tag, ids[0] if ids else "", classes, found))
     return sorted(rules, key=lambda rule: rule[0]), left
-
-
-def _without_comments(text: str) -> str:
-    kept, place = [], 0
-    while (start := text.find("/*", place)) >= 0:
-        kept.append(text[place:start])
-        end = text.find("*/", start + 2)
-        if end < 0:
-            return "".join(kept)
-        place = end + 2
-    return "".join((*kept, text[place:]))
 
 
 def styled(given: Mapping[str, str], inherited: Style, place: str) -> Style | None:

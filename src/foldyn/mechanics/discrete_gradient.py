@@ -131,7 +131,8 @@ def discrete_gradient(x, dx, turn, points, plain, gradient):
             shift += 0.25 * dx[v, c]
         for v in range(4):
             points[v, c], deform[v, c] = x[v, c] - middle, dx[v, c] - shift
-    w0, w1, w2 = _rotation(points, deform)
+    # the rotation w x r closest to the difference of the positions
+    w0, w1, w2 = turned_by(inertia_inverse(points), *moment_of(points, deform))
     square = 0.25 * (w0 * w0 + w1 * w1 + w2 * w2)
     stretch = math.sqrt(1.0 + square)
     for v in range(4):
@@ -163,10 +164,21 @@ def discrete_gradient(x, dx, turn, points, plain, gradient):
 
 
 @inner_scalar
-def _rotation(r, d):
-    """Vector w of the rotation w x r closest to d, both (4, 3) about their means."""
-    xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+def moment_of(r, d):
+    """Sum of r x d over the points; both are (4, 3)."""
     t0, t1, t2 = 0.0, 0.0, 0.0
+    for v in range(4):
+        a, b, c = r[v, 0], r[v, 1], r[v, 2]
+        t0 += b * d[v, 2] - c * d[v, 1]
+        t1 += c * d[v, 0] - a * d[v, 2]
+        t2 += a * d[v, 1] - b * d[v, 0]
+    return t0, t1, t2
+
+
+@inner_scalar
+def inertia_inverse(r):
+    """Inverse of the inertia of points r (4, 3) about their mean: xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for v in range(4):
         a, b, c = r[v, 0], r[v, 1], r[v, 2]
         xx += b * b + c * c
@@ -175,16 +187,20 @@ def _rotation(r, d):
         xy -= a * b
         xz -= a * c
         yz -= b * c
-        t0 += b * d[v, 2] - c * d[v, 1]
-        t1 += c * d[v, 0] - a * d[v, 2]
-        t2 += a * d[v, 1] - b * d[v, 0]
     axx, ayy, azz = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
     axy, axz, ayz = xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz
     once = 1.0 / (xx * axx + xy * axy + xz * axz)
+    return once * axx, once * ayy, once * azz, once * axy, once * axz, once * ayz
+
+
+@inner_scalar
+def turned_by(inverse, t0, t1, t2):
+    """Rotation vector of points with this inverse inertia, due to the moment (t0, t1, t2)."""
+    axx, ayy, azz, axy, axz, ayz = inverse
     return (
-        once * (axx * t0 + axy * t1 + axz * t2),
-        once * (axy * t0 + ayy * t1 + ayz * t2),
-        once * (axz * t0 + ayz * t1 + azz * t2),
+        axx * t0 + axy * t1 + axz * t2,
+        axy * t0 + ayy * t1 + ayz * t2,
+        axz * t0 + ayz * t1 + azz * t2,
     )
 
 

@@ -18,7 +18,7 @@ from foldyn.plots import scene, style
 from foldyn.plots.modes import ShownModes
 from foldyn.plots.readings import case_from_result, check_path, displacements, stretches, way
 from foldyn.plots.scene import Points, Sheet3D, View
-from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, side_by_side
+from foldyn.plots.sheet import DrawnSheet, add_undeformed, between, edge_keys, side_by_side
 from foldyn.plots.writers import checked_file, filmed
 from foldyn.structures import Structure
 
@@ -184,11 +184,8 @@ def frame_displacements(
         raise InputError("result: its displacement contains NaN or infinity; cut that off")
     stored = result["time"].values.astype(np.float64) if dimension == "time" else way(result)
     places = np.linspace(stored[0], stored[-1], frames)
-    after = np.clip(np.searchsorted(stored, places), 1, len(stored) - 1)
-    gap = stored[after] - stored[after - 1]
-    part = (places - stored[after - 1]) / np.where(gap > 0.0, gap, 1.0)
-    part = part[:, None, None]
-    return places, (1.0 - part) * motion[after - 1] + part * motion[after]
+    numbers = np.interp(places, stored, np.arange(len(stored)))
+    return places, np.array([between(motion, number) for number in numbers])
 
 
 @case_from_result

@@ -15,6 +15,7 @@ from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.readings import alone, check_nodes_of
+from foldyn.results.sweep_dataset import label
 from foldyn.values import choice
 
 # Looks of both sweep directions.
@@ -49,7 +50,7 @@ def plot_amplitudes(result: xr.Dataset, title: str = "") -> Figure:
     """
     _check("result", result, "bifurcation_diagram", "swept_sine")
     along = _along(result)
-    labels = _named(result[along]), _named(result["amplitude"])
+    labels = label(result[along]), label(result["amplitude"])
     figure, axes = style.single((7.0, 4.0), title, *labels)
     keys = []
     for way in result["sweep"].values:
@@ -92,7 +93,7 @@ def plot_bifurcation_diagram(diagram: xr.Dataset, title: str = "") -> Figure:
     """
     _check("diagram", diagram, "bifurcation_diagram")
     along = _along(diagram)
-    labels = _named(diagram[along]), _named(diagram["section"])
+    labels = label(diagram[along]), label(diagram["section"])
     figure, axes = style.single((7.0, 4.2), title, *labels)
     keys = []
     for way in diagram["sweep"].values:
@@ -178,7 +179,7 @@ def plot_basins(
     rest = [name for name in names if name != across]
     upward = rest[0] if y is None else choice("y", y, rest)
     labels = basins["basin"].transpose(upward, across).values
-    figure, axes = style.single((6.2, 4.8), title, _named(basins[across]), _named(basins[upward]))
+    figure, axes = style.single((6.2, 4.8), title, label(basins[across]), label(basins[upward]))
     axes.grid(False)
     colors = [style.GRAY, *(_pale(k) for k in range(basins.sizes["attractor"]))]
     axes.pcolormesh(
@@ -249,12 +250,6 @@ def _check(field: str, result: xr.Dataset, *kinds: str) -> None:
 def _along(result: xr.Dataset) -> str:
     """Name of the swept parameter."""
     return "level" if "level" in result.coords else "frequency"
-
-
-def _named(values: xr.DataArray) -> str:
-    """Title of the axis of a variable, with the unit."""
-    text, units = values.attrs.get("long_name", str(values.name)), values.attrs.get("units", "")
-    return text if units in ("", "1") else f"{text} ({units})"
 
 
 def _pale(number: int) -> tuple[float, float, float]:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots.modes import about_state
-from foldyn.plots.readings import MOST_MODES, case_from_result
+from foldyn.plots.readings import MOST_MODES, asked_modes, case_from_result
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import side_by_side
 from foldyn.structures import Structure
@@ -75,10 +75,4 @@ def shown_shapes(buckling: xr.Dataset, which: Sequence[int] | None) -> list[int]
     stored = buckling["mode"].values.tolist()
     if not stored:
         raise InputError("buckling: found no load factor, so that there is no shape to draw")
-    numbers = stored[:MOST_MODES] if which is None else [int(number) for number in which]
-    if not 0 < len(numbers) <= MOST_MODES:
-        raise InputError(f"which: {len(numbers)} modes; one figure shows 1 to {MOST_MODES}")
-    for number in numbers:
-        if number not in stored:
-            raise InputError(f"which: {number}; there are modes {stored[0]} to {stored[-1]}")
-    return numbers
+    return stored[:MOST_MODES] if which is None else asked_modes(stored, which)

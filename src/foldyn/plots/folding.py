@@ -14,7 +14,7 @@ from foldyn.errors import InputError
 from foldyn.plots import scene
 from foldyn.plots.readings import chosen
 from foldyn.plots.scene import Sheet3D, View
-from foldyn.plots.sheet import DrawnSheet, edge_keys, rest_keys, side_by_side
+from foldyn.plots.sheet import DrawnSheet, between, edge_keys, rest_keys, side_by_side
 from foldyn.plots.writers import checked_file, filmed
 from foldyn.statics.folding import Folding
 from foldyn.structures.mesh import n4b5
@@ -116,9 +116,7 @@ def animate_folding(
     scene.style.finish(figure, keys)
     with filmed(figure, path, fps) as writer:
         for place in np.linspace(0.0, len(positions) - 1.0, frames):
-            before = min(int(place), len(positions) - 2)
-            part = place - before
-            drawn.move((1.0 - part) * positions[before] + part * positions[before + 1])
+            drawn.move(between(positions, place))
             writer.grab_frame()
     return path
 

@@ -357,6 +357,11 @@ def chosen_modes(modes: xr.Dataset, which: Sequence[int] | None) -> list[int]:
         rigid = modes["rigid"].values.astype(bool)
         elastic = [number for number, is_rigid in zip(stored, rigid, strict=True) if not is_rigid]
         return (elastic or stored)[:MOST_MODES]
+    return asked_modes(stored, which)
+
+
+def asked_modes(stored: Sequence[int], which: Sequence[int]) -> list[int]:
+    """Numbers of modes that a figure is asked to show."""
     numbers = [int(number) for number in which]
     if not numbers:
         raise InputError("which: empty; give the number of at least one mode")

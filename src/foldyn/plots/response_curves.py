@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.readings import alone, by_label
+from foldyn.results.sweep_dataset import label
 
 MARKERS = {"fold": "o", "pitchfork": "s", "period doubling": "D", "Neimark-Sacker": "^"}
 UNSTABLE = (0, (3, 1.6))
@@ -55,13 +56,15 @@ def plot_response_curve(
         raise InputError(": some vary the frequency, others the level; draw them apart", "curves")
     along = "frequency" if kinds.pop() == "frequencies" else "level"
     xlabel = "frequency of the drive (Hz)" if along == "frequency" else "factor on the drive"
-    figure, axes = style.single(SIZE, title, xlabel, _amplitude(next(iter(labeled.values()))))
+    first = next(iter(labeled.values()))
+    ylabel = label(first["amplitude"], f"amplitude of the {first.attrs['measure']}")
+    figure, axes = style.single(SIZE, title, xlabel, ylabel)
     keys, kept = [], set()
-    for index, (label, curve) in enumerate(labeled.items()):
+    for index, (name, curve) in enumerate(labeled.items()):
         color = style.CYCLE[index % len(style.CYCLE)]
         kept |= _draw(axes, curve, along, color)
-        if label:
-            keys.append(style.key(label, color=color))
+        if name:
+            keys.append(style.key(name, color=color))
     if not all(curve["stable"].values.all() for curve in labeled.values()):
         keys.append(style.key("unstable", color=style.GRAY, linestyle=UNSTABLE))
     for name in (name for name in MARKERS if name in kept):
@@ -111,9 +114,9 @@ def plot_backbone(backbones: xr.Dataset | Mapping[str, xr.Dataset], title: str =
         axes.set_xscale("log")
         keys = [
             axes.plot(
-                one[name].values, one["frequency"].values, label=label, **style.line_style(k)
+                one[name].values, one["frequency"].values, label=whose, **style.line_style(k)
             )[0]
-            for k, (label, one) in enumerate(labeled.items())
+            for k, (whose, one) in enumerate(labeled.items())
         ]
     return style.finish(figure, keys if any(labeled) else [], 4, width=figure.get_figwidth())
 
@@ -139,11 +142,6 @@ def _kind(field: str, result: xr.Dataset, kind: str, attribute: str) -> str:
     if alone(field, result).attrs.get("foldyn_result") != kind or attribute not in result.attrs:
         raise InputError(f": must be a result of foldyn.{kind}", field)
     return str(result.attrs[attribute])
-
-
-def _amplitude(curve: xr.Dataset) -> str:
-    unit = curve["amplitude"].attrs.get("units", "")
-    return f"amplitude of the {curve.attrs['measure']}" + (f" ({unit})" if unit else "")
 
 
 def _mark(color: str, name: str) -> dict:

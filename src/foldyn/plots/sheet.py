@@ -82,16 +82,16 @@ def split_edges(
         cuts = [0, *(np.flatnonzero(row[1:] != row[:-1]) + 1).tolist(), len(row)]
         for low, high in pairwise(cuts):
             inner = line[low // each + 1 : -(-high // each)]
-            ends = [_point(line, cut / each) for cut in (low, high)]
+            ends = [between(line, cut / each) for cut in (low, high)]
             parts[int(row[low])].append(np.array([ends[0], *inner, ends[1]]))
     visible, hidden = (_together(part) for part in parts)
     return visible, hidden
 
 
-def _point(line: Points, place: float) -> Points:
-    """Point at a coordinate from 0 to p - 1 along a polyline (p, 3)."""
-    k = min(int(place), len(line) - 2)
-    return line[k] + (line[k + 1] - line[k]) * (place - k)
+def between(states: Points, place: float) -> Points:
+    """Point or state at a number from 0 to p - 1, linear between the p given ones (p, ...)."""
+    k = min(int(place), len(states) - 2)
+    return states[k] + (states[k + 1] - states[k]) * (place - k)
 
 
 def _together(parts: list[Points]) -> Points:

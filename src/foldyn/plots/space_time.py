@@ -14,6 +14,7 @@ from foldyn.linear.cell_motions import space_time
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.plots import style
 from foldyn.plots.readings import alone, by_label
+from foldyn.results.sweep_dataset import label
 from foldyn.values import choice, number
 
 SIGNED = LinearSegmentedColormap.from_list(
@@ -88,9 +89,7 @@ def drawn_cells(found: xr.Dataset, quantity: str, limit: float | None, title: st
         shading="nearest", rasterized=True,
     )  # fmt: skip
     name = quantity if quantity == "strain" else f"{found.attrs['component']} {quantity}"
-    units = shown.attrs["units"]
-    label = name if units == "1" else f"{name} ({units})"
-    style.color_bar(figure, mesh, label, ax=axes, extend="both")
+    style.color_bar(figure, mesh, label(shown, name), ax=axes, extend="both")
     axes.grid(False)
     return style.finish(figure)
 
@@ -188,20 +187,20 @@ def plot_transmission(
         The inputs are not results of these functions.
     """
     shown = by_label("transmissions", transmissions)
-    for label, one in shown.items():
+    for whose, one in shown.items():
         if "decay" not in one or "ratio" not in one:
-            where = f"transmissions[{label!r}]" if label else "transmissions"
+            where = f"transmissions[{whose!r}]" if whose else "transmissions"
             raise InputError(": give what foldyn.linear.transmission returns", where)
     labels = ["last cell over first", "decay (Np per cell)"]
     figure, (upper, lower) = style.rows((6.8, 5.0), title, "frequency (Hz)", labels)
     keys = []
     top = max(float(np.nanmax(one["decay"].values, initial=0.0)) for one in shown.values())
-    for k, (label, one) in enumerate(shown.items()):
+    for k, (whose, one) in enumerate(shown.items()):
         look = style.line_style(k)
         upper.semilogy(one["frequency"].values, one["ratio"].values, **look)
         dots = style.ring(look["color"], 3.5)
         lower.plot(one["frequency"].values, one["decay"].values, **dots)
-        keys.append(style.key(label or "chain", **look | dots | {"linestyle": "solid"}))
+        keys.append(style.key(whose or "chain", **look | dots | {"linestyle": "solid"}))
     if attenuation is not None:
         if "phase" not in alone("attenuation", attenuation):
             raise InputError(": give what foldyn.linear.attenuation returns", "attenuation")

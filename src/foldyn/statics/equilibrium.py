@@ -26,7 +26,7 @@ from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import following_force, following_tangent, joined
 from foldyn.mechanics.heat import add_heat
-from foldyn.statics.newton import EPS
+from foldyn.statics.newton import EPS, Problem
 from foldyn.statics.path_memory import REFUSED, Memories
 from foldyn.statics.rigid import Relief
 
@@ -119,7 +119,7 @@ class Actuation:
         return self._body.folded(self.rest(factor)) if self.acts else self._body
 
 
-class OrigamiProblem:
+class OrigamiProblem(Problem):
     """Equilibrium of a case along the load factor; dofs as in `mechanics.assembly`.
 
     If constraints tie displacements together, states and forces are the x and E' f of
@@ -345,7 +345,8 @@ class OrigamiProblem:
 
     def elapse(self, seconds: float) -> None:
         """Set the time (s) from the last accepted state to the next one."""
-        self.memories.elapse(seconds)
+        if seconds > 0.0:
+            self.memories.elapse(seconds)
 
     def keep(self, u: NDArray, factor: float) -> Any:
         """Accept a state (m,), storing what has yielded and slipped; see `recall`."""

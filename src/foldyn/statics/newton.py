@@ -109,17 +109,24 @@ class Problem(Protocol):
         """Largest turn (rad) of a part of the structure from u to v; inf if parts collide."""
         ...
 
+    # The following are for problems with contact, friction, memory and time.
 
-def clear_share(problem: Problem, u: NDArray, step: NDArray) -> float:
-    """Share of a step (m,) that can be taken before anything crosses; 1 without contact."""
-    clear = getattr(problem, "clear", None)  # problems without contact have none
-    return clear(u, step) if clear else 1.0
+    def clear(self, u: NDArray, step: NDArray) -> float:
+        """Share of a step (m,) that can be taken before anything crosses."""
+        return 1.0
 
+    def slips(self, u: NDArray) -> bool:
+        """Whether anything slips in a state (m,); negative eigenvalues then mean nothing."""
+        return False
 
-def is_counted(problem: Problem, u: NDArray) -> bool:
-    """Whether negative eigenvalues in a state (m,) are meaningful: not if a node slips."""
-    slips = getattr(problem, "slips", None)  # problems without friction have none
-    return not (slips and slips(u))
+    def keep(self, u: NDArray, factor: float) -> Any:
+        """Accept a state (m,) and return what has yielded and slipped, for `recall`."""
+
+    def recall(self, kept: Any) -> None:
+        """Go back to an accepted state."""
+
+    def elapse(self, seconds: float) -> None:
+        """Set the time (s) from the last accepted state to the next one."""
 
 
 class Balance(NamedTuple):
@@ -371,7 +378,7 @@ class Solver:
         for _ in range(HALVINGS):
             turn = self.problem.turn(u, u + share * step)
             if turn <= MOST_TURN:
-                return share * clear_share(self.problem, u, share * step)
+                return share * self.problem.clear(u, share * step)
             share *= MOST_TURN / turn if np.isfinite(turn) else 0.5
         return 0.0
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.statics.newton import COLLIDES, EPS, UNKNOWN, Attempt, Rule, Solver, clear_share
+from foldyn.statics.newton import COLLIDES, EPS, UNKNOWN, Attempt, Rule, Solver
 from foldyn.statics.stability import LostError, Section, critical_points
 from foldyn.statics.stepping import (
     PathStoppedError,
@@ -28,7 +28,6 @@ from foldyn.statics.stepping import (
     Walk,
     arrive,
     kept,
-    recall,
     step_to,
     stopped,
     walk,
@@ -202,7 +201,7 @@ def _advance(
     climb = _climb(station, length, moved)
     prediction = climb * station.response
     problem, point = solver.problem, station.point
-    clear = clear_share(problem, point.u, prediction)
+    clear = problem.clear(point.u, prediction)
     factor = point.factor + clear * climb
     u = point.u + clear * prediction
     u[problem.held] = problem.prescribed(factor)
@@ -373,15 +372,15 @@ def _up_to(solver: Solver, start: Station, way: Iterator[Station], end: float, s
 def _landed(solver: Solver, before: Station, after: Station, end: float) -> Station:
     """Station at the load factor `end` between two others; `after` if none is found."""
     section = Section(solver, before, after)
-    recall(solver.problem, before)
+    solver.problem.recall(before.point.memory)
     try:
         near = section.zero(lambda mark: mark.station.point.factor - end, 1e-10).station
     except LostError:
-        recall(solver.problem, after)
+        solver.problem.recall(after.point.memory)
         return after
     attempt = solver.correct(near.point.u, end, stiffness=near.stiffness)
     strayed = np.linalg.norm(attempt.u - near.point.u) > 1e-3 * np.sqrt(section.whole)
     if attempt.failure or strayed:
-        recall(solver.problem, after)
+        solver.problem.recall(after.point.memory)
         return after
     return kept(solver.problem, arrive(solver, attempt))

@@ -23,7 +23,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from foldyn.algebra.superlu import Factorization
 from foldyn.statics.newton import Solver, plane
-from foldyn.statics.stepping import Station, arrive, elapse, kept, recall
+from foldyn.statics.stepping import Station, arrive, kept
 
 APART = 1e-6  # share of a step within which crossings count as one multiple point
 SHARP = 1e-13  # accuracy of a located point or crossing, as a share of the step
@@ -65,7 +65,7 @@ class Section:
         u = one.u + weight * (other.u - one.u)
         u[self.solver.problem.held] = self.solver.problem.prescribed(factor)
         rule = plane(self.chord, share * self.whole)
-        elapse(self.solver.problem, share * self.seconds)
+        self.solver.problem.elapse(share * self.seconds)
         attempt = self.solver.correct(u, factor, rule, origin=self.start.point.u)
         farthest = 2.0 * np.sqrt(self.whole)  # from the start: twice the length of the step
         if attempt.failure or np.linalg.norm(attempt.u - self.start.point.u) > farthest:
@@ -126,15 +126,15 @@ def critical_points(solver: Solver, start: Station, end: Station) -> list[Statio
     if counts[0] == counts[1] or min(counts) < 0:
         return [end]
     section, found = Section(solver, start, end), []
-    recall(solver.problem, start)
+    solver.problem.recall(start.point.memory)
     for station in _crossings(section, *section.ends):
         if station.point.u is end.point.u:
             end = station
             break
-        elapse(solver.problem, section.share(station) * section.seconds)
+        solver.problem.elapse(section.share(station) * section.seconds)
         found.append(kept(solver.problem, station))
-        recall(solver.problem, start)
-    recall(solver.problem, end)
+        solver.problem.recall(start.point.memory)
+    solver.problem.recall(end.point.memory)
     return [*found, end]
 
 

@@ -29,8 +29,6 @@ from foldyn.statics.newton import (
     Solver,
     Stiffness,
     balance,
-    clear_share,
-    is_counted,
 )
 
 NEGLIGIBLE = 1e-6  # motions below this fraction of the structure's size are never a snap
@@ -104,7 +102,7 @@ Walk = Iterator[Station]
 def arrive(solver: Solver, attempt: Attempt) -> Station:
     """Station at the equilibrium found by a correction."""
     stiffness = solver.stiffness(attempt.u, attempt.factor)
-    counted = solver.settings.stability and is_counted(solver.problem, attempt.u)
+    counted = solver.settings.stability and not solver.problem.slips(attempt.u)
     negative = stiffness.symmetric.negative() if counted else -1
     relative = attempt.balance.relative
     point = Point(attempt.u, attempt.factor, attempt.iterations, relative, negative)
@@ -113,30 +111,15 @@ def arrive(solver: Solver, attempt: Attempt) -> Station:
 
 def kept(problem: Problem, station: Station) -> Station:
     """The station with its memory of yield and slip, from which the problem continues."""
-    keep = getattr(problem, "keep", None)  # problems without memory have none
-    memory = keep(station.point.u, station.point.factor) if keep else None
+    memory = problem.keep(station.point.u, station.point.factor)
     if memory is None:
         return station
     return station._replace(point=replace(station.point, memory=memory))
 
 
-def recall(problem: Problem, station: Station) -> None:
-    """Restore a problem's memory at a station."""
-    back = getattr(problem, "recall", None)  # problems without memory have none
-    if back:
-        back(station.point.memory)
-
-
-def elapse(problem: Problem, seconds: float) -> None:
-    """Set the time (s) from the last accepted state to the next one."""
-    pass_time = getattr(problem, "elapse", None)  # problems without time have none
-    if pass_time and seconds > 0.0:
-        pass_time(seconds)
-
-
 def step_to(solver: Solver, start: Station, factor: float, seconds: float = 0.0) -> Attempt:
     """Equilibrium at another load factor, or after some seconds, on the path of `start`."""
-    elapse(solver.problem, seconds)
+    solver.problem.elapse(seconds)
     plain = _step(solver, start, factor, seconds, False)
     if not plain.failure or plain.failure == SNAPS:
         return plain
@@ -220,7 +203,7 @@ def stopped(station: Station, attempt: Attempt) -> PathStoppedError:
     )
 
 
-class Released:
+class Released(Problem):
     """A problem at a fixed load factor; its out-of-balance force fades as `factor` goes to 1."""
 
     def __init__(self, problem: Problem, u: NDArray, factor: float) -> None:
@@ -254,8 +237,7 @@ class Released:
 
     def keep(self, u: NDArray, factor: float) -> Any:
         """Accept a state in the problem."""
-        keep = getattr(self.problem, "keep", None)
-        return keep(u, self.factor) if keep else None
+        return self.problem.keep(u, self.factor)
 
     def turn(self, u: NDArray, v: NDArray) -> float:
         """Largest turn from u to v in the problem."""
@@ -263,7 +245,7 @@ class Released:
 
     def clear(self, u: NDArray, step: NDArray) -> float:
         """Share of a step before anything crosses in the problem."""
-        return clear_share(self.problem, u, step)
+        return self.problem.clear(u, step)
 
 
 def settle(solver: Solver, u: NDArray, factor: float) -> Station:

@@ -63,10 +63,10 @@ def no_card() -> str:
     return ""
 
 
-def check_taken(case: Case, packed: PackedCase, place: str = "device") -> None:
+def check_taken(case: Case, packed: PackedCase) -> None:
     """Refuse a case that has a part without GPU kernel, and name the part."""
     if lack := lacking(case, packed):
-        raise InputError(f' = "gpu": {lack} has no GPU kernel; use device = "cpu"', place)
+        raise InputError(f' = "gpu": {lack} has no GPU kernel; use device = "cpu"', "device")
 
 
 def lacking(case: Case, packed: PackedCase) -> str:

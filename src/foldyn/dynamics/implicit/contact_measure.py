@@ -19,8 +19,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import inner, inner_scalar
+from foldyn.jit.compiled import inner
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.discrete_gradient import inertia_inverse, moment_of, turned_by
 
 NOISE = 16.0 * float(np.finfo(float).eps)  # rounding error of a measure, relative to positions
 
@@ -72,10 +73,10 @@ def go(move, tangent):
             shift += 0.25 * move.motion[v, c]
         for v in range(4):
             r[v, c], d[v, c] = move.middle[v, c] - middle, move.motion[v, c] - shift
-    inverse = _inertia_inverse(r)
+    inverse = inertia_inverse(r)
     w, size = (0.0, 0.0, 0.0), 0.0
     for _ in range(2):  # twice, as narrow pairs lose digits in the inverse
-        turn = _turned_by(inverse, *_moment(r, d))
+        turn = turned_by(inverse, *moment_of(r, d))
         for v in range(4):
             d[v, 0] -= turn[1] * r[v, 2] - turn[2] * r[v, 1]
             d[v, 1] -= turn[2] * r[v, 0] - turn[0] * r[v, 2]
@@ -93,47 +94,6 @@ def go(move, tangent):
     return size, farthest
 
 
-@inner_scalar
-def _moment(r, d):
-    """Sum of r x d over the points; both are (4, 3)."""
-    t0, t1, t2 = 0.0, 0.0, 0.0
-    for v in range(4):
-        a, b, c = r[v, 0], r[v, 1], r[v, 2]
-        t0 += b * d[v, 2] - c * d[v, 1]
-        t1 += c * d[v, 0] - a * d[v, 2]
-        t2 += a * d[v, 1] - b * d[v, 0]
-    return t0, t1, t2
-
-
-@inner_scalar
-def _inertia_inverse(r):
-    """Inverse of the inertia of points r (4, 3) about their mean: xx, yy, zz, xy, xz, yz."""
-    xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for v in range(4):
-        a, b, c = r[v, 0], r[v, 1], r[v, 2]
-        xx += b * b + c * c
-        yy += a * a + c * c
-        zz += a * a + b * b
-        xy -= a * b
-        xz -= a * c
-        yz -= b * c
-    axx, ayy, azz = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
-    axy, axz, ayz = xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz
-    once = 1.0 / (xx * axx + xy * axy + xz * axz)
-    return once * axx, once * ayy, once * azz, once * axy, once * axz, once * ayz
-
-
-@inner_scalar
-def _turned_by(inverse, t0, t1, t2):
-    """Rotation vector of points with this inverse inertia, due to the moment (t0, t1, t2)."""
-    axx, ayy, azz, axy, axz, ayz = inverse
-    return (
-        axx * t0 + axy * t1 + axz * t2,
-        axy * t0 + ayy * t1 + ayz * t2,
-        axz * t0 + ayz * t1 + azz * t2,
-    )
-
-
 @inner
 def _by_end(move, r, w, inverse):
     """Derivative of D = dx - w x r with respect to the end, which moves r by half, and w."""
@@ -147,7 +107,7 @@ def _by_end(move, r, w, inverse):
             moved[1] = one[1] - 0.5 * (w[2] * one[0] - w[0] * one[2])
             moved[2] = one[2] - 0.5 * (w[0] * one[1] - w[1] * one[0])
             d, a = move.deform[v], r[v]
-            turn = _turned_by(
+            turn = turned_by(
                 inverse,
                 0.5 * (one[1] * d[2] - one[2] * d[1]) + a[1] * moved[2] - a[2] * moved[1],
                 0.5 * (one[2] * d[0] - one[0] * d[2]) + a[2] * moved[0] - a[0] * moved[2],

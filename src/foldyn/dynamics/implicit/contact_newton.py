@@ -170,9 +170,9 @@ class TouchingNewton(Newton):
             share *= min(LARGEST, max(SMALLEST, -slope / (there - slope)))
         return norm, reference
 
-    def _clear(self, u: NDArray, step: NDArray, moves: NDArray, keep: float = KEEP) -> float:
+    def _clear(self, u: NDArray, step: NDArray, moves: NDArray) -> float:
         """Share of a step from u, both (rows, 3), without penetration, as planes move by (q, 3)."""
-        return self._contact.clear_with(self._memory, u, step, moves, keep)
+        return self._contact.clear_with(self._memory, u, step, moves, KEEP)
 
     def _predict(self, t: float) -> bool:
         """Shorten the predicted motion until nothing penetrates; return whether that is possible.

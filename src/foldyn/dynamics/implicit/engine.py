@@ -86,13 +86,15 @@ class ImplicitEngine(Engine):
 
     def facts(self) -> dict[str, Any]:
         """Statistics of the run; see `Engine`."""
-        return dict(self._scheme.facts) | {
+        facts = dict(self._scheme.facts) | {
             "iterations": self._newton.iterations,
             "factorizations": self._matrix.factorizations,
             "linear_solver": self._matrix.solver,
             "halved_steps": self._halved,
-            **self._contact_facts(),
         }
+        if self._touching is not None:
+            facts["contact_lists"] = int(self._touching.memory.counts.lists)
+        return facts
 
     def continuation(self) -> NDArray:
         """All numbers (k,) that the next steps depend on; see `continue_from`."""
@@ -156,11 +158,6 @@ class ImplicitEngine(Engine):
         measured = [float(self._state.tally[name]) for name in MEASURED]
         state = [self._state.angle.copy(), np.array([*measured, self._horizon])]
         return [*self._scheme.numbers(), *state, *self._newton.numbers()]
-
-    def _contact_facts(self) -> dict[str, Any]:
-        if self._touching is None:
-            return {}
-        return {"contact_lists": int(self._touching.memory.counts.lists)}
 
     def checkpoint_arrays(self) -> dict[str, NDArray]:
         """All arrays and numbers of `changing`, by name; see `Engine`."""

@@ -399,34 +399,22 @@ class _Search:
         self, values: NDArray[np.float64], runs: tuple[int, ...], rows: NDArray, both_sides: bool
     ) -> NDArray[np.float64]:
         """Rows of the Jacobian as difference quotients of whole runs, with points within bounds."""
-        points: list[NDArray[np.float64]] = []
-        # the two points of each quotient, and the distance between them
-        pairs: list[tuple[int, int, float]] = []
-        for k, scale in enumerate(self.scale):
-            step = np.zeros(len(values))
-            step[k] = STEP * scale
-            both = values + step, values - step
-            sides = [side for side in both if self.lower[k] <= side[k] <= self.upper[k]]
-            if not sides:
-                raise ComputationError(
-                    f"{self.made.space.keys[k]}: the bounds are less than {STEP:g} of its scale "
-                    "apart"
-                )
-            first = len(points)
-            points += sides if both_sides else sides[:1]
-            end = first + 1 if len(points) == first + 2 else -1
-            other = points[end] if end > 0 else values
-            pairs.append((first, end, (points[first][k] - other[k]) / scale))
-        residuals = [
-            one[rows] for one in (*self._residual(points, runs), *self._residual([values]))
-        ]
+        parts = self.made.space.differences(values, both_sides, STEP)
+        points = [part.point for part in parts if part.point[part.place] != values[part.place]]
+        residuals = self._residual(points, runs)
+        at = {tuple(point): one[rows] for point, one in zip(points, residuals, strict=True)}
+        at[tuple(values)] = self._residual([values])[0][rows]
+        columns = np.zeros((int(rows.sum()), len(values)))
         with np.errstate(invalid="ignore"):  # inf - inf where the model fails
-            columns = [(residuals[i] - residuals[j]) / step for i, j, step in pairs]
+            for part in parts:
+                weight = part.weight * self.scale[part.place]
+                columns[:, part.place] += weight * at[tuple(part.point)]
         if not np.isfinite(columns).all():
-            place = next(k for k, one in enumerate(columns) if not np.isfinite(one).all())
-            (why,), key = self.at([points[pairs[place][0]]], runs), self.made.space.keys[place]
+            failed = np.array(next(one for one in at if not np.isfinite(at[one]).all()))
+            place = int(np.argmax(failed != values))
+            (why,), key = self.at([failed], runs), self.made.space.keys[place]
             raise ComputationError(f"{key}: the model fails near {values[place]:.6g}: {why}")
-        return np.stack(columns, axis=1)
+        return columns
 
 
 def _width(finer: Finer, doubt: float) -> str:
@@ -445,8 +433,7 @@ def _width(finer: Finer, doubt: float) -> str:
 def _warn_of_pairing(made: Problem, values: NDArray[np.float64]) -> None:
     """Warn if the pairing of modes has become ambiguous during the fit."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)
+        with warnings.catch_warnings(action="ignore", category=FoldynWarning):
             made.examine(values)
     except InputError as error:
         _warn(f"at the values found: {error}")

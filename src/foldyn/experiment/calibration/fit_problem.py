@@ -108,8 +108,7 @@ class Problem:
     def _computed(self, run: PredictedRun, values: Sequence[float] | NDArray) -> Predicted:
         """Predictions of a run at given values."""
         case_file, members = self.case_file(run, values), run.those_of(self.measurements)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)
+        with warnings.catch_warnings(action="ignore", category=FoldynWarning):
             return self._predicted(
                 predicted_run.seen(run, case_file, members), case_file, run.members
             )
@@ -136,8 +135,7 @@ class Problem:
         points = {tuple(part.point): part.point for part in parts}
         if run.kind not in predicted_run.REFINED:
             points.pop(tuple(values), None)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)
+        with warnings.catch_warnings(action="ignore", category=FoldynWarning):
             one = self.case_file(run, values)
             others = [
                 one
@@ -172,8 +170,7 @@ class Problem:
             moved = [key for key, value in changes.items() if value != before[key]]
             if not any(key.startswith(STRUCTURAL) for key in moved):
                 structures = like.case_file.structures
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)
+        with warnings.catch_warnings(action="ignore", category=FoldynWarning):
             document = replaced(run.document, changes)
             made = case_of_document(
                 run.path, document, pattern=pattern, structures=structures,

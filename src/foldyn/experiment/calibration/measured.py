@@ -11,9 +11,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.cases.directions import AXES
+from foldyn.cases.directions import AXES, check_axes
 from foldyn.errors import InputError
-from foldyn.experiment.calibration.measurement import AtNodes, NodeValues, check_axes, column
+from foldyn.experiment.calibration.measurement import AtNodes, NodeValues, column
 from foldyn.values import choice
 
 IMPOSED = "imposed"  # as `nodes`: all nodes that supports of the case move along the axis
@@ -136,10 +136,6 @@ class Shapes(NodeValues):
         if not np.isfinite(values).any() or np.isinf(values).any():
             raise InputError(f"{self._of('values')}: must be numbers, NaN where a node is not seen")
         self._set(load_factor=factors, values=values)
-
-    def observed(self) -> NDArray[np.float64]:
-        """Measured values, flattened."""
-        return self.values[np.isfinite(self.values)]
 
     def factors(self, case: Case) -> NDArray[np.float64]:
         """Load factors at which the path is needed."""

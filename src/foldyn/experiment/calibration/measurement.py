@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from foldyn.analyses.keys import parts
 from foldyn.cases import Case
-from foldyn.cases.directions import AXES
 from foldyn.cases.selection import check_nodes, resolve_nodes
 from foldyn.errors import InputError
-from foldyn.values import number, numbers, show
+from foldyn.values import number, numbers
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -128,6 +127,10 @@ class NodeValues(AtNodes):
 
     values: Any = ()
 
+    def observed(self) -> NDArray[np.float64]:
+        """Measured values, flattened."""
+        return self.values[np.isfinite(self.values)]
+
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
         """Refuse a case that cannot predict these values."""
         named, known = len(self.where(case)), self.values.shape[1]
@@ -164,10 +167,3 @@ def plain_array(name: str, values: Any) -> NDArray:
 def spread(observed: NDArray) -> float:
     """Spread of measured values, which stands for their standard error if that is unknown."""
     return float(np.std(observed)) or float(np.abs(observed).max()) or 1.0
-
-
-def check_axes(name: str, axes: Any) -> None:
-    """Refuse anything but letters of "xyz" without repetition."""
-    sound = isinstance(axes, str) and axes and len(set(axes)) == len(axes) and {*axes} <= {*AXES}
-    if not sound:
-        raise InputError(f'{name} = {show(axes)}: must be letters of "xyz"')

@@ -12,12 +12,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases import BaseMotion, Case
-from foldyn.cases.directions import AXES
+from foldyn.cases.directions import AXES, check_axes
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment.calibration.measurement import (
     Measurement,
     NodeValues,
-    check_axes,
     column,
     plain_array,
 )
@@ -103,10 +102,6 @@ class ModeShapes(NodeValues):
     def count(self) -> int:
         """Number of modes of the model needed, without modes of zero stiffness."""
         return len(self.values)
-
-    def observed(self) -> NDArray[np.float64]:
-        """Measured values, flattened."""
-        return self.values[np.isfinite(self.values)]
 
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
         """Refuse a case that cannot predict these values."""

@@ -12,9 +12,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases.csv_table import UNITS, read_headings, read_numbers, some
-from foldyn.cases.directions import AXES
+from foldyn.cases.directions import AXES, check_axes
 from foldyn.errors import InputError
-from foldyn.experiment.calibration.measurement import Measurement, check_axes
+from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.modal import (
     MOTION,
     DampingRatios,

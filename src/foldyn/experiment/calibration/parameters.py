@@ -112,8 +112,8 @@ class Space:
         own = {key: float(value) for key, value in zip(self.keys, values, strict=True)}
         return own | {tie.key: tie.value(own) for tie in self.ties}
 
-    def differences(self, values: NDArray, second: bool) -> list[Beside]:
-        """Neighboring points within the bounds for difference quotients.
+    def differences(self, values: NDArray, second: bool, near: float = NEAR) -> list[Beside]:
+        """Points within the bounds for difference quotients, `near` in scaled parameters.
 
         Weighted sums of predictions are derivatives, accurate to first or second order.
 
@@ -124,14 +124,14 @@ class Space:
         """
         found = []
         for k, one in enumerate(self.parameters):
-            step = NEAR * (one.scale or 0.0)
+            step = near * (one.scale or 0.0)
             for sides in SECOND if second else FIRST:
                 ends = [values[k] + side * step for side, _ in sides]
                 if one.lower <= min(ends) and max(ends) <= one.upper:
                     break
             else:
                 raise InputError(
-                    f"{one.key}: the bounds are less than {2 * NEAR:g} of its scale apart"
+                    f"{one.key}: the bounds are less than {2 * near:g} of its scale apart"
                 )
             for end, (_, weight) in zip(ends, sides, strict=True):
                 point = np.array(values, float)

@@ -82,8 +82,7 @@ class PredictedRun:
 
 def result_of(run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]) -> Any:
     """Result of a case file, without warnings."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with warnings.catch_warnings(action="ignore", category=FoldynWarning):
         return computed(run, case_file, members)
 
 

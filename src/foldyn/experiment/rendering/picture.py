@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
 
+from foldyn.arguments import Check, Checked
 from foldyn.experiment.camera import Camera, opencv
 from foldyn.patterns.pattern import Pattern
 from foldyn.structures.discretized import Discretized
 from foldyn.values import number, whole
+
+Share = Annotated[float, Check(number, least=0.0, most=1.0)]
+NotNegative = Annotated[float, Check(number, least=0.0)]
 
 _TILE = 512  # side of the grain tile in texels, repeated over the paper
 _MARGIN = 6  # pixels around the structure that are redrawn in each picture
 
 
 @dataclass(frozen=True)
-class Look:
+class Look(Checked):
     """Appearance of specimen, light and background; reflectances from 0 to 1.
 
     Attributes
@@ -41,22 +47,15 @@ class Look:
         Part of the brightness that is missing in the corners of the image.
     """
 
-    paper: float = 0.85
-    ink: float = 0.3
-    background: float = 0.03
-    marker: float = 5e-3
-    grain: float = 0.02
-    grain_size: float = 1.5e-4
+    paper: Share = 0.85
+    ink: Share = 0.3
+    background: Share = 0.03
+    marker: NotNegative = 5e-3
+    grain: NotNegative = 0.02
+    grain_size: Annotated[float, Check(number, above=0.0, unit="m")] = 1.5e-4
     light: tuple[float, float, float] = (-0.45, -0.65, -0.6)
-    ambient: float = 0.45
-    vignette: float = 0.1
-
-    def __post_init__(self) -> None:
-        for name in ("paper", "ink", "background", "ambient", "vignette"):
-            number(name, getattr(self, name), least=0.0, most=1.0)
-        for name in ("marker", "grain"):
-            number(name, getattr(self, name), least=0.0)
-        number("grain_size", self.grain_size, above=0.0, unit="m")
+    ambient: Share = 0.45
+    vignette: Share = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,22 +97,12 @@ class Paper:
 
 def two_colors(pattern: Pattern) -> NDArray[np.bool_]:
     """Color of each panel; neighbors differ wherever the pattern allows."""
-    neighbors: list[list[int]] = [[] for _ in pattern.faces]
-    for a, b in np.asarray(pattern.crease_faces).tolist():
-        neighbors[a].append(b)
-        neighbors[b].append(a)
-    color = np.full(len(neighbors), -1)
-    for start in range(len(neighbors)):
-        if color[start] >= 0:
-            continue
-        color[start], queue = 0, deque([start])
-        while queue:
-            panel = queue.popleft()
-            for other in neighbors[panel]:
-                if color[other] < 0:
-                    color[other] = 1 - color[panel]
-                    queue.append(other)
-    return color == 1
+    pairs, count = np.reshape(pattern.crease_faces, (-1, 2)), len(pattern.faces)
+    beside = sparse.csr_array((np.ones(len(pairs)), pairs.T), (count, count))
+    part = csgraph.connected_components(beside, directed=False)[1]
+    starts = np.unique(part, return_index=True)[1]
+    steps = csgraph.dijkstra(beside, directed=False, indices=starts, unweighted=True, min_only=True)
+    return steps % 2 == 1
 
 
 def grain_tile(look: Look, rng: np.random.Generator) -> NDArray[np.float32]:
@@ -141,7 +130,7 @@ def shading(
 
 
 @dataclass(frozen=True)
-class Sensor:
+class Sensor(Checked):
     """Effects of lens and sensor.
 
     Attributes
@@ -159,16 +148,11 @@ class Sensor:
         Number of rays per pixel, each with its own place and time.
     """
 
-    exposure: float = 0.0
-    softness: float = 0.6
-    read_noise: float = 0.0
-    shot_noise: float = 0.0
-    samples: int = 16
-
-    def __post_init__(self) -> None:
-        for name in ("exposure", "softness", "read_noise", "shot_noise"):
-            number(name, getattr(self, name), least=0.0)
-        whole("samples", self.samples, least=4, what="rays in each pixel")
+    exposure: NotNegative = 0.0
+    softness: NotNegative = 0.6
+    read_noise: NotNegative = 0.0
+    shot_noise: NotNegative = 0.0
+    samples: Annotated[int, Check(whole, least=4, what="rays in each pixel")] = 16
 
     @cached_property
     def places(self) -> NDArray[np.float64]:

@@ -12,16 +12,18 @@ motion.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.arguments import brief
+from foldyn.arguments import Check, Checked, brief
 from foldyn.errors import InputError
 from foldyn.experiment.camera import opencv
 from foldyn.jit.compiled import strict
-from foldyn.values import number
+from foldyn.values import number, whole
+
+Positive = Annotated[float, Check(number, above=0.0)]
 
 _CANDIDATES = 5  # candidates of Harris's measure per requested corner
 _DIRECTIONS = 120  # samples on a circle around a point, to look for edges
@@ -38,7 +40,7 @@ _FLATTEST = 0.02  # smallest ratio of eigenvalues; lower ratios mean nearly para
 
 
 @dataclass(frozen=True)
-class CornerSettings:
+class CornerSettings(Checked):
     """Settings for finding and refining corners.
 
     Attributes
@@ -54,16 +56,10 @@ class CornerSettings:
         between corners. None means 0.012 of the picture's diagonal, from 7 to 24 pixels.
     """
 
-    spacing: float | None = None
-    quality: float = 0.005
-    most: int = 400
-    reach: float | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("spacing", "quality", "most", "reach"):
-            value = getattr(self, name)
-            if value is not None:
-                number(name, value, above=0.0)
+    spacing: Positive | None = None
+    quality: Positive = 0.005
+    most: Annotated[int, Check(whole, least=1)] = 400
+    reach: Positive | None = None
 
     def reach_in(self, shape: tuple[int, ...]) -> float:
         """Length of the edges in a picture of this shape (pixels)."""

@@ -14,10 +14,10 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.arguments import Unit, brief
+from foldyn.arguments import Check, Checked, Unit, brief
 from foldyn.experiment.camera import opencv
-from foldyn.experiment.tracking.corners import refine
-from foldyn.values import number, whole
+from foldyn.experiment.tracking.corners import Positive, refine
+from foldyn.values import whole
 
 Array = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ Guide = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
-class FollowSettings:
+class FollowSettings(Checked):
     """Settings for tracking corners.
 
     Attributes
@@ -121,17 +121,11 @@ class FollowSettings:
         the neighbors.
     """
 
-    window: int = 31
-    levels: int = 4
-    back: float = 2.0
-    error: float = 0.35
-    stray: float = 0.3
-
-    def __post_init__(self) -> None:
-        whole("window", self.window, least=5, what="pixels")
-        whole("levels", self.levels, least=0)
-        for name in ("back", "error", "stray"):
-            number(name, getattr(self, name), above=0.0)
+    window: Annotated[int, Check(whole, least=5, what="pixels")] = 31
+    levels: Annotated[int, Check(whole, least=0)] = 4
+    back: Positive = 2.0
+    error: Positive = 0.35
+    stray: Positive = 0.3
 
 
 @brief

@@ -16,7 +16,6 @@ angles wanted.
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable
 from itertools import product
 from typing import NamedTuple
@@ -262,6 +261,8 @@ def composed(pattern: Pattern, angles: NDArray) -> tuple[NDArray, float]:
 
     The error is the largest deviation of a vertex, as one of its panels has it, from the mean.
     """
+    from scipy.spatial.transform import Rotation  # loads slowly
+
     axes = pattern.vertices[np.concatenate([pattern.creases, pattern.welds]).astype(np.int64)]
     turns = np.concatenate([angles, np.zeros(len(pattern.welds))])
     neighbors: list[list[tuple[int, int, float]]] = [[] for _ in pattern.faces]
@@ -274,14 +275,14 @@ def composed(pattern: Pattern, angles: NDArray) -> tuple[NDArray, float]:
         if first in placed:
             continue
         placed[first] = np.eye(3), np.zeros(3)
-        queue = deque([first])
-        while queue:
-            face = queue.popleft()
+        queue = [first]
+        for face in queue:  # grows
             rotation, shift = placed[face]
             for other, k, way in neighbors[face]:
                 if other not in placed:
                     a, b = axes[k]
-                    own = _rotation(b - a, way * turns[k])
+                    axis = (b - a) / np.linalg.norm(b - a)
+                    own = Rotation.from_rotvec(way * turns[k] * axis).as_matrix()
                     placed[other] = rotation @ own, rotation @ (a - own @ a) + shift
                     queue.append(other)
     total, count = np.zeros_like(pattern.vertices), np.zeros(len(pattern.vertices))
@@ -296,10 +297,3 @@ def composed(pattern: Pattern, angles: NDArray) -> tuple[NDArray, float]:
     mean = np.where(count[:, None] > 0.0, total / np.maximum(count, 1.0)[:, None], pattern.vertices)
     gap = max(float(np.abs(image - mean[corners]).max()) for corners, image in images)
     return mean, gap
-
-
-def _rotation(axis: NDArray, angle: float) -> NDArray:
-    """Matrix (3, 3) of a right-handed rotation (Rodrigues)."""
-    u = axis / np.linalg.norm(axis)
-    cross = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
-    return np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross
