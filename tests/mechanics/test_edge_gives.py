@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 import foldyn as fd
 from foldyn.checks import gradient_error, tangent_error
 from foldyn.mechanics.following import following_force
-from foldyn.structures.membranes import with_gives
+from foldyn.structures.membranes import energies, with_gives
 
 
 @pytest.fixture(scope="module")
@@ -36,19 +36,6 @@ def state(structure):
     q = 1e-3 * rng.standard_normal(structure.body.size)
     q[structure.nodes.size :] *= 0.1
     return q
-
-
-def energies(kinds, rest, u, panels: int) -> np.ndarray:
-    """Energy (samples, panels), J, of the membranes at displacements u (samples, n, 3), m."""
-    x, out, strains = rest + u, np.zeros((len(u), panels)), []
-    for _, own in kinds:
-        start, end = (x[:, own.nodes[:, place]] for place in own.ends.T)
-        square = np.einsum("spbc,spbc->bsp", end - start, end - start)
-        strains.append(0.5 * (square * own.per_length2[:, None] - 1.0))
-    for (which, own), strain in zip(kinds, with_gives(kinds, strains), strict=True):
-        energy = 0.5 * np.einsum("isp,ijp,jsp->sp", strain, own.stiffness, strain)
-        np.add.at(out.T, which, energy.T)
-    return out
 
 
 def first_of(structure) -> int:

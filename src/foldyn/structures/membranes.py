@@ -225,6 +225,31 @@ def coupling(
     return np.block([[between, across], [across.T, stiff[corners:, corners:]]])
 
 
+def energies(
+    kinds: Sequence[PanelKind], rest: NDArray, u: NDArray, panels: int,
+    free: NDArray | None = None,
+) -> NDArray:  # fmt: skip
+    """Energy (samples, panels), J, of the membranes at displacements u (samples, n, 3), m.
+
+    free : (samples, k) free strains of the bars of all panels in turn, as `swelling` returns them.
+    """
+    x, out, first, strains = rest + u, np.zeros((len(u), panels)), 0, []
+    for _, own in kinds:
+        start, end = (x[:, own.nodes[:, place]] for place in own.ends.T)
+        square = np.einsum("spbc,spbc->bsp", end - start, end - start)
+        strain = 0.5 * (square * own.per_length2[:, None] - 1.0)
+        if free is not None:
+            bars, samples, count = strain.shape
+            end = first + bars * count
+            own_free, first = free[:, first:end].reshape(samples, bars, count), end
+            strain -= own_free.transpose(1, 0, 2)
+        strains.append(strain)
+    for (which, own), strain in zip(kinds, with_gives(kinds, strains), strict=True):
+        energy = 0.5 * np.einsum("isp,ijp,jsp->sp", strain, own.stiffness, strain)
+        np.add.at(out.T, which, energy.T)
+    return out
+
+
 def with_gives(kinds: Sequence[PanelKind], strains: Sequence[NDArray]) -> list[NDArray]:
     """Strains (b, samples, p) of each kind, followed by the gives (k, samples, p) in balance."""
     count = 1 + max((int(own.gives.max(initial=-1)) for _, own in kinds), default=-1)
