@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from swept_cases import BANDS, FRF, MODES, MOTION, PATH
 
 import foldyn as fd
@@ -55,6 +56,7 @@ def test_every_measure_can_be_taken_of_all_its_kinds(results, one, kind):
     never = (
         "limit_load",
         "bifurcation_load",
+        "first_loss_of_stability",
         "first_maximum",
         "barrier",
         "barrier_back",
@@ -236,3 +238,19 @@ def test_the_table_of_the_page_can_be_read(tmp_path):
     found = fd.sweep(tmp_path / "case.toml", samples=2, processes=1)
     assert set(found.data_vars) >= {"frequencies", "effective_mass_1_z"}
     assert found.attrs["failed"] == 0
+
+
+def test_the_first_loss_of_stability_is_the_first_critical_point():
+    """A bifurcation before a limit point on the path, whose load factor is lower or not."""
+    path = xr.Dataset(
+        {
+            "point": ("step", ["regular", "bifurcation", "limit"]),
+            "negative_eigenvalues": ("step", [0, 1, 2]),
+        },
+        {"load_factor": ("step", [0.0, 2.0, 1.5])},
+        {"method": "arc_length", "locate": 1},
+    )
+    taken = MEASURES["first_loss_of_stability"].function
+    assert taken(path, None) == 2.0
+    assert taken(path.isel(step=[0, 2]), None) == 1.5
+    assert np.isnan(taken(path.isel(step=[0]), None))

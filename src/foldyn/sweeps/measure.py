@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
+from inspect import signature
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -20,6 +21,7 @@ from foldyn.cases.directions import AXES
 from foldyn.errors import FoldynError, InputError
 from foldyn.values import choice, number, show, suggest
 
+F = TypeVar("F", bound=Callable[..., Any])
 NODE, AXIS, MODE, BAND = "node", "axis", "mode", "band"
 WORDS = ("model", "point", "leg")
 """Arguments of measures that are names in the result."""
@@ -77,6 +79,20 @@ class Measure:
         """Notation of the measure with its arguments, such as "peak_frequency[node,axis]"."""
         shown = [*self.takes[: self.needs], *(f"{word}?" for word in self.takes[self.needs :])]
         return f"{self.name}[{','.join(shown)}]" if shown else self.name
+
+
+def measure(known: dict[str, Measure], *kinds: str, **about: Any) -> Callable[[F], F]:
+    """Register a function, under its name, as a measure for kinds of analysis; see `Measure`."""
+
+    def registered(function: F) -> F:
+        name = function.__name__.removeprefix("_")
+        taken = [*signature(function).parameters.values()][2:]
+        needs = sum(one.default is one.empty for one in taken)
+        takes = tuple(one.name for one in taken)
+        known[name] = Measure(name, kinds, function, takes=takes, needs=needs, **about)
+        return function
+
+    return registered
 
 
 @dataclass(frozen=True)

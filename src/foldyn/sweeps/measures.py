@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from inspect import signature
-from typing import Any, TypeVar
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -13,7 +11,6 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError, warn
-from foldyn.linear.band_structure import ALL, frequencies_of, legs
 from foldyn.linear.frf import quantity_of
 from foldyn.linear.margins import margins
 from foldyn.linear.peaks_of import kind_of, resonances
@@ -22,33 +19,22 @@ from foldyn.mechanics.contact.clearance import Clearance, clearance
 from foldyn.signals import Peaks, find_peaks, half_power, log_decrement, sampling_interval, spectrum
 from foldyn.statics import Landscape, landscape
 from foldyn.statics.energy_landscape import load_at
-from foldyn.sweeps.measure import BAND, MODE, Measure
+from foldyn.sweeps.band_measures import OF_BANDS
+from foldyn.sweeps.measure import MODE, Measure, measure
 from foldyn.viewer.states import bar_strain
 
-F = TypeVar("F", bound=Callable[..., Any])
 MOTION, PATH, MODES, FRF, FIDELITY = "dynamics", "statics", "modes", "frf", "fidelity"
-BANDS, BUCKLING, RANDOM = "bands", "buckling", "random"
+BUCKLING, RANDOM = "buckling", "random"
 PROMINENT = 0.05
 """Least prominence of a peak of a spectrum, relative to its maximum."""
 NEAR = 1e-5
 """Intervals of load factors with a smaller relative width are not reported."""
 CURVES, MOVED = (FRF, MOTION), (MOTION, PATH)
-MEASURES: dict[str, Measure] = {}
+MEASURES: dict[str, Measure] = {**OF_BANDS}
 """Measures by name."""
 
 
-def _measure(*kinds: str, **about: Any) -> Callable[[F], F]:
-    """Register a function, under its name, as a measure for kinds of analysis; see `Measure`."""
-
-    def registered(function: F) -> F:
-        name = function.__name__.removeprefix("_")
-        taken = [*signature(function).parameters.values()][2:]
-        needs = sum(one.default is one.empty for one in taken)
-        takes = tuple(one.name for one in taken)
-        MEASURES[name] = Measure(name, kinds, function, takes=takes, needs=needs, **about)
-        return function
-
-    return registered
+_measure = partial(measure, MEASURES)
 
 
 @_measure(units="kg", doc="mass of the sheet and of point masses")
@@ -113,6 +99,13 @@ def _buckling_load(result: xr.Dataset, case: Case) -> float:
 @_measure(RANDOM, units="m", doc="root mean square displacement")
 def _rms(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
     return float(result["displacement_rms"].sel(node=node, axis=axis))
+
+
+@_measure(RANDOM, units="N", doc="root mean square of the sum of the reactions")
+def _reaction_rms(result: xr.Dataset, case: Case, axis: str) -> float:
+    if "total_reaction_rms" not in result:
+        raise InputError("needs analysis.reactions = true")
+    return float(result["total_reaction_rms"].sel(axis=axis))
 
 
 @_measure(RANDOM, units="m/s2", doc="root mean square of the absolute acceleration")
@@ -399,6 +392,13 @@ def _bifurcation_load(result: xr.Dataset, case: Case) -> float:
     return _load_of(result, "bifurcation")
 
 
+@_measure(PATH, doc="load factor of the first loss of stability (nan: none)")
+def _first_loss_of_stability(result: xr.Dataset, case: Case) -> float:
+    """Load factor of the first limit point or bifurcation along the path."""
+    critical = [kind for kind in result["point"].values if kind in ("limit", "bifurcation")]
+    return _load_of(result, critical[0] if critical else "limit")
+
+
 @_measure(PATH, doc="load factors between which the first bifurcation lies", dims=("end",))
 def _bifurcation_interval(result: xr.Dataset, case: Case) -> NDArray:
     return _first(result, "bifurcation")
@@ -448,96 +448,6 @@ def _barrier(found: Landscape, case: Case) -> float:
 )
 def _barrier_back(found: Landscape, case: Case) -> float:
     return found.barrier(1, 0) if len(found.stable) > 1 else np.nan
-
-
-# --------------------------------------------------------------------------- bands
-@_measure(BANDS, units="Hz", doc="frequency", dims=("phase", BAND))
-def _band_frequencies(result: xr.Dataset, case: Case) -> NDArray:
-    return _in_order(result)
-
-
-@_measure(BANDS, units="Hz", doc="frequency")
-def _band(result: xr.Dataset, case: Case, band: int, point: str) -> float:
-    ticks = np.atleast_1d(result.attrs["ticks"])
-    at = dict(zip(result.attrs["tick_labels"].split("-"), ticks.tolist(), strict=True))
-    if point not in at:
-        raise InputError(f"the path has the points {', '.join(at)}")
-    k = int(np.abs(result["distance"].values - at[point]).argmin())
-    return float(_of_band(_in_order(result), band)[k])
-
-
-@_measure(BANDS, units="Hz", doc="width of the gap above")
-def _band_gap(result: xr.Dataset, case: Case, band: int, leg: str = ALL) -> float:
-    bottom, top = _gap_ends(result, band, leg)
-    return top - bottom
-
-
-@_measure(BANDS, units="Hz", doc="middle of the gap above")
-def _gap_center(result: xr.Dataset, case: Case, band: int, leg: str = ALL) -> float:
-    bottom, top = _gap_ends(result, band, leg)
-    return 0.5 * (bottom + top)
-
-
-@_measure(BANDS, doc="relative width of the gap above")
-def _relative_gap(result: xr.Dataset, case: Case, band: int, leg: str = ALL) -> float:
-    bottom, top = _gap_ends(result, band, leg)
-    return 2.0 * (top - bottom) / (bottom + top) if bottom + top > 0.0 else np.nan
-
-
-@_measure(BANDS, units="Hz", doc="width of the widest full gap")
-def _widest_gap(result: xr.Dataset, case: Case) -> float:
-    count = result.sizes[BAND]
-    return max((_band_gap(result, case, band) for band in range(1, count)), default=0.0)
-
-
-@_measure(BANDS, units="Np", doc="attenuation from cell to cell at a frequency")
-def _attenuation(result: xr.Dataset, case: Case, leg: str, frequency: float) -> float:
-    _one_state(result)
-    if "attenuation" not in result:
-        raise InputError("needs analysis.attenuation, the number of frequencies")
-    if leg not in result["leg"].values:
-        raise InputError(f"is computed only along {', '.join(map(str, result['leg'].values))}")
-    levels = result["level_frequency"].values
-    if not 0.0 < frequency <= levels[-1]:
-        raise InputError(f"is known up to {levels[-1]:g} Hz")
-    return float(np.interp(frequency, levels, result["attenuation"].sel(leg=leg).values))
-
-
-@_measure(BANDS, doc="unstable bands")
-def _unstable_bands(result: xr.Dataset, case: Case) -> int:
-    _one_state(result)
-    return int((result["eigenvalue"] < 0.0).any("phase").sum())
-
-
-def _gap_ends(result: xr.Dataset, band: int, leg: str) -> tuple[float, float]:
-    """Top of a band and bottom of the next one (Hz), along a leg of the path or overall."""
-    values, known = _in_order(result), legs(result)
-    if leg not in known:
-        raise InputError(f"the path has the legs {', '.join(known)}")
-    values = values[known[leg]]
-    if leg == ALL and "zone_frequency" in result:
-        zone = result["zone_frequency"].transpose("zone", BAND).values
-        values = np.vstack([values, np.sort(np.nan_to_num(zone), axis=1)])
-    if band == result.sizes[BAND]:
-        raise InputError(f"there are {band} bands, none above this one; raise analysis.count")
-    return float(_of_band(values, band).max()), float(values[:, band].min())
-
-
-def _in_order(result: xr.Dataset) -> NDArray:
-    """Frequencies (phase, band), Hz, in increasing order at each phase."""
-    _one_state(result)
-    return frequencies_of(result)
-
-
-def _of_band(values: NDArray, band: int) -> NDArray:
-    if band > values.shape[1]:
-        raise InputError(f"there are {values.shape[1]} bands; raise analysis.count")
-    return values[:, band - 1]
-
-
-def _one_state(result: xr.Dataset) -> None:
-    if "state" in result.dims:
-        raise InputError("needs a single state; leave out analysis.vary, and sweep its key instead")
 
 
 # ------------------------------------------------------------- comparison with the shell

@@ -1,0 +1,108 @@
+"""Measures of bands: frequencies, gaps and attenuation."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.errors import InputError
+from foldyn.linear.band_structure import ALL, frequencies_of, legs
+from foldyn.sweeps.measure import BAND, Measure, measure
+
+BANDS = "bands"
+OF_BANDS: dict[str, Measure] = {}
+"""Measures of bands by name."""
+_measure = partial(measure, OF_BANDS)
+
+
+@_measure(BANDS, units="Hz", doc="frequency", dims=("phase", BAND))
+def _band_frequencies(result: xr.Dataset, case: Case) -> NDArray:
+    return _in_order(result)
+
+
+@_measure(BANDS, units="Hz", doc="frequency")
+def _band(result: xr.Dataset, case: Case, band: int, point: str) -> float:
+    ticks = np.atleast_1d(result.attrs["ticks"])
+    at = dict(zip(result.attrs["tick_labels"].split("-"), ticks.tolist(), strict=True))
+    if point not in at:
+        raise InputError(f"the path has the points {', '.join(at)}")
+    k = int(np.abs(result["distance"].values - at[point]).argmin())
+    return float(_of_band(_in_order(result), band)[k])
+
+
+@_measure(BANDS, units="Hz", doc="width of the gap above")
+def _band_gap(result: xr.Dataset, case: Case, band: int, leg: str = ALL) -> float:
+    bottom, top = _gap_ends(result, band, leg)
+    return top - bottom
+
+
+@_measure(BANDS, units="Hz", doc="middle of the gap above")
+def _gap_center(result: xr.Dataset, case: Case, band: int, leg: str = ALL) -> float:
+    bottom, top = _gap_ends(result, band, leg)
+    return 0.5 * (bottom + top)
+
+
+@_measure(BANDS, doc="relative width of the gap above")
+def _relative_gap(result: xr.Dataset, case: Case, band: int, leg: str = ALL) -> float:
+    bottom, top = _gap_ends(result, band, leg)
+    return 2.0 * (top - bottom) / (bottom + top) if bottom + top > 0.0 else np.nan
+
+
+@_measure(BANDS, units="Hz", doc="width of the widest full gap")
+def _widest_gap(result: xr.Dataset, case: Case) -> float:
+    count = result.sizes[BAND]
+    return max((_band_gap(result, case, band) for band in range(1, count)), default=0.0)
+
+
+@_measure(BANDS, units="Np", doc="attenuation from cell to cell at a frequency")
+def _attenuation(result: xr.Dataset, case: Case, leg: str, frequency: float) -> float:
+    _one_state(result)
+    if "attenuation" not in result:
+        raise InputError("needs analysis.attenuation, the number of frequencies")
+    if leg not in result["leg"].values:
+        raise InputError(f"is computed only along {', '.join(map(str, result['leg'].values))}")
+    levels = result["level_frequency"].values
+    if not 0.0 < frequency <= levels[-1]:
+        raise InputError(f"is known up to {levels[-1]:g} Hz")
+    return float(np.interp(frequency, levels, result["attenuation"].sel(leg=leg).values))
+
+
+@_measure(BANDS, doc="unstable bands")
+def _unstable_bands(result: xr.Dataset, case: Case) -> int:
+    _one_state(result)
+    return int((result["eigenvalue"] < 0.0).any("phase").sum())
+
+
+def _gap_ends(result: xr.Dataset, band: int, leg: str) -> tuple[float, float]:
+    """Top of a band and bottom of the next one (Hz), along a leg of the path or overall."""
+    values, known = _in_order(result), legs(result)
+    if leg not in known:
+        raise InputError(f"the path has the legs {', '.join(known)}")
+    values = values[known[leg]]
+    if leg == ALL and "zone_frequency" in result:
+        zone = result["zone_frequency"].transpose("zone", BAND).values
+        values = np.vstack([values, np.sort(np.nan_to_num(zone), axis=1)])
+    if band == result.sizes[BAND]:
+        raise InputError(f"there are {band} bands, none above this one; raise analysis.count")
+    return float(_of_band(values, band).max()), float(values[:, band].min())
+
+
+def _in_order(result: xr.Dataset) -> NDArray:
+    """Frequencies (phase, band), Hz, in increasing order at each phase."""
+    _one_state(result)
+    return frequencies_of(result)
+
+
+def _of_band(values: NDArray, band: int) -> NDArray:
+    if band > values.shape[1]:
+        raise InputError(f"there are {values.shape[1]} bands; raise analysis.count")
+    return values[:, band - 1]
+
+
+def _one_state(result: xr.Dataset) -> None:
+    if "state" in result.dims:
+        raise InputError("needs a single state; leave out analysis.vary, and sweep its key instead")
