@@ -205,6 +205,19 @@ def test_a_file_that_is_no_case_file(read) -> None:
             read(text, "modes")
 
 
+@pytest.mark.filterwarnings("ignore:at the load factor:foldyn.errors.FoldynWarning")
+def test_the_load_factors_of_a_path_and_of_a_motion(read, miura) -> None:
+    """Loads lose their histories; those that are constant on a path stay constant."""
+    plate = changed(miura, 'model = { preset = "plate" }')
+    of_motion = read(plate, "buckling", count=2)
+    case = of_motion.case()
+    assert [load.history for load in case.loads] == [fd.Constant()] * len(case.loads)
+    found = of_motion.run()
+    np.testing.assert_allclose(found.load_factor, fd.buckling(case, 2).load_factor, rtol=1e-9)
+    steady = changed(plate, f"{STATICS}; {GRAVITY}; analysis.constant = [1]")
+    assert len(read(steady, "buckling").run().attrs["constant"]) == 1
+
+
 @pytest.mark.parametrize("command", ["modes", "frf", "bands"])
 def test_help_tells_the_options(capsys, command) -> None:
     with pytest.raises(SystemExit) as left:

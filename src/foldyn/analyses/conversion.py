@@ -86,7 +86,7 @@ def converted(path: Path, document: Document, kind: str, state: str) -> Document
     if kind == "bands":
         return unbounded(path, document, state)
     left: list[str] = []
-    atrest = state == "rest"
+    atrest = state == "rest" and kind != "buckling"
     supports, bases = _supports(document.get("supports", []), atrest, left)
     loads = [_without(load, "history") for load in document.get("loads", [])]
     drive = [load for load in loads if kind == "frf" and "force" in load]
@@ -100,19 +100,22 @@ def converted(path: Path, document: Document, kind: str, state: str) -> Document
         ]
         bases = bases[1:]
     left += [f"supports[{i}]" for i, _ in bases]
+    what = "buckling" if kind == "buckling" else "small vibrations"
     if "initial" in document:
         left.append("[initial]")
     why = (
         "nothing acts or moves in the state of rest (--state equilibrium takes the equilibrium "
         "under the loads)"
         if atrest
-        else "what moves over time has no place in small vibrations about a state"
+        else f"what moves over time has no place in {what} about a state"
     )
     _tell(path, kind, left, why)
     kept = _without(document, "initial", "drive", "output")
     kept |= {"supports": supports, "loads": [] if atrest else loads, "analysis": {"kind": kind}}
     kept["output"] = _shown(document.get("output", {}), kind)
-    if kind == "modes":
+    if kind == "buckling" and "constant" in document["analysis"]:
+        kept["analysis"]["constant"] = document["analysis"]["constant"]
+    if kind in ("modes", "buckling"):
         return kept
     if not drive:
         raise InputError(
@@ -141,6 +144,8 @@ def _supports(
 
 def _shown(output: Document, kind: str) -> Document:
     """Keys of [output] that have the same meaning for another kind."""
+    if kind == "buckling":
+        return {}
     if kind == "modes":  # modes use axis and nodes for something else
         return {key: output[key] for key in ("animation",) if key in output}
     shown = {key: output[key] for key in ("nodes", "axis") if key in output}

@@ -84,7 +84,7 @@ def read_as(
     Parameters
     ----------
     path : Path
-    kind : {"modes", "frf", "response", "bands", "fidelity"}
+    kind : {"modes", "frf", "buckling", "response", "bands", "fidelity"}
     flags : mapping
         Keys of [analysis] from the command line, which override the file; `state` may also be the
         file of a result.

@@ -103,6 +103,16 @@ def parser() -> argparse.ArgumentParser:
     frf.add_argument("--method", help="direct (default), modal, impulse, ...: see the case file")
     _add_state(frf)
 
+    buckling = commands.add_parser(
+        "buckling",
+        help="load factors at which a case file of any kind buckles, and the shapes",
+        description="Linear buckling of the structure of a case file of any kind: all its loads "
+        "grow together, without their histories; what its [analysis] says, if it is of kind "
+        "buckling, holds unless given here.",
+    )
+    _add_common(buckling, "buckling", film=False)
+    buckling.add_argument("--count", type=integer, help="load factors of each sign (default: 6)")
+
     response = commands.add_parser(
         "response",
         help="response curve of a case file of any kind",
