@@ -146,7 +146,7 @@ class Linearized:
     secant: float | None
     residual: float
     unbalanced: float
-    reacting: Reacting
+    reacting: Reacting = field(repr=False)
     branches: Branches | None = field(default=None, repr=False)
     responding: Branches | None = field(default=None, repr=False)
 
