@@ -1,4 +1,4 @@
-"""Does a folded solar panel survive its launch? Margins under 20 g, random vibration and a shock."""
+"""Does a solar panel survive its launch? Margins under 20 g, random vibration and a shock."""
 
 import numpy as np
 
