@@ -23,6 +23,7 @@ POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
 UNDAMPED = 1e-9  # damping ratios below this count as none
 HALVINGS = 60
 AT_ONCE = 2048  # frequencies whose amplitudes are in memory
+ROOM = 4_000_000  # numbers of a quantity in memory, at so many frequencies as fit
 
 
 class Driven(NamedTuple):
@@ -91,7 +92,10 @@ def mean_squares(source: Source, at: NDArray) -> dict[str, Found]:
     sizes = {name: len(own) for name, own in rows.items()}
     totals = {name: np.zeros((2, size)) for name, size in sizes.items()}
     parts = {name: np.zeros((len(at) + 1, size)) for name, size in sizes.items()}
-    for frequency, weight in _chunks(source, at):
+    at_once = AT_ONCE
+    if len(at):  # all parts are found at each frequency
+        at_once = int(np.clip(ROOM // max(sizes.values()), 16, AT_ONCE))
+    for frequency, weight in _chunks(source, at, at_once):
         omega, slot = TURN * frequency, np.searchsorted(at, frequency)
         columns = source.columns(omega)
         for name, own in rows.items():
@@ -105,13 +109,12 @@ def mean_squares(source: Source, at: NDArray) -> dict[str, Found]:
             first = np.flatnonzero(np.diff(slot, prepend=-1))
             parts[name][slot[first]] += np.add.reduceat(weight[:, None] * square, first)
     density = {name: np.zeros((len(at), size)) for name, size in sizes.items()}
-    for first in range(0, len(at), AT_ONCE):
-        omega = TURN * at[first : first + AT_ONCE]
+    for first in range(0, len(at), at_once):
+        part = slice(first, first + at_once)
+        omega = TURN * at[part]
         columns = source.columns(omega)
         for name, own in rows.items():
-            density[name][first : first + AT_ONCE] = _moved(
-                own, source.raised(name, omega, columns)
-            )
+            density[name][part] = _moved(own, source.raised(name, omega, columns))
     found = {}
     for name in rows:
         square, rate = totals[name].clip(0.0)
@@ -138,15 +141,18 @@ def _squares(
     return np.array(found)
 
 
-def _chunks(source: Source, at: NDArray) -> Iterator[tuple[NDArray, NDArray]]:
-    """Frequencies and weights, Hz, of a quadrature of which no interval reaches across `at`."""
+def _chunks(source: Source, at: NDArray, at_once: int) -> Iterator[tuple[NDArray, NDArray]]:
+    """Frequencies and weights, Hz, of a quadrature of which no interval reaches across `at`.
+
+    at_once : how many frequencies come together.
+    """
     known = np.concatenate([driven.density.frequency for driven in source.drives])
     low, high = known.min(), known.max()
     ends = np.unique(np.concatenate([known, at[(at > low) & (at < high)]]))
     poles = _poles(source.drives[0].response, low, high)
     frequency, weight = _quadrature(poles, ends)
-    for first in range(0, len(frequency), AT_ONCE):
-        yield frequency[first : first + AT_ONCE], weight[first : first + AT_ONCE]
+    for first in range(0, len(frequency), at_once):
+        yield frequency[first : first + at_once], weight[first : first + at_once]
 
 
 def _quadrature(poles: NDArray[np.complex128], ends: NDArray) -> tuple[NDArray, NDArray]:
