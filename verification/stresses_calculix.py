@@ -6,7 +6,7 @@ takes sheets of `verification.stresses`, by number, with their supports and load
 with solids in CalculiX (`verification.calculix`), which must be installed as `ccx`. Of Foldyn's
 mechanics these use the stiffness of creases alone. Their forces and moments are extrapolated from
 the points of integration to the points of `fd.stresses`. Vertices have no rigid radius there. In
-Foldyn it is a quarter of the thickness, or the thickness itself, the default of superelements.
+Foldyn it is an eighth of the thickness, or the thickness itself, the default of superelements.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from verification.fidelity.fresh import FreshCase
 from verification.stresses import DIVISIONS, FIRST, SMALL, chosen, held, load_on
 
 CASES = (2, 4, 5, 7, 9, 12)  # of six patterns, under all four loads
+RADIUS = 1 / 8  # relative to the thickness
 RESULTS = Path(__file__).parent / "fidelity" / "results" / "stresses_calculix.csv"
 
 
@@ -50,7 +51,7 @@ class Row(NamedTuple):
 def rows(case: FreshCase, load: str) -> Iterator[Row]:
     """Errors of the three models of a sheet."""
     pattern, sheet = case.pattern(), case.sheet
-    radius = 0.25 * sheet.thickness
+    radius = RADIUS * sheet.thickness
     made = {
         "shell": fd.shell(pattern, sheet, divisions=DIVISIONS, vertex_radius=radius),
         "superelements": fd.superelements(pattern, sheet, vertex_radius=radius),

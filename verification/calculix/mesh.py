@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from foldyn.patterns import Pattern
 
-PIECES = 12  # of half an edge
-FIRST = 0.25  # length of the smallest one, relative to the thickness
+PIECES = 16  # of half an edge
+FIRST = 0.12  # length of the smallest one, relative to the thickness
 CORNERS = ((0, 0), (2, 0), (2, 2), (0, 2))  # of a cell, in halves of its sides
 MIDDLES = ((1, 0), (2, 1), (1, 2), (0, 1))
 GAUSS = 1.0 / np.sqrt(3.0)
