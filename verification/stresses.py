@@ -61,7 +61,7 @@ def row(case: FreshCase, load: str) -> Row:
     pattern, sheet = case.pattern(), case.sheet
     thickness = float(np.max(sheet.values("thickness", len(pattern.faces))))
     panels = fd.superelements(pattern, sheet)
-    own = _load(panels, load, FIRST)
+    own = load_on(panels, load, FIRST)
     size = np.linalg.norm(np.ptp(pattern.vertices, axis=0))
     moved = fd.trace(fd.Case(panels, [held(panels)], [own]), steps=1)["displacement"].values
     factor = FIRST * SMALL * size / np.abs(moved).max()
@@ -71,7 +71,7 @@ def row(case: FreshCase, load: str) -> Row:
     )
     found = []
     for structure in (panels, *others):
-        loaded = fd.Case(structure, [held(structure)], [_load(structure, load, factor)])
+        loaded = fd.Case(structure, [held(structure)], [load_on(structure, load, factor)])
         path = fd.trace(loaded, steps=1, settings=fd.statics.Settings(stability=False))
         found.append(fd.stresses(path.isel(step=[-1])).isel(step=0))
     one, true, bars = found
@@ -90,7 +90,8 @@ def _apart(own: NDArray, true: NDArray) -> float:
     return float(np.abs(own - true).max() / np.abs(true).max()) if true.size else 0.0
 
 
-def _load(structure: Discretized, load: str, factor: float) -> Load:
+def load_on(structure: Discretized, load: str, factor: float) -> Load:
+    """A load of the kind `load`, of this size."""
     pattern = structure.pattern
     away = pattern.vertices - pattern.vertices[list(pattern.faces[0])].mean(axis=0)
     tip = int(np.linalg.norm(away, axis=1).argmax())

@@ -1,0 +1,1 @@
+"""Folded sheets as solids in CalculiX."""
