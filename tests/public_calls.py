@@ -333,7 +333,7 @@ def solved(folder: Path) -> Calls:
         "save": (fd.save, {"ds": run, "path": folder / "again.nc"}),
         "load": (fd.load, {"path": folder / "run.nc", "whole": True}),
         "export": (fd.export, {"result": run, "path": folder / "run.csv", "format": None}),
-        "view": (fd.view, {"what": pattern(), "title": "t", "height": 500}),
+        "view": (fd.view, {"what": pattern(), "title": "t", "height": 500, "stresses": False}),
         "read_case": (fd.read_case, {
             "path": folder / "case.toml", "model": "bars_and_hinges", "divisions": None,
         }),

@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.dynamics.motion_state import Outcome
+from foldyn.cases import Case
+from foldyn.dynamics.methods import Integrator
+from foldyn.dynamics.motion_state import MotionState, Outcome, StepPlan
+from foldyn.dynamics.system import PackedCase
 from foldyn.errors import InstabilityError, PenetrationError
 from foldyn.structures.beyond_range import kept_apart
-
-if TYPE_CHECKING:
-    from foldyn.dynamics.motion import Motion
 
 SWING = 0.5  # turn (rad) of a hinge per step, too large for any law
 MET = 1e-3  # panels touch if they are closer than this to closed, rad
 
 
+class Failed(Protocol):
+    """What `failure` needs of a motion whose last step failed."""
+
+    case: Case
+    method: Integrator
+    plan: StepPlan
+    critical: float
+    packed: PackedCase
+    state: MotionState
+
+
 def failure(
-    motion: Motion, code: int, hinge: int
+    motion: Failed, code: int, hinge: int
 ) -> tuple[type[InstabilityError | PenetrationError], str]:
     """Exception class and message for a motion whose last step failed.
 
@@ -64,7 +75,7 @@ def failure(
     return InstabilityError, f"{moment} {_reason(motion, code)}"
 
 
-def smaller_step(motion: Motion) -> str:
+def smaller_step(motion: Failed) -> str:
     """Remedy text: how to make the motion more accurate."""
     plan = motion.plan
     if not plan.steps:
@@ -74,7 +85,7 @@ def smaller_step(motion: Motion) -> str:
     return f"use a step below {plan.dt:.3g} s (critical at the start: {motion.critical:.3g} s)"
 
 
-def _apart(motion: Motion, hinge: int) -> str:
+def _apart(motion: Failed, hinge: int) -> str:
     """Remedy text: how to keep the panels at a hinge apart, given its dihedral at the last step."""
     angle = motion.state.angle[hinge]
     if motion.plan.dt > motion.critical or _from_closed(angle) > SWING:
@@ -83,7 +94,7 @@ def _apart(motion: Motion, hinge: int) -> str:
     return kept_apart(motion.case.structure, j, k)
 
 
-def _reason(motion: Motion, code: int) -> str:
+def _reason(motion: Failed, code: int) -> str:
     """Reason for a failure that is not due to a single hinge."""
     plan, method = motion.plan, motion.method
     if code == Outcome.STUCK:
