@@ -170,6 +170,7 @@ measures = ["von_mises", "crease_moment", "margin"]
 """
 
 
+@pytest.mark.matrix
 def test_case_files_show_stresses_and_sweeps_measure_them(tmp_path):
     path = tmp_path / "fold.toml"
     path.write_text(CASE)
