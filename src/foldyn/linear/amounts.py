@@ -16,7 +16,7 @@ from foldyn.cases import Case, State
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.linear.excitation import Drive
-from foldyn.linear.frequency_domain import ModalResponse
+from foldyn.linear.frequency_domain import ModalResponse, SuperposedModes
 from foldyn.linear.linearized import Linearized, linearize
 from foldyn.linear.stresses import small_motions
 from foldyn.strength.dataset import MISES, face_stresses, point_coordinates
@@ -102,6 +102,20 @@ def squared_parts(name: str, squares: NDArray) -> NDArray[np.float64]:
     if name != "von_mises":
         return squares
     return squares[..., ::3] + squares[..., 1::3] + squares[..., 2::3]
+
+
+def covered_mass(modes: SuperposedModes, moved: NDArray, axis: int, top: float) -> float:
+    """Share of the mass that moves along an axis in the modes up to a frequency (Hz).
+
+    moved : (nf,) forces on the free dofs if the whole structure has unit acceleration, kg.
+    """
+    system, basis = modes.system, modes.basis
+    modal = basis.inertia > 0.0
+    effective = (basis.shapes[:, modal].T @ moved) ** 2
+    within = np.sqrt(basis.values[modal].clip(0.0)) <= 2.0 * np.pi * top
+    along = (system.free < system.displacement.size) & (system.free % 3 == axis)
+    whole = float(moved[along].sum())  # 0 if only edges and panels between held nodes move
+    return float(effective[within].sum()) / whole if whole > 0.0 else 1.0
 
 
 def _moving(system: Linearized, drive: Drive, response: ModalResponse) -> dict[str, Amounts]:

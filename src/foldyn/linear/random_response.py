@@ -24,7 +24,7 @@ from foldyn.algebra.eigen import Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError, ModelRangeWarning, warn
-from foldyn.linear.amounts import Amounts, Parts, squared_parts
+from foldyn.linear.amounts import Amounts, Parts, covered_mass, squared_parts
 from foldyn.linear.excitation import Drive, drive_of
 from foldyn.linear.frequency_domain import ModalResponse, SuperposedModes
 from foldyn.linear.linearized import Linearized, warn_beyond
@@ -268,14 +268,8 @@ def _sources(
 
 def _warn_of_mass(system: Linearized, driven: Driven) -> None:
     """Warn if modes above the density's highest frequency have much of the mass along its axis."""
-    axis, basis = AXES.index(driven.drive.axis or "x"), driven.response.modes.basis
-    modal, top = basis.inertia > 0.0, driven.density.frequency[-1]
-    inertia = system.inertia[:, axis]
-    effective = (basis.shapes[:, modal].T @ inertia) ** 2
-    within = np.sqrt(basis.values[modal].clip(0.0)) / TURN <= top
-    along = (system.free < system.displacement.size) & (system.free % 3 == axis)
-    whole = inertia[along].sum()  # 0 if only edges and panels between held nodes move
-    share = 1.0 - effective[within].sum() / whole if whole > 0.0 else 0.0
+    axis, top = AXES.index(driven.drive.axis or "x"), driven.density.frequency[-1]
+    share = 1.0 - covered_mass(driven.response.modes, system.inertia[:, axis], axis, top)
     if share > LEFT_OUT:
         warn(
             f"modes above {top:.4g} Hz, where the density along {driven.drive.axis} ends, have "

@@ -24,7 +24,7 @@ from foldyn.algebra.eigen import Pencil
 from foldyn.cases import BaseMotion, Case, State
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError, ModelRangeWarning, warn
-from foldyn.linear.amounts import Amounts, Parts, squared_parts
+from foldyn.linear.amounts import Amounts, Parts, covered_mass, squared_parts
 from foldyn.linear.excitation import drive_of
 from foldyn.linear.frequency_domain import ModalResponse, SuperposedModes
 from foldyn.linear.linearized import Linearized, warn_beyond
@@ -223,10 +223,7 @@ class _Shock:
             at = np.interp(np.log(omega / TURN), np.log(frequency), np.log(value))
         self._reached, self._swings = np.exp(at), omega <= TURN * frequency[-1]
         self._last, self._modal = float(value[-1]), modal
-        along = (system.free < system.displacement.size) & (system.free % 3 == k)
-        whole = float(moved[along].sum())
-        swung = float((self._participation[self._swings] ** 2).sum())
-        self.covered = swung / whole if whole > 0.0 else 1.0
+        self.covered = covered_mass(modes, moved, k, float(frequency[-1]))
         zeta = np.divide(
             modes.damping.diagonal()[modal], 2.0 * omega, out=np.zeros_like(omega),
             where=omega > 0.0,
