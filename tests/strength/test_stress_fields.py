@@ -26,7 +26,7 @@ def path(request):
 
 
 def test_pages_color_panels_and_creases_on_request(path):
-    shown = stage({"one": path}, {"one": fd.case_of(path)}, "path", [4], stressed=True)
+    shown = stage({"one": path}, {"one": fd.case_of(path)}, "path", [4], stresses=fd.stresses)
     known = shown.about["results"][0]["fields"]
     found = fd.stresses(path)
     assert known["crease_moment"]["on"] == "crease"

@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
 from inspect import signature
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
@@ -162,11 +161,12 @@ class Analysis(ABC):
         figures : file format of figures, "png", "svg" or "pdf"; None: no figures.
         """
         cases = {mass: case_file.case(mass) for mass in results}
-        title, output = case_file.heading, case_file.output
-        drawn = partial(stage, results, cases, title, output.nodes.tolist())
+        title, output, album = case_file.heading, case_file.output, Album(folder, figures)
+        colors = album.stresses if output.stresses else None
+        shown = output.nodes.tolist()
         sections = [
-            *([drawn(stressed=output.stresses)] if self.moving else []),
-            *filled(self.sections(case_file, results, Album(folder, figures))),
+            *([stage(results, cases, title, shown, stresses=colors)] if self.moving else []),
+            *filled(self.sections(case_file, results, album)),
             *provenance(case_file, results, call),
         ]
         return write_report(sections, folder / "report.html", title=title)

@@ -8,7 +8,7 @@ import numpy as np
 import xarray
 
 from foldyn import plots
-from foldyn.linear import margins, stresses
+from foldyn.linear import margins
 from foldyn.report.album import Album
 from foldyn.report.sections import Heading, Section, Table, Text, cell
 from foldyn.results import case_of
@@ -19,7 +19,7 @@ FILES = ("stresses", "crease-moments")
 
 def stress_sections(result: xarray.Dataset, album: Album) -> Iterator[Section]:
     """Figures and a table of the stresses of a path or a motion."""
-    found, pattern = stresses(result), case_of(result).structure.pattern
+    found, pattern = album.stresses(result), case_of(result).structure.pattern
     yield Heading("Does it hold?")
     if "von_mises" in found:
         yield from album.figure(

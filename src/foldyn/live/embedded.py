@@ -15,6 +15,7 @@ import xarray as xr
 from foldyn.analyses import CaseFile
 from foldyn.cases import Case
 from foldyn.errors import InputError
+from foldyn.linear import stresses as find_stresses
 from foldyn.patterns import Pattern
 from foldyn.plots.readings import moved_supports
 from foldyn.report.page import report_html, write_report
@@ -167,4 +168,4 @@ def results_stage(results: Mapping[str, xr.Dataset], title: str, stresses: bool 
     first = next(iter(cases.values()))
     moved = moved_supports(first)
     nodes = first.loaded_nodes.tolist() or (moved[0] if moved else [0])
-    return stage(results, cases, title, nodes, stressed=stresses)
+    return stage(results, cases, title, nodes, stresses=find_stresses if stresses else None)

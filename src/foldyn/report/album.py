@@ -11,6 +11,7 @@ import xarray
 
 from foldyn import plots
 from foldyn.cases import Case
+from foldyn.linear import stresses
 from foldyn.plots.law_charts import law_charts
 from foldyn.report.sections import Charts, Heading, Picture, Section, Table, Text
 from foldyn.shells import Shell
@@ -42,6 +43,13 @@ class Album:
 
     def __init__(self, folder: str | Path, form: str | None = "png") -> None:
         self.folder, self.form = Path(folder), form
+        self._stresses: dict[int, xarray.Dataset] = {}
+
+    def stresses(self, result: xarray.Dataset) -> xarray.Dataset:
+        """Stresses of a result of the page, which are found once."""
+        if id(result) not in self._stresses:
+            self._stresses[id(result)] = stresses(result)
+        return self._stresses[id(result)]
 
     def figure(
         self, name: str, caption: str, draw: Callable[[], Any], *otherwise: Section

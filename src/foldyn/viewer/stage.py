@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from foldyn import __version__
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear import character, mac, stresses
+from foldyn.linear import character, mac
 from foldyn.patterns import Pattern
 from foldyn.plots.readings import displacements, moved_supports, stretches, total_reaction, way
 from foldyn.results.contents import pattern_of
@@ -75,14 +75,15 @@ class Stage:
 
 def stage(
     results: Results, cases: Mapping[str, Case], title: str, nodes: list[int],
-    backdrop: Backdrop | None = None, stressed: bool = False,
+    backdrop: Backdrop | None = None,
+    stresses: Callable[[xr.Dataset], xr.Dataset] | None = None,
 ) -> Stage:  # fmt: skip
     """Show results of one kind by name: motions, paths, modes, bands or others that move.
 
     cases : cases of the results; foldings have no cases.
     nodes : nodes listed at the start; the first is selected.
     backdrop : photographs behind the sheets.
-    stressed : whether stresses color the panels and creases of motions and paths.
+    stresses : finds the stresses that color the panels and creases of motions and paths.
     """
     arrays, sheets, listed = Arrays(), {}, []
     kind = _kind(next(iter(results.values())))
@@ -96,7 +97,7 @@ def stage(
             if key not in sheets:
                 sheets[key] = sheet(arrays, key, case)
             alone = len(results) == 1
-            found = stresses(result) if stressed and kind in ("motion", "path") else None
+            found = stresses(result) if stresses and kind in ("motion", "path") else None
             one = _Shown(arrays, f"r{len(listed)}", case, result, name, alone, found)
             own = {"name": name, "sheet": key, "alone": alone}
             listed += [own | about for about in _LISTED[kind](one)]
