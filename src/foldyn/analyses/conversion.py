@@ -115,7 +115,7 @@ def converted(path: Path, document: Document, kind: str, state: str) -> Document
     kept["output"] = _shown(document.get("output", {}), kind)
     if kind == "buckling" and "constant" in document["analysis"]:
         kept["analysis"]["constant"] = document["analysis"]["constant"]
-    if kind in ("modes", "buckling"):
+    if kind in ("modes", "buckling", "random"):
         return kept
     if not drive:
         raise InputError(

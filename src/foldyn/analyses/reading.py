@@ -32,6 +32,11 @@ from foldyn.structures import Sheet
 from foldyn.tables import read, told
 from foldyn.values import LARGEST, MOST, SMALLEST, show
 
+WANTED: Mapping[str, tuple[tuple[str, ...], str]] = {
+    "frf": (("frequencies",), "at which frequencies? Give --frequencies FIRST LAST COUNT (Hz)"),
+    "random": (("base", "forces"), "under which noise? Give --base AXIS UNIT F:DENSITY ..."),
+}
+"""Keys of [analysis] of which commands need one, and what to say without them."""
 MOST_MIB = 2
 """Largest case file (MiB)."""
 
@@ -84,7 +89,7 @@ def read_as(
     Parameters
     ----------
     path : Path
-    kind : {"modes", "frf", "buckling", "response", "bands", "fidelity"}
+    kind : {"modes", "frf", "buckling", "random", "response", "bands", "fidelity"}
     flags : mapping
         Keys of [analysis] from the command line, which override the file; `state` may also be the
         file of a result.
@@ -107,8 +112,9 @@ def read_as(
         document = remodeled(document, model, divisions)
     if not own:
         document = converted(path, document, kind, flags.get("state", "rest"))
-    if kind == "frf" and not {"frequencies"} & {*flags, *document["analysis"]}:
-        raise InputError("at which frequencies? Give --frequencies FIRST LAST COUNT (Hz)", "", path)
+    keys, wanted = WANTED.get(kind, ((), ""))
+    if keys and not {*keys} & {*flags, *document["analysis"]}:
+        raise InputError(wanted, "", path)
     return case_of_document(path, flagged(document, flags), text)
 
 

@@ -142,8 +142,27 @@ def _read(path: Path, given: Namespace) -> CaseFile:
         first, last, count = given.frequencies
         whole = int(count) if count.is_integer() else count
         keys["frequencies"] = {"first": first, "last": last, "count": whole}
+    if given.command == "random":
+        keys = {key: value for key, value in keys.items() if value is not False}
+        keys["base"] = given.base and dict(_density(*words) for words in given.base)
     divisions = None if "divisions" in keys else getattr(given, "divisions", None)
     return read_as(path, given.command, keys, given.model, divisions)
+
+
+def _density(axis: str, *words: str) -> tuple[str, dict[str, Any]]:
+    """An axis and the table of its density, from the words of --base."""
+    unit, *points = words or [""]
+    pairs = [point.split(":") for point in points]
+    try:
+        frequency, value = (
+            [float(number) for number in column] for column in zip(*pairs, strict=True)
+        )
+    except ValueError:
+        raise InputError(
+            f"--base {' '.join((axis, *words))}: write AXIS UNIT F:DENSITY F:DENSITY ..., as in z "
+            "g2/Hz 20:0.005 80:0.04 500:0.04"
+        ) from None
+    return axis, {"frequency": frequency, "value": value, "unit": unit}
 
 
 def _computed(
