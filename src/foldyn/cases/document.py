@@ -220,13 +220,16 @@ class _Writer:
 
     def _sheet(self, sheet: Sheet) -> dict[str, Any]:
         section: dict[str, Any] = {
-            f.name: float(value)
+            f.name: plain(value)
             for f in dataclasses.fields(sheet)
             if f.name != "panels" and (value := getattr(sheet, f.name)) is not None
         }
         if sheet.panels:
             section["panels"] = [
-                {"panels": self.store(f"tables_sheet{i}_panels", part.panels), **part.own}
+                {
+                    "panels": self.store(f"tables_sheet{i}_panels", part.panels),
+                    **{name: plain(value) for name, value in part.own.items()},
+                }
                 for i, part in enumerate(sheet.panels)
             ]
         return section

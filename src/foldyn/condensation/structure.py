@@ -45,6 +45,7 @@ from foldyn.structures.discretize import checked_kinds
 from foldyn.structures.discretized import Discretized, Distributed, HingeKind, read_only
 from foldyn.structures.graded import grading
 from foldyn.structures.mass import MASS_RULES
+from foldyn.structures.material_axes import material_axes
 from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
 from foldyn.structures.swelling import Swelling
 from foldyn.values import choice, length, whole
@@ -173,7 +174,7 @@ class Superelements(Discretized):
         sheets = [
             replace(kinds[k], density=own) for k, own in zip(kind, density.tolist(), strict=True)
         ]
-        made = groups(self.pattern, sheets, meshes)
+        made = groups(self.pattern, sheets, material_axes(self.pattern, self.sheet), meshes)
         return Whole(self.pattern, made, level, meshes.graded[-1])
 
     @cached_property

@@ -19,11 +19,13 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.exports.creased_shell import CreasedShell, creased_shell
+from foldyn.structures import Sheet
 from foldyn.values import choice, whole
 from foldyn.writing import write_text
 
 ELEMENTS = ("STRI3", "S3")
 SHEET = "SHEET"
+ALIKE = 9  # decimals of directions that count as equal
 
 
 def write(
@@ -80,16 +82,37 @@ def _panels(shell: CreasedShell, kind: str) -> Iterator[str]:
         own = np.flatnonzero(shell.kind == number - 1)
         if len(own) == 0:
             continue
-        yield f"*ELEMENT, TYPE={kind}, ELSET=PANELS_{number}"
-        for element, nodes in zip(
-            (own + 1).tolist(), (shell.triangles[own] + 1).tolist(), strict=True
-        ):
-            yield _line(element, *nodes)
         yield f"*MATERIAL, NAME=MATERIAL_{number}"
-        yield from ("*ELASTIC", _line(sheet.youngs_modulus, sheet.poissons_ratio))
+        yield from _elastic(sheet)
         yield from ("*DENSITY", _line(sheet.density))
-        yield f"*SHELL SECTION, ELSET=PANELS_{number}, MATERIAL=MATERIAL_{number}"
-        yield _line(sheet.thickness)
+        # orthotropic panels are a section for each direction
+        axes = np.round(shell.axes[own], ALIKE) if sheet.orthotropic else np.zeros((len(own), 1))
+        ways, way = np.unique(axes.reshape(len(own), -1), axis=0, return_inverse=True)
+        for k, both in enumerate(ways.tolist()):
+            name, turned = (f"{number}", "") if len(ways) == 1 else (f"{number}_{k + 1}", "")
+            some = own[way.ravel() == k]
+            yield f"*ELEMENT, TYPE={kind}, ELSET=PANELS_{name}"
+            for element, nodes in zip(
+                (some + 1).tolist(), (shell.triangles[some] + 1).tolist(), strict=True
+            ):
+                yield _line(element, *nodes)
+            if sheet.orthotropic:
+                turned = f", ORIENTATION=AXES_{name}"
+                yield f"*ORIENTATION, NAME=AXES_{name}"
+                yield from (_line(*both), _line(3, 0.0))
+            yield f"*SHELL SECTION, ELSET=PANELS_{name}, MATERIAL=MATERIAL_{number}{turned}"
+            yield _line(sheet.thickness)
+
+
+def _elastic(sheet: Sheet) -> Iterator[str]:
+    """Elastic constants; an orthotropic sheet has those of direction 2 along its normal, too."""
+    if sheet.shear_modulus is None:
+        yield from ("*ELASTIC", _line(sheet.modulus, sheet.poissons_ratio))
+        return
+    (first, second), shear = sheet.moduli, sheet.shear_modulus
+    yield "*ELASTIC, TYPE=ENGINEERING CONSTANTS"
+    yield _line(first, second, second, sheet.poissons_ratio, 0.0, 0.0, shear, shear)
+    yield _line(shear)
 
 
 def _ties(shell: CreasedShell) -> Iterator[str]:

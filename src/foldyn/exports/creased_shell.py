@@ -24,6 +24,7 @@ from foldyn.patterns import Pattern
 from foldyn.shells import Shell
 from foldyn.structures import Sheet
 from foldyn.structures.discretized import Discretized
+from foldyn.structures.material_axes import material_axes, panel_axes
 from foldyn.values import whole
 
 DIVISIONS = 16  # gives frequencies of the case studies within 1 %
@@ -61,6 +62,8 @@ class CreasedShell:
     triangles, kind : (nt, 3), (nt,)
         Nodes, counter-clockwise seen from the front; index of each triangle's sheet in `sheets`.
     sheets : tuple of Sheet
+    axes : (nt, 2, 3)
+        Directions 1 and 2 of orthotropic sheets in the triangles' planes.
     joints : tuple of Joint
     places : tuple of tuples of int
         Groups of coincident nodes.
@@ -78,6 +81,7 @@ class CreasedShell:
     triangles: NDArray
     kind: NDArray
     sheets: tuple[Sheet, ...]
+    axes: NDArray
     joints: tuple[Joint, ...]
     places: tuple[tuple[int, ...], ...]
     held: NDArray
@@ -88,7 +92,7 @@ class CreasedShell:
     @property
     def membrane(self) -> float:
         """Largest membrane stiffness E t among the sheets, N/m."""
-        return max(sheet.youngs_modulus * sheet.thickness for sheet in self.sheets)
+        return max(max(sheet.moduli) * sheet.thickness for sheet in self.sheets)
 
     @property
     def loose(self) -> list[tuple[int, int]]:
@@ -130,6 +134,9 @@ def creased_shell(case: Case, divisions: int | None = None) -> CreasedShell:
     shell = held.structure
     assert isinstance(shell, Shell)
     sheets, kind = shell.sheet.kinds(len(shell.pattern.faces))
+    axes, fibers = panel_axes(shell.pattern), material_axes(shell.pattern, shell.sheet)
+    if fibers is not None:
+        axes = np.stack([fibers, np.cross(shell.pattern.face_normals, fibers)], axis=1)
     part = _components(shell.pattern.weld_faces, len(shell.pattern.faces))
     split = _Split(shell, part)
     clamped = np.zeros(len(split.origin), bool)
@@ -141,6 +148,7 @@ def creased_shell(case: Case, divisions: int | None = None) -> CreasedShell:
         triangles=split.triangles,
         kind=kind[shell.triangle_panel],
         sheets=tuple(sheets),
+        axes=axes[shell.triangle_panel],
         joints=_joints(shell, split),
         places=split.places,
         held=held.fixed[split.origin],

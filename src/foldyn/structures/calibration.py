@@ -29,6 +29,7 @@ from foldyn.errors import InputError, warn
 from foldyn.patterns import Pattern
 from foldyn.patterns.crease_data import crease_values
 from foldyn.patterns.topology import around, edge_of
+from foldyn.structures.material_axes import bending_across
 from foldyn.structures.mesh import Mesh, double_areas, lengths
 from foldyn.structures.sheet import Sheet
 from foldyn.values import doubt_degrees, number, numbers, show, single
@@ -42,11 +43,11 @@ def calibrated_folds(length: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray
     """Stiffness of whole creases (nf,), N m/rad, of the given lengths (m).
 
     The two sides of a crease are springs in series. Each has half the compliance of a crease
-    between two panels like the one on that side.
+    between two panels like the one on that side. G of an orthotropic panel is that across the
+    crease.
     """
-    count = len(pattern.faces)
-    g = sheet.values("bending_modulus", count)[pattern.crease_faces]
-    t = sheet.values("thickness", count)[pattern.crease_faces]
+    g = bending_across(pattern, sheet)
+    t = sheet.values("thickness", len(pattern.faces))[pattern.crease_faces]
     slender = 0.55 * g * (length[:, None] / t) ** (1.0 / 3.0)
     compliance = sheet.length_scale_ratio / g + 1.0 / slender
     return 1.0 / (0.5 * (compliance[:, 0] + compliance[:, 1]))
@@ -205,7 +206,7 @@ def _check_boards(sheet: Sheet, pattern: Pattern) -> None:
 
 def _check_scale(sheet: Sheet, low: float, high: float) -> None:
     """Refuse a sheet whose stiffness or mass, with edges from low to high (m), is out of range."""
-    stretching, mass = sheet.youngs_modulus * sheet.thickness, sheet.thickness * high**2
+    stretching, mass = sheet.modulus * sheet.thickness, sheet.thickness * high**2
     for what, value in (
         ("stretching stiffness E t (N/m)", stretching),
         ("bending stiffness E t^3 / 12(1 - nu^2) L^2 (N/m)", sheet.bending_modulus / low**2),
@@ -216,7 +217,7 @@ def _check_scale(sheet: Sheet, low: float, high: float) -> None:
             density = "" if sheet.density is None else f", density = {sheet.density:g} kg/m3"
             raise InputError(
                 f"sheet: its {what} is {value:.3g}, out of range: check youngs_modulus = "
-                f"{sheet.youngs_modulus:g} Pa, thickness = {sheet.thickness:g} m{density} and the "
+                f"{sheet.modulus:g} Pa, thickness = {sheet.thickness:g} m{density} and the "
                 f"pattern, whose edges have {low:.3g} to {high:.3g} m"
             )
 

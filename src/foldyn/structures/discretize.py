@@ -170,6 +170,12 @@ def discretize(
     nodes = len(pattern.vertices) + len(pattern.faces)
     check_memory("pattern", f"a structure of {nodes} nodes", PER_NODE * nodes, "take fewer panels")
     check_sheet(sheet, pattern)
+    if any(own.orthotropic for own in sheet.kinds(len(pattern.faces))[0]):
+        raise InputError(
+            "sheet: youngs_modulus: bars and hinges are calibrated for isotropic sheets; take "
+            'fd.superelements or fd.shell (in a case file, [model] kind = "superelements" or '
+            '"shell")'
+        )
     points = _given_centers({} if centers is None else centers, pattern, options.scheme)
     mesh = n4b5(pattern) if options.scheme == "n4b5" else n5b8(pattern, points)
     merlin2 = options.calibration == "merlin2"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -11,21 +11,75 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.arguments import Check, Checked, Read
-from foldyn.errors import InputError
+from foldyn.errors import InputError, within
+from foldyn.mechanics.triangle import isotropic, plane_stress
 from foldyn.tables import ListOf, TableOf
-from foldyn.values import indices, length, number, objects, show, single
+from foldyn.values import indices, length, number, objects, show, single, vector
 
 
-def _ratio(name: str, value: Any) -> float:
-    """Return a Poisson's ratio."""
-    checked = number(name, value)
-    if not -1.0 < checked < 0.5:
+def _moduli(name: str, value: Any) -> float | tuple[float, float]:
+    """Return Young's modulus, or those along and across a direction."""
+    value = single(value)
+    if not isinstance(value, list | tuple | np.ndarray):
+        return number(name, value, above=0.0, unit="Pa")
+    if len(value) != 2:
         raise InputError(
-            f" = {checked}: must lie between -1 and 0.5, both excluded (0.5 makes the bar areas "
-            "infinite)",
+            f" = {show(list(value))}: must be one number (Pa), or two: along the direction and "
+            "across",
             name,
         )
-    return checked
+    first, second = (
+        number(f"{name}[{k}]", each, above=0.0, unit="Pa") for k, each in enumerate(value)
+    )
+    return first, second
+
+
+def _direction(name: str, value: Any) -> Any:
+    """Return an angle (degrees), a vector, or an edge and the angle from it."""
+    value = single(value)
+    if isinstance(value, Mapping):
+        if {*value} - {"angle"} != {"edge"}:
+            raise InputError(
+                f" = {show(dict(value))}: must be {{ edge = [0, 1], angle = 30 }}, with two "
+                "vertices and degrees",
+                name,
+            )
+        value = value["edge"], value.get("angle", 0.0)
+    if isinstance(value, list | tuple) and len(value) == 2:
+        edge, angle = value
+        ends = indices(f"{name}.edge", edge, "vertex", "as in [0, 1]")
+        if len(ends) != 2:
+            raise InputError(f" = {show(list(ends))}: must be two vertices", f"{name}.edge")
+        return tuple(ends), number(f"{name}.angle", angle)
+    if isinstance(value, list | tuple | np.ndarray):
+        return vector(name, value, nonzero=True)
+    return number(name, value)
+
+
+def _check_material(given: Mapping[str, Any]) -> None:
+    """Refuse constants that do not fit together."""
+    moduli, nu = given["youngs_modulus"], given["poissons_ratio"]
+    if isinstance(moduli, tuple):
+        for name in OF_FIBERS:
+            if given[name] is None:
+                raise InputError(": missing; two moduli need it", name)
+        most = math.sqrt(moduli[0] / moduli[1])
+        if abs(nu) >= most:
+            raise InputError(
+                f" = {nu:g}: must lie below the root of E1/E2, {most:.4g}", "poissons_ratio"
+            )
+        return
+    if nu >= 0.5:
+        raise InputError(
+            f" = {nu:g}: must lie between -1 and 0.5, both excluded (0.5 makes the bar areas "
+            "infinite)",
+            "poissons_ratio",
+        )
+    for name in OF_FIBERS:
+        if given[name] is not None:
+            raise InputError(
+                ": belongs to orthotropic sheets; give youngs_modulus = [E1, E2] too", name
+            )
 
 
 def _panels(name: str, value: Any) -> tuple[int, ...]:
@@ -37,11 +91,18 @@ def _panels(name: str, value: Any) -> tuple[int, ...]:
 
 
 Modulus = Annotated[float, Check(number, above=0.0, unit="Pa")]
-Ratio = Annotated[float, Check(_ratio)]
+Moduli = Annotated[float | Sequence[float], Check(_moduli, unit="Pa")]
+Ratio = Annotated[float, Check(number, above=-1.0)]
+Direction = Annotated[float | Sequence[Any] | Mapping[str, Any], Check(_direction)]
 Length = Annotated[float, Check(length, unit="m")]
 Density = Annotated[float, Check(number, above=0.0, unit="kg/m3")]
-MATERIAL = ("youngs_modulus", "poissons_ratio", "thickness", "density", "strength")
+MATERIAL = (
+    "youngs_modulus", "poissons_ratio", "thickness", "density", "strength", "shear_modulus",
+    "direction",
+)  # fmt: skip
 """Values that may differ from panel to panel."""
+OF_FIBERS = ("shear_modulus", "direction")
+"""Values that isotropic sheets do not have."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +113,7 @@ class PanelSheet(Checked):
     ----------
     panels : int or sequence of int
         Indices of the panels, in the order of `pattern.faces`.
-    youngs_modulus, poissons_ratio, thickness, density, strength : float, optional
+    youngs_modulus, poissons_ratio, thickness, density, strength, shear_modulus, direction
         As in `Sheet`. Give at least one; the sheet's values apply to the rest.
 
     Raises
@@ -62,11 +123,13 @@ class PanelSheet(Checked):
     """
 
     panels: Annotated[Sequence[int] | int, Check(_panels)]
-    youngs_modulus: Modulus | None = None
+    youngs_modulus: Moduli | None = None
     poissons_ratio: Ratio | None = None
     thickness: Length | None = None
     density: Density | None = None
     strength: Modulus | None = None
+    shear_modulus: Modulus | None = None
+    direction: Direction | None = None
 
     def agree(self) -> None:
         """Refuse panels without a value that differs."""
@@ -74,22 +137,29 @@ class PanelSheet(Checked):
             raise InputError(f": give what differs there: {', '.join(MATERIAL)}", "panels")
 
     @property
-    def own(self) -> dict[str, float]:
+    def own(self) -> dict[str, Any]:
         """The values that differ from the rest of the sheet."""
         return {name: getattr(self, name) for name in self.given(*MATERIAL)}
+
+    @property
+    def instead(self) -> dict[str, Any]:
+        """The values that differ; isotropic panels have no direction."""
+        isotropic = isinstance(self.youngs_modulus, float)
+        return {**(dict.fromkeys(OF_FIBERS) if isotropic else {}), **self.own}
 
 
 @dataclass(frozen=True)
 class Sheet(Checked):
-    """An isotropic elastic sheet.
+    """An elastic sheet, isotropic or orthotropic.
 
     Parameters
     ----------
-    youngs_modulus : float
-        E (Pa), positive.
+    youngs_modulus : float or (float, float)
+        E (Pa), positive; of an orthotropic sheet E1 along `direction` and E2 across.
     poissons_ratio : float
         nu, -1 < nu < 0.5. N5B8 quadrilaterals need nu > 0: their spokes have an area
-        proportional to nu.
+        proportional to nu. Of an orthotropic sheet nu12, the contraction across under a stress
+        along `direction`, with nu12^2 E2 < E1.
     thickness : float
         t (m), positive.
     density : float, optional
@@ -100,6 +170,14 @@ class Sheet(Checked):
         Panels that differ from the rest.
     strength : float, optional
         Largest von Mises stress that the sheet bears, Pa, positive; only `margins` needs it.
+    shear_modulus : float, optional
+        G12 (Pa) of an orthotropic sheet.
+    direction : float, (float, float, float) or dict, optional
+        Direction 1 of an orthotropic sheet: an angle (degrees) from the first edge of each panel,
+        counter-clockwise seen from the front; a vector, projected on each panel at rest; or
+        ``{"edge": (0, 1), "angle": 30}``, the angle from an edge of the pattern (from its first to
+        its second vertex), continued over all creases as in the flat sheet. It turns with the
+        panels.
 
     Raises
     ------
@@ -114,7 +192,7 @@ class Sheet(Checked):
     0.02
     """
 
-    youngs_modulus: Modulus
+    youngs_modulus: Moduli
     poissons_ratio: Ratio
     thickness: Length
     density: Density | None = None
@@ -125,11 +203,14 @@ class Sheet(Checked):
         Read(ListOf(TableOf(PanelSheet))),
     ] = ()
     strength: Modulus | None = None
+    shear_modulus: Modulus | None = None
+    direction: Direction | None = None
 
     place = "sheet: "
 
     def agree(self) -> None:
-        """Refuse panels that are named twice, and densities given for some panels only."""
+        """Refuse impossible materials, panels named twice, and densities of some panels only."""
+        _check_material(vars(self))
         before: dict[int, int] = {}
         for i, part in enumerate(self.panels):
             if part.density is not None and self.density is None:
@@ -145,11 +226,50 @@ class Sheet(Checked):
                         f"panels[{i}].panels",
                     )
                 before[panel] = i
+            with within(f"panels[{i}]."):
+                _check_material({**vars(self), **part.instead})
+
+    @property
+    def orthotropic(self) -> bool:
+        """Whether the sheet has two moduli."""
+        return isinstance(self.youngs_modulus, tuple)
+
+    @property
+    def moduli(self) -> tuple[float, float]:
+        """E1 and E2, Pa; of an isotropic sheet E twice."""
+        given = self.youngs_modulus
+        return given if isinstance(given, tuple) else (given, given)  # type: ignore[return-value]
+
+    @property
+    def modulus(self) -> float:
+        """E, or E1, Pa: a measure of the stiffness."""
+        return self.moduli[0]
+
+    @property
+    def elastic(self) -> NDArray[np.float64]:
+        """Stiffness (3, 3) in plane stress, Pa; see `mechanics.triangle.plane_stress`."""
+        nu = self.poissons_ratio
+        if self.shear_modulus is None:
+            return self.modulus / (1.0 - nu**2) * isotropic(nu)
+        return plane_stress(*self.moduli, nu, self.shear_modulus)
+
+    @property
+    def stretching(self) -> NDArray[np.float64]:
+        """Membrane stiffness (3, 3) along the material's axes, N/m."""
+        return self.thickness * self.elastic
+
+    @property
+    def bending(self) -> NDArray[np.float64]:
+        """Bending stiffness (3, 3) along the material's axes, N m."""
+        return self.thickness**3 / 12.0 * self.elastic
 
     @property
     def bending_modulus(self) -> float:
-        """E t^3 / (12 (1 - nu^2)), N m."""
-        return self.youngs_modulus * self.thickness**3 / (12.0 * (1.0 - self.poissons_ratio**2))
+        """E t^3 / (12 (1 - nu^2)), N m, with the geometric mean of E1 and E2."""
+        first, second = self.moduli
+        mean = first if first == second else math.sqrt(first * second)
+        nu2 = self.poissons_ratio**2 * second / first
+        return mean * self.thickness**3 / (12.0 * (1.0 - nu2))
 
     @property
     def areal_density(self) -> float:
@@ -168,10 +288,10 @@ class Sheet(Checked):
         for number_of, part in enumerate(self.panels, 1):
             chosen = np.array(_numbers(part))
             kind[chosen[chosen < count]] = number_of
-        return [rest, *(replace(rest, **part.own) for part in self.panels)], kind
+        return [rest, *(replace(rest, **part.instead) for part in self.panels)], kind
 
     def values(self, name: str, count: int) -> NDArray[np.float64]:
-        """An attribute of the sheet, such as "thickness", for each of `count` panels (count,)."""
+        """A number of the sheet, such as "thickness", for each of `count` panels (count,)."""
         kinds, kind = self.kinds(count)
         return np.array([getattr(sheet, name) for sheet in kinds], float)[kind]
 
