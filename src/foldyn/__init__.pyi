@@ -136,6 +136,7 @@ from foldyn.structures import (
     Laminate as Laminate,
     ModelOptions as ModelOptions,
     PanelSheet as PanelSheet,
+    Ply as Ply,
     Sheet as Sheet,
     Structure as Structure,
     discretize as discretize,

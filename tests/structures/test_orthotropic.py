@@ -229,7 +229,7 @@ def test_a_case_with_fibers_is_stored_and_read(tmp_path):
         ({"poissons_ratio": 4.0}, "poissons_ratio = 4: must lie below the root of E1/E2, 3.742"),
         ({"youngs_modulus": (1e9, 2e9, 3e9)}, "must be one number .Pa., or two: along the dir"),
         ({"youngs_modulus": (1e9, -2e9)}, r"youngs_modulus\[1\] = -20.*: must be greater"),
-        ({"youngs_modulus": 1e9}, "shear_modulus: belongs to orthotropic sheets"),
+        ({"youngs_modulus": 1e9}, "shear_modulus: belongs to orthotropic materials"),
         ({"direction": (0, 0, 0)}, "direction = .0, 0, 0.: must not be zero"),
         ({"direction": {"angle": 3}}, "direction = .*: must be { edge = .0, 1., angle = 30 }"),
         ({"direction": {"edge": (1, 2, 3)}}, r"direction.edge = \[1, 2, 3\]: must be two vertices"),

@@ -60,9 +60,7 @@ def _table(found: xarray.Dataset) -> Table:
         step, crease = np.unravel_index(moment.argmax(), moment.shape)
         when = cell(float(found[along][step]))
         rows.append(["moment of a crease (N)", cell(float(moment.max())), f"crease {crease}", when])
-    structure = case_of(found).structure
-    strength = structure.sheet.values("strength", len(structure.pattern.faces))
-    if "von_mises" in found and np.isfinite(strength).any():
+    if "von_mises" in found and case_of(found).structure.sheet.has_strength:
         margin = margins(found).attrs
         rows.append(
             ["least margin of a panel", cell(margin["least_margin"]), margin["least_where"], ""]

@@ -219,16 +219,13 @@ class _Writer:
         }
 
     def _sheet(self, sheet: Sheet) -> dict[str, Any]:
-        section: dict[str, Any] = {
-            f.name: plain(value)
-            for f in dataclasses.fields(sheet)
-            if f.name != "panels" and (value := getattr(sheet, f.name)) is not None
-        }
+        given = {name: value for name, value in vars(sheet).items() if name != "panels"}
+        section = _material(given)
         if sheet.panels:
             section["panels"] = [
                 {
                     "panels": self.store(f"tables_sheet{i}_panels", part.panels),
-                    **{name: plain(value) for name, value in part.own.items()},
+                    **_material(part.own),
                 }
                 for i, part in enumerate(sheet.panels)
             ]
@@ -390,3 +387,11 @@ def _resolve(value: Any, arrays: Mapping[str, NDArray]) -> Any:
     if isinstance(value, list):
         return [_resolve(item, arrays) for item in value]
     return value
+
+
+def _material(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Table of a material; plies are tables, too."""
+    found = {name: plain(value) for name, value in given.items() if value not in (None, ())}
+    if "plies" in found:
+        found["plies"] = [_material(vars(ply)) for ply in found["plies"]]
+    return found

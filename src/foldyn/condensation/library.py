@@ -19,6 +19,7 @@ from foldyn.condensation.panel import CondensedPanel
 from foldyn.patterns import Pattern
 from foldyn.structures.graded import smooth_vertices
 from foldyn.structures.material_axes import material_axes
+from foldyn.structures.ply import Ply
 from foldyn.structures.sheet import Sheet
 
 ROOM = 256  # condensed panels kept in memory, each about 3 MB
@@ -57,6 +58,8 @@ def _condensed(shape: _Shape, sheet: Sheet, meshes: Meshes) -> CondensedPanel:
 
 def _unit(sheet: Sheet) -> Sheet:
     """The sheet with a modulus and a density of 1, without what does not matter here."""
+    if sheet.plies:
+        return Sheet(plies=[_ply(own, sheet.modulus) for own in sheet.plies], direction=0.0)
     first, second = sheet.moduli
     if sheet.shear_modulus is None:
         return Sheet(1.0, sheet.poissons_ratio, sheet.thickness, 1.0)
@@ -64,6 +67,14 @@ def _unit(sheet: Sheet) -> Sheet:
         (1.0, second / first), sheet.poissons_ratio, sheet.thickness, 1.0,
         shear_modulus=sheet.shear_modulus / first, direction=0.0,
     )  # fmt: skip
+
+
+def _ply(ply: Ply, modulus: float) -> Ply:
+    """A ply of a sheet that has a modulus and a density of 1."""
+    own, shear = (np.array(ply.youngs_modulus) / modulus).tolist(), ply.shear_modulus
+    return Ply(
+        ply.thickness, own, ply.poissons_ratio, shear and shear / modulus, ply.angle, density=1.0
+    )
 
 
 def groups(

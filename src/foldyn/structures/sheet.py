@@ -12,26 +12,20 @@ from numpy.typing import NDArray
 
 from foldyn.arguments import Check, Checked, Read
 from foldyn.errors import InputError, within
-from foldyn.mechanics.triangle import isotropic, plane_stress
+from foldyn.structures.ply import (
+    Density,
+    Length,
+    Moduli,
+    Modulus,
+    Ply,
+    Ratio,
+    check_material,
+    constants,
+    elastic,
+    matrices,
+)
 from foldyn.tables import ListOf, TableOf
-from foldyn.values import indices, length, number, objects, show, single, vector
-
-
-def _moduli(name: str, value: Any) -> float | tuple[float, float]:
-    """Return Young's modulus, or those along and across a direction."""
-    value = single(value)
-    if not isinstance(value, list | tuple | np.ndarray):
-        return number(name, value, above=0.0, unit="Pa")
-    if len(value) != 2:
-        raise InputError(
-            f" = {show(list(value))}: must be one number (Pa), or two: along the direction and "
-            "across",
-            name,
-        )
-    first, second = (
-        number(f"{name}[{k}]", each, above=0.0, unit="Pa") for k, each in enumerate(value)
-    )
-    return first, second
+from foldyn.values import indices, number, objects, show, single, vector
 
 
 def _direction(name: str, value: Any) -> Any:
@@ -56,32 +50,6 @@ def _direction(name: str, value: Any) -> Any:
     return number(name, value)
 
 
-def _check_material(given: Mapping[str, Any]) -> None:
-    """Refuse constants that do not fit together."""
-    moduli, nu = given["youngs_modulus"], given["poissons_ratio"]
-    if isinstance(moduli, tuple):
-        for name in OF_FIBERS:
-            if given[name] is None:
-                raise InputError(": missing; two moduli need it", name)
-        most = math.sqrt(moduli[0] / moduli[1])
-        if abs(nu) >= most:
-            raise InputError(
-                f" = {nu:g}: must lie below the root of E1/E2, {most:.4g}", "poissons_ratio"
-            )
-        return
-    if nu >= 0.5:
-        raise InputError(
-            f" = {nu:g}: must lie between -1 and 0.5, both excluded (0.5 makes the bar areas "
-            "infinite)",
-            "poissons_ratio",
-        )
-    for name in OF_FIBERS:
-        if given[name] is not None:
-            raise InputError(
-                ": belongs to orthotropic sheets; give youngs_modulus = [E1, E2] too", name
-            )
-
-
 def _panels(name: str, value: Any) -> tuple[int, ...]:
     """Return numbers of panels."""
     chosen = indices(name, value, "panel", "as in [0, 1]")
@@ -90,19 +58,18 @@ def _panels(name: str, value: Any) -> tuple[int, ...]:
     return chosen
 
 
-Modulus = Annotated[float, Check(number, above=0.0, unit="Pa")]
-Moduli = Annotated[float | Sequence[float], Check(_moduli, unit="Pa")]
-Ratio = Annotated[float, Check(number, above=-1.0)]
+Plies = Annotated[Sequence[Ply], Check(objects, kinds=(Ply,)), Read(ListOf(TableOf(Ply)))]
 Direction = Annotated[float | Sequence[Any] | Mapping[str, Any], Check(_direction)]
-Length = Annotated[float, Check(length, unit="m")]
-Density = Annotated[float, Check(number, above=0.0, unit="kg/m3")]
 MATERIAL = (
     "youngs_modulus", "poissons_ratio", "thickness", "density", "strength", "shear_modulus",
-    "direction",
+    "direction", "plies",
 )  # fmt: skip
 """Values that may differ from panel to panel."""
 OF_FIBERS = ("shear_modulus", "direction")
 """Values that isotropic sheets do not have."""
+ALIKE = 1e-9  # relative difference of values that count as equal
+OF_PLIES = ("youngs_modulus", "poissons_ratio", "thickness", "density", "shear_modulus")
+"""Values that follow from plies."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +80,7 @@ class PanelSheet(Checked):
     ----------
     panels : int or sequence of int
         Indices of the panels, in the order of `pattern.faces`.
-    youngs_modulus, poissons_ratio, thickness, density, strength, shear_modulus, direction
+    youngs_modulus, poissons_ratio, thickness, density, strength, shear_modulus, direction, plies
         As in `Sheet`. Give at least one; the sheet's values apply to the rest.
 
     Raises
@@ -130,6 +97,7 @@ class PanelSheet(Checked):
     strength: Modulus | None = None
     shear_modulus: Modulus | None = None
     direction: Direction | None = None
+    plies: Plies | None = None
 
     def agree(self) -> None:
         """Refuse panels without a value that differs."""
@@ -143,9 +111,13 @@ class PanelSheet(Checked):
 
     @property
     def instead(self) -> dict[str, Any]:
-        """The values that differ; isotropic panels have no direction."""
+        """The values that differ, with those that follow from them."""
+        if self.plies:
+            return {**dict.fromkeys(OF_PLIES), **self.own, **constants("plies", self.plies)}
+        if self.youngs_modulus is None:
+            return self.own
         isotropic = isinstance(self.youngs_modulus, float)
-        return {**(dict.fromkeys(OF_FIBERS) if isotropic else {}), **self.own}
+        return {"plies": None, **(dict.fromkeys(OF_FIBERS) if isotropic else {}), **self.own}
 
 
 @dataclass(frozen=True)
@@ -178,6 +150,9 @@ class Sheet(Checked):
         ``{"edge": (0, 1), "angle": 30}``, the angle from an edge of the pattern (from its first to
         its second vertex), continued over all creases as in the flat sheet. It turns with the
         panels.
+    plies : sequence of Ply, optional
+        Layers of a laminate from the back to the front, symmetric about the middle, in place of
+        moduli, Poisson's ratio, thickness and density.
 
     Raises
     ------
@@ -192,9 +167,9 @@ class Sheet(Checked):
     0.02
     """
 
-    youngs_modulus: Moduli
-    poissons_ratio: Ratio
-    thickness: Length
+    youngs_modulus: Moduli = None  # type: ignore[assignment]  # plies have one
+    poissons_ratio: Ratio = None  # type: ignore[assignment]
+    thickness: Length = None  # type: ignore[assignment]
     density: Density | None = None
     length_scale_ratio: Annotated[float, Check(number, above=0.0)] = 1.0
     panels: Annotated[
@@ -205,12 +180,18 @@ class Sheet(Checked):
     strength: Modulus | None = None
     shear_modulus: Modulus | None = None
     direction: Direction | None = None
+    plies: Plies | None = None
 
     place = "sheet: "
 
     def agree(self) -> None:
         """Refuse impossible materials, panels named twice, and densities of some panels only."""
-        _check_material(vars(self))
+        if self.plies:
+            self._follow(constants("plies", self.plies))
+        for name in ("youngs_modulus", "poissons_ratio", "thickness"):
+            if getattr(self, name) is None:
+                raise InputError(": missing; or give plies", name)
+        check_material(vars(self), OF_FIBERS)
         before: dict[int, int] = {}
         for i, part in enumerate(self.panels):
             if part.density is not None and self.density is None:
@@ -227,7 +208,17 @@ class Sheet(Checked):
                     )
                 before[panel] = i
             with within(f"panels[{i}]."):
-                _check_material({**vars(self), **part.instead})
+                check_material({**vars(self), **part.instead}, OF_FIBERS)
+
+    def _follow(self, made: Mapping[str, Any]) -> None:
+        """Take what plies make; refuse other values."""
+        for name, value in made.items():
+            given = getattr(self, name)
+            if given is not None and not np.allclose(given, np.array(value, float), rtol=ALIKE):
+                raise InputError(
+                    f" = {show(given)}: follows from the plies, {show(value)}; leave it out", name
+                )
+        self._set(**made)
 
     @property
     def orthotropic(self) -> bool:
@@ -246,30 +237,34 @@ class Sheet(Checked):
         return self.moduli[0]
 
     @property
-    def elastic(self) -> NDArray[np.float64]:
-        """Stiffness (3, 3) in plane stress, Pa; see `mechanics.triangle.plane_stress`."""
-        nu = self.poissons_ratio
-        if self.shear_modulus is None:
-            return self.modulus / (1.0 - nu**2) * isotropic(nu)
-        return plane_stress(*self.moduli, nu, self.shear_modulus)
-
-    @property
     def stretching(self) -> NDArray[np.float64]:
-        """Membrane stiffness (3, 3) along the material's axes, N/m."""
-        return self.thickness * self.elastic
+        """Membrane stiffness A (3, 3) along direction 1 and across, N/m; see `plane_stress`."""
+        return matrices(self.plies)[0] if self.plies else self.thickness * self._elastic
 
     @property
     def bending(self) -> NDArray[np.float64]:
-        """Bending stiffness (3, 3) along the material's axes, N m."""
-        return self.thickness**3 / 12.0 * self.elastic
+        """Bending stiffness D (3, 3) along direction 1 and across, N m."""
+        return matrices(self.plies)[2] if self.plies else self.thickness**3 / 12.0 * self._elastic
+
+    @property
+    def _elastic(self) -> NDArray[np.float64]:
+        return elastic(self.youngs_modulus, self.poissons_ratio, self.shear_modulus)
 
     @property
     def bending_modulus(self) -> float:
-        """E t^3 / (12 (1 - nu^2)), N m, with the geometric mean of E1 and E2."""
-        first, second = self.moduli
-        mean = first if first == second else math.sqrt(first * second)
-        nu2 = self.poissons_ratio**2 * second / first
-        return mean * self.thickness**3 / (12.0 * (1.0 - nu2))
+        """E t^3 / (12 (1 - nu^2)), N m; of an orthotropic sheet the root of D11 D22."""
+        if self.orthotropic:
+            own = self.bending
+            return math.sqrt(own[0, 0] * own[1, 1])
+        return self.modulus * self.thickness**3 / (12.0 * (1.0 - self.poissons_ratio**2))
+
+    @property
+    def has_strength(self) -> bool:
+        """Whether a panel, or a ply, has a strength."""
+        return any(
+            own.strength is not None or any(ply.strength for ply in own.plies or ())
+            for own in self.kinds(0)[0]
+        )
 
     @property
     def areal_density(self) -> float:
@@ -308,111 +303,3 @@ class Sheet(Checked):
 
 def _numbers(part: PanelSheet) -> tuple[int, ...]:
     return part.panels  # type: ignore[return-value]  # checked
-
-
-def check_layers(name: str, layers: Sequence[Sequence[float]]) -> tuple[tuple[float, ...], ...]:
-    """Layers of a laminate as tuples of numbers, checked."""
-    layers = single(layers)
-    listed = isinstance(layers, Sequence | np.ndarray) and not isinstance(layers, str)
-    if not listed or not len(layers):
-        raise InputError(
-            f" = {show(layers)}: give a row [thickness (m), Young's modulus (Pa), expansion (1/K)] "
-            "for each layer, from the back to the front",
-            name,
-        )
-    rows = []
-    for i, row in enumerate(layers):
-        place = f"{name}[{i}]"
-        if isinstance(row, str) or not hasattr(row, "__len__") or len(row) != 3:
-            raise InputError(
-                f" = {show(row)}: must be [thickness (m), Young's modulus (Pa), expansion (1/K)]",
-                place,
-            )
-        thickness = length(f"{place}[0]", row[0])
-        modulus = number(f"{place}[1]", row[1], above=0.0)
-        rows.append((thickness, modulus, number(f"{place}[2]", row[2])))
-    return tuple(rows)
-
-
-@dataclass(frozen=True)
-class Laminate(Checked):
-    """Layers of isotropic materials, bonded face to face.
-
-    With z_i the distance of the middle of a layer from the neutral surface, sum E_i t_i z_i = 0,
-    the free sheet has no force and no moment where its neutral surface stretches by `expansion`
-    and bends by `curvature` per kelvin,
-
-        expansion = sum E_i t_i alpha_i / sum E_i t_i
-        curvature = sum E_i t_i z_i alpha_i / sum E_i (t_i^3 / 12 + t_i z_i^2)
-
-    which for two layers is Timoshenko's formula (Analysis of bi-metal thermostats, J. Opt. Soc.
-    Am. 11, 1925, equation 4). All layers have the same Poisson's ratio.
-
-    Parameters
-    ----------
-    layers : sequence of (float, float, float)
-        Thickness (m), Young's modulus (Pa) and expansion (1/K) of each layer, from the back of the
-        sheet to the front.
-
-    Attributes
-    ----------
-    expansion : float
-        Strain of the neutral surface per kelvin, 1/K.
-    curvature : float
-        Curvature per kelvin, 1/(m K), positive if the sheet bends like a valley fold, toward its
-        front.
-
-    Examples
-    --------
-    >>> import foldyn as fd
-    >>> bimetal = fd.Laminate([(5e-4, 140e9, 1.0e-6), (5e-4, 140e9, 20.0e-6)])
-    >>> print(f"{bimetal.curvature:.4f}")  # Timoshenko: -1.5 * 19e-6 / 1e-3
-    -0.0285
-    """
-
-    layers: Annotated[Sequence[Sequence[float]], Check(check_layers)]
-
-    @property
-    def _columns(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-        """Thickness, E t, expansion and height above the neutral surface of each layer."""
-        t, modulus, expansion = np.array(self.layers).T
-        middle = np.cumsum(t) - 0.5 * t
-        stiff = modulus * t
-        return t, stiff, expansion, middle - stiff @ middle / stiff.sum()
-
-    @property
-    def _bending(self) -> float:
-        """Sum of E (t^3 / 12 + t z^2), N m."""
-        t, stiff, _, z = self._columns
-        return float(stiff @ (t**2 / 12.0 + z**2))
-
-    @property
-    def expansion(self) -> float:
-        """Strain of the neutral surface per kelvin, 1/K."""
-        _, stiff, expansion, _ = self._columns
-        return float(stiff @ expansion / stiff.sum())
-
-    @property
-    def curvature(self) -> float:
-        """Curvature per kelvin, 1/(m K), toward the front."""
-        _, stiff, expansion, z = self._columns
-        return -float(stiff @ (z * expansion)) / self._bending
-
-    def sheet(
-        self, poissons_ratio: float, areal_density: float | None = None, **others: Any
-    ) -> Sheet:
-        """Sheet with the same stiffness in stretching and in bending, about the neutral surface.
-
-        Parameters
-        ----------
-        poissons_ratio : float
-            Poisson's ratio of all layers.
-        areal_density : float, optional
-            Mass per area, kg/m2.
-        **others
-            Further arguments of `Sheet`.
-        """
-        stretching = float(self._columns[1].sum())
-        thickness = math.sqrt(12.0 * self._bending / stretching)
-        density = None if areal_density is None else areal_density / thickness
-        return Sheet(stretching / thickness, poissons_ratio, thickness, density, **others)
