@@ -23,13 +23,13 @@ from foldyn.results import case_of, load, netcdf
 from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import BAND, DAMPING, FOLDS, WATCHED
 from foldyn.studies.herkal.specimen import evaluation, synthetic, tasks
-from foldyn.studies.herkal.specimen.evaluation import FILM_SUPPORT
+from foldyn.studies.herkal.specimen.evaluation import CORNER, FILM_SUPPORT, Response
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.tasks import Part
-from foldyn.studies.herkal.vibration import CORNER, ORDINALS, TARGETS, Response
-from foldyn.studies.targets import Target, read_targets
+from foldyn.studies.herkal.targets import Target, read_targets
 
 WIDTH = 9.0  # inches
+ORDINALS = ("first", "second", "third")
 COLUMNS = 3  # number of front nodes in a row of the pattern
 SUPPORT_NAMES = {
     "glued": "plate, node 59 glued",
@@ -305,7 +305,7 @@ def _vibrations(front: xr.Dataset, data: Data) -> list[Section]:
         f"model: {name}": at["model"].sel(support=key) for key, name in SUPPORT_NAMES.items()
     }
     found = {name: evaluation.vibration_of(x.values, step) for name, x in curves.items()}
-    paper = _targets()
+    paper = read_targets("specimen")
     rows: list[list[Any]] = [
         ["paper", paper["release_frequency"].value, None, paper["release_damping"].value]
     ]
@@ -382,7 +382,7 @@ def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
         "published": "the paper's parameters", "air": "the same in air",
         "fitted": "fitted parameters",
     }  # fmt: skip
-    paper = _targets()
+    paper = read_targets("specimen")
     peaks = [paper[f"frf_{which}_peak"].value for which in ORDINALS]
     modes = load(folder / tasks.MODES)
     named = character(modes, "x")
@@ -442,7 +442,3 @@ def _response_table(responses: Mapping[str, xr.Dataset], paper: Mapping[str, Tar
 
 def _at(values: Sequence[float], k: int, factor: float = 1.0) -> float | None:
     return cell(factor * values[k]) if k < len(values) else None
-
-
-def _targets() -> Mapping[str, Target]:
-    return read_targets(TARGETS, "specimen")
