@@ -80,6 +80,9 @@ DATA: Calls = {
         "thickness": 0.5, "youngs_modulus": 1e6, "poissons_ratio": 0.25, "shear_modulus": None,
         "angle": 30.0, "density": 1000.0, "strength": [1e6, 2e6, 3e6, 4e6, 5e6],
     }),
+    "Strip": (fd.Strip, {
+        "width": 0.25, "thickness": 0.5, "youngs_modulus": 1e6, "poissons_ratio": 0.25,
+    }),
     "Laminate": (fd.Laminate, {"layers": [(0.5, 1e9, 0.125), (0.25, 2e9, 0.25)]}),
     "Fix": (fd.Fix, {"nodes": [0, 1], "axes": "xy", "along": False}),
     "Impose": (fd.Impose, {

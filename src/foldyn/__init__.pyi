@@ -138,6 +138,7 @@ from foldyn.structures import (
     PanelSheet as PanelSheet,
     Ply as Ply,
     Sheet as Sheet,
+    Strip as Strip,
     Structure as Structure,
     discretize as discretize,
 )

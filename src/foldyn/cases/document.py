@@ -34,6 +34,7 @@ from foldyn.materials import BAR_LAWS, HINGE_LAWS, HingeLaw
 from foldyn.patterns import Boards, Pattern
 from foldyn.structures import Sheet, discretize
 from foldyn.structures.discretized import Discretized
+from foldyn.structures.strip import Strip
 from foldyn.tables import read
 from foldyn.values import plain
 
@@ -240,7 +241,14 @@ class _Writer:
                 continue
             if name in LAWS:
                 section[name] = self._law(name, value)
-            elif name in PER_CREASE and not isinstance(value, Mapping):
+            elif isinstance(value, Strip):
+                section[name] = _material(vars(value))
+            elif name in PER_CREASE and isinstance(value, Mapping):
+                section[name] = {
+                    word: _material(vars(own)) if isinstance(own, Strip) else own
+                    for word, own in value.items()
+                }
+            elif name in PER_CREASE:
                 array = np.asarray(value, dtype=np.float64)
                 section[name] = self.store(f"tables_{name}", array) if array.ndim else float(value)
             else:

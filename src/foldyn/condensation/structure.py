@@ -34,6 +34,7 @@ from foldyn.shells.shell import LEAST, PER_DOUBLING
 from foldyn.structures import Sheet
 from foldyn.structures.beyond_range import doubt_units
 from foldyn.structures.calibration import (
+    Folds,
     PerCrease,
     check_creases,
     check_sheet,
@@ -63,7 +64,7 @@ class SuperelementsOptions:
     divisions: int | None = None
     mass: str = "consistent"
     fold_law: str | HingeLaw = EnhancedLinear()
-    crease_stiffness: PerCrease = None
+    crease_stiffness: Folds = None
     crease_rest: PerCrease = None
     clamped: tuple[Edge, ...] = ()
     rigid: str | tuple[int, ...] | None = None
@@ -342,7 +343,7 @@ def superelements(
     divisions: int | None = None,
     mass: str = "consistent",
     fold_law: str | HingeLaw = EnhancedLinear(),
-    crease_stiffness: PerCrease = None,
+    crease_stiffness: Folds = None,
     crease_rest: PerCrease = None,
     clamped: str | Sequence[Sequence[int]] = (),
     rigid: str | Sequence[int] | None = None,

@@ -50,6 +50,7 @@ from foldyn.shells import Shell
 from foldyn.structures import Structure
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.sheet import Sheet
+from foldyn.structures.strip import Strip
 
 SAME_AXES = 1e-9  # tolerance for axes that a screw preserves
 
@@ -236,7 +237,7 @@ def _per_crease(
     name: str, given: Any, lattice: Lattice, pattern: Pattern, vertices: Sequence[Vertex]
 ) -> Any:
     """Values for the creases of the patch, from the values for the cell."""
-    if given is None or isinstance(given, float):
+    if given is None or isinstance(given, float | Strip):
         return given
     seams, families = lattice.seams(), lattice.families()
     if isinstance(given, Mapping):

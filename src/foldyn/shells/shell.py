@@ -36,6 +36,7 @@ from foldyn.shells.term import GROUPS, ShellTerm
 from foldyn.structures import Sheet
 from foldyn.structures.beyond_range import doubt_locking, doubt_units
 from foldyn.structures.calibration import (
+    Folds,
     PerCrease,
     check_creases,
     check_sheet,
@@ -71,7 +72,7 @@ class ShellOptions:
     divisions: int = 16
     mass: str = "lumped"
     fold_law: str | HingeLaw = EnhancedLinear()
-    crease_stiffness: PerCrease = None
+    crease_stiffness: Folds = None
     crease_rest: PerCrease = None
     clamped: tuple[Edge, ...] = ()
     rigid: str | tuple[int, ...] | None = None
@@ -429,7 +430,7 @@ def shell(
     divisions: int = 16,
     mass: str | None = None,
     fold_law: str | HingeLaw | None = None,
-    crease_stiffness: PerCrease = None,
+    crease_stiffness: Folds = None,
     crease_rest: PerCrease = None,
     clamped: str | Sequence[Sequence[int]] = (),
     rigid: str | Sequence[int] | None = None,

@@ -7,6 +7,7 @@ from foldyn.structures.mesh import hinge_angles
 from foldyn.structures.ply import Ply
 from foldyn.structures.presets import PRESETS
 from foldyn.structures.sheet import PanelSheet, Sheet
+from foldyn.structures.strip import Strip
 from foldyn.structures.structure import ModelOptions, Structure
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "PanelSheet",
     "Ply",
     "Sheet",
+    "Strip",
     "Structure",
     "discretize",
     "hinge_angles",
