@@ -298,6 +298,11 @@ class Told:
             _issue(category(text))  # type: ignore
 
 
+def quietly() -> warnings.catch_warnings[None]:
+    """Leave Foldyn's warnings of the block unsaid: others have told them, or they do not matter."""
+    return warnings.catch_warnings(action="ignore", category=FoldynWarning)
+
+
 @contextmanager
 def told_once() -> Iterator[Told]:
     """Issue the warnings of the block at the end of the block, one of each kind."""

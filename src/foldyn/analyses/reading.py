@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.clamped_edges import straightened
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
-from foldyn.errors import Faults, FoldynWarning, InputError, warn, within
+from foldyn.errors import Faults, InputError, quietly, warn, within
 from foldyn.input_files import from_toml, path_of, read_text
 from foldyn.patterns import GENERATORS, Pattern, convex, imperfect, thicken, welded
 from foldyn.patterns.facets import HINGE, LINE, WELD, what_was_cut
@@ -177,8 +176,7 @@ def case_of_document(
 
     case = make(masses[0])
     cases = {masses[0]: case}
-    with warnings.catch_warnings():  # further rules would only repeat warnings
-        warnings.simplefilter("ignore", FoldynWarning)
+    with quietly():  # further rules would only repeat warnings
         cases |= {mass: make(mass) for mass in masses[1:]}
     with within("", path):
         analysis = kind.of(schema, case)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -19,7 +18,7 @@ from foldyn.cases import Case
 from foldyn.cases.clamped_edges import straightened
 from foldyn.cases.models import SHELL, SUPERELEMENTS
 from foldyn.condensation import Superelements
-from foldyn.errors import FoldynWarning, InputError, warn, within
+from foldyn.errors import InputError, quietly, warn, within
 from foldyn.linear.compared import OWN, Fidelity
 from foldyn.linear.level_error import other_level
 from foldyn.linear.linearized import linearize
@@ -431,8 +430,7 @@ def small_loads(case: Case, secant: float | None = None) -> SmallLoads:
     secant : float, optional
         As in `modes`.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with quietly():
         linear = linearize(case, secant=secant)
     force = rest_forces(case)
     free = linear.projected(force)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any, NamedTuple
@@ -16,7 +15,7 @@ from foldyn.algebra.eigen import SHIFT, Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
 from foldyn.condensation import Superelements
 from foldyn.dynamics.progress import Reporter
-from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning, StretchWarning, warn
+from foldyn.errors import InputError, ModelRangeWarning, StretchWarning, quietly, warn
 from foldyn.linear.excitation import NAMED, Answer, absolute, drive_of
 from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
@@ -222,8 +221,7 @@ def frf(
 
 def _trusted(case: Case, top: float, compared: Beside) -> dict[str, Any]:
     """Facts about the frequencies up to `top` (Hz) that are right; warns if some are not."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with quietly():
         holds, frequency, error = trusted(case, top, compared)
     own = compared.case is None
     if holds < top:

@@ -9,7 +9,6 @@ free to move along the axis.
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -24,7 +23,7 @@ from foldyn.algebra.superlu import factorize
 from foldyn.cases import Case, State
 from foldyn.condensation import Superelements
 from foldyn.dynamics.modal_damping import mass_of
-from foldyn.errors import FoldynWarning, StretchWarning, warn
+from foldyn.errors import StretchWarning, quietly, warn
 from foldyn.linear.hereditary import Branches, damped_mode
 from foldyn.linear.level_error import (
     first_doubtful,
@@ -285,8 +284,7 @@ def _variables(
 
 def _judged(case: Case, found: dict[str, Any], other: Case) -> Judged:
     """Modes of bars and hinges beside those of superelements; warns of large errors."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with quietly():
         most = min(len(found["frequency"]) + SPARE, most_modes(other))
         true = spectrum_of(other, most, verify=False, errors=False).result
     points = points_of(other, true)

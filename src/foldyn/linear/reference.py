@@ -6,7 +6,6 @@ estimated here.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, NamedTuple, Protocol
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from foldyn.algebra.extrapolation import convergence, limits
 from foldyn.arguments import Unit, brief
 from foldyn.cases import Case
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, quietly
 from foldyn.linear.mac import pairs, same_places
 from foldyn.linear.model_error import LEAST, SPARE
 from foldyn.linear.modes import elastic, modes, points_of
@@ -132,8 +131,7 @@ def modes_at_rest(case: Case, count: int, secant: float | None = None) -> xarray
     """
     asked = max(min(count + RIGID, len(case.free_dofs)), 1)  # superelements have other dofs, too
     while True:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)
+        with quietly():
             found = modes(case, asked, secant=secant, check_model=False)
         missing = count - int((found["eigenvalue"].values > 0.0).sum())
         most = int(found.attrs["free_dofs"])
