@@ -320,9 +320,7 @@ def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex
     """The values s (count,), 1/s, with the least |s|, one from each complex pair."""
     factors = bloch.factors(phase)
     free = np.flatnonzero(~bloch.held)
-    basis = np.eye(len(free))
-    if not bloch.ties.empty:
-        basis = null_space(bloch.ties.at(factors)[:, free])
+    basis = null_space(bloch.ties.at(factors)[:, free])
     stiffness, damping, mass = (
         basis.conj().T @ part.at(factors)[np.ix_(free, free)] @ basis
         for part in (bloch.stiffness, bloch.damping, bloch.mass)

@@ -126,12 +126,7 @@ def warn_of_bands(errors: NDArray) -> None:
     worst = np.abs(np.nan_to_num(errors)).argmax(axis=0)
     largest = np.nan_to_num(errors[worst, np.arange(len(worst))])
     told = _far_off("band", largest)
-    if told:
-        warn(
-            f"{told} at some wave vectors: {LINEAR}",
-            "superelements.md#bars-and-hinges-beside-them",
-            ModelRangeWarning,
-        )
+    _warn(told and f"{told} at some wave vectors")
 
 
 def judged(
@@ -161,13 +156,13 @@ def judged(
 
 def warn_of(own: Judged, elastic: NDArray) -> None:
     """Warn about modes, some (k,) of them elastic, that are far off, alone, or missing."""
-    doubts = own.doubts(elastic)
+    _warn(own.doubts(elastic))
+
+
+def _warn(doubts: str) -> None:
     if doubts:
-        warn(
-            f"{doubts}: {LINEAR}",
-            "superelements.md#bars-and-hinges-beside-them",
-            ModelRangeWarning,
-        )
+        page = "superelements.md#bars-and-hinges-beside-them"
+        warn(f"{doubts}: {LINEAR}", page, ModelRangeWarning)
 
 
 def _far_off(name: str, errors: NDArray) -> str:

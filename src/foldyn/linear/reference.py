@@ -53,11 +53,6 @@ class MeshModes(NamedTuple):
     shape: NDArray
     found: xarray.Dataset
 
-    def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
-        """Numbers (j,) of the points (m, 3) that are nodes of the mesh, and shapes (k, j, 3)."""
-        seen, place = same_places(self.structure.nodes, nodes, self.structure.pattern.size)
-        return seen, self.shape[:, place]
-
 
 def mesh_modes(case: Case, count: int) -> MeshModes:
     """The lowest elastic modes on the mesh of a case: `count`, and a few in reserve."""
@@ -78,9 +73,10 @@ def same_modes(own: MeshModes, meshes: Sequence[MeshModes], count: int) -> NDArr
     first, k = own.frequency[:count], min(count, len(own.frequency))
     frequencies = np.full((len(meshes), k), np.nan)
     for row, mesh in zip(frequencies, meshes, strict=True):
-        seen, shape = own.at(mesh.structure.nodes)
-        weights = np.ones(len(seen))
-        found = pairs(first, shape[:k], mesh.frequency, mesh.shape[:, seen], weights)
+        size = own.structure.pattern.size
+        seen, place = same_places(own.structure.nodes, mesh.structure.nodes, size)
+        shape, weights = own.shape[:k, place], np.ones(len(seen))
+        found = pairs(first, shape, mesh.frequency, mesh.shape[:, seen], weights)
         row[found.first] = mesh.frequency[found.second]
     return frequencies
 
