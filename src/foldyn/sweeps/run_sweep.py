@@ -17,8 +17,8 @@ import tomli_w
 import xarray as xr
 from numpy.typing import NDArray
 
-from foldyn.analyses.casefile import Moving
 from foldyn.analyses.keys import parts
+from foldyn.analyses.motion import MotionComputation
 from foldyn.cases.units import unit_of
 from foldyn.dynamics.gpu.choice import choose
 from foldyn.dynamics.motion import Motion
@@ -284,7 +284,7 @@ def swept(
         _check_sendable(job)
     follow = _Follow(len(set(points)), progress)
     chosen: Pool[Point, Evaluation] = pool_of(job, count, scheduler)
-    if device == "gpu" and isinstance(plan.compute, Moving):
+    if device == "gpu" and isinstance(plan.compute, MotionComputation):
         chosen = SideBySide(job, plan.compute.motion)
     with chosen as pool:
         evaluations = Evaluations[Point](pool, job.stamp, folder, follow)
@@ -328,7 +328,7 @@ class SideBySide(Here[Point, Evaluation]):
         left = iter(items)
         while some := list(islice(left, self.count)):
             begun = [(point, self.job.begun(point)) for point in some]
-            moving = [one.compute for _, one in begun if isinstance(one.compute, Moving)]
+            moving = [one.compute for _, one in begun if isinstance(one.compute, MotionComputation)]
             for k in integrate_prepared([compute.motion for compute in moving]):
                 moving[k].integrated = True
             while begun:  # frees the memory of each motion's samples
@@ -347,7 +347,7 @@ def _tell(plan: Plan, found: Sequence[Evaluation]) -> None:
 
 def _device(plan: Plan, cores: int, scheduler: str | None) -> tuple[str, dict[str, str]]:
     """Device for the points, "cpu" or "gpu", and attributes that record it."""
-    if not isinstance(plan.compute, Moving):
+    if not isinstance(plan.compute, MotionComputation):
         return "cpu", {}
     device, motion, why = plan.device, plan.compute.motion, ""
     if scheduler is not None:
