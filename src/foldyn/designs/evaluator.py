@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -35,19 +35,6 @@ Point = tuple[float, ...]
 Source = Callable[..., Case] | str | os.PathLike[str]
 
 UNCHECKED = {"check_model": False}  # the designs of a search are not compared one by one
-
-
-class Evaluator(Protocol):
-    """Evaluates measures of designs."""
-
-    @property
-    def stamp(self) -> list[Any]:
-        """Everything that the measures depend on, as JSON types."""
-        ...
-
-    def __call__(self, values: Mapping[str, Any], gradient: bool) -> tuple[NDArray, NDArray | None]:
-        """Measures (m,) of a design and, on request, derivatives (m, n) with respect to entries."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +169,7 @@ def _single(one: Asked, result: xr.Dataset, case: Case, shared: dict[Any, Any]) 
 class Evaluate:
     """Evaluates points of a space; errors become part of the evaluation."""
 
-    evaluator: Evaluator
+    evaluator: Measured
     space: Space
     gradient: bool
 

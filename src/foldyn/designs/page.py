@@ -55,7 +55,7 @@ def write_design(
     cases = {}
     for name, values in designs.items():
         try:
-            cases[name] = evaluator.case(values)  # type: ignore[attr-defined]
+            cases[name] = evaluator.case(values)
         except FoldynError:  # the guess may not give a case
             continue
     sections: list[Section | Stage] = [*_stages(plan, cases, designs, case_file)]
@@ -90,7 +90,7 @@ def _stages(
     """Results of the best design and of the first guess, side by side."""
     if case_file.analysis.kind not in SHOWN:
         return
-    results = {name: plan.evaluator.result(designs[name]) for name in cases}  # type: ignore
+    results = {name: plan.evaluator.result(designs[name]) for name in cases}
     nodes = case_file.output.nodes.tolist()
     yield stage(results, cases, f"{case_file.heading}: a design", nodes)
 

@@ -17,7 +17,7 @@ import foldyn
 from foldyn.analyses import CaseFile
 from foldyn.analyses.keys import files_moved, replaced, value_at
 from foldyn.analyses.reading import case_of_document, read_document
-from foldyn.designs.evaluator import Evaluate, Evaluator, Point, Source, measured
+from foldyn.designs.evaluator import Evaluate, Measured, Point, Source, measured
 from foldyn.designs.methods import METHODS, Settings, searched
 from foldyn.designs.problem import Problem, Space, problem_of, space_of
 from foldyn.designs.result import Design, End, history_of
@@ -65,7 +65,7 @@ class Plan:
     space : Space
     first : ndarray
         Entries of the first guess.
-    evaluator : Evaluator
+    evaluator : Measured
     method : str
     settings : Settings
     searches : int
@@ -74,7 +74,7 @@ class Plan:
     problem: Problem
     space: Space
     first: NDArray
-    evaluator: Evaluator
+    evaluator: Measured
     method: str
     settings: Settings
     searches: int
@@ -234,8 +234,8 @@ def _tell(search: Search, progress: Callable[[Course], None] | None) -> None:
     if progress is None:
         return
     best, found = search.best, search.evaluations.found
-    objective, violation = (np.nan, np.nan) if best is None else (best.numbers[0], best.violation)
-    progress(Course(len(search.rows), found, search.number, float(objective), float(violation)))
+    objective, violation = (np.nan, np.nan) if best is None else (best.objective, best.violation)
+    progress(Course(len(search.rows), found, search.number, objective, violation))
 
 
 def _end(number: int, search: Search, message: str, converged: bool) -> End:
@@ -249,9 +249,7 @@ def _end(number: int, search: Search, message: str, converged: bool) -> End:
         if _insensitive(search, best):
             why, converged = f"where no parameter changes {search.problem.objective.text}", False
         message = f"{message}; the design stays at its guess, {why}"
-    return End(
-        number, float(best.numbers[0]), best.violation, best.feasible, len(own), message, converged
-    )
+    return End(number, best.objective, best.violation, best.feasible, len(own), message, converged)
 
 
 def _insensitive(search: Search, row: Row) -> bool:
@@ -297,7 +295,7 @@ def _found(
         "feasible": int(best.feasible), "seconds": seconds,
     }  # fmt: skip
     return Design(
-        space.values(best.point), float(best.numbers[0]), best.feasible, violations, best.values,
+        space.values(best.point), best.objective, best.feasible, violations, best.values,
         gradient, tuple(ends), history_of(search.rows, best, space, problem, facts),
         len(search.rows), seconds,
     )  # fmt: skip

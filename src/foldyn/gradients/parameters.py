@@ -41,6 +41,8 @@ LEAST = 1e-6  # changes below this fraction of a value are lost in round-off
 GOLDEN = 0.6180339887498949  # multiples of this number modulo 1 are all distinct
 # round-off of a change, relative to the number itself, and to the largest number of its array
 SILENT = 1e-11, 1e-12
+DIFFERENTIATED = "load.", "imposed.", "mass", "point_masses", "alpha", "beta"
+"""Numbers of a case beside those of its body by which results have derivatives."""
 KINK = (
     "{}: the numbers of the case ({}) have a kink here: their slopes jump, such as where another "
     "diagonal of a panel becomes the shorter one, or a corner passes 120 degrees. The gradient is "
@@ -141,14 +143,9 @@ def numbers_of_motion(packed: PackedCase, start: tuple[NDArray, NDArray]) -> Arr
 
 def nothing(case: Case, pullback: Pullback) -> dict[str, NDArray]:
     """Gradient of zeros with respect to a case's numbers; `pullback` is the body's."""
-    total = {name: np.zeros_like(out) for name, out in pullback.gradient.items()}
-    for kind in ("load", "imposed"):
-        for k, (vector, _) in enumerate(getattr(case, f"{kind}_terms")):
-            total[f"{kind}.{k}"] = np.zeros_like(vector)
-    with suppress(InputError):
-        total["mass"] = np.zeros(case.mass.nnz)
-    points = {"point_masses": np.zeros_like(case.point_masses)} if case.structure.linear else {}
-    return total | points | {"alpha": np.zeros(1), "beta": np.zeros(1)}
+    others = numbers_of(case).numbers.items()
+    known = {name: array for name, array in others if name.startswith(DIFFERENTIATED)}
+    return {name: np.zeros_like(array) for name, array in {**pullback.gradient, **known}.items()}
 
 
 class Slope(NamedTuple):
