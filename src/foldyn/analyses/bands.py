@@ -18,11 +18,11 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn import plots
-from foldyn.analyses.bars import bar
+from foldyn.analyses.bars import bar, bar_closed
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
 from foldyn.analyses.ranges import Varied, varied
 from foldyn.analyses.sections import AnalysisSection, Count, Positive, Text, whole_number
-from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
+from foldyn.analyses.vibration import About, Secant, VibrationSchema, about
 from foldyn.arguments import Check, Placed
 from foldyn.cases import Case, State
 from foldyn.cases.loads import Actuate

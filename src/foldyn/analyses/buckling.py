@@ -9,11 +9,10 @@ import numpy as np
 import xarray
 
 from foldyn import plots
-from foldyn.analyses.bars import bar
+from foldyn.analyses.bars import bar, bar_closed
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
 from foldyn.analyses.path import constant_loads
 from foldyn.analyses.sections import AnalysisSection, CaseSchema, Count, some_shapes
-from foldyn.analyses.vibration import bar_closed
 from foldyn.arguments import Check
 from foldyn.cases.loads import LOAD
 from foldyn.cases.supports import SUPPORT

@@ -9,10 +9,10 @@ import numpy as np
 import xarray
 
 from foldyn import plots
-from foldyn.analyses.bars import bar
+from foldyn.analyses.bars import bar, bar_closed
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of
 from foldyn.analyses.sections import AnalysisSection, CaseSchema, Count, Positive, one_of
-from foldyn.analyses.vibration import Secant, bar_closed
+from foldyn.analyses.vibration import Secant
 from foldyn.arguments import Placed
 from foldyn.cases import Case
 from foldyn.cases.models import BARS_AND_HINGES, SUPERELEMENTS

@@ -15,18 +15,10 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn import plots
-from foldyn.analyses.bars import share_bar
+from foldyn.analyses.bars import bar_closed, share_bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, movable
 from foldyn.analyses.sections import AnalysisSection, Positive, ShownSection, one_of
-from foldyn.analyses.vibration import (
-    GONE,
-    About,
-    Secant,
-    VibrationSchema,
-    about,
-    bar_closed,
-    slope_notes,
-)
+from foldyn.analyses.vibration import GONE, About, Secant, VibrationSchema, about, slope_notes
 from foldyn.arguments import Check, arguments
 from foldyn.cases import BaseMotion, Case, Force
 from foldyn.cases.decode import PartOf

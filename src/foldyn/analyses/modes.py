@@ -12,14 +12,7 @@ from numpy.typing import NDArray
 from foldyn import plots
 from foldyn.analyses.casefile import CaseFile, arguments_of, counted
 from foldyn.analyses.sections import AnalysisSection, Animation, Count, ShownSection, some_shapes
-from foldyn.analyses.vibration import (
-    GONE,
-    About,
-    Secant,
-    VibrationAnalysis,
-    VibrationSchema,
-    slope_notes,
-)
+from foldyn.analyses.vibration import GONE, About, Secant, Vibration, VibrationSchema, slope_notes
 from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.linear import character, mac, modes, pair_modes
@@ -71,7 +64,7 @@ class ModesSchema(VibrationSchema):
     output: ModesOutput = ModesOutput()
 
 
-class ModesAnalysis(VibrationAnalysis):
+class ModesAnalysis(Vibration):
     """Natural frequencies and mode shapes about a state."""
 
     kind = "modes"

@@ -12,7 +12,7 @@ from foldyn import plots
 from foldyn.analyses.casefile import CaseFile, arguments_of, counted
 from foldyn.analyses.frf import NO_HISTORY, frequencies_of
 from foldyn.analyses.sections import AnalysisSection, Count, ShownSection, Switch
-from foldyn.analyses.vibration import About, VibrationAnalysis, VibrationSchema
+from foldyn.analyses.vibration import About, Vibration, VibrationSchema
 from foldyn.arguments import Check, arguments
 from foldyn.cases import Force
 from foldyn.cases.decode import PartOf
@@ -79,7 +79,7 @@ class RandomSchema(VibrationSchema):
     output: ShownSection = ShownSection()
 
 
-class RandomAnalysis(VibrationAnalysis):
+class RandomAnalysis(Vibration):
     """Root mean square response to a base that moves at random."""
 
     kind = "random"

@@ -9,10 +9,9 @@ import numpy as np
 import xarray
 
 from foldyn import plots
-from foldyn.analyses.bars import share_bar
+from foldyn.analyses.bars import bar_closed, share_bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
 from foldyn.analyses.sections import AnalysisSection, CaseSchema, Count, whole_number
-from foldyn.analyses.vibration import bar_closed
 from foldyn.arguments import Check
 from foldyn.dynamics import Progress
 from foldyn.periodic import response_curve

@@ -5,13 +5,12 @@ Supports and loads are preloads: they act in full in the equilibrium and have no
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Self
 
 import xarray
 
-from foldyn.analyses.bars import bar
+from foldyn.analyses.bars import bar, bar_closed
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute
 from foldyn.analyses.sections import CaseSchema, one_of
 from foldyn.analyses.start import StoredStart
@@ -20,7 +19,7 @@ from foldyn.cases import Case, Impose
 from foldyn.cases.loads import LOAD
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.supports import SUPPORT
-from foldyn.errors import ComputationError, InputError, MotionInterrupted
+from foldyn.errors import InputError
 from foldyn.tables import ListOf
 from foldyn.values import number, show
 
@@ -91,7 +90,7 @@ class VibrationSchema(CaseSchema):
                 )
 
 
-class VibrationAnalysis(Analysis):
+class Vibration(Analysis):
     """An analysis by a function of a case and a state, whose progress is unknown.
 
     Attributes
@@ -145,24 +144,3 @@ def about(case_file: CaseFile, mass: str) -> dict[str, Any]:
     """Arguments for the stored state of a case file; empty if it has none."""
     start = case_file.start(mass)._asdict()
     return {key: value for key, value in start.items() if value is not None}
-
-
-@contextmanager
-def bar_closed(bar: Any, keeps: bool = False) -> Iterator[Any]:
-    """Close a progress bar at the end.
-
-    Partial results of an equilibrium search or a simulated motion are dropped: they belong to
-    another kind of analysis.
-
-    keeps : whether the partial result of an interrupted computation belongs to this kind.
-    """
-    try:
-        yield bar
-    except ComputationError as error:
-        raise ComputationError(str(error)) from None
-    except MotionInterrupted as stop:
-        if keeps:
-            raise
-        raise KeyboardInterrupt(str(stop)) from None
-    finally:
-        bar.close()

@@ -20,13 +20,13 @@ from foldyn.cases import Case
 from foldyn.designs.problem import Space
 from foldyn.errors import ComputationError, FoldynError, InputError, Told, within
 from foldyn.gradients.measures import derivative_of, one_number
-from foldyn.gradients.run_sensitivity import FUNCTIONS, case_file_at, sensitivity
+from foldyn.gradients.run_sensitivity import FUNCTIONS, case_file_at, kind_of, sensitivity
 from foldyn.input_files import path_of
 from foldyn.store import program
 from foldyn.sweeps.evaluations import Evaluation
 from foldyn.sweeps.job import ASIDE, Job, code_of
 from foldyn.sweeps.measure import Asked
-from foldyn.values import choice, show
+from foldyn.values import show
 
 COMPUTING = ("analyses", "results", "sweeps", "gradients", "designs")
 """Folders that evaluations depend on, in addition to the solvers."""
@@ -128,13 +128,7 @@ def measured(
         kind = document.get("analysis", {}).get("kind")
         _check_keys(build, document, space)
     elif callable(build):
-        if not isinstance(analysis, Mapping) or "kind" not in analysis:
-            raise InputError(
-                f' = {show(analysis)}: say what is computed, like {{"kind": "modes", "count": 4}}',
-                "analysis",
-            )
-        kind = choice("analysis.kind", analysis["kind"], FUNCTIONS)
-        analysis = dict(analysis)
+        kind, analysis = kind_of(analysis), dict(analysis or {})
     else:
         raise InputError(f" = {show(build)}: give a function or a case file", "build")
     measures = []

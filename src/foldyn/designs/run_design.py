@@ -25,7 +25,7 @@ from foldyn.designs.search import Row, Search
 from foldyn.errors import ComputationError, InputError, warn
 from foldyn.sweeps.evaluations import Evaluation, Evaluations
 from foldyn.sweeps.pool import Here
-from foldyn.values import MOST, choice, number, whole
+from foldyn.values import MOST, choice, whole
 from foldyn.writing import write_text
 
 FLAT = 1e-12
@@ -179,12 +179,7 @@ def plan_of(
     problem = problem_of(minimize, maximize, subject_to)
     space, first = space_of(bounds, guess)
     METHODS[choice("method", method, METHODS)].check()
-    settings = Settings(
-        number("tolerance", tolerance, above=0.0, below=1.0),
-        number("slack", slack, above=0.0, below=1.0),
-        whole("max_evaluations", max_evaluations, least=1),
-        whole("seed", seed, least=0, most=2**31),
-    )
+    settings = Settings(tolerance, slack, max_evaluations, seed)
     whole("searches", searches, least=1, most=MOST)
     evaluator = measured(build, analysis, problem.places, space, METHODS[method].gradient)
     return Plan(problem, space, first, evaluator, method, settings, searches)
@@ -203,7 +198,7 @@ def designed(
         evaluations = Evaluations[Point](pool, evaluate.stamp, folder)
         search = Search(
             plan.problem, plan.space, evaluations, gradient, plan.settings.slack,
-            plan.settings.most, lambda: _tell(search, progress),
+            plan.settings.max_evaluations, lambda: _tell(search, progress),
         )  # fmt: skip
         ends = []
         for k in range(plan.searches):

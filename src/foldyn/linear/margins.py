@@ -139,7 +139,7 @@ def _stressed(
     return found, found[name].values, MOMENTS[name].format
 
 
-def place_in(found: xarray.Dataset, point: int) -> str:
+def place_in(found: xarray.Dataset, point: Any) -> str:
     """Where a point of stresses is, in words."""
     place = WORDS[str(found["point_place"].values[point])]
     number_ = found["point_number"].values[point]
