@@ -126,11 +126,10 @@ def dataset(plan: Plan, found: Sequence[Evaluation], facts: Mapping[str, Any]) -
         about = {"units": one.measure.units, "long_name": text}
         about |= {"measure": one.text}
         about = {key: text for key, text in about.items() if text}
-        data[one.name] = ((*dims, *inner), array.reshape(*shape, *array.shape[1:]), about)
-        for dim, length in zip(inner, array.shape[1:], strict=True):
-            longest = max(length, len(coordinates.get(dim, ())))
-            coordinates[dim] = 1 + np.arange(longest)
-    data = _even(data, coordinates)
+        along = {dim: 1 + np.arange(n) for dim, n in zip(inner, array.shape[1:], strict=True)}
+        values = array.reshape(*shape, *array.shape[1:])
+        # the dataset pads measures of one dimension to a common length
+        data[one.name] = xr.DataArray(values, along, (*dims, *inner), attrs=about)
     for name, text in ABOUT.items():
         array = np.array([getattr(one, name) for one in checked]).reshape(shape)
         units = {"units": "s"} if name == "seconds" else {}
@@ -166,19 +165,6 @@ def _stacked(one: Asked, found: list[Evaluation]) -> tuple[NDArray[np.float64], 
             continue
         stacked[(k, *map(slice, value.shape))] = value
     return stacked, checked
-
-
-def _even(data: Mapping[str, Any], coordinates: Mapping[str, Any]) -> dict[str, Any]:
-    """Pad variables with nan to a common length along each dimension."""
-    even = {}
-    for name, (dims, array, about) in data.items():
-        lengths = [
-            len(coordinates[dim]) if isinstance(coordinates[dim], np.ndarray) else array.shape[k]
-            for k, dim in enumerate(dims)
-        ]
-        missing = [(0, length - size) for length, size in zip(lengths, array.shape, strict=True)]
-        even[name] = (dims, np.pad(array, missing, constant_values=np.nan), about)
-    return even
 
 
 def sweep(
