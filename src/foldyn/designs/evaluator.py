@@ -67,9 +67,8 @@ class Measured:
         if not gradient:
             result, case, shared = *self._computed(values), dict[Any, Any]()
             return np.array([_single(one, result, case, shared) for one in self.measures]), None
-        width = self.space.parts(self.space.upper - self.space.lower)
-        zeros = {name: width[name] for name, value in values.items() if not np.any(value)}
-        sizes = {n: size if self.space.shapes[n] else float(size[0]) for n, size in zeros.items()}
+        width = self.space.values(self.space.upper - self.space.lower)
+        sizes = {name: width[name] for name, value in values.items() if not np.any(value)}
         texts = [one.text for one in self.measures]
         found = sensitivity(
             self.build, dict(values), measures=texts, analysis=self.analysis, sizes=sizes

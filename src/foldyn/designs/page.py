@@ -50,8 +50,7 @@ def write_design(
         File format of figures; by default none are drawn.
     """
     album, evaluator = Album(folder, figures), plan.evaluator
-    first = plan.space.values(tuple(plan.first.tolist()))
-    designs = {"after": found.parameters, "before": first}
+    designs = {"after": found.parameters, "before": plan.space.values(plan.first)}
     cases = {}
     for name, values in designs.items():
         try:
@@ -156,11 +155,8 @@ def _slopes(
 ) -> Iterator[Section]:
     """Sensitivity to each parameter; for arrays, also drawn on the sheet for each entry."""
     text = plan.problem.objective.text
-    width = plan.space.parts(plan.space.upper - plan.space.lower)
-    over = {name: np.asarray(found.gradient[name]) * width[name] for name in found.gradient}
-    slopes = {
-        name: one if plan.space.shapes[name] else float(one.item()) for name, one in over.items()
-    }
+    width = plan.space.values(plan.space.upper - plan.space.lower)
+    slopes = {name: one * width[name] for name, one in found.gradient.items()}
     caption = (
         "Derivative of the objective with respect to each parameter at the best design, times the "
         "range of the parameter. For an array: the root of the sum of squares over its entries."

@@ -280,9 +280,7 @@ def _found(
             "optimum; give another guess, or take another objective",
             "design-optimization.md#what-comes-back",
         )
-    gradient: dict[str, Any] = {}
-    if best.slopes is not None:
-        gradient = space.values(tuple(best.slopes[0].tolist()))
+    gradient = {} if best.slopes is None else space.values(best.slopes[0])
     facts = {
         "objective": problem.objective.text, "sense": "min" if problem.sign > 0.0 else "max",
         "method": plan.method, "searches": plan.searches, "seed": plan.settings.seed,

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy import sparse
 
 from foldyn.analyses import CaseFile
 from foldyn.analyses.keys import replaced
@@ -239,7 +240,8 @@ def _by_lengths(areas: Slope, numbers: Gradient) -> Slope:
         f"{prefix}bar_per_length2": -2.0 / length**3,
         f"{prefix}bar_excess": -2.0 / length,
     }
-    return Slope(by, dict.fromkeys(by, areas.entry[name]), areas.count)
+    own = areas.by[name].astype(bool)
+    return Slope({key: sparse.diags_array(each) @ own for key, each in by.items()}, areas.count)
 
 
 def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, NDArray]]:

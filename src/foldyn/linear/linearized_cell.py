@@ -131,8 +131,6 @@ class CellReach:
         first, own = displacement.size, self.rows[self.hidden]
         hidden = np.zeros(len(own))
         q = np.concatenate([displacement.ravel(), np.zeros(len(self.patch.hidden_unit))])
-        if not len(own):
-            return q
         for _ in range(ITERATIONS):
             couple = self.body.internal(q)[own]
             if not couple.any():
