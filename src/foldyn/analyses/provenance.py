@@ -56,8 +56,7 @@ def provenance(case_file: Any, results: ByRule, call: Call | None = None) -> lis
     """Table of all inputs that led to results of a `CaseFile`, and the text of the file."""
     first = next(iter(results))
     rows = inputs(case_file, case_file.case(first), results)
-    own = sum(float(result.attrs.get("wall_seconds", 0.0)) for result in results.values())
-    rows += cost_rows(results[first].attrs["foldyn_version"], call or Call(), own)
+    rows += computed(results, call or Call())
     sections: list[Section] = [Heading("How it was computed"), inputs_table(rows)]
     if case_file.text:
         sections.append(Listing(f"The case file {case_file.path.name}", case_file.text))
@@ -95,6 +94,12 @@ def inputs(case_file: Any, case: Case, results: ByRule) -> list[tuple[str, str]]
         ("initial state", _listed(case_file.start_keys)),
         ("analysis", f"{analysis.kind}; {_listed(analysis.arguments)}"),
     ]
+
+
+def computed(results: ByRule, call: Call) -> Iterator[tuple[str, str]]:
+    """Date, program, command, cost and warnings of results."""
+    own = sum(float(result.attrs.get("wall_seconds", 0.0)) for result in results.values())
+    yield from cost_rows(next(iter(results.values())).attrs["foldyn_version"], call, own)
 
 
 def cost_rows(version: str, call: Call, own: float = 0.0) -> Iterator[tuple[str, str]]:
