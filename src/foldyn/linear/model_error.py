@@ -161,8 +161,11 @@ def warn_of(own: Judged, elastic: NDArray) -> None:
 
 def _warn(doubts: str) -> None:
     if doubts:
-        page = "superelements.md#bars-and-hinges-beside-them"
-        warn(f"{doubts}: {LINEAR}", page, ModelRangeWarning)
+        warn(
+            f"{doubts}: {LINEAR}",
+            "superelements.md#bars-and-hinges-beside-them",
+            ModelRangeWarning,
+        )
 
 
 def _far_off(name: str, errors: NDArray) -> str:
