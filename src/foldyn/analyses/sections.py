@@ -74,8 +74,9 @@ def switch(name: str, value: Any) -> bool:
 
 def whole_number(name: str, value: Any, *, least: int = 1, most: int = MOST) -> int:
     """Return `value` if it is a whole number within bounds."""
-    number(name, whole(name, value), least=least, most=most)
-    return value
+    count = whole(name, value)
+    number(name, count, least=least, most=most)
+    return count
 
 
 def some_shapes(

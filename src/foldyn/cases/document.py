@@ -29,7 +29,7 @@ from foldyn.cases.loads import LOAD, Load
 from foldyn.cases.masses import MASS
 from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
 from foldyn.cases.supports import SUPPORT
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynWarning, InputError, quietly
 from foldyn.materials import BAR_LAWS, HINGE_LAWS, HingeLaw
 from foldyn.patterns import Boards, Pattern
 from foldyn.structures import Sheet, discretize
@@ -115,7 +115,7 @@ def pattern_from_document(sections: Mapping[str, Any], arrays: Mapping[str, NDAr
     """
     if not sections.get("pattern"):
         raise InputError("the stored case has no pattern")
-    with warnings.catch_warnings(action="ignore", category=FoldynWarning):
+    with quietly():
         return _undamaged(_stored_pattern, sections["pattern"], arrays)
 
 
@@ -342,7 +342,7 @@ def _structure(sections: Mapping[str, Any]) -> Any:
         if name in model:
             model[name] = law_from(model[name], laws)
     nodes = sections["nodes"]
-    with warnings.catch_warnings(action="ignore", category=FoldynWarning):
+    with quietly():
         pattern = _stored_pattern(sections["pattern"])
         sheet = read(Sheet, "sheet", sections["sheet"])
         kind = model.pop("kind", BARS_AND_HINGES)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.analyses import ANALYSES, CaseFile, Computation, read_case
-from foldyn.analyses.casefile import Kept
+from foldyn.analyses.motion import MotionComputation
 from foldyn.analyses.provenance import Call, mesh_error
 from foldyn.analyses.reading import read_as
 from foldyn.arguments import arguments
@@ -101,7 +101,7 @@ def _held_results(task: list[Computation]) -> Iterator[None]:
     """Lock the result files of motions, so that no other process stores to them."""
     with ExitStack() as stack:
         for one in task:
-            if isinstance(one.compute, Kept) and one.compute.kept:
+            if isinstance(one.compute, MotionComputation) and one.compute.kept:
                 stack.enter_context(one.compute.kept.held())
         yield
 
@@ -114,7 +114,7 @@ def _keep(task: list[Computation], folder: Path, given: Namespace) -> None:
     if seconds is not None:
         number("--checkpoint", seconds, above=0.0)
     for one in task:
-        if isinstance(one.compute, Kept):
+        if isinstance(one.compute, MotionComputation):
             how = "--resume", "--replace"
             keeping = Keeping(folder / one.file, seconds or SECONDS, resume, given.replace, how)
             one.compute.keep(keeping, not given.no_figures)
@@ -204,7 +204,7 @@ def _saved(one: Computation, result: xarray.Dataset) -> xarray.Dataset:
     """Reopen a motion's result from its final file if checkpoints kept it on disk."""
     from foldyn.results import load
 
-    keeping = one.compute.kept if isinstance(one.compute, Kept) else None
+    keeping = one.compute.kept if isinstance(one.compute, MotionComputation) else None
     if keeping is None or not keeping.begun:
         return result
     keeping.remove()

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynWarning, InputError, quietly
 from foldyn.formats.diagnosis import Diagnosis
 from foldyn.formats.drawing import Drawing, Notes, count
 from foldyn.formats.lines import MOST_LINES, Lines, too_many
@@ -164,7 +164,7 @@ def _lines(drawing: Drawing, unit: float, notes: Notes) -> Lines:
 
 def _pattern(panels: Panels, drawing: Drawing, notes: Notes) -> Pattern:
     """Pattern of panels with open cuts."""
-    with warnings.catch_warnings(action="ignore", category=FoldynWarning):
+    with quietly():
         bare = Pattern(panels.points, panels.faces)
     creases = {(a, b): k for k, (a, b) in enumerate(bare.creases.tolist())}
     given = np.array([panels.letters.get(edge, "") for edge in creases], dtype="<U1")

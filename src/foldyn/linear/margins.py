@@ -10,7 +10,7 @@ import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
-from foldyn.linear.stresses import stresses
+from foldyn.linear.stresses import ALONG, stresses
 from foldyn.patterns import Pattern
 from foldyn.patterns.crease_data import crease_values
 from foldyn.results import case_of
@@ -22,6 +22,7 @@ from foldyn.structures.sheet import Sheet
 from foldyn.values import choice, number, numbers, show
 
 LARGEST = {"random": "rms", "spectrum": "peak"}  # results that hold one value for all times
+MOMENTS = {"load_factor": ", load factor {:.6g}", "time": ", t = {:.6g} s"}
 WORDS = {
     "center": "at its center",
     "edge": "at the middle of its edge {}",
@@ -100,9 +101,7 @@ def margins(
         values |= _panels(found, factor / safety - 1.0, when)
         p = int(np.nan_to_num(values["panel_margin"], nan=np.inf).argmin())
         point = values["panel_point"][p]
-        place = WORDS[str(found["point_place"].values[point])]
-        where = place.format(found["point_number"].values[point])
-        where = f"panel {p} {where}{moment(float(values['panel_state'][p]))}"
+        where = place_in(found, point) + moment(float(values["panel_state"][p]))
         words.append((values["panel_margin"][p], where))
     creases = _crease_strengths(crease_strength, pattern)
     if creases is not None and len(creases):
@@ -137,20 +136,23 @@ def _stressed(
         found = sigmas * found if kind == "rms" else found
         return found.expand_dims("state"), np.array([np.nan]), lambda _: ""
     found = result if result.attrs["foldyn_result"] == "stresses" else stresses(result)
-    kind = str(found.attrs["of"])
-    states = {"path": ("step", "load_factor"), "trajectory": ("time", "time")}
-    first, name = states.get(kind, ("time", "time"))
-    if name in found.coords and first not in found.dims:  # of one state
+    first, name, _ = ALONG[found.attrs["of"]]
+    if name not in MOMENTS:
+        raise InputError(
+            f": stresses of {found.attrs['of']} are per unit, and have no margin; give a path, a "
+            "motion or a random response",
+            "result",
+        )
+    if first not in found.dims:  # of one state
         found = found.expand_dims(first).assign_coords({name: (first, [float(found[name])])})
-    if kind == "path":
-        return found, found["load_factor"].values, lambda at: f", load factor {at:.6g}"
-    if "time" in found.dims:
-        return found, found["time"].values, lambda at: f", t = {at:.6g} s"
-    raise InputError(
-        f": stresses of {kind} are per unit, and have no margin; give a path, a motion or a random "
-        "response",
-        "result",
-    )
+    return found, found[name].values, MOMENTS[name].format
+
+
+def place_in(found: xarray.Dataset, point: Any) -> str:
+    """Where a point of stresses is, in words."""
+    place = WORDS[str(found["point_place"].values[point])]
+    number_ = found["point_number"].values[point]
+    return f"panel {found['point_panel'].values[point]} {place.format(number_)}"
 
 
 def _factors(

@@ -21,7 +21,7 @@ from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.analyses.sections import Choice
 from foldyn.cases.models import BARS_AND_HINGES
 from foldyn.dynamics import prepare
-from foldyn.errors import FoldynError, FoldynWarning, InputError, warn
+from foldyn.errors import FoldynError, FoldynWarning, InputError, quietly, warn
 from foldyn.live.controls import changed, controls
 from foldyn.values import choice
 from foldyn.viewer import stage
@@ -247,8 +247,7 @@ def _as_kind(path: Path, document: Document, kind: str) -> Document:
     if document["analysis"]["kind"] == kind:
         return document
     make = {"modes": _modes, "frf": _response, "statics": _curve, "dynamics": _motion}[kind]
-    with warnings.catch_warnings():  # settings without meaning for this kind are left out
-        warnings.simplefilter("ignore", FoldynWarning)
+    with quietly():  # settings without meaning for this kind are left out
         return make(path, document)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.errors import FoldynWarning, InputError, warn
+from foldyn.errors import InputError, quietly, warn
 from foldyn.patterns.boards import Boards
 from foldyn.patterns.generators.arguments import check_size
 from foldyn.patterns.screw import direction
@@ -237,8 +236,7 @@ class Transforms:
             own["rim_families"] = _still_at_the_rim(self._rim(), values["faces"])
         if len(values.get("vertices", self.vertices)) != len(self.vertices):
             own["periods"] = ()  # they refer to vertex numbers
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)
+        with quietly():
             changed = type(self)(**{**own, **values})
         if "assignments" not in values:
             object.__setattr__(changed, "unlettered", self.unlettered)

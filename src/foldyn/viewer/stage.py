@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn import __version__
 from foldyn.cases import Case
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, quietly
 from foldyn.linear import character, mac
 from foldyn.patterns import Pattern
 from foldyn.plots.readings import displacements, moved_supports, stretches, total_reaction, way
@@ -307,7 +306,6 @@ def folding_case(result: xr.Dataset) -> Case:
     counts; creases have flat rest angles, since the pattern's own may be fully folded.
     """
     pattern = pattern_of(result)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with quietly():
         thin = Sheet(1.0, 0.0, THIN * pattern.size)
         return Case(discretize(pattern, thin, scheme="n4b5", crease_rest=180.0))
