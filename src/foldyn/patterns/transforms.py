@@ -92,15 +92,11 @@ class Transforms:
         about : array_like, shape (3,)
             A point on the axis (m).
         """
+        from scipy.spatial.transform import Rotation
+
         turn = np.radians(number("angle", angle, unit="degrees"))
-        x, y, z = unit = _direction("axis", axis)
-        center = np.array(vector("about", about))
-        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        rotation = (
-            np.eye(3)
-            + np.sin(turn) * cross
-            + (1.0 - np.cos(turn)) * (np.outer(unit, unit) - np.eye(3))
-        )  # Rodrigues' formula
+        center, about_axis = np.array(vector("about", about)), turn * _direction("axis", axis)
+        rotation = Rotation.from_rotvec(about_axis).as_matrix()
         return self._placed(lambda x: (x - center) @ rotation.T + center)
 
     def mirrored(self, normal: str | ArrayLike = "x", about: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
@@ -237,8 +233,7 @@ class Transforms:
             own["rim_families"] = _still_at_the_rim(self._rim(), values["faces"])
         if len(values.get("vertices", self.vertices)) != len(self.vertices):
             own["periods"] = ()  # they refer to vertex numbers
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)
+        with warnings.catch_warnings(action="ignore", category=FoldynWarning):
             changed = type(self)(**{**own, **values})
         if "assignments" not in values:
             object.__setattr__(changed, "unlettered", self.unlettered)
