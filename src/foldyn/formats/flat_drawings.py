@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -137,7 +139,7 @@ def _in_plane(lines: Lines, notes: Notes) -> Lines:
                 f"turned the drawing, which is in the plane of {'x' if even[1] else 'y'} and z, "
                 "into that of x and y"
             )
-    return Lines(points[:, :2], lines.ends, lines.letters, lines.angles, lines.source)
+    return replace(lines, points=points[:, :2])
 
 
 def _joined(lines: Lines, tolerance: float, notes: Notes) -> Lines:

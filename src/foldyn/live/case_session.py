@@ -125,8 +125,9 @@ class CaseSession:
 
     def _computed(self, wish: Any) -> Message:
         began = time.perf_counter()
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", FoldynWarning)
+        with warnings.catch_warnings(
+            record=True, action="always", category=FoldynWarning
+        ) as caught:
             answer = told(self.path, lambda: self._stage(wish))
         notes = [str(one.message) for one in caught if issubclass(one.category, FoldynWarning)]
         return {
@@ -247,8 +248,8 @@ def _as_kind(path: Path, document: Document, kind: str) -> Document:
     if document["analysis"]["kind"] == kind:
         return document
     make = {"modes": _modes, "frf": _response, "statics": _curve, "dynamics": _motion}[kind]
-    with warnings.catch_warnings():  # settings without meaning for this kind are left out
-        warnings.simplefilter("ignore", FoldynWarning)
+    # settings without meaning for this kind are left out
+    with warnings.catch_warnings(action="ignore", category=FoldynWarning):
         return make(path, document)
 
 

@@ -106,8 +106,8 @@ def folded_stage(pattern: Pattern, title: str) -> Stage:
     moves = given.any() and float(np.abs(wanted - fold_angles(pattern))[given].max()) > 1e-6
     if moves and len(pattern.faces) <= MOST_FOLDED:
         try:
-            with warnings.catch_warnings():  # `foldyn fold` reports failures to fold
-                warnings.simplefilter("ignore", FoldynWarning)
+            # `foldyn fold` reports failures to fold
+            with warnings.catch_warnings(action="ignore", category=FoldynWarning):
                 return results_stage({title: fold(pattern).path}, title)
         except FoldynError:
             pass

@@ -307,7 +307,6 @@ def folding_case(result: xr.Dataset) -> Case:
     counts; creases have flat rest angles, since the pattern's own may be fully folded.
     """
     pattern = pattern_of(result)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with warnings.catch_warnings(action="ignore", category=FoldynWarning):
         thin = Sheet(1.0, 0.0, THIN * pattern.size)
         return Case(discretize(pattern, thin, scheme="n4b5", crease_rest=180.0))
