@@ -18,7 +18,6 @@ from foldyn.condensation import Superelements
 from foldyn.errors import InputError, warn
 from foldyn.linear.shell_of import check_reduced, shell_of
 from foldyn.materials import MemoryLaw
-from foldyn.patterns import Pattern
 from foldyn.patterns.topology import components
 from foldyn.shells import Shell
 from foldyn.structures import Sheet
@@ -133,7 +132,8 @@ def creased_shell(case: Case, divisions: int | None = None) -> CreasedShell:
     split = _Split(shell, part)
     clamped = np.zeros(len(split.origin), bool)
     for edge, row in zip(shell.options.clamped, shell.clamped_nodes, strict=True):
-        clamped[split.of(_panel_at(shell.pattern, edge), row)] = True
+        panel = next(k for k, face in enumerate(shell.pattern.faces) if set(edge) <= set(face))
+        clamped[split.of(panel, row)] = True
     share = 1.0 / np.bincount(split.origin)[split.origin]
     return CreasedShell(
         nodes=shell.nodes[split.origin],
@@ -235,11 +235,6 @@ def fold_slopes(structure: Discretized) -> NDArray:
             "exports.md#input-decks",
         )
     return slope
-
-
-def _panel_at(pattern: Pattern, edge: tuple[int, int]) -> int:
-    """Panel of a boundary edge."""
-    return next(k for k, face in enumerate(pattern.faces) if set(edge) <= set(face))
 
 
 # ------------------------------------------------------------------ what is refused
