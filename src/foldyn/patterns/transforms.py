@@ -6,6 +6,7 @@ import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from inspect import signature
 from typing import Any, Self
 
 import numpy as np
@@ -215,19 +216,9 @@ class Transforms:
         **values
             New arguments of `Pattern`.
         """
-        own = {
-            "vertices": self.vertices,
-            "faces": self.faces,
-            "assignments": self.assignments,
-            "name": self.name,
-            "boards": self.boards,
-            "fold_angles": self.fold_angles,
-            "families": {name: self.creases[rows] for name, rows in self.families.items()},
-            "custom": self.custom,
-            "welds": self.welds,
-            "periods": self.periods,
-            "rim_families": self._rim(),
-        }
+        own = {name: getattr(self, name) for name in signature(type(self)).parameters}
+        own["families"] = {name: self.creases[rows] for name, rows in self.families.items()}
+        own["rim_families"] = self._rim()
         if "faces" in values:
             own["custom"] = {k: v for k, v in self.custom.items() if k != FACE_ORDERS}
             own["rim_families"] = _still_at_the_rim(self._rim(), values["faces"])
