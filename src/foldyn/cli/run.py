@@ -20,7 +20,7 @@ from foldyn.arguments import arguments
 from foldyn.cli.folder import Owner, Results, drawing, held
 from foldyn.cli.streams import Clock, noted_warnings, speech
 from foldyn.dynamics import SECONDS, Keeping
-from foldyn.errors import ComputationError, InputError, MotionInterrupted, Told
+from foldyn.errors import ComputationError, InputError, MotionInterrupted, Told, within
 from foldyn.plots import FIGURES
 from foldyn.studies import find_case
 from foldyn.tables import table_under
@@ -70,8 +70,11 @@ def run(given: Namespace) -> Path:
         _keep(task, folder, given)
         with case_file.placing():
             case_file.analysis.check([one.compute for one in task], given.figures is not None)
-        if page:
-            _check_video(case_file)
+        if page and case_file.output.animation == "mp4":
+            from foldyn.plots.writers import find_ffmpeg
+
+            with within('output.animation = "mp4": ', case_file.path):
+                find_ffmpeg()
     names = [one.file for one in task]
     say = speech(given.quiet)
     owner = Owner.of(command, path, folder)
@@ -169,8 +172,12 @@ def _computed(
     task: list[Computation], results: Results, introduction: Callable[[], None], progress: bool,
     say: Callable[[str], None],
 ) -> dict[str, xarray.Dataset]:  # fmt: skip
-    """Run all computations; save each result as soon as it is ready."""
+    """Run all computations; save each result as soon as it is ready, and say what it lacks.
+
+    A missing value without a known reason is an error.
+    """
     from foldyn.results import save
+    from foldyn.results.quantities import REASONS, missing_values
 
     done: dict[str, xarray.Dataset] = {}
     told = Told()
@@ -195,7 +202,10 @@ def _computed(
         say(one.case_file.analysis.line(one.mass, result))
         if mesh := mesh_error(result):
             say(f"  {one.mass}: {mesh}")
-        _tell_missing(one.place, result, say)
+        for name, text in missing_values(result).items():
+            if name not in REASONS:
+                raise ComputationError(f"{one.place}{name}: {text}", result)
+            say(f"  {name}: {text}")
     told.issue()
     return done
 
@@ -209,28 +219,6 @@ def _saved(one: Computation, result: xarray.Dataset) -> xarray.Dataset:
         return result
     keeping.remove()
     return load(keeping.file, whole=False)
-
-
-def _tell_missing(place: str, result: xarray.Dataset, say: Callable[[str], None]) -> None:
-    """Print which values a result lacks; raise if no known reason explains their absence."""
-    from foldyn.results.quantities import REASONS, missing_values
-
-    for name, text in missing_values(result).items():
-        if name not in REASONS:
-            raise ComputationError(f"{place}{name}: {text}", result)
-        say(f"  {name}: {text}")
-
-
-def _check_video(case_file: CaseFile) -> None:
-    """Refuse an MP4 animation without ffmpeg, before anything is computed."""
-    if case_file.output.animation != "mp4":
-        return
-    from foldyn.plots.writers import find_ffmpeg
-
-    try:
-        find_ffmpeg()
-    except InputError as error:
-        raise InputError(f'{case_file.path}: output.animation = "mp4": {error}') from None
 
 
 def _introduction(

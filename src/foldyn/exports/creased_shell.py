@@ -12,15 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from foldyn.cases import Case
 from foldyn.condensation import Superelements
 from foldyn.errors import InputError, warn
 from foldyn.linear.shell_of import check_reduced, shell_of
 from foldyn.materials import MemoryLaw
-from foldyn.patterns import Pattern
+from foldyn.patterns.topology import components
 from foldyn.shells import Shell
 from foldyn.structures import Sheet
 from foldyn.structures.discretized import Discretized
@@ -98,7 +96,7 @@ class CreasedShell:
     def loose(self) -> list[tuple[int, int]]:
         """Pairs of coincident nodes that no chain of joints connects."""
         pairs = np.concatenate([np.zeros((0, 2), int), *(joint.nodes for joint in self.joints)])
-        part = _components(pairs, len(self.nodes))
+        part = components(pairs, len(self.nodes))
         found = []
         for place in self.places:
             first = {part[place[0]]: place[0]}
@@ -137,11 +135,12 @@ def creased_shell(case: Case, divisions: int | None = None) -> CreasedShell:
     axes, fibers = panel_axes(shell.pattern), material_axes(shell.pattern, shell.sheet)
     if fibers is not None:
         axes = np.stack([fibers, np.cross(shell.pattern.face_normals, fibers)], axis=1)
-    part = _components(shell.pattern.weld_faces, len(shell.pattern.faces))
+    part = components(shell.pattern.weld_faces, len(shell.pattern.faces))
     split = _Split(shell, part)
     clamped = np.zeros(len(split.origin), bool)
     for edge, row in zip(shell.options.clamped, shell.clamped_nodes, strict=True):
-        clamped[split.of(_panel_at(shell.pattern, edge), row)] = True
+        panel = next(k for k, face in enumerate(shell.pattern.faces) if set(edge) <= set(face))
+        clamped[split.of(panel, row)] = True
     share = 1.0 / np.bincount(split.origin)[split.origin]
     return CreasedShell(
         nodes=shell.nodes[split.origin],
@@ -191,12 +190,6 @@ class _Split:
         """New node numbers for a panel."""
         keys = self._part[panel] + nodes * (self._part.max() + 1)
         return [self._number[key] for key in keys.tolist()]
-
-
-def _components(pairs: NDArray, count: int) -> NDArray:
-    """Connected component (count,) of each vertex of a graph with these edges."""
-    graph = sparse.coo_array((np.ones(len(pairs)), tuple(pairs.T)), (count, count))
-    return connected_components(graph, directed=False)[1]
 
 
 def _joints(shell: Shell, split: _Split) -> tuple[Joint, ...]:
@@ -250,11 +243,6 @@ def fold_slopes(structure: Discretized) -> NDArray:
             "exports.md#input-decks",
         )
     return slope
-
-
-def _panel_at(pattern: Pattern, edge: tuple[int, int]) -> int:
-    """Panel of a boundary edge."""
-    return next(k for k, face in enumerate(pattern.faces) if set(edge) <= set(face))
 
 
 # ------------------------------------------------------------------ what is refused

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,11 @@ class Built(NamedTuple):
 
     pattern: Pattern
     diagnosis: Diagnosis
+
+    def noted(self, kind: str, text: str, **more: Any) -> Built:
+        """Add a sentence to the assumptions, repairs or doubts, and change what else is given."""
+        told = {kind: (*getattr(self.diagnosis, kind), text)}
+        return self._replace(diagnosis=replace(self.diagnosis, **told), **more)
 
 
 def built(

@@ -403,12 +403,8 @@ def events(family: Any, step: Step, of: Multipliers) -> list[Event]:
         point = located(family, one, other, step.length, value)
         if abs(value(point)) <= SURE[name]:  # else a pair has met on the real axis instead
             events.append((name, point))
-    along = [_along(one, point) for _, point in events]
+    along = [np.append(at.z - one.z, at.p - one.p) @ one.tangent for _, at in events]
     return [Event(*events[k]) for k in np.argsort(along, kind="stable")]
-
-
-def _along(one: Point, point: Point) -> float:
-    return float(np.append(point.z - one.z, point.p - one.p) @ one.tangent)
 
 
 def _nearest(found: Found, value: float) -> float:
