@@ -295,7 +295,7 @@ def solved(folder: Path) -> Calls:
         "stresses": (fd.stresses, {"result": path}),
         "margins": (fd.margins, {
             "result": path, "strength": 1e6, "crease_strength": {"all": 2.0},
-            "factor_of_safety": 1.5, "sigmas": 3.0,
+            "factor_of_safety": 1.5, "sigmas": 3.0, "criterion": "tsai_wu",
         }),
         "imperfect": (fd.imperfect, {
             "pattern": pattern(), "amplitude": 1e-3, "shapes": None, "modes": 1,

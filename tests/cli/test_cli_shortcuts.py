@@ -242,7 +242,7 @@ def test_a_motion_under_noise(workplace, miura) -> None:
         ("", "case.toml: under which noise? Give --base AXIS UNIT F:DENSITY ..."),
         ("--base z", "--base z: write AXIS UNIT F:DENSITY F:DENSITY ..."),
         ("--base z g2/Hz 1:2 3", "--base z g2/Hz 1:2 3: write AXIS UNIT"),
-        ("--base z g2/Hz 3:1 2:1", "case.toml: analysis.base.z.frequency: give at least two"),
+        ("--base z g2/Hz 3:1 2:1", "case.toml: analysis.base.z.frequency[1] = 2.0: must increase"),
         ("--base q g2/Hz 1:1 2:1", 'case.toml: analysis.base = "q": choose one of x, y, z'),
     ],
 )

@@ -196,7 +196,7 @@ def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None
         build, values = _of_arrays(build, parameters)
     elif isinstance(build, str | os.PathLike):
         build, values, own = _of_file(build, parameters)
-        analysis = {**own, **of_kind("analysis", analysis or {}, Mapping)}
+        analysis = {**own, **of_kind("analysis", {} if analysis is None else analysis, Mapping)}
     elif callable(build):
         values = checked(parameters)
     else:

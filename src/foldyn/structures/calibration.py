@@ -275,7 +275,7 @@ def fold_stiffness(given: Folds, pattern: Pattern, sheet: Sheet) -> NDArray:
     if given is None:
         return calibrated_folds(length, pattern, sheet)
     if isinstance(given, Strip):
-        return given.stiffness(name, pattern, sheet) * length
+        return given.stiffness(pattern, sheet, name=name) * length
     strips = {}
     if isinstance(given, Mapping):
         strips = {word: own for word, own in given.items() if isinstance(own, Strip)}
@@ -283,7 +283,7 @@ def fold_stiffness(given: Folds, pattern: Pattern, sheet: Sheet) -> NDArray:
     per_length, chosen = _values(name, given, pattern)
     for word, strip in strips.items():
         rows = crease_rows(f"{name}.{word}", word, pattern, is_key=True)
-        per_length[rows] = strip.stiffness(f"{name}.{word}", pattern, sheet)[rows]
+        per_length[rows] = strip.stiffness(pattern, sheet, name=f"{name}.{word}")[rows]
     if (per_length[chosen] < 0.0).any():
         raise InputError("crease_stiffness: must not be negative")
     if chosen.all():

@@ -56,7 +56,7 @@ class Strip(Checked):
     youngs_modulus: Modulus | None = None
     poissons_ratio: Ratio | None = None
 
-    def stiffness(self, name: str, pattern: Pattern, sheet: Sheet) -> NDArray[np.float64]:
+    def stiffness(self, pattern: Pattern, sheet: Sheet, *, name: str) -> NDArray[np.float64]:
         """Stiffness (nf,) per length, N m/rad per m, as each crease of a pattern.
 
         Raises
