@@ -268,3 +268,47 @@ def test_a_direction_that_depends_on_the_way_is_refused():
 def test_bars_and_hinges_have_no_fibers():
     with pytest.raises(InputError, match="calibrated for isotropic sheets; take fd"):
         fd.discretize(MIURA, sheet())
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize("kind", ["shell", "superelements"])
+def test_frequencies_have_gradients_by_moduli_and_direction(tmp_path, kind):
+    """Beside central differences of whole computations."""
+    text = """
+        [pattern]
+        kind = "simple_fold"
+        a = 0.1
+        b = 0.12
+        dihedral = 100
+        [sheet]
+        youngs_modulus = [140e9, 10e9]
+        poissons_ratio = 0.3
+        shear_modulus = 5e9
+        thickness = 1e-3
+        density = 1600
+        direction = { edge = [0, 1], angle = 30 }
+        [model]
+        kind = "KIND"
+        divisions = 4
+        [[supports]]
+        nodes = [4, 5]
+        axes = "xyz"
+        along = true
+        [analysis]
+        kind = "modes"
+        count = 2
+        """.replace("KIND", kind)
+    path = tmp_path / "case.toml"
+    path.write_text(text)
+    values = {"sheet.youngs_modulus[1]": 10e9, "sheet.direction.angle": 30.0}
+    found = fd.sensitivity(path, values, measures="frequency[2]")
+    for (key, value), old in zip(values.items(), ("10e9", "angle = 30"), strict=True):
+        ends = []
+        for by in (-1e-3, 1e-3):
+            new = old.replace("10e9", f"{value * (1 + by)!r}").replace(
+                "30", f"{value * (1 + by)!r}"
+            )
+            path.write_text(text.replace(old, new))
+            ends.append(float(fd.read_case(path).run().frequency[1]))
+        slope = (ends[1] - ends[0]) / (2e-3 * value)
+        assert found[f"gradient_{key}"].item() == pytest.approx(slope, rel=1e-3)

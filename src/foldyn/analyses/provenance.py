@@ -19,7 +19,7 @@ from foldyn.materials.law import Law
 from foldyn.plots.load_curves import history_name
 from foldyn.report.album import ByRule
 from foldyn.report.sections import Heading, Listing, Section, Table
-from foldyn.structures import PanelSheet
+from foldyn.structures import PanelSheet, Ply
 from foldyn.values import plain
 
 if TYPE_CHECKING:
@@ -202,8 +202,12 @@ def _written(value: Any) -> str:
         return f"{value.name} ({given})" if given else value.name
     if isinstance(value, History):
         return history_name(value)
-    if isinstance(value, np.ndarray | list | tuple) and np.size(value) > MOST_LISTED:
-        return f"{np.size(value)} values"
+    if isinstance(value, np.ndarray | list | tuple):
+        size = sum(map(np.size, value))
+        if size > MOST_LISTED:
+            return f"{size} values"
+    if isinstance(value, list | tuple) and value and isinstance(value[0], Ply):
+        return " / ".join(f"{ply.angle:g}" for ply in value) + " degrees"
     if isinstance(value, list) and value and all(map(is_dataclass, value)):
         return _parts(value)
     if is_dataclass(value):
@@ -212,6 +216,10 @@ def _written(value: Any) -> str:
         return ", ".join(f"{word} {_written(one)}" for word, one in value.items())
     if isinstance(value, tuple) and all(isinstance(part, PanelSheet) for part in value):
         text = ", ".join(f"{_written(part.panels)} with {_listed(part.own)}" for part in value)
+    elif isinstance(value, tuple) and len(value) == 2 and isinstance(value[0], tuple):
+        text = f"{value[1]:g} degrees from the edge {list(value[0])}"
+    elif isinstance(value, list | tuple) and all(isinstance(part, float) for part in value):
+        text = f"[{', '.join(map(_written, value))}]"
     else:
         text = f"{value:.6g}" if isinstance(value, float) else str(plain(value))
     return text if len(text) <= MOST else f"{text[: MOST - 4]} ..."

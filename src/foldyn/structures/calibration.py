@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import arguments
 from foldyn.errors import InputError, warn
 from foldyn.patterns import Pattern
 from foldyn.patterns.crease_data import crease_rows, crease_values
@@ -258,7 +259,7 @@ def folds_given(name: str, value: Any) -> Any:
         return value
     if not isinstance(value, Mapping):
         return per_crease(name, value)
-    if {*value} & {"width"}:  # in a file
+    if {*value} & {*arguments(Strip)}:  # in a file
         return read(Strip, name, value)
     strips = {
         word: read(Strip, f"{name}.{word}", own) if isinstance(own, Mapping) else own
