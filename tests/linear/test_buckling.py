@@ -493,13 +493,6 @@ def test_refusals():
         buckling(case, 0)
 
 
-def test_superelements_are_refused():
-    made = fd.superelements(rectangle(1.0, 1.0), fd.Sheet(1e9, 0.3, 0.01, 900.0))
-    case = fd.Case(made, [fd.Fix([0, 1, 2, 3])], [fd.Gravity((0.0, 0.0, -1.0))])
-    with pytest.raises(InputError, match=r"structure: superelements .* take fd.shell"):
-        buckling(case)
-
-
 def test_the_result_holds_its_case(tmp_path):
     found = buckling(strip(2), 2)
     fd.save(found, tmp_path / "buckling.nc")

@@ -118,7 +118,7 @@ class BucklingAnalysis(Analysis):
                 "buckling",
                 "Buckling shapes, over the state before in gray. A shape has no amplitude of its "
                 "own: each is drawn so that it can be read.",
-                lambda: plots.draw_buckling(case, result, which=shown),
+                lambda: plots.draw_buckling(result, which=shown),
             )
         yield Heading("The numbers")
         yield _table(result)

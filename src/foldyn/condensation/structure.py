@@ -294,6 +294,18 @@ class Superelements(Discretized):
         points, motions = self.whole.between()
         return points, sparse.csr_array(motions @ self._dofs(edges))
 
+    def on_edges(
+        self, places: NDArray, *, edges: Mapping[int, NDArray]
+    ) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """Displacements (3 e p, m) at places (e, p) of edges, and turns (2 e (p - 1), m) between.
+
+        edges : edges that supports hold, as in `held`.
+        """
+        made, dofs = self.whole, self._dofs(edges)
+        between = 0.5 * (places[:, 1:] + places[:, :-1])
+        moved, turned = made.on_edges(places), made.turns_on_edges(between)
+        return sparse.csr_array(moved @ dofs), sparse.csr_array(turned @ dofs)
+
     @property
     def _fold_hinges(self) -> FoldHinges:
         count = len(self.folds)
