@@ -87,6 +87,7 @@ def roof(make, loads, **options):
 
 
 BOTH_HELD = [fd.Fix("xmin", along=True), fd.Fix("xmax", along=True)]
+SHEARED = [fd.Fix("xmin", along=True), fd.Fix("xmax", "xz", along=True)]
 MOVED = [
     fd.Fix("xmin", along=True),
     fd.Fix("xmax", "yz", along=True),
@@ -95,7 +96,7 @@ MOVED = [
 CASES = {
     "crease": lambda make: strip(make),
     "point forces": lambda make: strip(make, loads=[fd.Force([2, 5], (-0.5, 0.0, 0.0))]),
-    "sheared": lambda make: strip(make, BOTH_HELD[:1], [fd.LineLoad("xmax", (0.0, 1.0, 0.0))]),
+    "sheared": lambda make: strip(make, SHEARED, [fd.LineLoad("xmax", (0.0, 1.0, 0.0))]),
     "warmed": lambda make: strip(make, BOTH_HELD, [fd.Temperature(1.0, expansion=1e-5)]),
     "moved": lambda make: strip(make, MOVED, []),
     "weight": lambda make: strip(make, loads=[fd.Gravity((-9.81, 0.0, 0.0))]),
@@ -113,7 +114,7 @@ def test_beside_a_shell(name):
     assert found.attrs["departure"] == pytest.approx(expected.attrs["departure"], abs=0.005)
     assert found.attrs["free_dofs"] < 0.3 * expected.attrs["free_dofs"]
     moved, given = found["prebuckling"].values, expected["prebuckling"].values
-    np.testing.assert_allclose(moved, given, atol=0.01 * np.abs(given).max())
+    np.testing.assert_allclose(moved, given, atol=0.02 * np.abs(given).max())
     shape, other = found["shape"].values[0].ravel(), expected["shape"].values[0].ravel()
     assert (shape @ other) ** 2 > 0.99 * (shape @ shape) * (other @ other)
 
@@ -129,19 +130,7 @@ def test_a_tube(way):
         with pytest.warns(FoldynWarning, match="displacements are not small"):
             found = fd.buckling(fd.Case(make(pattern, sheet), [fd.Fix("zmin")], [load]), 1)
         factors.append(found.load_factor.values)
-    np.testing.assert_allclose(*factors, rtol=0.08)
-
-
-def test_levels_approach_the_shell():
-    expected = float(fd.buckling(strip(shell), 1).load_factor[0])
-    errors = []
-    for level in (1, 3, 5):
-        made = fd.superelements(
-            boards(1.0, 0.5, 2), SHEET, crease_stiffness=50.0, divisions=8, level=level
-        )
-        factor = float(fd.buckling(fd.Case(made, PINNED, [PRESSED]), 1).load_factor[0])
-        errors.append(abs(factor / expected - 1.0))
-    assert errors[0] < 2e-3 and errors[1] < 5e-4 and errors[2] < 1e-4
+    np.testing.assert_allclose(*factors, rtol=0.04)
 
 
 # ------------------------------------------------------------------ results and refusals

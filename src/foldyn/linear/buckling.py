@@ -53,7 +53,7 @@ def buckling(
     Parameters
     ----------
     case : Case
-        Bars and hinges, or a shell.
+        Bars and hinges, a shell, or superelements.
     count : int
         Number of factors of each sign, from the one nearest to zero on.
     preload : Load or sequence of Load, optional
@@ -68,7 +68,8 @@ def buckling(
         strains or turns of more than 10 % and are more than ten times as far from zero as the
         nearest. `shape`: the largest displacement of a node is 1, the largest component positive.
         `displacement` (m) of the base state, and `prebuckling` (m), the displacement from there per
-        unit of the factor. The case of the result has the preloads first among its loads.
+        unit of the factor. The case of the result has the preloads first among its loads; that of
+        superelements has the shell of their panels' mesh, whose nodes begin with the vertices.
         Attributes: `positive` and `negative` (numbers of factors), `complete` (number of factors
         that counts prove to be complete), `constant` (numbers of the preloads), and for the first
         factor `departure`, an estimate of its relative error, and `turn` (rad), the largest turn of
@@ -78,7 +79,8 @@ def buckling(
     ------
     InputError
         Nothing loads the case; it can move freely; it is unstable in the base state; contact, air,
-        creases that yield or creep, superelements; superlinear hinges without a slope.
+        creases that yield or creep; superlinear hinges without a slope; superelements under a
+        preload, with rigid panels, or with creases at rest at other angles than the pattern's.
     ComputationError
         No equilibrium is found under the preload; the factors do not converge.
 

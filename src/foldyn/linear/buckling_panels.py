@@ -37,10 +37,10 @@ class PanelsBase(Base):
 
     def __init__(self, case: Case) -> None:
         _refuse(case)
-        own = OrigamiProblem(case)
-        refuse_mechanisms(own)
-        structure = own.structure
+        structure = case.structure
         assert isinstance(structure, Superelements)
+        own = OrigamiProblem(case.altered(structure=structure.for_buckling))
+        refuse_mechanisms(own)
         meshes = structure.meshes
         self.case = shell_of(case, meshes.divisions[-2:][0], meshes.graded[-1].radius)
         assert isinstance(self.case.structure, Shell)
