@@ -29,12 +29,13 @@ def gable(length, width, angle):
     return fd.Pattern(vertices, [(0, 1, 3, 2), (2, 3, 5, 4)])
 
 
-def superelements(pattern, sheet, **options):
-    return fd.superelements(pattern, sheet, divisions=8, **options)
+def superelements(pattern, sheet, divisions=8, **options):
+    return fd.superelements(pattern, sheet, divisions=divisions, **options)
 
 
-def shell(pattern, sheet, **options):
-    return fd.shell(pattern, sheet, divisions=8, vertex_radius=sheet.thickness, **options)
+def shell(pattern, sheet, divisions=8, **options):
+    radius = sheet.thickness
+    return fd.shell(pattern, sheet, divisions=divisions, vertex_radius=radius, **options)
 
 
 PINNED = [fd.Fix("xmin", "xz", along=True), fd.Fix("xmax", "z", along=True), fd.Fix([0], "y")]
@@ -119,6 +120,15 @@ def test_beside_a_shell(name):
     assert (shape @ other) ** 2 > 0.99 * (shape @ shape) * (other @ other)
 
 
+def test_a_coarse_mesh_has_fewer_turns():
+    spring = fd.Spring(5.0, [1, 4], direction="z")
+    factors = [
+        fd.buckling(strip(make, [*PINNED, spring], divisions=4), 1).load_factor[0]
+        for make in (superelements, shell)
+    ]
+    assert float(factors[0]) == pytest.approx(float(factors[1]), rel=1e-3)
+
+
 @pytest.mark.matrix
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_a_tube(way):
@@ -145,6 +155,8 @@ def test_the_result_has_the_mesh_of_the_panels():
     assert np.linalg.norm(shape, axis=1).max() == pytest.approx(1.0)
     held = np.isin(rest[:, 0], (0.0, 1.0))
     assert np.abs(shape[held, 2]).max() < 1e-9
+    moved = fd.imperfect(case.structure.pattern, 1e-3, shapes=found, modes=[1]).vertices
+    assert np.abs(moved - case.structure.nodes).max() == pytest.approx(1e-3)
 
 
 def test_refusals():

@@ -62,8 +62,7 @@ class Substructures:
     def __init__(self, matrix: sparse.csr_array, owner: NDArray, factorize: Factorizer) -> None:
         self.size = matrix.shape[0]
         self.count = k = self.size - len(owner)
-        self._parts = []
-        blocks = []
+        self._parts, blocks = [], []
         for number in np.unique(owner):
             inside = k + np.flatnonzero(owner == number)
             rows = matrix[inside]
@@ -90,12 +89,11 @@ class Substructures:
         return out
 
     def pencil(self, change: sparse.csr_array) -> Pencil:
-        """The smaller pencil, with the change K1 (m, m) of K0."""
+        """The smaller pencil, with the change K1 (m, m) of K0, symmetric."""
         k, blocks, motions, size = self.count, [], [], self.count
         for part in self._parts:
             rows = change[part.inside]
             own = sparse.csr_array(rows[:, part.inside])
-            own = sparse.csr_array(0.5 * (own + own.T))
             moved = rows[:, part.outer].toarray() + own @ part.follows
             basis = _basis(part, own, moved)
             motions.append(basis)

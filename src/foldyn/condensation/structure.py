@@ -164,8 +164,11 @@ class Superelements(Discretized):
         arcs = min(m.arcs for m in self.meshes.graded[-2:])
         level, meshes = LEVELS[self.options.level - 1], self.meshes
         if self.finer is not None:
-            across = max(level.across, min(self.finer.across, 2 * arcs - 1))
-            level = self.finer._replace(across=across)
+            across, turns = (
+                max(own, min(other, 2 * arcs - 1))
+                for own, other in zip(level[1:3], self.finer[1:3], strict=True)
+            )
+            level = self.finer._replace(across=across, turns=turns)
             meshes = meshes._replace(level=level)
         if level.across >= 2 * arcs:
             raise InputError(

@@ -72,7 +72,8 @@ class PanelsBase(Base):
         ahead, behind = (self._moved_tangent(way * self.step) for way in (1.0, -1.0))
         loads = self._still.T @ self.problem.load_stiffness(self.u, 1.0) @ self._still
         warn_of_asymmetry(asymmetry(sparse.csr_array(loads)))
-        self._pencil = self._parts.pencil(sparse.csr_array((ahead - behind) / (2.0 * self.step)))
+        change = (ahead - behind) / (4.0 * self.step)
+        self._pencil = self._parts.pencil(sparse.csr_array(change + change.T))
         self.softening = Softening(
             self._pencil.stiffness, self._pencil.change, self._factorize(self._pencil.stiffness),
             self._factorize, rounding=1.0 / self.step, farthest=FARTHEST * self.step / STEP,
