@@ -24,10 +24,10 @@ from collections.abc import Callable
 import machine
 import numpy as np
 
-from foldyn.studies.herkal.opensees.stored import Moved, read_motion, stored_motions
 from foldyn.studies.herkal.runs import CASES
 from verification.fidelity.compare import markdown
 from verification.opensees import compare, run
+from verification.opensees.stored import Moved, read_motion, stored_motions
 
 Motion = Callable[[], Moved]
 

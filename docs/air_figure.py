@@ -12,7 +12,7 @@ import numpy as np
 import foldyn as fd
 from foldyn.linear import character
 from foldyn.plots import style
-from foldyn.studies.herkal.vibration import IN_AIR, specimen
+from foldyn.studies.herkal.calibration import IN_AIR, shipped
 
 IMAGES = Path(__file__).with_name("images")
 PUBLISHED = {"square": (1.0, 0.579), "1 x 2": (2.0, 0.757), "1 x 10": (10.0, 0.947)}
@@ -43,7 +43,7 @@ def main() -> None:
     left.set_yticks([0.3, 1, 3, 10], ["0.3 %", "1 %", "3 %", "10 %"])
     left.minorticks_off()
     left.legend(frameon=False)
-    found = specimen("modes", changes=IN_AIR).run("circumcenter")
+    found = shipped("specimen-modes", IN_AIR).run("circumcenter")
     share = 100.0 * found["air_share"].values[:6]
     names = [f"{k}: {name}" for k, name in enumerate(character(found, "x")["name"].values[:6], 1)]
     style.frame(right, "share of the air in the modal mass (%)", "", "the specimen")

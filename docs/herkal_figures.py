@@ -1,7 +1,8 @@
-"""Figures and tables of the page on the case studies, from a full study.
+"""Figures and tables of the page on the case studies, from a full study and one beyond the paper.
 
-    foldyn study herkal --out FOLDER
-    python docs/herkal_figures.py FOLDER
+    foldyn study herkal --out STUDY
+    python -m verification.herkal stiffnesses --out STIFFNESSES
+    python docs/herkal_figures.py STUDY STIFFNESSES
 
 writes images/herkal-*.png and specimen-test-*.png, and prints the tables in Markdown.
 """
@@ -18,13 +19,16 @@ from PIL import Image
 from foldyn import plots
 from foldyn.report import Table
 from foldyn.report.album import Album
-from foldyn.studies.herkal import report, sensitivity_page, stiffnesses_page, variations
-from foldyn.studies.herkal.claims import claims, paper_table, tolerance
-from foldyn.studies.herkal.runs import REFERENCE, label, reported, rules
-from foldyn.studies.herkal.sensitivity import BEND_LAWS
+from foldyn.studies.herkal import report
+from foldyn.studies.herkal.claims import claims, paper_table
+from foldyn.studies.herkal.runs import REFERENCE, reported
 from foldyn.studies.herkal.specimen import page
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.study import FULL, RESULTS, Study
+from verification.herkal import sensitivity_page, stiffnesses_page, variations
+from verification.herkal.models import DISTRIBUTIONS, LABELS, WiderPlan
+from verification.herkal.sensitivity import BEND_LAWS
+from verification.herkal.stiffnesses_page import WiderStudy
 
 IMAGES = Path(__file__).with_name("images")
 SPECIMEN = {
@@ -39,12 +43,12 @@ def draw(study: Study, found: variations.Variations) -> None:
     """Write the two figures."""
     nodes, axis, _ = reported("case2")
     names = (REFERENCE, "panel", "circumcenter", "consistent")
-    every = {label(m): study.result("case2", m, "motion") for m in names}
+    every = {LABELS[m]: study.result("case2", m, "motion") for m in names}
     motions = {name: motion for name, motion in every.items() if motion is not None}
     plots.plot_history(motions, nodes, axes=axis, max_frequency=5.0).savefig(
         IMAGES / "herkal-case2.png", dpi=100
     )
-    models = (*rules(), sensitivity_page.TURNED)
+    models = (*DISTRIBUTIONS, sensitivity_page.TURNED)
     sensitivity_page.plot_sensitivity(found, models, paper_table()).savefig(
         IMAGES / "herkal-sensitivity.png", dpi=100
     )
@@ -72,22 +76,30 @@ def table(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
         print(f"| {' | '.join(cells)} |")
 
 
-def main(folder: Path) -> None:
+def main(folder: Path, stiffnesses: Path) -> None:
     """Draw and print."""
     study, found = Study(FULL, folder), variations.read(variations.STORED)
+    wider = WiderStudy(WiderPlan(), stiffnesses)
     assert found is not None
     draw(study, found)
-    for case, row in study.table().items():
+    for case, row in wider.table().items():
         paper = [paper_table()[case].get(m) for m in row]
-        table([f"case {case[-1]}", *map(label, row)], [["paper", *paper], ["here", *row.values()]])
+        table(
+            [f"case {case[-1]}", *map(LABELS.__getitem__, row)],
+            [["paper", *paper], ["here", *row.values()]],
+        )
     table(
         ["claim", "paper or bound", "here", ""],
         [[v.target.what, v.asked, float(v.computed), v.word] for v in claims(study)],
     )
     for one in (
         report.rank_table(study),
-        *(one for one in stiffnesses_page.sections(study) if isinstance(one, Table)),
-        sensitivity_page.one_at_a_time(found, tolerance()),
+        *(
+            one
+            for one in stiffnesses_page.sections(wider, Album(stiffnesses))
+            if isinstance(one, Table)
+        ),
+        sensitivity_page.one_at_a_time(found),
         sensitivity_page.by_load(found),
         *(sensitivity_page.over_all(found, law) for law in BEND_LAWS),
         sensitivity_page.orientations(found),
@@ -96,8 +108,8 @@ def main(folder: Path) -> None:
         table(one.header, one.rows)
     for one in specimen(folder):
         table(one.header, one.rows)
-    print(f"\n{report.verdict(study, found)}\n\n{sensitivity_page.opinion(found)}")
+    print(f"\n{report.verdict(study)}\n\n{sensitivity_page.opinion(found)}")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -76,6 +76,13 @@ DATA: Calls = {
         "panels": [0, 1], "youngs_modulus": 1e6, "poissons_ratio": 0.25, "thickness": 0.5,
         "density": 1000.0, "strength": 2e6,
     }),
+    "Ply": (fd.Ply, {
+        "thickness": 0.5, "youngs_modulus": 1e6, "poissons_ratio": 0.25, "shear_modulus": None,
+        "angle": 30.0, "density": 1000.0, "strength": [1e6, 2e6, 3e6, 4e6, 5e6],
+    }),
+    "Strip": (fd.Strip, {
+        "width": 0.25, "thickness": 0.5, "youngs_modulus": 1e6, "poissons_ratio": 0.25,
+    }),
     "Laminate": (fd.Laminate, {"layers": [(0.5, 1e9, 0.125), (0.25, 2e9, 0.25)]}),
     "Fix": (fd.Fix, {"nodes": [0, 1], "axes": "xy", "along": False}),
     "Impose": (fd.Impose, {
@@ -288,7 +295,7 @@ def solved(folder: Path) -> Calls:
         "stresses": (fd.stresses, {"result": path}),
         "margins": (fd.margins, {
             "result": path, "strength": 1e6, "crease_strength": {"all": 2.0},
-            "factor_of_safety": 1.5, "sigmas": 3.0,
+            "factor_of_safety": 1.5, "sigmas": 3.0, "criterion": "tsai_wu",
         }),
         "imperfect": (fd.imperfect, {
             "pattern": pattern(), "amplitude": 1e-3, "shapes": None, "modes": 1,

@@ -23,7 +23,16 @@ from foldyn.values import number, whole
 
 KINDS = [*SUPPORTS, *LOADS, *DAMPINGS, *HISTORIES.values(), *BAR_LAWS.values()]
 KINDS += [*HINGE_LAWS.values(), *(method.options for method in METHODS.values()), Settings]
-KINDS += [fd.Sheet, fd.PanelSheet, fd.PointMass, fd.Contact, fd.Plane, fd.State, fd.Laminate]
+KINDS += [
+    fd.Sheet,
+    fd.PanelSheet,
+    fd.PointMass,
+    fd.Contact,
+    fd.Plane,
+    fd.State,
+    fd.Laminate,
+    fd.Ply,
+]
 OTHERWISE = {"law", "name", "solver"}
 """Arguments that are looked up where they are used."""
 Length = Annotated[float, Check(number, above=0.0, unit="m")]

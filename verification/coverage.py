@@ -1,7 +1,7 @@
 """Coverage of a fit's intervals: how often they contain the truth, over draws of the noise.
 
-`python -m verification.coverage [DRAWS] [FOLDER]` fits the folds and the damping of the
-paper specimen to synthetic data as `studies.herkal.calibration` makes them, each time with other
+`python -m verification.coverage [DRAWS] [FOLDER]` fits the folds and the damping of the paper
+specimen to synthetic data as `verification.herkal.calibration` makes them, each time with other
 noise, and writes coverage.json next to this module: every estimate with its interval. Each draw is
 fitted in full; draws share evaluations of the model at equal points, such as the start of the
 search.
@@ -19,6 +19,7 @@ import numpy as np
 
 from foldyn.experiment import Fit
 from foldyn.studies.herkal import calibration
+from verification.herkal.calibration import noisy, release_data, static_data
 
 STORED = Path(__file__).with_name("coverage.json")
 DRAWS = 100
@@ -57,7 +58,7 @@ def summary(
 
 def folds(draws: int, folder: Path) -> dict[str, Any]:
     """Coverage of the fit of the folds."""
-    data, noisy = calibration.static_data(), calibration.noisy
+    data = static_data()
     return summary(
         lambda draw: calibration.fit_folds(noisy(data, draw), folder=folder),
         draws, calibration.FOLDS,
@@ -66,8 +67,8 @@ def folds(draws: int, folder: Path) -> dict[str, Any]:
 
 def damping(draws: int, folder: Path) -> dict[str, Any]:
     """Coverage of the fit of the damping to node 8 only."""
-    case, noisy = calibration.released_case(folder), calibration.noisy
-    data = calibration.release_data(case)[:1]
+    case = calibration.released_case(folder)
+    data = release_data(case)[:1]
     return summary(
         lambda draw: calibration.fit_damping(case, noisy(data, draw), folder=folder),
         draws, calibration.DAMPING,

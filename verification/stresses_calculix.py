@@ -1,6 +1,6 @@
 """Stresses of shells and superelements beside those of CalculiX, on drawn sheets.
 
-    python -m verification.stresses_calculix [--cases 2 4 5 7 9 12] [--out FILE]
+    python -m verification.stresses_calculix [--cases 2 4 5 7 9 12] [--orthotropic] [--out FILE]
 
 takes sheets of `verification.stresses`, by number, with their supports and loads, and computes them
 with solids in CalculiX (`verification.calculix`), which must be installed as `ccx`. Of Foldyn's
@@ -16,6 +16,7 @@ import csv
 import sys
 import warnings
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -48,9 +49,20 @@ class Row(NamedTuple):
     crease: float  # largest difference of a crease's moment
 
 
-def rows(case: FreshCase, load: str) -> Iterator[Row]:
+def fibrous(sheet: fd.Sheet) -> fd.Sheet:
+    """An orthotropic sheet in place of an isotropic one, its fibers askew of the panels' edges."""
+    modulus = sheet.modulus
+    return replace(
+        sheet, youngs_modulus=(modulus, modulus / 7.0), poissons_ratio=0.3,
+        shear_modulus=modulus / 14.0, direction=25.0,
+    )  # fmt: skip
+
+
+def rows(case: FreshCase, load: str, orthotropic: bool = False) -> Iterator[Row]:
     """Errors of the three models of a sheet."""
     pattern, sheet = case.pattern(), case.sheet
+    if orthotropic:
+        sheet = fibrous(sheet)
     radius = RADIUS * sheet.thickness
     made = {
         "shell": fd.shell(pattern, sheet, divisions=DIVISIONS, vertex_radius=radius),
@@ -114,13 +126,14 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command line."""
     parser = argparse.ArgumentParser(description="Stresses beside those of CalculiX.")
     parser.add_argument("--cases", type=int, nargs="+", default=CASES, help="numbers of sheets")
+    parser.add_argument("--orthotropic", action="store_true", help="with fibers of 7 to 1")
     parser.add_argument("--out", type=Path, default=RESULTS, help="table of the errors")
     given, found = parser.parse_args(arguments), []
     sheets = chosen(max(given.cases) + 1)
     for number in given.cases:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", fd.errors.FoldynWarning)
-            found += rows(*sheets[number])
+            found += rows(*sheets[number], given.orthotropic)
         print(*found[-3:], sep="\n", file=sys.stderr, flush=True)
         with given.out.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")

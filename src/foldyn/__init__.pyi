@@ -136,7 +136,9 @@ from foldyn.structures import (
     Laminate as Laminate,
     ModelOptions as ModelOptions,
     PanelSheet as PanelSheet,
+    Ply as Ply,
     Sheet as Sheet,
+    Strip as Strip,
     Structure as Structure,
     discretize as discretize,
 )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
@@ -93,6 +93,16 @@ def within(field: str, file: object = None) -> Iterator[None]:
         yield
     except InputError as error:
         raise error.within(field, file) from None
+
+
+@contextmanager
+def renamed(names: Mapping[str, str]) -> Iterator[None]:
+    """Name fields of an `InputError` raised in the block as the user knows them."""
+    try:
+        yield
+    except InputError as error:
+        field = names.get(error.key, error.field)
+        raise InputError(error.reason, field, error.file, error.others) from None
 
 
 def optional(module: str, need: str, install: str) -> Any:
@@ -296,6 +306,11 @@ class Told:
         """Issue all warnings, at the user's line."""
         for text, category in self._texts():
             _issue(category(text))  # type: ignore
+
+
+def quietly() -> warnings.catch_warnings[None]:
+    """Leave Foldyn's warnings of the block unsaid: others have told them, or they do not matter."""
+    return warnings.catch_warnings(action="ignore", category=FoldynWarning)
 
 
 @contextmanager

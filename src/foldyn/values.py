@@ -312,6 +312,26 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
     return result
 
 
+def increasing(name: str, value: Any, **limits: Any) -> NDArray[np.float64]:
+    """Return `value`, one number or a list of them that increase, as a read-only array (k,).
+
+    limits : bounds of the first one, as in `number`.
+    """
+    array = np.atleast_1d(numbers(name, value))
+    if array.ndim != 1 or not array.size:
+        raise InputError(f" = {show(value)}: must be a list of numbers that increase", name)
+    number(f"{name}[0]", np.ravel(value)[0], **limits)
+    back = np.flatnonzero(np.diff(array) <= 0.0)
+    if back.size:
+        before, now = array[back[0] : back[0] + 2]
+        raise InputError(
+            f" = {show(now)}: must increase, and the one before it is {show(before)}; sort them "
+            "and drop doubles",
+            f"{name}[{back[0] + 1}]",
+        )
+    return array
+
+
 def writable(array: ArrayLike) -> NDArray[np.float64]:
     """Contiguous writable floats; other arrays would cause kernels to be compiled again."""
     floats = np.ascontiguousarray(array, float)

@@ -133,8 +133,8 @@ analysis.frequencies = "all": must be { first = 1, last = 25, count = 241 }, in 
 analysis.frequencies = []: must be { first = 1
 analysis.frequencies = [1, nan] | analysis.frequencies[1] = nan: must be a finite number
 analysis.frequencies = [-1, 1] | analysis.frequencies[0] = -1: must be at least 0
-analysis.frequencies = [1, 3, 2] | analysis.frequencies[2] = 2: must be greater than the frequency
-    before it (3)
+analysis.frequencies = [1, 3, 2] | analysis.frequencies[2] = 2.0: must increase, and the one before
+    it is 3.0
 analysis.frequencies.count =; analysis.frequencies.step = 1 | analysis.frequencies.step: unknown
     key; known keys: first, last, count
 analysis.frequencies.count = | analysis.frequencies.count: missing; give first and last (Hz) and

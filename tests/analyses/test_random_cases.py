@@ -122,7 +122,7 @@ def test_the_page_and_the_measures(file, tmp_path, capsys):
         ('unit = "g2/Hz"', "", r"analysis\.base\.z\.unit: missing"),
         ('unit = "g2/Hz"', 'unit = "g"', r"analysis\.base\.z\.unit = .*choose one of g2/Hz"),
         ("base.z", "base.w", r"analysis\.base = 'w'|analysis\.base = \"w\": choose one of x, y"),
-        ("[5, 20, 600]", "[20, 5, 600]", r"analysis\.base\.z\.frequency: give at least two"),
+        ("[5, 20, 600]", "[20, 5, 600]", r"analysis\.base\.z\.frequency\[1\] = 5.0: must increase"),
         ("0.001, ", "", "2 densities for 3 frequencies"),
         ("[analysis.base.z]", "[analysis.bases.z]", "analysis.bases"),
     ],

@@ -10,9 +10,9 @@ from case_texts import HELD_MIURA_TEXT, PLATE, changed
 from foldyn import plots
 from foldyn.analyses import read_case
 from foldyn.analyses.frf import driven_direction
-from foldyn.analyses.modes import shown_modes
 from foldyn.linear import peaks_of
 from foldyn.plots.frf import curves_of
+from foldyn.plots.readings import chosen_modes
 
 SHEET = changed(
     HELD_MIURA_TEXT,
@@ -52,10 +52,10 @@ def test_modes_about_an_equilibrium(write):
 @pytest.mark.matrix
 def test_which_modes_are_shown(write):
     found, _ = write('[analysis]\nkind = "modes"\ncount = 5\nsecant = 1\n[output]\nshapes = [2]\n')
-    assert shown_modes(found, 3) == [1, 2, 3]
-    assert shown_modes(found, (4, 2)) == [4, 2]
+    assert chosen_modes(found, 3) == [1, 2, 3]
+    assert chosen_modes(found, (4, 2)) == [4, 2]
     found["rigid"][:2] = True
-    assert shown_modes(found, 2) == [3, 4]
+    assert chosen_modes(found, 2) == [3, 4]
 
 
 @pytest.mark.matrix

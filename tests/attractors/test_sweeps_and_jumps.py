@@ -277,7 +277,7 @@ def test_what_cannot_be_swept_is_refused(hardening):
     for message, call in {
         "nothing drives it": lambda: fd.bifurcation_diagram(duffing(1.0), X, frequencies=[1.0]),
         "frequencies: give frequencies": lambda: fd.bifurcation_diagram(hardening, X),
-        "frequencies: must be a list": lambda: fd.bifurcation_diagram(
+        r"frequencies\[1\] = 1.0: must increase": lambda: fd.bifurcation_diagram(
             hardening, X, frequencies=[2.0, 1.0]
         ),
         "measure: must have a function": lambda: fd.swept_sine(

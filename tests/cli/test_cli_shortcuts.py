@@ -218,6 +218,39 @@ def test_the_load_factors_of_a_path_and_of_a_motion(read, miura) -> None:
     assert len(read(steady, "buckling").run().attrs["constant"]) == 1
 
 
+@pytest.mark.filterwarnings("ignore:modes above:foldyn.errors.FoldynWarning")
+def test_a_motion_under_noise(workplace, miura) -> None:
+    """The density of a base comes from the command line; loads of the motion do not act."""
+    workplace.write(changed(miura, 'model = { preset = "plate" }'))
+    base = ("--base", "z", "m2/s3", "1:0.5", "40:2", "--base", "x", "g2/Hz", "1:1e-3", "9:1e-3")
+    few = ("--count", "12", "--no-figures", "--reactions")
+    assert workplace.call("random", "case.toml", *base, *few).status == 0
+    stored = fd.load("case-random/result.nc")
+    densities = {
+        "z": fd.SpectralDensity([1.0, 40.0], [0.5, 2.0], "m2/s3"),
+        "x": fd.SpectralDensity([1.0, 9.0], [1e-3, 1e-3], "g2/Hz"),
+    }
+    expected = fd.random_response(fd.case_of(stored), base=densities, count=12, reactions=True)
+    for name in ("displacement_rms", "reaction_rms"):
+        np.testing.assert_allclose(stored[name], expected[name], rtol=1e-9)
+    assert "von_mises_rms" not in stored
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("", "case.toml: under which noise? Give --base AXIS UNIT F:DENSITY ..."),
+        ("--base z", "--base z: write AXIS UNIT F:DENSITY F:DENSITY ..."),
+        ("--base z g2/Hz 1:2 3", "--base z g2/Hz 1:2 3: write AXIS UNIT"),
+        ("--base z g2/Hz 3:1 2:1", "case.toml: analysis.base.z.frequency[1] = 2.0: must increase"),
+        ("--base q g2/Hz 1:1 2:1", 'case.toml: analysis.base = "q": choose one of x, y, z'),
+    ],
+)
+def test_bad_noise_gets_one_message(workplace, miura, words, message) -> None:
+    workplace.write(miura)
+    assert workplace.refused("random", "case.toml", *words.split()).startswith(message)
+
+
 @pytest.mark.parametrize("command", ["modes", "frf", "bands"])
 def test_help_tells_the_options(capsys, command) -> None:
     with pytest.raises(SystemExit) as left:

@@ -17,7 +17,9 @@ PATTERN = fd.patterns.simple_fold(a=1.0, b=1.3, dihedral=70)
 SHEET = fd.Sheet(2e9, 0.3, 0.02, 900.0)
 MESHES = fd.superelements(PATTERN, SHEET, divisions=4).meshes
 CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.1, 1.3, 0.0], [0.0, 1.2, 0.0]])
-GIVEN = {"corners": CORNERS, "smooth": (), "poissons_ratio": 0.3, "thickness": 0.02}
+PLAIN = fd.Sheet(1.0, 0.3, 0.02, 1.0)
+FIBERS = fd.Sheet((1.0, 0.1), 0.3, 0.02, 1.0, shear_modulus=0.05, direction=0.0)
+GIVEN = {"corners": CORNERS, "smooth": (), "sheet": PLAIN, "fibers": 0.0}
 
 
 @pytest.fixture
@@ -42,8 +44,11 @@ def test_a_panel_is_found_again_only_for_the_same_input(made):
     assert (near != CORNERS).sum() == 1
     other = MESHES._replace(graded=tuple(own._replace(radius=0.021) for own in MESHES.graded))
     for change in (
-        {"corners": near}, {"smooth": (1,)}, {"poissons_ratio": np.nextafter(0.3, 1.0)},
-        {"thickness": np.nextafter(0.02, 1.0)}, {"meshes": other},
+        {"corners": near}, {"smooth": (1,)},
+        {"sheet": replace(PLAIN, poissons_ratio=np.nextafter(0.3, 1.0))},
+        {"sheet": replace(PLAIN, thickness=np.nextafter(0.02, 1.0))}, {"meshes": other},
+        {"sheet": FIBERS}, {"sheet": FIBERS, "fibers": 0.1},
+        {"sheet": replace(FIBERS, shear_modulus=0.06)},
     ):  # fmt: skip
         count = len(made)
         for _ in range(2):
@@ -73,7 +78,7 @@ def test_files_that_cannot_be_used_are_replaced(made, tmp_path):
     first = kept(**GIVEN, meshes=MESHES)
     (path,) = tmp_path.glob("*.npz")
     sound = path.read_bytes()
-    kept(**{**GIVEN, "thickness": 0.03}, meshes=MESHES)
+    kept(**{**GIVEN, "sheet": replace(PLAIN, thickness=0.03)}, meshes=MESHES)
     (other,) = set(tmp_path.glob("*.npz")) - {path}
     flipped = bytearray(sound)
     flipped[len(sound) // 2] ^= 1
@@ -96,7 +101,7 @@ def test_a_folder_that_cannot_be_written_is_no_error(made, tmp_path, monkeypatch
 
 
 def test_the_files_used_longest_ago_go(made, tmp_path, monkeypatch):
-    thick = [{**GIVEN, "thickness": t} for t in (0.02, 0.03, 0.04)]
+    thick = [{**GIVEN, "sheet": replace(PLAIN, thickness=t)} for t in (0.02, 0.03, 0.04)]
     names = []
     for day, own in enumerate(thick[:2]):
         kept(**own, meshes=MESHES)

@@ -16,6 +16,7 @@ from foldyn.exports import opensees
 from foldyn.exports.creased_shell import creased_shell
 from foldyn.linear.linearized import linearize
 from foldyn.linear.shell_of import shell_of
+from foldyn.structures.material_axes import material_axes
 from named_models import named
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
@@ -275,6 +276,42 @@ def test_calculix_finds_what_the_shell_does(name, tmp_path):
     found, true = extrapolated(coarse[0], fine[0], 2.0), limits(ours(case.altered(loads=())))
     assert np.abs(found / true - 1.0).max() < 0.004
     assert away(fine[1], displaced(case, 8)) < 0.015
+
+
+def test_panels_of_fibers_have_axes_and_constants_of_their_own(tmp_path):
+    pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
+    sheet = fd.Sheet(
+        (9e6, 1e6), 0.25, 0.01, 1.0, shear_modulus=4e5, direction={"edge": (0, 1), "angle": 30.0},
+        panels=[fd.PanelSheet(1, thickness=0.015)],
+    )  # fmt: skip
+    case = fd.Case(fd.shell(pattern, sheet, divisions=2), [fd.Fix([4, 5], "xyz")])
+    lines = fd.export(case, tmp_path / "a.inp")[0].read_text().splitlines()
+    own = lines.index("*ELASTIC, TYPE=ENGINEERING CONSTANTS")
+    assert lines[own + 1 : own + 3] == ["9000000, 1000000, 1000000, 0.25, 0, 0, 400000, 400000",
+                                        "400000"]  # fmt: skip
+    for number, fibers in enumerate(material_axes(pattern, sheet), 1):
+        at = lines.index(f"*ORIENTATION, NAME=AXES_{number}_1")
+        axes = np.array(lines[at + 1].split(","), float).reshape(2, 3)
+        across = np.cross(pattern.face_normals[number - 1], fibers)
+        np.testing.assert_allclose(axes, [fibers, across], atol=1e-8)
+        assert f"MATERIAL=MATERIAL_{number}, ORIENTATION=AXES_{number}_1" in "\n".join(lines)
+    with pytest.raises(InputError, match=r"sheet\.youngs_modulus: triangles of OpenSees"):
+        fd.export(case, tmp_path / "a.tcl")
+
+
+def test_plies_are_a_composite_section_with_an_orientation_each(tmp_path):
+    carbon = {"youngs_modulus": (9e6, 1e6), "poissons_ratio": 0.25, "shear_modulus": 4e5}
+    plies = [fd.Ply(0.004, angle=angle, density=1.0, **carbon) for angle in (30, -30, 30)]
+    sheet = fd.Sheet(plies=plies, direction=(1.0, 0.0, 0.0))
+    flat = fd.Pattern([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2, 3)])
+    case = fd.Case(fd.shell(flat, sheet, divisions=2), [fd.Fix([0, 3], "xyz")])
+    lines = fd.export(case, tmp_path / "a.inp")[0].read_text().splitlines()
+    at = lines.index("*SHELL SECTION, ELSET=PANELS_1_1, COMPOSITE")
+    assert lines[at + 1 : at + 3] == ["0.004, 3, MATERIAL_1_1, AXES_1_1_1",
+                                      "0.004, 3, MATERIAL_1_2, AXES_1_1_2"]  # fmt: skip
+    second = lines[lines.index("*ORIENTATION, NAME=AXES_1_1_2") + 1].split(",")
+    c, s = np.cos(np.radians(-30)), np.sin(np.radians(-30))
+    np.testing.assert_allclose(np.array(second, float), [c, s, 0, -s, c, 0], atol=1e-9)
 
 
 # ------------------------------------------------------------------ what is refused

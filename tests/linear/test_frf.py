@@ -290,7 +290,7 @@ OPPOSED = [fd.Force([1], (1, 0, 0)), fd.Force([1], (-1, 0, 0))]
         ),
         ({"frequencies": []}, "frequencies"),
         ({"frequencies": [2.0, 1.0]}, "must increase"),
-        ({"frequencies": [-1.0, 1.0]}, "from 0 Hz"),
+        ({"frequencies": [-1.0, 1.0]}, r"frequencies\[0\] = -1.0: must be at least 0 Hz"),
         ({"frequencies": [1.0, np.nan]}, r"frequencies\[1\]"),
         ({"method": "drect"}, "did you mean 'direct'"),
         ({"count": 3}, "no option of the method direct"),

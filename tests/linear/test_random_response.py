@@ -294,8 +294,9 @@ def test_the_table_of_a_density():
     ("change", "told"),
     [
         ({"unit": "g/Hz"}, 'unit = "g/Hz"'),
-        ({"frequency": [20.0, 10.0]}, "frequency: give at least two frequencies"),
-        ({"frequency": [0.0, 10.0]}, "frequency: give at least two frequencies"),
+        ({"frequency": [20.0, 10.0]}, r"frequency\[1\] = 10.0: must increase"),
+        ({"frequency": [0.0, 10.0]}, r"frequency\[0\] = 0.0: must be greater than 0 Hz"),
+        ({"frequency": [10.0]}, "frequency: give at least two frequencies"),
         ({"value": [0.1, -0.1]}, "value: 2 densities for 2 frequencies"),
         ({"value": [0.1]}, "value: 1 densities for 2 frequencies"),
     ],
@@ -310,13 +311,19 @@ def test_refused_densities(change, told):
     ("given", "told"),
     [
         ({}, "base: give a base or forces"),
-        ({"base": {"u": noise(1.0)}}, 'base: "u" is no axis'),
+        ({"base": {"u": noise(1.0)}}, 'base = "u": choose one of x, y, z'),
         ({"base": {"x": noise(1.0, unit="N2/Hz")}}, r"base\['x'\]: its unit is N2/Hz"),
         ({"forces": [(fd.Force([1], (1, 0, 0)), noise(1.0))]}, r"forces\[0\]: its unit is m2/s3"),
         ({"forces": [fd.Force([1], (1, 0, 0))]}, r"forces\[0\] = .*give pairs"),
         ({"base": {"x": 0.1}}, "SpectralDensity"),
-        ({"base": {"x": noise(1.0)}, "frequencies": [2.0, 1.0]}, "frequencies: must increase"),
-        ({"base": {"x": noise(1.0)}, "frequencies": [0.0]}, "frequencies: give a list"),
+        (
+            {"base": {"x": noise(1.0)}, "frequencies": [2.0, 1.0]},
+            r"frequencies\[1\] = 1.0: must increase",
+        ),
+        (
+            {"base": {"x": noise(1.0)}, "frequencies": [0.0]},
+            r"frequencies\[0\] = 0.0: must be greater",
+        ),
     ],
 )
 def test_refused_drives(given, told):

@@ -187,7 +187,11 @@ AUXETIC = fd.Sheet(E, NU, T, panels=[fd.PanelSheet([1], poissons_ratio=-0.1)])
         (lambda: fd.PanelSheet([-1], thickness=1), r"panels = \[-1\]: panels are counted from 0"),
         (lambda: fd.PanelSheet("all", thickness=1), "panels .*must be panel numbers|not a panel"),
         (lambda: fd.PanelSheet([0], thickness=-1), "thickness = -1: must be greater than 0"),
-        (lambda: fd.PanelSheet([0], poissons_ratio=0.5), "must lie between -1 and 0.5"),
+        (lambda: fd.PanelSheet([0], poissons_ratio=-1), "poissons_ratio = -1.*greater than -1"),
+        (
+            lambda: fd.Sheet(E, NU, T, panels=[fd.PanelSheet([0], poissons_ratio=0.5)]),
+            r"panels\[0\].poissons_ratio = 0.5: must lie between -1 and 0.5",
+        ),
         (lambda: fd.Sheet(E, NU, T, panels=[OTHER]), r"\[0\].density = 2700: the rest .* has none"),
         (lambda: fd.Sheet(E, NU, T, RHO, panels=BOTH), r"panels\[1\].panels: panel 1 .* already"),
         (lambda: fd.Sheet(E, NU, T, panels=OTHER), "panels = .*must be a list of PanelSheet"),

@@ -13,7 +13,6 @@ import foldyn as fd
 from foldyn.linear.fidelity import small_loads
 from foldyn.linear.mac import likeness, pairs
 from foldyn.structures.beyond_range import BELOW, plate_frequency
-from foldyn.studies.herkal.stiffnesses import softness
 from pairwise import beyond
 from verification.fidelity import __main__ as command
 from verification.fidelity import independent
@@ -36,6 +35,7 @@ from verification.fidelity.compare import (
     write,
 )
 from verification.fidelity.statics import twisted, under_loads
+from verification.herkal.stiffnesses import softness
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 SETS = ("documented", "drawn")

@@ -7,7 +7,14 @@ import pytest
 
 import foldyn as fd
 from foldyn.studies import find_case
-from foldyn.studies.herkal import calibration
+from foldyn.studies.herkal.calibration import (
+    DAMPING_RANGES,
+    FOLD_RANGES,
+    MIRRORED,
+    WEIGHTS,
+    released_case,
+)
+from verification.herkal import calibration
 
 CASE = find_case("herkal/specimen")
 
@@ -19,7 +26,7 @@ def static_data():
 
 @pytest.fixture(scope="module")
 def released(tmp_path_factory):
-    return calibration.released_case(tmp_path_factory.mktemp("released"), step=0.002)
+    return released_case(tmp_path_factory.mktemp("released"), step=0.002)
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +35,7 @@ def release_data(released):
 
 
 def test_the_weights_are_those_of_the_paper(static_data) -> None:
-    np.testing.assert_allclose(static_data[0].force, calibration.WEIGHTS, rtol=1e-6)
+    np.testing.assert_allclose(static_data[0].force, WEIGHTS, rtol=1e-6)
     assert (np.diff(static_data[0].displacement) > 0.0).all()
 
 
@@ -36,7 +43,7 @@ def test_the_weights_are_those_of_the_paper(static_data) -> None:
 def test_folds_from_forces_and_shapes(static_data) -> None:
     """The issue asks for 3 % and 2 degrees."""
     data = calibration.noisy(static_data, np.random.default_rng(7))
-    found = fd.fit(CASE, data, parameters=calibration.FOLD_RANGES, ties=calibration.MIRRORED)
+    found = fd.fit(CASE, data, parameters=FOLD_RANGES, ties=MIRRORED)
     ratio, theta = found.estimates
     assert ratio.value == pytest.approx(2.7, rel=0.03)
     assert theta.value == pytest.approx(75.0, abs=2.0)
@@ -53,7 +60,7 @@ def test_folds_from_forces_and_shapes(static_data) -> None:
 def test_damping_from_node_8_alone(released, release_data) -> None:
     """The issue asks for 10 %; all other front nodes are held out, and follow."""
     data = calibration.noisy(release_data, np.random.default_rng(7))
-    found = fd.fit(released, data, parameters=calibration.DAMPING_RANGES)
+    found = fd.fit(released, data, parameters=DAMPING_RANGES)
     for one, truth in zip(found.estimates, (14.4, 4.1e-4), strict=True):
         assert one.value == pytest.approx(truth, rel=0.1)
         assert one.value == pytest.approx(truth, abs=4.0 * one.standard_error)

@@ -5,20 +5,27 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from pathlib import Path
 
 import pytest
 
 import foldyn as fd
-from foldyn.cli.main import main
-from foldyn.errors import FoldynWarning
-from foldyn.store import digest
-from foldyn.studies.herkal import report, runs, sensitivity, sensitivity_page, variations
-from foldyn.studies.herkal import study as studies
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.linear.fidelity import MODELS as BESIDE
+from foldyn.studies.herkal import report, runs
 from foldyn.studies.herkal.claims import paper_table, tolerance
 from foldyn.studies.herkal.metric import errors
-from foldyn.studies.herkal.runs import REFERENCE, Job, Numerics, Variant, paper_rules, rules
-from foldyn.studies.herkal.sensitivity import (
+from foldyn.studies.herkal.runs import REFERENCE, RULES, Numerics
+from verification.herkal import __main__ as command
+from verification.herkal import sensitivity, sensitivity_page, variations
+from verification.herkal.models import (
+    DISTRIBUTIONS,
+    OTHERS,
+    STIFFNESSES,
+    Variant,
+    Varied,
+    case_with,
+)
+from verification.herkal.sensitivity import (
     BEND_LAWS,
     CALIBRATIONS,
     MODELS,
@@ -26,16 +33,62 @@ from foldyn.studies.herkal.sensitivity import (
     Comparison,
     tasks,
 )
-from foldyn.studies.herkal.specimen import tasks as tasks_of_the_specimen
-from foldyn.studies.herkal.variations import (
-    Variations,
-    frequency_errors,
-    likeness,
-    rank_correlation,
-    standings,
-)
+from verification.herkal.variations import Variations, frequency_errors, likeness, standings
 
 SHORT = Numerics(divisions=2, dt=0.01, duration=0.5)
+
+
+# ---------------------------------------------------------------------- models
+@pytest.mark.parametrize("name", [*STIFFNESSES, *OTHERS, "inertia_exact"])
+def test_models_share_supports_and_loads(name):
+    case_file = runs.case_study("case2")
+    given, case = case_file.case(), case_with(case_file, name)
+    assert case.loads == given.loads and case.damping == given.damping
+    assert case.structure.mass.sum() == pytest.approx(given.structure.mass.sum(), rel=1e-12)
+    assert case.structure.options.fold_law == given.structure.options.fold_law
+    with pytest.raises(InputError, match="choose one of shell, equi_inertial"):
+        case_with(case_file, "voronoi")
+
+
+def test_models_beyond_the_paper_are_those_of_the_fidelity_study():
+    """No variant of bends and calibration is one of theirs; distributions keep the file's."""
+    case_file = runs.case_study("case2")
+    for name in STIFFNESSES:
+        made = [
+            case_with(case_file, name, variant).structure.options
+            for variant in (Variant(), Variant(bend_law="superlinear", calibration="merlin2"))
+        ]
+        assert made[0] == made[1]
+        options = vars(made[0])
+        assert {key: options[key] for key in BESIDE[name]} == dict(BESIDE[name])
+    own = vars(case_file.case().structure.options)
+    for name in DISTRIBUTIONS:
+        options = vars(case_with(case_file, name).structure.options)
+        assert {key for key in own if own[key] != options[key]} <= {"mass"}
+
+
+def test_variants():
+    case_file = runs.case_study("case2")
+    given = Variant(pulse=0.1, loads="edge", bend_law="linear", calibration="merlin2")
+    case = case_with(case_file, "panel", given)
+    assert [(load.history, load.nodes) for load in case.loads] == [
+        (fd.HalfSine(0.1), (6, 7, 8)),
+    ]
+    assert case.structure.options.bend_law == "linear"
+    assert case.structure.options.calibration == "merlin2"
+    assert case.structure.options.mass == "panel"
+    assert given.name == "pulse0.1-edge-linear-merlin2" and Variant().name == ""
+    assert given.of_shell == Variant(pulse=0.1, loads="edge")
+    with pytest.raises(InputError, match="choose one of file, edge"):
+        Variant(loads="corner")
+
+
+def test_variants_of_a_computation_are_kept_apart():
+    jobs = [Varied("case1", "panel", "path", SHORT, one) for one in (Variant(), Variant(0.1))]
+    assert [job.name for job in jobs] == ["case1-panel-path", "case1-panel-path-pulse0.1"]
+    assert jobs[0].settings() != jobs[1].settings()
+    coarse, fine = (Varied("case1", "n5b8e", "motion", Numerics(dt=dt)) for dt in (0.01, 0.02))
+    assert coarse.settings() != fine.settings()  # it has steps of its own
 
 
 # ---------------------------------------------------------------------- tasks
@@ -60,8 +113,8 @@ def test_a_task_keeps_the_errors_against_the_shell_under_the_same_load(tmp_path)
         itertools.product(BEND_LAWS, CALIBRATIONS)
     )
     variant = Variant(0.25, "edge", "linear", "merlin2")
-    shell = runs.compute(Job("case2", REFERENCE, "motion", SHORT, variant.of_shell))
-    ours = runs.compute(Job("case2", "panel", "motion", SHORT, variant))
+    shell = Varied("case2", REFERENCE, "motion", SHORT, variant.of_shell).compute()
+    ours = Varied("case2", "panel", "motion", SHORT, variant).compute()
     expected = errors(ours, shell, [6, 7, 8], "x").mean()
     assert rows[-1]["panel"] == pytest.approx(expected, rel=1e-9)
     assert rows[0]["panel"] != rows[1]["panel"] != rows[2]["panel"]  # each changes something
@@ -100,29 +153,6 @@ def test_frequencies_are_those_of_partners(tmp_path):
     assert first["mac"] > 0.9 and first["frequency"] == pytest.approx(first["shell"], rel=0.2)
 
 
-def test_the_program_is_told_by_what_computes(tmp_path):
-    for name in (*runs.COMPUTING, *tasks_of_the_specimen.COMPUTING):
-        assert (Path(fd.__file__).parent / name).exists(), name
-    for name in ("shells/shell.py", "studies/herkal/runs.py", "studies/herkal/report.py"):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text("a = 1\n")
-    before = digest(tmp_path)
-    (tmp_path / "studies/herkal/report.py").write_text("a = 2\n")
-    assert digest(tmp_path) == before
-    assert digest(tmp_path, "studies/herkal/report.py") != before
-    (tmp_path / "shells/shell.py").write_text("a = 2\n")
-    assert digest(tmp_path) != before
-
-
-@pytest.mark.matrix
-def test_results_of_another_program_are_computed_again(tmp_path, monkeypatch):
-    job = Job("case1", "panel", "path")
-    job.make(tmp_path)
-    assert job.there(tmp_path)
-    monkeypatch.setattr(runs, "program", lambda: "another")
-    assert not job.there(tmp_path)
-
-
 # ---------------------------------------------------------------------- summaries
 def row(case, values, pulse=0.5, loads="file", bends="superlinear", calibration="standard"):
     named = dict(zip("abc", values, strict=True))
@@ -148,7 +178,6 @@ def test_likeness():
     assert found.largest == pytest.approx(3.0)
     assert found.median == pytest.approx(0.5 * (0.5 + 0.1))
     assert found.correlation == pytest.approx(0.5 * (1.0 - 1.0))
-    assert rank_correlation({"a": 1, "b": 2, "c": 3}, {"a": 1, "b": 3, "c": 2}) == 0.5
 
 
 def test_frequencies_are_compared_where_all_have_a_partner():
@@ -218,40 +247,47 @@ def test_stored_tables_know_what_cannot_differ(stored):
     for r in stored.chosen(case="case1", calibration="merlin2"):  # squares: one order as the other
         same = stored.chosen(**{k: r[k] for k in ("case", "pulse", "loads", "bend_law")},
                              calibration="standard")  # fmt: skip
-        assert [r[m] for m in rules()] == [same[0][m] for m in rules()]
+        assert [r[m] for m in DISTRIBUTIONS] == [same[0][m] for m in DISTRIBUTIONS]
     low = [r for r in stored.frequencies if r["mode"] == 1 and r["bend_law"] == "superlinear"]
     assert all(abs(r["frequency"] / r["shell"] - 1.0) < 0.25 for r in low)
 
 
 @pytest.mark.matrix
 def test_page_of_the_sensitivity(stored, tmp_path):
-    page = report.write_sensitivity(stored, tmp_path).read_text("utf-8")
+    page = sensitivity_page.write(stored, tmp_path).read_text("utf-8")
     assert page.count("<img") == 1 and stored.about in page
     for text in ("load on every node of the edge", "merlin2", "other corners", "best of 56"):
         assert text in page
     assert ">nan<" not in page
     told = sensitivity_page.opinion(stored)
     hits = sum(
-        min(paper_rules(), key=lambda m: r[m])
-        == min(paper_rules(), key=lambda m: paper_table()[r["case"]][m])
+        min(RULES, key=lambda m: r[m]) == min(RULES, key=lambda m: paper_table()[r["case"]][m])
         for r in stored.chosen(bend_law="superlinear")
     )
     assert f"{hits} of 56 combinations" in told
-    assert sensitivity_page.sections(Variations("", [], []), None, tolerance()) == []
+    assert sensitivity_page.sections(Variations("", [], []), None) == []
+
+
+def test_the_bound_on_the_page_of_the_study_is_explained_by_these_tables(stored):
+    """`report.BOUND` has the medians in percent: half and twice the pulse, the whole edge."""
+    changes = {"pulse": 0.25}, {"pulse": 1.0}, {"loads": "edge"}
+    moved = [
+        likeness(stored.filed(**change), stored.filed(), tuple(RULES), tolerance()).median
+        for change in changes
+    ]
+    assert [f"{one:.0%}" for one in moved] == re.findall(r"\d+%", report.BOUND)
 
 
 @pytest.mark.matrix
 def test_the_command_varies_and_goes_on(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(runs, "CASES", ("case1",))
-    monkeypatch.setattr(studies, "QUICK", studies.StudyPlan(SHORT))
+    monkeypatch.setattr(command.studies, "QUICK", command.studies.StudyPlan(SHORT))
     monkeypatch.setattr(sensitivity, "PULSES", (0.5,))
-    monkeypatch.setattr("foldyn.cli.study.PROCESSES", 1)
     monkeypatch.setattr(sensitivity_page, "PULSES", (0.5,))
-    command = ["study", "herkal", "--quick", "--sensitivity", "--out", str(tmp_path / "study")]
-    assert main(command) == 0
-    found = variations.read(tmp_path / "study" / report.SENSITIVITY)
+    given = ["sensitivity", "--cases", "case1", "--processes", "1", "--out", str(tmp_path)]
+    assert command.main(given) == 0
+    found = variations.read(tmp_path)
     assert len(found.motions) == 4 and "2 divisions" in found.about
-    assert (tmp_path / "study" / "sensitivity.html").is_file()
-    capsys.readouterr()
-    assert main(command) == 0
-    assert "skipped 2 of 2 runs" in capsys.readouterr().out
+    assert (tmp_path / "sensitivity.html").is_file()
+    assert "0 runs were there" in capsys.readouterr().out
+    assert command.main(given) == 0
+    assert "2 runs were there" in capsys.readouterr().out

@@ -17,7 +17,7 @@ from foldyn.cli.main import main
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.experiment import ForceDisplacement, TimeHistory
 from foldyn.report.album import Album
-from foldyn.studies.herkal import calibration, vibration
+from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import DAMPING, FOLDS, FRONT, FULL, WATCHED
 from foldyn.studies.herkal.specimen import evaluation, measured, page, prepared, synthetic, tasks
 from foldyn.studies.herkal.specimen.evaluation import vibration_of
@@ -28,7 +28,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore:damping. beta resists rotations"),  # as the paper's model
 ]
 
-STEP = 1.0 / calibration.RATE
+STEP = 1.0 / synthetic.PAPERS.rate
 COARSER = 0.002  # s, step of the motions: half as many as in the study
 
 
@@ -399,12 +399,6 @@ def test_data_that_cannot_be_used(tables, capsys, names, message) -> None:
     assert not out.exists()
 
 
-def test_data_do_not_go_with_the_sensitivity(tables, capsys) -> None:
-    given = ["study", "herkal", "--sensitivity", "--data", str(tables / "film.csv")]
-    assert main([*given, "--out", str(tables / "out")]) == 2
-    assert "leave out --sensitivity" in capsys.readouterr().err
-
-
 def test_parts_need_those_before_them(tables) -> None:
     _, (fit, response) = tasks.parts(synthetic.COARSE, Data())
     with pytest.raises(ComputationError, match="it needs specimen-photographs, which failed"):
@@ -453,11 +447,11 @@ def test_a_table_of_weights_alone(tables, monkeypatch) -> None:
 def test_from_photographs_and_a_film_to_a_calibrated_model(tmp_path, monkeypatch) -> None:
     """The model is wrong in mass, stiffness and memory; parameters come out near all the same."""
     pytest.importorskip("cv2")
-    specimen, few = vibration.specimen, {"first": 1, "last": 25, "count": 9}
+    shipped, few = calibration.shipped, {"first": 1, "last": 25, "count": 9}
 
-    def with_few(name, changes):
-        frequencies = {"analysis.frequencies": few} if name == "frf" else {}
-        return specimen(name, changes={**changes, **frequencies})
+    def with_few(name, changes=None):
+        frequencies = {"analysis.frequencies": few} if name == "specimen-frf" else {}
+        return shipped(name, {**(changes or {}), **frequencies})
 
     def of_few(shot, exposure, sensor=synthetic.Shot.sensor):
         return replace(sensor(shot, exposure), samples=4)  # rays in each pixel instead of 10
@@ -474,7 +468,7 @@ def test_from_photographs_and_a_film_to_a_calibrated_model(tmp_path, monkeypatch
     near = replace(synthetic.PAPERS, size=(1814, 3226), metres_per_pixel=1e-4)
     monkeypatch.setattr(tasks, "PAPERS", near)
     monkeypatch.setattr(calibration, "fit_damping", fit_once)
-    monkeypatch.setattr(vibration, "specimen", with_few)
+    monkeypatch.setattr(calibration, "shipped", with_few)
     monkeypatch.setattr(synthetic.Shot, "sensor", of_few)
     monkeypatch.setattr(evaluation, "fit_release", fit_release)
     first, then = tasks.parts(replace(synthetic.COARSE, free=0.4), Data())

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import xarray as xr
 
 from foldyn.report import Table, Text
 from foldyn.studies import pool
-from foldyn.studies.herkal import report, runs, stiffnesses_page
+from foldyn.studies.herkal import runs
 from foldyn.studies.herkal import study as studies
-from foldyn.studies.herkal.runs import REFERENCE, Job, Numerics
-from foldyn.studies.herkal.stiffnesses import (
+from foldyn.studies.herkal.runs import Numerics
+from foldyn.studies.herkal.study import Study, StudyPlan
+from pairwise import beyond
+from verification.herkal import __main__ as command
+from verification.herkal import stiffnesses_page
+from verification.herkal.models import LINEAR, WiderPlan
+from verification.herkal.other_shell import second_table
+from verification.herkal.stiffnesses import (
     OWN,
     PEAKED,
     Stiffness,
@@ -18,8 +27,8 @@ from foldyn.studies.herkal.stiffnesses import (
     specimen_peaks,
     tasks,
 )
-from foldyn.studies.herkal.study import LINEAR, Study, StudyPlan
-from pairwise import beyond
+from verification.herkal.stiffnesses_page import WiderStudy
+from verification.opensees.stored import read_motion, stored_motions
 
 COARSE = (3, 6)
 
@@ -36,33 +45,25 @@ def test_tasks_are_each_known_by_what_they_depend_on():
 @pytest.mark.matrix
 def test_small_loads_and_the_papers(tmp_path):
     """Case 1: at small loads and at the paper's, plate and n5b8e are within 1 % of the shell."""
-    plan = StudyPlan(Numerics(divisions=8), ("case1",))
-    study = Study(plan, tmp_path)
+    plan = WiderPlan(Numerics(divisions=8), ("case1",))
     folder = tmp_path / studies.RESULTS
     folder.mkdir()
-    assert stiffnesses_page.sections(study) == []
-    paths = [
-        Job("case1", model, "path", plan.numerics, variant)
-        for model, variant in plan.paths().values()
-    ]
-    asked = [*paths, Stiffness("small-loads", "case1")]
+    asked = [*plan.paths("case1").values(), Stiffness("small-loads", "case1")]
     assert not any(done.failure for done in pool.run(asked, folder, processes=1))
     assert all(done.skipped for done in pool.run(asked, folder, processes=1))
-    moved = stiffnesses_page.displacements(Study(plan, tmp_path), "case1")
+    moved = stiffnesses_page.displacements(WiderStudy(plan, tmp_path), "case1")
     # two loaded nodes that move alike
-    end = Study(plan, tmp_path).displacements("case1")
+    end = WiderStudy(plan, tmp_path).displacements("case1")
+    assert end["bars and hinges, linear bends"][0] == pytest.approx(-0.0248, abs=5e-5)
     for label, displacement in moved.items():
         assert displacement == pytest.approx(np.abs(end[label]).mean(), rel=1e-6)
-    found = stiffnesses_page.sections(Study(plan, tmp_path))
-    (table,) = [one for one in found if isinstance(one, Table)]
+    table = stiffnesses_page._statics(WiderStudy(plan, tmp_path))
     small, large = table.rows
     assert small[:2] == ["1", "small"] and large[:2] == ["1", "paper's"]
     assert small[3] is None  # superlinear bends have no stiffness
     assert float(small[4].split("\N{NO-BREAK SPACE}")[0]) == pytest.approx(-29.1, abs=0.1)
     off = [float(cell.split("\N{NO-BREAK SPACE}")[0]) for cell in (*small[5:], *large[5:])]
     assert max(map(abs, off)) < 1.0
-    page = report.write(Study(plan, tmp_path)).read_text("utf-8")
-    assert "Models beyond the paper" in page
 
 
 @pytest.mark.matrix
@@ -117,9 +118,50 @@ def test_a_mode_without_a_partner_is_told():
 
 
 def test_paths_have_no_variants_of_models_beyond_the_paper():
-    paths = StudyPlan().paths()
-    assert paths["plate"][1] == paths["n5b8e"][1] == paths["shell"][1]
-    assert [label for label, (_, variant) in paths.items() if variant == LINEAR] == [
+    paths = WiderPlan().paths("case1")
+    assert list(paths)[:2] == ["shell", "bars and hinges"]
+    assert [label for label, job in paths.items() if job.variant == LINEAR] == [
         "bars and hinges, linear bends"
     ]
-    assert paths["shell"][0] == REFERENCE
+    assert paths["plate"].variant == paths["n5b8e"].variant == paths["shell"].variant
+
+
+def test_errors_against_the_finest_stored_motion_of_another_shell(tmp_path, monkeypatch):
+    divisions, dt = stored_motions("case2")[-1]
+    theirs = read_motion("case2", divisions, dt)
+    x = np.zeros((len(theirs.time), 9, 3))
+    x[:, theirs.node] = theirs.displacement
+    coordinates = {"time": theirs.time, "node": np.arange(9), "axis": ["x", "y", "z"]}
+    same = xr.Dataset({"displacement": (("time", "node", "axis"), x)}, coordinates)
+    motions = {"panel": same, "centroid": 1.5 * same}
+    monkeypatch.setattr(Study, "result", lambda self, case, model, kind: motions[model])
+    study = Study(StudyPlan(cases=("case2",), models={"panel": "", "centroid": ""}), tmp_path)
+    found = second_table(study)
+    assert found["case2"][0] == divisions
+    assert found["case2"][1] == pytest.approx({"panel": 0.0, "centroid": 0.5}, abs=1e-12)
+    motions["centroid"] = same.isel(time=slice(500))  # of another length: not comparable
+    assert second_table(study) == {}
+
+
+@pytest.mark.matrix
+def test_the_command_writes_its_page_and_goes_on(tmp_path, monkeypatch, capsys):
+    """A few models, briefly; the specimen's computations are left out."""
+    brief = studies.StudyPlan(Numerics(divisions=2, dt=0.01, duration=1.0))
+    monkeypatch.setattr(command.studies, "QUICK", brief)
+    monkeypatch.setattr(stiffnesses_page, "tasks", lambda *_: [])
+    labels = {"circumcenter": "circumcenter", "mixed_voronoi": "mixed Voronoi", "plate": "plate"}
+    monkeypatch.setattr(
+        command, "WiderPlan", lambda *given: replace(WiderPlan(*given), models=labels)
+    )
+    given = ["stiffnesses", "--quick", "--cases", "case1", "--processes", "1"]
+    assert command.main([*given, "--out", str(tmp_path)]) == 0
+    page = (tmp_path / "stiffnesses.html").read_text("utf-8")
+    assert page.count("<img") == 3 and ">nan<" not in page
+    for words in ("Models beyond the paper", "mixed Voronoi", "linear bends", "low frequencies"):
+        assert words in page
+    capsys.readouterr()
+    assert command.main([*given, "--out", str(tmp_path)]) == 0
+    assert "12 runs were there" in capsys.readouterr().out
+    study = WiderStudy(WiderPlan(brief.numerics, ("case1",), labels), tmp_path)
+    row = study.table()["case1"]
+    assert row["mixed_voronoi"] == pytest.approx(row["circumcenter"], rel=1e-6)  # equal squares

@@ -1,6 +1,6 @@
 """Our shell against stored results of OpenSees, and the model that made them.
 
-The results are in src/foldyn/studies/herkal/opensees/results; no test needs `opensees`.
+The results are in verification/opensees/results; no test needs `opensees`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,12 @@ import pytest
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.studies import find_case
-from foldyn.studies.herkal.opensees.stored import (
+from foldyn.studies.herkal.runs import CASES
+from named_models import named
+from pairwise import beyond
+from verification.opensees import compare, model
+from verification.opensees.model import panel_mesh
+from verification.opensees.stored import (
     Moved,
     read_motion,
     read_still,
@@ -23,11 +28,6 @@ from foldyn.studies.herkal.opensees.stored import (
     write_motion,
     write_still,
 )
-from foldyn.studies.herkal.runs import CASES
-from named_models import named
-from pairwise import beyond
-from verification.opensees import compare, model
-from verification.opensees.model import panel_mesh
 
 FINEST = 32
 

@@ -11,10 +11,12 @@ import pytest
 from foldyn.analyses import read_case
 from foldyn.linear import peaks_of
 from foldyn.studies import shipped_cases
-from foldyn.studies.herkal import vibration
-from foldyn.studies.targets import Target, Verdict, read_targets, verdicts
+from foldyn.studies.herkal.calibration import IN_AIR
+from foldyn.studies.herkal.specimen.evaluation import CORNER, Response
+from foldyn.studies.herkal.targets import Target, Verdict, read_targets, verdicts
+from verification.herkal import vibration
 
-TARGETS = read_targets(vibration.TARGETS)
+TARGETS = read_targets("specimen")
 COARSE = np.arange(2.5, 20.01, 0.25)  # Hz; peaks are refined between them
 PEAKS = ("frf_first_peak", "frf_second_peak", "frf_third_peak")
 
@@ -65,7 +67,7 @@ def test_air_lowers_the_frequencies_by_one_to_four_percent():
     changes = {"analysis.count": 4}
     vacuum, air = (
         vibration.specimen("modes", changes={**changes, **given}).run("circumcenter")
-        for given in ({}, vibration.IN_AIR)
+        for given in ({}, IN_AIR)
     )
     share = air.air_share.values
     assert share == pytest.approx([0.021, 0.072, 0.024, 0.042], abs=1e-3)
@@ -85,7 +87,7 @@ def test_damping_of_the_second_and_third_peak():
 def test_alpha_alone_damps_the_axial_mode_as_measured():
     """alpha = 2 zeta omega with 13.5 % at 9.3 Hz; without beta the third peak is damped less."""
     assert vibration.ALONE.alpha == pytest.approx(2 * 0.135 * 2 * math.pi * 9.3, rel=2e-3)
-    found = vibration.Response.of(damped_by_alpha())
+    found = Response.of(damped_by_alpha())
     assert found.damping[1] == pytest.approx(0.135, rel=0.12)
     assert found.damping[2] < 0.085
     assert all(
@@ -120,7 +122,7 @@ def test_modes_are_wobble_axial_wobble(published):
 def test_the_first_wobble_is_driven_at_a_corner_not_in_the_middle():
     """In the first wobble the top turns about its middle, which stays where it is."""
     found = damped_by_alpha()
-    corner = [p.frequency for p in peaks_of(found, vibration.CORNER, axis="x", prominence=0.02)]
+    corner = [p.frequency for p in peaks_of(found, CORNER, axis="x", prominence=0.02)]
     middle = [p.frequency for p in peaks_of(found, vibration.TOP, axis="x", prominence=0.02)]
     assert min(corner) < 4.5
     assert min(middle) > 8.0
@@ -145,6 +147,8 @@ def test_verdicts():
     assert not Verdict(target, 2.3).holds
     assert not Verdict(target, math.nan).holds
     assert Verdict(Target("b", 2.0, "Hz", "here", "another"), 7.0).holds is None
-    found = verdicts({"a": target}, {})
-    assert len(found) == 1 and not found[0].holds
-    assert Verdict(target, 2.1).line() == "a thing: 2.1 Hz beside 2 (table 1), +5.0%: holds"
+    found = verdicts("specimen", {})
+    assert len(found) == 7 and not found[0].holds
+    assert (
+        vibration.line(Verdict(target, 2.1)) == "a thing: 2.1 Hz beside 2 (table 1), +5.0%: holds"
+    )

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.patterns import Pattern
+from foldyn.structures.material_axes import material_axes
 from foldyn.structures.sheet import Sheet
 from verification.calculix.mesh import cell_ends, panel_mesh, shares
 
@@ -154,8 +155,11 @@ class Solids:
         return 1 + node + layer * len(self._points)
 
     def _cells(self) -> Iterator[str]:
-        number = 0
+        number, fibers = 0, material_axes(self.pattern, self.sheet)
         for p, own in enumerate(self.panels):
+            axes = own.frame[:2]
+            if fibers is not None:
+                axes = np.stack([fibers[p], np.cross(own.frame[2], fibers[p])])
             yield f"*ELEMENT, TYPE=C3D20R, ELSET=PANEL_{p}"
             for cell in (self._first[p] + own.cells()).tolist():
                 number += 1
@@ -164,13 +168,13 @@ class Solids:
                 nodes = [self._number(node, layer) for some, layer in layers for node in some]
                 yield from (_line(number, *nodes[:12]) + ",", _line(*nodes[12:]))
             yield f"*ORIENTATION, NAME=AXES_{p}"
-            yield _line(*own.frame[:2].ravel().tolist())
+            yield _line(*axes.ravel().tolist())
             yield f"*SOLID SECTION, ELSET=PANEL_{p}, MATERIAL=SHEET, ORIENTATION=AXES_{p}"
-        modulus, nu = self.sheet.youngs_modulus, self.sheet.poissons_ratio
-        shear = modulus / (2.0 * (1.0 + nu))
+        (first, second), nu = self.sheet.moduli, self.sheet.poissons_ratio
+        shear = self.sheet.shear_modulus or first / (2.0 * (1.0 + nu))
         yield from ("*MATERIAL, NAME=SHEET", "*ELASTIC, TYPE=ENGINEERING CONSTANTS")
-        yield _line(*3 * [modulus], nu, 0.0, 0.0, shear, STIFF * shear)
-        yield _line(STIFF * shear, 293.0)
+        yield _line(first, second, first, nu, 0.0, 0.0, shear, STIFF * first / 3.0)
+        yield _line(STIFF * first / 3.0, 293.0)
 
     def _ties(self) -> Iterator[list[Term]]:
         """Equal mean displacements of back and front where panels meet; none where held."""

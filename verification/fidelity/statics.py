@@ -22,8 +22,8 @@ from foldyn.structures import Sheet, discretize
 from foldyn.structures.discretized import Discretized
 from foldyn.studies import find_case
 from foldyn.studies.herkal.runs import CASES
-from foldyn.studies.herkal.stiffnesses import Softness, between, softness
 from verification.fidelity.compare import markdown
+from verification.herkal.stiffnesses import Softness, between, softness
 
 STEEL = Sheet(2e11, 0.3, 1e-4, density=7850.0)
 MESHES = (4, 8)  # divisions of the shell of steel

@@ -1,1 +1,1 @@
-"""The shell beside OpenSees."""
+"""The shell beside OpenSees: `stored` reads its results, `run` (with `opensees`) writes them."""

@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 from foldyn.dynamics import simulate
 from foldyn.linear import modes
 from foldyn.statics import trace
-from foldyn.studies.herkal.metric import AXES
-from foldyn.studies.herkal.opensees import stored
-from foldyn.studies.herkal.runs import CASES, REFERENCE, case_study, case_with, reported
+from foldyn.studies.herkal.runs import CASES, case_study, reported, shell_case
 from verification.fidelity.compare import markdown
+from verification.opensees import stored
 from verification.opensees.run import DT, SAMPLES
 
 COUNT = 5  # number of frequencies
@@ -31,7 +30,7 @@ COUNT = 5  # number of frequencies
 def our_still(name: str, divisions: int) -> stored.Still:
     """Statics and frequencies of a case study with our shell."""
     case_file = case_study(name)
-    case = case_with(case_file, REFERENCE, divisions=divisions)
+    case = shell_case(case_file, divisions)
     path, node = trace(case, steps=4), case_file.output.nodes
     return stored.Still(
         node=node,
@@ -48,7 +47,7 @@ def our_motion(name: str, divisions: int, dt: float, duration: float | None = No
     Its duration (s) is by default the case file's.
     """
     case_file = case_study(name)
-    case = case_with(case_file, REFERENCE, divisions=divisions)
+    case = shell_case(case_file, divisions)
     length = duration or case_file.analysis.arguments["duration"]
     motion = simulate(case, length, method="newmark", dt=dt, interval=SAMPLES)
     return stored.Moved(
@@ -99,7 +98,7 @@ def still_table(
         name = still.about["case"]
         _, axis, _ = reported(name)
         row = [name, str(still.about["divisions"])]
-        moved = still.displacement[-1, :, AXES.index(axis)]
+        moved = still.displacement[-1, :, "xyz".index(axis)]
         row.append(", ".join(f"{value:.5f}" for value in moved))
         row.append(", ".join(f"{value:.4f}" for value in still.frequency))
         for reference in (one[number] for one in references):

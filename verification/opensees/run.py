@@ -17,8 +17,8 @@ from typing import Any
 
 from foldyn.analyses import CaseFile
 from foldyn.errors import FoldynError
-from foldyn.studies.herkal.opensees import stored
 from foldyn.studies.herkal.runs import CASES, case_study
+from verification.opensees import stored
 from verification.opensees.model import PanelShells
 
 DT = 0.005  # s

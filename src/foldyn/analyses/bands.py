@@ -18,16 +18,16 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn import plots
-from foldyn.analyses.bars import bar
+from foldyn.analyses.bars import bar, bar_closed
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
 from foldyn.analyses.ranges import Varied, varied
 from foldyn.analyses.sections import AnalysisSection, Count, Positive, Text, whole_number
-from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
+from foldyn.analyses.vibration import About, Secant, VibrationSchema, about
 from foldyn.arguments import Check, Placed
 from foldyn.cases import Case, State
 from foldyn.cases.loads import Actuate
 from foldyn.cases.units import unit_of
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError, InputError, renamed
 from foldyn.linear import UnitCell, attenuation, band_gaps, bands, damped_bands, modes, relaxed
 from foldyn.linear.band_structure import ALL
 from foldyn.patterns.screw import Screw
@@ -130,13 +130,9 @@ class CellState:
     @contextmanager
     def placed(self) -> Iterator[None]:
         """Prefix messages with the state, and with `initial` if a stored state is wrong."""
-        with _placed(self.varied, self.value):
-            try:
-                yield
-            except InputError as error:
-                if error.field != "state" or not self.start:
-                    raise
-                raise InputError(error.reason, "initial") from None
+        own = {"state": "initial"} if self.start else {}
+        with _placed(self.varied, self.value), renamed(own):
+            yield
 
 
 def cell_states(case_file: CaseFile, mass: str, given: Mapping[str, Any]) -> list[CellState]:
@@ -307,7 +303,9 @@ class BandsAnalysis(Analysis):
         """See `Analysis`."""
         given = {**self.arguments, **changes}
         states = cell_states(case_file, mass, given)
-        path = _path(states[0].cell, given["path"], given["points"])
+        cell, points = states[0].cell, given["path"]
+        with renamed({"points": "path", "count": "points"}):
+            path = cell.path(AROUND[cell.dimensions] if points is None else points, given["points"])
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
             found = []
@@ -355,15 +353,6 @@ class BandsAnalysis(Analysis):
             f"{case_file.path.name}: the computation",
         )  # fmt: skip
         yield PageText(_notes(result))
-
-
-def _path(cell: UnitCell, points: str | None, count: int) -> xarray.DataArray:
-    """Phases along the path of a file."""
-    try:
-        return cell.path(AROUND[cell.dimensions] if points is None else points, count)
-    except InputError as error:  # its message names arguments, not keys of the file
-        key = {"points": "path", "count": "points"}[error.key]
-        raise InputError(error.reason, key) from None
 
 
 def _bands(state: CellState, path: xarray.DataArray, given: Mapping[str, Any]) -> xarray.Dataset:

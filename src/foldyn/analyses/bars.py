@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
+
+from foldyn.errors import ComputationError, MotionInterrupted
 
 
 class _Hidden:
@@ -33,3 +37,24 @@ def share_bar(shown: bool, text: str) -> Any:
     """Progress bar of a computation that reports its completed share, from 0 to 1."""
     layout = "{desc}: {percentage:3.0f} %|{bar}| [{elapsed}<{remaining}]"
     return bar(shown, total=1.0, desc=text, bar_format=layout)
+
+
+@contextmanager
+def bar_closed(bar: Any, keeps: bool = False) -> Iterator[Any]:
+    """Close a progress bar at the end.
+
+    Partial results of an equilibrium search or a simulated motion are dropped: they belong to
+    another kind of analysis.
+
+    keeps : whether the partial result of an interrupted computation belongs to this kind.
+    """
+    try:
+        yield bar
+    except ComputationError as error:
+        raise ComputationError(str(error)) from None
+    except MotionInterrupted as stop:
+        if keeps:
+            raise
+        raise KeyboardInterrupt(str(stop)) from None
+    finally:
+        bar.close()

@@ -9,15 +9,14 @@ import numpy as np
 import xarray
 
 from foldyn import plots
-from foldyn.analyses.bars import bar
+from foldyn.analyses.bars import bar, bar_closed
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
 from foldyn.analyses.path import constant_loads
 from foldyn.analyses.sections import AnalysisSection, CaseSchema, Count, some_shapes
-from foldyn.analyses.vibration import bar_closed
 from foldyn.arguments import Check
 from foldyn.cases.loads import LOAD
 from foldyn.cases.supports import SUPPORT
-from foldyn.errors import InputError
+from foldyn.errors import renamed
 from foldyn.linear import buckling
 from foldyn.linear.buckling import DEPARTS
 from foldyn.report.album import Album, ByRule, by_mass_rule
@@ -82,12 +81,9 @@ class BucklingAnalysis(Analysis):
         scaled = case.altered(loads=[o for i, o in enumerate(case.loads) if i not in steady])
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
-            with bar_closed(bar(progress, bar_format="load factors")):
-                try:
-                    result = buckling(scaled, preload=preload, **given)
-                except InputError as error:
-                    field = "analysis.constant" if error.field == "preload" else error.field
-                    raise InputError(error.reason, field) from None
+            own = renamed({"preload": "analysis.constant"})
+            with own, bar_closed(bar(progress, bar_format="load factors")):
+                result = buckling(scaled, preload=preload, **given)
             begun()
             return result
 
@@ -111,14 +107,12 @@ class BucklingAnalysis(Analysis):
         case = case_file.case(first)
         yield from album.structure(case)
         if result.sizes["mode"]:
-            shapes, stored = case_file.output.shapes, result["mode"].values.tolist()
-            shown = list(shapes) if isinstance(shapes, tuple) else stored[:shapes]
             yield Heading("The shapes")
             yield from album.figure(
                 "buckling",
                 "Buckling shapes, over the state before in gray. A shape has no amplitude of its "
                 "own: each is drawn so that it can be read.",
-                lambda: plots.draw_buckling(result, which=shown),
+                lambda: plots.draw_buckling(result, which=case_file.output.shapes),
             )
         yield Heading("The numbers")
         yield _table(result)

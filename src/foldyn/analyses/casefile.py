@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from inspect import signature
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import xarray
@@ -20,8 +20,6 @@ from foldyn.analyses.start import Start, start_of
 from foldyn.arguments import arguments
 from foldyn.cases import Case, State
 from foldyn.cases.models import MODELS
-from foldyn.dynamics import Keeping
-from foldyn.dynamics.motion import Motion
 from foldyn.errors import InputError, within
 from foldyn.linear import refinement
 from foldyn.patterns import Pattern
@@ -37,24 +35,6 @@ Begun = Callable[[], None]
 Compute = Callable[[bool, Begun], xarray.Dataset]
 """Function that computes a result, with or without a progress bar. It calls its second argument at
 least once, when all input has been accepted."""
-
-
-@runtime_checkable
-class Kept(Protocol):
-    """A computation that is stored while it runs, and can resume."""
-
-    kept: Keeping | None
-
-    def keep(self, keeping: Keeping, shown: bool) -> None:
-        """Set how it is stored, and whether its result will be shown and so must fit in memory."""
-
-
-@runtime_checkable
-class Moving(Protocol):
-    """A computation of a motion, which may be integrated in a batch with others beforehand."""
-
-    motion: Motion
-    integrated: bool
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,6 +79,15 @@ def _tell(path: Path, command: str, left: list[str], why: str) -> None:
         warn(text, "command-line.md#modes-frequency-responses-and-bands")
 
 
+ALIKE: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "modes": {"output": ("animation",)},  # axis and nodes mean something else there
+    "frf": {"output": ("nodes", "axis")},
+    "buckling": {"analysis": ("constant",)},
+    "random": {"output": ("nodes",)},
+}
+"""Keys of tables that mean the same in another kind."""
+
+
 def converted(path: Path, document: Document, kind: str, state: str) -> Document:
     """The document as another kind of analysis; a warning names parts that are left out."""
     if kind in STARTLESS:
@@ -93,16 +102,12 @@ def converted(path: Path, document: Document, kind: str, state: str) -> Document
     if atrest:
         steady = ["history" not in load for load in document.get("loads", [])]
         left += [f"loads[{i}]" for i, load in enumerate(loads) if steady[i] and load not in drive]
-    if kind == "frf" and not drive:
-        drive = [
-            {"base": base["base"], "displacement": abs(base.get("displacement", 1.0))}
-            for _, base in bases[:1]
-        ]
-        bases = bases[1:]
+    if kind == "frf" and not drive and bases:
+        (_, base), *bases = bases
+        drive = [{"base": base["base"], "displacement": abs(base.get("displacement", 1.0))}]
     left += [f"supports[{i}]" for i, _ in bases]
     what = "buckling" if kind == "buckling" else "small vibrations"
-    if "initial" in document:
-        left.append("[initial]")
+    left += _tables(document, "initial")
     why = (
         "nothing acts or moves in the state of rest (--state equilibrium takes the equilibrium "
         "under the loads)"
@@ -112,10 +117,10 @@ def converted(path: Path, document: Document, kind: str, state: str) -> Document
     _tell(path, kind, left, why)
     kept = _without(document, "initial", "drive", "output")
     kept |= {"supports": supports, "loads": [] if atrest else loads, "analysis": {"kind": kind}}
-    kept["output"] = _shown(document.get("output", {}), kind)
-    if kind == "buckling" and "constant" in document["analysis"]:
-        kept["analysis"]["constant"] = document["analysis"]["constant"]
-    if kind in ("modes", "buckling"):
+    for name, keys in ALIKE[kind].items():
+        alike = {key: value for key, value in document.get(name, {}).items() if key in keys}
+        kept[name] = {**kept.get(name, {}), **alike}
+    if kind != "frf":
         return kept
     if not drive:
         raise InputError(
@@ -140,18 +145,6 @@ def _supports(
         else:
             kept.append(_without(support, "history"))
     return kept, bases
-
-
-def _shown(output: Document, kind: str) -> Document:
-    """Keys of [output] that have the same meaning for another kind."""
-    if kind == "buckling":
-        return {}
-    if kind == "modes":  # modes use axis and nodes for something else
-        return {key: output[key] for key in ("animation",) if key in output}
-    shown = {key: output[key] for key in ("nodes", "axis") if key in output}
-    if "axis" in shown and kind != "frf":  # frf also accepts "-x" and the like
-        shown["axis"] = shown["axis"][-1]
-    return shown
 
 
 def _without(table: Document, *keys: str) -> Document:

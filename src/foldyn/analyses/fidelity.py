@@ -9,7 +9,7 @@ import numpy as np
 import xarray
 
 from foldyn import plots
-from foldyn.analyses.bars import bar
+from foldyn.analyses.bars import bar, bar_closed
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of
 from foldyn.analyses.sections import AnalysisSection, CaseSchema, Count, Positive, one_of
 from foldyn.analyses.vibration import Secant
@@ -91,8 +91,9 @@ class FidelityAnalysis(Analysis):
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
             begun()
-            with _Steps(progress) as steps:
-                return checked.run(steps).result
+            with bar_closed(bar(progress, bar_format="{desc} ({elapsed})")) as shown:
+                told = checked.run(lambda step: shown.set_description_str(f"fidelity: {step}"))
+            return told.result
 
         return compute
 
@@ -118,22 +119,6 @@ class FidelityAnalysis(Analysis):
         yield _modes(found)
         yield Text(_notes(found))
         yield from album.structure(case_file.case(first))
-
-
-class _Steps:
-    """A progress display that shows the current step."""
-
-    def __init__(self, shown: bool) -> None:
-        self.bar = bar(shown, bar_format="{desc} ({elapsed})")
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __call__(self, step: str) -> None:
-        self.bar.set_description_str(f"fidelity: {step}")
-
-    def __exit__(self, *_: object) -> None:
-        self.bar.close()
 
 
 def _models(found: Fidelity) -> Table:

@@ -15,10 +15,10 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn import plots
-from foldyn.analyses.bars import share_bar
+from foldyn.analyses.bars import bar_closed, share_bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, movable
 from foldyn.analyses.sections import AnalysisSection, Positive, ShownSection, one_of
-from foldyn.analyses.vibration import GONE, About, Secant, VibrationSchema, about, bar_closed
+from foldyn.analyses.vibration import GONE, About, Secant, VibrationSchema, about, slope_notes
 from foldyn.arguments import Check, arguments
 from foldyn.cases import BaseMotion, Case, Force
 from foldyn.cases.decode import PartOf
@@ -28,10 +28,11 @@ from foldyn.errors import InputError
 from foldyn.linear import Peak, frf, peaks_of
 from foldyn.linear.frf import METHODS, PER_FORCE, quantity_of
 from foldyn.plots.charts import Chart, Curve
+from foldyn.plots.readings import along_drive, unit_of
 from foldyn.report.album import Album, ByRule, by_mass_rule, listed, rules, shown_nodes
 from foldyn.report.sections import Charts, Heading, Section, Table, Text, cell
 from foldyn.tables import ListOf, check_keys
-from foldyn.values import number, show, whole
+from foldyn.values import increasing, number, show, whole
 
 MOST_FREQUENCIES = 100_000
 SLOPES_AT_REST = ("direct", "modal")
@@ -52,15 +53,7 @@ def frequencies_of(name: str, value: Any) -> NDArray[np.float64]:
             "of frequencies",
             name,
         )
-    listed = [number(f"{name}[{i}]", item, least=0.0) for i, item in enumerate(value)]
-    for i in range(1, len(listed)):
-        if listed[i] <= listed[i - 1]:
-            raise InputError(
-                f" = {show(value[i])}: must be greater than the frequency before it "
-                f"({show(value[i - 1])})",
-                f"{name}[{i}]",
-            )
-    return np.array(listed)
+    return increasing(name, value, least=0.0, unit="Hz")
 
 
 def _range(name: str, table: dict[str, Any]) -> NDArray[np.float64]:
@@ -318,8 +311,6 @@ def _coherence(results: ByRule, nodes: list[int], axis: str) -> list[Section]:
 
 def driven_direction(response: xarray.Dataset) -> str:
     """Axis along which the drive is largest."""
-    from foldyn.plots.readings import along_drive
-
     drive = response["drive"].transpose("node", "axis").values
     return along_drive(response)[int(np.abs(drive).sum(axis=0).argmax())]
 
@@ -343,8 +334,6 @@ def _meaning(quantity: str, axis: str, response: xarray.Dataset) -> str:
 def _peaks(
     peaks: Mapping[tuple[str, int], tuple[Peak, ...]], quantity: str, axis: str, several: bool
 ) -> Table:
-    from foldyn.plots.readings import unit_of
-
     header = [*(["mass rule"] if several else []), "node", "peak (Hz)"]
     header += [f"height{unit_of(quantity)}", "3 dB (%)", "textbook (%)"]
     header += ["f0 (Hz)", "circle (%)", "misfit (%)"]
@@ -398,18 +387,7 @@ def _notes(
         f"Damping: alpha {case.rayleigh.alpha:g} 1/s, beta {case.rayleigh.beta:g} s. The result "
         "carries its own case."
     ]
-    soft = int(response.attrs.get("soft", 0))
-    if soft:
-        notes.append(
-            f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
-            "vanishes: they count without stiffness here. Responses of finite amplitude, by a "
-            "secant amplitude or computed in time, have it."
-        )
-    if "secant" in response.attrs:
-        notes.append(
-            "Superlinear hinges have the slope that is equivalent to an oscillation by "
-            f"{response.attrs['secant']:g} degrees."
-        )
+    notes += slope_notes(response)
     swing = response["swing"].values if "swing" in response else np.zeros(1)
     if (swing > 0.0).any():  # without a swing no hinge is superlinear
         at = int(np.nanargmax(swing)) if np.isfinite(swing).any() else 0

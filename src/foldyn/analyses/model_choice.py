@@ -6,7 +6,6 @@ hinges for what moves far, and where superelements refuse the case or would take
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from foldyn.cases import Case
 from foldyn.cases.models import BARS_AND_HINGES, SUPERELEMENTS
 from foldyn.condensation import superelements
 from foldyn.condensation.library import different
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, quietly
 from foldyn.patterns import Pattern
 
 MOST_DIFFERENT = 20
@@ -66,8 +65,7 @@ def _why_not(schema: VibrationSchema, pattern: Pattern) -> str:
         shapes = different(pattern, schema.sheet)
         if shapes > MOST_DIFFERENT:
             return f"would take long: {shapes} different panels, more than {MOST_DIFFERENT}"
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)
+        with quietly():
             made = superelements(pattern, schema.sheet, **schema.model.options(SUPERELEMENTS))
             Case(
                 made, schema.supports, schema.loads, schema.damping.made(), schema.masses,

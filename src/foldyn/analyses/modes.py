@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
 
 from foldyn import plots
-from foldyn.analyses.bars import bar
-from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
+from foldyn.analyses.casefile import CaseFile, arguments_of, counted
 from foldyn.analyses.sections import AnalysisSection, Animation, Count, ShownSection, some_shapes
-from foldyn.analyses.vibration import GONE, About, Secant, VibrationSchema, about, bar_closed
+from foldyn.analyses.vibration import GONE, About, Secant, Vibration, VibrationSchema, slope_notes
 from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.linear import character, mac, modes, pair_modes
 from foldyn.linear.compared import size
+from foldyn.plots.readings import chosen_modes
 from foldyn.report.album import Album, ByRule, by_mass_rule, listed
 from foldyn.report.sections import Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
@@ -64,35 +64,16 @@ class ModesSchema(VibrationSchema):
     output: ModesOutput = ModesOutput()
 
 
-class ModesAnalysis(Analysis):
+class ModesAnalysis(Vibration):
     """Natural frequencies and mode shapes about a state."""
 
     kind = "modes"
     moving = True
     schema = ModesSchema
     needs_density = "modes need"
+    function = staticmethod(modes)
     takes = arguments_of(modes)
     files = ("modes", "mac", "modes.gif", "modes.mp4")
-
-    @classmethod
-    def of(cls, schema: Any, case: Case) -> Self:
-        """See `Analysis`."""
-        given = super().of(schema, case).arguments
-        return cls({**given, "state": None if given["state"] == "rest" else given["state"]})
-
-    def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
-        """See `Analysis`."""
-        given = {**self.arguments, **about(case_file, mass), **changes}
-        case = case_file.case(mass)
-
-        def compute(progress: bool, begun: Begun) -> xarray.Dataset:
-            text = f"modes with mass rule {mass}"
-            with bar_closed(bar(progress, bar_format=text)):
-                result = modes(case, **given)
-            begun()
-            return result
-
-        return compute
 
     def line(self, name: str, result: xarray.Dataset) -> str:
         """Frequencies and effort."""
@@ -121,7 +102,7 @@ class ModesAnalysis(Analysis):
         """See `Analysis`."""
         (first, modes), *others = results.items()
         case = case_file.case(first)
-        shown = shown_modes(modes, case_file.output.shapes)
+        shown = chosen_modes(modes, case_file.output.shapes)
         names = _character(case_file, modes, case)
         rule = f", mass rule {first}" if others else ""
         yield from album.structure(case)
@@ -155,15 +136,6 @@ class ModesAnalysis(Analysis):
             yield _compared(results, same)
         yield _run(case_file, results)
         yield Text(_notes(modes, case))
-
-
-def shown_modes(modes: xarray.Dataset, shapes: int | tuple[int, ...] | None) -> list[int]:
-    """Numbers of the drawn modes: the requested modes, or the first that are not rigid."""
-    from foldyn.plots.readings import chosen_modes
-
-    if isinstance(shapes, tuple):
-        return chosen_modes(modes, shapes)
-    return chosen_modes(modes, None)[:shapes]
 
 
 def _about(modes: xarray.Dataset) -> str:
@@ -270,19 +242,7 @@ def _notes(modes: xarray.Dataset, case: Case) -> str:
             f"Damping: C = alpha M + beta K0 with alpha {rayleigh.alpha:g} 1/s and beta "
             f"{rayleigh.beta:g} s gives the ratio of each mode."
         )
-    soft = int(modes.attrs["soft_hinges"])
-    if soft:
-        notes.append(
-            f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
-            "vanishes: they count without stiffness, and motions that only they resist have the "
-            "frequency zero. With a secant amplitude they have the slope of an oscillation of that "
-            'amplitude; the preset "plate" has linear bends.'
-        )
-    if "secant" in modes.attrs:
-        notes.append(
-            "Superlinear hinges have the slope that is equivalent to an oscillation by "
-            f"{modes.attrs['secant']:g} degrees: the frequencies are those of that amplitude."
-        )
+    notes += slope_notes(modes)
     if case.air is not None and "air_share" in modes:
         share = 100.0 * modes["air_share"].values
         notes.append(

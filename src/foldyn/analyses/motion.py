@@ -130,11 +130,11 @@ class MotionAnalysis(Analysis):
         given = {**kept, **changes}
         if "initial" not in given:
             given["initial"] = case_file.start(mass).state
-        return _Prepared(prepared(case_file.case(mass), **given, kept=True))
+        return MotionComputation(prepared(case_file.case(mass), **given, kept=True))
 
     def check(self, computations: Sequence[Compute], figures: bool) -> None:
         """Refuse more samples than memory holds, or fewer than spectra need."""
-        prepared = [one for one in computations if isinstance(one, _Prepared)]
+        prepared = [one for one in computations if isinstance(one, MotionComputation)]
         motions = [one.motion for one in prepared]
         samples = min(motion.expected_samples for motion in motions)
         if figures and samples < MINIMUM_SAMPLES:
@@ -221,8 +221,15 @@ class MotionAnalysis(Analysis):
         )
 
 
-class _Prepared:
-    """A checked motion."""
+class MotionComputation:
+    """A checked motion, which may be stored while it runs.
+
+    Attributes
+    ----------
+    motion : Motion or LinearMotion
+    integrated : bool
+        Whether it was integrated in a batch with others beforehand.
+    """
 
     def __init__(self, motion: Any) -> None:
         self.motion = motion
@@ -231,10 +238,11 @@ class _Prepared:
         self.integrated = False
 
     def keep(self, keeping: Keeping, shown: bool) -> None:
-        """See `Kept`."""
+        """Set how it is stored, and whether its result will be shown and so must fit in memory."""
         self.kept, self.shown = keeping, shown
 
     def __call__(self, progress: bool, begun: Begun) -> xarray.Dataset:
+        """The result, integrated, or as it was finished before."""
         begun()
         if self.integrated:
             return self.motion.result(progress)

@@ -189,7 +189,8 @@ class PathAnalysis(Analysis):
                 points.set_postfix_str(f"load factor {point.factor:.4g}", refresh=False)
                 points.update()
 
-            with closing(_bar(progress)) as points:
+            layout = "points: {n_fmt}{postfix} [{elapsed}]"  # nobody knows how many
+            with closing(bar(progress, bar_format=layout, mininterval=0.0)) as points:
                 return trace(case, progress=tell, **given)
 
         return compute
@@ -286,11 +287,6 @@ class PathAnalysis(Analysis):
             "The result carries its own case, can be run again from it, and motions can start from "
             "its points."
         )
-
-
-def _bar(shown: bool) -> Any:
-    """Progress bar of points, whose number is unknown."""
-    return bar(shown, bar_format="points: {n_fmt}{postfix} [{elapsed}]", mininterval=0.0)
 
 
 FRAMES, FPS = 60, 15

@@ -3,52 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
 import xarray
 
 from foldyn import plots
-from foldyn.analyses.bars import bar
-from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
+from foldyn.analyses.casefile import CaseFile, arguments_of, counted
 from foldyn.analyses.frf import NO_HISTORY, frequencies_of
 from foldyn.analyses.sections import AnalysisSection, Count, ShownSection, Switch
-from foldyn.analyses.vibration import About, VibrationSchema, about, bar_closed
-from foldyn.arguments import Check
-from foldyn.cases import Case, Force
+from foldyn.analyses.vibration import About, Vibration, VibrationSchema
+from foldyn.arguments import Check, arguments
+from foldyn.cases import Force
 from foldyn.cases.decode import PartOf
 from foldyn.cases.directions import AXES
-from foldyn.errors import InputError, within
+from foldyn.errors import InputError
 from foldyn.linear import SpectralDensity, margins, random_response
 from foldyn.plots.charts import Chart, Curve
 from foldyn.report.album import Album, ByRule, by_mass_rule, shown_nodes
 from foldyn.report.sections import Charts, Heading, Section, Table, Text, cell
-from foldyn.tables import check_keys, check_table
+from foldyn.tables import check_table, read
 from foldyn.values import choice, show
 
-KEYS = ("frequency", "value", "unit")
+KEYS = tuple(arguments(SpectralDensity))
 
 
 def _base(name: str, value: Any) -> dict[str, SpectralDensity]:
     """Densities of a base by axis, from tables."""
-    found = {}
-    for axis, table in check_table(name, value).items():
-        place = f"{name}.{choice(name, axis, AXES)}"
-        check_keys(check_table(place, table), KEYS, place)
-        found[axis] = _density(place, table)
+    found = {
+        choice(name, axis, AXES): read(SpectralDensity, f"{name}.{axis}", table)
+        for axis, table in check_table(name, value).items()
+    }
     if not found:
         raise InputError(": give an axis, as [analysis.base.z]", name)
     return found
-
-
-def _density(place: str, table: Mapping[str, Any]) -> SpectralDensity:
-    for key in KEYS:
-        if key not in table:
-            raise InputError(
-                ": missing; give frequency (Hz), value, and their unit", f"{place}.{key}"
-            )
-    with within(f"{place}."):
-        return SpectralDensity(**{key: table[key] for key in KEYS})
 
 
 FORCE = PartOf((Force,), "force", "nodes and force", history=NO_HISTORY)
@@ -61,8 +49,9 @@ def _forces(name: str, value: Any) -> list[tuple[Force, SpectralDensity]]:
     found = []
     for i, table in enumerate(value):
         place = f"{name}[{i}]"
-        own = {key: each for key, each in check_table(place, table).items() if key not in KEYS}
-        found.append((FORCE(place, own), _density(place, table)))
+        density = {key: each for key, each in check_table(place, table).items() if key in KEYS}
+        own = {key: each for key, each in table.items() if key not in KEYS}
+        found.append((FORCE(place, own), read(SpectralDensity, place, density)))
     return found
 
 
@@ -90,33 +79,15 @@ class RandomSchema(VibrationSchema):
     output: ShownSection = ShownSection()
 
 
-class RandomAnalysis(Analysis):
+class RandomAnalysis(Vibration):
     """Root mean square response to a base that moves at random."""
 
     kind = "random"
     schema = RandomSchema
     needs_density = "random vibration needs"
+    function = staticmethod(random_response)
     takes = arguments_of(random_response)
     files = ("stresses",)
-
-    @classmethod
-    def of(cls, schema: Any, case: Case) -> Self:
-        """See `Analysis`."""
-        given = super().of(schema, case).arguments
-        return cls({**given, "state": None if given["state"] == "rest" else given["state"]})
-
-    def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
-        """See `Analysis`."""
-        given = {**self.arguments, **about(case_file, mass), **changes}
-        case = case_file.case(mass)
-
-        def compute(progress: bool, begun: Begun) -> xarray.Dataset:
-            with bar_closed(bar(progress, bar_format=f"random response, mass rule {mass}")):
-                result = random_response(case, **given)
-            begun()
-            return result
-
-        return compute
 
     def line(self, name: str, result: xarray.Dataset) -> str:
         """Largest root mean squares, and effort."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.clamped_edges import straightened
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
-from foldyn.errors import Faults, FoldynWarning, InputError, warn, within
+from foldyn.errors import Faults, InputError, quietly, renamed, warn, within
 from foldyn.input_files import from_toml, path_of, read_text
 from foldyn.patterns import GENERATORS, Pattern, convex, imperfect, thicken, welded
 from foldyn.patterns.facets import HINGE, LINE, WELD, what_was_cut
@@ -32,6 +31,11 @@ from foldyn.structures import Sheet
 from foldyn.tables import read, told
 from foldyn.values import LARGEST, MOST, SMALLEST, show
 
+WANTED: Mapping[str, tuple[tuple[str, ...], str]] = {
+    "frf": (("frequencies",), "at which frequencies? Give --frequencies FIRST LAST COUNT (Hz)"),
+    "random": (("base", "forces"), "under which noise? Give --base AXIS UNIT F:DENSITY ..."),
+}
+"""Keys of [analysis] of which commands need one, and what to say without them."""
 MOST_MIB = 2
 """Largest case file (MiB)."""
 
@@ -63,8 +67,7 @@ def read_case(
         remedy.
     """
     path = path_of(path)
-    text = _text(path)
-    document = _parsed(path, text)
+    text, document = _read(path)
     if model is not None or divisions is not None:
         validated(path, document)
         with within("", path):
@@ -84,7 +87,7 @@ def read_as(
     Parameters
     ----------
     path : Path
-    kind : {"modes", "frf", "buckling", "response", "bands", "fidelity"}
+    kind : {"modes", "frf", "buckling", "random", "response", "bands", "fidelity"}
     flags : mapping
         Keys of [analysis] from the command line, which override the file; `state` may also be the
         file of a result.
@@ -97,8 +100,7 @@ def read_as(
         Loads, motions of the base or a start have no meaning in that kind of analysis and are left
         out.
     """
-    text = _text(path)
-    document = _parsed(path, text)
+    text, document = _read(path)
     flags = {key: value for key, value in flags.items() if value is not None}
     own = schema_of(document) is ANALYSES[kind].schema
     if not own:  # otherwise flags may provide missing keys
@@ -107,8 +109,9 @@ def read_as(
         document = remodeled(document, model, divisions)
     if not own:
         document = converted(path, document, kind, flags.get("state", "rest"))
-    if kind == "frf" and not {"frequencies"} & {*flags, *document["analysis"]}:
-        raise InputError("at which frequencies? Give --frequencies FIRST LAST COUNT (Hz)", "", path)
+    keys, wanted = WANTED.get(kind, ((), ""))
+    if keys and not {*keys} & {*flags, *document["analysis"]}:
+        raise InputError(wanted, "", path)
     return case_of_document(path, flagged(document, flags), text)
 
 
@@ -177,8 +180,7 @@ def case_of_document(
 
     case = make(masses[0])
     cases = {masses[0]: case}
-    with warnings.catch_warnings():  # further rules would only repeat warnings
-        warnings.simplefilter("ignore", FoldynWarning)
+    with quietly():  # further rules would only repeat warnings
         cases |= {mass: make(mass) for mass in masses[1:]}
     with within("", path):
         analysis = kind.of(schema, case)
@@ -204,20 +206,17 @@ def case_of_document(
 
 def read_document(path: Path) -> dict[str, Any]:
     """Read the content of a case file without checks."""
-    return _parsed(path, _text(path))
+    return _read(path)[1]
 
 
-def _text(path: Path) -> str:
-    return read_text(
-        path, "a case file (TOML)", MOST_MIB, "put long tables into files of their own"
-    )
-
-
-def _parsed(path: Path, text: str) -> dict[str, Any]:
+def _read(path: Path) -> tuple[str, dict[str, Any]]:
+    """Text and content of a case file."""
+    remedy = "put long tables into files of their own"
+    text = read_text(path, "a case file (TOML)", MOST_MIB, remedy)
     with within("", path):
         document = from_toml(text)
         check_values(document)
-    return document
+    return text, document
 
 
 def check_values(document: Mapping[str, Any]) -> None:
@@ -296,18 +295,12 @@ def _imperfect(pattern: Pattern, section: ImperfectionSection, folder: Path) -> 
     place = f"file = {show(section.file)}"
     with within(f"{place}: "):
         shapes = load(folder / section.file)
-    try:
+    with renamed({"shapes": place}):
         return imperfect(pattern, section.amplitude, shapes=shapes, modes=section.modes)
-    except InputError as error:
-        field = place if error.key == "shapes" else error.field
-        raise InputError(error.reason, field) from None
 
 
 def _thick(pattern: Pattern, sheet: Sheet, offset: Any) -> Pattern:
     """The pattern with panels of the sheet's thickness, with hinges at the given heights."""
     thickness = sheet.values("thickness", len(pattern.faces))
-    try:
+    with renamed({"offsets": f"pattern.{HINGES}", "thickness": "sheet.thickness"}):
         return thicken(pattern, thickness.tolist(), offsets=None if offset == FACES else offset)
-    except InputError as error:
-        own = {"offsets": f"pattern.{HINGES}", "thickness": "sheet.thickness"}
-        raise InputError(error.reason, own.get(error.key, "pattern")) from None

@@ -9,30 +9,22 @@ import numpy as np
 import xarray
 
 from foldyn import plots
-from foldyn.analyses.bars import share_bar
+from foldyn.analyses.bars import bar_closed, share_bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
 from foldyn.analyses.sections import AnalysisSection, CaseSchema, Count, whole_number
-from foldyn.analyses.vibration import bar_closed
 from foldyn.arguments import Check
 from foldyn.dynamics import Progress
-from foldyn.errors import InputError
 from foldyn.periodic import response_curve
 from foldyn.periodic.equation import Drive
+from foldyn.periodic.response import checked_range
 from foldyn.report.album import Album, ByRule, by_mass_rule
 from foldyn.report.sections import Heading, Table
 from foldyn.report.sections import Section as PageSection
 from foldyn.tables import ListOf, Section
-from foldyn.values import number, show
-
-
-def _apart(name: str, ends: list[float]) -> list[float]:
-    if ends[0] == ends[1]:
-        raise InputError(f" = {show(ends)}: must be two different numbers", name)
-    return ends
-
+from foldyn.values import number
 
 ENDS = ListOf(Check(number, above=0.0), "two numbers, as in [2.0, 5.0]", least=2, most=2)
-Ends = Annotated[Sequence[float] | None, ENDS, Check(_apart)]
+Ends = Annotated[Sequence[float] | None, ENDS]
 
 
 class ResponseSection(AnalysisSection):
@@ -48,13 +40,8 @@ class ResponseSection(AnalysisSection):
     most_points: Annotated[int, Check(whole_number, least=2)] = 500
 
     def agree(self) -> None:
-        """Require either frequencies or amplitudes."""
-        if (self.frequencies is None) == (self.amplitudes is None):
-            raise InputError(
-                ": give both ends of the frequencies (Hz), as frequencies = [2.0, 5.0], or of a "
-                "factor on the drive, as amplitudes = [0.1, 2.0]",
-                "frequencies",
-            )
+        """Require two ends, of either frequencies or amplitudes."""
+        checked_range(self.frequencies, self.amplitudes)
 
 
 class ResponseOutput(Section):

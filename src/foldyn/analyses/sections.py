@@ -30,7 +30,7 @@ from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.plots import ANIMATIONS
 from foldyn.shells import shell
 from foldyn.structures import PRESETS, Sheet, discretize
-from foldyn.structures.calibration import per_crease
+from foldyn.structures.calibration import folds_given, per_crease
 from foldyn.structures.rigid_plates import checked_panels
 from foldyn.structures.structure import CALIBRATIONS, MEMBRANES, SCHEMES
 from foldyn.tables import ListOf, Section, TableOf, check_table
@@ -74,8 +74,9 @@ def switch(name: str, value: Any) -> bool:
 
 def whole_number(name: str, value: Any, *, least: int = 1, most: int = MOST) -> int:
     """Return `value` if it is a whole number within bounds."""
-    number(name, whole(name, value), least=least, most=most)
-    return value
+    count = whole(name, value)
+    number(name, count, least=least, most=most)
+    return count
 
 
 def some_shapes(
@@ -148,6 +149,11 @@ def _per_crease(name: str, value: Any) -> Any:
     )
 
 
+def _folds(name: str, value: Any) -> Any:
+    """Return the same for stiffness, with tables of strips."""
+    return folds_given(name, value) if isinstance(value, Mapping) else _per_crease(name, value)
+
+
 def _edges(name: str, value: Any) -> Any:
     return check_nodes(name, value) if isinstance(value, str) else check_pairs(name, value)
 
@@ -173,6 +179,7 @@ Vector = Annotated[Sequence[float] | None, Check(vector)]
 HingeLaw = Annotated[Any, KindOf(law_from, HINGE_LAWS, named=True, laws=HINGE_LAWS)]
 BarLaw = Annotated[Any, KindOf(law_from, BAR_LAWS, named=True, laws=BAR_LAWS)]
 PerCrease = Annotated[float | Sequence[float] | Mapping[str, float] | None, Check(_per_crease)]
+Folds = Annotated[float | Sequence[float] | Mapping[str, Any] | None, Check(_folds)]
 Edges = Annotated[str | Sequence[Sequence[int]] | None, Check(_edges)]
 Animation = Annotated[str | None, one_of(ANIMATIONS)]
 
@@ -216,7 +223,7 @@ class ModelSection(Section):
     fold_law: HingeLaw = None
     bend_law: HingeLaw = None
     calibration: Annotated[str | None, one_of(CALIBRATIONS)] = None
-    crease_stiffness: PerCrease = None
+    crease_stiffness: Folds = None
     crease_rest: PerCrease = None
     clamped: Edges = None
     rigid: Annotated[

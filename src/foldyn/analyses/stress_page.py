@@ -8,7 +8,8 @@ import numpy as np
 import xarray
 
 from foldyn import plots
-from foldyn.linear import margins
+from foldyn.linear.margins import margins, place_in
+from foldyn.linear.stresses import ALONG
 from foldyn.report.album import Album
 from foldyn.report.sections import Heading, Section, Table, Text, cell
 from foldyn.results import case_of
@@ -43,28 +44,21 @@ def stress_sections(result: xarray.Dataset, album: Album) -> Iterator[Section]:
 
 def _table(found: xarray.Dataset) -> Table:
     """The largest values, with the least margin of the panels if their strength is known."""
-    state = "load factor" if found.attrs["of"] == "path" else "time (s)"
-    along = "load_factor" if found.attrs["of"] == "path" else "time"
-    rows = []
+    along, rows = ALONG[found.attrs["of"]][1], []
     if "von_mises" in found:
         stress = found["von_mises"].values
         step, point, _ = np.unravel_index(stress.argmax(), stress.shape)
-        place = str(found["point_place"].values[point])
-        where = f"panel {found['point_panel'].values[point]}, {place}"
-        if place != "center":
-            where += f" {found['point_number'].values[point]}"
-        when = cell(float(found[along][step]))
+        when, where = cell(float(found[along][step])), place_in(found, point)
         rows.append(["von Mises stress (Pa)", cell(float(stress.max())), where, when])
     moment = np.abs(found["crease_moment"].values)
     if moment.size:
         step, crease = np.unravel_index(moment.argmax(), moment.shape)
         when = cell(float(found[along][step]))
         rows.append(["moment of a crease (N)", cell(float(moment.max())), f"crease {crease}", when])
-    structure = case_of(found).structure
-    strength = structure.sheet.values("strength", len(structure.pattern.faces))
-    if "von_mises" in found and np.isfinite(strength).any():
+    if "von_mises" in found and case_of(found).structure.sheet.has_strength:
         margin = margins(found).attrs
         rows.append(
             ["least margin of a panel", cell(margin["least_margin"]), margin["least_where"], ""]
         )
+    state = "time (s)" if along == "time" else "load factor"
     return Table(["", "largest", "where", state], rows, "Stresses, moments and margins.")

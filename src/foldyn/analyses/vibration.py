@@ -5,19 +5,21 @@ Supports and loads are preloads: they act in full in the equilibrium and have no
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from typing import Annotated, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Self
 
-from foldyn.analyses.casefile import CaseFile
+import xarray
+
+from foldyn.analyses.bars import bar, bar_closed
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute
 from foldyn.analyses.sections import CaseSchema, one_of
 from foldyn.analyses.start import StoredStart
 from foldyn.arguments import Check
-from foldyn.cases import Impose
+from foldyn.cases import Case, Impose
 from foldyn.cases.loads import LOAD
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.supports import SUPPORT
-from foldyn.errors import ComputationError, InputError, MotionInterrupted
+from foldyn.errors import InputError
 from foldyn.tables import ListOf
 from foldyn.values import number, show
 
@@ -88,28 +90,57 @@ class VibrationSchema(CaseSchema):
                 )
 
 
+class Vibration(Analysis):
+    """An analysis by a function of a case and a state, whose progress is unknown.
+
+    Attributes
+    ----------
+    function : callable
+    """
+
+    function: ClassVar[Callable[..., xarray.Dataset]]
+
+    @classmethod
+    def of(cls, schema: Any, case: Case) -> Self:
+        """See `Analysis`."""
+        own = super().of(schema, case)
+        if own.arguments["state"] == "rest":
+            own.arguments["state"] = None
+        return own
+
+    def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
+        """See `Analysis`."""
+        given = {**self.arguments, **about(case_file, mass), **changes}
+        case, what = case_file.case(mass), self.function.__name__.replace("_", " ")
+
+        def compute(progress: bool, begun: Begun) -> xarray.Dataset:
+            with bar_closed(bar(progress, bar_format=f"{what} with mass rule {mass}")):
+                result = self.function(case, **given)
+            begun()
+            return result
+
+        return compute
+
+
+def slope_notes(result: xarray.Dataset) -> list[str]:
+    """Notes on superlinear hinges in small vibrations, for pages."""
+    notes, soft = [], int(result.attrs.get("soft_hinges", 0))
+    if soft:
+        notes.append(
+            f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
+            "vanishes: they count without stiffness, and motions that only they resist have the "
+            "frequency zero. With a secant amplitude they have the slope of an oscillation of that "
+            'amplitude; the preset "plate" has linear bends.'
+        )
+    if "secant" in result.attrs:
+        notes.append(
+            "Superlinear hinges have the slope that is equivalent to an oscillation by "
+            f"{result.attrs['secant']:g} degrees: the numbers are those of that amplitude."
+        )
+    return notes
+
+
 def about(case_file: CaseFile, mass: str) -> dict[str, Any]:
     """Arguments for the stored state of a case file; empty if it has none."""
     start = case_file.start(mass)._asdict()
     return {key: value for key, value in start.items() if value is not None}
-
-
-@contextmanager
-def bar_closed(bar: Any, keeps: bool = False) -> Iterator[Any]:
-    """Close a progress bar at the end.
-
-    Partial results of an equilibrium search or a simulated motion are dropped: they belong to
-    another kind of analysis.
-
-    keeps : whether the partial result of an interrupted computation belongs to this kind.
-    """
-    try:
-        yield bar
-    except ComputationError as error:
-        raise ComputationError(str(error)) from None
-    except MotionInterrupted as stop:
-        if keeps:
-            raise
-        raise KeyboardInterrupt(str(stop)) from None
-    finally:
-        bar.close()

@@ -14,13 +14,12 @@ from foldyn.attractors.drive import at_frequency, at_level, driven_frequency
 from foldyn.attractors.jumps import Jump, is_jump, jump_variables
 from foldyn.attractors.run import PER_PERIOD, Run, Stretch, check_measure, measured, swing
 from foldyn.cases import Case, State
-from foldyn.dynamics.progress import Progress, Reporter
+from foldyn.dynamics.progress import Progress, Reporter, reported
 from foldyn.errors import ComputationError, InputError, MotionInterrupted, told_once, warn
-from foldyn.linear.time_domain import reported
 from foldyn.results import Quantity
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import variable
-from foldyn.values import choice, number, numbers, of_kind, whole
+from foldyn.values import choice, increasing, number, of_kind, whole
 
 SWEEPS = ("up", "down", "both")
 RESOLUTION = 1e-3  # relative width to which jumps are bracketed
@@ -194,9 +193,7 @@ def _swept(case: Case, frequencies: ArrayLike | None, amplitudes: ArrayLike | No
         raise InputError(": give frequencies (Hz) or amplitudes, one of the two", "frequencies")
     own = driven_frequency(case, "fd.bifurcation_diagram")
     by, given = ("frequencies", frequencies) if amplitudes is None else ("amplitudes", amplitudes)
-    values = numbers(by, given)
-    if values.ndim != 1 or not values.size or values.min() <= 0.0 or (np.diff(values) <= 0.0).any():
-        raise InputError(": must be a list of numbers above 0 that increase", by)
+    values = increasing(by, given, above=0.0)
     if amplitudes is None:
         return Swept("frequency", FREQUENCY, values, lambda f: at_frequency(case, f), lambda f: f)
     return Swept("level", LEVEL, values, lambda level: at_level(case, level), lambda _: own)

@@ -29,9 +29,8 @@ from foldyn.cases.document import to_document
 from foldyn.dynamics import initial_state, prepare, simulate_many
 from foldyn.dynamics.ensemble import device_for
 from foldyn.dynamics.gpu.choice import DEVICES
-from foldyn.dynamics.progress import Progress, Reporter
+from foldyn.dynamics.progress import Progress, Reporter, reported
 from foldyn.errors import InputError, told_once, warn
-from foldyn.linear.time_domain import reported
 from foldyn.ram_limit import check_memory
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import PLACE, variable

@@ -18,9 +18,8 @@ from foldyn.dynamics import METHODS, Motion, prepare
 from foldyn.dynamics.failures import failure
 from foldyn.dynamics.methods import suited
 from foldyn.dynamics.motion_state import Outcome
-from foldyn.dynamics.progress import Progress, Reporter
+from foldyn.dynamics.progress import Progress, Reporter, reported
 from foldyn.errors import ComputationError, InputError, MotionInterrupted, told_once
-from foldyn.linear.time_domain import reported
 from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import variable

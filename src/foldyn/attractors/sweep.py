@@ -17,9 +17,9 @@ from foldyn.attractors.drive import at_frequency, drive_frequency, driven_freque
 from foldyn.attractors.jumps import Jump, is_jump, jump_variables, jumps_between
 from foldyn.attractors.run import Run, Stretch, check_measure, extremes, measured
 from foldyn.cases import Case, Chirp, Harmonic, State
-from foldyn.dynamics.progress import Reporter
+from foldyn.dynamics.progress import Reporter, reported
 from foldyn.errors import ComputationError, InputError, told_once
-from foldyn.linear.time_domain import overall, reported
+from foldyn.linear.time_domain import overall
 from foldyn.ram_limit import check_memory
 from foldyn.results import Quantity
 from foldyn.results.dataset import result_dataset

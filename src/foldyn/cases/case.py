@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -24,7 +23,7 @@ from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
 from foldyn.cases.state import State
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
-from foldyn.errors import Faults, FoldynWarning, InputError, within
+from foldyn.errors import Faults, InputError, quietly, within
 from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.mechanics.air.added_mass import AddedMass
 from foldyn.mechanics.assembly import Assembly
@@ -193,7 +192,7 @@ class Case(Loaded, Damped):
 
     def altered(self, **changes: Any) -> Case:
         """Copy with other fields, without repeating the warnings of this case."""
-        with warnings.catch_warnings(action="ignore", category=FoldynWarning):
+        with quietly():
             return replace(self, **changes)
 
     @cached_property

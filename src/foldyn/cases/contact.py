@@ -121,7 +121,7 @@ class Contact(Part):
         panel = np.array(structure.triangle_panel)
         count, sheet = int(panel.max(initial=-1)) + 1, structure.sheet
         own = sheet.values("thickness", count)
-        moduli = sheet.values("youngs_modulus", count)
+        moduli = sheet.values("modulus", count)
         stiffness = self.stiffness
         if stiffness is None:
             stiffness = STIFFNESS * float((moduli * own).min())

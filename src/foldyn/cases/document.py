@@ -29,11 +29,12 @@ from foldyn.cases.loads import LOAD, Load
 from foldyn.cases.masses import MASS
 from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
 from foldyn.cases.supports import SUPPORT
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynWarning, InputError, quietly
 from foldyn.materials import BAR_LAWS, HINGE_LAWS, HingeLaw
 from foldyn.patterns import Boards, Pattern
 from foldyn.structures import Sheet, discretize
 from foldyn.structures.discretized import Discretized
+from foldyn.structures.strip import Strip
 from foldyn.tables import read
 from foldyn.values import plain
 
@@ -114,7 +115,7 @@ def pattern_from_document(sections: Mapping[str, Any], arrays: Mapping[str, NDAr
     """
     if not sections.get("pattern"):
         raise InputError("the stored case has no pattern")
-    with warnings.catch_warnings(action="ignore", category=FoldynWarning):
+    with quietly():
         return _undamaged(_stored_pattern, sections["pattern"], arrays)
 
 
@@ -219,14 +220,14 @@ class _Writer:
         }
 
     def _sheet(self, sheet: Sheet) -> dict[str, Any]:
-        section: dict[str, Any] = {
-            f.name: float(value)
-            for f in dataclasses.fields(sheet)
-            if f.name != "panels" and (value := getattr(sheet, f.name)) is not None
-        }
+        given = {name: value for name, value in vars(sheet).items() if name != "panels"}
+        section = _material(given)
         if sheet.panels:
             section["panels"] = [
-                {"panels": self.store(f"tables_sheet{i}_panels", part.panels), **part.own}
+                {
+                    "panels": self.store(f"tables_sheet{i}_panels", part.panels),
+                    **_material(part.own),
+                }
                 for i, part in enumerate(sheet.panels)
             ]
         return section
@@ -240,7 +241,14 @@ class _Writer:
                 continue
             if name in LAWS:
                 section[name] = self._law(name, value)
-            elif name in PER_CREASE and not isinstance(value, Mapping):
+            elif isinstance(value, Strip):
+                section[name] = _material(vars(value))
+            elif name in PER_CREASE and isinstance(value, Mapping):
+                section[name] = {
+                    word: _material(vars(own)) if isinstance(own, Strip) else own
+                    for word, own in value.items()
+                }
+            elif name in PER_CREASE:
                 array = np.asarray(value, dtype=np.float64)
                 section[name] = self.store(f"tables_{name}", array) if array.ndim else float(value)
             else:
@@ -334,7 +342,7 @@ def _structure(sections: Mapping[str, Any]) -> Any:
         if name in model:
             model[name] = law_from(model[name], laws)
     nodes = sections["nodes"]
-    with warnings.catch_warnings(action="ignore", category=FoldynWarning):
+    with quietly():
         pattern = _stored_pattern(sections["pattern"])
         sheet = read(Sheet, "sheet", sections["sheet"])
         kind = model.pop("kind", BARS_AND_HINGES)
@@ -387,3 +395,11 @@ def _resolve(value: Any, arrays: Mapping[str, NDArray]) -> Any:
     if isinstance(value, list):
         return [_resolve(item, arrays) for item in value]
     return value
+
+
+def _material(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Table of a material; plies are tables, too."""
+    found = {name: plain(value) for name, value in given.items() if value not in (None, ())}
+    if "plies" in found:
+        found["plies"] = [_material(vars(ply)) for ply in found["plies"]]
+    return found

@@ -32,7 +32,7 @@ from foldyn.mechanics.sheet_term import NO_DOF
 from foldyn.patterns.topology import edge_lookup
 from foldyn.structures import Laminate
 from foldyn.structures.discretized import Discretized, Distributed
-from foldyn.structures.sheet import check_layers
+from foldyn.structures.laminate import check_layers
 from foldyn.structures.swelling import Swelling
 from foldyn.values import number, number_or_list, one_or_each, show, vector
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from foldyn.cli.options import add_reading, add_switches, flag, integer, number, reading_of
 from foldyn.cli.streams import speech
 from foldyn.errors import InputError
+from foldyn.studies import find_case, shipped_cases
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -64,8 +65,10 @@ def convert(given: argparse.Namespace) -> None:
     source = Path(given.file)
     if _is_result(source):
         _export(given, source)
-    elif _is_case(given.file):
-        _export(given, _case(given.file))
+    elif given.file.endswith(".toml") or (given.file in shipped_cases() and not source.exists()):
+        from foldyn.analyses import read_case
+
+        _export(given, read_case(find_case(given.file)).case())
     else:
         _convert_pattern(given, source)
 
@@ -79,21 +82,6 @@ def _is_result(source: Path) -> bool:
             return file.read(len(HDF5)) == HDF5
     except OSError:  # the reader reports it
         return False
-
-
-def _is_case(name: str) -> bool:
-    """Whether the name ends in .toml or belongs to a shipped case."""
-    from foldyn.studies import shipped_cases
-
-    return name.endswith(".toml") or (name in shipped_cases() and not Path(name).exists())
-
-
-def _case(name: str) -> Case:
-    """Read the case of a case file."""
-    from foldyn.analyses import read_case
-    from foldyn.studies import find_case
-
-    return read_case(find_case(name)).case()
 
 
 def _export(given: argparse.Namespace, what: Path | Case) -> None:

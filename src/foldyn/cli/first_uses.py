@@ -6,7 +6,6 @@ the model has. So one use of each part with every kind of method compiles everyt
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -17,7 +16,7 @@ import numpy as np
 import foldyn as fd
 from foldyn.dynamics import METHODS
 from foldyn.dynamics.driver import prepare
-from foldyn.errors import FoldynWarning
+from foldyn.errors import quietly
 from foldyn.experiment.tracking.corners import refine
 from foldyn.gradients.neighbors import Asked, motions
 from foldyn.materials.series import in_series
@@ -255,7 +254,7 @@ def use(name: str) -> int:
     (uses,) = (stage[name] for stage in STAGES if name in stage)
     with (
         count_compiled() as compiled,
-        warnings.catch_warnings(action="ignore", category=FoldynWarning),
+        quietly(),
     ):
         for compute in uses:
             compute()

@@ -81,14 +81,6 @@ def raw_stamp(folder: Path) -> bytes | None:
         return None
 
 
-def restore_stamp(folder: Path, content: bytes | None) -> None:
-    """Restore an earlier stamp."""
-    if content is None:
-        (folder / STAMP).unlink(missing_ok=True)
-    else:
-        write_bytes(content, folder / STAMP)
-
-
 def write_stamp(
     folder: Path, owner: Owner, state: str, results: Sequence[str], outdated: Sequence[str] = ()
 ) -> None:
@@ -232,8 +224,10 @@ class Results:
         with suppress(OSError):
             if self._new:
                 self._stamp(state)
+            elif self._begun and self._before is not None:
+                write_bytes(self._before, self.folder / STAMP)
             elif self._begun:
-                restore_stamp(self.folder, self._before)
+                (self.folder / STAMP).unlink(missing_ok=True)
 
     def summary(self) -> str:
         """List what was kept, for the end of a message."""

@@ -113,6 +113,27 @@ def parser() -> argparse.ArgumentParser:
     _add_common(buckling, "buckling", film=False)
     buckling.add_argument("--count", type=integer, help="load factors of each sign (default: 6)")
 
+    random = commands.add_parser(
+        "random",
+        help="random vibration of a case file of any kind",
+        description="Root mean square response of the structure of a case file of any kind to a "
+        "base that moves at random; what its [analysis] says, if it is of kind random, holds "
+        "unless given here.",
+    )
+    _add_common(random, "random", film=False)
+    random.add_argument(
+        "--base",
+        nargs="+",
+        action="append",
+        metavar=("AXIS UNIT", "F:DENSITY"),
+        help="axis, unit (g2/Hz or m2/s3) and points of the density, frequency (Hz) and value, as "
+        "in --base z g2/Hz 20:0.005 80:0.04 500:0.04; again for other axes",
+    )
+    random.add_argument("--count", type=integer, help="how many modes (default: by the density)")
+    for name, text in (("stresses", "stresses"), ("reactions", "forces of the supports")):
+        flag(random, f"--{name}", f"with root mean squares of {text}")
+    _add_state(random)
+
     response = commands.add_parser(
         "response",
         help="response curve of a case file of any kind",

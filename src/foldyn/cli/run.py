@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.analyses import ANALYSES, CaseFile, Computation, read_case
-from foldyn.analyses.casefile import Kept
+from foldyn.analyses.motion import MotionComputation
 from foldyn.analyses.provenance import Call, mesh_error
 from foldyn.analyses.reading import read_as
 from foldyn.arguments import arguments
 from foldyn.cli.folder import Owner, Results, drawing, held
 from foldyn.cli.streams import Clock, noted_warnings, speech
 from foldyn.dynamics import SECONDS, Keeping
-from foldyn.errors import ComputationError, InputError, MotionInterrupted, Told
+from foldyn.errors import ComputationError, InputError, MotionInterrupted, Told, within
 from foldyn.plots import FIGURES
 from foldyn.studies import find_case
 from foldyn.tables import table_under
@@ -70,8 +70,11 @@ def run(given: Namespace) -> Path:
         _keep(task, folder, given)
         with case_file.placing():
             case_file.analysis.check([one.compute for one in task], given.figures is not None)
-        if page:
-            _check_video(case_file)
+        if page and case_file.output.animation == "mp4":
+            from foldyn.plots.writers import find_ffmpeg
+
+            with within('output.animation = "mp4": ', case_file.path):
+                find_ffmpeg()
     names = [one.file for one in task]
     say = speech(given.quiet)
     owner = Owner.of(command, path, folder)
@@ -101,7 +104,7 @@ def _held_results(task: list[Computation]) -> Iterator[None]:
     """Lock the result files of motions, so that no other process stores to them."""
     with ExitStack() as stack:
         for one in task:
-            if isinstance(one.compute, Kept) and one.compute.kept:
+            if isinstance(one.compute, MotionComputation) and one.compute.kept:
                 stack.enter_context(one.compute.kept.held())
         yield
 
@@ -114,7 +117,7 @@ def _keep(task: list[Computation], folder: Path, given: Namespace) -> None:
     if seconds is not None:
         number("--checkpoint", seconds, above=0.0)
     for one in task:
-        if isinstance(one.compute, Kept):
+        if isinstance(one.compute, MotionComputation):
             how = "--resume", "--replace"
             keeping = Keeping(folder / one.file, seconds or SECONDS, resume, given.replace, how)
             one.compute.keep(keeping, not given.no_figures)
@@ -142,16 +145,39 @@ def _read(path: Path, given: Namespace) -> CaseFile:
         first, last, count = given.frequencies
         whole = int(count) if count.is_integer() else count
         keys["frequencies"] = {"first": first, "last": last, "count": whole}
+    if given.command == "random":
+        keys = {key: value for key, value in keys.items() if value is not False}
+        keys["base"] = given.base and dict(_density(*words) for words in given.base)
     divisions = None if "divisions" in keys else getattr(given, "divisions", None)
     return read_as(path, given.command, keys, given.model, divisions)
+
+
+def _density(axis: str, *words: str) -> tuple[str, dict[str, Any]]:
+    """An axis and the table of its density, from the words of --base."""
+    unit, *points = words or [""]
+    pairs = [point.split(":") for point in points]
+    try:
+        frequency, value = (
+            [float(number) for number in column] for column in zip(*pairs, strict=True)
+        )
+    except ValueError:
+        raise InputError(
+            f"--base {' '.join((axis, *words))}: write AXIS UNIT F:DENSITY F:DENSITY ..., as in z "
+            "g2/Hz 20:0.005 80:0.04 500:0.04"
+        ) from None
+    return axis, {"frequency": frequency, "value": value, "unit": unit}
 
 
 def _computed(
     task: list[Computation], results: Results, introduction: Callable[[], None], progress: bool,
     say: Callable[[str], None],
 ) -> dict[str, xarray.Dataset]:  # fmt: skip
-    """Run all computations; save each result as soon as it is ready."""
+    """Run all computations; save each result as soon as it is ready, and say what it lacks.
+
+    A missing value without a known reason is an error.
+    """
     from foldyn.results import save
+    from foldyn.results.quantities import REASONS, missing_values
 
     done: dict[str, xarray.Dataset] = {}
     told = Told()
@@ -176,7 +202,10 @@ def _computed(
         say(one.case_file.analysis.line(one.mass, result))
         if mesh := mesh_error(result):
             say(f"  {one.mass}: {mesh}")
-        _tell_missing(one.place, result, say)
+        for name, text in missing_values(result).items():
+            if name not in REASONS:
+                raise ComputationError(f"{one.place}{name}: {text}", result)
+            say(f"  {name}: {text}")
     told.issue()
     return done
 
@@ -185,33 +214,11 @@ def _saved(one: Computation, result: xarray.Dataset) -> xarray.Dataset:
     """Reopen a motion's result from its final file if checkpoints kept it on disk."""
     from foldyn.results import load
 
-    keeping = one.compute.kept if isinstance(one.compute, Kept) else None
+    keeping = one.compute.kept if isinstance(one.compute, MotionComputation) else None
     if keeping is None or not keeping.begun:
         return result
     keeping.remove()
     return load(keeping.file, whole=False)
-
-
-def _tell_missing(place: str, result: xarray.Dataset, say: Callable[[str], None]) -> None:
-    """Print which values a result lacks; raise if no known reason explains their absence."""
-    from foldyn.results.quantities import REASONS, missing_values
-
-    for name, text in missing_values(result).items():
-        if name not in REASONS:
-            raise ComputationError(f"{place}{name}: {text}", result)
-        say(f"  {name}: {text}")
-
-
-def _check_video(case_file: CaseFile) -> None:
-    """Refuse an MP4 animation without ffmpeg, before anything is computed."""
-    if case_file.output.animation != "mp4":
-        return
-    from foldyn.plots.writers import find_ffmpeg
-
-    try:
-        find_ffmpeg()
-    except InputError as error:
-        raise InputError(f'{case_file.path}: output.animation = "mp4": {error}') from None
 
 
 def _introduction(

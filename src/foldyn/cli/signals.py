@@ -52,7 +52,11 @@ class Endings:
             for one, handler in before.items():
                 signal.signal(one, handler)
             if self.first is not None:
-                _forget_interrupt()
+                # CPython sets a flag when KeyboardInterrupt ends code run from a string, as
+                # dataclasses and named tuples do, and `python -m` then ends by SIGINT even if the
+                # exception was caught: our exit status is lost. The next string that runs to its
+                # end clears the flag.
+                eval("None")
 
     @contextmanager
     def saving(self) -> Iterator[None]:
@@ -75,16 +79,6 @@ class Endings:
             return
         self._due = False
         raise KeyboardInterrupt
-
-
-def _forget_interrupt() -> None:
-    """Keep CPython from overriding our exit status after an interrupt.
-
-    CPython sets a flag when KeyboardInterrupt ends code run from a string, as dataclasses and named
-    tuples do, and `python -m` then ends by SIGINT even if the exception was caught. The next string
-    that runs to its end clears the flag.
-    """
-    eval("None")
 
 
 ENDINGS = Endings()

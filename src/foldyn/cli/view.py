@@ -32,6 +32,8 @@ def add_view(commands: Any) -> None:
 
 def run_view(given: Namespace) -> None:
     """Serve the page until Ctrl-C."""
+    import webbrowser
+
     from foldyn.live.files import served
     from foldyn.studies import find_case
     from foldyn.threads import one_thread
@@ -43,15 +45,9 @@ def run_view(given: Namespace) -> None:
             print(server.address, flush=True)
             say(f"{title}: the page is at this address until Ctrl-C")
             if not given.no_browser:
-                _open(server.address)
+                webbrowser.open(server.address)
             server.serve_forever()
         except KeyboardInterrupt:
             if not ENDINGS.by_hand:
                 raise
             say("")
-
-
-def _open(address: str) -> None:
-    import webbrowser
-
-    webbrowser.open(address)

@@ -45,36 +45,36 @@ class Meshes(NamedTuple):
 
 
 def kept(
-    corners: NDArray, smooth: Sequence[int], poissons_ratio: float, thickness: float, meshes: Meshes
+    corners: NDArray, smooth: Sequence[int], sheet: Sheet, fibers: float, meshes: Meshes
 ) -> CondensedPanel:
     """A panel as `condensed` makes it, from disk if it is there."""
-    given = (corners.tolist(), smooth, poissons_ratio, thickness, meshes)
+    material = sheet.stretching.tolist(), sheet.bending.tolist(), sheet.thickness, sheet.density
+    given = (corners.tolist(), smooth, material, fibers, meshes)
     folder = folder_for(HERE.parent)
     if folder is None:
-        return condensed(corners, smooth, poissons_ratio, thickness, meshes)
+        return condensed(corners, smooth, sheet, fibers, meshes)
     tools = (scipy.__version__, llvmlite.binding.get_host_cpu_name())
     key = repr((digest(HERE, condensed.__name__), tools, given))
     path = folder / f"panel-{hashlib.sha256(key.encode()).hexdigest()[:32]}.npz"
     found = _read(path, key)
     if found is None:
-        found = condensed(corners, smooth, poissons_ratio, thickness, meshes)
+        found = condensed(corners, smooth, sheet, fibers, meshes)
         with suppress(OSError):
             _write(path, key, found)
     return found
 
 
 def condensed(
-    corners: NDArray, smooth: Sequence[int], poissons_ratio: float, thickness: float, meshes: Meshes
+    corners: NDArray, smooth: Sequence[int], sheet: Sheet, fibers: float, meshes: Meshes
 ) -> CondensedPanel:
-    """A panel of a sheet of unit modulus and density."""
+    """A panel of a sheet; `fibers` is the angle (rad) of an orthotropic one, see `condense`."""
     *others, finest = meshes.graded
-    sheet = Sheet(1.0, poissons_ratio, thickness, 1.0)
     with one_thread():  # bits that do not depend on the number of threads
-        fine, modes = condense(corners, smooth, sheet, finest, meshes.level)
+        fine, modes = condense(corners, smooth, sheet, fibers, finest, meshes.level)
         if not others:
             return fine
         coarse, middle = (
-            condense(corners, smooth, sheet, own, meshes.level, modes)[0] for own in others
+            condense(corners, smooth, sheet, fibers, own, meshes.level, modes)[0] for own in others
         )
         first, second, third = meshes.divisions
         coarser = extrapolated(coarse, middle, second / first)

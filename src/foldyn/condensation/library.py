@@ -18,6 +18,8 @@ from foldyn.condensation.kept import Meshes, kept
 from foldyn.condensation.panel import CondensedPanel
 from foldyn.patterns import Pattern
 from foldyn.structures.graded import smooth_vertices
+from foldyn.structures.material_axes import material_axes
+from foldyn.structures.ply import Ply
 from foldyn.structures.sheet import Sheet
 
 ROOM = 256  # condensed panels kept in memory, each about 3 MB
@@ -43,23 +45,49 @@ class _Shape:
     places: tuple[tuple[float, ...], ...]  # rounded
     size: float
     smooth: tuple[int, ...]  # corners where the sheet is smooth
+    turned: float  # angle of direction 1 from the first axis, rad, rounded
     corners: NDArray = field(compare=False)  # (k, 3), m
+    fibers: float = field(compare=False)  # the angle, not rounded
 
 
 @lru_cache(maxsize=ROOM)
-def _condensed(
-    shape: _Shape, poissons_ratio: float, thickness: float, meshes: Meshes
-) -> CondensedPanel:
+def _condensed(shape: _Shape, sheet: Sheet, meshes: Meshes) -> CondensedPanel:
     """A panel of a sheet of unit modulus and density."""
-    return kept(shape.corners, shape.smooth, poissons_ratio, thickness, meshes)
+    return kept(shape.corners, shape.smooth, sheet, shape.fibers, meshes)
 
 
-def groups(pattern: Pattern, sheets: Sequence[Sheet], meshes: Meshes) -> list[Group]:
-    """The condensed panels of a pattern, grouped by congruence; `sheets` of all panels."""
+def _unit(sheet: Sheet) -> Sheet:
+    """The sheet with a modulus and a density of 1, without what does not matter here."""
+    if sheet.plies:
+        return Sheet(plies=[_ply(own, sheet.modulus) for own in sheet.plies], direction=0.0)
+    first, second = sheet.moduli
+    if sheet.shear_modulus is None:
+        return Sheet(1.0, sheet.poissons_ratio, sheet.thickness, 1.0)
+    return Sheet(
+        (1.0, second / first), sheet.poissons_ratio, sheet.thickness, 1.0,
+        shear_modulus=sheet.shear_modulus / first, direction=0.0,
+    )  # fmt: skip
+
+
+def _ply(ply: Ply, modulus: float) -> Ply:
+    """A ply of a sheet that has a modulus and a density of 1."""
+    own, shear = (np.array(ply.youngs_modulus) / modulus).tolist(), ply.shear_modulus
+    return Ply(
+        ply.thickness, own, ply.poissons_ratio, shear and shear / modulus, ply.angle, density=1.0
+    )
+
+
+def groups(
+    pattern: Pattern, sheets: Sequence[Sheet], fibers: NDArray | None, meshes: Meshes
+) -> list[Group]:
+    """The condensed panels of a pattern, grouped by congruence.
+
+    sheets, fibers : of all panels; see `structures.material_axes`.
+    """
     out = []
-    for (shape, sheet), members in _congruent(pattern, sheets).items():
+    for (shape, sheet), members in _congruent(pattern, sheets, fibers).items():
         numbers, faces, frames = zip(*members, strict=True)
-        own = _condensed(shape, sheet.poissons_ratio, sheet.thickness, meshes).of(sheet)
+        own = _condensed(shape, _unit(sheet), meshes).of(sheet)
         out.append(Group(own, np.array(faces), np.array(frames), np.array(numbers)))
     return out
 
@@ -67,26 +95,31 @@ def groups(pattern: Pattern, sheets: Sequence[Sheet], meshes: Meshes) -> list[Gr
 def different(pattern: Pattern, sheet: Sheet) -> int:
     """How many panels have to be condensed."""
     kinds, kind = sheet.kinds(len(pattern.faces))
-    return len(_congruent(pattern, [kinds[k] for k in kind]))
+    fibers = material_axes(pattern, sheet)
+    return len(_congruent(pattern, [kinds[k] for k in kind], fibers))
 
 
 def _congruent(
-    pattern: Pattern, sheets: Sequence[Sheet]
+    pattern: Pattern, sheets: Sequence[Sheet], fibers: NDArray | None
 ) -> dict[tuple[_Shape, Sheet], list[tuple[int, NDArray, NDArray]]]:
     """Numbers, vertices and frames (3, 3) of the panels of each shape and sheet."""
     found: dict[tuple[_Shape, Sheet], list[tuple[int, NDArray, NDArray]]] = {}
     smooth = smooth_vertices(pattern)
     for number, (face, sheet) in enumerate(zip(pattern.faces, sheets, strict=True)):
-        own = list(face)
-        shape, turned, frame = _described(pattern.vertices[own], pattern.size, smooth[own])
+        own, along = list(face), None if fibers is None or not sheet.orthotropic else fibers[number]
+        shape, turned, frame = _described(pattern.vertices[own], pattern.size, smooth[own], along)
         found.setdefault((shape, sheet), []).append((number, np.roll(face, -turned), frame))
     return found
 
 
-def _described(x: NDArray, size: float, smooth: NDArray) -> tuple[_Shape, int, NDArray]:
+def _described(
+    x: NDArray, size: float, smooth: NDArray, along: NDArray | None
+) -> tuple[_Shape, int, NDArray]:
     """Shape in the frame of one corner, the first of all in sorted order.
 
     Also returns the number of corners before that corner, and the frame (3, 3).
+
+    along : direction 1 (3,) of an orthotropic sheet.
     """
     order = (np.arange(len(x))[:, None] + np.arange(len(x))) % len(x)
     away = x[order] - x[:, None]
@@ -97,9 +130,13 @@ def _described(x: NDArray, size: float, smooth: NDArray) -> tuple[_Shape, int, N
     frames = np.stack([first, np.cross(normal, first), normal], axis=1)
     corners = away @ frames.swapaxes(1, 2)
     places = np.round(corners / size, ALIKE) + 0.0  # no negative zeros
+    flat = np.zeros((len(x), 2)) if along is None else frames[:, :2] @ along
+    angles = np.arctan2(flat[:, 1], flat[:, 0]) % np.pi
+    rounded = np.where(angles > np.pi - 10.0**-ALIKE, 0.0, np.round(angles, ALIKE))
     described = []
     for turned, own in enumerate(places.tolist()):
         there = tuple(np.flatnonzero(smooth[order[turned]]).tolist())
-        described.append((tuple(map(tuple, own)), there, turned))
-    least, there, turned = min(described)
-    return _Shape(least, size, there, corners[turned]), turned, frames[turned]
+        described.append((tuple(map(tuple, own)), there, rounded[turned], turned))
+    least, there, angle, turned = min(described)
+    shape = _Shape(least, size, there, angle, corners[turned], float(angles[turned]))
+    return shape, turned, frames[turned]

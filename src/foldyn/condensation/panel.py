@@ -30,7 +30,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from foldyn.algebra.superlu import factorize
 from foldyn.condensation.shapes import Level, bows, turns
 from foldyn.mechanics.block_matrix import of_elements
-from foldyn.mechanics.triangle import triangle_stiffness
+from foldyn.mechanics.triangle import triangle_stiffness, turned_axes
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import around
 from foldyn.shells.mesh import shell_mesh, side_between
@@ -97,7 +97,7 @@ class CondensedPanel:
 
     def of(self, sheet: Sheet) -> CondensedPanel:
         """The panel of a sheet, from that of a sheet of unit modulus and density."""
-        modulus, density = sheet.youngs_modulus, sheet.density
+        modulus, density = sheet.modulus, sheet.density
         assert density is not None
         return replace(
             self,
@@ -152,8 +152,8 @@ def beside(panel: CondensedPanel, other: CondensedPanel) -> CondensedPanel:
 
 
 def condense(
-    corners: NDArray, smooth: Collection[int], sheet: Sheet, graded: Grading, level: Level,
-    like: LinearNDInterpolator | None = None,
+    corners: NDArray, smooth: Collection[int], sheet: Sheet, fibers: float, graded: Grading,
+    level: Level, like: LinearNDInterpolator | None = None,
 ) -> tuple[CondensedPanel, LinearNDInterpolator]:  # fmt: skip
     """Condense a panel with corners (k, 3), m, onto the shapes of a level.
 
@@ -161,11 +161,12 @@ def condense(
 
     corners : in a frame whose third axis is nearly normal to the panel.
     smooth : corners that are not rigid within the radius.
+    fibers : angle (rad) of direction 1 of an orthotropic sheet from the frame's first axis.
     like : the inner modes on another mesh, which are reproduced.
     """
     from scipy.interpolate import LinearNDInterpolator  # loads slowly: not for other models
 
-    mesh = _Mesh(corners, smooth, sheet, graded)
+    mesh = _Mesh(corners, smooth, sheet, fibers, graded)
     shapes, kind, held = _edge_shapes(mesh, graded.radius, level)
     inside = np.setdiff1d(np.arange(mesh.size), held)
     stiffness, mass = mesh.stiffness, mesh.mass
@@ -216,21 +217,25 @@ class _Mesh:
     """Triangles of a panel with corners (k, 3), and the rows of side strains and rotations."""
 
     def __init__(
-        self, corners: NDArray, smooth: Collection[int], sheet: Sheet, graded: Grading
-    ) -> None:
+        self, corners: NDArray, smooth: Collection[int], sheet: Sheet, fibers: float,
+        graded: Grading,
+    ) -> None:  # fmt: skip
         face = tuple(range(len(corners)))
         mesh = shell_mesh(Pattern(corners, [face]), 0, graded)
         self.nodes, self.triangles, self.corners = mesh.nodes, mesh.triangles, len(corners)
         points = mesh.edge_points
         self.edges = [np.array(side_between(points, a, b), np.int64) for a, b in around(face)]
         tri, x = self.triangles, self.nodes[self.triangles]
-        nu, n, nt = sheet.poissons_ratio, len(self.nodes), len(tri)
-        stretching = sheet.youngs_modulus * sheet.thickness / (1.0 - nu**2)
-        membrane, bending = triangle_stiffness(x, nu, stretching, sheet.bending_modulus)
+        n, nt, axes = len(self.nodes), len(tri), None
+        stretching, bent = sheet.stretching, sheet.bending
+        if sheet.orthotropic:
+            stretching, bent = (turned_axes(each, fibers) for each in (stretching, bent))
+            axes = np.tile([1.0, 0.0, 0.0], (nt, 1))
+        membrane, bending = triangle_stiffness(x, stretching, bent, axes)
         stiff = np.setdiff1d(face, list(smooth))
         rigid = np.asarray(np.isin(tri, stiff).any(axis=1))
         membrane[rigid] *= STIFF
-        self._elastic, self._stretching, self._nu = (membrane, bending), stretching, nu
+        self._elastic, self._stretching = (membrane, bending), stretching
         near = stress_points(self.nodes[: self.corners], max(sheet.thickness, graded.radius))
         self._recovery = recovery(near, x, np.eye(3)[:2], rigid)
         side = np.roll(x, -1, axis=1) - x
@@ -300,7 +305,7 @@ class _Mesh:
             rotation[:, -1] -= self._free[1].ravel()
         moment = -self._recovery.moment @ (block_diagonal(self._elastic[1]) @ rotation)
         found = (self._recovery.strain @ strain).reshape(-1, 3, strain.shape[1])
-        force = forces(found.swapaxes(1, 2), self._stretching, self._nu).swapaxes(1, 2)
+        force = forces(found.swapaxes(1, 2), self._stretching).swapaxes(1, 2)
         return np.stack([force, moment.reshape(found.shape)])
 
     @property

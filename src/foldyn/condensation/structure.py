@@ -34,6 +34,7 @@ from foldyn.shells.shell import LEAST, PER_DOUBLING
 from foldyn.structures import Sheet
 from foldyn.structures.beyond_range import doubt_units
 from foldyn.structures.calibration import (
+    Folds,
     PerCrease,
     check_creases,
     check_sheet,
@@ -45,6 +46,7 @@ from foldyn.structures.discretize import checked_kinds
 from foldyn.structures.discretized import Discretized, Distributed, HingeKind, read_only
 from foldyn.structures.graded import grading
 from foldyn.structures.mass import MASS_RULES
+from foldyn.structures.material_axes import material_axes
 from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
 from foldyn.structures.swelling import Swelling
 from foldyn.values import choice, length, whole
@@ -62,7 +64,7 @@ class SuperelementsOptions:
     divisions: int | None = None
     mass: str = "consistent"
     fold_law: str | HingeLaw = EnhancedLinear()
-    crease_stiffness: PerCrease = None
+    crease_stiffness: Folds = None
     crease_rest: PerCrease = None
     clamped: tuple[Edge, ...] = ()
     rigid: str | tuple[int, ...] | None = None
@@ -181,7 +183,7 @@ class Superelements(Discretized):
         sheets = [
             replace(kinds[k], density=own) for k, own in zip(kind, density.tolist(), strict=True)
         ]
-        made = groups(self.pattern, sheets, meshes)
+        made = groups(self.pattern, sheets, material_axes(self.pattern, self.sheet), meshes)
         return Whole(self.pattern, made, level, meshes.graded[-1])
 
     @cached_property
@@ -361,7 +363,7 @@ def superelements(
     divisions: int | None = None,
     mass: str = "consistent",
     fold_law: str | HingeLaw = EnhancedLinear(),
-    crease_stiffness: PerCrease = None,
+    crease_stiffness: Folds = None,
     crease_rest: PerCrease = None,
     clamped: str | Sequence[Sequence[int]] = (),
     rigid: str | Sequence[int] | None = None,

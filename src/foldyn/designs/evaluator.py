@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -20,13 +20,13 @@ from foldyn.cases import Case
 from foldyn.designs.problem import Space
 from foldyn.errors import ComputationError, FoldynError, InputError, Told, within
 from foldyn.gradients.measures import derivative_of, one_number
-from foldyn.gradients.run_sensitivity import FUNCTIONS, case_file_at, sensitivity
+from foldyn.gradients.run_sensitivity import FUNCTIONS, case_file_at, kind_of, sensitivity
 from foldyn.input_files import path_of
 from foldyn.store import program
 from foldyn.sweeps.evaluations import Evaluation
 from foldyn.sweeps.job import ASIDE, Job, code_of
 from foldyn.sweeps.measure import Asked
-from foldyn.values import choice, show
+from foldyn.values import show
 
 COMPUTING = ("analyses", "results", "sweeps", "gradients", "designs")
 """Folders that evaluations depend on, in addition to the solvers."""
@@ -35,19 +35,6 @@ Point = tuple[float, ...]
 Source = Callable[..., Case] | str | os.PathLike[str]
 
 UNCHECKED = {"check_model": False}  # the designs of a search are not compared one by one
-
-
-class Evaluator(Protocol):
-    """Evaluates measures of designs."""
-
-    @property
-    def stamp(self) -> list[Any]:
-        """Everything that the measures depend on, as JSON types."""
-        ...
-
-    def __call__(self, values: Mapping[str, Any], gradient: bool) -> tuple[NDArray, NDArray | None]:
-        """Measures (m,) of a design and, on request, derivatives (m, n) with respect to entries."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +67,8 @@ class Measured:
         if not gradient:
             result, case, shared = *self._computed(values), dict[Any, Any]()
             return np.array([_single(one, result, case, shared) for one in self.measures]), None
-        width = self.space.parts(self.space.upper - self.space.lower)
-        zeros = {name: width[name] for name, value in values.items() if not np.any(value)}
-        sizes = {n: size if self.space.shapes[n] else float(size[0]) for n, size in zeros.items()}
+        width = self.space.values(self.space.upper - self.space.lower)
+        sizes = {name: width[name] for name, value in values.items() if not np.any(value)}
         texts = [one.text for one in self.measures]
         found = sensitivity(
             self.build, dict(values), measures=texts, analysis=self.analysis, sizes=sizes
@@ -141,13 +127,7 @@ def measured(
         kind = document.get("analysis", {}).get("kind")
         _check_keys(build, document, space)
     elif callable(build):
-        if not isinstance(analysis, Mapping) or "kind" not in analysis:
-            raise InputError(
-                f' = {show(analysis)}: say what is computed, like {{"kind": "modes", "count": 4}}',
-                "analysis",
-            )
-        kind = choice("analysis.kind", analysis["kind"], FUNCTIONS)
-        analysis = dict(analysis)
+        kind, analysis = kind_of(analysis), dict(analysis or {})
     else:
         raise InputError(f" = {show(build)}: give a function or a case file", "build")
     measures = []
@@ -182,7 +162,7 @@ def _single(one: Asked, result: xr.Dataset, case: Case, shared: dict[Any, Any]) 
 class Evaluate:
     """Evaluates points of a space; errors become part of the evaluation."""
 
-    evaluator: Evaluator
+    evaluator: Measured
     space: Space
     gradient: bool
 

@@ -5,39 +5,41 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import BFGS, Bounds, NonlinearConstraint, minimize
 
+from foldyn.arguments import Check, Checked
 from foldyn.designs.search import BAD, Ended, Search, Trial
 from foldyn.errors import optional
+from foldyn.values import number, whole
 
 SPREAD = 0.25
 """Standard deviation of the first generation of CMA-ES, in scaled entries."""
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Checked):
     """Settings that all methods share.
 
-    Attributes
+    Parameters
     ----------
     tolerance : float
         Relative change of the objective at which a search ends.
     slack : float
         Relative violation of a constraint up to which it counts as satisfied.
-    most : int
+    max_evaluations : int
         Most evaluations of a search.
     seed : int
         Random seed of stochastic methods.
     """
 
-    tolerance: float
-    slack: float
-    most: int
-    seed: int
+    tolerance: Annotated[float, Check(number, above=0.0, below=1.0)]
+    slack: Annotated[float, Check(number, above=0.0, below=1.0)]
+    max_evaluations: Annotated[int, Check(whole, least=1)]
+    seed: Annotated[int, Check(whole, least=0, most=2**31)]
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ def _slsqp(search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
     found = minimize(
         lambda x: search.at(x).objective, x, jac=lambda x: search.at(x).slope, method="SLSQP",
         bounds=[(0.0, 1.0)] * len(x), constraints=constraints, callback=search.step,
-        options={"ftol": settings.tolerance, "maxiter": settings.most},
+        options={"ftol": settings.tolerance, "maxiter": settings.max_evaluations},
     )  # fmt: skip
     return str(found.message), bool(found.success)
 
@@ -105,7 +107,7 @@ def _trust_constr(search: Search, x: NDArray, settings: Settings) -> tuple[str, 
             callback=search.step,
             options={
                 "gtol": settings.tolerance, "xtol": settings.tolerance,
-                "barrier_tol": settings.tolerance, "maxiter": settings.most,
+                "barrier_tol": settings.tolerance, "maxiter": settings.max_evaluations,
             },
         )  # fmt: skip
     return str(found.message), found.status in (1, 2)

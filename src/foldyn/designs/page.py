@@ -50,12 +50,11 @@ def write_design(
         File format of figures; by default none are drawn.
     """
     album, evaluator = Album(folder, figures), plan.evaluator
-    first = plan.space.values(tuple(plan.first.tolist()))
-    designs = {"after": found.parameters, "before": first}
+    designs = {"after": found.parameters, "before": plan.space.values(plan.first)}
     cases = {}
     for name, values in designs.items():
         try:
-            cases[name] = evaluator.case(values)  # type: ignore[attr-defined]
+            cases[name] = evaluator.case(values)
         except FoldynError:  # the guess may not give a case
             continue
     sections: list[Section | Stage] = [*_stages(plan, cases, designs, case_file)]
@@ -90,7 +89,7 @@ def _stages(
     """Results of the best design and of the first guess, side by side."""
     if case_file.analysis.kind not in SHOWN:
         return
-    results = {name: plan.evaluator.result(designs[name]) for name in cases}  # type: ignore
+    results = {name: plan.evaluator.result(designs[name]) for name in cases}
     nodes = case_file.output.nodes.tolist()
     yield stage(results, cases, f"{case_file.heading}: a design", nodes)
 
@@ -156,11 +155,8 @@ def _slopes(
 ) -> Iterator[Section]:
     """Sensitivity to each parameter; for arrays, also drawn on the sheet for each entry."""
     text = plan.problem.objective.text
-    width = plan.space.parts(plan.space.upper - plan.space.lower)
-    over = {name: np.asarray(found.gradient[name]) * width[name] for name in found.gradient}
-    slopes = {
-        name: one if plan.space.shapes[name] else float(one.item()) for name, one in over.items()
-    }
+    width = plan.space.values(plan.space.upper - plan.space.lower)
+    slopes = {name: one * width[name] for name, one in found.gradient.items()}
     caption = (
         "Derivative of the objective with respect to each parameter at the best design, times the "
         "range of the parameter. For an array: the root of the sum of squares over its entries."

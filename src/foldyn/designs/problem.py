@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError, within
 from foldyn.gradients.expressions import Constraint, Expression, constraint, parse
@@ -147,7 +147,7 @@ class Space:
         split = np.split(np.asarray(entries), np.cumsum(counts)[:-1], axis=-1)
         return dict(zip(self.shapes, split, strict=True))
 
-    def values(self, point: tuple[float, ...]) -> dict[str, float | NDArray]:
+    def values(self, point: ArrayLike) -> dict[str, float | NDArray]:
         """Values of the parameters of a design."""
         return {
             name: part if self.shapes[name] else float(part[0])

@@ -155,20 +155,17 @@ def history_of(
     entries = np.array([row.point for row in rows])
     numbers = np.array([row.numbers for row in rows])
     along = "evaluation"
-    data: dict[str, Any] = {
-        "search": (along, np.array([row.search for row in rows])),
-        "iteration": (along, np.array([row.iteration for row in rows])),
-        "objective": (along, numbers[:, 0], {"long_name": problem.objective.text}),
-        "violation": (
-            along, np.array([row.violation for row in rows]),
-            {"long_name": "largest violation, relative to the size of the constraint"},
-        ),
-        "feasible": (along, np.array([row.feasible for row in rows])),
-        "seconds": (along, np.array([row.seconds for row in rows]), {"units": "s"}),
-        "failure": (along, np.array([row.failure for row in rows], dtype=str)),
-        "warnings": (along, np.array([row.warnings for row in rows], dtype=str)),
-        "best": ((), rows.index(best)),
+    about: dict[str, dict[str, str]] = {
+        "search": {}, "iteration": {},
+        "objective": {"long_name": problem.objective.text},
+        "violation": {"long_name": "largest violation, relative to the size of the constraint"},
+        "feasible": {}, "seconds": {"units": "s"}, "failure": {}, "warnings": {},
     }  # fmt: skip
+    data: dict[str, Any] = {
+        name: (along, np.array([getattr(row, name) for row in rows]), text)
+        for name, text in about.items()
+    }
+    data["best"] = (), rows.index(best)
     coordinates: dict[str, Any] = {along: np.arange(len(rows))}
     if problem.constraints:
         told = {"long_name": "left minus right side"}

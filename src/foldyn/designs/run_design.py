@@ -17,7 +17,7 @@ import foldyn
 from foldyn.analyses import CaseFile
 from foldyn.analyses.keys import files_moved, replaced, value_at
 from foldyn.analyses.reading import case_of_document, read_document
-from foldyn.designs.evaluator import Evaluate, Evaluator, Point, Source, measured
+from foldyn.designs.evaluator import Evaluate, Measured, Point, Source, measured
 from foldyn.designs.methods import METHODS, Settings, searched
 from foldyn.designs.problem import Problem, Space, problem_of, space_of
 from foldyn.designs.result import Design, End, history_of
@@ -25,7 +25,7 @@ from foldyn.designs.search import Row, Search
 from foldyn.errors import ComputationError, InputError, warn
 from foldyn.sweeps.evaluations import Evaluation, Evaluations
 from foldyn.sweeps.pool import Here
-from foldyn.values import MOST, choice, number, whole
+from foldyn.values import MOST, choice, whole
 from foldyn.writing import write_text
 
 FLAT = 1e-12
@@ -65,7 +65,7 @@ class Plan:
     space : Space
     first : ndarray
         Entries of the first guess.
-    evaluator : Evaluator
+    evaluator : Measured
     method : str
     settings : Settings
     searches : int
@@ -74,7 +74,7 @@ class Plan:
     problem: Problem
     space: Space
     first: NDArray
-    evaluator: Evaluator
+    evaluator: Measured
     method: str
     settings: Settings
     searches: int
@@ -179,12 +179,7 @@ def plan_of(
     problem = problem_of(minimize, maximize, subject_to)
     space, first = space_of(bounds, guess)
     METHODS[choice("method", method, METHODS)].check()
-    settings = Settings(
-        number("tolerance", tolerance, above=0.0, below=1.0),
-        number("slack", slack, above=0.0, below=1.0),
-        whole("max_evaluations", max_evaluations, least=1),
-        whole("seed", seed, least=0, most=2**31),
-    )
+    settings = Settings(tolerance, slack, max_evaluations, seed)
     whole("searches", searches, least=1, most=MOST)
     evaluator = measured(build, analysis, problem.places, space, METHODS[method].gradient)
     return Plan(problem, space, first, evaluator, method, settings, searches)
@@ -203,7 +198,7 @@ def designed(
         evaluations = Evaluations[Point](pool, evaluate.stamp, folder)
         search = Search(
             plan.problem, plan.space, evaluations, gradient, plan.settings.slack,
-            plan.settings.most, lambda: _tell(search, progress),
+            plan.settings.max_evaluations, lambda: _tell(search, progress),
         )  # fmt: skip
         ends = []
         for k in range(plan.searches):
@@ -234,8 +229,8 @@ def _tell(search: Search, progress: Callable[[Course], None] | None) -> None:
     if progress is None:
         return
     best, found = search.best, search.evaluations.found
-    objective, violation = (np.nan, np.nan) if best is None else (best.numbers[0], best.violation)
-    progress(Course(len(search.rows), found, search.number, float(objective), float(violation)))
+    objective, violation = (np.nan, np.nan) if best is None else (best.objective, best.violation)
+    progress(Course(len(search.rows), found, search.number, objective, violation))
 
 
 def _end(number: int, search: Search, message: str, converged: bool) -> End:
@@ -249,9 +244,7 @@ def _end(number: int, search: Search, message: str, converged: bool) -> End:
         if _insensitive(search, best):
             why, converged = f"where no parameter changes {search.problem.objective.text}", False
         message = f"{message}; the design stays at its guess, {why}"
-    return End(
-        number, float(best.numbers[0]), best.violation, best.feasible, len(own), message, converged
-    )
+    return End(number, best.objective, best.violation, best.feasible, len(own), message, converged)
 
 
 def _insensitive(search: Search, row: Row) -> bool:
@@ -287,9 +280,7 @@ def _found(
             "optimum; give another guess, or take another objective",
             "design-optimization.md#what-comes-back",
         )
-    gradient: dict[str, Any] = {}
-    if best.slopes is not None:
-        gradient = space.values(tuple(best.slopes[0].tolist()))
+    gradient = {} if best.slopes is None else space.values(best.slopes[0])
     facts = {
         "objective": problem.objective.text, "sense": "min" if problem.sign > 0.0 else "max",
         "method": plan.method, "searches": plan.searches, "seed": plan.settings.seed,
@@ -297,7 +288,7 @@ def _found(
         "feasible": int(best.feasible), "seconds": seconds,
     }  # fmt: skip
     return Design(
-        space.values(best.point), float(best.numbers[0]), best.feasible, violations, best.values,
+        space.values(best.point), best.objective, best.feasible, violations, best.values,
         gradient, tuple(ends), history_of(search.rows, best, space, problem, facts),
         len(search.rows), seconds,
     )  # fmt: skip

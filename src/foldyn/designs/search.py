@@ -71,6 +71,11 @@ class Row:
     values: dict[str, float] = field(default_factory=dict)
     slopes: NDArray | None = None  # derivatives of `numbers` with respect to entries of the design
 
+    @property
+    def objective(self) -> float:
+        """The first of `numbers`."""
+        return float(self.numbers[0])
+
 
 class Search:
     """Evaluates designs for a method.
@@ -202,18 +207,17 @@ class Search:
         signs = np.array([self.problem.sign, *self.problem.signs])
         scale = signs / self.sizes
         scaled = numbers * scale
-        width = 0 if slopes is None else len(point)
         by = np.zeros((len(scaled), 0)) if slopes is None else (
             slopes * scale[:, None] * (self.space.upper - self.space.lower)
         )  # fmt: skip
         excess = scaled[1:]
         off = np.where(self.problem.equal, np.abs(excess), np.maximum(excess, 0.0))
         return Trial(
-            self.space.x(np.array(point)), float(scaled[0]), excess, by[0, :width], by[1:, :width],
+            self.space.x(np.array(point)), float(scaled[0]), excess, by[0], by[1:],
             float(off.max(initial=0.0)),
         )  # fmt: skip
 
     def key(self, row: Row) -> tuple[bool, float]:
         """Sort key for the best design: feasible first, then least objective or violation."""
-        least = self.problem.sign * row.numbers[0] if row.feasible else row.violation
+        least = self.problem.sign * row.objective if row.feasible else row.violation
         return not row.feasible, float(least)

@@ -270,13 +270,10 @@ def _refuse(motion: Any) -> None:
             "there are no gradients of motions in which constraints tie nodes without mass; give "
             "them mass, or vary the parameters by fd.sweep"
         )
-    if len(motion.packed.body.hidden) and _jumps_within(motion):
+    plan = motion.plan
+    jumped = any(plan.start < jump <= plan.end for jump in jumps(motion.case))
+    if len(motion.packed.body.hidden) and jumped:
         raise InputError(
             "there are no gradients of motions in which loads jump and rotations without mass "
             "follow at once; let them rise in a step, as by fd.Ramp"
         )
-
-
-def _jumps_within(motion: Any) -> bool:
-    plan = motion.plan
-    return any(plan.start < jump <= plan.end for jump in jumps(motion.case))

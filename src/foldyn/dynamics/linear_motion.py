@@ -20,7 +20,7 @@ from foldyn.dynamics.audit import audited, energy_error
 from foldyn.dynamics.initial import MODAL, check_imposed, check_start, check_steady
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.motion_state import Samples, StepPlan, samples
-from foldyn.dynamics.progress import Progress, Reporter, reporter
+from foldyn.dynamics.progress import Progress, Reporter, reported
 from foldyn.dynamics.sampling import Sampler, SamplingError
 from foldyn.dynamics.superposition import (
     Bases,
@@ -138,11 +138,8 @@ class LinearMotion:
         """
         if keeping is not None:
             keeping.begin({"method": MODAL}, {})
-        report, close = reporter(progress)
-        try:
+        with reported(progress) as report:
             return self._computed(report)
-        finally:
-            close()
 
     def _computed(self, report: Reporter) -> xarray.Dataset:
         began, case, plan = time.perf_counter(), self.case, self.plan

@@ -22,7 +22,7 @@ from foldyn.dynamics.initial import begin
 from foldyn.dynamics.methods import METHODS, ExplicitEngine, ImplicitEngine, Integrator
 from foldyn.dynamics.motion_state import MotionState, Outcome, Samples, StepPlan
 from foldyn.dynamics.output import Output
-from foldyn.dynamics.progress import Progress, Reporter, reporter
+from foldyn.dynamics.progress import Progress, Reporter, reported
 from foldyn.dynamics.sampling import Sampler, SamplingError
 from foldyn.dynamics.softening import swings_told
 from foldyn.dynamics.stability import MARGIN, limit_below
@@ -226,25 +226,23 @@ class Motion:
         """
         self.restart(keeping)
         self.make_room()
-        report, close = reporter(progress)
-        try:
-            begin_flow(self.case, self.packed, self.state, self._flow)
-            given = self.case, self.packed, self.state, self.plan, self.device
-            engine = engine_of(self.state) if engine_of else self.method.engine(*given)
-            known = self._initial[3] if self.case.contact is None else None
-            if known and known.method != self.method.name:
-                known = None
-            if known and isinstance(engine, ImplicitEngine):
-                engine.continue_from(known.values)
-            self._engine = engine
-            self._advance(engine, report)
-        except KeyboardInterrupt:
-            kept = self._keeping.summary if self._keeping else ""
-            raise MotionInterrupted(
-                f"interrupted at t = {self.state.tally.time:.6g} s{kept}", self._dataset()
-            ) from None
-        finally:
-            close()
+        with reported(progress) as report:
+            try:
+                begin_flow(self.case, self.packed, self.state, self._flow)
+                given = self.case, self.packed, self.state, self.plan, self.device
+                engine = engine_of(self.state) if engine_of else self.method.engine(*given)
+                known = self._initial[3] if self.case.contact is None else None
+                if known and known.method != self.method.name:
+                    known = None
+                if known and isinstance(engine, ImplicitEngine):
+                    engine.continue_from(known.values)
+                self._engine = engine
+                self._advance(engine, report)
+            except KeyboardInterrupt:
+                kept = self._keeping.summary if self._keeping else ""
+                raise MotionInterrupted(
+                    f"interrupted at t = {self.state.tally.time:.6g} s{kept}", self._dataset()
+                ) from None
 
     def restart(self, keeping: Keeping | None = None) -> None:
         """Return to the start, without samples: a motion may be integrated any number of times.

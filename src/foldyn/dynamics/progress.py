@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import NamedTuple
 
 from foldyn.errors import InputError
@@ -21,14 +22,14 @@ class Progress(NamedTuple):
 Reporter = Callable[[Progress], None]
 
 
-def reporter(choice: bool | Reporter | None) -> tuple[Reporter, Callable[[], None]]:
-    """Reporter and its closing function: none, a bar on stderr (True), or the user's own."""
-    if callable(choice):
-        return choice, lambda: None
-    if choice is not None and not isinstance(choice, bool):
+@contextmanager
+def reported(choice: bool | Reporter | None) -> Iterator[Reporter]:
+    """Reporter for the argument `progress`: none, a bar on stderr (True), or the user's own."""
+    if choice is not None and not isinstance(choice, bool) and not callable(choice):
         raise InputError(f" = {choice!r}: give True, False or a function of a Progress", "progress")
-    if not choice:
-        return lambda _: None, lambda: None
+    if choice is not True:
+        yield choice if callable(choice) else lambda _: None
+        return
     from tqdm import tqdm
 
     layout = "{l_bar}{bar}| {n:.3g}/{total:.3g} s [{elapsed}<{remaining}{postfix}]"
@@ -44,4 +45,5 @@ def reporter(choice: bool | Reporter | None) -> tuple[Reporter, Callable[[], Non
         bar.set_postfix_str(text, refresh=False)
         bar.update(state.time - bar.n)
 
-    return show, bar.close
+    with bar:
+        yield show

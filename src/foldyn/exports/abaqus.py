@@ -9,6 +9,7 @@ Keywords Reference Guide; numbers have at most 20 columns, as it requires.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
@@ -19,11 +20,13 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.exports.creased_shell import CreasedShell, creased_shell
+from foldyn.structures import Ply, Sheet
 from foldyn.values import choice, whole
 from foldyn.writing import write_text
 
 ELEMENTS = ("STRI3", "S3")
 SHEET = "SHEET"
+ALIKE = 9  # decimals of directions that count as equal
 
 
 def write(
@@ -80,16 +83,59 @@ def _panels(shell: CreasedShell, kind: str) -> Iterator[str]:
         own = np.flatnonzero(shell.kind == number - 1)
         if len(own) == 0:
             continue
-        yield f"*ELEMENT, TYPE={kind}, ELSET=PANELS_{number}"
-        for element, nodes in zip(
-            (own + 1).tolist(), (shell.triangles[own] + 1).tolist(), strict=True
-        ):
-            yield _line(element, *nodes)
-        yield f"*MATERIAL, NAME=MATERIAL_{number}"
-        yield from ("*ELASTIC", _line(sheet.youngs_modulus, sheet.poissons_ratio))
-        yield from ("*DENSITY", _line(sheet.density))
-        yield f"*SHELL SECTION, ELSET=PANELS_{number}, MATERIAL=MATERIAL_{number}"
+        for k, part in enumerate(sheet.plies or [sheet], 1):
+            yield f"*MATERIAL, NAME=MATERIAL_{_name(number, k if sheet.plies else 0)}"
+            yield from _elastic(part)
+            yield from ("*DENSITY", _line(part.density))
+        # orthotropic panels are a section for each direction
+        axes = np.round(shell.axes[own], ALIKE) if sheet.orthotropic else np.zeros((len(own), 2, 3))
+        ways, way = np.unique(axes, axis=0, return_inverse=True)
+        for k, both in enumerate(ways):
+            name, some = _name(number, k + 1 if sheet.orthotropic else 0), own[way.ravel() == k]
+            yield f"*ELEMENT, TYPE={kind}, ELSET=PANELS_{name}"
+            for element, nodes in zip(
+                (some + 1).tolist(), (shell.triangles[some] + 1).tolist(), strict=True
+            ):
+                yield _line(element, *nodes)
+            yield from _section(sheet, number, name, both)
+
+
+def _name(number: int | str, part: int) -> str:
+    """Name of a part, counted from 1; 0 if there is one only."""
+    return f"{number}_{part}" if part else f"{number}"
+
+
+def _section(sheet: Sheet, number: int, name: str, axes: NDArray) -> Iterator[str]:
+    """Thickness and material of a set of elements, with directions 1 and 2 (2, 3)."""
+    section = f"*SHELL SECTION, ELSET=PANELS_{name}"
+    if not sheet.orthotropic:
+        yield from (f"{section}, MATERIAL=MATERIAL_{number}", _line(sheet.thickness))
+        return
+    angles = [math.radians(ply.angle) for ply in sheet.plies or ()] or [0.0]
+    for k, angle in enumerate(angles, 1):
+        c, s = math.cos(angle), math.sin(angle)
+        turned = np.array([[c, s], [-s, c]]) @ axes
+        yield f"*ORIENTATION, NAME=AXES_{_name(name, k if sheet.plies else 0)}"
+        yield from (_line(*turned.ravel().tolist()), _line(3, 0.0))
+    if sheet.plies:
+        yield f"{section}, COMPOSITE"
+        for k, ply in enumerate(sheet.plies, 1):
+            yield f"{_line(ply.thickness)}, 3, MATERIAL_{number}_{k}, AXES_{name}_{k}"
+    else:
+        yield f"{section}, MATERIAL=MATERIAL_{number}, ORIENTATION=AXES_{name}"
         yield _line(sheet.thickness)
+
+
+def _elastic(part: Sheet | Ply) -> Iterator[str]:
+    """Elastic constants; an orthotropic sheet has those of direction 2 along its normal, too."""
+    first, second = np.broadcast_to(part.youngs_modulus, 2).tolist()
+    if part.shear_modulus is None:
+        yield from ("*ELASTIC", _line(first, part.poissons_ratio))
+        return
+    yield "*ELASTIC, TYPE=ENGINEERING CONSTANTS"
+    shear = part.shear_modulus
+    yield _line(first, second, second, part.poissons_ratio, 0.0, 0.0, shear, shear)
+    yield _line(shear)
 
 
 def _ties(shell: CreasedShell) -> Iterator[str]:

@@ -12,18 +12,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from foldyn.cases import Case
 from foldyn.condensation import Superelements
 from foldyn.errors import InputError, warn
 from foldyn.linear.shell_of import check_reduced, shell_of
 from foldyn.materials import MemoryLaw
-from foldyn.patterns import Pattern
+from foldyn.patterns.topology import components
 from foldyn.shells import Shell
 from foldyn.structures import Sheet
 from foldyn.structures.discretized import Discretized
+from foldyn.structures.material_axes import material_axes, panel_axes
 from foldyn.values import whole
 
 DIVISIONS = 16  # gives frequencies of the case studies within 1 %
@@ -61,6 +60,8 @@ class CreasedShell:
     triangles, kind : (nt, 3), (nt,)
         Nodes, counter-clockwise seen from the front; index of each triangle's sheet in `sheets`.
     sheets : tuple of Sheet
+    axes : (nt, 2, 3)
+        Directions 1 and 2 of orthotropic sheets in the triangles' planes.
     joints : tuple of Joint
     places : tuple of tuples of int
         Groups of coincident nodes.
@@ -78,6 +79,7 @@ class CreasedShell:
     triangles: NDArray
     kind: NDArray
     sheets: tuple[Sheet, ...]
+    axes: NDArray
     joints: tuple[Joint, ...]
     places: tuple[tuple[int, ...], ...]
     held: NDArray
@@ -88,13 +90,13 @@ class CreasedShell:
     @property
     def membrane(self) -> float:
         """Largest membrane stiffness E t among the sheets, N/m."""
-        return max(sheet.youngs_modulus * sheet.thickness for sheet in self.sheets)
+        return max(max(sheet.moduli) * sheet.thickness for sheet in self.sheets)
 
     @property
     def loose(self) -> list[tuple[int, int]]:
         """Pairs of coincident nodes that no chain of joints connects."""
         pairs = np.concatenate([np.zeros((0, 2), int), *(joint.nodes for joint in self.joints)])
-        part = _components(pairs, len(self.nodes))
+        part = components(pairs, len(self.nodes))
         found = []
         for place in self.places:
             first = {part[place[0]]: place[0]}
@@ -130,17 +132,22 @@ def creased_shell(case: Case, divisions: int | None = None) -> CreasedShell:
     shell = held.structure
     assert isinstance(shell, Shell)
     sheets, kind = shell.sheet.kinds(len(shell.pattern.faces))
-    part = _components(shell.pattern.weld_faces, len(shell.pattern.faces))
+    axes, fibers = panel_axes(shell.pattern), material_axes(shell.pattern, shell.sheet)
+    if fibers is not None:
+        axes = np.stack([fibers, np.cross(shell.pattern.face_normals, fibers)], axis=1)
+    part = components(shell.pattern.weld_faces, len(shell.pattern.faces))
     split = _Split(shell, part)
     clamped = np.zeros(len(split.origin), bool)
     for edge, row in zip(shell.options.clamped, shell.clamped_nodes, strict=True):
-        clamped[split.of(_panel_at(shell.pattern, edge), row)] = True
+        panel = next(k for k, face in enumerate(shell.pattern.faces) if set(edge) <= set(face))
+        clamped[split.of(panel, row)] = True
     share = 1.0 / np.bincount(split.origin)[split.origin]
     return CreasedShell(
         nodes=shell.nodes[split.origin],
         triangles=split.triangles,
         kind=kind[shell.triangle_panel],
         sheets=tuple(sheets),
+        axes=axes[shell.triangle_panel],
         joints=_joints(shell, split),
         places=split.places,
         held=held.fixed[split.origin],
@@ -183,12 +190,6 @@ class _Split:
         """New node numbers for a panel."""
         keys = self._part[panel] + nodes * (self._part.max() + 1)
         return [self._number[key] for key in keys.tolist()]
-
-
-def _components(pairs: NDArray, count: int) -> NDArray:
-    """Connected component (count,) of each vertex of a graph with these edges."""
-    graph = sparse.coo_array((np.ones(len(pairs)), tuple(pairs.T)), (count, count))
-    return connected_components(graph, directed=False)[1]
 
 
 def _joints(shell: Shell, split: _Split) -> tuple[Joint, ...]:
@@ -242,11 +243,6 @@ def fold_slopes(structure: Discretized) -> NDArray:
             "exports.md#input-decks",
         )
     return slope
-
-
-def _panel_at(pattern: Pattern, edge: tuple[int, int]) -> int:
-    """Panel of a boundary edge."""
-    return next(k for k, face in enumerate(pattern.faces) if set(edge) <= set(face))
 
 
 # ------------------------------------------------------------------ what is refused

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
+from foldyn.errors import InputError
 from foldyn.exports.creased_shell import CreasedShell, Joint, creased_shell
 from foldyn.values import whole
 from foldyn.writing import write_text
@@ -36,6 +37,12 @@ def model(shell: CreasedShell, tie: float = TIE) -> Iterator[Command]:
     for number, point in enumerate(shell.nodes.tolist(), 1):
         yield "node", number, *point
     for number, sheet in enumerate(shell.sheets, 1):
+        if sheet.orthotropic:
+            raise InputError(
+                ": triangles of OpenSees (ASDShellT3) are isotropic here; export to Abaqus or "
+                "CalculiX instead",
+                "sheet.youngs_modulus",
+            )
         yield (
             "section", "ElasticMembranePlateSection", number, sheet.youngs_modulus,
             sheet.poissons_ratio, sheet.thickness, sheet.density or 0.0,

@@ -96,7 +96,11 @@ def write(
         points = shapes.nodes[None]
     else:
         points = shapes.nodes + shapes.displacement
-        cells |= _cell_fields(mesh, _known(case, some, shapes.displacement))
+        if result.attrs["foldyn_result"] == "folding":
+            known = folding_fields(case, shapes.displacement, some["fold_angle"].values)
+        else:
+            known = fields(case, some, shapes.displacement)
+        cells |= _cell_fields(mesh, known)
     if flag("stresses", bool(stresses) if stresses is None else stresses):
         found = find_stresses(result).isel({dimension: shapes.samples})
         cells |= _cell_fields(mesh, stress_fields(found))
@@ -135,12 +139,6 @@ def _mesh(structure: Discretized) -> Mesh:
         numbered(1, np.arange(len(bars))),
         numbered(2, structure.triangle_panel),
     )
-
-
-def _known(case: Case, result: xr.Dataset, displacement: NDArray) -> dict[str, Field]:
-    if result.attrs["foldyn_result"] == "folding":
-        return folding_fields(case, displacement, result["fold_angle"].values)
-    return fields(case, result, displacement)
 
 
 def _cell_fields(mesh: Mesh, known: Mapping[str, Field]) -> dict[str, NDArray]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynWarning, InputError, quietly
 from foldyn.formats.diagnosis import Diagnosis
 from foldyn.formats.drawing import Drawing, Notes, count
 from foldyn.formats.lines import MOST_LINES, Lines, too_many
@@ -32,6 +33,11 @@ class Built(NamedTuple):
 
     pattern: Pattern
     diagnosis: Diagnosis
+
+    def noted(self, kind: str, text: str, **more: Any) -> Built:
+        """Add a sentence to the assumptions, repairs or doubts, and change what else is given."""
+        told = {kind: (*getattr(self.diagnosis, kind), text)}
+        return self._replace(diagnosis=replace(self.diagnosis, **told), **more)
 
 
 def built(
@@ -164,7 +170,7 @@ def _lines(drawing: Drawing, unit: float, notes: Notes) -> Lines:
 
 def _pattern(panels: Panels, drawing: Drawing, notes: Notes) -> Pattern:
     """Pattern of panels with open cuts."""
-    with warnings.catch_warnings(action="ignore", category=FoldynWarning):
+    with quietly():
         bare = Pattern(panels.points, panels.faces)
     creases = {(a, b): k for k, (a, b) in enumerate(bare.creases.tolist())}
     given = np.array([panels.letters.get(edge, "") for edge in creases], dtype="<U1")

@@ -7,22 +7,18 @@ drawing that keep a pattern from folding flat.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from foldyn.errors import ComputationError, InputError, within
+from foldyn.formats.building import Built
 from foldyn.formats.diagnosis import LISTED
-from foldyn.formats.drawing import count
+from foldyn.formats.drawing import Drawing, count
 from foldyn.patterns import Pattern, convex, welded
 from foldyn.patterns.facets import COPLANAR, FACETS, HINGE, WELD, what_was_cut
 from foldyn.patterns.flat_foldability import flat_foldability, flat_foldable, slips
 from foldyn.patterns.topology import Edge, edge_lookup
 from foldyn.values import choice
-
-if TYPE_CHECKING:
-    from foldyn.formats.building import Built
-    from foldyn.formats.drawing import Drawing
 
 
 def with_facets(made: Built, drawing: Drawing, facets: str | None) -> Built:
@@ -43,27 +39,23 @@ def with_facets(made: Built, drawing: Drawing, facets: str | None) -> Built:
         return made._replace(pattern=welded(made.pattern, drawn)) if drawn else made
     if not made.diagnosis.facets:
         return made
-    told, bent = made.diagnosis, _bent(made.pattern, made.diagnosis.facets)
+    bent = _bent(made.pattern, made.diagnosis.facets)
     if bent:
         text = (
             f"{bent}: flat creases of the file are folded, so that all of its flat creases are "
             'hinges; facets = "weld" takes them for lines in the sheet, "hinge" for hinges'
         )
-        return made._replace(diagnosis=replace(told, doubts=(*told.doubts, text)))
+        return made.noted("doubts", text)
     pattern = welded(made.pattern, made.diagnosis.facets)
-    text = _acted(made.pattern, pattern)
-    return made._replace(
-        pattern=pattern, diagnosis=replace(told, assumptions=(*told.assumptions, text))
-    )
+    return made.noted("assumptions", _acted(made.pattern, pattern), pattern=pattern)
 
 
 def with_convex_panels(made: Built) -> Built:
     """Cut panels that are not convex."""
-    pattern, told = convex(made.pattern), made.diagnosis
+    pattern = convex(made.pattern)
     if pattern is made.pattern:
         return made
-    repairs = (*told.repairs, what_was_cut(made.pattern, pattern))
-    return made._replace(pattern=pattern, diagnosis=replace(told, repairs=repairs))
+    return made.noted("repairs", what_was_cut(made.pattern, pattern), pattern=pattern)
 
 
 def _drawn(made: Built, drawing: Drawing) -> tuple[Edge, ...]:
@@ -133,19 +125,13 @@ def without_slips(made: Built, mend: bool, is_state: bool) -> Built:
             if isinstance(error, InputError)
             else f"{error}; a `tolerance` joins ends that miss each other"
         )
-        text = f"{said}, by which panels bend when it folds; {remedy}"
-        return made._replace(diagnosis=replace(told, doubts=(*told.doubts, text)))
+        return made.noted("doubts", f"{said}, by which panels bend when it folds; {remedy}")
     moves = np.linalg.norm(mended.vertices - pattern.vertices, axis=1)
-    number, most = int((moves > LISTED).sum()), f"{1e3 * moves.max():.3g} mm"
+    which = count(int((moves > LISTED).sum()), "vertex", "vertices")
+    moving = f"{which} by up to {1e3 * moves.max():.3g} mm to where they fold flat"
+    made = made._replace(diagnosis=replace(told, moves=moves))
     if mend:
-        text = (
-            f"moved {count(number, 'vertex', 'vertices')} by up to {most} to where they fold flat"
-        )
-        vertices = flat_foldability(mended)
-        told = replace(told, repairs=(*told.repairs, text), moves=moves, vertices=vertices)
-        return made._replace(pattern=mended, diagnosis=told)
-    text = (
-        f"{said}, by which panels bend when it folds; flat_foldable = true moves "
-        f"{count(number, 'vertex', 'vertices')} by up to {most} to where they fold flat"
-    )
-    return made._replace(diagnosis=replace(told, doubts=(*told.doubts, text), moves=moves))
+        diagnosis = replace(made.diagnosis, vertices=flat_foldability(mended))
+        return Built(mended, diagnosis).noted("repairs", f"moved {moving}")
+    text = f"{said}, by which panels bend when it folds; flat_foldable = true moves {moving}"
+    return made.noted("doubts", text)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -210,8 +210,7 @@ def _with_families(made: Built, drawing: Drawing) -> Built:
     pairs = {tuple(sorted(pair)) for members in drawing.families.values() for pair in members}
     if len(made.pattern.vertices) == len(drawing.vertices) and pairs <= creases:
         return made._replace(pattern=made.pattern.changed(families=drawing.families))
-    told = (*made.diagnosis.repairs, "families of creases left out: the vertices are others now")
-    return made._replace(diagnosis=replace(made.diagnosis, repairs=told))
+    return made.noted("repairs", "families of creases left out: the vertices are others now")
 
 
 def write_pattern(

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.formats import planar
 from foldyn.formats.drawing import Notes, count
 from foldyn.formats.lines import Lines, single, without_points
 from foldyn.formats.panels import Panels, compact, with_inner_borders
-from foldyn.formats.planar import (
-    GAP,
-    check_crowding,
-    joined,
-    on_lines,
-    points_on,
-    split,
-    tolerance_of,
-    without_gaps,
-)
 from foldyn.formats.regions import areas, enclosed, sheet, straightened
 
 _SAME = 1e-9  # relative to the size: larger distances between joined ends are reported
@@ -43,22 +36,23 @@ def flat_panels(lines: Lines, notes: Notes, tolerance: float | None = None) -> P
         The lines are not in the plane, enclose nothing, or are too many.
     """
     lines = _in_plane(lines, notes)
-    tolerance = tolerance_of(lines) if tolerance is None else tolerance
+    tolerance = planar.tolerance_of(lines) if tolerance is None else tolerance
     whole = _joined(lines, tolerance, notes)
     whole, contradictions = single(whole)
     notes.contradict(contradictions)
-    check_crowding(whole)
+    planar.check_crowding(whole)
     whole = _on_lines(whole, tolerance, notes)
-    pieces = split(whole, tolerance)
+    pieces = planar.split(whole, tolerance)
     if len(pieces.ends) > len(whole.ends):
         more = len(pieces.ends) - len(whole.ends)
         notes.repairs.append(f"split lines where they meet: {count(more, 'piece')} more")
     parted = pieces
-    pieces = straightened(parted, np.unique(points_on(whole, 0.5 * tolerance)[:, 1]), tolerance)
+    suspects = np.unique(planar.points_on(whole, 0.5 * tolerance)[:, 1])
+    pieces = straightened(parted, suspects, tolerance)
     if len(pieces.ends) < len(parted.ends):
         more = len(parted.ends) - len(pieces.ends)
         notes.repairs.append(f"left out {count(more, 'end')} of lines upon others, within these")
-    pieces, moved, farthest = without_gaps(pieces, tolerance)
+    pieces, moved, farthest = planar.without_gaps(pieces, tolerance)
     if moved:
         notes.repairs.append(
             f"drew {count(moved, 'open end')} on to the next line, by up to {1e3 * farthest:.3g} mm"
@@ -137,12 +131,12 @@ def _in_plane(lines: Lines, notes: Notes) -> Lines:
                 f"turned the drawing, which is in the plane of {'x' if even[1] else 'y'} and z, "
                 "into that of x and y"
             )
-    return Lines(points[:, :2], lines.ends, lines.letters, lines.angles, lines.source)
+    return replace(lines, points=points[:, :2])
 
 
 def _joined(lines: Lines, tolerance: float, notes: Notes) -> Lines:
     """Lines with joined ends; lines of zero length are left out."""
-    whole = joined(lines, tolerance)
+    whole = planar.joined(lines, tolerance)
     moves = np.linalg.norm(whole.points[whole.ends] - lines.points[lines.ends], axis=2)
     moved = int(np.count_nonzero(moves > _SAME * lines.size))
     if moved:
@@ -164,7 +158,7 @@ def _joined(lines: Lines, tolerance: float, notes: Notes) -> Lines:
 
 def _on_lines(lines: Lines, tolerance: float, notes: Notes) -> Lines:
     """Move line ends onto lines that they nearly reach."""
-    placed = on_lines(lines, tolerance)
+    placed = planar.on_lines(lines, tolerance)
     moves = np.linalg.norm(placed.points - lines.points, axis=1)
     if moves.any():
         notes.repairs.append(
@@ -176,7 +170,7 @@ def _on_lines(lines: Lines, tolerance: float, notes: Notes) -> Lines:
 
 def _tell_loose(loose: Lines, lines: Lines, notes: Notes) -> None:
     """Report lines that bound no panel; among them, cuts and long pieces of creases are doubted."""
-    folds = np.isin(loose.letters, ("M", "V", "U")) & (loose.lengths > 2 * GAP * lines.size)
+    folds = np.isin(loose.letters, ("M", "V", "U")) & (loose.lengths > 2 * planar.GAP * lines.size)
     slits = loose.letters == "C"
     for which, told, noun, what in (
         (~slits & ~folds, notes.repairs, "line", "or parts of them that bound no panel"),

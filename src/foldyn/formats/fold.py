@@ -77,11 +77,12 @@ def read(text: str, frame: int | str | None = None) -> Drawing:
         unit = "unit"
     title = fields.get("frame_title") or document.get("file_title") or ""
     places = tuple(f"edges_vertices[{e}]" for e in range(len(assignments)))
+    welds = _pairs(WELDS, _list(fields, WELDS), len(vertices)) if WELDS in fields else None
     return Drawing(
         vertices, edges, assignments, angles, faces, METERS.get(unit), name=str(title),
         places=places, repairs=tuple(repairs), doubts=_angle_doubts(angles),
         families=_families(fields.get(FAMILIES, {}), len(vertices)),
-        welds=_welds(fields, len(vertices)), custom=custom,
+        welds=welds, custom=custom,
     )  # fmt: skip
 
 
@@ -318,13 +319,6 @@ def _families(given: Any, count: int) -> dict[str, list[tuple[int, int]]]:
     return {
         name: _pairs(f"{FAMILIES}[{show(name)}]", pairs, count) for name, pairs in given.items()
     }
-
-
-def _welds(fields: dict[str, Any], count: int) -> list[tuple[int, int]] | None:
-    """Vertex pairs of the welds; None if the file has no field for them."""
-    if WELDS not in fields:
-        return None
-    return _pairs(WELDS, _list(fields, WELDS), count)
 
 
 def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:

@@ -14,9 +14,16 @@ from scipy.spatial import cKDTree
 from foldyn.errors import InputError
 from foldyn.formats.drawing import Notes, count
 from foldyn.formats.lines import MOST_PAIRS, Lines, single, without_points
-from foldyn.formats.panels import Panels, compact, components, with_inner_borders
+from foldyn.formats.panels import Panels, compact, renumbered, with_inner_borders
 from foldyn.patterns.geometry import SAME_PLACE, face_geometry, seams
-from foldyn.patterns.topology import Edge, Faces, around, build_topology, checked_faces, edge_of
+from foldyn.patterns.topology import (
+    Faces,
+    around,
+    build_topology,
+    checked_faces,
+    components,
+    edge_of,
+)
 from foldyn.values import show
 
 _ROUNDS = 8
@@ -66,7 +73,7 @@ def listed_panels(
         into, wound, points, normals = _seam_points(panels, near or SAME_PLACE)
         if into is not None:
             merged += int(np.count_nonzero(into != np.arange(len(into))))
-            panels = _renumbered(panels, into)
+            panels = renumbered(panels, dict(enumerate(into.tolist())))
             continue
         whole = replace(panels, faces=wound)
         parted, more = with_corners_on_edges(whole, points, normals, near or ON_EDGE)
@@ -148,17 +155,6 @@ def _seam_points(
     part = components(same, len(points))
     into = np.unique(part, return_index=True)[1][part]  # the first of the merged points
     return into, topology.faces, points, normals
-
-
-def _renumbered(panels: Panels, into: NDArray[np.int64]) -> Panels:
-    number = into.tolist()
-    faces: Faces = tuple(tuple(number[point] for point in face) for face in panels.faces)
-    letters: dict[Edge, str] = {}
-    angles: dict[Edge, float] = {}
-    for (a, b), letter in panels.letters.items():
-        letters.setdefault(edge_of(number[a], number[b]), letter)
-        angles.setdefault(edge_of(number[a], number[b]), panels.angles.get((a, b), np.nan))
-    return Panels(panels.points, faces, letters, angles)
 
 
 ON_EDGE = 1e-5

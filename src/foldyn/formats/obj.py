@@ -84,8 +84,10 @@ def read(text: str) -> Drawing:
             chain = _corners(rest, known, place)
             lines += [_Crease((a, b), letter, np.nan, place) for a, b in pairwise(chain) if a != b]
         elif word in ("g", "o", "usemtl"):
-            letter = _letter_of(" ".join(rest)) or letter
-            name = " ".join(rest) if word == "o" and not name else name
+            group = " ".join(rest)
+            found = (own for start, own in GROUPS.items() if group.lower().startswith(start))
+            letter = next(found, letter)
+            name = group if word == "o" and not name else name
         elif word.startswith("#"):
             meters = meters or _meters(" ".join([word, *rest]))
     if not vertices:
@@ -188,11 +190,6 @@ def _angles(creases: list[_Crease]) -> NDArray[np.float64]:
     """Fold angles (degrees); if all are 0, the program only filled the column."""
     angles = np.array([each.angle for each in creases])
     return np.full(len(angles), np.nan) if not np.nan_to_num(angles).any() else angles
-
-
-def _letter_of(name: str) -> str | None:
-    start = name.strip().lower()
-    return next((letter for word, letter in GROUPS.items() if start.startswith(word)), None)
 
 
 def _meters(comment: str) -> float | None:

@@ -1,18 +1,14 @@
-"""`Panels` with data on their edges, and connected components."""
+"""`Panels` with data on their edges."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TypeVar
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from foldyn.patterns.topology import Edge, Faces, around, edge_of
-
-T = TypeVar("T")
+from foldyn.patterns.topology import Edge, Faces, around, components, edge_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,27 +61,27 @@ def with_inner_borders(panels: Panels) -> tuple[Panels, int, int]:
     return panels, len(inner) - len(folds), len(folds)
 
 
-def components(pairs: list[tuple[int, int]], size: int) -> NDArray[np.int64]:
-    """Component number of each of the nodes (size,) connected by pairs."""
-    rows = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    graph = coo_array((np.ones(len(rows)), (rows[:, 0], rows[:, 1])), shape=(size, size))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
-
-
 def compact(panels: Panels) -> Panels:
     """Panels without unused points; the order of points stays."""
     used = sorted({point for face in panels.faces for point in face})
     number = {point: k for k, point in enumerate(used)}
+    return replace(renumbered(panels, number), points=panels.points[used])
+
+
+def renumbered(panels: Panels, number: Mapping[int, int]) -> Panels:
+    """Panels with new numbers of points; of edges that become one, the first counts.
+
+    Edges with points that get no number are left out.
+    """
     faces = tuple(tuple(number[point] for point in face) for face in panels.faces)
-
-    def renamed(known: dict[Edge, T]) -> dict[Edge, T]:
-        return {
-            (number[a], number[b]): value
-            for (a, b), value in known.items()
-            if a in number and b in number
-        }
-
-    return Panels(panels.points[used], faces, renamed(panels.letters), renamed(panels.angles))
+    letters: dict[Edge, str] = {}
+    angles: dict[Edge, float] = {}
+    for (a, b), letter in panels.letters.items():
+        if a in number and b in number:
+            edge = edge_of(number[a], number[b])
+            letters.setdefault(edge, letter)
+            angles.setdefault(edge, panels.angles.get((a, b), np.nan))
+    return Panels(panels.points, faces, letters, angles)
 
 
 def opened(panels: Panels) -> tuple[Panels, int]:
@@ -118,12 +114,8 @@ def opened(panels: Panels) -> tuple[Panels, int]:
         if all(apart[sides[edge][0], end] == apart[sides[edge][1], end] for end in edge)
     ]
     if halved:
-        panels = _halved(panels, halved)
-        sides = panels.sides()
-        cuts = {
-            edge for edge, at in sides.items() if len(at) == 2 and panels.letters.get(edge) == "C"
-        }
-        apart = _parted(panels, sides, cuts)
+        panels, count = opened(_halved(panels, halved))
+        return panels, count - len(halved)
     number: dict[tuple[int, int], int] = {}
     copies: list[int] = []
     taken: set[int] = set()
@@ -146,7 +138,7 @@ def opened(panels: Panels) -> tuple[Panels, int]:
                 letters[new] = panels.letters[edge]
                 angles[new] = panels.angles.get(edge, np.nan)
     points = np.concatenate((panels.points, panels.points[copies]))
-    return Panels(points, tuple(faces), letters, angles), len(cuts) - len(halved)
+    return Panels(points, tuple(faces), letters, angles), len(cuts)
 
 
 def _parted(

@@ -7,6 +7,8 @@ Practical segment intersection with finite precision output, Comput. Geom. 13, 1
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -60,8 +62,7 @@ def joined(lines: Lines, tolerance: float) -> Lines:
 def renumbered(lines: Lines, into: NDArray) -> Lines:
     """Lines with renumbered ends, and only the points that they use."""
     used, ends = np.unique(into[lines.ends], return_inverse=True)
-    ends = ends.reshape(lines.ends.shape)
-    return Lines(lines.points[used], ends, lines.letters, lines.angles, lines.source)
+    return replace(lines, points=lines.points[used], ends=ends.reshape(lines.ends.shape))
 
 
 def on_lines(lines: Lines, tolerance: float) -> Lines:
@@ -80,7 +81,7 @@ def on_lines(lines: Lines, tolerance: float) -> Lines:
     moved = np.linalg.norm(foot - lines.points[point], axis=1) > 1e-3 * FINEST * lines.size
     points = lines.points.copy()
     points[point[moved]] = foot[moved]
-    return Lines(points, lines.ends, lines.letters, lines.angles, lines.source)
+    return replace(lines, points=points)
 
 
 def split(lines: Lines, tolerance: float) -> Lines:
@@ -148,7 +149,7 @@ def _with_crossings(lines: Lines, near_by: float, tolerance: float) -> tuple[Lin
         raise too_many(f"{len(pairs)} crossings")
     every = np.concatenate((points, places))
     number = merged(every, tolerance, kept=len(points))[len(points) :]
-    more = Lines(every, ends, lines.letters, lines.angles, lines.source)
+    more = replace(lines, points=every)
     hits = np.concatenate((np.column_stack((pairs[:, 0], number)),
                            np.column_stack((pairs[:, 1], number))))  # fmt: skip
     return more, hits[(ends[hits[:, 0]] != hits[:, 1:]).all(axis=1)]
@@ -202,13 +203,8 @@ def _pieces(lines: Lines, hits: NDArray) -> Lines:
     line, point = line[order], point[order]
     same = line[1:] == line[:-1]
     row = line[:-1][same]
-    return Lines(
-        lines.points,
-        np.column_stack((point[:-1][same], point[1:][same])),
-        lines.letters[row],
-        lines.angles[row],
-        lines.source[row],
-    )
+    ends = np.column_stack((point[:-1][same], point[1:][same]))
+    return replace(lines.taken(row), ends=ends)
 
 
 GAP = 5e-3
@@ -268,7 +264,7 @@ def without_gaps(lines: Lines, tolerance: float) -> tuple[Lines, int, float]:
     moved = np.linalg.norm(points[into] - lines.points, axis=1)
     if not moved.any():
         return lines, 0, 0.0
-    more = Lines(points, lines.ends, lines.letters, lines.angles, lines.source)
+    more = replace(lines, points=points)
     more = joined(single(without_points(renumbered(more, into)))[0], tolerance)
     return split(without_points(more), tolerance), int(np.count_nonzero(moved)), float(moved.max())
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,9 +11,9 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.formats.lines import Lines
-from foldyn.formats.panels import Panels, components
+from foldyn.formats.panels import Panels
 from foldyn.formats.planar import segments
-from foldyn.patterns.topology import Faces, around, edge_of
+from foldyn.patterns.topology import Faces, around, components, edge_of
 
 
 def enclosed(lines: Lines, tolerance: float) -> tuple[Panels, Lines, int]:
@@ -108,8 +109,7 @@ def straightened(lines: Lines, suspects: NDArray, tolerance: float) -> Lines:
         ends[one], kept[other] = (a, b), False
         drawn.add(edge_of(a, b))
         at[b] = at[b] - {other} | {one}
-    joined = Lines(lines.points, ends, lines.letters, lines.angles, lines.source)
-    return joined.taken(kept)
+    return replace(lines, ends=ends).taken(kept)
 
 
 def areas(panels: Panels) -> NDArray[np.float64]:

@@ -192,14 +192,11 @@ def _rgba(value: str, style: Style, place: str) -> tuple[RGB | None, float]:
             color = Color(word)
         except (ValueError, TypeError, IndexError, AttributeError, OverflowError):
             color = None
-    if color is None or color.value is None or (color.rgb == 0 and not _is_black(word)):
+    # svgelements returns black for unknown colors too
+    black = word == "black" or word.startswith(("#", "rgb", "hsl"))
+    if color is None or color.value is None or (color.rgb == 0 and not black):
         raise InputError(f" = {show(value)}: is no color", f"{place}.stroke")
     return (color.red, color.green, color.blue), color.alpha / 255
-
-
-def _is_black(word: str) -> bool:
-    """Whether a color is explicitly black; svgelements returns black for unknown colors too."""
-    return word == "black" or word.startswith(("#", "rgb", "hsl"))
 
 
 def _share(value: str, place: str) -> float:

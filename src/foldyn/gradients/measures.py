@@ -22,10 +22,9 @@ from foldyn.sweeps.measures import (
     MEASURES,
     closest_panels,
     curve_of,
-    frequency_of,
     intervals,
+    nearest_of,
     sampled,
-    time_of,
 )
 from foldyn.viewer.states import bar_strain
 
@@ -340,7 +339,7 @@ def _climb(start: int, end: int) -> Derivative:
 
 # ------------------------------------------------------------------ frequency responses
 def _response(result: xr.Dataset, case: Case, node: int, axis: str, frequency: float) -> Seeds:
-    k = frequency_of(result, frequency)
+    k = nearest_of(result, "frequency", frequency)
     return _sizes(result, node, [AXES.index(axis)], {k: 1.0})
 
 
@@ -396,7 +395,7 @@ DERIVATIVES: Mapping[str, Derivative] = {
     "effective_mass": _of_mode("effective_mass"),
     "displacement": _of_samples(lambda result, motion: _one(len(motion), -1)),
     "displacement_at": _of_samples(
-        lambda result, motion, time: _one(len(motion), time_of(result, time))
+        lambda result, motion, time: _one(len(motion), nearest_of(result, "time", time))
     ),
     "velocity": _of_samples(lambda result, motion: _one(len(motion), -1), "velocity"),
     "maximum": _extreme(1.0),

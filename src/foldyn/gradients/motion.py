@@ -43,15 +43,13 @@ class MotionGradient(Differentiated):
                 # samples in between are checkpoints for the backward pass
                 own = {"dt": motion.plan.dt, "every_steps": apart, "interval": None}
                 motion = prepare(case, **{**given, **own})
-            samples = motion.run(progress)
             self._adjoint: Callable[[], Adjoint] = lambda: RungeKuttaAdjoint(motion, samples)
         elif motion.method.name == "central_difference":
-            samples = motion.run(progress)
             self._adjoint = lambda: CentralDifferenceAdjoint(motion)
         else:
             steps = Retraced(motion)
-            samples = motion.run(progress)
             self._adjoint = lambda: ImplicitAdjoint(motion, steps)
+        samples = motion.run(progress)
         self._motion, self._times = motion, samples["time"].values
         self._every, self._stride = motion.plan.every, wanted // motion.plan.every
         self.result = samples.isel(time=slice(None, None, self._stride))

@@ -41,6 +41,8 @@ LEAST = 1e-6  # changes below this fraction of a value are lost in round-off
 GOLDEN = 0.6180339887498949  # multiples of this number modulo 1 are all distinct
 # round-off of a change, relative to the number itself, and to the largest number of its array
 SILENT = 1e-11, 1e-12
+DIFFERENTIATED = "load.", "imposed.", "mass", "point_masses", "alpha", "beta"
+"""Numbers of a case beside those of its body by which results have derivatives."""
 KINK = (
     "{}: the numbers of the case ({}) have a kink here: their slopes jump, such as where another "
     "diagonal of a panel becomes the shorter one, or a corner passes 120 degrees. The gradient is "
@@ -141,37 +143,26 @@ def numbers_of_motion(packed: PackedCase, start: tuple[NDArray, NDArray]) -> Arr
 
 def nothing(case: Case, pullback: Pullback) -> dict[str, NDArray]:
     """Gradient of zeros with respect to a case's numbers; `pullback` is the body's."""
-    total = {name: np.zeros_like(out) for name, out in pullback.gradient.items()}
-    for kind in ("load", "imposed"):
-        for k, (vector, _) in enumerate(getattr(case, f"{kind}_terms")):
-            total[f"{kind}.{k}"] = np.zeros_like(vector)
-    with suppress(InputError):
-        total["mass"] = np.zeros(case.mass.nnz)
-    points = {"point_masses": np.zeros_like(case.point_masses)} if case.structure.linear else {}
-    return total | points | {"alpha": np.zeros(1), "beta": np.zeros(1)}
+    others = numbers_of(case).numbers.items()
+    known = {name: array for name, array in others if name.startswith(DIFFERENTIATED)}
+    return {name: np.zeros_like(array) for name, array in {**pullback.gradient, **known}.items()}
 
 
 class Slope(NamedTuple):
     """Derivatives of a case's numbers with respect to a parameter.
 
-    Each number depends on at most one entry of the parameter.
-
-    by : for each array of numbers, the derivatives.
-    entry : for each array of numbers, the entry on which each number depends; -1 for none.
+    by : for each array of numbers, their derivatives (numbers, count) with respect to all entries.
     """
 
-    by: Mapping[str, NDArray]
-    entry: Mapping[str, NDArray]
+    by: Mapping[str, sparse.csr_array]
     count: int
 
     def pulled(self, gradient: Gradient) -> NDArray:
         """Derivatives (count,) with respect to the parameter, from the gradient by numbers."""
         out = np.zeros(self.count)
         for name, by in self.by.items():
-            here = self.entry[name] >= 0
-            if here.any():
-                product = (_known(gradient, name) * by)[here]
-                out += np.bincount(self.entry[name][here], product, self.count)
+            if by.nnz:
+                out += by.T @ np.ravel(_known(gradient, name))
         return out
 
 
@@ -248,7 +239,7 @@ class Parameters:
 
     def _slope(
         self, name: str, numbers_of: Callable[[Any], Arrays], here: Arrays, steps: Sequence[float]
-    ) -> Any:
+    ) -> Slope:
         """Derivatives of the numbers of a case with respect to one parameter."""
         value, size = self.values[name], self.size(name)
 
@@ -274,11 +265,13 @@ class Parameters:
         entry = {key: np.zeros(np.shape(each), np.int64) for key, each in here.numbers.items()}
         if value.size > 1 and (entry := self._told_apart(at, size, here.numbers)) is None:
             return self._one_by_one(change, size)
-        by = change(size)
-        entry = {key: np.where(each != 0.0, entry[key], -1) for key, each in by.items()}
-        return Slope(
-            {key: each / np.ravel(size)[entry[key]] for key, each in by.items()}, entry, value.size
-        )
+        by, own = {}, np.ravel(size)
+        for key, each in change(size).items():
+            row = np.flatnonzero((each != 0.0) & (entry[key] >= 0))
+            place = np.ravel(entry[key])[row]
+            slopes = np.ravel(each)[row] / own[place]
+            by[key] = sparse.csr_array((slopes, (row, place)), (each.size, value.size))
+        return Slope(by, value.size)
 
     def _told_apart(
         self, at: Callable[[NDArray, float], Mapping[str, NDArray]], size: NDArray,
@@ -305,16 +298,14 @@ class Parameters:
             entry[key] = place - 1
         return entry
 
-    def _one_by_one(
-        self, change: Callable[[NDArray], dict[str, NDArray]], size: NDArray
-    ) -> Columns:
+    def _one_by_one(self, change: Callable[[NDArray], dict[str, NDArray]], size: NDArray) -> Slope:
         """Derivatives of the numbers with respect to each entry, changed one at a time."""
-        columns = []
-        for k in range(len(size)):
-            alone = np.zeros_like(size)
-            alone[k] = size[k]
-            columns.append({key: each / size[k] for key, each in change(alone).items()})
-        return Columns(columns)
+        columns = [change(alone) for alone in np.diag(size)]
+        by = {
+            key: sparse.csr_array(np.stack([np.ravel(one[key]) for one in columns], 1) / size)
+            for key in columns[0]
+        }
+        return Slope(by, len(size))
 
 
 def _difference(
@@ -350,25 +341,6 @@ def _seen(rate: NDArray, here: NDArray) -> NDArray:
     size = np.abs(here)
     rounding = SILENT[0] * size + SILENT[1] * size.max(initial=0.0)
     return np.where(np.abs(rate) > rounding, rate, 0.0)
-
-
-class Columns(NamedTuple):
-    """Derivatives of a case's numbers with respect to each entry; numbers depend on several."""
-
-    by: list[dict[str, NDArray]]
-
-    def pulled(self, gradient: Gradient) -> NDArray:
-        """Derivatives (count,) with respect to the parameter, from the gradient by numbers."""
-        return np.array(
-            [
-                sum(
-                    float((_known(gradient, k) * each).sum())
-                    for k, each in by.items()
-                    if each.any()
-                )
-                for by in self.by
-            ]
-        )
 
 
 def _known(gradient: Gradient, name: str) -> NDArray:

@@ -112,10 +112,9 @@ def seen_through(
         total[name] -= out
     size = case.structure.nodes.size
     for k in range(len(case.load_terms)):
-        pushed = factor * adjoint[:size].reshape(-1, 3)
-        total[f"load.{k}"] += pushed
+        total[f"load.{k}"] += factor * adjoint[:size].reshape(-1, 3)
+    moved = factor * (by_state - product)[:size].reshape(-1, 3) * case.imposed
     for k in range(len(case.imposed_terms)):
-        moved = factor * (by_state - product)[:size].reshape(-1, 3) * case.imposed
         total[f"imposed.{k}"] += moved
 
 

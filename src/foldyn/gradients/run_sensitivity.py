@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy import sparse
 
 from foldyn.analyses import CaseFile
 from foldyn.analyses.keys import replaced
@@ -191,18 +192,27 @@ class Sourced(NamedTuple):
 
 def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None) -> Sourced:
     """Check the case source, parameters and analysis of `sensitivity`."""
-    if analysis is not None:
-        of_kind("analysis", analysis, Mapping)
     if isinstance(build, Case):
         build, values = _of_arrays(build, parameters)
     elif isinstance(build, str | os.PathLike):
         build, values, own = _of_file(build, parameters)
-        analysis = {**own, **(analysis or {})}
+        analysis = {**own, **of_kind("analysis", {} if analysis is None else analysis, Mapping)}
     elif callable(build):
         values = checked(parameters)
     else:
         raise InputError(f" = {show(build)}: give a function, a case or a case file", "build")
-    if analysis is None or "kind" not in analysis:
+    kind = kind_of(analysis)
+    arguments = {name: value for name, value in (analysis or {}).items() if name != "kind"}
+    known = [*signature(FUNCTIONS[kind]).parameters.values()][1:]
+    if all(one.kind is not one.VAR_KEYWORD for one in known):  # `frf` takes options of methods
+        for name in arguments:
+            choice("analysis", name, [one.name for one in known])
+    return Sourced(build, values, kind, arguments)
+
+
+def kind_of(analysis: Any) -> str:
+    """Kind of an analysis, of those that have derivatives."""
+    if not isinstance(analysis, Mapping) or "kind" not in analysis:
         raise InputError(
             f' = {show(analysis)}: say what is computed, such as {{"kind": "modes", "count": 4}}',
             "analysis",
@@ -210,16 +220,10 @@ def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None
     if analysis["kind"] == "bands":
         raise InputError(
             ' = "bands": bands have no derivatives; sweep the parameters (foldyn.sweep), or search '
-            'with foldyn.design and method = "cma", which needs none',
+            'a case file with foldyn.design and method = "cma", which needs none',
             "analysis.kind",
         )
-    kind = choice("analysis.kind", analysis["kind"], tuple(KINDS))
-    arguments = {name: value for name, value in analysis.items() if name != "kind"}
-    known = [*signature(FUNCTIONS[kind]).parameters.values()][1:]
-    if all(one.kind is not one.VAR_KEYWORD for one in known):  # `frf` takes options of methods
-        for name in arguments:
-            choice("analysis", name, [one.name for one in known])
-    return Sourced(build, values, kind, arguments)
+    return choice("analysis.kind", analysis["kind"], KINDS)
 
 
 def _by_lengths(areas: Slope, numbers: Gradient) -> Slope:
@@ -236,7 +240,8 @@ def _by_lengths(areas: Slope, numbers: Gradient) -> Slope:
         f"{prefix}bar_per_length2": -2.0 / length**3,
         f"{prefix}bar_excess": -2.0 / length,
     }
-    return Slope(by, dict.fromkeys(by, areas.entry[name]), areas.count)
+    own = areas.by[name].astype(bool)
+    return Slope({key: sparse.diags_array(each) @ own for key, each in by.items()}, areas.count)
 
 
 def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, NDArray]]:

@@ -24,7 +24,6 @@ is the residual on these dofs and K mu equals the derivatives of the quantity wi
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping
 from copy import copy
 from functools import cached_property
@@ -38,7 +37,7 @@ from scipy.sparse.linalg import splu
 
 from foldyn.cases import Case, Rayleigh, State
 from foldyn.cases.directions import AXES
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, quietly
 from foldyn.gradients.linearized import Products, refuse
 from foldyn.gradients.parameters import Differentiated, Gradient, check_known
 from foldyn.linear.excitation import drive_of, drive_terms
@@ -233,8 +232,7 @@ class FrfGradient(Differentiated):
         equilibrium = state == "equilibrium"
         if equilibrium:
             state = State(self.result["displacement"].transpose("node", "axis").values)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)  # `frf` has warned already
+        with quietly():  # `frf` has warned already
             self._linear = linearize(
                 case, state, secant=given.get("secant"), load_factor=given.get("load_factor", 1.0)
             )

@@ -8,7 +8,6 @@ definite.
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
@@ -21,7 +20,7 @@ from scipy.sparse.linalg import LinearOperator, eigs
 
 from foldyn.cases import State
 from foldyn.condensation import Superelements
-from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning, warn
+from foldyn.errors import InputError, ModelRangeWarning, quietly, warn
 from foldyn.linear.bloch import Bloch, null_space
 from foldyn.linear.level_error import DOUBTFUL, band_errors, first_doubtful
 from foldyn.linear.linearized import warn_beyond
@@ -199,8 +198,7 @@ def bands(
 def _model_errors(reference: UnitCell, phases: NDArray, frequency: NDArray) -> NDArray[np.float64]:
     """Relative errors (n, k) of bands, by comparison with a cell of superelements; see `bands`."""
     chosen = np.unique(np.linspace(0, len(phases) - 1, COMPARED).round().astype(int))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with quietly():
         linear = linearize_cell(reference, None, None, 1.0)
         found = WaveSolver(linear.bloch, frequency.shape[1]).at(phases[chosen])
     true = np.sqrt(np.array([each.values for each in found]).clip(min=0.0)) / TURN
@@ -322,9 +320,7 @@ def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex
     """The values s (count,), 1/s, with the least |s|, one from each complex pair."""
     factors = bloch.factors(phase)
     free = np.flatnonzero(~bloch.held)
-    basis = np.eye(len(free))
-    if not bloch.ties.empty:
-        basis = null_space(bloch.ties.at(factors)[:, free])
+    basis = null_space(bloch.ties.at(factors)[:, free])
     stiffness, damping, mass = (
         basis.conj().T @ part.at(factors)[np.ix_(free, free)] @ basis
         for part in (bloch.stiffness, bloch.damping, bloch.mass)

@@ -148,8 +148,12 @@ class Bloch:
         return Hops(rows[0], columns[0], values[0], (nodes, nodes)) if alike else None
 
 
-def hermitian(own: Hops, steps: NDArray, what: str) -> Hops:
-    """Hermitian part of a matrix; raises an error if the rest is more than round-off."""
+def hermitian(own: Hops, steps: NDArray, what: str, first: NDArray) -> Hops:
+    """Hermitian part of a matrix; raises an error if the rest is more than round-off.
+
+    what : name of the matrix.
+    first : (m,) the node to name for each node of cell 0.
+    """
     where = {tuple(row): k for k, row in enumerate(steps.tolist())}
     opposite = np.array([where[tuple(-x for x in row)] for row in steps.tolist()])  # index of -R
     entries = own.values.tocoo()
@@ -168,31 +172,16 @@ def hermitian(own: Hops, steps: NDArray, what: str) -> Hops:
     off = np.abs(skew.values.data)
     if off.max(initial=0.0) > ALIKE * largest:
         place = int(np.searchsorted(skew.values.indptr, off.argmax(), side="right")) - 1
-        dofs = int(skew.rows[place]), int(skew.columns[place])
-        raise NotAlikeError(what, float(off.max() / largest), dofs)
-    return both
-
-
-class NotAlikeError(InputError):
-    """The matrices of two cells differ; the largest difference is at `dofs`."""
-
-    def __init__(self, what: str, share: float, dofs: tuple[int, int]) -> None:
-        self.what, self.share, self.dofs = what, share, dofs
-        super().__init__(self._message("dofs {} and {}".format(*dofs)), "case")
-
-    def _message(self, where: str) -> str:
-        return (
-            f": the {self.what} differs from one cell to the next by {self.share:.2g} of its "
-            f"largest entry, at {where}; a support, a panel or the state does not repeat"
-        )
-
-    def naming(self, first: NDArray) -> InputError:
-        """The same error with names of nodes; `first` (m,) has the node for each node of cell 0."""
-        names = [
+        where = " and ".join(
             f"node {first[dof // 3]}" if dof < 3 * len(first) else "a rotation of a panel's edge"
-            for dof in self.dofs
-        ]
-        return InputError(self._message(" and ".join(names)), "case")
+            for dof in (skew.rows[place], skew.columns[place])
+        )
+        raise InputError(
+            f": the {what} differs from one cell to the next by {off.max() / largest:.2g} of its "
+            f"largest entry, at {where}; a support, a panel or the state does not repeat",
+            "case",
+        )
+    return both
 
 
 def steps_of(offset: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

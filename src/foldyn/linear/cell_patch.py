@@ -10,7 +10,6 @@ actuated creases.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -29,7 +28,7 @@ from foldyn.cases.selection import resolve_creases, resolve_nodes
 from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
 from foldyn.condensation import Superelements
 from foldyn.condensation.panel import INNER
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, quietly
 from foldyn.linear.lattice import (
     Lattice,
     Panel,
@@ -50,6 +49,7 @@ from foldyn.shells import Shell
 from foldyn.structures import Structure
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.sheet import Sheet
+from foldyn.structures.strip import Strip
 
 SAME_AXES = 1e-9  # tolerance for axes that a screw preserves
 
@@ -122,8 +122,7 @@ def cell_patch(cell: UnitCell) -> Patch:
     lattice = Lattice(cell)
     panels = lattice.around_cell()
     vertices = sorted(lattice.vertices_of(panels) | tied_vertices(case, lattice))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with quietly():
         made = _structure(lattice, panels, lattice.patch_pattern(panels, vertices), vertices)
         sites = node_sites(made, vertices, panels)
         own_panels = list(zip(lattice.steps, range(len(lattice.faces)), strict=True))
@@ -236,7 +235,7 @@ def _per_crease(
     name: str, given: Any, lattice: Lattice, pattern: Pattern, vertices: Sequence[Vertex]
 ) -> Any:
     """Values for the creases of the patch, from the values for the cell."""
-    if given is None or isinstance(given, float):
+    if given is None or isinstance(given, float | Strip):
         return given
     seams, families = lattice.seams(), lattice.families()
     if isinstance(given, Mapping):

@@ -147,20 +147,12 @@ def _blocks(bloch: Bloch, matrix: Any, along: int, phase: float) -> Reach:
 
 def _bordered(dynamic: NDArray, ties: NDArray) -> NDArray[np.complex128]:
     """Blocks with constraints (s, k, n) added, whose forces are further unknowns."""
-    count = ties.shape[1]
-    if not count:
-        return dynamic.astype(complex)
-    scale = np.abs(dynamic).max()
+    count, scale = ties.shape[1], np.abs(dynamic).max()
     turned = ties[::-1].conj().transpose(0, 2, 1)  # G^H at 1 / lambda*
     none = np.zeros((len(ties), count, count))
-    out = np.concatenate(
-        [
-            np.concatenate([dynamic, scale * turned], axis=2),
-            np.concatenate([scale * ties, none], axis=2),
-        ],
-        axis=1,
-    )
-    return out.astype(complex)
+    above = np.concatenate([dynamic, scale * turned], axis=2)
+    below = np.concatenate([scale * ties, none], axis=2)
+    return np.concatenate([above, below], axis=1).astype(complex)
 
 
 def phases_of(reach: Reach, condense: bool = True) -> NDArray[np.complex128]:
@@ -175,9 +167,8 @@ def phases_of(reach: Reach, condense: bool = True) -> NDArray[np.complex128]:
     b, i = np.flatnonzero(coupled), np.flatnonzero(~coupled)
     own = blocks[steps == 0][0]
     reduced = blocks[:, b[:, None], b].astype(complex)
-    if len(i):
-        follow = np.linalg.solve(own[np.ix_(i, i)], own[np.ix_(i, b)])
-        reduced[steps == 0] -= own[np.ix_(b, i)] @ follow
+    follow = np.linalg.solve(own[np.ix_(i, i)], own[np.ix_(i, b)])
+    reduced[steps == 0] -= own[np.ix_(b, i)] @ follow
     used = np.flatnonzero(np.abs(reduced).sum(axis=(1, 2)))
     low, high = int(used.min()), int(used.max())
     reduced, order, size = reduced[low : high + 1], high - low, len(b)

@@ -188,18 +188,16 @@ def drive_terms(system: Linearized, drive: Drive) -> list[Term]:
     if drive.axis is None:
         return [Term(system.projected((drive.vector / drive.value).ravel()), lambda omega: 1.0)]
     axis, damping = AXES.index(drive.axis), system.case.rayleigh
-    inertia = system.inertia[:, axis]
-    terms = [Term(inertia, lambda omega: omega**2 - 1j * omega * damping.alpha)]
-    pushed = system.pushed[:, axis]
-    if pushed.any():
-        terms.append(Term(pushed, lambda omega: omega**2))
-    held = system.ground[:, axis]
-    if held.any():
-        terms.append(Term(held, lambda omega: -1.0 - 1j * omega * damping.beta))
-    dragged = system.drag[:, axis]
-    if dragged.any():
-        terms.append(Term(dragged, lambda omega: -1j * omega))
-    return terms
+    inertia, *others = (
+        Term(forces[:, axis], factor)
+        for forces, factor in (
+            (system.inertia, lambda omega: omega**2 - 1j * omega * damping.alpha),
+            (system.pushed, lambda omega: omega**2),
+            (system.ground, lambda omega: -1.0 - 1j * omega * damping.beta),
+            (system.drag, lambda omega: -1j * omega),
+        )
+    )
+    return [inertia, *(term for term in others if term.shape.any())]
 
 
 def absolute(system: Linearized, drive: Drive, relative: NDArray) -> NDArray[np.complex128]:

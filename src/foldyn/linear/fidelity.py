@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -19,10 +18,10 @@ from foldyn.cases import Case
 from foldyn.cases.clamped_edges import straightened
 from foldyn.cases.models import SHELL, SUPERELEMENTS
 from foldyn.condensation import Superelements
-from foldyn.errors import FoldynWarning, InputError, warn, within
+from foldyn.errors import InputError, quietly, warn, within
 from foldyn.linear.compared import OWN, Fidelity
 from foldyn.linear.level_error import other_level
-from foldyn.linear.linearized import linearize
+from foldyn.linear.linearized import amplitude_of, linearize
 from foldyn.linear.operating_point import BALANCED
 from foldyn.linear.reference import (
     SPARE,
@@ -49,7 +48,7 @@ from foldyn.results import fidelity_dataset
 from foldyn.structures import ModelOptions, discretize
 from foldyn.structures.beyond_range import BELOW, plate_frequency
 from foldyn.structures.discretized import Discretized
-from foldyn.values import choice, listed, number, show, whole
+from foldyn.values import choice, listed, show, whole
 
 MODELS: Mapping[str, Mapping[str, Any]] = {
     "standard": {
@@ -276,8 +275,7 @@ def comparison(
 ) -> Comparison:  # fmt: skip
     """Check a comparison and make its structures; arguments as in `fidelity`."""
     count = whole("count", count, least=1)
-    if secant is not None:
-        number("secant", secant, above=0.0, most=180.0, unit="degrees")
+    amplitude_of(secant)  # refuses what is none
     check_reduced(case)
     forces, others = forces_alone(case)
     compared = _compared(forces, models)
@@ -431,8 +429,7 @@ def small_loads(case: Case, secant: float | None = None) -> SmallLoads:
     secant : float, optional
         As in `modes`.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with quietly():
         linear = linearize(case, secant=secant)
     force = rest_forces(case)
     free = linear.projected(force)

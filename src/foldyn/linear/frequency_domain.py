@@ -148,10 +148,8 @@ class SuperposedModes:
         self.count = pencil.finite if count is None else int(count)
         modes = lowest(pencil, self.count, unresisted(system, rigid_space(system)))
         self.basis = basis = _with_massless(system, pencil, modes)
-        self.damping = basis.shapes.T @ (system.damping @ basis.shapes)
-        if len(system.modal):
-            own = system.modal @ basis.shapes
-            self.damping = self.damping + own.T @ own
+        own = system.modal @ basis.shapes
+        self.damping = basis.shapes.T @ (system.damping @ basis.shapes) + own.T @ own
         diagonal = self.damping.diagonal()
         scale = np.sqrt(np.abs(np.outer(diagonal, diagonal)))
         off = np.abs(self.damping - np.diag(diagonal)) > DIAGONAL * scale.max(initial=0.0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any, NamedTuple
@@ -15,23 +14,22 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.algebra.eigen import SHIFT, Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
 from foldyn.condensation import Superelements
-from foldyn.dynamics.progress import Reporter
-from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning, StretchWarning, warn
+from foldyn.dynamics.progress import Reporter, reported
+from foldyn.errors import InputError, ModelRangeWarning, quietly, warn
 from foldyn.linear.excitation import NAMED, Answer, absolute, drive_of
 from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
 from foldyn.linear.level_error import DOUBTFUL
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
 from foldyn.linear.model_error import ALONE, Beside, beside
-from foldyn.linear.modes import trusted
-from foldyn.linear.time_domain import Rig, SteppedSine, reported, stepped_sine
+from foldyn.linear.modes import trusted, warn_of_stretch
+from foldyn.linear.time_domain import Rig, SteppedSine, stepped_sine
 from foldyn.linear.transients import BurstRandom, Impulse, burst_random, impulse
 from foldyn.ram_limit import check_memory
 from foldyn.results import frf_dataset
 from foldyn.results.quantities import RESPONSES, variable
 from foldyn.signals import convert_response
-from foldyn.structures.stretching import most, remedy, stretching
-from foldyn.values import choice, flag, number, numbers, of_kind, suggest
+from foldyn.values import choice, flag, increasing, number, of_kind, suggest
 
 
 class ResponseMethod(NamedTuple):
@@ -222,8 +220,7 @@ def frf(
 
 def _trusted(case: Case, top: float, compared: Beside) -> dict[str, Any]:
     """Facts about the frequencies up to `top` (Hz) that are right; warns if some are not."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with quietly():
         holds, frequency, error = trusted(case, top, compared)
     own = compared.case is None
     if holds < top:
@@ -253,24 +250,16 @@ def _warn_of_instability(system: Linearized) -> None:
 
 def _warn_of_stretch(system: Linearized, frequency: NDArray, response: NDArray) -> None:
     """Warn if stretching holds much of the strain energy of the response (m, nf) at a peak."""
-    structure, motion = system.case.structure, np.nan_to_num(response).T
-    limit = most(structure)
-    if not np.isfinite(limit):
-        return
+    motion = np.nan_to_num(response).T
     strain = np.einsum("im,im->m", motion.conj(), system.stiffness @ motion).real
     beside = np.concatenate([[0.0], strain, [0.0]])
     peaks = np.flatnonzero((strain > beside[:-2]) & (strain >= beside[2:]))
-    bars = stretching(structure, system.displacement, system.whole(motion[:, peaks]))
-    told = bars > limit * strain[peaks]
-    if told.any():
-        share = (bars[told] / strain[peaks[told]]).clip(max=1.0)
+
+    def named(told: NDArray) -> str:
         listed = ", ".join(f"{f:.4g}" for f in frequency[peaks[told]][:NAMED])
-        warn(
-            f"panels that stretch hold more than {limit:.0%} of the strain energy of the response "
-            f"at {listed} Hz ({share.max():.0%} at most), {remedy(structure, linear=True)}",
-            "models.md#where-panels-stretch",
-            StretchWarning,
-        )
+        return f"the response at {listed} Hz"
+
+    warn_of_stretch(system, motion[:, peaks], strain[peaks], named)
 
 
 def _options(way: ResponseMethod, given: Mapping[str, Any]) -> Any:
@@ -287,15 +276,7 @@ def _options(way: ResponseMethod, given: Mapping[str, Any]) -> Any:
 
 def _frequencies(given: ArrayLike, way: ResponseMethod) -> NDArray:
     """Checked frequencies (m,), Hz, that the method can compute."""
-    frequency = np.atleast_1d(numbers("frequencies", given))
-    if frequency.ndim != 1 or not frequency.size:
-        raise InputError(
-            ": give a list of frequencies (Hz), as numpy.arange(1, 20, 0.1)", "frequencies"
-        )
-    if frequency[0] < 0.0 or (np.diff(frequency) <= 0.0).any():
-        raise InputError(
-            ": must increase from 0 Hz or more; sort them and drop doubles", "frequencies"
-        )
+    frequency = increasing("frequencies", given, least=0.0, unit="Hz")
     if frequency[0] == 0.0 and way.name in ("stepped_sine", "burst_random"):
         raise InputError(f": {way.name} cannot give 0 Hz; begin above it", "frequencies")
     if frequency[-1] == 0.0 and not way.linear:

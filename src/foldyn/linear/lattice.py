@@ -8,14 +8,13 @@ directions of hinges, signs of rotations, ties.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, quietly
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import around, edge_lookup, edge_of
@@ -185,8 +184,7 @@ class Lattice:
         shared, times = np.unique(np.array(sides), axis=0, return_counts=True)
         shared = shared[times == 2]
         welds = [kind in welded for kind in kinds_of(shared, vertices)]
-        with warnings.catch_warnings():  # warnings came with the pattern of the cell
-            warnings.simplefilter("ignore", FoldynWarning)
+        with quietly():  # warnings came with the pattern of the cell
             bare = Pattern(points, faces, name=own.name, welds=shared[welds])
             if any(bare.flipped):
                 raise InputError(

@@ -217,9 +217,7 @@ def linearize(
             "contact",
         )
     refuse_wind(case, "small vibrations")
-    amplitude = None
-    if secant is not None:
-        amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
+    amplitude = amplitude_of(secant)
     check_mass(case.mass, case.constraints.determined)
     check_fill(case.structure.fill, case.body.size)
     point = operating_point(case, state, load_factor)
@@ -241,7 +239,7 @@ def linearize(
     if loads is not None:
         stiffness = sparse.csr_array(stiffness + _symmetric(loads, free))
     ties, more, mass = case.constraints, damping_matrix(case, point.dofs, True), mass_of(case)
-    damping = case.rayleigh.matrix(mass, _reference(case, exact))
+    damping = case.rayleigh.matrix(mass, damped_tangent(case, exact))
     added = _added(case, point.displacement, body)
     mass = _moved(mass, added)
     modal = _modal_rows(case, point.displacement, stiffness, mass)
@@ -294,6 +292,13 @@ def _symmetric(loads: sparse.csr_array, free: NDArray) -> sparse.csr_array:
             "loads.md#pressure",
         )
     return sparse.csr_array(0.5 * (loads + loads.T))
+
+
+def amplitude_of(secant: float | None) -> float | None:
+    """Checked amplitude (rad) at which hinges take their slopes, from the argument (degrees)."""
+    if secant is None:
+        return None
+    return math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
 
 
 def slope_change(
@@ -372,7 +377,7 @@ def _modal_rows(case: Case, state: NDArray, stiffness: sparse.csr_array, mass: M
     return modal.rows
 
 
-def _reference(case: Case, exact: sparse.csr_array) -> sparse.csr_array:
+def damped_tangent(case: Case, exact: sparse.csr_array) -> sparse.csr_array:
     """K0 of the damping (m, m), N/m: the exact tangent in the state, or at rest."""
     if case.rayleigh.state != "rest" or case.rayleigh.beta == 0.0:
         return exact

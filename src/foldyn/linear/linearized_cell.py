@@ -9,7 +9,6 @@ factor.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -27,7 +26,6 @@ from foldyn.errors import ComputationError, InputError, warn
 from foldyn.linear.bloch import (
     Bloch,
     Hops,
-    NotAlikeError,
     collected,
     hermitian,
     hops,
@@ -35,7 +33,7 @@ from foldyn.linear.bloch import (
     steps_of,
 )
 from foldyn.linear.cell_patch import Patch, cell_patch
-from foldyn.linear.linearized import slope_change
+from foldyn.linear.linearized import amplitude_of, damped_tangent, slope_change
 from foldyn.linear.unit_cell import UnitCell, check_commuting, images, rotation
 from foldyn.mechanics.assembly import BALANCED as SETTLED
 from foldyn.mechanics.assembly import Assembly
@@ -133,8 +131,6 @@ class CellReach:
         first, own = displacement.size, self.rows[self.hidden]
         hidden = np.zeros(len(own))
         q = np.concatenate([displacement.ravel(), np.zeros(len(self.patch.hidden_unit))])
-        if not len(own):
-            return q
         for _ in range(ITERATIONS):
             couple = self.body.internal(q)[own]
             if not couple.any():
@@ -150,10 +146,7 @@ class CellReach:
     @cached_property
     def ties(self) -> Hops:
         """Constraints (k, m) of one cell: constraints whose first cell is cell 0."""
-        ties = self.patch.case.constraints
-        rows = (
-            sparse.csr_array(ties.rows) if ties else sparse.csr_array((0, 3 * len(self.patch.unit)))
-        )
+        rows = self.patch.case.constraints.rows
         first = [
             min(map(tuple, self.steps[self._number[rows.indices[a:b]]].tolist()))
             for a, b in zip(rows.indptr[:-1], rows.indptr[1:], strict=True)
@@ -171,8 +164,6 @@ class CellReach:
     def moves(self) -> NDArray[np.float64]:
         """Orthonormal motions (m, r), equal in all cells, that supports and constraints allow."""
         basis = np.eye(self.count)[:, ~self.held]
-        if self.ties.empty:
-            return basis
         together = self.ties.at(np.ones(len(self.steps)))
         return basis @ null_space(together @ basis).real
 
@@ -273,9 +264,7 @@ def linearize_cell(
     """
     of_kind("cell", cell, UnitCell)
     load_factor = number("load_factor", load_factor)
-    amplitude = None
-    if secant is not None:
-        amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
+    amplitude = amplitude_of(secant)
     patch = cell_patch(cell)
     case, own = patch.case, np.zeros_like(cell.case.structure.nodes)
     check_mass(case.mass[patch.own_nodes][:, patch.own_nodes], patch.determined)
@@ -305,20 +294,19 @@ def linearize_cell(
     tangent, mass = body.tangent(q), mass_of(case)
     stiffness = tangent if change is None else sparse.csr_array(tangent + change)
     damping = sparse.csr_array(
-        damping_matrix(case, q, True) + case.rayleigh.matrix(mass, _reference(patch, tangent))
+        damping_matrix(case, q, True) + case.rayleigh.matrix(mass, damped_tangent(case, tangent))
     )
-    try:
-        bloch = Bloch(
-            steps=reach.steps,
-            stiffness=hermitian(reach.hops(stiffness), reach.steps, "stiffness"),
-            mass=hermitian(reach.hops(mass), reach.steps, "mass"),
-            damping=hermitian(reach.hops(damping), reach.steps, "damping"),
-            ties=reach.ties,
-            hidden=reach.hidden,
-            held=reach.held,
-        )
-    except NotAlikeError as error:
-        raise error.naming(patch.first) from None
+    matrices = {"stiffness": stiffness, "mass": mass, "damping": damping}
+    bloch = Bloch(
+        reach.steps,
+        **{
+            name: hermitian(reach.hops(own), reach.steps, name, patch.first)
+            for name, own in matrices.items()
+        },
+        ties=reach.ties,
+        hidden=reach.hidden,
+        held=reach.held,
+    )
     residual = _residual(reach, q)
     if residual > BALANCED:
         _warn(
@@ -337,14 +325,6 @@ def check_state(cell: UnitCell) -> None:
 
 def _warn(message: str) -> None:
     warn(message, "waves.md#prestressed-and-folded-states")
-
-
-def _reference(patch: Patch, tangent: sparse.csr_array) -> sparse.csr_array:
-    """K0 of the damping: the tangent in the state, or at rest."""
-    rayleigh, body = patch.case.rayleigh, patch.case.elastic_body
-    if rayleigh.state != "rest" or rayleigh.beta == 0.0:
-        return tangent
-    return body.tangent(body.dofs(np.zeros_like(patch.case.structure.nodes)))
 
 
 def deformed_motions(cell: UnitCell, patch: Patch, displacement: NDArray) -> tuple[Screw, ...]:

@@ -10,15 +10,19 @@ import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
-from foldyn.linear.stresses import stresses
+from foldyn.linear.stresses import ALONG, stresses
 from foldyn.patterns import Pattern
 from foldyn.patterns.crease_data import crease_values
 from foldyn.results import case_of
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import MARGINS, variables
-from foldyn.values import number, numbers, show
+from foldyn.strength.plies import CRITERIA, ply_factors
+from foldyn.structures.material_axes import material_axes
+from foldyn.structures.sheet import Sheet
+from foldyn.values import choice, number, numbers, show
 
 LARGEST = {"random": "rms", "spectrum": "peak"}  # results that hold one value for all times
+MOMENTS = {"load_factor": ", load factor {:.6g}", "time": ", t = {:.6g} s"}
 WORDS = {
     "center": "at its center",
     "edge": "at the middle of its edge {}",
@@ -33,11 +37,13 @@ def margins(
     crease_strength: float | Mapping[str, float] | ArrayLike | None = None,
     factor_of_safety: float = 1.0,
     sigmas: float = 3.0,
+    criterion: str = "tsai_wu",
 ) -> xarray.Dataset:
     """Least margins of safety of panels and creases over all states of a result.
 
     The margin is strength / (factor of safety x stress) - 1: below 0, a panel or crease fails. In
-    panels the von Mises stress counts, at both faces; in creases the moment per length.
+    panels the von Mises stress counts, at both faces, or the stresses of plies that have a strength
+    (`Ply.strength`), by their criterion; in creases the moment per length.
 
     Parameters
     ----------
@@ -53,6 +59,8 @@ def margins(
     factor_of_safety : float
     sigmas : float
         For random responses: stresses are this number times their root mean square.
+    criterion : {"tsai_wu", "maximum_stress"}
+        When a ply fails (Tsai and Wu, J. Compos. Mater. 5, 1971, or by its largest component).
 
     Returns
     -------
@@ -79,6 +87,7 @@ def margins(
     True
     """
     safety = number("factor_of_safety", factor_of_safety, above=0.0)
+    criterion = choice("criterion", criterion, CRITERIA)
     case = case_of(result)
     pattern, sheet = case.structure.pattern, case.structure.sheet
     found, when, moment = _stressed(result, number("sigmas", sigmas, above=0.0))
@@ -87,13 +96,12 @@ def margins(
         bears = np.full(len(bears), number("strength", strength, above=0.0, unit="Pa"))
     values: dict[str, NDArray] = {}
     words: list[tuple[float, str]] = []
-    if "von_mises" in found and np.isfinite(bears).any():
-        values |= _panels(found, bears / safety, when)
+    factor = _factors(found, bears, pattern, sheet if strength is None else None, criterion)
+    if not np.isnan(factor).all():
+        values |= _panels(found, factor / safety - 1.0, when)
         p = int(np.nan_to_num(values["panel_margin"], nan=np.inf).argmin())
         point = values["panel_point"][p]
-        place = WORDS[str(found["point_place"].values[point])]
-        where = place.format(found["point_number"].values[point])
-        where = f"panel {p} {where}{moment(float(values['panel_state'][p]))}"
+        where = place_in(found, point) + moment(float(values["panel_state"][p]))
         words.append((values["panel_margin"][p], where))
     creases = _crease_strengths(crease_strength, pattern)
     if creases is not None and len(creases):
@@ -104,7 +112,7 @@ def margins(
         words.append((values["crease_margin"][k], f"crease {k}{moment(float(when[at[k]]))}"))
     if not words:
         reason = ": the sheet has none; give Sheet(strength=...), or strength and crease_strength"
-        if np.isfinite(bears).any():
+        if strength is not None or sheet.has_strength:
             reason = ": the panels of this model have no stresses; give crease_strength as well"
         raise InputError(reason, "strength")
     least, where = min(words)
@@ -128,30 +136,65 @@ def _stressed(
         found = sigmas * found if kind == "rms" else found
         return found.expand_dims("state"), np.array([np.nan]), lambda _: ""
     found = result if result.attrs["foldyn_result"] == "stresses" else stresses(result)
-    kind = str(found.attrs["of"])
-    states = {"path": ("step", "load_factor"), "trajectory": ("time", "time")}
-    first, name = states.get(kind, ("time", "time"))
-    if name in found.coords and first not in found.dims:  # of one state
+    first, name, _ = ALONG[found.attrs["of"]]
+    if name not in MOMENTS:
+        raise InputError(
+            f": stresses of {found.attrs['of']} are per unit, and have no margin; give a path, a "
+            "motion or a random response",
+            "result",
+        )
+    if first not in found.dims:  # of one state
         found = found.expand_dims(first).assign_coords({name: (first, [float(found[name])])})
-    if kind == "path":
-        return found, found["load_factor"].values, lambda at: f", load factor {at:.6g}"
-    if "time" in found.dims:
-        return found, found["time"].values, lambda at: f", t = {at:.6g} s"
-    raise InputError(
-        f": stresses of {kind} are per unit, and have no margin; give a path, a motion or a random "
-        "response",
-        "result",
-    )
+    return found, found[name].values, MOMENTS[name].format
 
 
-def _panels(found: xarray.Dataset, bears: NDArray, when: NDArray) -> dict[str, NDArray]:
-    """Least margins of panels that bear (np,), Pa, and where they are."""
+def place_in(found: xarray.Dataset, point: Any) -> str:
+    """Where a point of stresses is, in words."""
+    place = WORDS[str(found["point_place"].values[point])]
+    number_ = found["point_number"].values[point]
+    return f"panel {found['point_panel'].values[point]} {place.format(number_)}"
+
+
+def _factors(
+    found: xarray.Dataset, bears: NDArray, pattern: Pattern, sheet: Sheet | None, criterion: str
+) -> NDArray[np.float64]:
+    """Factors (s, p) by which stresses at points may grow; nan where no strength is known.
+
+    bears : (np,) von Mises stress that panels bear, Pa.
+    sheet : whose plies have strengths, or None.
+    """
+    if "von_mises" not in found:
+        return np.zeros(0)
     panel = found["point_panel"].values
-    margin = _margin(bears[panel][:, None], found["von_mises"].values).min(axis=2)
+    with np.errstate(divide="ignore"):
+        factor = (bears[panel][:, None] / found["von_mises"].values).min(axis=2)
+    kinds, kind = sheet.kinds(len(bears)) if sheet else ([], np.zeros(0, np.int64))
+    for number_of, own in enumerate(kinds):
+        points = np.flatnonzero(kind[panel] == number_of)
+        if not any(ply.strength for ply in own.plies or ()) or not len(points):
+            continue
+        if "membrane_force" not in found:
+            raise InputError(
+                ": strengths of plies need stresses with signs, and this response has none; give "
+                "strength, of von Mises stresses, instead",
+                "result",
+            )
+        fibers = material_axes(pattern, sheet)[panel[points]]  # type: ignore[index]
+        x, y = np.einsum("pai,pi->ap", found["panel_axes"].values[panel[points]], fibers)
+        force, moment = (
+            found[name].values[:, points] for name in ("membrane_force", "bending_moment")
+        )
+        factor[:, points] = ply_factors(own, force, moment, np.arctan2(y, x), criterion)
+    return factor
+
+
+def _panels(found: xarray.Dataset, margin: NDArray, when: NDArray) -> dict[str, NDArray]:
+    """Least margins of panels, from those of points (s, p), and where they are."""
+    panel = found["point_panel"].values
     at = np.nan_to_num(margin, nan=np.inf).argmin(axis=0)  # of each point
     least = margin[at, np.arange(len(panel))]
     order = np.lexsort((np.nan_to_num(least, nan=np.inf), panel))
-    point = order[np.searchsorted(panel[order], np.arange(len(bears)))]
+    point = order[np.searchsorted(panel[order], np.arange(panel.max() + 1))]
     return {"panel_margin": least[point], "panel_point": point, "panel_state": when[at[point]]}
 
 

@@ -6,7 +6,7 @@ amplitudes of a unit white noise.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -63,18 +63,24 @@ class Source(NamedTuple):
         each = zip(self.factors, self.drives, strict=True)
         return [factor * driven.columns(omega) for factor, driven in each]
 
-    def raised(
-        self, name: str, omega: NDArray, columns: Sequence[NDArray]
-    ) -> NDArray[np.complex128]:
-        """Columns (nf, n) of a quantity, with their powers."""
-        each = zip(self.amounts, columns, strict=True)
-        return np.hstack(
-            [
-                ((1j * omega) ** power)[:, None] * own
-                for amounts, own in each
-                for power in amounts[name].powers
-            ]
-        )
+    def parts(
+        self, frequency: NDArray, at_once: int
+    ) -> Iterator[tuple[slice, str, NDArray[np.complex128]]]:
+        """Columns (k, n), with their powers, of each quantity at k of the frequencies (nf,), Hz.
+
+        at_once : the largest k.
+        """
+        for first in range(0, len(frequency), at_once):
+            part = slice(first, first + at_once)
+            omega = TURN * frequency[part]
+            columns = self.columns(omega)
+            for name in self.amounts[0]:
+                raised = [
+                    ((1j * omega) ** power)[:, None] * own
+                    for amounts, own in zip(self.amounts, columns, strict=True)
+                    for power in amounts[name].powers
+                ]
+                yield part, name, np.hstack(raised)
 
 
 class Found(NamedTuple):
@@ -95,26 +101,19 @@ def mean_squares(source: Source, at: NDArray) -> dict[str, Found]:
     at_once = AT_ONCE
     if len(at):  # all parts are found at each frequency
         at_once = int(np.clip(ROOM // max(sizes.values()), 16, AT_ONCE))
-    for frequency, weight in _chunks(source, at, at_once):
-        omega, slot = TURN * frequency, np.searchsorted(at, frequency)
-        columns = source.columns(omega)
-        for name, own in rows.items():
-            raised = source.raised(name, omega, columns)
-            powers = weight * omega ** (2 * np.arange(2)[:, None])
-            if not len(at):
-                totals[name] += _squares(own, raised, powers)
-                continue
-            square = _moved(own, raised)
-            totals[name] += powers @ square
-            first = np.flatnonzero(np.diff(slot, prepend=-1))
-            parts[name][slot[first]] += np.add.reduceat(weight[:, None] * square, first)
+    frequency, weight = _quadrature(source, at)
+    powers, slot = weight * (TURN * frequency) ** (2 * np.arange(2)[:, None]), at.searchsorted
+    for part, name, raised in source.parts(frequency, at_once):
+        if not len(at):
+            totals[name] += _squares(rows[name], raised, powers[:, part])
+            continue
+        square, place = _moved(rows[name], raised), slot(frequency[part])
+        totals[name] += powers[:, part] @ square
+        first = np.flatnonzero(np.diff(place, prepend=-1))
+        parts[name][place[first]] += np.add.reduceat(weight[part, None] * square, first)
     density = {name: np.zeros((len(at), size)) for name, size in sizes.items()}
-    for first in range(0, len(at), at_once):
-        part = slice(first, first + at_once)
-        omega = TURN * at[part]
-        columns = source.columns(omega)
-        for name, own in rows.items():
-            density[name][part] = _moved(own, source.raised(name, omega, columns))
+    for part, name, raised in source.parts(at, at_once):
+        density[name][part] = _moved(rows[name], raised)
     found = {}
     for name in rows:
         square, rate = totals[name].clip(0.0)
@@ -141,22 +140,15 @@ def _squares(
     return np.array(found)
 
 
-def _chunks(source: Source, at: NDArray, at_once: int) -> Iterator[tuple[NDArray, NDArray]]:
-    """Frequencies and weights, Hz, of a quadrature of which no interval reaches across `at`.
+def _quadrature(source: Source, at: NDArray) -> tuple[NDArray, NDArray]:
+    """Frequencies, increasing, and weights (nf,), Hz, that integrate a response.
 
-    at_once : how many frequencies come together.
+    No interval reaches across `at`.
     """
     known = np.concatenate([driven.density.frequency for driven in source.drives])
     low, high = known.min(), known.max()
     ends = np.unique(np.concatenate([known, at[(at > low) & (at < high)]]))
     poles = _poles(source.drives[0].response, low, high)
-    frequency, weight = _quadrature(poles, ends)
-    for first in range(0, len(frequency), at_once):
-        yield frequency[first : first + at_once], weight[first : first + at_once]
-
-
-def _quadrature(poles: NDArray[np.complex128], ends: NDArray) -> tuple[NDArray, NDArray]:
-    """Frequencies, increasing, and weights (nf,), Hz, that integrate a response between ends."""
     first, last = ends[:-1], ends[1:]
     kept: list[tuple[NDArray, NDArray]] = []
     for _ in range(HALVINGS):

@@ -7,7 +7,6 @@ shapes at the nodes that the models share.
 
 from __future__ import annotations
 
-import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.condensation.library import different
-from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning, warn
+from foldyn.errors import InputError, ModelRangeWarning, quietly, warn
 from foldyn.linear.level_error import DOUBTFUL
 from foldyn.linear.linearized import numbered
 from foldyn.linear.mac import pairs, same_places
@@ -70,8 +69,7 @@ def beside(case: Case, asked: bool, state: Any, secant: float | None) -> Beside:
         shapes = different(pattern, structure.sheet)
         if shapes > SHAPES:
             return Beside(why=f"{shapes} different panels, more than {SHAPES}")
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)
+        with quietly():
             bare = case.altered(loads=(), contact=None)
             return Beside(superelements_of(bare, level=LEVEL, divisions=DIVISIONS))
     except InputError as error:
@@ -128,12 +126,7 @@ def warn_of_bands(errors: NDArray) -> None:
     worst = np.abs(np.nan_to_num(errors)).argmax(axis=0)
     largest = np.nan_to_num(errors[worst, np.arange(len(worst))])
     told = _far_off("band", largest)
-    if told:
-        warn(
-            f"{told} at some wave vectors: {LINEAR}",
-            "superelements.md#bars-and-hinges-beside-them",
-            ModelRangeWarning,
-        )
+    _warn(told and f"{told} at some wave vectors")
 
 
 def judged(
@@ -163,7 +156,10 @@ def judged(
 
 def warn_of(own: Judged, elastic: NDArray) -> None:
     """Warn about modes, some (k,) of them elastic, that are far off, alone, or missing."""
-    doubts = own.doubts(elastic)
+    _warn(own.doubts(elastic))
+
+
+def _warn(doubts: str) -> None:
     if doubts:
         warn(
             f"{doubts}: {LINEAR}",

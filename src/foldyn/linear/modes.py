@@ -9,8 +9,7 @@ free to move along the axis.
 from __future__ import annotations
 
 import time
-import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +23,7 @@ from foldyn.algebra.superlu import factorize
 from foldyn.cases import Case, State
 from foldyn.condensation import Superelements
 from foldyn.dynamics.modal_damping import mass_of
-from foldyn.errors import FoldynWarning, StretchWarning, warn
+from foldyn.errors import StretchWarning, quietly, warn
 from foldyn.linear.hereditary import Branches, damped_mode
 from foldyn.linear.level_error import (
     first_doubtful,
@@ -32,7 +31,7 @@ from foldyn.linear.level_error import (
     other_level,
     warn_of_errors,
 )
-from foldyn.linear.linearized import Linearized, linearize, warn_beyond
+from foldyn.linear.linearized import Linearized, linearize, numbered, warn_beyond
 from foldyn.linear.model_error import ALONE, SPARE, Beside, Judged, beside, judged, warn_of
 from foldyn.ram_limit import check_memory
 from foldyn.results import modes_dataset
@@ -166,7 +165,8 @@ def spectrum_of(
     along = unit_translations(linear)
     _warn(spectrum)
     if compared.case is None:
-        _warn_of_stretch(linear, spectrum)
+        shapes, values = spectrum.shapes, spectrum.values
+        warn_of_stretch(linear, shapes, values, lambda told: numbered("mode", told + 1))
         frequency = np.sqrt(spectrum.values.clip(min=0.0)) / TURN
         warn_beyond(case.structure, frequency, "mode", linear=True)
     statistics = {
@@ -285,8 +285,7 @@ def _variables(
 
 def _judged(case: Case, found: dict[str, Any], other: Case) -> Judged:
     """Modes of bars and hinges beside those of superelements; warns of large errors."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with quietly():
         most = min(len(found["frequency"]) + SPARE, most_modes(other))
         true = spectrum_of(other, most, verify=False, errors=False).result
     points = points_of(other, true)
@@ -412,22 +411,25 @@ def _warn(spectrum: Spectrum) -> None:
         )
 
 
-def _warn_of_stretch(linear: Linearized, spectrum: Spectrum) -> None:
-    """Warn about modes in which stretching holds much of the strain energy."""
+def warn_of_stretch(
+    linear: Linearized, motions: NDArray, strain: NDArray, named: Callable[[NDArray], str]
+) -> None:
+    """Warn about motions (nf, k) in which stretching holds much of the strain energy (k,), J / 2.
+
+    named : which motions, by their rows, in words.
+    """
     structure = linear.case.structure
     limit = most(structure)
     if not np.isfinite(limit):
         return
-    bars = stretching(structure, linear.displacement, linear.whole(spectrum.shapes))
-    share = np.divide(bars, spectrum.values, out=np.zeros_like(bars), where=spectrum.values > 0.0)
+    bars = stretching(structure, linear.displacement, linear.whole(motions))
+    share = np.divide(bars, strain, out=np.zeros_like(bars), where=strain > 0.0).clip(max=1.0)
     told = np.flatnonzero(share > limit)
     if len(told):
         worst = told[share[told].argmax()]
-        numbers = ", ".join(str(k + 1) for k in told)
         warn(
-            f"panels that stretch hold more than {limit:.0%} of the strain energy of "
-            f"mode{'s' * (len(told) > 1)} {numbers} (mode {worst + 1}: "
-            f"{min(share[worst], 1.0):.0%}), {remedy(structure, linear=True)}",
+            f"panels that stretch hold more than {limit:.0%} of the strain energy of {named(told)} "
+            f"({named(worst[None])}: {share[worst]:.0%}), {remedy(structure, linear=True)}",
             "models.md#where-panels-stretch",
             StretchWarning,
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +10,7 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn.cases.directions import AXES, signed
-from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.errors import ComputationError, InputError, quietly
 from foldyn.linear.frf import PER_FORCE, convert, quantity_of
 from foldyn.signals import (
     CircleFit,
@@ -159,8 +158,7 @@ def _with_half_power(
     peak: Peak, f: NDArray, curve: NDArray, kind: str, rate: float
 ) -> tuple[Peak, float]:
     """The peak with its half-power damping, and the distance (Hz) of the half-power points."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)  # the asymmetry is in the result
+    with quietly():  # the asymmetry is in the result
         try:
             points = half_power(f, np.abs(curve), near=peak.frequency, quantity=kind)
         except InputError as error:

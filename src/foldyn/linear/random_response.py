@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import xarray
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
 
 from foldyn.algebra.eigen import Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
@@ -32,7 +33,7 @@ from foldyn.linear.mean_squares import TURN, Driven, Found, Source, mean_squares
 from foldyn.linear.spectral_density import SpectralDensity
 from foldyn.ram_limit import check_memory
 from foldyn.results import random_dataset
-from foldyn.values import flag, number, numbers, of_kind, show, whole
+from foldyn.values import choice, flag, increasing, number, numbers, of_kind, show, whole
 
 FEWEST, BEYOND = 10, 1.5  # least number of modes; their highest frequency over that of densities
 LEFT_OUT = 0.05  # share of the mass in modes above the spectra, of which a warning tells
@@ -133,7 +134,9 @@ def random_response(
     began = time.perf_counter()
     count = None if count is None else whole("count", count, least=1, what="modes")
     load_factor = number("load_factor", load_factor)
-    at = np.zeros(0) if frequencies is None else _increasing("frequencies", frequencies)
+    at = np.zeros(0)
+    if frequencies is not None:
+        at = increasing("frequencies", frequencies, above=0.0, unit="Hz")
     drives = _drives(of_kind("case", case, Case), base, forces)
     together = _coherence(coherence, len(forces))
     parts = Parts(
@@ -197,9 +200,8 @@ def _drives(
     if not isinstance(forces, Sequence) or isinstance(forces, str | bytes):
         raise InputError(f" = {show(forces)}: give a list of pairs (force, density)", "forces")
     for axis, density in (base or {}).items():
-        if axis not in (*AXES,):
-            raise InputError(f': {show(axis)} is no axis; give "x", "y" or "z"', "base")
-        out.append((_density(density, "acceleration", f"base[{axis!r}]"), BaseMotion(axis)))
+        place = f"base[{choice('base', axis, AXES)!r}]"
+        out.append((_density(density, "acceleration", place), BaseMotion(axis)))
     for k, pair in enumerate(forces):
         if not isinstance(pair, Sequence) or len(pair) != 2:
             raise InputError(
@@ -233,17 +235,13 @@ def _coherence(given: ArrayLike, count: int) -> NDArray[np.float64]:
             "its diagonal",
             "coherence",
         )
-    if not own.size:
-        return own
     values, vectors = np.linalg.eigh(own)
-    if values[0] < -FULL:
+    if values.min(initial=0.0) < -FULL:
         raise InputError(
             ": no forces have these coherences (the matrix has a negative eigenvalue, "
             f"{values[0]:.3g}); give smaller ones",
             "coherence",
         )
-    if np.array_equal(own, np.eye(count)):
-        return own
     kept = values > FULL
     return vectors[:, kept] * np.sqrt(values[kept])
 
@@ -252,17 +250,12 @@ def _sources(
     driven: Sequence[Driven], amounts: Sequence[dict[str, Amounts]], together: NDArray
 ) -> list[Source]:
     """Independent sources: each axis of the base, and the noises from which forces are mixed."""
-    shaken = len(driven) - len(together)
-    out = [Source((driven[k],), (1.0,), (amounts[k],)) for k in range(shaken)]
-    for noise in together.T:
+    out = []
+    for noise in block_diag(np.eye(len(driven) - len(together)), together).T:
         acting = np.flatnonzero(noise).tolist()
-        out.append(
-            Source(
-                tuple(driven[shaken + k] for k in acting),
-                tuple(float(noise[k]) for k in acting),
-                tuple(amounts[shaken + k] for k in acting),
-            )
-        )
+        each = [(driven[k], float(noise[k]), amounts[k]) for k in acting]
+        drives, factors, own = zip(*each, strict=True)
+        out.append(Source(drives, factors, own))
     return out
 
 
@@ -277,13 +270,3 @@ def _warn_of_mass(system: Linearized, driven: Driven) -> None:
             "random-vibration.md#how-it-is-computed",
             ModelRangeWarning,
         )
-
-
-def _increasing(name: str, given: ArrayLike) -> NDArray[np.float64]:
-    """Frequencies (nf,), Hz, above 0 and increasing."""
-    frequency = np.atleast_1d(numbers(name, given))
-    if frequency.ndim != 1 or not len(frequency) or frequency[0] <= 0.0:
-        raise InputError(": give a list of frequencies (Hz) above 0", name)
-    if (np.diff(frequency) <= 0.0).any():
-        raise InputError(": must increase; sort them and drop doubles", name)
-    return frequency

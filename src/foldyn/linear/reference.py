@@ -6,7 +6,6 @@ estimated here.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, NamedTuple, Protocol
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from foldyn.algebra.extrapolation import convergence, limits
 from foldyn.arguments import Unit, brief
 from foldyn.cases import Case
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, quietly
 from foldyn.linear.mac import pairs, same_places
 from foldyn.linear.model_error import LEAST, SPARE
 from foldyn.linear.modes import elastic, modes, points_of
@@ -54,11 +53,6 @@ class MeshModes(NamedTuple):
     shape: NDArray
     found: xarray.Dataset
 
-    def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
-        """Numbers (j,) of the points (m, 3) that are nodes of the mesh, and shapes (k, j, 3)."""
-        seen, place = same_places(self.structure.nodes, nodes, self.structure.pattern.size)
-        return seen, self.shape[:, place]
-
 
 def mesh_modes(case: Case, count: int) -> MeshModes:
     """The lowest elastic modes on the mesh of a case: `count`, and a few in reserve."""
@@ -79,9 +73,10 @@ def same_modes(own: MeshModes, meshes: Sequence[MeshModes], count: int) -> NDArr
     first, k = own.frequency[:count], min(count, len(own.frequency))
     frequencies = np.full((len(meshes), k), np.nan)
     for row, mesh in zip(frequencies, meshes, strict=True):
-        seen, shape = own.at(mesh.structure.nodes)
-        weights = np.ones(len(seen))
-        found = pairs(first, shape[:k], mesh.frequency, mesh.shape[:, seen], weights)
+        size = own.structure.pattern.size
+        seen, place = same_places(own.structure.nodes, mesh.structure.nodes, size)
+        shape, weights = own.shape[:k, place], np.ones(len(seen))
+        found = pairs(first, shape, mesh.frequency, mesh.shape[:, seen], weights)
         row[found.first] = mesh.frequency[found.second]
     return frequencies
 
@@ -132,8 +127,7 @@ def modes_at_rest(case: Case, count: int, secant: float | None = None) -> xarray
     """
     asked = max(min(count + RIGID, len(case.free_dofs)), 1)  # superelements have other dofs, too
     while True:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)
+        with quietly():
             found = modes(case, asked, secant=secant, check_model=False)
         missing = count - int((found["eigenvalue"].values > 0.0).sum())
         most = int(found.attrs["free_dofs"])

@@ -13,7 +13,7 @@ from foldyn.arguments import Check, Checked
 from foldyn.cases import Table
 from foldyn.errors import InputError
 from foldyn.ram_limit import check_memory
-from foldyn.values import choice, number, numbers, whole
+from foldyn.values import choice, increasing, number, numbers, whole
 
 PER_PERIOD = 20  # numbers of a history per period of the highest frequency
 STANDARD_GRAVITY = 9.80665  # m/s2, ISO 80000-3
@@ -52,13 +52,15 @@ class SpectralDensity(Checked):
     value: Annotated[Sequence[float], Check(_column)]
     unit: Annotated[str, Check(choice, known=tuple(UNITS))]
 
+    missing = dict.fromkeys(
+        ("frequency", "value", "unit"), "give frequency (Hz), value, and their unit"
+    )
+
     def agree(self) -> None:
         """Check the table."""
-        frequency = np.array(self.frequency)
-        if len(frequency) < 2 or frequency[0] <= 0.0 or (np.diff(frequency) <= 0.0).any():
-            raise InputError(
-                ": give at least two frequencies (Hz), above 0 and increasing", "frequency"
-            )
+        frequency = increasing("frequency", self.frequency, above=0.0, unit="Hz")
+        if len(frequency) < 2:
+            raise InputError(": give at least two frequencies (Hz)", "frequency")
         if len(self.value) != len(frequency) or min(self.value) <= 0.0:
             raise InputError(
                 f": {len(self.value)} densities for {len(frequency)} frequencies: give one above 0 "

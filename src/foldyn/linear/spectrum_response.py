@@ -30,7 +30,7 @@ from foldyn.linear.frequency_domain import ModalResponse, SuperposedModes
 from foldyn.linear.linearized import Linearized, warn_beyond
 from foldyn.results import random_dataset
 from foldyn.signals import ShockSpectrum
-from foldyn.values import choice, flag, number, numbers, of_kind, show, whole
+from foldyn.values import choice, flag, increasing, number, numbers, of_kind, show, whole
 
 TURN = 2.0 * np.pi
 FEWEST = 10  # modes
@@ -136,8 +136,14 @@ def spectrum_response(
     squares: dict[str, NDArray] = {}
     facts: dict[str, Any] = {"modes": modes.count, "combine": rule}
     for axis, spectrum in spectra.items():
-        drive = drive_of(case, BaseMotion(axis), 1.0)
-        _refuse_ground(system, axis)
+        drive, k = drive_of(case, BaseMotion(axis), 1.0), AXES.index(axis)
+        if system.ground[:, k].any() or system.drag[:, k].any():
+            raise InputError(
+                f": springs, dashpots or planes hold the case to the ground along {axis}, which "
+                "does not move with the base; connect them to held nodes (between = ...), or take "
+                "fd.simulate with the record",
+                "supports",
+            )
         shock = _Shock(system, modes, axis, spectrum, rule)
         for name, amounts in parts.amounts(drive, ModalResponse(modes, drive)).items():
             squares[name] = squares.get(name, 0.0) + shock.square(amounts)
@@ -160,9 +166,7 @@ def _spectra(case: Case, given: Any) -> dict[str, tuple[NDArray, NDArray]]:
         raise InputError(f' = {show(given)}: give spectra by axis, as {{"z": spectrum}}', "base")
     out = {}
     for axis, spectrum in given.items():
-        place = f"base[{axis!r}]"
-        if axis not in (*AXES,):
-            raise InputError(f': {show(axis)} is no axis; give "x", "y" or "z"', "base")
+        place = f"base[{choice('base', axis, AXES)!r}]"
         if isinstance(spectrum, ShockSpectrum):
             spectrum = spectrum.frequency, spectrum.maximax
         if not isinstance(spectrum, tuple | list) or len(spectrum) != 2:
@@ -171,27 +175,12 @@ def _spectra(case: Case, given: Any) -> dict[str, tuple[NDArray, NDArray]]:
                 "accelerations (m/s2)",
                 place,
             )
-        frequency, value = (np.atleast_1d(numbers(place, each)) for each in spectrum)
-        rising = frequency.ndim == 1 and (np.diff(frequency) > 0.0).all() and frequency[0] > 0.0
-        if not rising or value.shape != frequency.shape or not (value > 0.0).all():
-            raise InputError(
-                ": give frequencies (Hz) above 0, increasing, and an acceleration (m/s2) above 0 "
-                "for each",
-                place,
-            )
+        frequency = increasing(f"{place}[0]", spectrum[0], above=0.0, unit="Hz")
+        value = np.atleast_1d(numbers(f"{place}[1]", spectrum[1]))
+        if value.shape != frequency.shape or not (value > 0.0).all():
+            raise InputError(": give an acceleration (m/s2) above 0 for each frequency", place)
         out[axis] = frequency, value
     return out
-
-
-def _refuse_ground(system: Linearized, axis: str) -> None:
-    k = AXES.index(axis)
-    if system.ground[:, k].any() or system.drag[:, k].any():
-        raise InputError(
-            f": springs, dashpots or planes hold the case to the ground along {axis}, which does "
-            "not move with the base; connect them to held nodes (between = ...), or take "
-            "fd.simulate with the record",
-            "supports",
-        )
 
 
 class _Shock:

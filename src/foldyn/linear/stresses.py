@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -16,7 +15,7 @@ from foldyn.cases.directions import AXES
 from foldyn.condensation import Superelements
 from foldyn.dynamics.initial import MODAL, initial_state
 from foldyn.dynamics.linear_motion import prepare_linear
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, quietly
 from foldyn.linear.excitation import Drive
 from foldyn.linear.finer_shapes import FinerMotion, FinerShapes
 from foldyn.linear.frequency_domain import Direct, direct
@@ -148,8 +147,7 @@ def _superposed(
         )
     initial = None
     if facts["started_from"] != "rest":
-        with warnings.catch_warnings():  # without more, panels did start in balance
-            warnings.simplefilter("ignore", FoldynWarning)
+        with quietly():  # without more, panels did start in balance
             initial = initial_state(result, 0)
     motion = prepare_linear(
         case, facts["duration"], MODAL, interval=facts["interval"], start=facts["start"],

@@ -6,8 +6,7 @@ The stepped sine method uses steady motions under a sine, one frequency at a tim
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, cast
 
@@ -31,7 +30,7 @@ from foldyn.cases import (
 from foldyn.cases.directions import unit_vector
 from foldyn.cases.supports import Support
 from foldyn.dynamics import METHODS, Progress, prepare
-from foldyn.dynamics.progress import Reporter, reporter
+from foldyn.dynamics.progress import Reporter
 from foldyn.linear.excitation import Answer, Drive, warn_at
 from foldyn.linear.operating_point import operating_point
 from foldyn.signals import stepped_sine as response_per_drive
@@ -150,16 +149,6 @@ def forces(vectors: NDArray, history: History | None = None) -> list[Force]:
         for k, vector in enumerate(distinct)
         if vector.any()
     ]
-
-
-@contextmanager
-def reported(progress: bool | Reporter | None) -> Iterator[Reporter]:
-    """A reporter for the argument `progress`; closed at the end."""
-    report, close = reporter(progress)
-    try:
-        yield report
-    finally:
-        close()
 
 
 def overall(report: Reporter, before: float, total: float) -> Callable[[Progress], Any]:

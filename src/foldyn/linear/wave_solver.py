@@ -163,9 +163,7 @@ class WaveSolver:
             return self._lanczos(phase)
         factors = bloch.factors(phase)
         whole, free, hidden = bloch.stiffness.at(factors), self.free, self.hidden
-        stiffness, follow = whole, np.zeros((0, len(free)))
-        if len(free) < bloch.size:
-            stiffness = whole[np.ix_(free, free)]
+        stiffness, follow = whole[np.ix_(free, free)], np.zeros((0, len(free)))
         if len(hidden):
             across = whole[np.ix_(hidden, free)]
             follow = -linalg.solve(whole[np.ix_(hidden, hidden)], across, assume_a="her")

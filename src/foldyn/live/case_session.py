@@ -21,7 +21,7 @@ from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.analyses.sections import Choice
 from foldyn.cases.models import BARS_AND_HINGES
 from foldyn.dynamics import prepare
-from foldyn.errors import FoldynError, FoldynWarning, InputError, warn
+from foldyn.errors import FoldynError, FoldynWarning, InputError, quietly, warn
 from foldyn.live.controls import changed, controls
 from foldyn.values import choice
 from foldyn.viewer import stage
@@ -125,8 +125,9 @@ class CaseSession:
 
     def _computed(self, wish: Any) -> Message:
         began = time.perf_counter()
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", FoldynWarning)
+        with warnings.catch_warnings(
+            record=True, action="always", category=FoldynWarning
+        ) as caught:
             answer = told(self.path, lambda: self._stage(wish))
         notes = [str(one.message) for one in caught if issubclass(one.category, FoldynWarning)]
         return {
@@ -191,10 +192,8 @@ def offered(document: Document) -> dict[str, str]:
         "frf": driven or based,
         "statics": bool(document.get("loads")) or (imposed and not based),
         "dynamics": bool(document.get("loads")) or imposed or based,
-        "bands": False,  # only for files of this kind: few patterns repeat
-        "response": False,  # only for files of this kind: curves take seconds
-    }
-    kinds = [kind for kind in KINDS if kind == own or possible[kind]]
+    }  # others only for files of their kind: few patterns repeat, and response curves take seconds
+    kinds = [kind for kind in KINDS if kind == own or possible.get(kind)]
     return {kind: KINDS[kind] for kind in sorted(kinds, key=lambda kind: kind != own)}
 
 
@@ -247,8 +246,7 @@ def _as_kind(path: Path, document: Document, kind: str) -> Document:
     if document["analysis"]["kind"] == kind:
         return document
     make = {"modes": _modes, "frf": _response, "statics": _curve, "dynamics": _motion}[kind]
-    with warnings.catch_warnings():  # settings without meaning for this kind are left out
-        warnings.simplefilter("ignore", FoldynWarning)
+    with quietly():  # settings without meaning for this kind are left out
         return make(path, document)
 
 

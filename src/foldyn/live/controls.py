@@ -137,7 +137,8 @@ def _of_pattern(table: Mapping[str, Any]) -> Iterator[Control]:
             places = [(("pattern", name, k), value) for k, value in enumerate(given)]
         else:
             places = [(("pattern", name), given)]
-        counts = all(type(value) is int for _, value in places) and _counted(parameter.annotation)
+        counts = all(type(value) is int for _, value in places)
+        counts = counts and "int" in str(parameter.annotation)
         for place, value in places:
             if counts:
                 yield Control(place, value, 1, max(MOST_COUNT, 2 * value), counts=True)
@@ -146,11 +147,6 @@ def _of_pattern(table: Mapping[str, Any]) -> Iterator[Control]:
                 yield Control(place, value, min(low, value), max(high, value), "°")
             elif _is_number(value):
                 yield _positive(place, value, "m")
-
-
-def _counted(annotation: Any) -> bool:
-    """Whether a generator's argument is an integer; its annotation is a string."""
-    return "int" in str(annotation)
 
 
 def _of_sheet(table: Mapping[str, Any]) -> Iterator[Control]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from functools import partial
 from html import escape
@@ -11,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from foldyn.errors import FoldynError, FoldynWarning, InputError
+from foldyn.errors import FoldynError, InputError, quietly
 from foldyn.formats import read_pattern
 from foldyn.live.case_session import CaseSession
 from foldyn.live.embedded import View, check_results, results_stage
@@ -106,8 +105,7 @@ def folded_stage(pattern: Pattern, title: str) -> Stage:
     moves = given.any() and float(np.abs(wanted - fold_angles(pattern))[given].max()) > 1e-6
     if moves and len(pattern.faces) <= MOST_FOLDED:
         try:
-            with warnings.catch_warnings():  # `foldyn fold` reports failures to fold
-                warnings.simplefilter("ignore", FoldynWarning)
+            with quietly():  # `foldyn fold` reports failures to fold
                 return results_stage({title: fold(pattern).path}, title)
         except FoldynError:
             pass

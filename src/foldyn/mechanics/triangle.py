@@ -14,7 +14,7 @@ from foldyn.jit.eights import COUNT, eight, put
 
 
 def triangle_stiffness(
-    corners: NDArray, poissons_ratio: float, stretching: float, bending: float
+    corners: NDArray, stretching: NDArray, bending: NDArray, first: NDArray | None = None
 ) -> tuple[NDArray, NDArray]:
     """Membrane and bending stiffness (nt, 3, 3) of triangles with corners (nt, 3, 3).
 
@@ -24,35 +24,68 @@ def triangle_stiffness(
     Parameters
     ----------
     corners : (nt, 3, 3)
-    poissons_ratio : float
-    stretching, bending : float
-        E t/(1 - nu^2), N/m, and E t^3/(12 (1 - nu^2)), N m.
+    stretching, bending : (3, 3)
+        Of the sheet, see `plane_stress`: N/m and N m per unit of xx, yy, and twice xy.
+    first : (nt, 3), optional
+        Unit vectors along x in the triangles' planes; by default along the first sides, as the axes
+        of an isotropic sheet do not matter.
 
     Returns
     -------
     membrane, bending : (nt, 3, 3)
         J per strain squared; N m per rad squared.
     """
-    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normal = np.cross(first, second)
+    side = np.roll(corners, -1, axis=1) - corners
+    normal = np.cross(side[:, 0], side[:, 1])
     twice = np.linalg.norm(normal, axis=1)
     area = 0.5 * twice
-    e1 = first / np.linalg.norm(first, axis=1)[:, None]
-    e2 = np.cross(normal / twice[:, None], e1)
-    side = np.roll(corners, -1, axis=1) - corners
     length = np.linalg.norm(side, axis=2)
+    e1 = side[:, 0] / length[:, :1] if first is None else first
+    e2 = np.cross(normal / twice[:, None], e1)
     tx = np.einsum("tki,ti->tk", side, e1) / length
     ty = np.einsum("tki,ti->tk", side, e2) / length
     along = np.stack([tx * tx, ty * ty, tx * ty], axis=2)  # e = along eps
     across = np.stack([ty * ty, tx * tx, -2.0 * tx * ty], axis=1)  # kappa = across beta
     across = across * (length / area[:, None])[:, None, :]
-    nu = poissons_ratio
-    # plane stress on (xx, yy, gamma xy), without E t / (1 - nu^2)
-    elastic = np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, 0.5 * (1.0 - nu)]])
     strain = np.linalg.inv(along)
-    membrane = np.einsum("tak,ab,tbl,t->tkl", strain, elastic, strain, area * stretching)
-    curved = np.einsum("tak,ab,tbl,t->tkl", across, elastic, across, area * bending)
+    membrane = np.einsum("tak,ab,tbl,t->tkl", strain, stretching, strain, area)
+    curved = np.einsum("tak,ab,tbl,t->tkl", across, bending, across, area)
     return membrane, curved
+
+
+def plane_stress(
+    first: float, second: float, poissons_ratio: float, shear: float
+) -> NDArray[np.float64]:
+    """Stiffness (3, 3) in plane stress on strains xx, yy, and twice xy, along the material's axes.
+
+    Parameters
+    ----------
+    first, second : float
+        Moduli along x and y.
+    poissons_ratio : float
+        Contraction along y over the strain along x, under a stress along x.
+    shear : float
+    """
+    across = poissons_ratio * second
+    rest = 1.0 - poissons_ratio * across / first
+    return np.array(
+        [[first / rest, across / rest, 0.0], [across / rest, second / rest, 0.0], [0.0, 0.0, shear]]
+    )
+
+
+def isotropic(poissons_ratio: float) -> NDArray[np.float64]:
+    """`plane_stress` of an isotropic sheet, divided by E/(1 - nu^2)."""
+    nu = poissons_ratio
+    return np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, 0.5 * (1.0 - nu)]])
+
+
+def turned_axes(stiffness: NDArray, angle: NDArray | float) -> NDArray[np.float64]:
+    """Stiffness (..., 3, 3) along axes from which the material's are turned by an angle, rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    strain = np.array(  # along the material's axes
+        [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
+    )
+    return np.einsum("ba...,...bc,cd...->...ad", strain, stiffness, strain)
 
 
 MIDDLES = 0.5 * (np.ones((3, 3)) - np.eye(3))  # side midpoints, an exact quadrature

@@ -27,8 +27,7 @@ def parse(text: str) -> ast.expr:
     if len(text) > LONGEST:
         raise InputError(f"is longer than {LONGEST} characters")
     try:
-        with warnings.catch_warnings():  # Python's syntax warnings
-            warnings.simplefilter("ignore")
+        with warnings.catch_warnings(action="ignore"):  # Python's syntax warnings
             tree = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise InputError("cannot be read") from None

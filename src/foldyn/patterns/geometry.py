@@ -12,11 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from foldyn.errors import InputError
-from foldyn.patterns.topology import Edge, Faces, around, edge_lookup, edge_of
+from foldyn.patterns.topology import Edge, Faces, around, components, edge_lookup, edge_of
 
 # A face is degenerate if area divided by squared diameter, or edge length divided by diameter, is
 # smaller: far above rounding (1e-16), far below any panel that can be made.
@@ -212,9 +210,8 @@ def _places(vertices: NDArray, boundary: NDArray, near: float) -> NDArray:
     rim = np.unique(boundary)
     points, where = np.unique(vertices[rim], axis=0, return_inverse=True)
     pairs = _pairs_nearer(points, near * float(np.linalg.norm(np.ptp(vertices, axis=0))))
-    graph = coo_array((np.ones(len(pairs)), tuple(pairs.T)), (len(points), len(points)))
     places = np.arange(len(vertices)) + len(points)
-    places[rim] = connected_components(graph, directed=False)[1][where.ravel()]
+    places[rim] = components(pairs, len(points))[where.ravel()]
     return places
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from html import escape
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.patterns.palette import CREASES, PAPER
+from foldyn.patterns.topology import around, edge_of
 
 WIDTH, HEIGHT, MARGIN = 520.0, 300.0, 8.0  # pixels
 VIEW = (28.0, -60.0)  # elevation above the xy plane and azimuth around z (degrees) of the view
@@ -33,7 +33,7 @@ def picture(pattern: Any, words: str = "") -> str | None:
     if len(pattern.faces) > MOST_PANELS:
         return None
     words = words if len(words) <= MOST_WORDS else f"{words[: MOST_WORDS - 4]} ..."
-    right, up, toward = _directions(*VIEW)
+    right, up, toward = directions(*VIEW)
     x = pattern.vertices @ np.stack([right, -up, toward], axis=1)
     used = sorted({corner for face in pattern.faces for corner in face})
     low, size = x[used, :2].min(axis=0), np.ptp(x[used, :2], axis=0)
@@ -58,10 +58,7 @@ def _panels(pattern: Any, places: NDArray, depth: NDArray, toward: NDArray) -> l
     }
     letters |= {tuple(pair): "B" for pair in pattern.boundary.tolist()}
     order = np.argsort([depth[list(face)].mean() for face in pattern.faces], kind="stable")
-    edges_of = [
-        [(min(pair), max(pair)) for pair in zip(face, (*face[1:], face[0]), strict=True)]
-        for face in pattern.faces
-    ]
+    edges_of = [[edge_of(a, b) for a, b in around(face)] for face in pattern.faces]
     last = {edge: face for face in order.tolist() for edge in edges_of[face]}  # nearest face
     facing = (pattern.face_normals @ toward).tolist()
     out = []
@@ -82,9 +79,9 @@ def _panels(pattern: Any, places: NDArray, depth: NDArray, toward: NDArray) -> l
     return out
 
 
-def _directions(elevation: float, azimuth: float) -> tuple[NDArray, NDArray, NDArray]:
-    """Unit vectors to the right, up and towards the viewer."""
-    e, a = math.radians(elevation), math.radians(azimuth)
-    toward = np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
-    right = np.array([-math.sin(a), math.cos(a), 0.0])
-    return right, np.cross(toward, right), toward
+def directions(elevation: float, azimuth: float) -> NDArray:
+    """Unit vectors (3, 3) to the right, up and towards the viewer, from angles in degrees."""
+    e, a = np.radians([elevation, azimuth])
+    toward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    right = np.array([-np.sin(a), np.cos(a), 0.0])
+    return np.array([right, np.cross(toward, right), toward])

@@ -128,8 +128,7 @@ def of_twist(twist: NDArray) -> Screw:
 
 def _screw(axis: NDArray, angle: float, shift: float, point: NDArray) -> Screw:
     """A screw from computed values, which are not checked; angle in rad."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UnitsWarning)
+    with warnings.catch_warnings(action="ignore", category=UnitsWarning):
         return Screw(tuple(axis.tolist()), math.degrees(angle), shift, tuple(point.tolist()))
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -95,13 +96,13 @@ def check_expression(expression: str) -> str:
     return expression
 
 
+@dataclass(frozen=True, eq=False)
 class _Selector:
     """Evaluates one expression on points with an absolute tolerance (m)."""
 
-    def __init__(self, expression: str, points: NDArray, tolerance: float) -> None:
-        self.expression = expression
-        self.points = points
-        self.tolerance = tolerance
+    expression: str
+    points: NDArray
+    tolerance: float
 
     def mask(self) -> NDArray[np.bool_]:
         try:

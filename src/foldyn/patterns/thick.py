@@ -18,7 +18,6 @@ of different heights meet moves only if the thicknesses satisfy certain conditio
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -29,7 +28,7 @@ from foldyn.errors import InputError
 from foldyn.patterns.boards import Boards
 from foldyn.patterns.crease_data import crease_values
 from foldyn.patterns.pattern import Pattern, pattern_of
-from foldyn.patterns.topology import around, edge_lookup, edge_of
+from foldyn.patterns.topology import around, edge_lookup, edge_of, walk
 from foldyn.values import SHORTEST, number, number_or_list, show
 
 SAME = 1e-9  # positions and heights closer than this, relative to the size, are equal
@@ -240,22 +239,9 @@ def _shifts(height: NDArray, pattern: Pattern) -> NDArray[np.float64]:
     normal = pattern.face_normals
     step = height[:, :1] * normal[pattern.crease_faces[:, 0]]
     step = step - height[:, 1:] * normal[pattern.crease_faces[:, 1]]
-    beside: list[list[tuple[int, NDArray]]] = [[] for _ in pattern.faces]
-    for (one, two), way in zip(pattern.crease_faces.tolist(), step, strict=True):
-        beside[one].append((two, way))
-        beside[two].append((one, -way))
-    shift = np.full((len(pattern.faces), 3), np.nan)
-    for seed in range(len(shift)):
-        if not np.isnan(shift[seed, 0]):
-            continue
-        shift[seed] = 0.0
-        queue = deque([seed])
-        while queue:
-            panel = queue.popleft()
-            for other, way in beside[panel]:
-                if np.isnan(shift[other, 0]):
-                    shift[other] = shift[panel] + way
-                    queue.append(other)
+    shift = np.zeros((len(pattern.faces), 3))
+    for panel, other, crease, way in walk(pattern.crease_faces, len(shift)):
+        shift[other] = shift[panel] + way * step[crease]
     one, two = pattern.crease_faces.T
     torn = np.abs(shift[two] - shift[one] - step).max(axis=1, initial=0.0) > SAME * pattern.size
     if torn.any():

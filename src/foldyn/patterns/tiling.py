@@ -8,11 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from foldyn.errors import InputError
-from foldyn.patterns.topology import Faces, around, edge_lookup, edge_of
+from foldyn.patterns.topology import Faces, around, components, edge_lookup, edge_of
 
 PARALLEL = 1e-3  # rad: periods within this angle have the same direction
 MOST_EDGES = 600  # most boundary edges in a search for periods
@@ -79,9 +77,7 @@ def glue(vertices: Sequence[NDArray], edges: Sequence[NDArray], tolerance: float
                 if owner[e] < owner[f]:
                     same += zip(rim[e], rim[f][::-1] if flip else rim[f], strict=True)
                     joined += 1
-    pairs = np.array(same, dtype=np.int64).reshape(-1, 2)
-    graph = coo_array((np.ones(len(pairs)), tuple(pairs.T)), (len(points), len(points)))
-    label = connected_components(graph, directed=False)[1]
+    label = components(same, len(points))
     _, first = np.unique(label, return_index=True)
     rank = np.empty(len(first), dtype=np.int64)
     rank[np.argsort(first)] = np.arange(len(first))
@@ -162,8 +158,7 @@ def _translations(
     shifts = np.where(largest < 0.0, -shifts, shifts)[far]
     one, two = one[far], two[far]
     pairs = cKDTree(shifts).query_pairs(4.0 * tolerance, output_type="ndarray")
-    graph = coo_array((np.ones(len(pairs)), tuple(pairs.T)), (len(shifts), len(shifts)))
-    group = connected_components(graph, directed=False)[1]
+    group = components(pairs, len(shifts))
     order = np.argsort(group, kind="stable")
     bounds = np.flatnonzero(np.diff(group[order])) + 1
     return [

@@ -9,7 +9,9 @@ from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from foldyn.errors import InputError
 from foldyn.values import listed
@@ -198,23 +200,8 @@ def _reversals(n_faces: int, pairs: NDArray, clash: NDArray, creases: NDArray) -
     reverse = np.zeros(n_faces, dtype=bool)
     if not clash.any():
         return reverse
-    neighbors: list[list[tuple[int, bool]]] = [[] for _ in range(n_faces)]
-    for (f, g), differs in zip(pairs.tolist(), clash.tolist(), strict=True):
-        neighbors[f].append((g, differs))
-        neighbors[g].append((f, differs))
-    reached = np.zeros(n_faces, dtype=bool)
-    for seed in range(n_faces):
-        if reached[seed]:
-            continue
-        reached[seed] = True
-        queue = deque([seed])
-        while queue:
-            f = queue.popleft()
-            for g, differs in neighbors[f]:
-                if not reached[g]:
-                    reached[g] = True
-                    reverse[g] = reverse[f] ^ differs
-                    queue.append(g)
+    for f, g, k, _ in walk(pairs, n_faces):
+        reverse[g] = reverse[f] ^ clash[k]
     wrong = np.flatnonzero((reverse[pairs[:, 0]] ^ reverse[pairs[:, 1]]) != clash)
     if len(wrong):
         (a, b), (f, g) = creases[wrong[0]].tolist(), pairs[wrong[0]].tolist()
@@ -224,6 +211,36 @@ def _reversals(n_faces: int, pairs: NDArray, clash: NDArray, creases: NDArray) -
             "edge by giving one of its faces vertices of its own."
         )
     return reverse
+
+
+def walk(pairs: NDArray, count: int) -> Iterator[tuple[int, int, int, int]]:
+    """Steps from face to face that reach all of `count` faces, across pairs (k, 2) of neighbors.
+
+    Each part is walked from its lowest face, breadth first. A step is the face where it starts, the
+    new face, the row of the pair, and 1, or -1 if it leads from the second to the first of a pair.
+    """
+    beside: list[list[tuple[int, int, int]]] = [[] for _ in range(count)]
+    for row, (one, two) in enumerate(pairs.tolist()):
+        beside[one].append((two, row, 1))
+        beside[two].append((one, row, -1))
+    reached = [False] * count
+    for seed in range(count):
+        queue = deque([] if reached[seed] else [seed])
+        reached[seed] = True
+        while queue:
+            here = queue.popleft()
+            for there, row, way in beside[here]:
+                if not reached[there]:
+                    reached[there] = True
+                    yield here, there, row, way
+                    queue.append(there)
+
+
+def components(pairs: ArrayLike, count: int) -> NDArray[np.int64]:
+    """Number of the connected part of each of `count` nodes, joined by pairs (k, 2)."""
+    rows = np.asarray(pairs, np.int64).reshape(-1, 2)
+    graph = coo_array((np.ones(len(rows)), (rows[:, 0], rows[:, 1])), (count, count))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def edge_lookup(edges: NDArray) -> dict[Edge, int]:

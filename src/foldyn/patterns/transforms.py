@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from inspect import signature
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.errors import FoldynWarning, InputError, warn
+from foldyn.errors import InputError, quietly, warn
 from foldyn.patterns.boards import Boards
 from foldyn.patterns.generators.arguments import check_size
 from foldyn.patterns.screw import direction
@@ -92,15 +92,11 @@ class Transforms:
         about : array_like, shape (3,)
             A point on the axis (m).
         """
+        from scipy.spatial.transform import Rotation
+
         turn = np.radians(number("angle", angle, unit="degrees"))
-        x, y, z = unit = _direction("axis", axis)
-        center = np.array(vector("about", about))
-        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        rotation = (
-            np.eye(3)
-            + np.sin(turn) * cross
-            + (1.0 - np.cos(turn)) * (np.outer(unit, unit) - np.eye(3))
-        )  # Rodrigues' formula
+        center, about_axis = np.array(vector("about", about)), turn * _direction("axis", axis)
+        rotation = Rotation.from_rotvec(about_axis).as_matrix()
         return self._placed(lambda x: (x - center) @ rotation.T + center)
 
     def mirrored(self, normal: str | ArrayLike = "x", about: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
@@ -219,26 +215,15 @@ class Transforms:
         **values
             New arguments of `Pattern`.
         """
-        own = {
-            "vertices": self.vertices,
-            "faces": self.faces,
-            "assignments": self.assignments,
-            "name": self.name,
-            "boards": self.boards,
-            "fold_angles": self.fold_angles,
-            "families": {name: self.creases[rows] for name, rows in self.families.items()},
-            "custom": self.custom,
-            "welds": self.welds,
-            "periods": self.periods,
-            "rim_families": self._rim(),
-        }
+        own = {name: getattr(self, name) for name in signature(type(self)).parameters}
+        own["families"] = {name: self.creases[rows] for name, rows in self.families.items()}
+        own["rim_families"] = self._rim()
         if "faces" in values:
             own["custom"] = {k: v for k, v in self.custom.items() if k != FACE_ORDERS}
             own["rim_families"] = _still_at_the_rim(self._rim(), values["faces"])
         if len(values.get("vertices", self.vertices)) != len(self.vertices):
             own["periods"] = ()  # they refer to vertex numbers
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)
+        with quietly():
             changed = type(self)(**{**own, **values})
         if "assignments" not in values:
             object.__setattr__(changed, "unlettered", self.unlettered)

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, State
 from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics import Progress
-from foldyn.dynamics.progress import Reporter
+from foldyn.dynamics.progress import Reporter, reported
 from foldyn.errors import ComputationError, InputError, MotionInterrupted, warn
-from foldyn.linear.time_domain import reported
 from foldyn.periodic.balance import Balance, Fourier, values_of
 from foldyn.periodic.continuation import LOST, Point, Step, Stride, corrected, point_at, steps
 from foldyn.periodic.equation import Equation

@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from foldyn.attractors.run import check_measure
 from foldyn.cases import Case, State
 from foldyn.dynamics import Progress
-from foldyn.dynamics.progress import Reporter
+from foldyn.dynamics.progress import Reporter, reported
 from foldyn.errors import InputError, MotionInterrupted, warn
-from foldyn.linear.time_domain import reported
 from foldyn.periodic.balance import Balance, Fourier
 from foldyn.periodic.continuation import (
     LONG,
@@ -154,7 +153,7 @@ def response_curve(
     of_kind("case", case, Case)
     if measure is not None:
         check_measure(measure, len(case.structure.nodes))
-    by, ends = _range(frequencies, amplitudes)
+    by, ends = checked_range(frequencies, amplitudes)
     tolerance = number("tolerance", tolerance, above=0.0, below=1.0)
     longest = number("longest_step", longest_step, above=0.0, most=1.0)
     stride = Stride(FIRST * longest, longest, whole("most_points", most_points, least=2))
@@ -175,10 +174,14 @@ def response_curve(
     return _dataset(case, tracer, measure, began)
 
 
-def _range(frequencies: Any, amplitudes: Any) -> tuple[str, tuple[float, float]]:
+def checked_range(frequencies: Any, amplitudes: Any) -> tuple[str, tuple[float, float]]:
     """Name of the varied parameter, and the two ends of its range."""
     if (frequencies is None) == (amplitudes is None):
-        raise InputError(": give frequencies (Hz) or amplitudes, one of the two", "frequencies")
+        raise InputError(
+            ": give both ends of the frequencies (Hz), as frequencies = [2.0, 5.0], or of a "
+            "factor on the drive, as amplitudes = [0.1, 2.0]",
+            "frequencies",
+        )
     by, given = ("frequencies", frequencies) if amplitudes is None else ("amplitudes", amplitudes)
     ends = numbers(by, given)
     if ends.shape != (2,) or ends[0] == ends[1] or ends.min() <= 0.0:
@@ -400,12 +403,8 @@ def events(family: Any, step: Step, of: Multipliers) -> list[Event]:
         point = located(family, one, other, step.length, value)
         if abs(value(point)) <= SURE[name]:  # else a pair has met on the real axis instead
             events.append((name, point))
-    along = [_along(one, point) for _, point in events]
+    along = [np.append(at.z - one.z, at.p - one.p) @ one.tangent for _, at in events]
     return [Event(*events[k]) for k in np.argsort(along, kind="stable")]
-
-
-def _along(one: Point, point: Point) -> float:
-    return float(np.append(point.z - one.z, point.p - one.p) @ one.tangent)
 
 
 def _nearest(found: Found, value: float) -> float:

@@ -8,14 +8,11 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from foldyn.cases import Case
-from foldyn.errors import InputError
 from foldyn.plots.modes import about_state
-from foldyn.plots.readings import MOST_MODES, asked_modes, case_from_result
+from foldyn.plots.readings import case_from_result, chosen_modes
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import side_by_side
 from foldyn.structures import Structure
-
-NEEDED = "load_factor", "shape", "displacement"
 
 
 @case_from_result
@@ -23,7 +20,7 @@ def draw_buckling(
     case_or_structure: Case | Structure,
     buckling: xr.Dataset,
     *,
-    which: Sequence[int] | None = None,
+    which: Sequence[int] | int | None = None,
     amplitude: float | None = None,
     view: tuple[float, float] = (28.0, -60.0),
     title: str = "",
@@ -36,8 +33,8 @@ def draw_buckling(
         The structure that buckles; by default from the result: ``draw_buckling(buckling)``.
     buckling : xarray.Dataset
         A result of `foldyn.buckling`.
-    which : sequence of int, optional
-        Mode numbers, from 1; by default the first, at most 12.
+    which : sequence of int, or int, optional
+        Mode numbers, from 1, or how many; by default the first, at most 12.
     amplitude : float, optional
         Largest displacement (m) in each picture; by default 12 % of the sheet's size, or less if
         neighboring nodes would move too far apart for a legible shape.
@@ -57,7 +54,7 @@ def draw_buckling(
         The result belongs to another structure, has no shapes, or a mode does not exist.
     """
     drawn, whose = Sheet3D.of(case_or_structure), "buckling: its shapes have"
-    numbers = shown_shapes(buckling, which)
+    numbers = chosen_modes(buckling, which, "buckling")
     sheet, swings, notes = about_state(drawn, buckling, numbers, amplitude, whose)
     factors = buckling["load_factor"].sel(mode=numbers).values.tolist()
     captions = [
@@ -65,14 +62,3 @@ def draw_buckling(
         for number, factor in zip(numbers, factors, strict=True)
     ]
     return side_by_side(sheet, sheet.nodes + swings, captions, View(*view), notes, title)[0]
-
-
-def shown_shapes(buckling: xr.Dataset, which: Sequence[int] | None) -> list[int]:
-    """Numbers of the shapes to draw: as asked for, or the first."""
-    missing = [key for key in NEEDED if key not in buckling]
-    if missing:
-        raise InputError(f"buckling: has no {missing[0]}; give a result of fd.buckling")
-    stored = buckling["mode"].values.tolist()
-    if not stored:
-        raise InputError("buckling: found no load factor, so that there is no shape to draw")
-    return stored[:MOST_MODES] if which is None else asked_modes(stored, which)

@@ -74,10 +74,10 @@ def plot_fidelity(fidelity: Fidelity, title: str = "") -> Figure:
     lower.text(0.006, 0.06, "lost", transform=lower.transAxes, va="bottom", **style.FINE)
     _along(upper, lower, frequency, fidelity.limit)
     if fidelity.limit < upper.get_xlim()[1]:
-        for axes in (upper, lower):
-            axes.axvline(fidelity.limit, color=style.BLACK, linewidth=1.0, linestyle=(0, (4, 2)))
-        text = f"0.6 of the plate frequency, {hertz(fidelity.limit)} Hz"
         dashes = {"color": style.BLACK, "linewidth": 1.0, "linestyle": (0, (4, 2))}
+        for axes in (upper, lower):
+            axes.axvline(fidelity.limit, **dashes)
+        text = f"0.6 of the plate frequency, {hertz(fidelity.limit)} Hz"
         keys.append(style.key(text, **dashes))
     return style.finish(figure, keys, columns=4, width=7.6)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,7 @@ def plot_landscape(landscape: Landscape, title: str = "") -> Figure:
     stroke, force, energy = with_states(landscape)
     for axes, values in ((upper, energy), (lower, force)):
         axes.plot(stroke, values, color=style.BLUE, linewidth=1.4)
+        style.exponents(axes)
         for start, end in landscape.negative_stiffness:
             axes.axvspan(start, end, color=_FALLS, zorder=0.5)
     lower.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
@@ -72,8 +74,6 @@ def plot_landscape(landscape: Landscape, title: str = "") -> Figure:
     if landscape.negative_stiffness:
         keys.append(Patch(facecolor=_FALLS, label="negative stiffness"))
     upper.set_title(barriers(landscape), **style.FINE, loc="right", y=1.0, pad=4.0)
-    for axes in (upper, lower):
-        style.exponents(axes)
     lower.margins(x=0.02)
     return style.finish(figure, keys)
 
@@ -92,7 +92,6 @@ def with_states(landscape: Landscape) -> tuple[NDArray, NDArray, NDArray]:
 def barriers(landscape: Landscape) -> str:
     """Barriers between neighboring stable states, in words; "" if there are none."""
     count = len(landscape.stable)
-    pairs = [(k, k + 1) for k in range(count - 1)]
     texts = [f"{landscape.barrier(a, b):.3g} J there, {landscape.barrier(b, a):.3g} J back"
-             for a, b in pairs]  # fmt: skip
+             for a, b in pairwise(range(count))]  # fmt: skip
     return f"barrier{'s' if count > 2 else ''}: {'; '.join(texts)}" if texts else ""

@@ -124,7 +124,9 @@ def load_charts(case: Case, start: float, duration: float) -> list[Chart]:
             (_most(s.value), describe_moment(s), s.history) for s in moments(case)
         ],
         "temperature (K)": [(_most(s.value), describe_temperature(s), s.history) for s in warm],
-        "gravity (m/s2)": [(_peak(g), describe_gravity(g), h) for g, h in case.gravity_terms],
+        "gravity (m/s2)": [
+            (_peak(g), describe_vector("gravity", g, "m/s2"), h) for g, h in case.gravity_terms
+        ],
         "imposed displacement (m)": _imposed(case),
         "base displacement (m)": _of_base(case),
     }
@@ -234,17 +236,8 @@ def _most(values: np.ndarray) -> float:
     return float(values[np.abs(values).argmax()])
 
 
-def describe_base(vector: np.ndarray) -> str:
-    """Describe a base motion (3,) in words: its distance and direction."""
-    return _toward("base moved", vector, "m")
-
-
-def describe_gravity(acceleration: np.ndarray) -> str:
-    """Describe an acceleration of gravity (3,) in words: its size and direction."""
-    return _toward("gravity", acceleration, "m/s2")
-
-
-def _toward(text: str, vector: np.ndarray, unit: str) -> str:
+def describe_vector(text: str, vector: np.ndarray, unit: str) -> str:
+    """Describe a vector (3,) in words, after a text: its size and direction."""
     size = float(np.linalg.norm(vector))
     text = f"{text} {size:.4g} {unit}"
     return f"{text} along {_direction(vector / size)}" if size else text

@@ -68,11 +68,7 @@ class Mark(NamedTuple):
 
 def billboard(tip: Points, along: Points, length: float, half: float, view: View) -> Points:
     """Return a triangle (3, 3) that points along a unit vector and faces the viewer."""
-    across = np.cross(view.basis[2], along)
-    size = np.linalg.norm(across)
-    # Seen end-on, any sideways direction in the screen will do.
-    across = across / size if size > 1e-6 else view.basis[0]
-    base = tip - length * along
+    across, base = view.across(along), tip - length * along
     return np.array([tip, base + half * across, base - half * across])
 
 

@@ -238,7 +238,10 @@ STRAIN: Mapping[str, str] = {
 }
 MOST_MODES = 12
 # Variables of modes that figures need.
-NEEDED = ("frequency", "eigenvalue", "shape", "rigid", "displacement")
+NEEDED = {
+    "modes": ("frequency", "eigenvalue", "shape", "rigid", "displacement"),
+    "buckling": ("load_factor", "shape", "displacement"),
+}
 _NONE = 1e-9  # below this energy, relative to the largest, shares are undefined
 
 
@@ -347,21 +350,23 @@ def energy_shares(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
     return {strain_name(part): energy / total for part, energy in energies.items()}
 
 
-def chosen_modes(modes: xr.Dataset, which: Sequence[int] | None) -> list[int]:
-    """Numbers of the modes to show: as asked for, or the first modes that are not rigid."""
-    missing = [key for key in NEEDED if key not in modes]
+def chosen_modes(
+    modes: xr.Dataset, which: Sequence[int] | int | None, field: str = "modes"
+) -> list[int]:
+    """Numbers of the modes to show: as asked for, or the first modes that are not rigid.
+
+    which : numbers of modes, or how many.
+    field : "modes", or "buckling" for its shapes.
+    """
+    missing = [key for key in NEEDED[field] if key not in modes]
     if missing:
-        raise InputError(f"modes: has no {missing[0]}; give a result of fd.modes")
-    stored = modes["mode"].values.tolist()
-    if which is None:
-        rigid = modes["rigid"].values.astype(bool)
-        elastic = [number for number, is_rigid in zip(stored, rigid, strict=True) if not is_rigid]
-        return (elastic or stored)[:MOST_MODES]
-    return asked_modes(stored, which)
-
-
-def asked_modes(stored: Sequence[int], which: Sequence[int]) -> list[int]:
-    """Numbers of modes that a figure is asked to show."""
+        raise InputError(f"{field}: has no {missing[0]}; give a result of fd.{field}")
+    stored = modes["mode"].values
+    if not stored.size:
+        raise InputError(f"{field}: found none, so that there is no shape to draw")
+    if which is None or isinstance(which, int):
+        elastic = stored[~modes["rigid"].values.astype(bool)] if "rigid" in modes else stored
+        return (elastic if elastic.size else stored)[: which or MOST_MODES].tolist()
     numbers = [int(number) for number in which]
     if not numbers:
         raise InputError("which: empty; give the number of at least one mode")

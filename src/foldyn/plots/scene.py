@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.patterns.palette import PAPER
+from foldyn.patterns.picture import directions
 from foldyn.plots import style
 from foldyn.results import case_of
 from foldyn.values import show
@@ -170,17 +171,14 @@ class View:
     @cached_property
     def basis(self) -> Points:
         """Unit vectors to the right, up and towards the viewer, shape (3, 3)."""
-        e, a = np.radians([self.elevation, self.azimuth])
-        toward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-        right = np.array([-np.sin(a), np.cos(a), 0.0])
-        return np.array([right, np.cross(toward, right), toward])
+        return directions(self.elevation, self.azimuth)
 
     def flat(self, points: Points) -> Points:
         """Project points to the screen, shape (..., 2)."""
         return points @ self.basis[:2].T
 
     def across(self, line: Points) -> Points:
-        """Unit vector (3,) in the screen perpendicular to a line (3,)."""
+        """Unit vector (3,) in the screen perpendicular to a line (3,); any for one seen end-on."""
         across = np.cross(self.basis[2], line)
         length = np.linalg.norm(across)
         return across / length if length > 1e-6 * np.linalg.norm(line) else self.basis[0]

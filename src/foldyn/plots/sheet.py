@@ -130,12 +130,18 @@ def panel_keys(sheet: Sheet3D) -> list[Patch]:
     ]
 
 
-def _differs(own: Mapping[str, float]) -> str:
+def _differs(own: Mapping[str, Any]) -> str:
     words = {
-        "youngs_modulus": "E = {:.4g} Pa", "poissons_ratio": "ν = {:.4g}",
-        "thickness": "t = {:.4g} m", "density": "ρ = {:.4g} kg/m³",
+        "youngs_modulus": ("E", "Pa"), "poissons_ratio": ("ν", ""), "thickness": ("t", "m"),
+        "density": ("ρ", "kg/m³"), "strength": ("strength", "Pa"), "shear_modulus": ("G", "Pa"),
     }  # fmt: skip
-    return "panels with " + ", ".join(words[name].format(value) for name, value in own.items())
+    told = [
+        f"{words[name][0]} = {', '.join(f'{one:.4g}' for one in np.atleast_1d(value))} "
+        f"{words[name][1]}".rstrip()
+        for name, value in own.items()
+        if name in words
+    ]
+    return "panels with " + ", ".join(told or ["a direction of their own"])
 
 
 class EdgeKind(NamedTuple):

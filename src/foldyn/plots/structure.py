@@ -160,10 +160,8 @@ def _supports(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[
         straight, axes = marks.support_triangles(points, mask, size, sight, moves)
         oblique = attachments.direction_triangles(sheet.case, kind, points, size, sight)
         if len(straight) or len(oblique):
-            triangles, keys = (
-                np.concatenate([straight, oblique]),
-                [Patch(facecolor=color, label=text)],
-            )
+            triangles = np.concatenate([straight, oblique])
+            keys = [Patch(facecolor=color, label=text)]
             groups.append(_Supports(Mark(color, keys, (), triangles, zorder=5.5), axes, ink))
     return groups
 
@@ -179,7 +177,8 @@ def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list
         moved = load_curves.base_vectors(sheet.case, vectors)
         peak = load_curves.signed_peak(moved)
         middle = points[moved.any(axis=1)].mean(axis=0)
-        base.append((middle[None], peak[None], load_curves.describe_base(peak)))
+        text = load_curves.describe_vector("base moved", peak, "m")
+        base.append((middle[None], peak[None], text))
     return [
         *_arrows(imposed, length, sight, style.IMPOSED),
         *_arrows(base, length, sight, style.BASE),
@@ -207,7 +206,8 @@ def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[M
     gravity = []
     for vector, _ in case.gravity_terms:  # only gravity needs masses
         center = case.nodal_mass @ points / case.nodal_mass.sum()
-        gravity.append((center[None], vector[None], load_curves.describe_gravity(vector)))
+        text = load_curves.describe_vector("gravity", vector, "m/s2")
+        gravity.append((center[None], vector[None], text))
     return [
         *_arrows(forces, length, sight, style.LOAD, vertices),
         *_arrows(pressure, length, sight, style.LOAD),

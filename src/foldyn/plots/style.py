@@ -83,7 +83,9 @@ def new_figure(width: float, height: float, title: str = "", constrained: bool =
     if not constrained:
         figure.set_layout_engine("none")  # overrides the caller's layout setting
     FigureCanvasAgg(figure)
-    title_above(figure, title)
+    if of_kind("title", title, str):
+        place = {} if constrained else {"y": 1.0 - 0.1 / height, "va": "top"}
+        figure.suptitle(title, fontsize=TITLE, color=BLACK, **place)
     return figure
 
 
@@ -197,17 +199,6 @@ def columns_that_fit(handles: Sequence, width: float, most: int) -> int:
     return 1
 
 
-def title_above(figure: Figure, title: str) -> None:
-    """Set the figure's title, if any; raise InputError if it is not text."""
-    place = {} if _constrained(figure) else {"y": 1.0 - 0.1 / figure.get_figheight(), "va": "top"}
-    if of_kind("title", title, str):
-        figure.suptitle(title, fontsize=TITLE, color=BLACK, **place)
-
-
-def _constrained(figure: Figure) -> bool:
-    return isinstance(figure.get_layout_engine(), ConstrainedLayoutEngine)
-
-
 def legend_below(
     figure: Figure, handles: Sequence, columns: int = 3, width: float | None = None
 ) -> None:
@@ -218,10 +209,11 @@ def legend_below(
     if width is not None:
         columns = columns_that_fit(handles, width, columns)
     rows = max(1, -(-len(handles) // columns))
+    # only the layout engine can make room "outside"
+    outside = isinstance(figure.get_layout_engine(), ConstrainedLayoutEngine)
     figure.legend(
         handles=list(handles),
-        # only the layout engine can make room "outside"
-        loc="outside lower center" if _constrained(figure) else "lower center",
+        loc="outside lower center" if outside else "lower center",
         ncols=max(1, -(-len(handles) // rows)),  # fills the rows evenly
         fontsize=TICK,
         labelcolor=BLACK,

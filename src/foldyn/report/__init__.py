@@ -1,18 +1,5 @@
 """Reports: one self-contained HTML page of text, tables and pictures."""
 
-from foldyn.plots.charts import Chart, Curve
-from foldyn.report.page import write_report
-from foldyn.report.sections import Charts, Heading, Listing, Picture, Section, Table, Text
+from foldyn.facade import lazy
 
-__all__ = [
-    "Chart",
-    "Charts",
-    "Curve",
-    "Heading",
-    "Listing",
-    "Picture",
-    "Section",
-    "Table",
-    "Text",
-    "write_report",
-]
+__getattr__, __dir__, __all__ = lazy(__name__, __file__)

@@ -210,8 +210,7 @@ def read(path: str | os.PathLike[str], unreadable: str, into_memory: bool = True
 
 def _load(path: Path) -> xr.Dataset:
     _check_header(path)
-    with warnings.catch_warnings():  # xarray's warnings about odd content
-        warnings.simplefilter("ignore")
+    with warnings.catch_warnings(action="ignore"):  # xarray's warnings about odd content
         ds = xr.load_dataset(path, engine=ENGINE, decode_times=False, decode_timedelta=False)
     return _fitting(ds)
 
@@ -391,8 +390,8 @@ def apart(make: Callable[[], T], seconds: int, memory: int) -> T:
     if sys.platform != "linux":
         return make()
     reading, writing = os.pipe()
-    with warnings.catch_warnings():  # warnings about threads, which the child does not need
-        warnings.simplefilter("ignore", DeprecationWarning)
+    # warnings about threads, which the child does not need
+    with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
         child = os.fork()
     if child == 0:
         os.close(reading)

@@ -192,24 +192,15 @@ ESTIMATES: Mapping[str, Quantity] = {
     "unsteadiness": Quantity("1", "relative error that transients leave, estimated"),
 }
 """and those that the method adds."""
+WAVE = ("phase", "band")
 BANDS: Mapping[str, Quantity] = {
-    "frequency": Quantity("Hz", "frequency", ("phase", "band")),
-    "frequency_error": Quantity(
-        "Hz", "estimate of the largest error of the frequency", ("phase", "band")
-    ),
-    "model_error": Quantity(
-        "1", "error of the frequency, by comparison with superelements", ("phase", "band")
-    ),
-    "eigenvalue": Quantity(
-        "rad2/s2", "square of the angular frequency (negative: unstable)", ("phase", "band")
-    ),
-    "group_velocity": Quantity("m/s", "group velocity", ("phase", "band", "axis")),
-    "polarization": Quantity(
-        "1", "share of the direction in the kinetic energy", ("phase", "band", "axis")
-    ),
-    "shape": Quantity(
-        "m", "Bloch mode with the modal mass 1 kg m2 in a cell", ("phase", "band", *PLACE)
-    ),
+    "frequency": Quantity("Hz", "frequency", WAVE),
+    "frequency_error": INTERNAL["frequency_error"]._replace(dims=WAVE),
+    "model_error": INTERNAL["model_error"]._replace(dims=WAVE),
+    "eigenvalue": MODES["eigenvalue"]._replace(dims=WAVE),
+    "group_velocity": Quantity("m/s", "group velocity", (*WAVE, "axis")),
+    "polarization": Quantity("1", "share of the direction in the kinetic energy", (*WAVE, "axis")),
+    "shape": Quantity("m", "Bloch mode with the modal mass 1 kg m2 in a cell", (*WAVE, *PLACE)),
     "position": Quantity("m", "position in the state", PLACE),
     "displacement": Quantity("m", "displacement of the state from the rest position", PLACE),
     "residual": Quantity("1", "residual of the state as a fraction of the forces at play"),
@@ -218,8 +209,8 @@ BANDS: Mapping[str, Quantity] = {
     "axes": Quantity("1", "axis of the turn", ("period", "axis")),
     "points": Quantity("m", "point on the axis of the turn", ("period", "axis")),
     "zone_frequency": Quantity("Hz", "frequency in the whole zone", ("zone", "band")),
-    "damped_frequency": Quantity("Hz", "frequency of the damped wave", ("phase", "band")),
-    "damped_ratio": Quantity("1", "damping ratio of the wave", ("phase", "band")),
+    "damped_frequency": Quantity("Hz", "frequency of the damped wave", WAVE),
+    "damped_ratio": Quantity("1", "damping ratio of the wave", WAVE),
     "attenuation": Quantity("Np", "attenuation from cell to cell", ("leg", "level")),
     "level_frequency": Quantity("Hz", "frequency of the attenuation", ("level",)),
 }

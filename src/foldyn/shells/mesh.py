@@ -38,6 +38,7 @@ from foldyn.structures import Sheet
 from foldyn.structures.clamps import opposite
 from foldyn.structures.edge_angles import EdgePlates
 from foldyn.structures.graded import Grading
+from foldyn.structures.material_axes import material_axes
 from foldyn.structures.mesh import CUT, Triangle, check_triangles
 
 EQUAL = 1e-6  # diagonals with a smaller relative difference count as equal
@@ -301,15 +302,17 @@ def _pieces(points: list[int]) -> list[Edge]:
     return [edge_of(a, b) for a, b in pairwise(points)]
 
 
-def stiffness(corners: NDArray, panel: NDArray, sheet: Sheet) -> tuple[NDArray, NDArray]:
+def stiffness(
+    corners: NDArray, panel: NDArray, sheet: Sheet, pattern: Pattern
+) -> tuple[NDArray, NDArray]:
     """Membrane and bending stiffness (nt, 3, 3) of triangles (nt, 3, 3) in the panels (nt,)."""
-    kinds, kind = sheet.kinds(int(panel.max()) + 1)
+    kinds, kind = sheet.kinds(len(pattern.faces))
+    axes = material_axes(pattern, sheet)
     membrane, bending = np.empty((2, len(corners), 3, 3))
     for number, own in enumerate(kinds):
-        rows, nu = kind[panel] == number, own.poissons_ratio
-        stretching = own.youngs_modulus * own.thickness / (1.0 - nu**2)
+        rows = kind[panel] == number
         membrane[rows], bending[rows] = triangle_stiffness(
-            corners[rows], nu, stretching, own.bending_modulus
+            corners[rows], own.stretching, own.bending, None if axes is None else axes[panel[rows]]
         )
     return membrane, bending
 

@@ -78,13 +78,6 @@ class StressPoints(NamedTuple):
             thickness[where],
         )  # fmt: skip
 
-    def elastic(self, sheet: Sheet) -> tuple[NDArray, NDArray]:
-        """E t/(1 - nu^2), N/m, and nu (p,) at the points."""
-        count = len(self.axes)
-        modulus, nu = (sheet.values(name, count) for name in ("youngs_modulus", "poissons_ratio"))
-        stretching = modulus * sheet.values("thickness", count) / (1.0 - nu**2)
-        return stretching[self.panel], nu[self.panel]
-
 
 def stress_points(corners: NDArray, near: float) -> NDArray[np.float64]:
     """Points (2k + 1, ...) of a panel with corners (k, ...): center, middles of edges, corners.
@@ -166,14 +159,9 @@ def _fitted(
     return sparse.csr_array((np.concatenate(values), place), shape=shape)
 
 
-def forces(
-    strain: NDArray, stretching: NDArray | float, poissons_ratio: NDArray | float
-) -> NDArray[np.float64]:
+def forces(strain: NDArray, stretching: NDArray) -> NDArray[np.float64]:
     """Membrane forces (..., 3), N/m, from strains xx, yy, xy (..., 3).
 
-    stretching : E t/(1 - nu^2), N/m.
+    stretching : (..., 3, 3), N/m per unit of xx, yy, and twice xy.
     """
-    xx, yy, xy = np.moveaxis(strain, -1, 0)
-    nu = poissons_ratio
-    parts = [xx + nu * yy, yy + nu * xx, (1.0 - nu) * xy]
-    return np.stack([stretching * part for part in parts], axis=-1)
+    return np.einsum("...ij,...j->...i", stretching, strain * np.array([1.0, 1.0, 2.0]))

@@ -36,6 +36,7 @@ from foldyn.shells.term import GROUPS, ShellTerm
 from foldyn.structures import Sheet
 from foldyn.structures.beyond_range import doubt_locking, doubt_units
 from foldyn.structures.calibration import (
+    Folds,
     PerCrease,
     check_creases,
     check_sheet,
@@ -48,6 +49,7 @@ from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.edge_angles import EdgePlates, plates_model
 from foldyn.structures.graded import Grading, grading, smooth_vertices
 from foldyn.structures.mass import MASS_RULES
+from foldyn.structures.material_axes import own_stretching
 from foldyn.structures.membranes import PanelKind, swelling
 from foldyn.structures.mesh import double_areas, hinge_angles, lengths
 from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
@@ -70,7 +72,7 @@ class ShellOptions:
     divisions: int = 16
     mass: str = "lumped"
     fold_law: str | HingeLaw = EnhancedLinear()
-    crease_stiffness: PerCrease = None
+    crease_stiffness: Folds = None
     crease_rest: PerCrease = None
     clamped: tuple[Edge, ...] = ()
     rigid: str | tuple[int, ...] | None = None
@@ -246,7 +248,9 @@ class Shell(Discretized):
     @cached_property
     def _stiffness(self) -> tuple[NDArray, NDArray]:
         """Stiffness (nt, 3, 3) of triangles: for side strains, J, and for rotations, N m."""
-        membrane, bending = stiffness(self.nodes[self.triangles], self.triangle_panel, self.sheet)
+        membrane, bending = stiffness(
+            self.nodes[self.triangles], self.triangle_panel, self.sheet, self.pattern
+        )
         if self.graded:
             vertices = np.flatnonzero(~smooth_vertices(self.pattern))
             membrane[np.isin(self.triangles, vertices).any(axis=1)] *= STIFF
@@ -312,6 +316,12 @@ class Shell(Discretized):
             *(sparse.csr_array(sparse.vstack(each)) for each in zip(*parts, strict=True))
         )
 
+    @cached_property
+    def _stretching(self) -> NDArray:
+        """Membrane stiffness (p, 3, 3), N/m, at the stress points."""
+        own = own_stretching(self.pattern, self.sheet, self.stress_points.axes)
+        return own[self.stress_points.panel]
+
     def resultants(self, q: NDArray, free: tuple[NDArray, NDArray] | None) -> NDArray[np.float64]:
         """Membrane forces, N/m, and moments, N, (p, 2, 3) at the stress points, xx, yy, xy.
 
@@ -329,9 +339,8 @@ class Shell(Discretized):
             angle = angle - free[1]
         turned = np.bincount(side, share * angle, 3 * len(self.triangles)).reshape(-1, 3)
         moment = np.einsum("tkl,tl->tk", self._stiffness[1], turned)
-        points, recovered = self.stress_points, self._recoveries
-        stretching, nu = points.elastic(self.sheet)
-        force = forces((recovered.strain @ strain.ravel()).reshape(-1, 3), stretching, nu)
+        recovered = self._recoveries
+        force = forces((recovered.strain @ strain.ravel()).reshape(-1, 3), self._stretching)
         return np.stack([force, (recovered.moment @ moment.ravel()).reshape(-1, 3)], axis=1)
 
     @property
@@ -421,7 +430,7 @@ def shell(
     divisions: int = 16,
     mass: str | None = None,
     fold_law: str | HingeLaw | None = None,
-    crease_stiffness: PerCrease = None,
+    crease_stiffness: Folds = None,
     crease_rest: PerCrease = None,
     clamped: str | Sequence[Sequence[int]] = (),
     rigid: str | Sequence[int] | None = None,

@@ -87,15 +87,15 @@ def checked_window(window: Window, n: int) -> NDArray[np.float64]:
     return weights
 
 
-def detrended(x: NDArray[np.float64], kind: str | None, axis: int = 0) -> NDArray[np.float64]:
-    """Return `x` minus its mean ("constant") or its line of best fit ("linear")."""
+def detrended(x: NDArray[np.float64], kind: str | None) -> NDArray[np.float64]:
+    """Return `x` minus its mean ("constant") or line of best fit ("linear"), by columns."""
     if kind not in DETRENDS:
         raise InputError(f'detrend: {kind!r} is unknown; use None, "constant" or "linear"')
     if kind is None:
         return x
     from scipy.signal import detrend  # slow to import, and seldom needed
 
-    return detrend(x, axis=axis, type=kind)
+    return detrend(x, axis=0, type=kind)
 
 
 def checked_frequencies(frequency: ArrayLike, fewest: int) -> NDArray[np.float64]:

@@ -74,14 +74,9 @@ def spectrum(
     interval = records.checked_interval(dt)
     length = n * whole("pad", pad, least=1)
 
-    samples = records.detrended(samples, detrend)
-    gain = float(n)
-    if window is not None:
-        weights = records.checked_window(window, n)
-        gain = float(weights.sum())
-        samples = samples * records.beside(weights, samples)
-
-    amplitude = np.abs(scipy.fft.rfft(samples, n=length, axis=0)) / gain
+    samples, weights = records.detrended(samples, detrend), records.checked_window(window, n)
+    waves = scipy.fft.rfft(samples * records.beside(weights, samples), n=length, axis=0)
+    amplitude = np.abs(waves) / weights.sum()
     doubled = slice(1, -1) if length % 2 == 0 else slice(1, None)
     amplitude[doubled] *= 2.0
     return scipy.fft.rfftfreq(length, interval), np.moveaxis(amplitude, 0, axis)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -171,17 +171,11 @@ def stepped_sine(
     """
     if np.ndim(force) != 1:
         raise InputError(f"force: shape {np.shape(force)}; give one record, shape (n,)")
-    push = fit_sine(time, force, frequency=frequency, cycles=cycles, harmonics=harmonics).amplitude[
-        0
-    ]
+    asked: dict[str, Any] = {"frequency": frequency, "cycles": cycles, "harmonics": harmonics}
+    push = fit_sine(time, force, **asked).amplitude[0]
     if not np.abs(push) > 1e-12 * np.abs(real_array("force", force)).max():
         raise InputError(f"force: no content at {frequency:g} Hz; a response per force needs one")
-    return (
-        fit_sine(time, response, frequency=frequency, cycles=cycles, harmonics=harmonics).amplitude[
-            0
-        ]
-        / push
-    )
+    return fit_sine(time, response, **asked).amplitude[0] / push
 
 
 def _steady_part(

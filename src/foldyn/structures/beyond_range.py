@@ -218,7 +218,7 @@ def _unit_doubts(pattern: Pattern, sheet: Sheet) -> Iterator[str]:
             f"{thickness[least]:g} m thick, below 1/{1.0 / THIN:.0f} of that: lengths are in m; "
             "if those of the pattern are meant in mm, make it a thousand times smaller"
         )
-    modulus, density = (sheet.values(name, count) for name in ("youngs_modulus", "density"))
+    modulus, density = (sheet.values(name, count) for name in ("modulus", "density"))
     speed = np.sqrt(modulus / density)  # nan without density
     wrong = np.flatnonzero((speed < SLOWEST) | (speed > FASTEST))
     if len(wrong):

@@ -27,10 +27,13 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError, warn
 from foldyn.patterns import Pattern
-from foldyn.patterns.crease_data import crease_values
+from foldyn.patterns.crease_data import crease_rows, crease_values
 from foldyn.patterns.topology import around, edge_of
+from foldyn.structures.material_axes import bending_across
 from foldyn.structures.mesh import Mesh, double_areas, lengths
 from foldyn.structures.sheet import Sheet
+from foldyn.structures.strip import Strip
+from foldyn.tables import read
 from foldyn.values import doubt_degrees, number, numbers, show, single
 
 STIFFEST = 1e100  # N/m or kg: above this, or below its inverse, squares and quotients overflow
@@ -42,11 +45,11 @@ def calibrated_folds(length: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray
     """Stiffness of whole creases (nf,), N m/rad, of the given lengths (m).
 
     The two sides of a crease are springs in series. Each has half the compliance of a crease
-    between two panels like the one on that side.
+    between two panels like the one on that side. G of an orthotropic panel is that across the
+    crease.
     """
-    count = len(pattern.faces)
-    g = sheet.values("bending_modulus", count)[pattern.crease_faces]
-    t = sheet.values("thickness", count)[pattern.crease_faces]
+    g = bending_across(pattern, sheet)
+    t = sheet.values("thickness", len(pattern.faces))[pattern.crease_faces]
     slender = 0.55 * g * (length[:, None] / t) ** (1.0 / 3.0)
     compliance = sheet.length_scale_ratio / g + 1.0 / slender
     return 1.0 / (0.5 * (compliance[:, 0] + compliance[:, 1]))
@@ -205,7 +208,7 @@ def _check_boards(sheet: Sheet, pattern: Pattern) -> None:
 
 def _check_scale(sheet: Sheet, low: float, high: float) -> None:
     """Refuse a sheet whose stiffness or mass, with edges from low to high (m), is out of range."""
-    stretching, mass = sheet.youngs_modulus * sheet.thickness, sheet.thickness * high**2
+    stretching, mass = sheet.modulus * sheet.thickness, sheet.thickness * high**2
     for what, value in (
         ("stretching stiffness E t (N/m)", stretching),
         ("bending stiffness E t^3 / 12(1 - nu^2) L^2 (N/m)", sheet.bending_modulus / low**2),
@@ -216,18 +219,19 @@ def _check_scale(sheet: Sheet, low: float, high: float) -> None:
             density = "" if sheet.density is None else f", density = {sheet.density:g} kg/m3"
             raise InputError(
                 f"sheet: its {what} is {value:.3g}, out of range: check youngs_modulus = "
-                f"{sheet.youngs_modulus:g} Pa, thickness = {sheet.thickness:g} m{density} and the "
+                f"{sheet.modulus:g} Pa, thickness = {sheet.thickness:g} m{density} and the "
                 f"pattern, whose edges have {low:.3g} to {high:.3g} m"
             )
 
 
 PerCrease = float | Sequence[float] | Mapping[str, float] | None
+Folds = PerCrease | Strip | Mapping[str, float | Strip]
 
 
 def check_creases(options: Any) -> None:
     """Check the values for creases of a frozen data class of options, and set them in place."""
-    for name in ("crease_stiffness", "crease_rest"):
-        object.__setattr__(options, name, per_crease(name, getattr(options, name)))
+    for name, check in (("crease_stiffness", folds_given), ("crease_rest", per_crease)):
+        object.__setattr__(options, name, check(name, getattr(options, name)))
 
 
 def per_crease(name: str, value: Any) -> Any:
@@ -248,12 +252,38 @@ def per_crease(name: str, value: Any) -> Any:
     return None if value is None else number(name, value)
 
 
-def fold_stiffness(given: PerCrease, pattern: Pattern, sheet: Sheet) -> NDArray:
-    """Stiffness of whole creases (nf,), N m/rad: calibrated, or `given` per length."""
-    length = lengths(pattern.vertices, pattern.creases)
+def folds_given(name: str, value: Any) -> Any:
+    """Return stiffness of creases as in `per_crease`, with strips among them."""
+    if isinstance(value, Strip):
+        return value
+    if not isinstance(value, Mapping):
+        return per_crease(name, value)
+    if {*value} & {"width"}:  # in a file
+        return read(Strip, name, value)
+    strips = {
+        word: read(Strip, f"{name}.{word}", own) if isinstance(own, Mapping) else own
+        for word, own in value.items()
+        if isinstance(own, Mapping | Strip)
+    }
+    others = {word: own for word, own in value.items() if word not in strips}
+    return {**(per_crease(name, others) if others or not strips else {}), **strips}
+
+
+def fold_stiffness(given: Folds, pattern: Pattern, sheet: Sheet) -> NDArray:
+    """Stiffness of whole creases (nf,), N m/rad: calibrated, of strips, or `given` per length."""
+    length, name = lengths(pattern.vertices, pattern.creases), "crease_stiffness"
     if given is None:
         return calibrated_folds(length, pattern, sheet)
-    per_length, chosen = _values("crease_stiffness", given, pattern)
+    if isinstance(given, Strip):
+        return given.stiffness(pattern, sheet, name=name) * length
+    strips = {}
+    if isinstance(given, Mapping):
+        strips = {word: own for word, own in given.items() if isinstance(own, Strip)}
+        given = {word: 0.0 if isinstance(own, Strip) else own for word, own in given.items()}
+    per_length, chosen = _values(name, given, pattern)
+    for word, strip in strips.items():
+        rows = crease_rows(f"{name}.{word}", word, pattern, is_key=True)
+        per_length[rows] = strip.stiffness(pattern, sheet, name=f"{name}.{word}")[rows]
     if (per_length[chosen] < 0.0).any():
         raise InputError("crease_stiffness: must not be negative")
     if chosen.all():

@@ -16,6 +16,7 @@ from foldyn.patterns.pattern import Patterned, pattern_of
 from foldyn.ram_limit import check_memory
 from foldyn.structures.beyond_range import doubt_locking, doubt_range, doubt_units
 from foldyn.structures.calibration import (
+    Folds,
     PerCrease,
     bar_areas,
     bend_stiffness,
@@ -55,7 +56,7 @@ def discretize(
     fold_law: str | HingeLaw | None = None,
     bend_law: str | HingeLaw | None = None,
     calibration: Literal["standard", "merlin2", "plate"] | None = None,
-    crease_stiffness: PerCrease = None,
+    crease_stiffness: Folds = None,
     crease_rest: PerCrease = None,
     centers: Mapping[int, ArrayLike] | None = None,
     clamped: str | Sequence[Sequence[int]] = (),
@@ -89,8 +90,9 @@ def discretize(
         "merlin2" assigns bend stiffnesses and bar areas in MERLIN2's order (see
         `foldyn.structures.calibration`); "plate" makes panels bend and twist like thin plates, for
         small vibrations (see `foldyn.structures.plate`).
-    crease_stiffness : float, sequence or mapping, optional
-        Stiffness per length (N m/rad per m) of all creases, of each in the order of
+    crease_stiffness : float, Strip, sequence or mapping, optional
+        Stiffness per length (N m/rad per m), or a strip with a width, of all creases, of each in
+        the order of
         `pattern.creases`, or by name ("mountain", "valley", "flat", or a family of the pattern),
         for example {"mountain": 0.1, "valley": 0.2}. Creases that are not named keep the calibrated
         stiffness. With "plate" the adjacent panels remain compliant to the crease's moment.
@@ -170,6 +172,12 @@ def discretize(
     nodes = len(pattern.vertices) + len(pattern.faces)
     check_memory("pattern", f"a structure of {nodes} nodes", PER_NODE * nodes, "take fewer panels")
     check_sheet(sheet, pattern)
+    if any(own.orthotropic for own in sheet.kinds(len(pattern.faces))[0]):
+        raise InputError(
+            "sheet: youngs_modulus: bars and hinges are calibrated for isotropic sheets; take "
+            'fd.superelements or fd.shell (in a case file, [model] kind = "superelements" or '
+            '"shell")'
+        )
     points = _given_centers({} if centers is None else centers, pattern, options.scheme)
     mesh = n4b5(pattern) if options.scheme == "n4b5" else n5b8(pattern, points)
     merlin2 = options.calibration == "merlin2"

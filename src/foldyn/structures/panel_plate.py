@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.eights import COUNT
-from foldyn.mechanics.triangle import triangle_stiffness
+from foldyn.mechanics.triangle import isotropic, triangle_stiffness
 
 Value = TypeVar("Value")
 Find = Callable[[Sequence[tuple]], list[Value]]
@@ -198,7 +198,8 @@ def plate_blocks(corners: NDArray, sign: NDArray, poissons_ratio: float) -> NDAr
     sign : (nt, 3), 1 if slopes are outward.
     """
     flat = np.concatenate([corners, np.zeros((len(corners), 3, 1))], axis=2)
-    bending = triangle_stiffness(flat, poissons_ratio, 1.0, 1.0)[1]
+    elastic = isotropic(poissons_ratio)
+    bending = triangle_stiffness(flat, elastic, elastic)[1]
     along = np.roll(corners, -1, axis=1) - corners
     outward = np.stack([along[:, :, 1], -along[:, :, 0]], axis=2)
     outward /= np.linalg.norm(along, axis=2)[:, :, None]

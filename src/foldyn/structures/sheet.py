@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -11,21 +11,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.arguments import Check, Checked, Read
-from foldyn.errors import InputError
+from foldyn.errors import InputError, within
+from foldyn.structures.ply import (
+    Density,
+    Length,
+    Moduli,
+    Modulus,
+    Ply,
+    Ratio,
+    check_material,
+    constants,
+    elastic,
+    matrices,
+)
 from foldyn.tables import ListOf, TableOf
-from foldyn.values import indices, length, number, objects, show, single
+from foldyn.values import indices, number, objects, show, single, vector
 
 
-def _ratio(name: str, value: Any) -> float:
-    """Return a Poisson's ratio."""
-    checked = number(name, value)
-    if not -1.0 < checked < 0.5:
-        raise InputError(
-            f" = {checked}: must lie between -1 and 0.5, both excluded (0.5 makes the bar areas "
-            "infinite)",
-            name,
-        )
-    return checked
+def _direction(name: str, value: Any) -> Any:
+    """Return an angle (degrees), a vector, or an edge and the angle from it."""
+    value = single(value)
+    if isinstance(value, Mapping):
+        if {*value} - {"angle"} != {"edge"}:
+            raise InputError(
+                f" = {show(dict(value))}: must be {{ edge = [0, 1], angle = 30 }}, with two "
+                "vertices and degrees",
+                name,
+            )
+        value = value["edge"], value.get("angle", 0.0)
+    if isinstance(value, list | tuple) and len(value) == 2:
+        edge, angle = value
+        ends = indices(f"{name}.edge", edge, "vertex", "as in [0, 1]")
+        if len(ends) != 2:
+            raise InputError(f" = {show(list(ends))}: must be two vertices", f"{name}.edge")
+        return tuple(ends), number(f"{name}.angle", angle)
+    if isinstance(value, list | tuple | np.ndarray):
+        return vector(name, value, nonzero=True)
+    return number(name, value)
 
 
 def _panels(name: str, value: Any) -> tuple[int, ...]:
@@ -36,12 +58,18 @@ def _panels(name: str, value: Any) -> tuple[int, ...]:
     return chosen
 
 
-Modulus = Annotated[float, Check(number, above=0.0, unit="Pa")]
-Ratio = Annotated[float, Check(_ratio)]
-Length = Annotated[float, Check(length, unit="m")]
-Density = Annotated[float, Check(number, above=0.0, unit="kg/m3")]
-MATERIAL = ("youngs_modulus", "poissons_ratio", "thickness", "density", "strength")
+Plies = Annotated[Sequence[Ply], Check(objects, kinds=(Ply,)), Read(ListOf(TableOf(Ply)))]
+Direction = Annotated[float | Sequence[Any] | Mapping[str, Any], Check(_direction)]
+MATERIAL = (
+    "youngs_modulus", "poissons_ratio", "thickness", "density", "strength", "shear_modulus",
+    "direction", "plies",
+)  # fmt: skip
 """Values that may differ from panel to panel."""
+OF_FIBERS = ("shear_modulus", "direction")
+"""Values that isotropic sheets do not have."""
+ALIKE = 1e-9  # relative difference of values that count as equal
+OF_PLIES = ("youngs_modulus", "poissons_ratio", "thickness", "density", "shear_modulus")
+"""Values that follow from plies."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +80,7 @@ class PanelSheet(Checked):
     ----------
     panels : int or sequence of int
         Indices of the panels, in the order of `pattern.faces`.
-    youngs_modulus, poissons_ratio, thickness, density, strength : float, optional
+    youngs_modulus, poissons_ratio, thickness, density, strength, shear_modulus, direction, plies
         As in `Sheet`. Give at least one; the sheet's values apply to the rest.
 
     Raises
@@ -62,11 +90,14 @@ class PanelSheet(Checked):
     """
 
     panels: Annotated[Sequence[int] | int, Check(_panels)]
-    youngs_modulus: Modulus | None = None
+    youngs_modulus: Moduli | None = None
     poissons_ratio: Ratio | None = None
     thickness: Length | None = None
     density: Density | None = None
     strength: Modulus | None = None
+    shear_modulus: Modulus | None = None
+    direction: Direction | None = None
+    plies: Plies | None = None
 
     def agree(self) -> None:
         """Refuse panels without a value that differs."""
@@ -74,22 +105,33 @@ class PanelSheet(Checked):
             raise InputError(f": give what differs there: {', '.join(MATERIAL)}", "panels")
 
     @property
-    def own(self) -> dict[str, float]:
+    def own(self) -> dict[str, Any]:
         """The values that differ from the rest of the sheet."""
         return {name: getattr(self, name) for name in self.given(*MATERIAL)}
+
+    @property
+    def instead(self) -> dict[str, Any]:
+        """The values that differ, with those that follow from them."""
+        if self.plies:
+            return {**dict.fromkeys(OF_PLIES), **self.own, **constants("plies", self.plies)}
+        if self.youngs_modulus is None:
+            return self.own
+        isotropic = isinstance(self.youngs_modulus, float)
+        return {"plies": None, **(dict.fromkeys(OF_FIBERS) if isotropic else {}), **self.own}
 
 
 @dataclass(frozen=True)
 class Sheet(Checked):
-    """An isotropic elastic sheet.
+    """An elastic sheet, isotropic or orthotropic.
 
     Parameters
     ----------
-    youngs_modulus : float
-        E (Pa), positive.
+    youngs_modulus : float or (float, float)
+        E (Pa), positive; of an orthotropic sheet E1 along `direction` and E2 across.
     poissons_ratio : float
         nu, -1 < nu < 0.5. N5B8 quadrilaterals need nu > 0: their spokes have an area
-        proportional to nu.
+        proportional to nu. Of an orthotropic sheet nu12, the contraction across under a stress
+        along `direction`, with nu12^2 E2 < E1.
     thickness : float
         t (m), positive.
     density : float, optional
@@ -100,6 +142,17 @@ class Sheet(Checked):
         Panels that differ from the rest.
     strength : float, optional
         Largest von Mises stress that the sheet bears, Pa, positive; only `margins` needs it.
+    shear_modulus : float, optional
+        G12 (Pa) of an orthotropic sheet.
+    direction : float, (float, float, float) or dict, optional
+        Direction 1 of an orthotropic sheet: an angle (degrees) from the first edge of each panel,
+        counter-clockwise seen from the front; a vector, projected on each panel at rest; or
+        ``{"edge": (0, 1), "angle": 30}``, the angle from an edge of the pattern (from its first to
+        its second vertex), continued over all creases as in the flat sheet. It turns with the
+        panels.
+    plies : sequence of Ply, optional
+        Layers of a laminate from the back to the front, symmetric about the middle, in place of
+        moduli, Poisson's ratio, thickness and density.
 
     Raises
     ------
@@ -114,9 +167,9 @@ class Sheet(Checked):
     0.02
     """
 
-    youngs_modulus: Modulus
-    poissons_ratio: Ratio
-    thickness: Length
+    youngs_modulus: Moduli = None  # type: ignore[assignment]  # plies have one
+    poissons_ratio: Ratio = None  # type: ignore[assignment]
+    thickness: Length = None  # type: ignore[assignment]
     density: Density | None = None
     length_scale_ratio: Annotated[float, Check(number, above=0.0)] = 1.0
     panels: Annotated[
@@ -125,11 +178,20 @@ class Sheet(Checked):
         Read(ListOf(TableOf(PanelSheet))),
     ] = ()
     strength: Modulus | None = None
+    shear_modulus: Modulus | None = None
+    direction: Direction | None = None
+    plies: Plies | None = None
 
     place = "sheet: "
 
     def agree(self) -> None:
-        """Refuse panels that are named twice, and densities given for some panels only."""
+        """Refuse impossible materials, panels named twice, and densities of some panels only."""
+        if self.plies:
+            self._follow(constants("plies", self.plies))
+        for name in ("youngs_modulus", "poissons_ratio", "thickness"):
+            if getattr(self, name) is None:
+                raise InputError(": missing; or give plies", name)
+        check_material(vars(self), OF_FIBERS)
         before: dict[int, int] = {}
         for i, part in enumerate(self.panels):
             if part.density is not None and self.density is None:
@@ -145,11 +207,64 @@ class Sheet(Checked):
                         f"panels[{i}].panels",
                     )
                 before[panel] = i
+            with within(f"panels[{i}]."):
+                check_material({**vars(self), **part.instead}, OF_FIBERS)
+
+    def _follow(self, made: Mapping[str, Any]) -> None:
+        """Take what plies make; refuse other values."""
+        for name, value in made.items():
+            given = getattr(self, name)
+            if given is not None and not np.allclose(given, np.array(value, float), rtol=ALIKE):
+                raise InputError(
+                    f" = {show(given)}: follows from the plies, {show(value)}; leave it out", name
+                )
+        self._set(**made)
+
+    @property
+    def orthotropic(self) -> bool:
+        """Whether the sheet has two moduli."""
+        return isinstance(self.youngs_modulus, tuple)
+
+    @property
+    def moduli(self) -> tuple[float, float]:
+        """E1 and E2, Pa; of an isotropic sheet E twice."""
+        given = self.youngs_modulus
+        return given if isinstance(given, tuple) else (given, given)  # type: ignore[return-value]
+
+    @property
+    def modulus(self) -> float:
+        """E, or E1, Pa: a measure of the stiffness."""
+        return self.moduli[0]
+
+    @property
+    def stretching(self) -> NDArray[np.float64]:
+        """Membrane stiffness A (3, 3) along direction 1 and across, N/m; see `plane_stress`."""
+        return matrices(self.plies)[0] if self.plies else self.thickness * self._elastic
+
+    @property
+    def bending(self) -> NDArray[np.float64]:
+        """Bending stiffness D (3, 3) along direction 1 and across, N m."""
+        return matrices(self.plies)[2] if self.plies else self.thickness**3 / 12.0 * self._elastic
+
+    @property
+    def _elastic(self) -> NDArray[np.float64]:
+        return elastic(self.youngs_modulus, self.poissons_ratio, self.shear_modulus)
 
     @property
     def bending_modulus(self) -> float:
-        """E t^3 / (12 (1 - nu^2)), N m."""
-        return self.youngs_modulus * self.thickness**3 / (12.0 * (1.0 - self.poissons_ratio**2))
+        """E t^3 / (12 (1 - nu^2)), N m; of an orthotropic sheet the root of D11 D22."""
+        if self.orthotropic:
+            own = self.bending
+            return math.sqrt(own[0, 0] * own[1, 1])
+        return self.modulus * self.thickness**3 / (12.0 * (1.0 - self.poissons_ratio**2))
+
+    @property
+    def has_strength(self) -> bool:
+        """Whether a panel, or a ply, has a strength."""
+        return any(
+            own.strength is not None or any(ply.strength for ply in own.plies or ())
+            for own in self.kinds(0)[0]
+        )
 
     @property
     def areal_density(self) -> float:
@@ -168,10 +283,10 @@ class Sheet(Checked):
         for number_of, part in enumerate(self.panels, 1):
             chosen = np.array(_numbers(part))
             kind[chosen[chosen < count]] = number_of
-        return [rest, *(replace(rest, **part.own) for part in self.panels)], kind
+        return [rest, *(replace(rest, **part.instead) for part in self.panels)], kind
 
     def values(self, name: str, count: int) -> NDArray[np.float64]:
-        """An attribute of the sheet, such as "thickness", for each of `count` panels (count,)."""
+        """A number of the sheet, such as "thickness", for each of `count` panels (count,)."""
         kinds, kind = self.kinds(count)
         return np.array([getattr(sheet, name) for sheet in kinds], float)[kind]
 
@@ -188,111 +303,3 @@ class Sheet(Checked):
 
 def _numbers(part: PanelSheet) -> tuple[int, ...]:
     return part.panels  # type: ignore[return-value]  # checked
-
-
-def check_layers(name: str, layers: Sequence[Sequence[float]]) -> tuple[tuple[float, ...], ...]:
-    """Layers of a laminate as tuples of numbers, checked."""
-    layers = single(layers)
-    listed = isinstance(layers, Sequence | np.ndarray) and not isinstance(layers, str)
-    if not listed or not len(layers):
-        raise InputError(
-            f" = {show(layers)}: give a row [thickness (m), Young's modulus (Pa), expansion (1/K)] "
-            "for each layer, from the back to the front",
-            name,
-        )
-    rows = []
-    for i, row in enumerate(layers):
-        place = f"{name}[{i}]"
-        if isinstance(row, str) or not hasattr(row, "__len__") or len(row) != 3:
-            raise InputError(
-                f" = {show(row)}: must be [thickness (m), Young's modulus (Pa), expansion (1/K)]",
-                place,
-            )
-        thickness = length(f"{place}[0]", row[0])
-        modulus = number(f"{place}[1]", row[1], above=0.0)
-        rows.append((thickness, modulus, number(f"{place}[2]", row[2])))
-    return tuple(rows)
-
-
-@dataclass(frozen=True)
-class Laminate(Checked):
-    """Layers of isotropic materials, bonded face to face.
-
-    With z_i the distance of the middle of a layer from the neutral surface, sum E_i t_i z_i = 0,
-    the free sheet has no force and no moment where its neutral surface stretches by `expansion`
-    and bends by `curvature` per kelvin,
-
-        expansion = sum E_i t_i alpha_i / sum E_i t_i
-        curvature = sum E_i t_i z_i alpha_i / sum E_i (t_i^3 / 12 + t_i z_i^2)
-
-    which for two layers is Timoshenko's formula (Analysis of bi-metal thermostats, J. Opt. Soc.
-    Am. 11, 1925, equation 4). All layers have the same Poisson's ratio.
-
-    Parameters
-    ----------
-    layers : sequence of (float, float, float)
-        Thickness (m), Young's modulus (Pa) and expansion (1/K) of each layer, from the back of the
-        sheet to the front.
-
-    Attributes
-    ----------
-    expansion : float
-        Strain of the neutral surface per kelvin, 1/K.
-    curvature : float
-        Curvature per kelvin, 1/(m K), positive if the sheet bends like a valley fold, toward its
-        front.
-
-    Examples
-    --------
-    >>> import foldyn as fd
-    >>> bimetal = fd.Laminate([(5e-4, 140e9, 1.0e-6), (5e-4, 140e9, 20.0e-6)])
-    >>> print(f"{bimetal.curvature:.4f}")  # Timoshenko: -1.5 * 19e-6 / 1e-3
-    -0.0285
-    """
-
-    layers: Annotated[Sequence[Sequence[float]], Check(check_layers)]
-
-    @property
-    def _columns(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-        """Thickness, E t, expansion and height above the neutral surface of each layer."""
-        t, modulus, expansion = np.array(self.layers).T
-        middle = np.cumsum(t) - 0.5 * t
-        stiff = modulus * t
-        return t, stiff, expansion, middle - stiff @ middle / stiff.sum()
-
-    @property
-    def _bending(self) -> float:
-        """Sum of E (t^3 / 12 + t z^2), N m."""
-        t, stiff, _, z = self._columns
-        return float(stiff @ (t**2 / 12.0 + z**2))
-
-    @property
-    def expansion(self) -> float:
-        """Strain of the neutral surface per kelvin, 1/K."""
-        _, stiff, expansion, _ = self._columns
-        return float(stiff @ expansion / stiff.sum())
-
-    @property
-    def curvature(self) -> float:
-        """Curvature per kelvin, 1/(m K), toward the front."""
-        _, stiff, expansion, z = self._columns
-        return -float(stiff @ (z * expansion)) / self._bending
-
-    def sheet(
-        self, poissons_ratio: float, areal_density: float | None = None, **others: Any
-    ) -> Sheet:
-        """Sheet with the same stiffness in stretching and in bending, about the neutral surface.
-
-        Parameters
-        ----------
-        poissons_ratio : float
-            Poisson's ratio of all layers.
-        areal_density : float, optional
-            Mass per area, kg/m2.
-        **others
-            Further arguments of `Sheet`.
-        """
-        stretching = float(self._columns[1].sum())
-        thickness = math.sqrt(12.0 * self._bending / stretching)
-        density = None if areal_density is None else areal_density / thickness
-        return Sheet(stretching / thickness, poissons_ratio, thickness, density, **others)

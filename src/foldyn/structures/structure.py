@@ -31,7 +31,7 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm
 from foldyn.structures.bars_plates import BarsPlatesTerm, ClampsTerm, balanced
-from foldyn.structures.calibration import PerCrease, per_crease
+from foldyn.structures.calibration import Folds, PerCrease, folds_given, per_crease
 from foldyn.structures.clamps import clamp_points
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.edge_angles import (
@@ -70,7 +70,7 @@ class ModelOptions(Checked):
     fold_law: str | HingeLaw = EnhancedLinear()
     bend_law: str | HingeLaw = "linear"
     calibration: Annotated[str, Check(choice, known=CALIBRATIONS)] = "plate"
-    crease_stiffness: Annotated[PerCrease, Check(per_crease, unit="N m/rad per m")] = None
+    crease_stiffness: Annotated[Folds, Check(folds_given, unit="N m/rad per m")] = None
     crease_rest: Annotated[PerCrease, Check(per_crease, unit="degrees")] = None
     clamped: tuple[Edge, ...] = ()
     rigid: str | tuple[int, ...] | None = None

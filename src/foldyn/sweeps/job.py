@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.analyses import CaseFile
-from foldyn.analyses.casefile import Moving
 from foldyn.analyses.keys import Tie, files_of, replaced
+from foldyn.analyses.motion import MotionComputation
 from foldyn.analyses.reading import case_of_document
 from foldyn.analyses.sections import Choice
 from foldyn.errors import ComputationError, InputError, Told
@@ -123,7 +123,7 @@ class BegunPoint:
         values = {}
         with self._timed(), self._noted():
             if self.compute is not None:
-                if isinstance(self.compute, Moving) and self.compute.integrated:
+                if isinstance(self.compute, MotionComputation) and self.compute.integrated:
                     self._seconds += self.compute.motion.seconds
                 result, case, shared = self._result(), self._case_file.case(), {}
                 for variable in result.variables.values():  # no measure may change the result

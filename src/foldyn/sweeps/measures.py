@@ -29,6 +29,10 @@ PROMINENT = 0.05
 """Least prominence of a peak of a spectrum, relative to its maximum."""
 NEAR = 1e-5
 """Intervals of load factors with a smaller relative width are not reported."""
+SPANS = {
+    "time": "the motion lasts from {:g} to {:g} s",
+    "frequency": "the response has frequencies from {:g} to {:g} Hz",
+}
 CURVES, MOVED = (FRF, MOTION), (MOTION, PATH)
 MEASURES: dict[str, Measure] = {**OF_BANDS}
 """Measures by name."""
@@ -136,22 +140,20 @@ def curve_of(
     return f, size, peaks, kind_of(shown)
 
 
-def highest(peaks: Peaks) -> int | None:
-    """Number of the highest peak, if there is one."""
-    return int(np.argmax(peaks.height)) if peaks.height.size else None
-
-
 def _highest(peaks: Peaks, name: str) -> float:
-    k = highest(peaks)
-    return np.nan if k is None else float(getattr(peaks, name)[k])
+    """A number of the highest peak; nan if there is none."""
+    return float(getattr(peaks, name)[peaks.height.argmax()]) if peaks.height.size else np.nan
 
 
-def frequency_of(result: xr.Dataset, frequency: float) -> int:
-    """Index of the frequency (Hz) in a response that is nearest, at most half the spacing away."""
-    known = result["frequency"].values
-    k = int(np.abs(known - frequency).argmin())
-    if abs(known[k] - frequency) > 0.5 * np.diff(known).max(initial=0.0):
-        raise InputError(f"the response has frequencies from {known[0]:g} to {known[-1]:g} Hz")
+def nearest_of(result: xr.Dataset, along: str, value: float) -> int:
+    """Index of the sample in time (s) or frequency (Hz) that is nearest.
+
+    It is at most half the spacing away.
+    """
+    known = result[along].values
+    k = int(np.abs(known - value).argmin())
+    if abs(known[k] - value) > 0.5 * np.diff(known).max(initial=0.0):
+        raise InputError(SPANS[along].format(known[0], known[-1]))
     return k
 
 
@@ -160,7 +162,7 @@ def _response(
     result: xr.Dataset, case: Case, node: int, axis: str, frequency: float
 ) -> float:  # fmt: skip
     response = result[quantity_of(result)].transpose("frequency", ...).sel(node=node, axis=axis)
-    return float(np.abs(response.values[frequency_of(result, frequency)]))
+    return float(np.abs(response.values[nearest_of(result, "frequency", frequency)]))
 
 
 @_measure(*CURVES, units="Hz", doc="frequency of the highest peak")
@@ -183,10 +185,10 @@ def _peak_frequencies(
 @_measure(FRF, doc="damping ratio of the highest peak, by half power")
 def _peak_damping(result: xr.Dataset, case: Case, node: int, axis: str | None = None) -> float:
     f, size, peaks, kind = curve_of(result, node, axis)
-    k = highest(peaks)
-    if k is None:
-        return np.nan
-    return half_power(f, size, near=float(peaks.frequency[k]), quantity=kind).damping_ratio
+    near = _highest(peaks, "frequency")
+    if np.isnan(near):
+        return near
+    return half_power(f, size, near=near, quantity=kind).damping_ratio
 
 
 @_measure(MOTION, doc="damping ratio by logarithmic decrement")
@@ -205,17 +207,8 @@ def _displacement(result: xr.Dataset, case: Case, node: int, axis: str) -> float
 def _displacement_at(
     result: xr.Dataset, case: Case, node: int, axis: str, time: float
 ) -> float:  # fmt: skip
-    moved = sampled(result, "displacement")[time_of(result, time)]
+    moved = sampled(result, "displacement")[nearest_of(result, "time", time)]
     return float(moved.sel(node=node, axis=axis))
-
-
-def time_of(result: xr.Dataset, time: float) -> int:
-    """Index of the sample nearest to a time (s), at most half a sampling interval away."""
-    times = result["time"].values
-    k = int(np.abs(times - time).argmin())
-    if abs(times[k] - time) > 0.5 * np.diff(times).max():
-        raise InputError(f"the motion lasts from {times[0]:g} to {times[-1]:g} s")
-    return k
 
 
 @_measure(MOTION, units="m/s", doc="velocity at the end")

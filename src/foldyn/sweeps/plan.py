@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from foldyn.analyses import CaseFile
 from foldyn.analyses.casefile import Compute
-from foldyn.analyses.keys import parts, ties_of
+from foldyn.analyses.keys import parts
 from foldyn.analyses.model_choice import bound
 from foldyn.analyses.motion import MotionAnalysis
-from foldyn.analyses.ranges import SAMPLINGS, Varied, varied
+from foldyn.analyses.ranges import Varied
 from foldyn.analyses.reading import case_of_document, read_document, validated
 from foldyn.analyses.sections import Choice, SweepSection
-from foldyn.arguments import Placed
 from foldyn.cases.models import BARS_AND_HINGES
 from foldyn.dynamics.gpu.choice import DEVICES
 from foldyn.errors import Faults, InputError, within
@@ -24,7 +23,8 @@ from foldyn.sweeps.job import ASIDE, Job, this_program
 from foldyn.sweeps.measure import Asked, Measure, asked, of_callable
 from foldyn.sweeps.measures import MEASURES
 from foldyn.sweeps.points import GRID, Point, grid, samples
-from foldyn.values import MOST, choice, listed, show, whole
+from foldyn.tables import read, told
+from foldyn.values import choice, listed, show
 
 MASS = "model.mass"
 
@@ -156,17 +156,11 @@ def _chosen(
             ": is for samples only; give samples too, or leave it out for a grid",
             "method" if method is not None else "seed",
         )
-    if count is not None:
-        whole("samples", count, least=1)
-    with within("vary"):
-        keys = varied(vary, count is not None)
-    return SweepSection(
-        samples=count,
-        method=choice("method", method or SAMPLINGS[0], SAMPLINGS),
-        seed=whole("seed", seed or 0, least=0, most=MOST),
-        vary=keys,
-        ties=Placed(ties_of)("ties", {} if ties is None else ties),
-    )
+    given = {"samples": count, "method": method, "seed": seed, "vary": vary, "ties": ties}
+    try:
+        return read(SweepSection, "", {key: one for key, one in given.items() if one is not None})
+    except InputError as error:
+        raise told(error, None) from None
 
 
 def _with_masses(
@@ -210,17 +204,14 @@ def _measure(one: Any, k: int) -> Asked:
     if isinstance(one, Measure):
         return Asked(one.name, one, {}, one.name)
     if callable(one):
-        return of_callable(getattr(one, "__name__", show(one)), _function(one))
+        name = getattr(one, "__name__", show(one))
+        if name == "<lambda>":
+            raise InputError(
+                ': a function without a name; give it one, as in {"tip": function}', "measures"
+            )
+        return of_callable(name, one)
     with within(f"measures[{k}]"):
         return asked(one, MEASURES)
-
-
-def _function(one: Callable[..., Any]) -> Callable[..., Any]:
-    if getattr(one, "__name__", "") == "<lambda>":
-        raise InputError(
-            ': a function without a name; give it one, as in {"tip": function}', "measures"
-        )
-    return one
 
 
 def _check_keys(job: Job, keys: Sequence[Varied], first: Point) -> None:

@@ -17,8 +17,8 @@ import tomli_w
 import xarray as xr
 from numpy.typing import NDArray
 
-from foldyn.analyses.casefile import Moving
 from foldyn.analyses.keys import parts
+from foldyn.analyses.motion import MotionComputation
 from foldyn.cases.units import unit_of
 from foldyn.dynamics.gpu.choice import choose
 from foldyn.dynamics.motion import Motion
@@ -126,11 +126,10 @@ def dataset(plan: Plan, found: Sequence[Evaluation], facts: Mapping[str, Any]) -
         about = {"units": one.measure.units, "long_name": text}
         about |= {"measure": one.text}
         about = {key: text for key, text in about.items() if text}
-        data[one.name] = ((*dims, *inner), array.reshape(*shape, *array.shape[1:]), about)
-        for dim, length in zip(inner, array.shape[1:], strict=True):
-            longest = max(length, len(coordinates.get(dim, ())))
-            coordinates[dim] = 1 + np.arange(longest)
-    data = _even(data, coordinates)
+        along = {dim: 1 + np.arange(n) for dim, n in zip(inner, array.shape[1:], strict=True)}
+        values = array.reshape(*shape, *array.shape[1:])
+        # the dataset pads measures of one dimension to a common length
+        data[one.name] = xr.DataArray(values, along, (*dims, *inner), attrs=about)
     for name, text in ABOUT.items():
         array = np.array([getattr(one, name) for one in checked]).reshape(shape)
         units = {"units": "s"} if name == "seconds" else {}
@@ -166,19 +165,6 @@ def _stacked(one: Asked, found: list[Evaluation]) -> tuple[NDArray[np.float64], 
             continue
         stacked[(k, *map(slice, value.shape))] = value
     return stacked, checked
-
-
-def _even(data: Mapping[str, Any], coordinates: Mapping[str, Any]) -> dict[str, Any]:
-    """Pad variables with nan to a common length along each dimension."""
-    even = {}
-    for name, (dims, array, about) in data.items():
-        lengths = [
-            len(coordinates[dim]) if isinstance(coordinates[dim], np.ndarray) else array.shape[k]
-            for k, dim in enumerate(dims)
-        ]
-        missing = [(0, length - size) for length, size in zip(lengths, array.shape, strict=True)]
-        even[name] = (dims, np.pad(array, missing, constant_values=np.nan), about)
-    return even
 
 
 def sweep(
@@ -284,7 +270,7 @@ def swept(
         _check_sendable(job)
     follow = _Follow(len(set(points)), progress)
     chosen: Pool[Point, Evaluation] = pool_of(job, count, scheduler)
-    if device == "gpu" and isinstance(plan.compute, Moving):
+    if device == "gpu" and isinstance(plan.compute, MotionComputation):
         chosen = SideBySide(job, plan.compute.motion)
     with chosen as pool:
         evaluations = Evaluations[Point](pool, job.stamp, folder, follow)
@@ -328,7 +314,7 @@ class SideBySide(Here[Point, Evaluation]):
         left = iter(items)
         while some := list(islice(left, self.count)):
             begun = [(point, self.job.begun(point)) for point in some]
-            moving = [one.compute for _, one in begun if isinstance(one.compute, Moving)]
+            moving = [one.compute for _, one in begun if isinstance(one.compute, MotionComputation)]
             for k in integrate_prepared([compute.motion for compute in moving]):
                 moving[k].integrated = True
             while begun:  # frees the memory of each motion's samples
@@ -347,7 +333,7 @@ def _tell(plan: Plan, found: Sequence[Evaluation]) -> None:
 
 def _device(plan: Plan, cores: int, scheduler: str | None) -> tuple[str, dict[str, str]]:
     """Device for the points, "cpu" or "gpu", and attributes that record it."""
-    if not isinstance(plan.compute, Moving):
+    if not isinstance(plan.compute, MotionComputation):
         return "cpu", {}
     device, motion, why = plan.device, plan.compute.motion, ""
     if scheduler is not None:

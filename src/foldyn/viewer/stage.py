@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -13,8 +12,9 @@ from numpy.typing import NDArray
 
 from foldyn import __version__
 from foldyn.cases import Case
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, quietly
 from foldyn.linear import character, mac
+from foldyn.linear.frf import quantity_of
 from foldyn.patterns import Pattern
 from foldyn.plots.readings import displacements, moved_supports, stretches, total_reaction, way
 from foldyn.results.contents import pattern_of
@@ -238,7 +238,7 @@ def _modes(one: _Shown) -> Iterator[dict[str, Any]]:
 
 
 def _response(one: _Shown) -> Iterator[dict[str, Any]]:
-    values = one.result[_measured(one.result)].transpose("frequency", "node", "axis").values
+    values = one.result[quantity_of(one.result)].transpose("frequency", "node", "axis").values
     both = np.stack([np.real(values), np.imag(values)], axis=1)
     frequency = one.result["frequency"].values
     yield {
@@ -258,13 +258,8 @@ _LISTED: Mapping[str, Callable[[_Shown], Iterable[dict[str, Any]]]] = {
 def _moved(kind: str, result: xr.Dataset) -> str:
     """Name of the variable that describes how nodes move."""
     if kind == "response":
-        return _measured(result)
+        return quantity_of(result)
     return "coefficient" if kind == "periodic" else "displacement"
-
-
-def _measured(result: xr.Dataset) -> str:
-    known = ("receptance", "mobility", "accelerance", "transmissibility")
-    return next(name for name in known if name in result)
 
 
 def _more(
@@ -307,7 +302,6 @@ def folding_case(result: xr.Dataset) -> Case:
     counts; creases have flat rest angles, since the pattern's own may be fully folded.
     """
     pattern = pattern_of(result)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
+    with quietly():
         thin = Sheet(1.0, 0.0, THIN * pattern.size)
         return Case(discretize(pattern, thin, scheme="n4b5", crease_rest=180.0))

@@ -238,10 +238,7 @@ class _Band:
     def __call__(self, weights: Weights, matrices: Matrices, added: NDArray | None = None) -> Any:
         flat = self._memory.T.reshape(-1)
         flat[:] = 0.0
-        if len(self._value):
-            _gather_tied(weights, matrices, self._take, self._value, self._put, flat)
-        else:
-            _gather(weights, matrices, self._take, self._put, flat)
+        _gather(weights, matrices, self._take, self._value, self._put, flat)
         if added is not None:
             flat[self._everywhere] += added.T
         return self._make(self._memory)
@@ -251,26 +248,17 @@ class _Sparse:
     """Writes entries into a sparse matrix in CSC format."""
 
     def __init__(self, entries: _Entries, size: int, symmetric: bool) -> None:
-        row, column, take, self._value = entries
-        self._put = np.arange(len(take))
-        if len(self._value):  # several entries may share a place
-            place, self._put = np.unique(row + size * column, return_inverse=True)
-            row, column, self._take = place % size, place // size, take
-        numbered = sparse.csc_array((np.arange(1, len(row) + 1), (row, column)), (size, size))
-        numbered.sort_indices()
-        if not len(self._value):
-            self._take = take[numbered.data - 1]
-        self._indices, self._indptr, self._size = numbered.indices, numbered.indptr, size
+        row, column, self._take, self._value = entries
+        place, self._put = np.unique(row + size * column, return_inverse=True)
+        filled = sparse.csc_array((place, (place % size, place // size)), (size, size))
+        self._indices, self._indptr, self._size = filled.indices, filled.indptr, size
         self.solver, self._make = "superlu", SuperLU
         if symmetric:
             self.solver, self._make = factorizer("auto", size)
 
     def __call__(self, weights: Weights, matrices: Matrices, added: Any = None) -> Any:
         data = np.zeros(len(self._indices))
-        if len(self._value):
-            _gather_tied(weights, matrices, self._take, self._value, self._put, data)
-        else:
-            _gather(weights, matrices, self._take, self._put, data)
+        _gather(weights, matrices, self._take, self._value, self._put, data)
         shape = (self._size, self._size)
         matrix = sparse.csc_array((data, self._indices, self._indptr), shape)
         return self._make(matrix if added is None else sparse.csc_array(matrix + added))
@@ -320,20 +308,17 @@ def _masters(number: NDArray, free: NDArray, ties: Ties) -> tuple[NDArray, NDArr
 
 
 @kernel
-def _gather(weights, matrices, take, put, out):
-    """out[put] = weighted sum of the entries `take` of the matrices; all are flat."""
-    stiffness, mass, damping = flat(matrices.stiffness), flat(matrices.mass), flat(matrices.damping)
-    for k in range(take.size):
-        e = take[k]
-        value = weights.stiffness * stiffness[e] + weights.mass * mass[e]
-        out[put[k]] = value + weights.damping * damping[e]
+def _gather(weights, matrices, take, value, put, out):
+    """Put into out[put] the weighted sum of the entries `take`; all are flat.
 
-
-@kernel
-def _gather_tied(weights, matrices, take, value, put, out):
-    """Add to out[put] `value` times the weighted sum of the entries `take`; all are flat."""
+    With factors `value`, several entries may share a place, which starts at zero.
+    """
     stiffness, mass, damping = flat(matrices.stiffness), flat(matrices.mass), flat(matrices.damping)
     for k in range(take.size):
         e = take[k]
         entry = weights.stiffness * stiffness[e] + weights.mass * mass[e]
-        out[put[k]] += value[k] * (entry + weights.damping * damping[e])
+        entry += weights.damping * damping[e]
+        if value.size == 0:
+            out[put[k]] = entry
+        else:
+            out[put[k]] += value[k] * entry

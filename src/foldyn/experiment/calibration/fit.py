@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from foldyn.errors import ComputationError, FoldynWarning, InputError, warn
+from foldyn.errors import ComputationError, InputError, quietly, warn
 from foldyn.experiment.calibration.fit_problem import Finer, Problem, problem
 from foldyn.experiment.calibration.fitted import Descent, Fit, Uncertainty, score
 from foldyn.experiment.calibration.measurement import Measurement
@@ -433,7 +432,7 @@ def _width(finer: Finer, doubt: float) -> str:
 def _warn_of_pairing(made: Problem, values: NDArray[np.float64]) -> None:
     """Warn if the pairing of modes has become ambiguous during the fit."""
     try:
-        with warnings.catch_warnings(action="ignore", category=FoldynWarning):
+        with quietly():
             made.examine(values)
     except InputError as error:
         _warn(f"at the values found: {error}")

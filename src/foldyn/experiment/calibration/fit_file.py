@@ -15,27 +15,14 @@ from foldyn.arguments import Check, Placed
 from foldyn.cases.decode import call_from
 from foldyn.errors import InputError, within
 from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
-from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes
 from foldyn.experiment.calibration.measured_files import READERS
 from foldyn.experiment.calibration.measurement import Measurement
-from foldyn.experiment.calibration.modal import (
-    DampingRatios,
-    FrequencyResponse,
-    ModalParameters,
-    ModeShapes,
-    NaturalFrequencies,
-)
+from foldyn.experiment.calibration.modal import FrequencyResponse, ModalParameters
 from foldyn.experiment.calibration.parameters import Parameter
 from foldyn.tables import ListOf, Section, check_keys, check_table, keys, read, told
 from foldyn.values import number, show
 
-CLASSES = {
-    one.kind: one
-    for one in (
-        ForceDisplacement, Shapes, TimeHistory, Spectrum, NaturalFrequencies, DampingRatios,
-        ModeShapes, FrequencyResponse,
-    )
-}  # fmt: skip
+CLASSES = {one.kind: one for one in READERS}
 # Fields of measurements that come from a data file, or have another name in a fit file.
 MADE = (
     "kind", "case", "changes", "held_out", "displacement", "force", "values", "time", "frequency",
@@ -57,7 +44,7 @@ def _case(name: str, value: Any, folder: Path, find: Callable[[str], Path] | Non
 class DataSection(Section):
     """A [[data]] table; its other keys depend on its kind."""
 
-    kind: Annotated[str, one_of(READERS)]
+    kind: Annotated[str, one_of(CLASSES)]
     file: Text
     case: Annotated[Path | None, Check(_case)] = None
     set: Anything | None = None
@@ -71,13 +58,14 @@ def _measurement(name: str, value: Any, folder: Path, find: Any) -> Measurement:
     check_keys(given, [*keys(DataSection), *_known(section.kind)], name)
     if "nodes" not in given and section.kind in NAMED:
         raise InputError(": missing; name the nodes that were measured", f"{name}.nodes")
-    if issubclass(CLASSES[section.kind], ModalParameters) and "shapes" in given:
+    kind = CLASSES[section.kind]
+    if issubclass(kind, ModalParameters) and "shapes" in given:
         shapes = given["shapes"]
         if not isinstance(shapes, str):
             raise InputError(f" = {show(shapes)}: must be the name of a file", f"{name}.shapes")
         given = {**given, "shapes": folder / shapes}
     with within(f"{name}: "):
-        return READERS[section.kind](
+        return READERS[kind](
             folder / section.file,
             **{"name": Path(section.file).stem, **given},
             case=section.case,
@@ -88,7 +76,7 @@ def _measurement(name: str, value: Any, folder: Path, find: Any) -> Measurement:
 
 def _known(kind: str) -> list[str]:
     """Keys of a fit file for measurements of one kind."""
-    reader = signature(READERS[kind]).parameters.values()
+    reader = signature(READERS[CLASSES[kind]]).parameters.values()
     keys = [one.name for one in reader if one.kind is not one.VAR_KEYWORD and one.name != "file"]
     if kind == Spectrum.kind:
         keys += _known(TimeHistory.kind)

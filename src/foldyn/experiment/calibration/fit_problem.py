@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -19,7 +18,7 @@ from foldyn.analyses.keys import files_of, replaced, value_at
 from foldyn.analyses.pattern_section import HINGES
 from foldyn.analyses.reading import case_of_document, read_document, validated
 from foldyn.cases.models import SHELL
-from foldyn.errors import FoldynError, FoldynWarning, InputError
+from foldyn.errors import FoldynError, InputError, quietly
 from foldyn.experiment.calibration import predicted_run
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Beside, Parameter, Space, space
@@ -108,7 +107,7 @@ class Problem:
     def _computed(self, run: PredictedRun, values: Sequence[float] | NDArray) -> Predicted:
         """Predictions of a run at given values."""
         case_file, members = self.case_file(run, values), run.those_of(self.measurements)
-        with warnings.catch_warnings(action="ignore", category=FoldynWarning):
+        with quietly():
             return self._predicted(
                 predicted_run.seen(run, case_file, members), case_file, run.members
             )
@@ -135,7 +134,7 @@ class Problem:
         points = {tuple(part.point): part.point for part in parts}
         if run.kind not in predicted_run.REFINED:
             points.pop(tuple(values), None)
-        with warnings.catch_warnings(action="ignore", category=FoldynWarning):
+        with quietly():
             one = self.case_file(run, values)
             others = [
                 one
@@ -170,7 +169,7 @@ class Problem:
             moved = [key for key, value in changes.items() if value != before[key]]
             if not any(key.startswith(STRUCTURAL) for key in moved):
                 structures = like.case_file.structures
-        with warnings.catch_warnings(action="ignore", category=FoldynWarning):
+        with quietly():
             document = replaced(run.document, changes)
             made = case_of_document(
                 run.path, document, pattern=pattern, structures=structures,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -386,12 +386,10 @@ class Fit:
         """Estimates, correlation, and measured and predicted values, as a labeled dataset."""
         keys = list(self.values)
         data: dict[str, Any] = {
-            name: ("parameter", np.array([getattr(one, name) for one in self.estimates]))
-            for name in (
-                "value", "standard_error", "lower", "upper", "determined", "at_bound",
-                "discretization",
-            )
-        }  # fmt: skip
+            item.name: ("parameter", np.array([getattr(one, item.name) for one in self.estimates]))
+            for item in fields(Estimate)
+            if item.name != "key"
+        }
         data["correlation"] = (("parameter", "other"), self.correlation)
         data["singular_value"] = ("direction", self.singular_values)
         data["direction_of"] = (("direction", "parameter"), self.directions)

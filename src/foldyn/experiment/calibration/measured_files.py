@@ -277,13 +277,13 @@ def _texts(given: Any) -> bool:
 
 
 # Function that reads each kind of measurement: ``reader(file, **arguments)`` returns it.
-READERS: Mapping[str, Any] = {
-    ForceDisplacement.kind: force_displacement,
-    Shapes.kind: shapes,
-    TimeHistory.kind: history,
-    Spectrum.kind: spectrum,
-    NaturalFrequencies.kind: modal_files.frequencies,
-    DampingRatios.kind: modal_files.damping_ratios,
-    ModeShapes.kind: modal_files.mode_shapes,
-    FrequencyResponse.kind: modal_files.frf,
+READERS: Mapping[type[Measurement], Any] = {
+    ForceDisplacement: force_displacement,
+    Shapes: shapes,
+    TimeHistory: history,
+    Spectrum: spectrum,
+    NaturalFrequencies: modal_files.frequencies,
+    DampingRatios: modal_files.damping_ratios,
+    ModeShapes: modal_files.mode_shapes,
+    FrequencyResponse: modal_files.frf,
 }

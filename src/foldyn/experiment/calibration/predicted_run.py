@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from foldyn.analyses.sections import Choice
 from foldyn.cases import Case, State
 from foldyn.dynamics.methods import method_of
 from foldyn.dynamics.motion import Motion
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, quietly
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.modal import FrequencyResponse, ModalParameters, ModeShapes
 from foldyn.gradients.neighbors import Asked, equilibria, modes, motions, responses
@@ -82,7 +81,7 @@ class PredictedRun:
 
 def result_of(run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]) -> Any:
     """Result of a case file, without warnings."""
-    with warnings.catch_warnings(action="ignore", category=FoldynWarning):
+    with quietly():
         return computed(run, case_file, members)
 
 

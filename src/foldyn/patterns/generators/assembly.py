@@ -47,17 +47,13 @@ def assembled(
     Pattern
     """
     panels = Counter(edge_of(a, b) for face in faces for a, b in around(face))
-    creases = {
-        family: inner
-        for family, pairs in families.items()
-        if (inner := [edge_of(*pair) for pair in pairs if panels[edge_of(*pair)] == 2])
-    }
 
-    rims = {
-        family: rim
-        for family, pairs in families.items()
-        if (rim := [edge_of(*pair) for pair in pairs if panels[edge_of(*pair)] == 1])
-    }
+    def shared_by(count: int) -> dict[str, list[Edge]]:
+        edges = {family: [edge_of(*pair) for pair in pairs] for family, pairs in families.items()}
+        found = {family: [e for e in own if panels[e] == count] for family, own in edges.items()}
+        return {family: own for family, own in found.items() if own}
+
+    creases = shared_by(2)
 
     def each(values: Mapping[str, T]) -> dict[Edge, T]:
         return {pair: values[f] for f, pairs in creases.items() if f in values for pair in pairs}
@@ -72,5 +68,5 @@ def assembled(
         families=creases,
         custom=custom,
         periods=periods,
-        rim_families=rims,
+        rim_families=shared_by(1),
     )

@@ -146,6 +146,8 @@ def folded(
     -------
     ndarray, shape (n, 3)
     """
+    from scipy.spatial.transform import Rotation
+
     points = np.column_stack([flat, np.zeros(len(flat))])
     beside: dict[Edge, list[tuple[int, Edge]]] = {}
     for number, face in enumerate(faces):
@@ -163,14 +165,8 @@ def folded(
         for a, b in around(faces[panel]):
             for other, _ in beside[edge_of(a, b)]:
                 if other not in turns:
-                    own = _about(points[b] - points[a], -angles[edge_of(a, b)])
+                    axis = (points[b] - points[a]) / np.linalg.norm(points[b] - points[a])
+                    own = Rotation.from_rotvec(-angles[edge_of(a, b)] * axis).as_matrix()
                     turns[other] = turn @ own, turn @ (points[a] - own @ points[a]) + shift
                     queue.append(other)
     return places
-
-
-def _about(axis: NDArray, angle: float) -> NDArray[np.float64]:
-    """Rotation matrix about an axis, counter-clockwise looking against it (rad)."""
-    x, y, z = axis / np.linalg.norm(axis)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross

@@ -98,23 +98,15 @@ def waterbomb(
             center = len(vertices)
             vertices.append(place(column, row * row_length + a / 2, depth))
             families["middle"] += [(low + column, center), (high + column, center)]
-            if column > 0:
-                left = column - 1
-                faces += [
-                    (center, high + left, low + left),
-                    (center, low + left, low + column),
-                    (center, high + column, high + left),
-                ]
-                families["diagonal"] += [(low + left, center), (high + left, center)]
-            if column < line - 1:
-                right = column + 1
-                faces += [
-                    (center, low + column, low + right),
-                    (center, low + right, high + right),
-                    (center, high + right, high + column),
-                ]
-                families["diagonal"] += [(low + right, center), (high + right, center)]
-                families["side"].append((low + right, high + right))
+            for side, order in ((column - 1, (1, 2, 0)), (column + 1, (0, 1, 2))):
+                if not 0 <= side < line:
+                    continue
+                ring = (low + column, low + side, high + side, high + column)
+                ring = ring if side > column else ring[::-1]
+                faces += [(center, ring[k], ring[k + 1]) for k in order]
+                families["diagonal"] += [(low + side, center), (high + side, center)]
+                if side > column:
+                    families["side"].append((low + side, high + side))
         if row % 2:  # its first and its last half base
             across.append((len(vertices) - nx - 1, len(vertices) - 1))
         if row:

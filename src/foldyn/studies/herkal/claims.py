@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache, partial
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import xarray
@@ -13,19 +12,16 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.studies.herkal.metric import UP_TO, content, content_of, strongest_peak
-from foldyn.studies.herkal.runs import REFERENCE, paper_rules, reported
+from foldyn.studies.herkal.runs import BARS_AND_HINGES, REFERENCE, RULES, reported
 from foldyn.studies.herkal.study import Study, mean_ranks
-from foldyn.studies.targets import Target, Verdict, read_targets, verdicts
+from foldyn.studies.herkal.targets import Verdict, read_targets, verdicts
 
-TARGETS = Path(__file__).with_name("targets.toml")
 BAND = (1.4, 2.4)  # Hz: band in which second peaks are sought
 PROMINENCE = 0.01  # smallest prominence of a peak, relative to the highest amplitude
-NO_VALUE = math.nan
-NO_MOTION = np.full((1, 2), math.nan)
 
 
-def _motion(study: Study, case: str, model: str) -> xarray.Dataset | None:
-    return study.result(case, model, "motion") if case in study.plan.cases else None
+def _motion(study: Study, case: str, model: str) -> xarray.Dataset:
+    return study.motions(case)[model]
 
 
 def _edge(motion: xarray.Dataset) -> NDArray:
@@ -36,8 +32,7 @@ def _edge(motion: xarray.Dataset) -> NDArray:
 
 def _asymmetry(study: Study, models: Iterable[str]) -> float:
     """Largest difference between the motions of the two nodes of case 1, among some models."""
-    motions = [_motion(study, "case1", model) for model in models]
-    moved = [NO_MOTION if motion is None else _edge(motion) for motion in motions]
+    moved = [_edge(_motion(study, "case1", model)) for model in models]
     return max(
         float(np.linalg.norm(x[:, 0] - x[:, 1]) / np.linalg.norm(x.mean(axis=1))) for x in moved
     )
@@ -46,8 +41,6 @@ def _asymmetry(study: Study, models: Iterable[str]) -> float:
 def second_peak_case1(study: Study) -> float:
     """Peak (Hz) of the spectrum of the difference between the two nodes (equi-inertial masses)."""
     motion = _motion(study, "case1", "equi_inertial")
-    if motion is None:
-        return NO_VALUE
     x = _edge(motion)
     found = content_of(motion["time"].values, x[:, 0] - x[:, 1])
     return strongest_peak(*found, (0.0, UP_TO), PROMINENCE)
@@ -55,58 +48,46 @@ def second_peak_case1(study: Study) -> float:
 
 def _second_peak(study: Study, case: str) -> float:
     """Second peak (Hz) of the shell, all reported nodes together."""
-    motion = _motion(study, case, REFERENCE)
-    if motion is None:
-        return NO_VALUE
-    frequency, amplitude = content(motion, *reported(case))
+    frequency, amplitude = content(_motion(study, case, REFERENCE), *reported(case))
     return strongest_peak(frequency, np.linalg.norm(amplitude, axis=1), BAND, PROMINENCE)
 
 
 def _mismatch(study: Study, places: list[int]) -> float:
     """Largest static deviation from the shell in case 2 at some of the reported nodes."""
-    found = study.displacements("case2") if "case2" in study.plan.cases else {}
-    if "shell" not in found or "bars and hinges" not in found:
-        return NO_VALUE
-    return float(np.abs(found["bars and hinges"] / found["shell"] - 1.0)[places].max())
+    found = study.displacements("case2")
+    return float(np.abs(found[BARS_AND_HINGES] / found[REFERENCE] - 1.0)[places].max())
 
 
 def softer_folds_move_more(study: Study) -> float:
-    """Displacement of node 7 of the shell in case 4, divided by that in case 2."""
-    moved = []
-    for case in ("case4", "case2"):
-        path = study.result(case, REFERENCE, "path")
-        there = None if path is None else path["displacement"].sel(node=7, axis="x").values[-1]
-        moved.append(NO_VALUE if there is None else float(there))
-    return moved[0] / moved[1]
+    """Displacement of node 7, the second reported, of the shell in case 4 over that in case 2."""
+    soft, stiff = (study.displacements(case)[REFERENCE][1] for case in ("case4", "case2"))
+    return float(soft / stiff)
 
 
 def softer_folds_err_less(study: Study) -> float:
     """Largest of the five ratios of the error in case 4 to the error in case 2."""
-    ratios = [study.error("case4", m) / study.error("case2", m) for m in paper_rules()]
-    return float(np.max(ratios))
+    return float(np.max([study.error("case4", m) / study.error("case2", m) for m in RULES]))
 
 
 def _over_best(study: Study, case: str, model: str) -> float:
     """Error of a model divided by the smallest error of the five: 1 for the best model."""
-    row = {m: study.error(case, m) for m in paper_rules()}
+    row = {m: study.error(case, m) for m in RULES}
     known = all(0.0 < error < math.inf for error in row.values())
-    return row[model] / min(row.values()) if known else NO_VALUE
+    return row[model] / min(row.values()) if known else math.nan
 
 
 def best_overall(study: Study) -> float:
     """Mean rank of circumcenter divided by the smallest mean rank of the five."""
-    means = mean_ranks(study.table(models=paper_rules()), paper_rules())
+    means = mean_ranks(study.table(models=RULES), RULES)
     known = len(study.plan.cases) == 4 and all(map(math.isfinite, means.values()))
-    return means["circumcenter"] / min(means.values()) if known else NO_VALUE
+    return means["circumcenter"] / min(means.values()) if known else math.nan
 
 
 # Function that computes the number of each claim, by the key of its row; nan if it cannot.
 CLAIMS: Mapping[str, Callable[[Study], float]] = {
     # how differently the two nodes of the free edge move: heavy corners are diagonally opposite
     "asymmetry_equi_inertial": partial(_asymmetry, models=("equi_inertial",)),
-    "asymmetry_others": partial(
-        _asymmetry, models=[m for m in paper_rules() if m != "equi_inertial"]
-    ),
+    "asymmetry_others": partial(_asymmetry, models=[m for m in RULES if m != "equi_inertial"]),
     "second_peak_case1": second_peak_case1,
     "second_peak_case2": partial(_second_peak, case="case2"),
     "second_peak_case3": partial(_second_peak, case="case3"),
@@ -129,15 +110,10 @@ def claims(study: Study) -> list[Verdict]:
     return _known(study, "claims", {key: _value(claim, study) for key, claim in CLAIMS.items()})
 
 
-@cache
-def _table1() -> Mapping[str, Target]:
-    return read_targets(TARGETS, "table1")
-
-
 def paper_table() -> dict[str, dict[str, float]]:
     """Table 1 of the paper: errors by case and distribution."""
     found: dict[str, dict[str, float]] = {}
-    for key, target in _table1().items():
+    for key, target in read_targets("table1").items():
         case, _, model = key.partition("_")
         found.setdefault(case, {})[model] = target.value
     return found
@@ -145,7 +121,7 @@ def paper_table() -> dict[str, dict[str, float]]:
 
 def tolerance() -> float:
     """Largest relative deviation at which a number of Table 1 counts as reproduced."""
-    return max(target.tolerance or 0.0 for target in _table1().values())
+    return max(target.tolerance or 0.0 for target in read_targets("table1").values())
 
 
 def table1(study: Study) -> list[Verdict]:
@@ -161,10 +137,9 @@ def table1(study: Study) -> list[Verdict]:
 def _value(claim: Callable[[Study], float], study: Study) -> float:
     try:
         return claim(study)
-    except InputError:  # the motion is too short for a spectrum
-        return NO_VALUE
+    except (InputError, KeyError):  # the motion is too short for a spectrum, or missing
+        return math.nan
 
 
 def _known(study: Study, group: str, computed: Mapping[str, float]) -> list[Verdict]:
-    found = verdicts(read_targets(TARGETS, group), computed)
-    return [v for v in found if math.isfinite(v.computed)]
+    return [v for v in verdicts(group, computed) if math.isfinite(v.computed)]

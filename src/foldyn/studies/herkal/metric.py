@@ -19,7 +19,6 @@ from foldyn.linear import mac, pair_modes
 from foldyn.signals import find_peaks, sampling_interval, spectrum
 
 UP_TO = 5.0  # Hz
-AXES = ("x", "y", "z")
 LEAST_MAC = 0.5  # modes with a smaller MAC are no partners
 FAR = 2.0  # largest ratio of the frequencies of partners
 
@@ -127,6 +126,14 @@ def best(values: Mapping[str, float]) -> str:
     """Name of the model with the smallest error, or ""."""
     known = {name: value for name, value in values.items() if np.isfinite(value)}
     return min(known, key=known.__getitem__) if known else ""
+
+
+def rank_correlation(a: Mapping[str, float], b: Mapping[str, float]) -> float:
+    """Spearman's rank correlation of two sets of errors: 1 for equal, -1 for reverse order."""
+    first, second = ranks(a), ranks({m: b[m] for m in a})
+    n = len(first)
+    apart = sum((first[m] - second[m]) ** 2 for m in first)
+    return 1.0 - 6.0 * apart / (n * (n * n - 1))
 
 
 @dataclass(frozen=True, eq=False)

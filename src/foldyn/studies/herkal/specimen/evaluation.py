@@ -20,6 +20,7 @@ from foldyn.analyses.keys import replaced
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.errors import InputError
 from foldyn.experiment import Fit, ForceDisplacement, Measurement, Shapes, TimeHistory
+from foldyn.linear import peaks_of
 from foldyn.signals import log_decrement, spectrum
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import BAND, FRONT, FULL, SUPPORTS, WATCHED
@@ -32,6 +33,8 @@ PROMINENCE = 0.05  # smallest prominence of a peak, relative to the highest ampl
 NEAR = (4.0, 14.0)  # Hz: band of the axial vibration
 FINER = 8  # points of the frequency grid per interval of resolution
 UNLIKE = 0.2  # largest misfit of nodes to a state of the model, relative to their displacement
+CORNER = 0  # top node at a corner, of which the response is shown
+HIGHEST = 22.0  # Hz: upper limit of reported peaks
 SAME = 1e-4  # m: largest difference of rest positions
 FACTORS = np.linspace(0.0, 1.1, 34)  # load factors that are searched for measured shapes
 
@@ -350,3 +353,26 @@ def content_misfit(film: NDArray[np.float64], model: NDArray[np.float64], step: 
     if measured is None or said is None:
         return math.nan
     return float(deviation(said[1][:, None], measured[1][:, None])[0])
+
+
+@dataclass(frozen=True)
+class Response:
+    """Peaks of a frequency response at a corner of the top, along the axis.
+
+    Attributes
+    ----------
+    frequencies : tuple of float
+        Hz.
+    damping : tuple of float
+        Damping ratios from half-power points by the textbook formula; nan without such points.
+    """
+
+    frequencies: tuple[float, ...]
+    damping: tuple[float, ...]
+
+    @classmethod
+    def of(cls, found: xr.Dataset) -> Response:
+        """Peaks of a result of `foldyn.frf`."""
+        every = peaks_of(found, CORNER, axis="x", prominence=0.02)
+        peaks = [one for one in every if one.frequency < HIGHEST]
+        return cls(tuple(p.frequency for p in peaks), tuple(p.textbook for p in peaks))

@@ -23,13 +23,13 @@ from foldyn.results import case_of, load, netcdf
 from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import BAND, DAMPING, FOLDS, WATCHED
 from foldyn.studies.herkal.specimen import evaluation, synthetic, tasks
-from foldyn.studies.herkal.specimen.evaluation import FILM_SUPPORT
+from foldyn.studies.herkal.specimen.evaluation import CORNER, FILM_SUPPORT, Response
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.tasks import Part
-from foldyn.studies.herkal.vibration import CORNER, ORDINALS, TARGETS, Response
-from foldyn.studies.targets import Target, read_targets
+from foldyn.studies.herkal.targets import Target, read_targets
 
 WIDTH = 9.0  # inches
+ORDINALS = ("first", "second", "third")
 COLUMNS = 3  # number of front nodes in a row of the pattern
 SUPPORT_NAMES = {
     "glued": "plate, node 59 glued",
@@ -38,34 +38,21 @@ SUPPORT_NAMES = {
 }
 
 
-def plot_front(front: xr.Dataset, support: str, label: str, note: str) -> Figure:
-    """Draw all front nodes of the film and of the model against time, a frame for each node."""
-    measured, model = front["measured"], front["model"].sel(support=support)
-    curves = {
-        node: (front["time"].values, measured.sel(node=node).values, model.sel(node=node).values)
-        for node in front["node"].values.tolist()
-    }
-    return _grid(curves, ("time (s)", "x (mm)"), label, note)
-
-
-def plot_front_content(front: xr.Dataset, support: str, label: str, note: str) -> Figure:
-    """Draw amplitude spectra of all front nodes of the film and of the model, a frame for each."""
-    step = sampling_interval(front["time"].values)
-    curves = {}
-    for node in front["node"].values.tolist():
-        film = evaluation.content(front["whole"].sel(node=node).values, step)
-        said = evaluation.content(front["model"].sel(node=node, support=support).values, step)
-        if film is not None and said is not None:
-            curves[node] = (*film, said[1])
-    return _grid(curves, ("frequency (Hz)", "x (mm)"), label, note)
-
-
-def _grid(
-    curves: Mapping[int, tuple[NDArray, NDArray, NDArray]],
-    labels: tuple[str, str],
-    label: str,
-    note: str,
+def plot_front(
+    front: xr.Dataset, support: str, label: str, note: str, spectra: bool = False
 ) -> Figure:
+    """Draw all front nodes of the film and of the model, a frame for each: histories or spectra."""
+    along = front["time"].values
+    curves: dict[int, tuple[NDArray, NDArray, NDArray]] = {}
+    for node in front["node"].values.tolist():
+        film = front["whole" if spectra else "measured"].sel(node=node).values
+        model = front["model"].sel(node=node, support=support).values
+        if not spectra:
+            curves[node] = along, film, model
+            continue
+        there, said = (evaluation.content(x, sampling_interval(along)) for x in (film, model))
+        if there is not None and said is not None:
+            curves[node] = *there, said[1]
     rows = -(-len(curves) // COLUMNS)
     figure = style.new_figure(WIDTH, 0.8 + 1.15 * rows, note)
     frames = figure.subplots(rows, COLUMNS, squeeze=False, sharex=True, sharey="row").ravel()
@@ -73,8 +60,9 @@ def _grid(
     for k, (frame, (node, (along, film, model))) in enumerate(
         zip(frames, curves.items(), strict=False)
     ):
-        below = labels[0] if k >= len(curves) - COLUMNS else ""
-        style.frame(frame, below, labels[1] if k % COLUMNS == 0 else "", f"node {node}")
+        below = "frequency (Hz)" if spectra else "time (s)"
+        beside = "x (mm)" if k % COLUMNS == 0 else ""
+        style.frame(frame, below if k >= len(curves) - COLUMNS else "", beside, f"node {node}")
         mark = {"marker": ".", "markersize": 2.5, "linestyle": "none", "label": label}
         lines = frame.plot(along, 1e3 * film, color=style.VERMILLION, **mark)
         lines += frame.plot(along, 1e3 * model, color=style.BLUE, linewidth=1.0, label="model")
@@ -289,7 +277,7 @@ def _release(folder: Path, found: dict[str, Any], fit: Part, album: Album) -> li
         *album.figure(
             "specimen-front-frequency",
             "Their amplitude spectra. Nodes that were lost for long have none.",
-            lambda: plot_front_content(front, FILM_SUPPORT, label, note),
+            lambda: plot_front(front, FILM_SUPPORT, label, note, spectra=True),
         ),
         _agreement(front),
     ]
@@ -305,7 +293,7 @@ def _vibrations(front: xr.Dataset, data: Data) -> list[Section]:
         f"model: {name}": at["model"].sel(support=key) for key, name in SUPPORT_NAMES.items()
     }
     found = {name: evaluation.vibration_of(x.values, step) for name, x in curves.items()}
-    paper = _targets()
+    paper = read_targets("specimen")
     rows: list[list[Any]] = [
         ["paper", paper["release_frequency"].value, None, paper["release_damping"].value]
     ]
@@ -382,7 +370,7 @@ def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
         "published": "the paper's parameters", "air": "the same in air",
         "fitted": "fitted parameters",
     }  # fmt: skip
-    paper = _targets()
+    paper = read_targets("specimen")
     peaks = [paper[f"frf_{which}_peak"].value for which in ORDINALS]
     modes = load(folder / tasks.MODES)
     named = character(modes, "x")
@@ -442,7 +430,3 @@ def _response_table(responses: Mapping[str, xr.Dataset], paper: Mapping[str, Tar
 
 def _at(values: Sequence[float], k: int, factor: float = 1.0) -> float | None:
     return cell(factor * values[k]) if k < len(values) else None
-
-
-def _targets() -> Mapping[str, Target]:
-    return read_targets(TARGETS, "specimen")

@@ -2,13 +2,10 @@
 
 The photographed and filmed sheet differs from the fitted model: it is softer, its mass is
 distributed differently, and its creases relax, so that it drifts back after the release.
-
-`python -m foldyn.studies.herkal.specimen.synthetic FOLDER` writes photographs and the film.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -139,11 +136,3 @@ def held(motion: xarray.Dataset, duration: float) -> xarray.Dataset:
     kept = motion.drop_dims("time").assign_coords(time=("time", times, motion["time"].attrs))
     along = ("time", "node", "axis")
     return kept.assign(displacement=(along, moved, motion["displacement"].attrs))
-
-
-if __name__ == "__main__":
-    place = Path(sys.argv[1] if len(sys.argv) > 1 else "herkal-specimen")
-    place.mkdir(parents=True, exist_ok=True)
-    print(*photograph(place, PAPERS))
-    experiment.write_film(film(place, PAPERS), place / TRACKED)
-    print(place / TRACKED)

@@ -19,7 +19,7 @@ from foldyn.experiment.calibration.fit_page import write_fit
 from foldyn.input_files import file_digest, from_json, read_text
 from foldyn.results import netcdf, save
 from foldyn.store import Store, program, warn_of_damage
-from foldyn.studies.herkal import calibration, vibration
+from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.specimen import evaluation, synthetic
 from foldyn.studies.herkal.specimen.measured import Data, measurement
 from foldyn.studies.herkal.specimen.synthetic import PAPERS, Shot
@@ -28,8 +28,8 @@ from foldyn.writing import scratch, whole, write_text
 
 # Files and folders on which results depend, in addition to the solvers.
 COMPUTING = (
-    "experiment", "studies/herkal/calibration.py", "studies/herkal/vibration.py",
-    "studies/herkal/specimen", "studies/herkal/cases",
+    "experiment", "studies/herkal/calibration.py", "studies/herkal/specimen",
+    "studies/herkal/cases",
 )  # fmt: skip
 FOLDER = "specimen"
 NOTE = "synthetic data: the specimen's own are not public"
@@ -240,11 +240,16 @@ def _write(one: Fit, folder: Path, note: str) -> None:
 
 def _response(part: Part, folder: Path) -> None:
     changes = read_found(folder)["changes"]
-    for name, given in (("published", {}), ("air", vibration.IN_AIR), ("fitted", changes)):
-        save(vibration.specimen("frf", changes=given).run(), folder / RESPONSES[name])
     folds = {key: value for key, value in changes.items() if not key.startswith("damping.")}
-    for name, given in ((MODES, folds), (IN_AIR, {**folds, **vibration.IN_AIR})):
-        save(vibration.specimen("modes", changes=given).run(), folder / name)
+    air = calibration.IN_AIR
+    for kind, given, name in (
+        ("frf", {}, RESPONSES["published"]),
+        ("frf", air, RESPONSES["air"]),
+        ("frf", changes, RESPONSES["fitted"]),
+        ("modes", folds, MODES),
+        ("modes", {**folds, **air}, IN_AIR),
+    ):
+        save(calibration.shipped(f"specimen-{kind}", given).run(), folder / name)
 
 
 # Computation of each part, and the files that it writes for other parts or for the page.

@@ -1,20 +1,28 @@
-"""Page sections on stiffnesses other than the paper's: static displacements, the specimen."""
+"""Page on further models: their errors, static displacements, and the specimen."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from foldyn.report import Heading, Section, Table, Text
-from foldyn.studies.herkal.claims import TARGETS
-from foldyn.studies.herkal.runs import BARS_AND_HINGES, case_study
-from foldyn.studies.herkal.specimen.page import NO_BREAK
-from foldyn.studies.herkal.stiffnesses import OWN, PEAKED, Rows
-from foldyn.studies.herkal.study import Study
-from foldyn.studies.herkal.vibration import ORDINALS
-from foldyn.studies.targets import read_targets
+from foldyn.report import Heading, Section, Table, Text, write_report
+from foldyn.report.album import Album
+from foldyn.report.sections import cell
+from foldyn.structures.beyond_range import BELOW, plate_frequency
+from foldyn.studies.herkal import report
+from foldyn.studies.herkal.runs import BARS_AND_HINGES, REFERENCE, RULES, case_study
+from foldyn.studies.herkal.specimen.page import NO_BREAK, ORDINALS
+from foldyn.studies.herkal.study import RESULTS, Study
+from foldyn.studies.herkal.targets import read_targets
+from foldyn.studies.pool import Task
+from foldyn.viewer import Stage
+from verification.herkal import other_shell
+from verification.herkal.stiffnesses import MESHES, OWN, PEAKED, Rows, Stiffness, tasks
 
 # Models of the fidelity study, by the label of the equilibrium path they belong to.
 SMALL = {f"{BARS_AND_HINGES}, linear bends": "standard", "plate": "plate", "n5b8e": "n5b8e"}
@@ -22,13 +30,42 @@ PATHS = (BARS_AND_HINGES, *SMALL)
 LABELS = {OWN: "as filed (superlinear bends)", "standard": "standard, linear bends"}
 
 
-def sections(study: Study) -> list[Section]:
-    """Sections on the computed parts; empty if there are none."""
-    found = [_statics(study), *specimen(study.rows("modes"), _peaks(study))]
-    shown = [one for one in found if one is not None]
-    if not shown:
-        return []
-    return [
+@dataclass(frozen=True, eq=False)
+class WiderStudy(Study):
+    """The case studies with further models, and their stiffnesses; `plan` is a `WiderPlan`.
+
+    Attributes
+    ----------
+    meshes : tuple of int
+        Divisions of the shells for the specimen.
+    """
+
+    meshes: tuple[int, int] = MESHES
+
+    def tasks(self) -> list[Task]:
+        """All computations."""
+        return [*self.plan.jobs(), *tasks(self.plan.cases, self.meshes)]
+
+    def rows(self, kind: Any, of: str = "specimen") -> Rows | None:
+        """Rows of a computation of `stiffnesses`, or None if missing."""
+        return Stiffness(kind, of, self.meshes).result(self.folder / RESULTS)
+
+
+def write(study: WiderStudy) -> Path:
+    """Draw figures into the study's folder and write stiffnesses.html; return its path."""
+    title = "The case studies of Herkal et al.: further models"
+    page = study.folder / "stiffnesses.html"
+    return write_report(sections(study, Album(study.folder)), page, title=title)
+
+
+def sections(study: WiderStudy, album: Album) -> list[Section | Stage]:
+    """Sections on what has been computed."""
+    table = replace(
+        report.table_1(study),
+        caption="Mean error of the frequency content against the shell. Plate and n5b8e differ in "
+        "stiffness, all others only in the distribution of the mass.",
+    )
+    found: list[Section | Stage] = [
         Heading("Models beyond the paper: plate and n5b8e"),
         Text(
             "The paper varies only the mass. Two of our models change the stiffness: in plate, "
@@ -36,8 +73,45 @@ def sections(study: Study) -> list[Section]:
             "their edges give way too, and the mass follows the plate's shape. Both have linear "
             "bends, and nothing in them is fitted to this paper."
         ),
-        *shown,
+        *[table, report.rank_table(study), frequency_table(study), *other_shell.sections(study)],
+        *[one for one in [_statics(study)] if one is not None],
+        *specimen(study.rows("modes"), _peaks(study)),
     ]
+    beyond = {m: label for m, label in study.plan.models.items() if m not in RULES}
+    others = replace(study, plan=replace(study.plan, models=beyond))
+    for case in study.plan.cases:
+        found += report.case_sections(others, case, album)
+    return found
+
+
+def frequency_table(study: Study) -> Table:
+    """Table of errors of the first frequencies, a measure without a load."""
+    return Table(
+        ["model", "error of low frequencies (%)", "of all (%)"],
+        [
+            [
+                label,
+                *(cell(100.0 * _frequency_error(study, m, up_to)) for up_to in (BELOW, math.inf)),
+            ]
+            for m, label in study.plan.models.items()
+        ],
+        "Mean absolute deviation from the shell's first five frequencies, for modes with a "
+        f"partner. Low ones lie below {BELOW:g} of a free plate's frequency, above which the "
+        "panels themselves vibrate.",
+        digits=3,
+    )
+
+
+def _frequency_error(study: Study, model: str, up_to: float) -> float:
+    """Mean error over the cases, for modes up to a multiple `up_to` of a free plate's frequency."""
+    errors = []
+    for case in study.plan.cases:
+        found, file = study.frequencies(case, model), case_study(case)
+        if found is not None:
+            low = found.reference < up_to * plate_frequency(file.pattern, file.sheet)
+            off = np.abs(found.deviation[low])
+            errors.append(float(np.nanmean(off)) if np.isfinite(off).any() else math.nan)
+    return float(np.nanmean(errors)) if np.isfinite(errors).any() else math.nan
 
 
 # ---------------------------------------------------------------------- case studies
@@ -52,18 +126,18 @@ def displacements(study: Study, case: str) -> dict[str, float]:
     }
 
 
-def _statics(study: Study) -> Table | None:
+def _statics(study: WiderStudy) -> Table | None:
     rows: list[list[Any]] = []
     for case in study.plan.cases:
         small, large = study.rows("small-loads", case), displacements(study, case)
         if small:
             errors = [small[0].get(SMALL.get(name, "")) for name in PATHS]
             rows.append([case[-1], "small", 1e3 * small[0]["shell"], *map(_percent, errors)])
-        if "shell" in large:
+        if REFERENCE in large:
             errors = [
-                large[name] / large["shell"] - 1.0 if name in large else None for name in PATHS
+                large[name] / large[REFERENCE] - 1.0 if name in large else None for name in PATHS
             ]
-            rows.append([case[-1], "paper's", 1e3 * large["shell"], *map(_percent, errors)])
+            rows.append([case[-1], "paper's", 1e3 * large[REFERENCE], *map(_percent, errors)])
     if not rows:
         return None
     return Table(
@@ -81,7 +155,7 @@ def _percent(error: float | None) -> str | None:
 
 
 # ---------------------------------------------------------------------- the specimen
-def _peaks(study: Study) -> dict[str, Rows]:
+def _peaks(study: WiderStudy) -> dict[str, Rows]:
     found = {model: study.rows("peaks", model) for model in PEAKED}
     return {model: rows for model, rows in found.items() if rows}
 
@@ -115,7 +189,7 @@ def _beside(row: Mapping[str, Any]) -> str:
 
 
 def _measured() -> list[float]:
-    paper = read_targets(TARGETS, "specimen")
+    paper = read_targets("specimen")
     return [paper[f"frf_{which}_peak"].value for which in ORDINALS]
 
 

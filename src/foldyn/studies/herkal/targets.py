@@ -1,4 +1,4 @@
-"""Values and claims of a paper, with computed values: the rows of a study's `targets.toml`."""
+"""Values and claims of the paper, with computed values: the rows of `targets.toml`."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Literal
-
-from foldyn.errors import InputError
 
 
 @dataclass(frozen=True)
 class Target:
-    """A value in a paper, or a bound that expresses one of its claims as a number.
+    """A value in the paper, or a bound that expresses one of its claims as a number.
 
     Attributes
     ----------
@@ -42,13 +41,6 @@ class Target:
     bound: Literal["least", "most"] | None = None
     group: str = ""
 
-    def __post_init__(self) -> None:
-        """Check that the target is either a value or a bound."""
-        if self.bound not in (None, "least", "most"):
-            raise InputError(f'{self.key}: bound = {self.bound!r}: give "least" or "most"')
-        if self.bound is not None and self.tolerance is not None:
-            raise InputError(f"{self.key}: a bound has no tolerance; leave out one of the two")
-
 
 @dataclass(frozen=True)
 class Verdict:
@@ -73,13 +65,6 @@ class Verdict:
             return None
         return math.isfinite(self.computed) and abs(self.deviation) <= self.target.tolerance
 
-    def line(self) -> str:
-        """One line of text."""
-        return (
-            f"{self.target.what}: {self.computed:.4g} {self.target.unit} beside "
-            f"{self.asked} ({self.target.source}), {self.deviation:+.1%}: {self.word}"
-        )
-
     @property
     def word(self) -> str:
         """Agreement in a word."""
@@ -92,13 +77,14 @@ class Verdict:
         return f"{before}{self.target.value:.4g}"
 
 
-def read_targets(path: Path, group: str | None = None) -> Mapping[str, Target]:
-    """Targets of a file by key, one for each table; only those of a group if it is given."""
-    tables = tomllib.loads(path.read_text("utf-8"))
+@cache
+def read_targets(group: str) -> Mapping[str, Target]:
+    """Targets of a group by key: "specimen", "table1" or "claims"."""
+    tables = tomllib.loads(Path(__file__).with_name("targets.toml").read_text("utf-8"))
     targets = {key: Target(key=key, **table) for key, table in tables.items()}
-    return {k: t for k, t in targets.items() if group is None or t.group == group}
+    return {key: target for key, target in targets.items() if target.group == group}
 
 
-def verdicts(targets: Mapping[str, Target], computed: Mapping[str, float]) -> list[Verdict]:
-    """Every target with its computed value, in the order of the targets."""
-    return [Verdict(t, computed.get(key, math.nan)) for key, t in targets.items()]
+def verdicts(group: str, computed: Mapping[str, float]) -> list[Verdict]:
+    """Every target of a group with its computed value, in their order."""
+    return [Verdict(t, computed.get(key, math.nan)) for key, t in read_targets(group).items()]

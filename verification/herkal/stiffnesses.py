@@ -17,18 +17,18 @@ import numpy as np
 from foldyn import store
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.analyses import read_case
+from foldyn.input_files import file_digest
 from foldyn.linear.fidelity import MODELS, fidelity, small_loads
 from foldyn.shells import shell
 from foldyn.structures import discretize
 from foldyn.structures.discretized import Discretized
 from foldyn.studies import find_case
-from foldyn.studies.herkal import vibration
+from foldyn.studies.herkal.calibration import shipped
 from foldyn.studies.herkal.runs import case_file_digest
-from foldyn.studies.herkal.sensitivity import KEPT
+from foldyn.studies.herkal.specimen.evaluation import Response
 from foldyn.studies.pool import Task
+from verification.herkal.sensitivity import KEPT
 
-# Files on which results depend, in addition to the solvers.
-COMPUTING = "studies/herkal/stiffnesses.py", "studies/herkal/vibration.py"
 OWN = "own"  # the model of the specimen's case file
 BESIDE = ("standard", "plate", "n5b8e")  # other models whose modes are computed
 PEAKED = (OWN, "plate", "n5b8e")
@@ -36,6 +36,10 @@ SPECIMEN = ("specimen-modes", "specimen-frf")
 MODES = 5
 MESHES = (6, 12)  # divisions of the shells for the specimen
 STUDIED = (8, 16)  # divisions of the shells for the case studies
+
+# Files on which results depend, in addition to the solvers.
+COMPUTING = "studies/herkal/calibration.py", "studies/herkal/specimen/evaluation.py"
+SOURCE = file_digest(Path(__file__))
 
 Rows = list[dict[str, Any]]
 
@@ -72,7 +76,7 @@ class Stiffness(Task):
         return {
             "task": self.name,
             "case_files": [case_file_digest(file) for file in files],
-            "program": store.program(*COMPUTING),
+            "program": [store.program(*COMPUTING), SOURCE],
             **mesh,
         }
 
@@ -145,7 +149,7 @@ def specimen_modes(divisions: tuple[int, int] = MESHES, **changes: Any) -> Rows:
         One for each model and mode: model, mode, frequencies `shell` and `frequency` (Hz, None for
         a mode without a partner) and mac.
     """
-    file = vibration.specimen("modes", changes={f"model.{k}": v for k, v in changes.items()})
+    file = shipped("specimen-modes", {f"model.{k}": v for k, v in changes.items()})
     secant = file.analysis.arguments["secant"]
     found = fidelity(
         file.case(file.masses[0]),
@@ -177,8 +181,8 @@ def specimen_peaks(model: str) -> Rows:
         One for each peak: frequency (Hz) and damping, which is None without half-power points.
     """
     own = {} if model == OWN else {k: v for k, v in MODELS[model].items() if k != "straight"}
-    file = vibration.specimen("frf", changes={f"model.{key}": value for key, value in own.items()})
-    found = vibration.Response.of(file.run(file.masses[0]))
+    file = shipped("specimen-frf", {f"model.{key}": value for key, value in own.items()})
+    found = Response.of(file.run(file.masses[0]))
     return [
         {"frequency": f, "damping": ratio if math.isfinite(ratio) else None}
         for f, ratio in zip(found.frequencies, found.damping, strict=True)

@@ -1,55 +1,30 @@
 """The vibration of the paper's specimen, computed from shipped cases and compared with the paper.
 
-`python -m foldyn.studies.herkal.vibration` prints the table (about a minute).
+`python -m verification.herkal.vibration` prints the table (about a minute).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import xarray
 
 from foldyn.analyses import CaseFile
 from foldyn.cases import Rayleigh
-from foldyn.linear import character, peaks_of
+from foldyn.linear import character
 from foldyn.signals import LogDecrement, log_decrement
-from foldyn.studies.herkal.calibration import WATCHED, peak, shipped
-from foldyn.studies.targets import Verdict, read_targets, verdicts
+from foldyn.studies.herkal.calibration import IN_AIR, WATCHED, shipped
+from foldyn.studies.herkal.specimen.evaluation import Response
+from foldyn.studies.herkal.specimen.page import ORDINALS
+from foldyn.studies.herkal.targets import Verdict, verdicts
+from verification.herkal.calibration import peak
 
-TARGETS = Path(__file__).with_name("targets.toml")
-CORNER, TOP = 0, 3  # top nodes at a corner and in the middle
-HIGHEST = 22.0  # Hz: upper limit of reported peaks
+TOP = 3  # top node in the middle
 RELEASED = 2.0  # s: time at which the weight is removed
 SETTLED = 0.05  # s from the release to the first minimum
 PAIR, ALONE = Rayleigh(14.4, 4.1e-4), Rayleigh(15.8)
-IN_AIR = {"air.density": 1.204}  # kg/m3
-ORDINALS = ("first", "second", "third")
-
-
-@dataclass(frozen=True)
-class Response:
-    """Peaks of a frequency response at a corner of the top, along the axis.
-
-    Attributes
-    ----------
-    frequencies : tuple of float
-        Hz.
-    damping : tuple of float
-        Damping ratios from half-power points by the textbook formula; nan without such points.
-    """
-
-    frequencies: tuple[float, ...]
-    damping: tuple[float, ...]
-
-    @classmethod
-    def of(cls, found: xarray.Dataset) -> Response:
-        """Peaks of a result of `foldyn.frf`."""
-        every = peaks_of(found, CORNER, axis="x", prominence=0.02)
-        peaks = [one for one in every if one.frequency < HIGHEST]
-        return cls(tuple(p.frequency for p in peaks), tuple(p.textbook for p in peaks))
 
 
 def specimen(
@@ -142,10 +117,19 @@ def vibration() -> list[Verdict]:
         "release_frequency": decrement.damped_frequency,
         "release_damping": 100.0 * decrement.damping_ratio,
     }
-    return verdicts(read_targets(TARGETS, "specimen"), computed)
+    return verdicts("specimen", computed)
+
+
+def line(verdict: Verdict) -> str:
+    """One line of text."""
+    target = verdict.target
+    return (
+        f"{target.what}: {verdict.computed:.4g} {target.unit} beside "
+        f"{verdict.asked} ({target.source}), {verdict.deviation:+.1%}: {verdict.word}"
+    )
 
 
 if __name__ == "__main__":
     for verdict in vibration():
-        print(verdict.line())
+        print(line(verdict))
     print("peaks in air (Hz):", *(f"{peak:.4g}" for peak in response(air=True).frequencies))

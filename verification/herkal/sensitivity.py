@@ -18,25 +18,28 @@ from typing import Any
 
 import foldyn
 from foldyn.analyses import CaseFile
-from foldyn.input_files import from_json, read_text
+from foldyn.input_files import file_digest, from_json, read_text
 from foldyn.store import Store, stamp_of
 from foldyn.studies.herkal import runs
 from foldyn.studies.herkal.metric import errors, partners
-from foldyn.studies.herkal.runs import Job, Numerics, Variant
-from foldyn.studies.herkal.variations import Variations
+from foldyn.studies.herkal.runs import REFERENCE, Numerics
 from foldyn.studies.pool import Task
 from foldyn.writing import write_text
+from verification.herkal import models
+from verification.herkal.models import AS_FILED, DISTRIBUTIONS, LOADS, OTHERS, Variant, Varied
+from verification.herkal.variations import Variations
 
 PULSES = (0.1, 0.25, 0.5, 1.0)  # s
 BEND_LAWS = ("superlinear", "linear")
 CALIBRATIONS = ("standard", "merlin2")
 # Models compared with the shell: all distributions, and equi-inertial with the other orientation.
-MODELS = (*runs.rules(), *runs.OTHERS)
+MODELS = (*DISTRIBUTIONS, *OTHERS)
+SOURCES = [file_digest(Path(file)) for file in (__file__, models.__file__)]
 
 MOST = 64  # largest stored file (MiB)
 
 
-def stiffnesses(load: Variant = runs.AS_FILED) -> list[Variant]:
+def stiffnesses(load: Variant = AS_FILED) -> list[Variant]:
     """Variants of law and calibration of bars and hinges under one load."""
     laws = product(BEND_LAWS, CALIBRATIONS)
     return [Variant(load.pulse, load.loads, *law) for law in laws]
@@ -45,7 +48,7 @@ def stiffnesses(load: Variant = runs.AS_FILED) -> list[Variant]:
 def load_sets(case_file: CaseFile) -> tuple[str, ...]:
     """Sets of loaded nodes; a single set if the case file loads the whole edge."""
     loaded = {node for load in case_file.case().loads for node in getattr(load, "nodes", ())}
-    return runs.LOADS[:1] if loaded == set(case_file.output.nodes.tolist()) else runs.LOADS
+    return LOADS[:1] if loaded == set(case_file.output.nodes.tolist()) else LOADS
 
 
 def _digest(rows: Any) -> str:
@@ -97,7 +100,7 @@ class Comparison(Task):
         return {
             "task": self.name,
             "case_file": runs.case_file_digest(self.case),
-            "program": runs.program(),
+            "program": [runs.program(), *SOURCES],
             "models": list(MODELS),
             **asdict(self.numerics),
         }
@@ -109,19 +112,19 @@ class Comparison(Task):
     def _errors(self, load: Variant) -> Iterator[dict[str, Any]]:
         """Rows with errors of the frequency content under one load."""
         shown = runs.reported(self.case)
-        reference = runs.compute(Job(self.case, runs.REFERENCE, "motion", self.numerics, load))
+        reference = Varied(self.case, REFERENCE, "motion", self.numerics, load).compute()
         for variant in stiffnesses(load):
             row = {"case": self.case, **asdict(variant)}
             for model in MODELS:
-                motion = runs.compute(Job(self.case, model, "motion", self.numerics, variant))
+                motion = Varied(self.case, model, "motion", self.numerics, variant).compute()
                 row[model] = float(errors(motion, reference, *shown).mean())
             yield row
 
     def _frequencies(self) -> Iterator[dict[str, Any]]:
         """Rows that compare first frequencies with the shell's."""
-        reference = runs.compute(Job(self.case, runs.REFERENCE, "modes", self.numerics))
+        reference = Varied(self.case, REFERENCE, "modes", self.numerics).compute()
         for variant, model in product(stiffnesses(), MODELS):
-            ours = runs.compute(Job(self.case, model, "modes", self.numerics, variant))
+            ours = Varied(self.case, model, "modes", self.numerics, variant).compute()
             found = partners(reference, ours)
             for k, shell in enumerate(found.reference):
                 yield {

@@ -14,10 +14,10 @@ import numpy as np
 from foldyn.errors import InputError
 from foldyn.input_files import read_text
 from foldyn.store import warn_of_damage
-from foldyn.studies.herkal.metric import best, ranks
+from foldyn.studies.herkal.metric import best, rank_correlation, ranks
 from foldyn.writing import whole
 
-STORED = Path(__file__).with_name("results")  # tables that come with the package
+STORED = Path(__file__).with_name("results")  # tables of this repository
 METRIC, FREQUENCIES = "sensitivity.csv", "frequencies.csv"
 WORDS = ("case", "loads", "bend_law", "calibration", "model")  # columns with text
 # Settings of the case files.
@@ -155,14 +155,6 @@ def standings(rows: Sequence[Row], models: Sequence[str]) -> dict[str, Standing]
             max(errors),
         )  # fmt: skip
     return found
-
-
-def rank_correlation(a: Mapping[str, float], b: Mapping[str, float]) -> float:
-    """Spearman's rank correlation of two sets of errors: 1 for equal, -1 for reverse order."""
-    first, second = ranks(a), ranks({m: b[m] for m in a})
-    n = len(first)
-    apart = sum((first[m] - second[m]) ** 2 for m in first)
-    return 1.0 - 6.0 * apart / (n * (n * n - 1))
 
 
 @dataclass(frozen=True)

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from foldyn.plots import style
-from foldyn.report import Heading, Section, Table, Text
+from foldyn.report import Heading, Section, Table, Text, write_report
 from foldyn.report.album import Album
 from foldyn.report.sections import cell
-from foldyn.studies.herkal import variations
-from foldyn.studies.herkal.claims import paper_table
+from foldyn.studies.herkal.claims import paper_table, tolerance
 from foldyn.studies.herkal.metric import best
-from foldyn.studies.herkal.runs import OTHERS, label, paper_rules, rules
-from foldyn.studies.herkal.sensitivity import BEND_LAWS, CALIBRATIONS, PULSES
-from foldyn.studies.herkal.variations import Variations
+from foldyn.studies.herkal.runs import RULES
+from verification.herkal import variations
+from verification.herkal.models import DISTRIBUTIONS, LABELS, OTHERS
+from verification.herkal.sensitivity import BEND_LAWS, CALIBRATIONS, PULSES
+from verification.herkal.variations import Variations
 
 LOADED = {"file": "as filed", "edge": "whole edge"}
 SIDES = {"superlinear": (-0.3, style.BLUE), "linear": (0.08, style.ORANGE)}
@@ -36,7 +38,13 @@ CHANGES: Mapping[str, Mapping[str, Any]] = {
 }
 
 
-def sections(found: Variations, album: Album, tolerance: float) -> list[Section]:
+def write(found: Variations, folder: Path) -> Path:
+    """Write sensitivity.html into a folder; return its path."""
+    title = "The case studies of Herkal et al.: sensitivity"
+    return write_report(sections(found, Album(folder)), folder / "sensitivity.html", title=title)
+
+
+def sections(found: Variations, album: Album) -> list[Section]:
     """Text, tables and a figure; empty if no case was computed with its own settings."""
     if not found.filed():
         return []
@@ -54,9 +62,9 @@ def sections(found: Variations, album: Album, tolerance: float) -> list[Section]
             "sensitivity",
             "Errors of the distributions, a dot for each combination: superlinear bends above the "
             "line, linear ones below. Rings: the case files as they are. Crosses: the paper.",
-            lambda: plot_sensitivity(found, (*rules(), TURNED), paper_table()),
+            lambda: plot_sensitivity(found, (*DISTRIBUTIONS, TURNED), paper_table()),
         ),
-        one_at_a_time(found, tolerance),
+        one_at_a_time(found),
         by_load(found),
         by_stiffness(found),
         *(over_all(found, law) for law in BEND_LAWS),
@@ -93,7 +101,7 @@ def plot_sensitivity(
             if model in paper.get(case, {}):
                 cross[0].set_data([paper[case][model]], [place])
             frame.axhline(place, color=style.LIGHT, linewidth=0.6, zorder=0)
-        frame.set_yticks(range(len(models)), [label(m) for m in models], fontsize=style.TICK)
+        frame.set_yticks(range(len(models)), [LABELS[m] for m in models], fontsize=style.TICK)
         frame.set_ylim(len(models) - 0.4, -0.6)
         frame.grid(False, axis="y")
     largest = max(row[model] for row in found.motions for model in models)
@@ -110,7 +118,7 @@ def plot_sensitivity(
 def opinion(found: Variations) -> str:
     """Text on how robust a ranking is, from the numbers."""
     parts = []
-    paper, names = paper_table(), paper_rules()
+    paper, names = paper_table(), tuple(RULES)
     for law in BEND_LAWS:
         rows = found.chosen(bend_law=law)
         if not rows:
@@ -119,7 +127,7 @@ def opinion(found: Variations) -> str:
         ranked = variations.standings(rows, names)
         first = min(ranked, key=lambda m: ranked[m].mean_rank)
         worst = max(one.worst_rank for one in ranked.values())
-        spared = [label(m) for m, one in ranked.items() if one.worst_rank < worst]
+        spared = [LABELS[m] for m, one in ranked.items() if one.worst_rank < worst]
         last = (
             f"Never the last: {' and '.join(spared)}."
             if spared
@@ -127,28 +135,28 @@ def opinion(found: Variations) -> str:
         )
         parts.append(
             f"With {law} bends the paper's best distribution of a case is also the best of the "
-            f"five in {hits} of {len(rows)} combinations. {label(first)} has the best mean "
+            f"five in {hits} of {len(rows)} combinations. {LABELS[first]} has the best mean "
             f"rank: {ranked[first].mean_rank:.1f}, between 1 and {ranked[first].worst_rank}. {last}"
         )
     return " ".join(parts)
 
 
-def one_at_a_time(found: Variations, tolerance: float) -> Table:
+def one_at_a_time(found: Variations) -> Table:
     """Table of agreement with the paper, and of changes of errors, for one change at a time."""
-    names, filed = paper_rules(), found.filed()
+    names, filed = tuple(RULES), found.filed()
     rows: list[list[Any]] = []
     for what, change in CHANGES.items():
         table = found.filed(**change)
         if not table:
             continue
-        near = variations.likeness(table, paper_table(), names, tolerance)
-        moved = variations.likeness(table, filed, names, tolerance)
+        near = variations.likeness(table, paper_table(), names, tolerance())
+        moved = variations.likeness(table, filed, names, tolerance())
         sizes = [round(100.0 * size) if change else None for size in (moved.median, moved.largest)]
         cases = near.of // len(names)
         rows.append([what, f"{near.within} of {near.of}", f"{near.same_best} of {cases}",
                      f"{near.correlation:+.2f}", *sizes])  # fmt: skip
     return Table(
-        ["what is changed", f"numbers within {tolerance:.0%} of the paper's",
+        ["what is changed", f"numbers within {tolerance():.0%} of the paper's",
          "cases with its best", "rank correlation with it", "median change (%)",
          "largest change (%)"],
         rows,
@@ -170,9 +178,9 @@ def _best_table(
     for first, second, table in tables:
         row: list[Any] = [first, second]
         for case in cases:
-            errors = {m: table[case][m] for m in paper_rules()} if case in table else {}
+            errors = {m: table[case][m] for m in RULES} if case in table else {}
             name = best(errors)
-            row.append(f"{label(name)} ({errors[name]:.2g})" if name else None)
+            row.append(f"{LABELS[name]} ({errors[name]:.2g})" if name else None)
         rows.append(row)
     return Table([*titles, *[f"case {case[-1]}" for case in cases]], rows, caption)
 
@@ -206,12 +214,12 @@ def by_stiffness(found: Variations) -> Table:
 def over_all(found: Variations, law: str) -> Table:
     """Table of ranks of each distribution in all combinations with one law of the bends."""
     chosen = found.chosen(bend_law=law)
-    five, every = variations.standings(chosen, paper_rules()), variations.standings(chosen, rules())
+    five, every = (variations.standings(chosen, tuple(names)) for names in (RULES, DISTRIBUTIONS))
     rows: list[list[Any]] = []
     for model, among in every.items():
         own = five.get(model)
         ranked = [None] * 3 if own is None else [own.mean_rank, own.worst_rank, own.best]
-        rows.append([label(model), *ranked, among.mean_rank, among.median, among.largest])
+        rows.append([LABELS[model], *ranked, among.mean_rank, among.median, among.largest])
     return Table(
         ["distribution", "mean rank of the five", "worst", f"best of {len(chosen)}",
          "mean rank of all", "median error", "largest"],
@@ -241,7 +249,7 @@ def orientations(found: Variations) -> Table:
 
 def frequencies(found: Variations) -> Table:
     """Table of errors of the first frequencies, which do not depend on the load."""
-    names = (*rules(), TURNED)
+    names = (*DISTRIBUTIONS, TURNED)
     columns = [
         variations.frequency_errors(
             [r for r in found.frequencies if (r["bend_law"], r["calibration"]) == one], names
@@ -250,7 +258,7 @@ def frequencies(found: Variations) -> Table:
     ]
     return Table(
         ["distribution", *map(", ".join, STIFFNESSES)],
-        [[label(m), *[cell(100.0 * means[m]) for means, _ in columns]] for m in names],
+        [[LABELS[m], *[cell(100.0 * means[m]) for means, _ in columns]] for m in names],
         "A measure without a load: mean deviation (%) of the frequencies at rest from the shell's, "
         "by law and calibration of the bends, for modes with a partner in every distribution: "
         f"{', '.join(str(count) for _, count in columns)} of the first five of each case, 20 in "
