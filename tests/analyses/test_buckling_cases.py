@@ -67,6 +67,16 @@ def test_a_page(file, tmp_path, capsys):
     assert first in page and "Buckling shapes" in page
 
 
+def test_superelements(file, tmp_path):
+    text = CASE.replace('preset = "plate"', 'kind = "superelements"\ndivisions = 8')
+    file.write_text(text.replace('\nconstant = "gravity"', ""), "utf-8")
+    read = fd.read_case(file)
+    np.testing.assert_array_equal(read.run().load_factor, fd.buckling(read.case(), 2).load_factor)
+    assert main(["run", str(file), "--out", str(tmp_path / "out"), "--figures", "png"]) == 0
+    page = next((tmp_path / "out").rglob("report.html")).read_text("utf-8")
+    assert "Buckling shapes" in page
+
+
 def test_a_drawing(file):
     found = fd.read_case(file).run()
     figure = draw_buckling(found, which=[2, 1], title="Shapes")

@@ -112,7 +112,7 @@ class BucklingAnalysis(Analysis):
                 "buckling",
                 "Buckling shapes, over the state before in gray. A shape has no amplitude of its "
                 "own: each is drawn so that it can be read.",
-                lambda: plots.draw_buckling(case, result, which=case_file.output.shapes),
+                lambda: plots.draw_buckling(result, which=case_file.output.shapes),
             )
         yield Heading("The numbers")
         yield _table(result)

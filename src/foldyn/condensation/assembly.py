@@ -224,23 +224,10 @@ class Whole:
 
     def between(self) -> tuple[NDArray, sparse.csr_array]:
         """Points (q, 3) on edges and at the means of panels' corners; their motions (3 q, m)."""
-        own, x, ends = self.unknowns, self.pattern.vertices, self.edges
-        axis, edge = np.arange(3), np.arange(own.edges)
-        length = np.linalg.norm(self._along, axis=1)
-        points, columns = [], _Columns()
-        for place in PLACES:
-            points.append((1.0 - place) * x[ends[:, 0]] + place * x[ends[:, 1]])
-            values = bows(np.full(own.edges, place), self._graded.radius / length, 1)
-            vertices = [3 * ends[:, k, None, None] + axis for k in range(2)]
-            bowed = [own.bow(edge, k)[:, None, None] + axis for k in range(own.functions)]
-            rows = np.concatenate([*vertices, *bowed], axis=1)  # (e, 2 + functions, 3)
-            weight = np.concatenate(
-                [np.tile([1.0 - place, place], (own.edges, 1)), values[:, : own.functions]], axis=1
-            )
-            weights = np.broadcast_to(weight[:, :, None], rows.shape)
-            columns.add(np.moveaxis(rows, 2, 1).reshape(-1, rows.shape[1]),
-                        np.moveaxis(weights, 2, 1).reshape(-1, rows.shape[1]))  # fmt: skip
-        on_edges = columns.matrix(own.size).T
+        own, x, axis = self.unknowns, self.pattern.vertices, np.arange(3)
+        ends = x[self.edges]
+        points = [(1.0 - place) * ends[:, 0] + place * ends[:, 1] for place in PLACES]
+        on_edges = [self.on_edges(np.full((own.edges, 1), place)) for place in PLACES]
         centers = sparse.csr_array((3 * own.panels, own.size))
         for group, (kept, placed) in zip(self.groups, self.amplitudes, strict=True):
             local = np.einsum("pad,ac->pdc", group.frames, group.panel.center[:, kept])
@@ -249,7 +236,37 @@ class Whole:
             put = sparse.csr_array(entries, shape=(3 * own.panels, len(rows)))
             centers = centers + put @ (block_diagonal(local).tocsr() @ placed)
         points.append(np.array([x[list(face)].mean(axis=0) for face in self.pattern.faces]))
-        return np.concatenate(points), sparse.csr_array(sparse.vstack([on_edges, centers]))
+        return np.concatenate(points), sparse.csr_array(sparse.vstack([*on_edges, centers]))
+
+    def on_edges(self, places: NDArray) -> sparse.csr_array:
+        """Displacements (3 e p, m) of points at places (e, p), from 0 to 1, of all edges."""
+        own, (edges, count) = self.unknowns, places.shape
+        length = np.linalg.norm(self._along, axis=1)
+        cut_off = np.repeat(self._graded.radius / length, count)
+        share = bows(places.ravel(), cut_off, 1)[:, : own.functions]
+        weight = np.column_stack([1.0 - places.ravel(), places.ravel(), share])
+        bow = own.bow(np.arange(edges)[:, None], np.arange(own.functions)) // 3
+        column = np.repeat(np.hstack([self.edges, bow]), count, axis=0)
+        begin = weight.shape[1] * np.arange(len(weight) + 1)
+        shape = (len(weight), own.turn(0, 0, 0) // 3)
+        out = sparse.kron(
+            sparse.csr_array((weight.ravel(), column.ravel(), begin), shape=shape),
+            sparse.eye_array(3), format="csr",
+        )  # fmt: skip
+        out.resize((out.shape[0], own.size))
+        return sparse.csr_array(out)
+
+    def turns_on_edges(self, places: NDArray) -> sparse.csr_array:
+        """Turns (2 e p, m) of the sheet on both sides of points at places (e, p) of all edges."""
+        own, (edges, count) = self.unknowns, places.shape
+        value = np.repeat(turns(places.ravel(), self.level.turns), 2, axis=0)
+        edge = np.repeat(np.arange(edges), 2 * count)[:, None]
+        side = np.tile([0, 1], edges * count)[:, None]
+        column = own.turn(edge, side, np.arange(self.level.turns))
+        begin = self.level.turns * np.arange(len(value) + 1)
+        return sparse.csr_array(
+            (value.ravel(), column.ravel(), begin), shape=(len(value), own.size)
+        )
 
     def spread(self, load: Distributed) -> NDArray[np.float64]:
         """Forces (m,), N, on the unknowns due to a distributed load."""

@@ -50,6 +50,8 @@ LEVELS = (
 HIGHEST = LEVELS[-1]
 FOR_STRESSES = Level(9, 18, 16, 6)
 """Shapes with which stresses near the corners converge; energies hardly change beyond level 5."""
+FOR_BUCKLING = HIGHEST._replace(turns=FOR_STRESSES.turns)
+"""Shapes for load factors: panels bend sharply at creases that bulge near vertices."""
 SHAPES = (ALONG, ACROSS, ACROSS)
 
 

@@ -18,7 +18,7 @@ from foldyn.condensation.assembly import Whole
 from foldyn.condensation.library import ALIKE, Meshes, groups
 from foldyn.condensation.panel import BOW
 from foldyn.condensation.resultants import resultants
-from foldyn.condensation.shapes import FOR_STRESSES, LEVELS, Level
+from foldyn.condensation.shapes import FOR_BUCKLING, FOR_STRESSES, LEVELS, Level
 from foldyn.condensation.term import GROUPS, SuperelementsTerm
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, Superlinear, hinge_law
@@ -92,8 +92,8 @@ class Superelements(Discretized):
         Input from which it was made.
     meshes : Meshes
         How the panels are meshed.
-    stressed : bool
-        Whether the panels have the shapes for stresses instead of those of the level.
+    finer : Level, optional
+        Shapes that the panels have instead of those of the level.
     """
 
     nodes: NDArray
@@ -106,7 +106,7 @@ class Superelements(Discretized):
     sheet: Sheet
     options: SuperelementsOptions
     meshes: Meshes
-    stressed: bool = False
+    finer: Level | None = None
 
     kind: ClassVar[str] = "superelements"
     linear: ClassVar[str] = "superelements"
@@ -128,7 +128,12 @@ class Superelements(Discretized):
     @cached_property
     def for_stresses(self) -> Superelements:
         """The same with the shapes for stresses, or as many as the mesh can have."""
-        return replace(self, stressed=True).marked()
+        return replace(self, finer=FOR_STRESSES).marked()
+
+    @cached_property
+    def for_buckling(self) -> Superelements:
+        """The same with the shapes for buckling."""
+        return replace(self, finer=FOR_BUCKLING).marked()
 
     @cached_property
     def bars(self) -> NDArray:
@@ -160,9 +165,12 @@ class Superelements(Discretized):
         # the coarsest of several meshes is only for estimates of errors
         arcs = min(m.arcs for m in self.meshes.graded[-2:])
         level, meshes = LEVELS[self.options.level - 1], self.meshes
-        if self.stressed:
-            across = max(level.across, min(FOR_STRESSES.across, 2 * arcs - 1))
-            level = Level(FOR_STRESSES.along, across, *FOR_STRESSES[2:])
+        if self.finer is not None:
+            across, turns = (
+                max(own, min(other, 2 * arcs - 1))
+                for own, other in zip(level[1:3], self.finer[1:3], strict=True)
+            )
+            level = self.finer._replace(across=across, turns=turns)
             meshes = meshes._replace(level=level)
         if level.across >= 2 * arcs:
             raise InputError(
@@ -295,6 +303,18 @@ class Superelements(Discretized):
         """
         points, motions = self.whole.between()
         return points, sparse.csr_array(motions @ self._dofs(edges))
+
+    def on_edges(
+        self, places: NDArray, *, edges: Mapping[int, NDArray]
+    ) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """Displacements (3 e p, m) at places (e, p) of edges, and turns (2 e (p - 1), m) between.
+
+        edges : edges that supports hold, as in `held`.
+        """
+        made, dofs = self.whole, self._dofs(edges)
+        between = 0.5 * (places[:, 1:] + places[:, :-1])
+        moved, turned = made.on_edges(places), made.turns_on_edges(between)
+        return sparse.csr_array(moved @ dofs), sparse.csr_array(turned @ dofs)
 
     @property
     def _fold_hinges(self) -> FoldHinges:

@@ -22,30 +22,21 @@ from collections.abc import Sequence
 import numpy as np
 import xarray
 from numpy.typing import NDArray
-from scipy import sparse
 
-from foldyn.algebra.load_factors import LoadFactors, Softening
-from foldyn.algebra.reduction import Reduction
-from foldyn.algebra.solvers import check_fill, factorizer
-from foldyn.algebra.superlu import SingularTangentError, Solution, Unsymmetric
+from foldyn.algebra.load_factors import LoadFactors
+from foldyn.algebra.solvers import check_fill
 from foldyn.cases import LOADS, Case, Load
 from foldyn.cases.air import refuse_air
-from foldyn.dynamics.modal_damping import soft_at_rest
-from foldyn.errors import ComputationError, InputError, warn
-from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
+from foldyn.errors import InputError, warn
+from foldyn.linear.buckling_base import Base
+from foldyn.linear.buckling_panels import PanelsBase
 from foldyn.ram_limit import check_memory
 from foldyn.results.dataset import buckling_dataset
-from foldyn.statics import OrigamiProblem
 from foldyn.statics.equilibrium import drives
-from foldyn.statics.newton import Solver
 from foldyn.statics.stability import oriented
-from foldyn.statics.stepping import PathStoppedError, settle
-from foldyn.statics.tracing import refuse_mechanisms
 from foldyn.values import objects, of_kind, whole
 
 COPIES = 8  # copies of the shapes in memory, while they are found and stored
-STEP = 1e-5  # largest strain or turn in the difference of tangents: errors of 1e-10 and rounding
-FARTHEST = 0.1  # strain or turn along the linear path beyond which no factor means anything
 DEPARTS = 0.05  # departure from which the lowest factor is doubtful
 TURNS = np.radians(10.0)  # turn of a hinge from which displacements are not small
 
@@ -62,7 +53,7 @@ def buckling(
     Parameters
     ----------
     case : Case
-        Bars and hinges, or a shell.
+        Bars and hinges, a shell, or superelements.
     count : int
         Number of factors of each sign, from the one nearest to zero on.
     preload : Load or sequence of Load, optional
@@ -77,7 +68,8 @@ def buckling(
         strains or turns of more than 10 % and are more than ten times as far from zero as the
         nearest. `shape`: the largest displacement of a node is 1, the largest component positive.
         `displacement` (m) of the base state, and `prebuckling` (m), the displacement from there per
-        unit of the factor. The case of the result has the preloads first among its loads.
+        unit of the factor. The case of the result has the preloads first among its loads; that of
+        superelements has the shell of their panels' mesh, whose nodes begin with the vertices.
         Attributes: `positive` and `negative` (numbers of factors), `complete` (number of factors
         that counts prove to be complete), `constant` (numbers of the preloads), and for the first
         factor `departure`, an estimate of its relative error, and `turn` (rad), the largest turn of
@@ -87,7 +79,8 @@ def buckling(
     ------
     InputError
         Nothing loads the case; it can move freely; it is unstable in the base state; contact, air,
-        creases that yield or creep, superelements; superlinear hinges without a slope.
+        creases that yield or creep; superlinear hinges without a slope; superelements under a
+        preload, with rigid panels, or with creases at rest at other angles than the pattern's.
     ComputationError
         No equilibrium is found under the preload; the factors do not converge.
 
@@ -116,9 +109,9 @@ def buckling(
     began = time.perf_counter()
     given = [] if preload is None else [preload] if isinstance(preload, LOADS) else preload
     steady = objects("preload", given, LOADS)
-    _check(case)
-    base = _Base(case, steady)
-    positive, negative = base.softening.nearest(count)
+    _check(case, bool(steady))
+    base = PanelsBase(case) if case.structure.linear else Base(case, steady)
+    positive, negative = base.nearest(count)
     values = np.concatenate([positive.values, negative.values])
     shapes = _nodal(base, np.hstack([positive.shapes, negative.shapes]))
     departure, turn = _departure(base, positive, negative)
@@ -133,7 +126,7 @@ def buckling(
         "count": count,
         "state": "equilibrium" if found["displacement"].any() else "rest",
         "constant": list(range(len(steady))) or None,
-        "free_dofs": len(base.problem.free),
+        "free_dofs": base.softening.size,
         "positive": len(positive.values),
         "negative": len(negative.values),
         "complete": positive.complete + negative.complete,
@@ -143,134 +136,15 @@ def buckling(
         "solver": base.backend,
         "wall_seconds": time.perf_counter() - began,
     }
-    return buckling_dataset(base.problem.case, found, statistics)
+    return buckling_dataset(base.case, found, statistics)
 
 
-class _Base:
-    """The base state, the tangent there, and its change along the path.
-
-    Attributes
-    ----------
-    problem : OrigamiProblem
-        The case, with its preloads constant.
-    u, slope : (m,)
-        The base state, and its derivative with respect to the load factor.
-    step : float
-        Load factor of the central difference.
-    softening : Softening
-        Symmetric parts of the tangent and of its derivative, on the free dofs.
-    """
-
-    def __init__(self, case: Case, preloads: Sequence[Load]) -> None:
-        whole = case.altered(loads=(*preloads, *case.loads)) if preloads else case
-        problem = OrigamiProblem(whole, range(len(preloads)))
-        refuse_mechanisms(problem)
-        try:
-            self.u = settle(Solver(problem), problem.start(), 0.0).point.u
-        except PathStoppedError as stop:
-            raise ComputationError(f"buckling: {stop}") from None
-        self.problem, self._reduce = problem, Reduction(problem.free)
-        self._refuse_soft()
-        self.backend, self._factorize = factorizer("auto", len(problem.free))
-        matrix = self.tangent(self.u, 0.0)
-        block = self._reduce(matrix)
-        try:
-            factors = self._factorize(block.symmetric)
-            negative = factors.negative()
-            exact = factors if block.is_symmetric else Unsymmetric(block.exact)
-        except SingularTangentError:
-            raise _unstable("is singular", bool(preloads)) from None
-        if negative:
-            raise _unstable(f"has {negative} negative eigenvalues", bool(preloads))
-        self._exact: Solution = exact
-        self.slope = self._slope(matrix)
-        self.step = STEP / self._stretch()
-        ahead, behind = (
-            self.tangent(self.u + way * self.slope, way) for way in (self.step, -self.step)
-        )
-        change = self._reduce(sparse.csr_array((ahead - behind) / (2.0 * self.step)))
-        if not change.is_symmetric:
-            loads = problem.case.constraints.matrix(
-                problem.load_stiffness(problem.dofs(self.u), 1.0)
-            )
-            _warn_of_asymmetry(asymmetry(Reduction(problem.free)(sparse.csr_array(loads)).exact))
-        self.softening = Softening(
-            block.symmetric, change.symmetric, factors, self._factorize,
-            rounding=1.0 / self.step, farthest=FARTHEST * self.step / STEP,
-        )  # fmt: skip
-
-    def tangent(self, u: NDArray, factor: float) -> sparse.csr_array:
-        """Exact tangent (m, m) of a state, N/m, with the load stiffness."""
-        problem, q = self.problem, self.problem.dofs(u)
-        matrix = problem.body(u, factor).tangent(q)
-        if problem.following.acts:
-            matrix = sparse.csr_array(matrix + problem.load_stiffness(q, factor))
-        return sparse.csr_array(problem.case.constraints.matrix(matrix))
-
-    def all_dofs(self, free: NDArray) -> NDArray:
-        """Motions (m, k) of all dofs in motions of the free dofs."""
-        full = np.zeros((len(self.u), free.shape[1]))
-        full[self.problem.free] = free
-        return full
-
-    def moved(self, force: NDArray) -> NDArray:
-        """Motion (m,) under a force (m,) on the free dofs."""
-        motion = np.zeros(len(self.u))
-        motion[self.problem.free] = self._exact.solve(force[self.problem.free])
-        return motion
-
-    def _slope(self, matrix: sparse.csr_array) -> NDArray:
-        problem, given = self.problem, np.zeros(len(self.u))
-        given[problem.held] = problem.prescribed(1.0) - problem.prescribed(0.0)
-        return given + self.moved(-problem.rate(self.u, 0.0) - matrix @ given)
-
-    def _stretch(self) -> float:
-        """Largest strain or turn per unit of the load factor, about.
-
-        Loads on held dofs move nothing, but stress the structure: their forces over those at unit
-        strain count, too.
-        """
-        problem, structure = self.problem, self.problem.structure
-        body = problem.body(self.u, 0.0)
-        moved, q = problem.dofs(self.slope), problem.dofs(self.u)
-        nodes = structure.nodes.size
-        x, v = structure.nodes + q[:nodes].reshape(-1, 3), moved[:nodes].reshape(-1, 3)
-        a, b = structure.bars.T
-        apart = np.linalg.norm(v[b] - v[a], axis=1) / np.linalg.norm(x[b] - x[a], axis=1)
-        turned = body.sheet.per_hidden * np.abs(moved[body.hidden])
-        scale = body.scale()
-        held = np.abs(problem.rate(self.u, 0.0))[: len(scale)]
-        stressed = np.divide(held, scale, out=np.zeros_like(scale), where=scale > 0.0)
-        most = max(float(each.max(initial=0.0)) for each in (apart, turned, stressed))
-        if most == 0.0:  # springs alone resist the loads
-            most = float(np.linalg.norm(v)) / problem.length
-        if most == 0.0:
-            raise InputError(
-                ": they load nothing, so that no load factor exists; give loads that deform the "
-                "case",
-                "loads",
-            )
-        return most
-
-    def _refuse_soft(self) -> None:
-        case, problem = self.problem.case, self.problem
-        soft = int(soft_at_rest(case, problem.body(self.u, 0.0), problem.dofs(self.u))[0].sum())
-        if soft:
-            raise InputError(
-                f": {soft} hinges of the superlinear law stand at their rest angle, where their "
-                'slope vanishes and has no derivative; take preset = "plate" or "n5b8e", or a '
-                "preload that turns these hinges",
-                "bend_law",
-            )
-
-
-def _check(case: Case) -> None:
+def _check(case: Case, preloaded: bool) -> None:
     """Refuse what has no tangent that changes linearly."""
-    if case.structure.linear:
+    if case.structure.linear and preloaded:
         raise InputError(
-            f": {case.structure.linear} are linear and have no geometric stiffness; take fd.shell "
-            "or fd.discretize (bars and hinges)",
-            "structure",
+            f": {case.structure.linear} have load factors about rest alone; take fd.shell",
+            "preload",
         )
     if case.contact is not None:
         raise InputError(
@@ -289,23 +163,9 @@ def _check(case: Case) -> None:
         )
 
 
-def _unstable(how: str, preloaded: bool) -> InputError:
-    """Error for a base state in which the tangent is not positive definite."""
-    if preloaded:
-        return InputError(
-            f": the tangent {how} in the equilibrium under it: the case has buckled already; give "
-            "a smaller one",
-            "preload",
-        )
-    return InputError(
-        f"the tangent {how} at rest, before any load acts; hold what moves, or give folds a "
-        "stiffness, or a preload under which the case is stable"
-    )
-
-
-def _nodal(base: _Base, free: NDArray) -> NDArray:
+def _nodal(base: Base, free: NDArray) -> NDArray:
     """Shapes (k, n, 3) of the nodes, the largest displacement 1, from motions of the free dofs."""
-    case = base.problem.case
+    case = base.case
     shapes = base.problem.dofs(base.all_dofs(free))[: case.structure.nodes.size]
     if not shapes.shape[1]:
         return np.zeros((0, *case.structure.nodes.shape))
@@ -314,7 +174,7 @@ def _nodal(base: _Base, free: NDArray) -> NDArray:
     return shapes / np.where(sizes > 0.0, sizes, 1.0)[:, None, None]
 
 
-def _departure(base: _Base, positive: LoadFactors, negative: LoadFactors) -> tuple[float, float]:
+def _departure(base: Base, positive: LoadFactors, negative: LoadFactors) -> tuple[float, float]:
     """Departure and turn (rad) at the first factor; nan without one.
 
     The state there is corrected to second order in the factor, with the tangent in the base state.
@@ -346,13 +206,4 @@ def _warn(values: NDArray, departure: float, turn: float) -> None:
             "stiffness is left where the linear path is corrected to second order: this factor may "
             "be off by as much, or mean nothing. fd.trace finds the critical points of the path",
             "buckling.md#when-the-factors-hold",
-        )
-
-
-def _warn_of_asymmetry(share: float) -> None:
-    if share > ASYMMETRIC:
-        warn(
-            f"{NO_POTENTIAL.format(share)} load factors take its symmetric part, which misses "
-            "flutter: simulated motions include it",
-            "loads.md#pressure",
         )

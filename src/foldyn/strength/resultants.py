@@ -104,7 +104,7 @@ class SuperelementResultants:
 def for_stresses(case: Case) -> Case:
     """The case with the model that its stresses are computed with."""
     structure = case.structure
-    if not isinstance(structure, Superelements) or structure.stressed:
+    if not isinstance(structure, Superelements) or structure.finer is not None:
         return case
     return case.altered(structure=structure.for_stresses)
 
