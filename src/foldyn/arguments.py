@@ -183,6 +183,8 @@ class Checked:
         Prefix of arguments in messages, such as "settings: ".
     missing : mapping of str to str
         Remedy for each required key, for messages about files that lack it.
+    either : sequence of sequence of str
+        Sets of keys of which files give at least one.
     gone : mapping of str to str
         What takes the place of each key that files may no longer have.
     in_files : Check or None
@@ -193,6 +195,7 @@ class Checked:
 
     place: ClassVar[str] = ""
     missing: ClassVar[Mapping[str, str]] = NOTHING
+    either: ClassVar[Sequence[Sequence[str]]] = ()
     gone: ClassVar[Mapping[str, str]] = NOTHING
     in_files: ClassVar[Check | None] = None
     like: ClassVar[Sequence[Any]] = ()

@@ -216,7 +216,8 @@ def schema_of(
             for field, one in own.items()
         }
         required = [key for key in needs(kind) if key in properties]
-        definitions[name] = closed(properties, required, kind, word)
+        either = {"anyOf": [{"required": [*keys]} for keys in kind.either]} if kind.either else {}
+        definitions[name] = {**closed(properties, required, kind, word), **either}
     return {"$ref": f"#/definitions/{name}"}
 
 

@@ -140,7 +140,7 @@ def test_an_interrupted_path_is_kept(workplace, monkeypatch) -> None:
 
         clear = close = set_postfix_str = nothing
 
-    monkeypatch.setattr(paths, "_bar", lambda shown: Impatient())
+    monkeypatch.setattr(paths, "bar", lambda shown, **options: Impatient())
     stopped = workplace.run(TOWER)
     assert stopped.status == 130
     assert "interrupted after 3 points" in stopped.err

@@ -183,12 +183,13 @@ class Sheet(Checked):
     plies: Plies | None = None
 
     place = "sheet: "
+    either = ("youngs_modulus", "poissons_ratio", "thickness"), ("plies",)
 
     def agree(self) -> None:
         """Refuse impossible materials, panels named twice, and densities of some panels only."""
         if self.plies:
             self._follow(constants("plies", self.plies))
-        for name in ("youngs_modulus", "poissons_ratio", "thickness"):
+        for name in self.either[0]:
             if getattr(self, name) is None:
                 raise InputError(": missing; or give plies", name)
         check_material(vars(self), OF_FIBERS)
