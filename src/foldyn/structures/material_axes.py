@@ -17,7 +17,7 @@ from foldyn.patterns.topology import around, edge_of
 from foldyn.structures.sheet import Sheet
 
 UPRIGHT = 0.02  # a vector with a smaller part along a panel counts as normal to it
-SAME = 1e-6  # rad: difference of directions carried along two ways
+SAME = 1e-3  # rad: difference of directions carried along two ways; drawings are not exact
 
 
 def material_axes(pattern: Pattern, sheet: Sheet) -> NDArray[np.float64] | None:
