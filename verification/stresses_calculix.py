@@ -133,7 +133,7 @@ def main(arguments: list[str] | None = None) -> int:
     for number in given.cases:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", fd.errors.FoldynWarning)
-            found += rows(*sheets[number], given.orthotropic)
+            found += rows(*sheets[number], orthotropic=given.orthotropic)
         print(*found[-3:], sep="\n", file=sys.stderr, flush=True)
         with given.out.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")

@@ -124,7 +124,6 @@ duration = 1.0
 """)
     rows = dict(inputs(case_file, case_file.case(), {"mixed_voronoi": xr.Dataset()}))
     assert rows["contact"] == (
-        "between panels; friction 0.2. "
-        "Plane: point [0.0, 0.0, -0.1] m; normal [0.0, 0.0, 1.0]; friction 0.45"
+        "between panels; friction 0.2. Plane: point [0, 0, -0.1] m; normal [0, 0, 1]; friction 0.45"
     )
-    assert rows["initial state"] == "velocity [0.0, 0.0, -1.5] m/s"
+    assert rows["initial state"] == "velocity [0, 0, -1.5] m/s"

@@ -232,6 +232,7 @@ class PanelShells:
             triangles=mesh.triangles,
             kind=np.zeros(len(mesh.triangles), np.int64),
             sheets=(sheet,),
+            axes=np.zeros((len(mesh.triangles), 2, 3)),  # of isotropic sheets
             joints=joints,
             places=mesh.corners,
             held=held,

@@ -216,7 +216,7 @@ def _written(value: Any) -> str:
         return ", ".join(f"{word} {_written(one)}" for word, one in value.items())
     if isinstance(value, tuple) and all(isinstance(part, PanelSheet) for part in value):
         text = ", ".join(f"{_written(part.panels)} with {_listed(part.own)}" for part in value)
-    elif isinstance(value, tuple) and len(value) == 2 and isinstance(value[0], tuple):
+    elif isinstance(value, tuple) and [*map(type, value)] == [tuple, float]:
         text = f"{value[1]:g} degrees from the edge {list(value[0])}"
     elif isinstance(value, list | tuple) and all(isinstance(part, float) for part in value):
         text = f"[{', '.join(map(_written, value))}]"

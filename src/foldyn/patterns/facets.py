@@ -284,7 +284,8 @@ def _parts(face: Face, vertices: NDArray, normal: NDArray) -> list[Face]:
     for number, piece in enumerate(pieces):
         for a, b in around(piece):
             beside.setdefault(edge_of(a, b), []).append(number)
-    edges = np.array([edge for edge, both in beside.items() if len(both) == 2])
+    inner = [edge for edge, both in beside.items() if len(both) == 2]
+    edges = np.array(inner, np.int64).reshape(-1, 2)  # none of a needle, which is convex
     cuts = edges[longest_first(vertices, edges)].tolist()
     both = [beside[a, b] for a, b in cuts]
     return joined(pieces, vertices, np.tile(normal, (len(pieces), 1)), cuts, both)
