@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from case_texts import changed
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.errors import InputError
 from foldyn.linear import modes
@@ -16,6 +17,32 @@ FIBERS = {"youngs_modulus": (140e9, 10e9), "poissons_ratio": 0.3, "shear_modulus
 T, RHO = 1e-3, 1600.0
 MIURA = fd.patterns.miura(cells=(1, 1), a=0.1, b=0.12, panel_angle=65, dihedral=110)
 QUAD = fd.Pattern([(0, 0, 0), (0.3, 0.02, 0), (0.27, 0.2, 0), (-0.04, 0.16, 0)], [(0, 1, 2, 3)])
+
+CASE = """
+[pattern]
+kind = "simple_fold"
+a = 0.1
+b = 0.1
+dihedral = 120
+[sheet]
+youngs_modulus = [140e9, 10e9]
+poissons_ratio = 0.3
+shear_modulus = 5e9
+thickness = 1e-3
+density = 1600
+direction = { edge = [0, 1], angle = 30 }
+panels = [{ panels = [1], direction = [0, 1, 0] }]
+[model]
+kind = "shell"
+divisions = 2
+[[supports]]
+nodes = [4, 5]
+axes = "xyz"
+along = true
+[analysis]
+kind = "modes"
+count = 2
+"""
 
 
 def sheet(direction=0.0, **others) -> fd.Sheet:
@@ -188,32 +215,7 @@ def test_panels_may_be_orthotropic_among_isotropic_ones_and_the_other_way():
 
 
 def test_a_case_with_fibers_is_stored_and_read(tmp_path):
-    text = """
-        [pattern]
-        kind = "simple_fold"
-        a = 0.1
-        b = 0.1
-        dihedral = 120
-        [sheet]
-        youngs_modulus = [140e9, 10e9]
-        poissons_ratio = 0.3
-        shear_modulus = 5e9
-        thickness = 1e-3
-        density = 1600
-        direction = { edge = [0, 1], angle = 30 }
-        panels = [{ panels = [1], direction = [0, 1, 0] }]
-        [model]
-        kind = "shell"
-        divisions = 2
-        [[supports]]
-        nodes = [4, 5]
-        axes = "xyz"
-        along = true
-        [analysis]
-        kind = "modes"
-        count = 2
-        """
-    (tmp_path / "case.toml").write_text(text)
+    (tmp_path / "case.toml").write_text(CASE)
     result = fd.read_case(tmp_path / "case.toml").run()
     stored = fd.case_of(result).structure.sheet
     assert stored == fd.read_case(tmp_path / "case.toml").case().structure.sheet
@@ -274,41 +276,16 @@ def test_bars_and_hinges_have_no_fibers():
 @pytest.mark.parametrize("kind", ["shell", "superelements"])
 def test_frequencies_have_gradients_by_moduli_and_direction(tmp_path, kind):
     """Beside central differences of whole computations."""
-    text = """
-        [pattern]
-        kind = "simple_fold"
-        a = 0.1
-        b = 0.12
-        dihedral = 100
-        [sheet]
-        youngs_modulus = [140e9, 10e9]
-        poissons_ratio = 0.3
-        shear_modulus = 5e9
-        thickness = 1e-3
-        density = 1600
-        direction = { edge = [0, 1], angle = 30 }
-        [model]
-        kind = "KIND"
-        divisions = 4
-        [[supports]]
-        nodes = [4, 5]
-        axes = "xyz"
-        along = true
-        [analysis]
-        kind = "modes"
-        count = 2
-        """.replace("KIND", kind)
+    edits = f'model.kind = "{kind}"; model.divisions = 4; sheet.panels ='
+    text = changed(CASE, edits)
     path = tmp_path / "case.toml"
     path.write_text(text)
     values = {"sheet.youngs_modulus[1]": 10e9, "sheet.direction.angle": 30.0}
     found = fd.sensitivity(path, values, measures="frequency[2]")
-    for (key, value), old in zip(values.items(), ("10e9", "angle = 30"), strict=True):
+    for key, value in values.items():
         ends = []
         for by in (-1e-3, 1e-3):
-            new = old.replace("10e9", f"{value * (1 + by)!r}").replace(
-                "30", f"{value * (1 + by)!r}"
-            )
-            path.write_text(text.replace(old, new))
+            path.write_text(changed(text, f"{key} = {value * (1 + by)!r}"))
             ends.append(float(fd.read_case(path).run().frequency[1]))
         slope = (ends[1] - ends[0]) / (2e-3 * value)
         assert found[f"gradient_{key}"].item() == pytest.approx(slope, rel=1e-3)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.exports.creased_shell import CreasedShell, creased_shell
 from foldyn.structures import Ply, Sheet
+from foldyn.structures.ply import pair
 from foldyn.values import choice, whole
 from foldyn.writing import write_text
 
@@ -128,7 +129,7 @@ def _section(sheet: Sheet, number: int, name: str, axes: NDArray) -> Iterator[st
 
 def _elastic(part: Sheet | Ply) -> Iterator[str]:
     """Elastic constants; an orthotropic sheet has those of direction 2 along its normal, too."""
-    first, second = np.broadcast_to(part.youngs_modulus, 2).tolist()
+    first, second = pair(part.youngs_modulus)
     if part.shear_modulus is None:
         yield from ("*ELASTIC", _line(first, part.poissons_ratio))
         return

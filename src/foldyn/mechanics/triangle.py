@@ -79,12 +79,17 @@ def isotropic(poissons_ratio: float) -> NDArray[np.float64]:
     return np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, 0.5 * (1.0 - nu)]])
 
 
-def turned_axes(stiffness: NDArray, angle: NDArray | float) -> NDArray[np.float64]:
-    """Stiffness (..., 3, 3) along axes from which the material's are turned by an angle, rad."""
+def turned_strain(angle: NDArray | float) -> NDArray[np.float64]:
+    """Strains (3, 3, ...) along axes turned by an angle (rad), of unit xx, yy, and twice xy."""
     c, s = np.cos(angle), np.sin(angle)
-    strain = np.array(  # along the material's axes
+    return np.array(
         [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
     )
+
+
+def turned_axes(stiffness: NDArray, angle: NDArray | float) -> NDArray[np.float64]:
+    """Stiffness (..., 3, 3) along axes from which the material's are turned by an angle, rad."""
+    strain = turned_strain(angle)
     return np.einsum("ba...,...bc,cd...->...ad", strain, stiffness, strain)
 
 

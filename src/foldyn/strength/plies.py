@@ -16,8 +16,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.mechanics.triangle import turned_axes
-from foldyn.structures.ply import Ply, heights
+from foldyn.mechanics.triangle import turned_axes, turned_strain
+from foldyn.structures.ply import heights
 from foldyn.structures.sheet import Sheet
 
 MAXIMUM_STRESS, TSAI_WU = "maximum_stress", "tsai_wu"
@@ -50,20 +50,13 @@ def ply_factors(
     for ply, low, high in zip(plies, bounds[:-1], bounds[1:], strict=True):
         if ply.strength is None:
             continue
+        along = turned_strain(angle + np.radians(ply.angle))
         for z in (low, high):
-            stress = _along(ply, strain + z * curvature, angle + np.radians(ply.angle))
+            there = strain + z * curvature
+            stress = np.einsum("ab,bcp,...pc->...pa", ply.fibers, along, there)
             own = (_tsai_wu if criterion == TSAI_WU else _maximum_stress)(stress, *ply.strength)
             least = np.minimum(least, own)
     return least
-
-
-def _along(ply: Ply, strain: NDArray, angle: NDArray) -> NDArray[np.float64]:
-    """Stresses (..., p, 3) along the fibers and across, from strains xx, yy, and twice xy."""
-    c, s = np.cos(angle), np.sin(angle)
-    turned = np.array(
-        [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
-    )
-    return np.einsum("ab,bcp,...pc->...pa", ply.fibers, turned, strain)
 
 
 def _maximum_stress(

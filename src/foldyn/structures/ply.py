@@ -138,11 +138,17 @@ class Ply(Checked):
         return turned_axes(self.fibers, math.radians(self.angle))
 
 
+def pair(moduli: float | Sequence[float]) -> tuple[float, float]:
+    """E1 and E2, Pa; of an isotropic material E twice."""
+    first, second = np.broadcast_to(moduli, 2).tolist()
+    return first, second
+
+
 def elastic(
     moduli: float | Sequence[float], poissons_ratio: float, shear: float | None
 ) -> NDArray[np.float64]:
     """Stiffness (3, 3) in plane stress, Pa, of an isotropic or orthotropic material."""
-    first, second = np.broadcast_to(moduli, 2).tolist()
+    first, second = pair(moduli)
     if shear is None:
         return first / (1.0 - poissons_ratio**2) * isotropic(poissons_ratio)
     return plane_stress(first, second, poissons_ratio, shear)

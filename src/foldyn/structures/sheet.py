@@ -23,6 +23,7 @@ from foldyn.structures.ply import (
     constants,
     elastic,
     matrices,
+    pair,
 )
 from foldyn.tables import ListOf, TableOf
 from foldyn.values import indices, number, objects, show, single, vector
@@ -229,8 +230,7 @@ class Sheet(Checked):
     @property
     def moduli(self) -> tuple[float, float]:
         """E1 and E2, Pa; of an isotropic sheet E twice."""
-        given = self.youngs_modulus
-        return given if isinstance(given, tuple) else (given, given)  # type: ignore[return-value]
+        return pair(self.youngs_modulus)
 
     @property
     def modulus(self) -> float:
