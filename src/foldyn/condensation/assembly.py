@@ -4,8 +4,8 @@ The unknowns, from which each panel takes the amplitudes of its shapes, are
 
 - displacements of the vertices (3 v + axis),
 - a vector along x, y, z for each edge and each of its functions,
-- turns of the sheet on both sides of each edge, first of the panel that runs along the edge from
-  its lower to its higher vertex; positive where the sheet lifts toward the front of the panel,
+- turns of the sheet on all sides of each edge, see `EdgeSides`; positive where the sheet lifts
+  toward the front of the panel,
 - vibrations of each panel with its edges held.
 
 Supports, clamps, welds and rigid panels leave some of these, or combinations of them, as dofs.
@@ -22,6 +22,7 @@ from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.condensation.edge_sides import EdgeSides, edge_sides
 from foldyn.condensation.library import Group
 from foldyn.condensation.panel import (
     BOW,
@@ -56,6 +57,7 @@ class Unknowns(NamedTuple):
     vertices: int
     edges: int
     panels: int
+    sides: EdgeSides
     level: Level
 
     @property
@@ -72,21 +74,21 @@ class Unknowns(NamedTuple):
         """First of the three unknowns of a function of an edge."""
         return 3 * (self.vertices + edge * self.functions + function)
 
-    def turn(self, edge: Any, side: Any, number: Any) -> Any:
-        """A turn of a side of an edge."""
-        return self.bow(self.edges, 0) + (2 * edge + side) * self.level.turns + number
+    def turn(self, side: Any, number: Any) -> Any:
+        """A turn of a side."""
+        return self.bow(self.edges, 0) + side * self.level.turns + number
 
     def inner(self, panel: Any, mode: Any) -> Any:
         """A vibration of a panel."""
-        return self.turn(self.edges, 0, 0) + panel * self.level.inner + mode
+        return self.turn(len(self.sides.edge), 0) + panel * self.level.inner + mode
 
     def places_in(self, other: Unknowns) -> NDArray[np.int64]:
         """Index (m,) of each unknown among those of a level that contains this one."""
-        edge, side, panel = np.arange(self.edges), np.arange(2), np.arange(self.panels)
+        edge, panel = np.arange(self.edges), np.arange(self.panels)
         vertices = np.arange(3 * self.vertices)
         bows = other.bow(edge[:, None, None], np.arange(self.functions)[:, None]) + np.arange(3)
         number = np.arange(self.level.turns)
-        turned = other.turn(edge[:, None, None], side[:, None], number)
+        turned = other.turn(np.arange(len(self.sides.edge))[:, None], number)
         inner = other.inner(panel[:, None], np.arange(self.level.inner))
         return np.concatenate([vertices, bows.ravel(), turned.ravel(), inner.ravel()])
 
@@ -95,10 +97,14 @@ class Unknowns(NamedTuple):
 
         The numbers begin with 0 at each edge and panel.
         """
-        begin = np.array([self.bow(0, 0), self.turn(0, 0, 0), self.inner(0, 0)])
-        each = np.array([3 * self.functions, 2 * self.level.turns, self.level.inner])
+        begin = np.array([self.bow(0, 0), self.turn(0, 0), self.inner(0, 0)])
+        each = np.array([3 * self.functions, self.level.turns, self.level.inner])
         kind = np.searchsorted(begin, unknown, side="right") - 1
-        return (kind + BOW, *np.divmod(unknown - begin[kind], each[kind]))
+        owner, number = np.divmod(unknown - begin[kind], each[kind])
+        turned = kind == 1
+        number[turned] += self.level.turns * self.sides.rank[owner[turned]]
+        owner[turned] = self.sides.edge[owner[turned]]
+        return kind + BOW, owner, number
 
 
 class Whole:
@@ -119,7 +125,8 @@ class Whole:
         self.pattern, self.groups, self.level, self._graded = pattern, groups, level, graded
         self.edges = pattern.lines
         x, faces = pattern.vertices, pattern.faces
-        self.unknowns = Unknowns(len(x), len(self.edges), len(faces), level)
+        self.sides = edge_sides(pattern)
+        self.unknowns = Unknowns(len(x), len(self.edges), len(faces), self.sides, level)
         self._along = x[self.edges[:, 1]] - x[self.edges[:, 0]]
 
     @cached_property
@@ -140,7 +147,7 @@ class Whole:
         kept = np.flatnonzero(kind[:, 2] < counts)
         p = len(group.faces)
         edge, backwards = self._edges_of(group.faces)
-        frames = self._edge_frames(group, edge, backwards)
+        frames, sides = self._edge_frames(group, edge, backwards), self._sides_of(group, edge)
         row = len(kept) * np.arange(p)
         rows, columns, values = [], [], []
         for i, (what, where, shape) in enumerate(kind[kept].tolist()):
@@ -154,7 +161,7 @@ class Whole:
                 sign = np.where(backwards[:, e], (-1.0) ** degree, 1.0)
                 vector = sign[:, None] * frames[:, e, axis]
             elif what == TURN:
-                first = own.turn(edge[:, where], backwards[:, where].astype(int), shape)
+                first = own.turn(sides[:, where], shape)
                 vector = np.where(backwards[:, where], (-1.0) ** shape, 1.0)[:, None]
             else:
                 first, vector = own.inner(group.number, shape), np.ones((p, 1))
@@ -173,6 +180,12 @@ class Whole:
         low_high = np.sort(ends, axis=2).reshape(-1, 2).tolist()
         found = np.array([number[low, high] for low, high in low_high]).reshape(faces.shape)
         return found, ends[:, :, 0] > ends[:, :, 1]
+
+    def _sides_of(self, group: Group, edge: NDArray) -> NDArray[np.int64]:
+        """Sides (p, k) of the edges (p, k) of a group's panels."""
+        panels = np.repeat(group.number, edge.shape[1]).tolist()
+        found = [self.sides.of[pair] for pair in zip(panels, edge.ravel().tolist(), strict=True)]
+        return np.reshape(found, edge.shape)
 
     def _edge_frames(self, group: Group, edge: NDArray, backwards: NDArray) -> NDArray:
         """Directions (p, k, 3, 3) along edges, across them in the plane, and normal to both."""
@@ -248,7 +261,7 @@ class Whole:
         bow = own.bow(np.arange(edges)[:, None], np.arange(own.functions)) // 3
         column = np.repeat(np.hstack([self.edges, bow]), count, axis=0)
         begin = weight.shape[1] * np.arange(len(weight) + 1)
-        shape = (len(weight), own.turn(0, 0, 0) // 3)
+        shape = (len(weight), own.turn(0, 0) // 3)
         out = sparse.kron(
             sparse.csr_array((weight.ravel(), column.ravel(), begin), shape=shape),
             sparse.eye_array(3), format="csr",
@@ -257,12 +270,14 @@ class Whole:
         return sparse.csr_array(out)
 
     def turns_on_edges(self, places: NDArray) -> sparse.csr_array:
-        """Turns (2 e p, m) of the sheet on both sides of points at places (e, p) of all edges."""
+        """Turns (2 e p, m) of the sheet on both sides of points at places (e, p) of all edges.
+
+        Junctions have further sides, which are left out.
+        """
         own, (edges, count) = self.unknowns, places.shape
         value = np.repeat(turns(places.ravel(), self.level.turns), 2, axis=0)
-        edge = np.repeat(np.arange(edges), 2 * count)[:, None]
-        side = np.tile([0, 1], edges * count)[:, None]
-        column = own.turn(edge, side, np.arange(self.level.turns))
+        side = 2 * np.repeat(np.arange(edges), 2 * count) + np.tile([0, 1], edges * count)
+        column = own.turn(side[:, None], np.arange(self.level.turns))
         begin = self.level.turns * np.arange(len(value) + 1)
         return sparse.csr_array(
             (value.ravel(), column.ravel(), begin), shape=(len(value), own.size)
@@ -322,19 +337,19 @@ class Whole:
     def rotated(self) -> NDArray[np.float64]:
         """Unknowns (m, 3) other than displacements, in rotations by 1 rad about x, y, z."""
         along = self._along / np.linalg.norm(self._along, axis=1)[:, None]
-        out, edge = np.zeros((self.unknowns.size, 3)), np.arange(self.unknowns.edges)
-        for side, sign in ((0, 1.0), (1, -1.0)):
-            out[self.unknowns.turn(edge, side, 0)] = sign * along
+        out, sides = np.zeros((self.unknowns.size, 3)), self.sides
+        turned = self.unknowns.turn(np.arange(len(sides.edge)), 0)
+        out[turned] = sides.way[:, None] * along[sides.edge]
         return out
 
     @property
     def _turns(self) -> sparse.csr_array:
         """Turns (nf * turns, m) of both sides of the creases relative to each other."""
-        own, count, creases = self.unknowns, self.level.turns, len(self.pattern.creases)
-        first = own.turn(np.arange(creases)[:, None], 0, np.arange(count)).ravel()
-        row = np.tile(np.arange(len(first)), 2)
-        column = np.concatenate([first, first + count])
-        return sparse.csr_array((np.ones(len(row)), (row, column)), (len(first), own.size))
+        own, number = self.unknowns, np.arange(self.level.turns)
+        column = own.turn(self.sides.creases.T[:, :, None], number).reshape(2, -1)
+        row = np.tile(np.arange(column.shape[1]), 2)
+        ways = np.repeat(self.pattern.crease_ways.T.astype(float), len(number), axis=1)
+        return sparse.csr_array((ways.ravel(), (row, column.ravel())), (column.shape[1], own.size))
 
     @cached_property
     def _roots(self) -> NDArray[np.float64]:
@@ -344,7 +359,7 @@ class Whole:
         """
         count, creases = self.level.turns, len(self.pattern.creases)
         roots = np.zeros((creases, count, count))
-        for crease, along in enumerate(self._along[:creases]):
+        for crease, along in enumerate(self._along[self.sides.crease_edge]):
             places = np.append(0.0, self._graded.places(float(np.linalg.norm(along))))
             share = np.diff(places, append=1.0)
             shapes = turns(places + 0.5 * share, count)
@@ -409,41 +424,35 @@ class Whole:
         """
         own, level, columns = self.unknowns, self.level, _Columns()
         columns.add(np.arange(3 * own.vertices)[:, None])
-        sides, turned = self._sides(rigid)
-        straight = {int(edge): np.eye(3) for edge in np.flatnonzero((turned >= 0).any(axis=1))}
+        bends, turned = self._panels(rigid)
+        straight = {int(self.sides.edge[side]): np.eye(3) for side in np.flatnonzero(turned >= 0)}
         self._add_bows(columns, {**held, **straight})
-        sides[clamped] = False
-        welds = len(self.pattern.creases) + len(self.pattern.boundary)  # the first of them
-        number = np.arange(level.turns)
-        edge, side = np.nonzero(sides[:welds])
-        columns.add(own.turn(edge[:, None], side[:, None], number).reshape(-1, 1))
-        edge = np.arange(welds, own.edges)[:, None]
-        both = np.stack([own.turn(edge, side, number) for side in range(2)], axis=-1)
-        columns.add(both.reshape(-1, 2), np.array([1.0, -1.0]))
+        welds = own.edges - len(np.unique(self.pattern.welds, axis=0))  # the first of them
+        number, edge = np.arange(level.turns), self.sides.edge
+        loose = np.flatnonzero(bends & ~np.isin(edge, clamped) & (edge < welds))
+        columns.add(own.turn(loose[:, None], number).reshape(-1, 1))
+        for sides in self.sides.along[welds:]:
+            columns.add(own.turn(sides, number[:, None]), self.sides.way[sides].astype(float))
         panels = np.setdiff1d(np.arange(own.panels), list(rigid))
         columns.add(own.inner(panels[:, None], np.arange(level.inner)).reshape(-1, 1))
-        for edge, side in np.argwhere(turned >= 0).tolist():
-            dofs, factors = self._facet_turn(int(turned[edge, side]), edge, side)
-            columns.put(np.full(len(dofs), own.turn(edge, side, 0)), dofs, factors)
+        for side in np.flatnonzero(turned >= 0).tolist():
+            dofs, factors = self._facet_turn(int(turned[side]), side)
+            columns.put(np.full(len(dofs), own.turn(side, 0)), dofs, factors)
         return columns.matrix(own.size)
 
-    def _sides(self, rigid: Collection[int]) -> tuple[NDArray, NDArray]:
-        """Whether each side (e, 2) of an edge has a panel that bends, and its rigid panel or -1."""
-        bends, turned = (
-            np.zeros((self.unknowns.edges, 2), bool),
-            np.full((self.unknowns.edges, 2), -1),
-        )
-        for group in self.groups:
-            edge, backwards = self._edges_of(group.faces)
-            stiff = np.isin(group.number, list(rigid))
-            bends[edge, backwards.astype(int)] = ~stiff[:, None]
-            turned[edge, backwards.astype(int)] = np.where(stiff, group.number, -1)[:, None]
+    def _panels(self, rigid: Collection[int]) -> tuple[NDArray, NDArray]:
+        """Whether each side (s,) has a panel that bends, and its rigid panel or -1."""
+        bends = np.zeros(len(self.sides.edge), bool)
+        turned = np.full(len(bends), -1)
+        for (panel, _), side in self.sides.of.items():
+            bends[side] = panel not in rigid
+            turned[side] = panel if panel in rigid else -1
         return bends, turned
 
-    def _facet_turn(self, panel: int, edge: int, side: int) -> tuple[NDArray, NDArray]:
-        """Dofs (9,) of vertices and factors (9,), 1/m, of the turn of a panel about an edge."""
+    def _facet_turn(self, panel: int, side: int) -> tuple[NDArray, NDArray]:
+        """Dofs (9,) of vertices and factors (9,), 1/m, of the turn of a panel about a side."""
         x, face = self.pattern.vertices, np.array(self.pattern.faces[panel])
-        a, b = self.edges[edge][::-1] if side else self.edges[edge]
+        a, b = self.edges[self.sides.edge[side]][:: self.sides.way[side]]
         along = (x[b] - x[a]) / np.linalg.norm(x[b] - x[a])
         away = x[face] - x[a]
         height = np.linalg.norm(away - np.outer(away @ along, along), axis=1)

@@ -454,11 +454,12 @@ def superelements(
 def _folds(pattern: Pattern) -> NDArray:
     """Hinge rows (nf, 4) of the creases: axis j, k, then the next corners i, l of both panels."""
     rows = []
-    for (low, high), (one, two) in zip(
-        pattern.creases.tolist(), pattern.crease_faces.tolist(), strict=True
+    for edge, panels, ways in zip(
+        pattern.creases.tolist(), pattern.crease_faces.tolist(), pattern.crease_ways, strict=True
     ):
         wings = []
-        for face, second in ((pattern.faces[one], high), (pattern.faces[two], low)):
-            wings.append(face[(face.index(second) + 1) % len(face)])
-        rows.append((low, high, *wings))
+        for panel, forward in zip(panels, ways * [1, -1], strict=True):
+            face, last = pattern.faces[panel], edge[:: int(forward)][1]
+            wings.append(face[(face.index(last) + 1) % len(face)])
+        rows.append((*edge, *wings))
     return np.array(rows, np.int64).reshape(-1, 4)

@@ -139,7 +139,7 @@ def _seam_points(
     """
     points = np.zeros((len(panels.points), 3))
     points[:, : panels.points.shape[1]] = panels.points
-    topology = build_topology(checked_faces(panels.faces, len(points)), len(points))
+    topology = build_topology(checked_faces(panels.faces, len(points)), points)
     normals = face_geometry(points, topology.faces).face_normals
     pairs = seams(points, topology.faces, normals, topology.boundary, near)
     same: list[tuple[int, int]] = []

@@ -72,6 +72,7 @@ class BarsPlates(NamedTuple):
     hinges: NDArray  # (nf + nb, 4) of the folds, then of the bends
     wings: NDArray  # (c, 3) virtual wings of clamped edges, from the edge's middle, m
     fold_rotations: NDArray  # (nf, 2) rotations on both sides of each fold, or -1
+    fold_ways: NDArray  # (nf, 2) 1, or -1 for rotations that open the fold, as at junctions
     unmoved: NDArray  # (nf,) dihedrals at rest, rad, if dofs are turns of folds; or (0,)
     fold_stiffness: NDArray  # (nf,) N m/rad
     fold_rest: NDArray  # (nf,) rad
@@ -254,9 +255,12 @@ def handed_over(model: BarsPlates, push: NDArray) -> tuple[NDArray, NDArray]:
 def turn_folds(model, x, scratch):
     """Angles of the folds with rotations x."""
     for f in range(model.fold_rest.size):
-        one, other = model.fold_rotations[f]
-        both = (x[one] if one >= 0 else 0.0) + (x[other] if other >= 0 else 0.0)
-        scratch.fold_angle[f] = scratch.angle[f] - model.per_reach * both
+        scratch.fold_angle[f] = scratch.angle[f]
+        for side in range(2):
+            rotation = model.fold_rotations[f, side]
+            if rotation >= 0:
+                turn = model.per_reach * x[rotation]
+                scratch.fold_angle[f] -= model.fold_ways[f, side] * turn
 
 
 @kernel
@@ -414,9 +418,10 @@ def turn_moments(model, x, couple, scratch):
 def turn_rotations(model, couple, scratch):
     """Add the forces of the folds' moments on the rotations beside them."""
     for f in range(model.fold_rest.size):
-        for rotation in model.fold_rotations[f]:
+        for side in range(2):
+            rotation = model.fold_rotations[f, side]
             if rotation >= 0:
-                couple[rotation] -= model.per_reach * scratch.moment[f]
+                couple[rotation] -= model.fold_ways[f, side] * model.per_reach * scratch.moment[f]
 
 
 @inner
@@ -482,8 +487,10 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
     scratch.moment[:] = 0.0
     for f in range(model.fold_rest.size):
         angle = began[f]
-        for rotation in model.fold_rotations[f]:
-            angle -= model.per_reach * x0[rotation] if rotation >= 0 else 0.0
+        for side in range(2):
+            rotation = model.fold_rotations[f, side]
+            if rotation >= 0:
+                angle -= model.fold_ways[f, side] * model.per_reach * x0[rotation]
         scratch.moment[f] = model.fold_stiffness[f] * mean_moment(
             model.code, model.addresses, model.fold_parameters[f], 1.0, model.fold_rest[f], angle,
             scratch.fold_angle[f] - angle,

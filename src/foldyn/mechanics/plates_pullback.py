@@ -109,15 +109,18 @@ def pull_folds(model, x, y, scratch, back, by_x):
             p[f, 0], p[f, 1], p[f, 2], p[f, 3], 1.0, model.addresses,
         )  # fmt: skip
         scratch.moment[f] = stiffness * moment
-        for rotation in model.fold_rotations[f]:
+        for side in range(2):
+            rotation = model.fold_rotations[f, side]
             if rotation >= 0:
-                rate -= model.per_reach * y[rotation]
+                rate -= model.fold_ways[f, side] * model.per_reach * y[rotation]
         back.moment[f] = stiffness * slope * rate
-        for rotation in model.fold_rotations[f]:
+        for side in range(2):
+            rotation, way = model.fold_rotations[f, side], model.fold_ways[f, side]
             if rotation >= 0:
-                by_x[rotation] -= model.per_reach * back.moment[f]
-                back.couple[rotation] -= model.per_reach * scratch.moment[f]
-                out.per_reach[0] -= back.moment[f] * x[rotation] + scratch.moment[f] * y[rotation]
+                by_x[rotation] -= way * model.per_reach * back.moment[f]
+                back.couple[rotation] -= way * model.per_reach * scratch.moment[f]
+                turned = back.moment[f] * x[rotation] + scratch.moment[f] * y[rotation]
+                out.per_reach[0] -= way * turned
         out.fold_stiffness[f] += moment * rate
         rate *= stiffness
         out.fold_rest[f] += by_rest * rate

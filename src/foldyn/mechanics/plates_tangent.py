@@ -142,11 +142,16 @@ def _scatter(indptr, dof, first, nodes, block, data):
 def _put_fold(model, scratch, f, floor, moment, stiffness):
     """Put moments and matrix of the angles of fold f: its dihedral, and rotations beside it."""
     moment[0] = fold_moment(model, scratch, f)
-    stiffness[0, 0] = model.fold_stiffness[f] * max(fold_slope(model, scratch, f), floor)
-    for k in range(1, 3):
-        moment[k] = -moment[0]
-        stiffness[0, k] = stiffness[k, 0] = -stiffness[0, 0]
-        stiffness[k, 1] = stiffness[k, 2] = stiffness[0, 0]
+    slope = model.fold_stiffness[f] * max(fold_slope(model, scratch, f), floor)
+    way, k = np.ones(3), 1
+    for side in range(2):
+        if model.fold_rotations[f, side] >= 0:
+            way[k] = -model.fold_ways[f, side]
+            k += 1
+    for k in range(3):
+        moment[k] = way[k] * moment[0]
+        for m in range(3):
+            stiffness[k, m] = way[k] * way[m] * slope
 
 
 @inner_scalar

@@ -45,7 +45,7 @@ class FoldHinges(NamedTuple):
     nodes: NDArray  # (k, 4) axis j, k, wings i, l
     corners: NDArray  # (k, 4, 3) rest positions, m
     hidden: NDArray  # (k, 2) dofs, or NO_DOF
-    per_hidden: float  # rad/m
+    per_hidden: NDArray | float  # (k, 2) or one for all, rad/m
     rest: NDArray  # (k,) rad
     stiffness: NDArray  # (k,) N m/rad
     softness: NDArray  # (k,) rad/(N m), softness of the adjacent panels

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.patterns.topology import edge_lookup, vertex_pair
+from foldyn.patterns.topology import edge_rows, vertex_pair
 from foldyn.values import listed, show, single, suggest
 
 # Words that select creases in every pattern, and the letters that each word selects.
@@ -56,7 +57,7 @@ def fold_angles(given: Any, creases: NDArray[np.int64], named: Named) -> NDArray
     if given is None:
         return angles
     if isinstance(given, Mapping):
-        row = edge_lookup(creases)
+        row = edge_rows(creases)
         for word in (key for key in given if isinstance(key, str)):
             rows = folded_rows(f"fold_angles.{word}", word, named)
             angles[rows] = _own_way(word, _angle(given[word]), np.array(named.assignments)[rows])
@@ -119,7 +120,7 @@ def families(
         return {}
     if not isinstance(given, Mapping):
         raise InputError(f" = {given!r}: give a mapping from names to creases", field)
-    row, rows = edge_lookup(creases), {}
+    row, rows = edge_rows(creases), {}
     for name, members in given.items():
         if not isinstance(name, str) or not name or name in ASSIGNED:
             raise InputError(
@@ -132,7 +133,9 @@ def families(
         strange = [pair for pair in pairs if pair not in row]
         if strange:
             raise InputError(f": {strange[0]} is not {what}; name the two vertices of each", place)
-        rows[name] = np.array(sorted({row[pair] for pair in pairs}), dtype=np.int64)
+        rows[name] = np.array(
+            sorted(chain.from_iterable(row[pair] for pair in {*pairs})), dtype=np.int64
+        )
         rows[name].setflags(write=False)
     return rows
 

@@ -40,5 +40,6 @@ def fold_angles(pattern: Pattern, vertices: NDArray | None = None) -> NDArray[np
     if vertices is None:
         return flat - pattern.dihedrals
     normals = face_geometry(vertices, pattern.faces).face_normals
-    graph = pattern.creases, pattern.crease_faces, np.array(pattern.assignments, dtype="<U1")
-    return flat - crease_dihedrals(vertices, normals, *graph)[0]
+    graph = pattern.creases, pattern.crease_faces, pattern.crease_ways
+    letters = np.array(pattern.assignments, dtype="<U1")
+    return flat - crease_dihedrals(vertices, normals, *graph, letters)[0]

@@ -131,8 +131,9 @@ def _crosses_itself(corners: NDArray, normals: NDArray, diameter: NDArray) -> ND
 
 
 def crease_dihedrals(
-    vertices: NDArray, normals: NDArray, creases: NDArray, crease_faces: NDArray, letters: NDArray
-) -> tuple[NDArray, NDArray]:
+    vertices: NDArray, normals: NDArray, creases: NDArray, crease_faces: NDArray, ways: NDArray,
+    letters: NDArray,
+) -> tuple[NDArray, NDArray]:  # fmt: skip
     """Dihedral of each crease, from the angle (`atan2`) between the two normals.
 
     Parameters
@@ -141,8 +142,8 @@ def crease_dihedrals(
         Coordinates (m).
     normals : ndarray, shape (m, 3)
         Unit normals of the faces towards the front.
-    creases, crease_faces : ndarray of int, shape (nc, 2)
-        As in `Topology`.
+    creases, crease_faces, ways : ndarray of int, shape (nc, 2)
+        As `creases`, `crease_faces` and `crease_ways` in `Topology`.
     letters : ndarray of str, shape (nc,)
         "M" and "V" decide the side of closed creases.
 
@@ -157,7 +158,7 @@ def crease_dihedrals(
     """
     axis = vertices[creases[:, 1]] - vertices[creases[:, 0]]
     axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
-    front, back = normals[crease_faces[:, 0]], normals[crease_faces[:, 1]]
+    front, back = (ways[:, k, None] * normals[crease_faces[:, k]] for k in range(2))
     # Normals of non-planar faces may lean along the crease: use only the components across it.
     front = front - np.einsum("ij,ij->i", front, axis)[:, None] * axis
     back = back - np.einsum("ij,ij->i", back, axis)[:, None] * axis

@@ -18,9 +18,11 @@ from foldyn.patterns.picture import picture
 from foldyn.patterns.topology import (
     Edge,
     Topology,
+    at_junctions,
     build_topology,
     checked_faces,
     edge_lookup,
+    edge_rows,
     vertex_pair,
 )
 from foldyn.patterns.transforms import Transforms
@@ -48,7 +50,7 @@ class Pattern(Transforms):
         order of `creases` or as a mapping from vertex pairs and families, such as {(a, b): "M",
         "zigzag": "V"}, where pairs override families. A mapping may also hold "B" for boundary
         edges. Creases without an entry get the letter that fits their dihedral; with None, all
-        creases do.
+        creases do, and those of junctions always.
     name : str
         Name of the pattern.
     boards : Boards, optional
@@ -88,18 +90,25 @@ class Pattern(Transforms):
         For each face, whether its winding was reversed. A reversed face keeps its first
         vertex: (v1, v2, v3, v4) becomes (v1, v4, v3, v2).
     edges, creases, boundary : ndarray of int, shape (m, 2)
-        All edges; edges shared by two faces, except welds; and edges of one face only. Each is a
-        (low, high) vertex pair, in lexicographic order.
+        All edges; edges shared by faces, except welds; and edges of one face only. Each is a
+        (low, high) vertex pair, in lexicographic order. An edge of m > 2 faces, a junction, is m
+        creases, one between each two neighbors in the order of angles about it.
     crease_faces : ndarray of int, shape (nc, 2)
         The face that runs along the crease from low to high, and the face that runs from high to
-        low.
-    welds, weld_faces, weld_dihedrals
-        Like `creases`, `crease_faces` and `dihedrals`, for welds.
+        low; at junctions see `dihedrals`.
+    crease_ways : ndarray of int, shape (nc, 2)
+        1, or at junctions -1 for faces that run the other way along the crease.
+    welds, weld_faces, weld_ways, weld_dihedrals
+        Like `creases`, `crease_faces`, `crease_ways` and `dihedrals`, for welds. A junction of m
+        faces is m (m - 1) / 2 welds, of each two faces.
+    junctions : ndarray of int, shape (nj, 2)
+        Edges of more than two faces.
     dihedrals : ndarray, shape (nc,)
         Angle between the two panels across each crease (rad, 0 to 2 pi) seen from the front:
         pi when flat, below pi on a valley, above on a mountain. Where panels coincide within
         1e-3 rad the letter decides between 0 and 2 pi; exactly closed creases without a letter
-        have 0.
+        have 0. At junctions it is the angle from the first to the second panel of the crease, by
+        the right-hand rule about the direction from low to high.
     flat_dihedrals : ndarray, shape (nc,)
         Dihedral (rad) at which the two panels lie flat: pi for thin panels; for thick panels it may
         differ, since boards can be tilted relative to the planes through their hinge lines.
@@ -115,7 +124,7 @@ class Pattern(Transforms):
     Raises
     ------
     InputError
-        Bad vertices, faces or assignments; an edge of more than two faces; a one-sided surface.
+        Bad vertices, faces or assignments; a one-sided surface.
 
     Warns
     -----
@@ -155,17 +164,18 @@ class Pattern(Transforms):
         if not isinstance(name, str):
             raise InputError(f"name = {name!r}: give a string.")
         points = _checked_vertices(vertices)
-        topology = build_topology(checked_faces(faces, len(points)), len(points), welds)
+        topology = build_topology(checked_faces(faces, len(points)), points, welds)
         geometry = face_geometry(points, topology.faces)
         normals = geometry.face_normals
         named = crease_data.families(families, topology.creases)
         by_pair = crease_data.letters_by_pair(assignments, named, topology.creases)
         given, open_edges = _given_letters(by_pair, topology)
-        graph = topology.creases, topology.crease_faces, given
+        given[at_junctions(topology.creases)] = ""  # the panels there have no common front
+        graph = topology.creases, topology.crease_faces, topology.crease_ways, given
         dihedrals, _ = crease_dihedrals(points, normals, *graph)
         flat_there = np.full(len(topology.welds), "F")
         bent, shut = crease_dihedrals(
-            points, normals, topology.welds, topology.weld_faces, flat_there
+            points, normals, topology.welds, topology.weld_faces, topology.weld_ways, flat_there
         )
         if shut.any():
             raise InputError(
@@ -209,8 +219,15 @@ class Pattern(Transforms):
 
     @property
     def lines(self) -> NDArray[np.int64]:
-        """All edges by kind, shape (m, 2): creases, then boundary edges, then welds."""
-        return np.concatenate([self.creases, self.boundary, self.welds]).reshape(-1, 2)
+        """All edges by kind, each once, shape (m, 2): creases, then boundary edges, then welds."""
+        kinds = (_once(pairs) for pairs in (self.creases, self.boundary, self.welds))
+        return np.concatenate(list(kinds)).reshape(-1, 2)
+
+    @cached_property
+    def junctions(self) -> NDArray[np.int64]:
+        """Edges (nj, 2) of more than two faces."""
+        both = np.concatenate([self.creases, self.welds])
+        return np.unique(both[at_junctions(both)], axis=0)
 
     @cached_property
     def sides(self) -> list[NDArray[np.float64]]:
@@ -284,6 +301,12 @@ def _checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
     return result
 
 
+def _once(pairs: NDArray) -> NDArray:
+    """Sorted pairs without repetitions, as junctions have them."""
+    new = np.append(True, (pairs[1:] != pairs[:-1]).any(axis=1))
+    return pairs[new[: len(pairs)]]
+
+
 def _letters(dihedrals: NDArray[np.float64]) -> NDArray[np.str_]:
     """Letter that fits the dihedral of each crease."""
     return np.select([dihedrals < np.pi - _FLAT, dihedrals > np.pi + _FLAT], ["V", "M"], "F")
@@ -297,7 +320,7 @@ def _given_letters(assignments: Any, topology: Topology) -> tuple[NDArray[np.str
     if assignments is None:
         return given, boundary_edges
     if isinstance(assignments, Mapping):
-        row, rim = edge_lookup(creases), edge_lookup(topology.boundary)
+        row, rim = edge_rows(creases), edge_lookup(topology.boundary)
         welds = edge_lookup(topology.welds)
         before: dict[Edge, Any] = {}
         for key, letter in assignments.items():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from collections import deque
 from collections.abc import Iterator, Sequence
-from itertools import chain
+from itertools import chain, combinations, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from foldyn.values import listed
 
 Faces = tuple[tuple[int, ...], ...]
 Edge = tuple[int, int]
+SAME_ANGLE = 1e-6  # rad: panels at a junction within this angle coincide
 
 
 class Topology(NamedTuple):
@@ -30,22 +31,31 @@ class Topology(NamedTuple):
     flipped : tuple of bool
         For each face, whether the winding given was reversed.
     edges, creases, boundary : ndarray of int, shape (m, 2)
-        All edges; edges of two faces, except welds; and edges of one face only. Each is a vertex
-        pair (low, high), in lexicographic order.
+        All edges; edges of several faces, except welds; and edges of one face only. Each is a
+        vertex pair (low, high), in lexicographic order. A junction, an edge of m > 2 faces, is m
+        creases: one between each two neighbors in the order of angles about the edge.
     crease_faces : ndarray of int, shape (nc, 2)
-        For each crease the face that runs low to high and the face that runs high to low.
-    welds, weld_faces : ndarray of int, shape (nw, 2)
-        Like `creases` and `crease_faces`, for edges across which the sheet is continuous.
+        For each crease the face that runs low to high and the face that runs high to low; at
+        junctions two faces of which the second is reached from the first by a turn about the edge,
+        by the right-hand rule from low to high.
+    crease_ways : ndarray of int, shape (nc, 2)
+        1, or at junctions -1 for a first face that runs high to low, or a second face that runs low
+        to high.
+    welds, weld_faces, weld_ways : ndarray of int, shape (nw, 2)
+        Like `creases`, `crease_faces` and `crease_ways`, for edges across which the sheet is
+        continuous. A junction is m (m - 1) / 2 welds, of each two faces.
     """
 
     faces: Faces
     flipped: tuple[bool, ...]
     edges: NDArray[np.int64]
-    creases: NDArray[np.int64]
     boundary: NDArray[np.int64]
+    creases: NDArray[np.int64]
     crease_faces: NDArray[np.int64]
+    crease_ways: NDArray[np.int64]
     welds: NDArray[np.int64]
     weld_faces: NDArray[np.int64]
+    weld_ways: NDArray[np.int64]
 
 
 def checked_faces(faces: Any, n_vertices: int) -> Faces:
@@ -119,21 +129,21 @@ def _checked_face(f: int, face: Any, n_vertices: int) -> tuple[int, ...]:
     return tuple(numbers)
 
 
-def build_topology(faces: Faces, n_vertices: int, welds: Any = ()) -> Topology:
+def build_topology(faces: Faces, vertices: NDArray, welds: Any = ()) -> Topology:
     """Edges, creases and a consistent winding of checked faces.
 
-    Each connected component is walked from its lowest-numbered face, whose winding stays;
-    a neighbor that runs along the shared edge in the same direction is reversed. A reversed
+    Each part connected by edges of two faces is walked from its lowest-numbered face, whose winding
+    stays; a neighbor that runs along the shared edge in the same direction is reversed. A reversed
     face keeps its first vertex: (v1, v2, v3, v4) becomes (v1, v4, v3, v2).
 
     Parameters
     ----------
     faces : tuple of tuple of int
         Faces that passed `checked_faces`.
-    n_vertices : int
-        Number of vertices.
+    vertices : ndarray, shape (n, 3)
+        Coordinates (m), for the order of faces at junctions.
     welds : sequence of (vertex, vertex)
-        Edges of two faces across which the sheet is continuous.
+        Edges of several faces across which the sheet is continuous.
 
     Returns
     -------
@@ -143,8 +153,7 @@ def build_topology(faces: Faces, n_vertices: int, welds: Any = ()) -> Topology:
     Raises
     ------
     InputError
-        An edge of more than two faces, a one-sided surface, or a weld that is not an edge of two
-        faces.
+        A one-sided surface, or a weld that is not an edge of several faces.
     """
     sizes = np.array([len(face) for face in faces])
     owner = np.repeat(np.arange(len(faces)), sizes)
@@ -153,43 +162,67 @@ def build_topology(faces: Faces, n_vertices: int, welds: Any = ()) -> Topology:
     end[last] = start[last - sizes + 1]
     low, high = np.minimum(start, end), np.maximum(start, end)
     # Sorted by edge, so that equal edges are side by side, the one of the lower face first.
-    order = np.argsort(low * n_vertices + high, kind="stable")
+    order = np.argsort(low * len(vertices) + high, kind="stable")
     low, high, owner, start = low[order], high[order], owner[order], start[order]
     first = np.flatnonzero(np.r_[True, (np.diff(low) != 0) | (np.diff(high) != 0)])
     count = np.diff(np.r_[first, len(low)])
-    crowded = np.flatnonzero(count > 2)
-    if len(crowded):
-        k = first[crowded[0]]
-        around = owner[k : k + count[crowded[0]]].tolist()
-        raise InputError(
-            f"faces: edge ({low[k]}, {high[k]}) is shared by {len(around)} faces {around}; at "
-            "most two may meet at an edge: give the others vertices of their own there."
-        )
     edges = np.column_stack([low[first], high[first]])
-    shared = first[count == 2]
+    pairs = first[count == 2][:, None] + np.arange(2)
     forward = start == low
-    pairs = np.column_stack([owner[shared], owner[shared + 1]])
-    creases = edges[count == 2]
-    reverse = _reversals(len(faces), pairs, forward[shared] == forward[shared + 1], creases)
+    clash = forward[pairs[:, 0]] == forward[pairs[:, 1]]
+    reverse = _reversals(len(faces), owner[pairs], clash, edges[count == 2])
     wound = tuple(
         (face[0], *face[:0:-1]) if turn else face for face, turn in zip(faces, reverse, strict=True)
     )
-    lower_runs_forward = forward[shared] ^ reverse[pairs[:, 0]]
-    crease_faces = np.where(lower_runs_forward[:, None], pairs, pairs[:, ::-1])
+    forward ^= reverse[owner]
+    pairs = np.where(forward[pairs[:, :1]], pairs, pairs[:, ::-1])
+    welded = _welded(welds, edges, count > 1)
+    found, owners = [pairs], [np.flatnonzero(count == 2)]
+    for k in np.flatnonzero(count > 2).tolist():
+        sides = np.arange(first[k], first[k] + count[k])
+        about = [wound[face] for face in owner[sides].tolist()]
+        ring = sides[_ring(vertices, edges[k], about, forward[sides])].tolist()
+        beside = combinations(ring, 2) if welded[k] else pairwise([*ring, ring[0]])
+        found.append(np.array(list(beside)))
+        owners.append(np.full(len(found[-1]), k))
+    pairs, edge = np.concatenate(found), np.concatenate(owners)
+    order = np.argsort(edge, kind="stable")
+    pairs, edge = pairs[order], edge[order]
+    ways = np.where(forward[pairs], 1, -1) * np.array([1, -1])
+    creases, joined = (
+        (edges[edge[rows]], owner[pairs[rows]], ways[rows])
+        for rows in (~welded[edge], welded[edge])
+    )
     flipped = tuple(bool(turn) for turn in reverse)
-    welded = _welded(welds, creases)
-    return Topology(
-        wound, flipped, edges, creases[~welded], edges[count == 1], crease_faces[~welded],
-        creases[welded], crease_faces[welded],
-    )  # fmt: skip
+    return Topology(wound, flipped, edges, edges[count == 1], *creases, *joined)
 
 
-def _welded(welds: Any, shared: NDArray) -> NDArray[np.bool_]:
-    """Whether each edge (k,) of two faces is among the vertex pairs `welds`."""
-    row, chosen = edge_lookup(shared), np.zeros(len(shared), bool)
+def _ring(
+    vertices: NDArray, edge: NDArray, faces: Sequence[tuple[int, ...]], forward: NDArray
+) -> NDArray[np.int64]:
+    """Order (m,) of faces by their angle about an edge, from the first of them.
+
+    forward : (m,) whether the faces run along the edge from its lower to its higher vertex.
+    """
+    axis = vertices[edge[1]] - vertices[edge[0]]
+    axis = axis / max(float(np.linalg.norm(axis)), 1e-154)
+    normals = []
+    for face in faces:
+        corners = vertices[list(face)] - vertices[edge[0]]
+        normals.append(np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0))
+    inward = np.where(forward, 1.0, -1.0)[:, None] * np.cross(normals, axis)
+    sine, cosine = np.cross(inward[0], inward) @ axis, inward @ inward[0]
+    angle = np.arctan2(sine, cosine) % (2.0 * np.pi)
+    angle[angle > 2.0 * np.pi - SAME_ANGLE] = 0.0
+    return np.lexsort((np.arange(len(faces)), (angle / SAME_ANGLE).round()))
+
+
+def _welded(welds: Any, edges: NDArray, inner: NDArray) -> NDArray[np.bool_]:
+    """Whether each edge (k,) is among the vertex pairs `welds`, all of which are `inner` (k,)."""
+    row, chosen = edge_lookup(edges), np.zeros(len(edges), bool)
     for pair in listed("welds", welds, "pairs of vertices, as [(0, 1)]"):
         edge = vertex_pair("welds", pair)
-        if edge not in row:
+        if edge not in row or not inner[row[edge]]:
             raise InputError(f": {edge} is not an edge of two panels; leave it out", "welds")
         chosen[row[edge]] = True
     return chosen
@@ -246,6 +279,20 @@ def components(pairs: ArrayLike, count: int) -> NDArray[np.int64]:
 def edge_lookup(edges: NDArray) -> dict[Edge, int]:
     """Row number of each (low, high) vertex pair."""
     return {(a, b): k for k, (a, b) in enumerate(edges.tolist())}
+
+
+def at_junctions(pairs: NDArray) -> NDArray[np.bool_]:
+    """Mask (k,) of the vertex pairs (k, 2) that occur more than once."""
+    number = np.unique(pairs, axis=0, return_inverse=True)[1].ravel()
+    return np.bincount(number, minlength=1)[number] > 1
+
+
+def edge_rows(edges: NDArray) -> dict[Edge, list[int]]:
+    """All row numbers of each (low, high) vertex pair: several at junctions."""
+    rows: dict[Edge, list[int]] = {}
+    for k, (a, b) in enumerate(edges.tolist()):
+        rows.setdefault((a, b), []).append(k)
+    return rows
 
 
 def edge_of(a: int, b: int) -> Edge:

@@ -15,7 +15,8 @@ beta K_b beta / 2.
 On a side shared by two triangles of one panel, and along a weld of two panels, the sheet is smooth:
 with d the change of the dihedral there, the sheet turns by d/2 + x in one triangle and by d/2 - x
 in the other, with x a rotation without mass. On a crease each triangle has its own rotation, x or
-y, and the crease turns by the rest of the dihedral, d - x - y. Free sides have no moment: their
+y, and the crease turns by the rest of the dihedral, d - x - y; at junctions of several panels x and
+y have signs, and welds are as in `structures.edge_angles`. Free sides have no moment: their
 rotation is eliminated in the triangle. A clamped side keeps its rest tangent in space: one wing of
 its hinge is a point that is not a node and moves with the mean displacement of the side's ends. The
 sides of rigid panels, which stay flat, have no rotations.
@@ -26,17 +27,17 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.mechanics.triangle import triangle_stiffness
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
+from foldyn.patterns.topology import Edge, around, at_junctions, edge_lookup, edge_of
 from foldyn.structures import Sheet
 from foldyn.structures.clamps import opposite
-from foldyn.structures.edge_angles import EdgePlates
+from foldyn.structures.edge_angles import EdgePlates, weld_turns
 from foldyn.structures.graded import Grading
 from foldyn.structures.material_axes import material_axes
 from foldyn.structures.mesh import CUT, Triangle, check_triangles
@@ -213,6 +214,7 @@ class Sides(NamedTuple):
     free: NDArray  # (nt, 3) bool
     rotations: int
     piece_rotations: NDArray  # (c, 2) rotations of both sides, -1 for none
+    piece_ways: NDArray  # (c, 2) 1, or at junctions -1 for rotations that open the crease
     piece_crease: NDArray  # (c,) number of the pattern's crease
     wings: NDArray  # (g, 3) positions of wings that are no nodes, m
 
@@ -236,26 +238,36 @@ def sides(
     a, b, third = tri.ravel(), np.roll(tri, -1, 1).ravel(), np.roll(tri, -2, 1).ravel()
     low, high = np.minimum(a, b), np.maximum(a, b)
     order = np.lexsort((a > b, high, low))  # the triangle that runs low to high comes first
-    same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
-    one, two = order[:-1][same], order[1:][same]
-    alone = np.setdiff1d(np.arange(3 * count), np.concatenate([one, two]))
+    new = (low[order][1:] != low[order][:-1]) | (high[order][1:] != high[order][:-1])
+    first = np.flatnonzero(np.append(True, new))
+    times = np.diff(np.append(first, 3 * count))
+    both = order[first[times == 2][:, None] + np.arange(2)]
+    alone = np.sort(order[first[times == 1]])
 
-    folded = mesh.panel[one // 3] != mesh.panel[two // 3]
-    between = zip(low[one[folded]].tolist(), high[one[folded]].tolist(), strict=True)
-    folded[folded] = [pair in crease_of for pair in between]
-    first = np.argsort(~folded, kind="stable")  # pieces of creases come first
-    one, two, folded = one[first], two[first], folded[first]
-    hinges = [np.stack([low[one], high[one], third[one], third[two]], axis=1)]
+    folded = mesh.panel[both[:, 0] // 3] != mesh.panel[both[:, 1] // 3]
+    ends = np.stack([low, high], axis=1)
+    folded[folded] = [pair in crease_of for pair in map(tuple, ends[both[folded, 0]].tolist())]
+    smooth = both[~folded]
+    creased = _Creased.between(both[folded], ends, crease_of)
+    half, turned = np.full(smooth.shape, 0.5), np.ones(smooth.shape) * [1.0, -1.0]
+    joined = _Joined(smooth, ends[smooth[:, 0]], half, turned, np.arange(len(smooth)))
+    if (times > 2).any():
+        creased, joined = _with_junctions(
+            creased, joined, mesh, pattern, order[np.repeat(times > 2, times)], ends
+        )
+    hinges = [
+        np.column_stack([part.axis, third[part.sides]]) for part in (creased, joined)
+    ]  # pieces of creases come first
     hinge, rotation = np.full((2, 3 * count), -1)
     weight, sign = np.zeros((2, 3 * count))
-    numbers, smooth = np.arange(len(one)), ~folded
-    for side, turn in ((one, 1.0), (two, -1.0)):
-        hinge[side[smooth]], weight[side[smooth]] = numbers[smooth], 0.5
-        sign[side] = turn
-    rotation[one[smooth]] = rotation[two[smooth]] = np.arange(smooth.sum())
-    pieces = smooth.sum() + np.arange(2 * folded.sum()).reshape(-1, 2)
-    rotation[one[folded]], rotation[two[folded]] = pieces.T
-    sign[one[folded]] = sign[two[folded]] = 1.0
+    numbers = np.arange(len(creased.sides) + len(joined.sides))
+    hinge[joined.sides] = numbers[len(creased.sides) :, None]
+    weight[joined.sides], sign[joined.sides] = joined.weight, joined.sign
+    rotation[joined.sides] = joined.rotation[:, None]
+    turns = int(joined.rotation.max(initial=-1)) + 1
+    own, place, which = np.unique(creased.sides, return_index=True, return_inverse=True)
+    pieces = turns + np.argsort(np.argsort(place))[which].reshape(-1, 2)
+    rotation[creased.sides], sign[creased.sides] = pieces, 1.0
 
     stiff = [k for k in alone.tolist() if (int(low[k]), int(high[k])) in held]
     wings = []
@@ -268,10 +280,9 @@ def sides(
     free[alone] = True
     free[stiff] = False
     rotation, pieces, rotations = _without(
-        np.isin(mesh.panel, list(rigid)), rotation, pieces, int(smooth.sum() + 2 * folded.sum())
+        np.isin(mesh.panel, list(rigid)), rotation, pieces, turns + len(own)
     )
     sign[rotation < 0] = 0.0
-    pairs = zip(low[one[folded]].tolist(), high[one[folded]].tolist(), strict=True)
     return Sides(
         hinges=np.concatenate(hinges).astype(np.int64),
         hinge=hinge.reshape(-1, 3),
@@ -281,9 +292,78 @@ def sides(
         free=free.reshape(-1, 3),
         rotations=rotations,
         piece_rotations=pieces,
-        piece_crease=np.array([crease_of[pair] for pair in pairs], np.int64),
+        piece_ways=creased.ways,
+        piece_crease=creased.crease,
         wings=np.array(wings).reshape(-1, 3),
     )
+
+
+class _Creased(NamedTuple):
+    """c pieces of creases."""
+
+    sides: NDArray  # (c, 2) sides of triangles
+    axis: NDArray  # (c, 2) nodes
+    ways: NDArray  # (c, 2) see `Sides.piece_ways`
+    crease: NDArray  # (c,)
+
+    @classmethod
+    def between(
+        cls, both: NDArray, ends: NDArray, crease_of: dict[tuple[int, ...], int]
+    ) -> _Creased:
+        """Pieces between two sides each (c, 2), the first of which runs from low to high."""
+        axis = ends[both[:, 0]]
+        crease = np.array([crease_of[pair] for pair in map(tuple, axis.tolist())], np.int64)
+        return cls(both, axis, np.ones(both.shape), crease)
+
+
+class _Joined(NamedTuple):
+    """s pairs of sides between which the sheet is smooth."""
+
+    sides: NDArray  # (s, 2) sides of triangles
+    axis: NDArray  # (s, 2) nodes
+    weight: NDArray  # (s, 2) as in `Sides`
+    sign: NDArray  # (s, 2) as in `Sides`
+    rotation: NDArray  # (s,)
+
+
+def _with_junctions(
+    creased: _Creased, joined: _Joined, mesh: ShellMesh, pattern: Pattern, sides: NDArray,
+    ends: NDArray,
+) -> tuple[_Creased, _Joined]:  # fmt: skip
+    """Add the pieces of junctions, at which the `sides` of triangles meet."""
+    side_of = {
+        (panel, *pair): side
+        for panel, pair, side in zip(
+            mesh.panel[sides // 3].tolist(), ends[sides].tolist(), sides.tolist(), strict=True
+        )
+    }
+
+    def along(edge: Edge, one: int, two: int) -> list[tuple[list[int], Edge]]:
+        """Sides of two panels at the pieces of an edge, and the nodes of these."""
+        pieces = pairwise(mesh.edge_points[edge])
+        return [([side_of[p, *edge_of(*piece)] for p in (one, two)], piece) for piece in pieces]
+
+    folds, welds = [], []
+    for k in np.flatnonzero(at_junctions(pattern.creases)).tolist():
+        a, b = pattern.creases[k].tolist()
+        for both, piece in along((a, b), *pattern.crease_faces[k].tolist()):
+            folds.append((both, piece, pattern.crease_ways[k], k))
+    turns, number = weld_turns(pattern), int(joined.rotation.max(initial=-1)) + 1
+    shared: dict[Edge, int] = {}
+    for k in np.flatnonzero(at_junctions(pattern.welds)).tolist():
+        (a, b), (one, two) = pattern.welds[k].tolist(), pattern.weld_faces[k].tolist()
+        row, share, way = turns[two, (a, b)]
+        for both, piece in along((a, b), one, two) if row == k else ():
+            rotation = shared.setdefault(piece, number + len(shared))
+            welds.append((both, piece, (0.0, share), (1.0, way), rotation))
+
+    return _after(creased, folds), _after(joined, welds)
+
+
+def _after(own: Any, more: list[tuple[Any, ...]]) -> Any:
+    """Rows of a named tuple of arrays, and more of them."""
+    columns = zip(*more, strict=True) if more else (each[:0] for each in own)
+    return type(own)(*map(np.concatenate, zip(own, map(np.array, columns), strict=True)))
 
 
 def _without(
@@ -337,6 +417,7 @@ def triangle_plates(ends: Sides, bending: NDArray) -> tuple[EdgePlates, NDArray,
     plates = EdgePlates(
         rotation_hinge=at,
         fold_rotations=ends.piece_rotations,
+        fold_ways=ends.piece_ways,
         start=np.concatenate([[0], np.cumsum(count)]),
         angle=angle[there],
         entry=np.concatenate([[0], np.cumsum(count**2)]),

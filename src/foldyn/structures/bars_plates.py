@@ -273,7 +273,7 @@ class BarsPlatesTerm(SheetTerm):
     def fold_hinges(self) -> FoldHinges:
         """See `SheetTerm`: one hinge per fold."""
         nodes = self.model.hinges[: len(self.model.fold_rest)]
-        turns, per_hidden = self.model.fold_rotations, self.model.per_reach
+        turns, per_hidden = self.model.fold_rotations, self.model.per_reach * self.model.fold_ways
         if len(self.model.unmoved):  # one dof is the turn of the fold
             first = np.where(turns[:, 0] >= 0, turns[:, 0], turns[:, 1])
             turns, per_hidden = np.stack([first, first], axis=1), -0.5 * per_hidden

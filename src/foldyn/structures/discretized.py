@@ -245,6 +245,13 @@ class Discretized:
         """The structure with the dofs that explicit methods take."""
         if not self.massless or self.by_folds:
             return self
+        if len(self.pattern.junctions):
+            a, b = self.pattern.junctions[0].tolist()
+            raise InputError(
+                f": more than two panels meet at edge ({a}, {b}), where explicit methods cannot "
+                f'integrate {self.massless}; take "generalized_alpha", or scheme = "n5b8"',
+                "method",
+            )
         other = replace(self, by_folds=True)
         return other.marked() if self.as_made else other
 

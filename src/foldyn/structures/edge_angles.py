@@ -11,7 +11,8 @@ bending are in the ratio w^2 : t^2). Panels count as lying in different planes i
 
 Along a weld the sheet is smooth: with d the change of the dihedral between the facets at the weld,
 one panel turns by d/2 + x and the other by d/2 - x, with x a shared rotation. A weld that does not
-stay straight also has a shared bow.
+stay straight also has a shared bow. At a welded junction of several panels x is the turn of the
+first of them, and the others turn by d - x or x - d, with d between the first panel and theirs.
 
 A clamped edge has no rotation of its own: relative to the facet the sheet turns there by the
 dihedral between the facet and the mirror image that the facet has at rest, minus pi.
@@ -33,7 +34,7 @@ from foldyn.algebra.superlu import SingularTangentError
 from foldyn.materials import BarLaw, HingeLaw, LinearBar, LinearHinge
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
+from foldyn.patterns.topology import Edge, around, at_junctions, edge_lookup, edge_of, edge_rows
 from foldyn.structures.clamps import clamp_points
 from foldyn.structures.condensed_panel import panel_moments, panel_stiffness
 from foldyn.structures.mesh import Mesh, hinge_angles, lengths, too_narrow
@@ -48,6 +49,7 @@ class EdgePlates(NamedTuple):
 
     rotation_hinge: NDArray
     fold_rotations: NDArray
+    fold_ways: NDArray
     start: NDArray
     angle: NDArray
     entry: NDArray
@@ -68,8 +70,8 @@ def edge_plates(
     """
     kinds, kind = sheet.kinds(len(pattern.faces))
     folds, bends = len(mesh.folds), len(mesh.bends)
-    hinge = edge_lookup(pattern.creases)
-    hinge |= {edge: folds + bends + k for edge, k in edge_lookup(pattern.welds).items()}
+    creases, welds = edge_rows(pattern.creases), weld_turns(pattern)
+    hinge = {edge: folds + bends + k for edge, k in edge_lookup(pattern.welds).items()}
     hinges = np.concatenate([mesh.folds, mesh.welds])
     hinge |= {edge: bends + len(hinges) + k for k, edge in enumerate(clamped)}
     panels = outlines(
@@ -77,7 +79,7 @@ def edge_plates(
     )
     spokes = [len(face) if mesh.centers[p] >= 0 else 0 for p, face in enumerate(pattern.faces)]
     first = folds + np.concatenate([[0], np.cumsum(spokes)])
-    rotations = np.full((folds, 2), -1)
+    rotations, ways = np.full((folds, 2), -1), np.ones((folds, 2))
     beside: list[int] = []
     shared: dict[tuple[int, str], int] = {}
 
@@ -104,19 +106,24 @@ def edge_plates(
             continue
         turned = list(range(first[p], first[p + 1]))
         parts = [np.eye(len(turned))]
-        for k in (hinge[edge] for edge in edges if edge in hinge):
-            if k < folds:
-                rotations[k, int(rotations[k, 0] >= 0)] = len(beside)
+        for edge in edges:
+            if edge in creases:
+                for k in creases[edge]:
+                    if p in pattern.crease_faces[k]:
+                        own, side = pattern.crease_faces[k] == p, int(rotations[k, 0] >= 0)
+                        rotations[k, side] = len(beside)
+                        ways[k, side] = pattern.crease_ways[k][own][0]
                 turned.append(-1 - len(beside))
                 parts.append(np.ones((1, 1)))
-                beside.append(k)
-            elif k >= bends + len(hinges):
-                turned.append(k)
+                beside.append(creases[edge][0])
+            elif edge in clamped:
+                turned.append(hinge[edge])
                 parts.append(np.ones((1, 1)))
-            else:  # the dihedral at the weld, and the shared rotation
-                first_side = (k, "turn") not in shared
-                turned += [k, -1 - number(k, "turn")]
-                parts.append(np.array([[0.5, 1.0 if first_side else -1.0]]))
+            elif edge in hinge:  # the dihedral at the weld, and the shared rotation
+                k, share, way = welds[p, edge]
+                turned += [folds + bends + k] * (share != 0.0)
+                turned.append(-1 - number(hinge[edge], "turn"))
+                parts.append(np.array([[share, way] if share else [way]]))
         for edge in (edge for edge, bow in zip(edges, panel.bowed, strict=True) if bow):
             turned.append(-1 - number(hinge[edge], "bow"))
             parts.append(np.ones((1, 1)))
@@ -130,6 +137,7 @@ def edge_plates(
     return EdgePlates(
         rotation_hinge=np.array(beside, np.int64),
         fold_rotations=rotations,
+        fold_ways=ways,
         start=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
         angle=np.array([k for turned in angles for k in turned], np.int64),
         entry=np.concatenate([[0], np.cumsum(np.square(sizes))]).astype(np.int64),
@@ -137,9 +145,26 @@ def edge_plates(
     )
 
 
+def weld_turns(pattern: Pattern) -> dict[tuple[int, Edge], tuple[int, float, float]]:
+    """Row of the weld, and factors of its dihedral and of the shared rotation, by panel and edge.
+
+    The sheet turns by their sum relative to the panel, see the top of this module.
+    """
+    found: dict[tuple[int, Edge], tuple[int, float, float]] = {}
+    at_junction = at_junctions(pattern.welds)
+    for row, (a, b) in enumerate(pattern.welds.tolist()):
+        (one, two), (way, other) = pattern.weld_faces[row].tolist(), pattern.weld_ways[row].tolist()
+        if at_junction[row]:  # the rows of the first panel come first
+            found.setdefault((one, (a, b)), (row, 0.0, 1.0))
+            found.setdefault((two, (a, b)), (row, other, -other * way))
+        else:
+            found[one, (a, b)], found[two, (a, b)] = (row, 0.5, 1.0), (row, 0.5, -1.0)
+    return found
+
+
 def curl_moments(
-    plates: EdgePlates, panels: Sequence[Outline | None], curvature: NDArray, sheet: Sheet,
-    area: NDArray, clamps: int,
+    plates: EdgePlates, panels: Sequence[Outline | None], curvature: NDArray, pattern: Pattern,
+    sheet: Sheet, area: NDArray, clamps: int,
 ) -> NDArray:  # fmt: skip
     """Moments (nq,), N m, of the angles of plates with given free curvatures.
 
@@ -149,21 +174,21 @@ def curl_moments(
     clamps : index of the first hinge of a clamped edge.
     """
     kinds, kind = sheet.kinds(len(panels))
-    out, seen = np.zeros(len(plates.angle)), set()
+    out, turns = np.zeros(len(plates.angle)), weld_turns(pattern)
     for p, panel in enumerate(panels):
         if panel is None:
             continue
         own, size = kinds[kind[p]], np.sqrt(2.0 * area[p])  # an outline's size is 1
         scale, place = own.bending_modulus * curvature[p] * size, plates.start[p]
         spokes = len(panel.corners) if panel.center else 0
+        edges = ((p, edge_of(a, b)) for a, b in around(pattern.faces[p]))
+        by_weld = iter([turns[edge][1:] for edge in edges if edge in turns and turns[edge][1]])
         for k, moment in enumerate(scale * panel_moments(panel, own.poissons_ratio)):
             if k < spokes or not 0 <= plates.angle[place] < clamps:
                 out[place] = moment
                 place += 1
                 continue
-            shared = plates.angle[place + 1]  # rotation of a weld, see `edge_plates`
-            out[place : place + 2] = 0.5 * moment, -moment if shared in seen else moment
-            seen.add(shared)
+            out[place : place + 2] = moment * np.array(next(by_weld))  # see `edge_plates`
             place += 2
     return out
 
@@ -217,7 +242,9 @@ def straight_creases(nodes: NDArray, hinges: NDArray, pattern: Pattern, sheet: S
     faces = np.concatenate([pattern.crease_faces, pattern.weld_faces])
     thickness = sheet.values("thickness", len(pattern.faces))[faces].max(axis=1)
     slender = thickness / lengths(pattern.vertices, edges)
-    return np.abs(np.sin(hinge_angles(nodes, hinges))) > STRAIGHT * slender
+    straight = np.abs(np.sin(hinge_angles(nodes, hinges))) > STRAIGHT * slender
+    _, edge = np.unique(edges, axis=0, return_inverse=True)  # junctions are several creases
+    return np.bincount(edge.ravel(), straight, minlength=1)[edge.ravel()] > 0.0
 
 
 def plates_model(
@@ -252,7 +279,8 @@ def clamps_model(nodes: NDArray, clamps: NDArray, stiffness: NDArray) -> BarsPla
     """Clamped edges (c, 3) alone, as plates of one angle each with the given stiffness (c,)."""
     none, number = np.zeros((0, 4), np.int64), np.arange(len(clamps) + 1)
     entries = np.array(stiffness)  # writable, for which the kernels of plates are compiled
-    plates = EdgePlates(none[:, 0], none[:, :2], number, number[:-1], number, entries)
+    ways = np.zeros((0, 2))
+    plates = EdgePlates(none[:, 0], none[:, :2], ways, number, number[:-1], number, entries)
     model = plates_model(
         nodes, none[:, :2], np.zeros(0), LinearBar(), none, np.zeros(0), np.zeros(0), LinearHinge(),
         none, np.zeros(0), plates, clamps, False,

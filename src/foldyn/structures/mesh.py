@@ -117,7 +117,8 @@ def _mesh(
 
     The axis of a hinge runs from j to k, the direction in which wing i's triangle passes the
     crease. Wing i is the third corner of the triangle that passes it from the lower to the higher
-    vertex; wing l is the third corner of the other triangle.
+    vertex; wing l is the third corner of the other triangle. At junctions they are those of the
+    first and the second panel.
     """
     triangles, triangle_panel, inner, inner_panel = [], [], [], []
     third = {}  # third corner by panel and directed side: a diagonal may be another panel's edge
@@ -133,15 +134,16 @@ def _mesh(
         (a, b, third[panel, a, b], third[panel, b, a])
         for panel, (a, b) in zip(inner_panel, inner, strict=True)
     ]
-    folds, welds = (
-        [
-            (low, high, third[front, low, high], third[back, high, low])
-            for (low, high), (front, back) in zip(edges.tolist(), faces.tolist(), strict=True)
-        ]
-        for edges, faces in (
-            (pattern.creases, pattern.crease_faces),
-            (pattern.welds, pattern.weld_faces),
-        )
+
+    def hinge(edge: list[int], panels: list[int], ways: list[int]) -> tuple[int, ...]:
+        there, back = edge[:: ways[0]], edge[:: -ways[1]]
+        return *edge, third[panels[0], there[0], there[1]], third[panels[1], back[0], back[1]]
+
+    folds = map(
+        hinge, pattern.creases.tolist(), pattern.crease_faces.tolist(), pattern.crease_ways.tolist()
+    )
+    welds = map(
+        hinge, pattern.welds.tolist(), pattern.weld_faces.tolist(), pattern.weld_ways.tolist()
     )
     mesh = Mesh(
         nodes=nodes,
@@ -151,8 +153,8 @@ def _mesh(
         bends=_rows(bends, 4),
         triangles=_rows(triangles, 3),
         triangle_panel=np.array(triangle_panel, np.int64),
-        folds=_rows(folds, 4),
-        welds=_rows(welds, 4),
+        folds=_rows(list(folds), 4),
+        welds=_rows(list(welds), 4),
     )
     check_triangles(nodes, mesh.triangles, mesh.triangle_panel, pattern, remedy)
     return mesh

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import around, edge_lookup, edge_of
+from foldyn.patterns.topology import around, edge_lookup, edge_of, edge_rows
 from foldyn.structures.condensed_panel import spoke_turns
 from foldyn.structures.edge_angles import straight_creases
 from foldyn.structures.mesh import Mesh, double_areas, lengths, quad_centers
@@ -76,6 +76,7 @@ def panel_plates(
     first = np.searchsorted(mesh.inner_panel, np.arange(count + 1))
     stiff = set(rigid_panels(rigid, count))
     quads = _quads(mesh, pattern, sheet, edges)
+    rows = edge_rows(pattern.creases)
     bends, creases = np.empty(len(mesh.inner)), np.zeros(len(pattern.creases))
     for p in range(count):
         own = slice(first[p], first[p + 1])
@@ -83,24 +84,34 @@ def panel_plates(
             mesh, pattern, p, own, float(nu[p]), -1 in edges[p]
         )
         bends[own] = modulus[p] * stiffness
-        for k, c in zip(edges[p], compliance.tolist(), strict=True):
-            if 0 <= k < len(creases) and p not in stiff:
-                creases[k] += c / modulus[p]
+        for (a, b), c in zip(around(pattern.faces[p]), compliance.tolist(), strict=True):
+            for k in rows.get(edge_of(a, b), ()):
+                if p not in stiff and p in pattern.crease_faces[k]:
+                    creases[k] += c / modulus[p]
     return Plates(bends, creases)
 
 
 def weld_stiffness(pattern: Pattern, sheet: Sheet) -> NDArray:
-    """Stiffness of whole welds (nw,), N m/rad: the panels on both sides in series."""
+    """Stiffness of whole welds (nw,), N m/rad: the panels on both sides in series.
+
+    Panels of stiffness g about a junction that has no moment of its own are springs g_i g_j / sum g
+    between each two of them.
+    """
     free = set(edge_lookup(pattern.boundary))
     modulus = sheet.values("bending_modulus", len(pattern.faces))
-    compliance = np.zeros(len(pattern.welds))
-    for k, both in enumerate(pattern.weld_faces.tolist()):
+    edge = np.unique(pattern.welds, axis=0, return_inverse=True)[1].ravel()
+    beside: list[dict[int, float]] = [{} for _ in range(len(edge))]
+    for k, both in zip(edge.tolist(), pattern.weld_faces.tolist(), strict=True):
         for p in both:
             edges = [edge_of(a, b) for a, b in around(pattern.faces[p])]
             alone = len(edges) == 4 and len(free.intersection(edges)) == 3
             c = WELDED_TRIANGLE if len(edges) == 3 else WELDED_ALONE if alone else COMPLIANCE
-            compliance[k] += c * pattern.face_areas[p] / modulus[p]
-    return lengths(pattern.vertices, pattern.welds) ** 2 / compliance
+            beside[k][p] = modulus[p] / (c * pattern.face_areas[p])
+    between = [
+        beside[k][one] * beside[k][two] / sum(beside[k].values())
+        for k, (one, two) in zip(edge.tolist(), pattern.weld_faces.tolist(), strict=True)
+    ]
+    return lengths(pattern.vertices, pattern.welds) ** 2 * np.array(between)
 
 
 def _quads(mesh: Mesh, pattern: Pattern, sheet: Sheet, edges: list[list[int]]) -> dict[int, Panel]:

@@ -328,7 +328,9 @@ class Structure(Discretized):
         area = np.bincount(self.triangle_panel, area)
         hinges, on_hinge = np.concatenate([self.folds, self.bends]), plates.angle >= 0
         count = len(hinges)
-        moment = curl_moments(plates, self.outlines, curvature, self.sheet, area, count)
+        moment = curl_moments(
+            plates, self.outlines, curvature, self.pattern, self.sheet, area, count
+        )
         turning = np.bincount(plates.angle[on_hinge], moment[on_hinge], count + len(self.clamps))
         parts = [moments(self.nodes[hinges], hinges, turning[:count])]
         if len(self.clamps):
