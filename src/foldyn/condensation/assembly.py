@@ -147,7 +147,7 @@ class Whole:
         kept = np.flatnonzero(kind[:, 2] < counts)
         p = len(group.faces)
         edge, backwards = self._edges_of(group.faces)
-        frames, sides = self._edge_frames(group, edge, backwards), self._sides_of(group, edge)
+        frames, sides = self._edge_frames(group, edge, backwards), self.sides_of(group)
         row = len(kept) * np.arange(p)
         rows, columns, values = [], [], []
         for i, (what, where, shape) in enumerate(kind[kept].tolist()):
@@ -181,8 +181,9 @@ class Whole:
         found = np.array([number[low, high] for low, high in low_high]).reshape(faces.shape)
         return found, ends[:, :, 0] > ends[:, :, 1]
 
-    def _sides_of(self, group: Group, edge: NDArray) -> NDArray[np.int64]:
-        """Sides (p, k) of the edges (p, k) of a group's panels."""
+    def sides_of(self, group: Group) -> NDArray[np.int64]:
+        """Sides (p, k) of a group's panels, edge by edge; see `EdgeSides`."""
+        edge, _ = self._edges_of(group.faces)
         panels = np.repeat(group.number, edge.shape[1]).tolist()
         found = [self.sides.of[pair] for pair in zip(panels, edge.ravel().tolist(), strict=True)]
         return np.reshape(found, edge.shape)

@@ -70,6 +70,6 @@ def edge_sides(pattern: Pattern) -> EdgeSides:
         for row, both in zip(crease_edge, pattern.crease_faces.tolist(), strict=True)
     ]
     return EdgeSides(
-        *(np.array(each, np.int64) for each in (edge, rank, way)), of,
+        np.array(edge), np.array(rank), np.array(way), of,
         np.array(creases, np.int64).reshape(-1, 2), np.array(crease_edge, np.int64),
     )  # fmt: skip

@@ -18,7 +18,7 @@ from foldyn.condensation import Superelements
 from foldyn.errors import InputError, warn
 from foldyn.linear.shell_of import check_reduced, shell_of
 from foldyn.materials import MemoryLaw
-from foldyn.patterns.topology import components
+from foldyn.patterns.topology import Lines, components
 from foldyn.shells import Shell
 from foldyn.structures import Sheet
 from foldyn.structures.discretized import Discretized
@@ -195,10 +195,10 @@ class _Split:
 def _joints(shell: Shell, split: _Split) -> tuple[Joint, ...]:
     """Joints of all creases; each pair of nodes has its share of the crease's stiffness."""
     pattern, slope = shell.pattern, fold_slopes(shell)
-    found = []
+    lines, found = Lines.of(pattern.creases).number, []
     for crease, (low, high) in enumerate(pattern.creases.tolist()):
         axis = pattern.vertices[high] - pattern.vertices[low]
-        row = shell.edge_nodes[crease]
+        row = shell.edge_nodes[lines[crease]]
         both = [split.of(panel, row) for panel in pattern.crease_faces[crease].tolist()]
         if both[0] == both[1]:
             raise InputError(

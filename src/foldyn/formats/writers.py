@@ -42,11 +42,12 @@ def flat_points(pattern: Pattern, kind: str) -> NDArray[np.float64]:
 def letters(pattern: Pattern) -> list[tuple[Edge, str, float]]:
     """Each edge with its letter ("B" on the boundary, "C" on a cut) and the angle it folds to.
 
-    Welds are "F", like facets in all formats.
+    Welds are "F", like facets in all formats, and junctions "U".
 
     The angle (rad) is NaN if not given, and on the boundary.
     """
     row, welds = edge_lookup(pattern.creases), edge_lookup(pattern.welds)
+    junctions = edge_lookup(pattern.junctions)
     pairs = seams(pattern.vertices, pattern.faces, pattern.face_normals, pattern.boundary)
     cuts = {edge for pair in pairs for edge in pair}
     told = []
@@ -54,6 +55,8 @@ def letters(pattern: Pattern) -> list[tuple[Edge, str, float]]:
         k = row.get((a, b))
         if (a, b) in welds:
             told.append(((a, b), "F", np.nan))
+        elif (a, b) in junctions:
+            told.append(((a, b), "U", np.nan))
         elif k is None:
             told.append(((a, b), "C" if (a, b) in cuts else "B", np.nan))
         else:

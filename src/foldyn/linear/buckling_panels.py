@@ -25,6 +25,7 @@ from foldyn.errors import InputError
 from foldyn.linear.buckling_base import FARTHEST, STEP, Base, unstable, warn_of_asymmetry
 from foldyn.linear.shell_of import shell_of
 from foldyn.mechanics.following import asymmetry
+from foldyn.patterns.pattern import refuse_junctions
 from foldyn.shells import Shell
 from foldyn.statics import OrigamiProblem
 from foldyn.statics.tracing import refuse_mechanisms
@@ -175,6 +176,7 @@ def _entries(
 def _refuse(case: Case) -> None:
     """Refuse what shapes of edges leave out."""
     structure = case.structure
+    refuse_junctions(structure.pattern, "where superelements have no load factors; take fd.shell")
     if structure.options.rigid:
         raise InputError(
             ": superelements with rigid panels have no load factors; take fd.shell", "rigid"

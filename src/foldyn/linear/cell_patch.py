@@ -256,7 +256,13 @@ def _per_crease(
             "letter or family, or one for all",
             name,
         )
-    values = dict(zip(kinds_of(lattice.pattern.creases, lattice.vertices), given, strict=True))
+    values: dict[Any, Any] = {}
+    own = kinds_of(lattice.pattern.creases, lattice.vertices)
+    for kind, value in zip(own, given, strict=True):
+        if values.setdefault(kind, value) != value:
+            raise InputError(
+                ": has different values for the creases of one junction; give one value there", name
+            )
     return [values[kind] for kind in kinds_of(pattern.creases, vertices)]
 
 
@@ -266,7 +272,7 @@ def _edges(
 ) -> list[tuple[int, int]]:  # fmt: skip
     """Boundary edges of the patch that are copies of chosen edges of the cell."""
     kinds = {lattice.edge(a, b).kind: (a, b) for a, b in given}
-    inside = [pair for kind, pair in kinds.items() if len(lattice.beside[kind]) == 2]
+    inside = [pair for kind, pair in kinds.items() if len(lattice.beside[kind]) > 1]
     if inside:
         raise InputError(f": edge {inside[0]} is a crease between cells; leave it out", name)
     rim = kinds_of(pattern.boundary, vertices)
@@ -530,7 +536,10 @@ class Repeated:
             return part
         rows = resolve_creases(self.case.structure, creases, f"{field}.creases")
         lattice = self.lattice
-        kinds = {lattice.edge(*lattice.pattern.creases[row].tolist()).kind for row in rows}
+        own = lattice.pattern.creases
+        kinds = {lattice.edge(*own[row].tolist()).kind for row in rows}
+        if sum(kind in kinds for kind in kinds_of(own, lattice.vertices)) != len(rows):
+            raise InputError(": has some creases of a junction; take all", f"{field}.creases")
         vertices = [(step, part_[1]) for step, part_ in self.sites[: len(pattern.vertices)]]
         found = kinds_of(pattern.creases, vertices)
         return replace(part, creases=[k for k, kind in enumerate(found) if kind in kinds])

@@ -79,7 +79,7 @@ class Lattice:
     Raises
     ------
     InputError
-        Panels that are copies of each other, or more than two at an edge.
+        Panels that are copies of each other.
     """
 
     def __init__(self, cell: UnitCell) -> None:
@@ -107,14 +107,6 @@ class Lattice:
         for f in range(len(self.faces)):
             for edge in self._edges(f):
                 self.beside.setdefault(edge.kind, []).append((f, edge.step))
-        for (one, two, _), panels in self.beside.items():
-            if len(panels) > 2:
-                a, b = cell.copies.first[[one, two]].tolist()
-                raise InputError(
-                    f": {len(panels)} panels would meet at the edge of vertices {a} and {b} and "
-                    "their copies; at most two may",
-                    "case",
-                )
 
     def _edges(self, f: int) -> Iterator[Edge]:
         face = self.faces[f]
@@ -129,7 +121,7 @@ class Lattice:
         kinds: dict[Kind, tuple[int, int]] = {}
         for a, b in self.pattern.boundary.tolist():
             kind = self.edge(a, b).kind
-            if len(self.beside[kind]) == 2:
+            if len(self.beside[kind]) > 1:
                 kinds.setdefault(kind, (a, b))
         return list(kinds.values())
 
@@ -182,7 +174,7 @@ class Lattice:
         letters = dict(zip(kinds_of(own.creases, self.vertices), own.assignments, strict=True))
         sides = [edge_of(a, b) for face in faces for a, b in around(face)]
         shared, times = np.unique(np.array(sides), axis=0, return_counts=True)
-        shared = shared[times == 2]
+        shared = shared[times > 1]
         welds = [kind in welded for kind in kinds_of(shared, vertices)]
         with quietly():  # warnings came with the pattern of the cell
             bare = Pattern(points, faces, name=own.name, welds=shared[welds])

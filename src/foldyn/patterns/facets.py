@@ -20,7 +20,14 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError, warn
 from foldyn.patterns.crease_data import crease_rows
 from foldyn.patterns.pattern import Pattern, pattern_of
-from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of, vertex_pair
+from foldyn.patterns.topology import (
+    Edge,
+    around,
+    at_junctions,
+    edge_of,
+    edge_rows,
+    vertex_pair,
+)
 from foldyn.values import flag, listed
 
 # What facets become: "weld", removed if panels can be joined, else welds; "line", welds; "hinge",
@@ -78,7 +85,8 @@ def welded(
     beside = np.concatenate([pattern.crease_faces[rows], pattern.weld_faces])
     turned = np.concatenate([pattern.dihedrals[rows], pattern.weld_dihedrals]) - np.pi
     order = longest_first(pattern.vertices, edges)
-    flat = order[np.abs(turned[order]) <= COPLANAR] if join else order[:0]
+    apart = (np.abs(turned) > COPLANAR) | at_junctions(edges)
+    flat = order[~apart[order]] if join else order[:0]
     faces = joined(
         pattern.faces, pattern.vertices, pattern.face_normals, edges[flat].tolist(),
         beside[flat].tolist(),
@@ -107,7 +115,7 @@ def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
     """Row numbers of the creases that are facets."""
     letters = np.array(pattern.assignments, dtype="<U1")
     if facets is None:
-        rows = np.flatnonzero(letters == "F")
+        rows = np.flatnonzero((letters == "F") & ~at_junctions(pattern.creases))
         guessed = rows[pattern.unlettered[rows]]
         if 0 < guessed.size < len(letters):  # in a completely flat sheet all creases are facets
             which = (
@@ -121,18 +129,19 @@ def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
         return rows
     if isinstance(facets, str):
         facets = pattern.creases[crease_rows("facets", facets, pattern)]
-    row, rows = edge_lookup(pattern.creases), set()
+    row, rows = edge_rows(pattern.creases), set()
     for facet in listed("facets", facets, "pairs of vertices, as [(0, 1)]"):
         pair = vertex_pair("facets", facet)
         if pair not in row:
             raise InputError(f": {pair} is not a crease; name its two vertices", "facets")
-        if letters[row[pair]] in ("M", "V"):
+        first = row[pair][0]
+        if letters[first] in ("M", "V") and len(row[pair]) == 1:
             raise InputError(
-                f': crease {pair} is assigned "{letters[row[pair]]}", so that it folds; assign '
+                f': crease {pair} is assigned "{letters[first]}", so that it folds; assign '
                 'it "F", or leave it out',
                 "facets",
             )
-        rows.add(row[pair])
+        rows.update(row[pair])
     return np.array(sorted(rows), dtype=np.int64)
 
 

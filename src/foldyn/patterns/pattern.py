@@ -17,6 +17,7 @@ from foldyn.patterns.geometry import crease_dihedrals, face_geometry, seams
 from foldyn.patterns.picture import picture
 from foldyn.patterns.topology import (
     Edge,
+    Lines,
     Topology,
     at_junctions,
     build_topology,
@@ -220,8 +221,8 @@ class Pattern(Transforms):
     @property
     def lines(self) -> NDArray[np.int64]:
         """All edges by kind, each once, shape (m, 2): creases, then boundary edges, then welds."""
-        kinds = (_once(pairs) for pairs in (self.creases, self.boundary, self.welds))
-        return np.concatenate(list(kinds)).reshape(-1, 2)
+        creases, welds = (each[Lines.of(each).first] for each in (self.creases, self.welds))
+        return np.concatenate([creases, self.boundary, welds]).reshape(-1, 2)
 
     @cached_property
     def junctions(self) -> NDArray[np.int64]:
@@ -269,6 +270,13 @@ def pattern_of(given: Any, name: str = "pattern") -> Pattern:
     raise InputError(f": got {type(given).__name__}, give a Pattern", name)
 
 
+def refuse_junctions(pattern: Pattern, why: str, field: str = "pattern") -> None:
+    """Refuse a pattern with edges of more than two panels, with a reason and a remedy."""
+    if len(pattern.junctions):
+        a, b = pattern.junctions[0].tolist()
+        raise InputError(f": more than two panels meet at edge ({a}, {b}), {why}", field)
+
+
 def _checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
     try:
         points = np.array(vertices)
@@ -299,12 +307,6 @@ def _checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
             f"vertices: they span {size:.3g} m: give coordinates that span at least {SHORTEST:g} m."
         )
     return result
-
-
-def _once(pairs: NDArray) -> NDArray:
-    """Sorted pairs without repetitions, as junctions have them."""
-    new = np.append(True, (pairs[1:] != pairs[:-1]).any(axis=1))
-    return pairs[new[: len(pairs)]]
 
 
 def _letters(dihedrals: NDArray[np.float64]) -> NDArray[np.str_]:

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.patterns.boards import Boards
 from foldyn.patterns.crease_data import crease_values
-from foldyn.patterns.pattern import Pattern, pattern_of
+from foldyn.patterns.pattern import Pattern, pattern_of, refuse_junctions
 from foldyn.patterns.topology import around, edge_lookup, edge_of, walk
 from foldyn.values import SHORTEST, number, number_or_list, show
 
@@ -123,6 +123,9 @@ def _thickness(given: Any, pattern: Pattern) -> NDArray[np.float64]:
             "a crease",
             "pattern",
         )
+    refuse_junctions(
+        pattern, "and boards hinge in pairs; give some of them vertices of their own there"
+    )
     bent = np.flatnonzero(pattern.face_planarity > SAME)
     if bent.size:
         raise InputError(f": panel {bent[0]} is not flat, and a board is; cut it in two", "pattern")

@@ -281,6 +281,22 @@ def edge_lookup(edges: NDArray) -> dict[Edge, int]:
     return {(a, b): k for k, (a, b) in enumerate(edges.tolist())}
 
 
+class Lines(NamedTuple):
+    """The distinct pairs among sorted vertex pairs, which repeat at junctions."""
+
+    first: NDArray[np.int64]  # (n,) first row of each
+    number: NDArray[np.int64]  # (k,) of each row
+    single: NDArray[np.bool_]  # (n,) whether no other row has the pair
+
+    @classmethod
+    def of(cls, pairs: NDArray) -> Lines:
+        """Lines of sorted pairs (k, 2)."""
+        rows = np.reshape(pairs, (-1, 2))
+        new = np.append(True, (rows[1:] != rows[:-1]).any(axis=1))[: len(rows)]
+        first = np.flatnonzero(new)
+        return cls(first, np.cumsum(new) - 1, np.diff(np.append(first, len(rows))) == 1)
+
+
 def at_junctions(pairs: NDArray) -> NDArray[np.bool_]:
     """Mask (k,) of the vertex pairs (k, 2) that occur more than once."""
     number = np.unique(pairs, axis=0, return_inverse=True)[1].ravel()

@@ -106,7 +106,7 @@ def draw_colored(
 
 def _color_creases(axes: Any, sheet: Sheet3D, view: View, colors: NDArray) -> None:
     """Draw creases in their own colors, pale if a panel hides them."""
-    for crease, color in zip(sheet.edges, colors, strict=False):
+    for crease, color in zip(sheet.edges[sheet.lines.number], colors, strict=True):
         seen, hidden = split_edges(crease[None], sheet.nodes, sheet.triangles, view, sheet.size)
         scene.add_segments(axes, seen, color, WIDE, zorder=3.0)
         scene.add_segments(axes, hidden, color, WIDE, zorder=1.6, alpha=HIDDEN)

@@ -21,6 +21,7 @@ from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.patterns.palette import PAPER
 from foldyn.patterns.picture import directions
+from foldyn.patterns.topology import Lines
 from foldyn.plots import style
 from foldyn.results import case_of
 from foldyn.values import show
@@ -90,16 +91,17 @@ class Sheet3D:
 
         p is 2, or for a shell the number of nodes along an edge, because edges of a shell bend.
         """
-        count = len(self._creases) + len(self.pattern.boundary)
+        creases = self._creases[self.lines.first]
+        count = len(creases) + len(self.pattern.boundary)
         if hasattr(self.structure, "edge_nodes"):
             return np.asarray(self.structure.edge_nodes, dtype=np.int64)[:count]
-        both = [np.reshape(pairs, (-1, 2)) for pairs in (self._creases, self.pattern.boundary)]
+        both = [np.reshape(pairs, (-1, 2)) for pairs in (creases, self.pattern.boundary)]
         return np.concatenate(both).astype(np.int64)
 
     @cached_property
     def boundary(self) -> Indices:
         """Edges that belong to a single panel, shape (nb, p)."""
-        return self.edges[len(self._creases) :]
+        return self.edges[len(self.lines.first) :]
 
     @cached_property
     def pieces(self) -> Indices:
@@ -121,7 +123,7 @@ class Sheet3D:
         """Actuated creases, shape (k, p)."""
         if self.case is None:
             return np.zeros((0, 2), dtype=np.int64)
-        return self.edges[self.case.actuated_creases]
+        return self.edges[np.unique(self.lines.number[self.case.actuated_creases])]
 
     @property
     def highlights(self) -> bool:
@@ -151,10 +153,16 @@ class Sheet3D:
             )
 
     def creases(self) -> dict[str, Indices]:
-        """Creases (k, p), grouped by their assignment."""
-        creases = self.edges[: len(self._creases)]
-        kinds = np.array(self.pattern.assignments, dtype=str)
+        """Creases (k, p), grouped by their assignment; junctions have none."""
+        creases, lines = self.edges[: len(self.lines.first)], self.lines
+        kinds = np.array(self.pattern.assignments, dtype="U1")[lines.first]
+        kinds = np.where(lines.single, kinds, "U")
         return {kind: creases[kinds == kind] for kind in style.CREASES if (kinds == kind).any()}
+
+    @cached_property
+    def lines(self) -> Lines:
+        """The lines on which creases lie."""
+        return Lines.of(self._creases)
 
     @property
     def _creases(self) -> Indices:

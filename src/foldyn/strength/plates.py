@@ -8,12 +8,13 @@ these models.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from foldyn.cases import Case
 from foldyn.condensation import superelements
@@ -22,7 +23,7 @@ from foldyn.condensation.library import ALIKE, Group
 from foldyn.condensation.panel import BOW, TURN, VERTEX, CondensedPanel
 from foldyn.condensation.resultants import in_own_axes
 from foldyn.errors import InputError
-from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
+from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.strength.creases import crease_lengths, crease_moments
 from foldyn.strength.loaded import LoadedSheet
 from foldyn.structures.edge_angles import straight_creases
@@ -63,7 +64,7 @@ class _Kind(NamedTuple):
     nodes: NDArray  # (p, k) corners
     center: NDArray  # (p,) nodes of the centers, or -1
     frames: NDArray  # (p, 3, 3) axes, in rows
-    edges: NDArray  # (p, k) creases, or -1
+    edges: NDArray  # (p, k) sides, see `EdgeSides`
     maps: NDArray  # (p, points, 2, 3, inputs) see `_map`, in the panels' own axes
 
 
@@ -81,6 +82,10 @@ class PlateResultants:
             sheet = replace(sheet, density=1.0)
         panels = superelements(self._pattern, sheet, divisions=DIVISIONS)
         self.points, self._kinds = panels.stress_points, self._found(panels.whole)
+        sides = panels.whole.sides
+        row, ways = np.arange(len(sides.creases)), self._pattern.crease_ways
+        entries = (ways.ravel().astype(float), (sides.creases.ravel(), np.repeat(row, 2)))
+        self._on_sides = sparse.csr_array(entries, shape=(len(sides.edge), len(row)))
 
     def at(self, q: NDArray, factors: NDArray) -> NDArray[np.float64]:
         """See `strength.resultants.Resultants`."""
@@ -88,7 +93,7 @@ class PlateResultants:
         x = structure.nodes + q[: structure.nodes.size].reshape(-1, 3)
         moment = crease_moments(structure, self._sheet.body(factors), q) * crease_lengths(structure)
         opened = self._sheet.distributed(factors).creases  # acts on the panels beside a crease
-        moment = np.append(moment if opened is None else moment - opened, 0.0)
+        moment = np.append(self._on_sides @ (moment if opened is None else moment - opened), 0.0)
         out = np.zeros((len(self.points.panel), 2, 3))
         for kind in self._kinds:
             place, turned = _moved(structure.nodes, x, kind)
@@ -104,8 +109,8 @@ class PlateResultants:
         structure, pattern = self._structure, self._pattern
         rigid = set(rigid_panels(structure.options.rigid, len(pattern.faces)))
         straight = straight_creases(structure.nodes, structure.folds, pattern, structure.sheet)
-        creases, condition = edge_lookup(pattern.creases), {}
-        for edge, k in creases.items():
+        condition = {}
+        for edge, k in edge_lookup(pattern.creases).items():
             condition[edge] = CREASED if straight[k] else FREE
         condition |= dict.fromkeys(structure.options.straight, STRAIGHT)
         condition |= {(low, high): CREASED for low, high, _ in structure.options.guided}
@@ -122,7 +127,7 @@ class PlateResultants:
                     group.panel,
                     *(each[members] for each in (group.faces, group.frames, group.number)),
                 )
-                found.append(self._kind(whole, chosen, edges, center, creases))
+                found.append(self._kind(whole, chosen, edges, center))
         return found
 
     def _center(self, group: Group, k: int) -> tuple[float, ...] | None:
@@ -135,18 +140,16 @@ class PlateResultants:
         return tuple((np.round(away / size, ALIKE) * size).tolist())
 
     def _kind(
-        self, whole: Whole, group: Group, edges: Sequence[int], center: tuple[float, ...] | None,
-        creases: Mapping[Edge, int],
-    ) -> _Kind:  # fmt: skip
+        self, whole: Whole, group: Group, edges: Sequence[int], center: tuple[float, ...] | None
+    ) -> _Kind:
         """Panels of a group with the same conditions of their edges, and center."""
         faces, centers = group.faces, self._structure.centers[group.number]
         rise = np.zeros((0, len(group.panel.kind)))
         if center is not None:
             rise = group.panel.lift(np.array([center])).reshape(1, -1)
         maps = [own for _, own in in_own_axes(self._pattern, group, _map(group.panel, edges, rise))]
-        pairs = [[edge_of(a, b) for a, b in around(face)] for face in faces.tolist()]
-        numbers = np.array([[creases.get(edge, -1) for edge in row] for row in pairs])
-        return _Kind(group.number, faces, centers, group.frames, numbers, np.array(maps))
+        sides = whole.sides_of(group)
+        return _Kind(group.number, faces, centers, group.frames, sides, np.array(maps))
 
 
 def _map(panel: CondensedPanel, conditions: Sequence[int], rise: NDArray) -> NDArray[np.float64]:

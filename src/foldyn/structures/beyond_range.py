@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from foldyn.errors import ModelRangeWarning, UnitsWarning, warn
 from foldyn.materials import EnhancedLinear, HingeLaw
 from foldyn.patterns import Pattern
+from foldyn.patterns.topology import Lines
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.mesh import double_areas, lengths
 from foldyn.structures.rigid_plates import rigid_panels
@@ -260,7 +261,8 @@ def kept_apart(structure: Discretized, one: int, other: int) -> str:
     panels that are pushed hard pass through each other, however small the steps.
     """
     ends = {one, other}
-    creases = structure.edge_nodes[: len(structure.fold_rest)].tolist()
+    count = len(Lines.of(structure.pattern.creases).first)
+    creases = structure.edge_nodes[:count].tolist()
     fold = any(ends == {*pair} for row in creases for pair in pairwise(row) if ends & {*row})
     kind = "fold" if fold else "bend"
     law = structure.fold_law if fold else getattr(structure, "bend_law", None)

@@ -19,6 +19,7 @@ from foldyn.materials.plate_superlinear import onset_parameters
 from foldyn.materials.series import in_series
 from foldyn.mechanics import Hinges
 from foldyn.mechanics.assembly import Assembly
+from foldyn.patterns.pattern import refuse_junctions
 from foldyn.patterns.picture import picture
 from foldyn.patterns.topology import Edge
 from foldyn.structures.mass import Surface, center_of_mass, inertia_tensor, row_sums
@@ -245,13 +246,12 @@ class Discretized:
         """The structure with the dofs that explicit methods take."""
         if not self.massless or self.by_folds:
             return self
-        if len(self.pattern.junctions):
-            a, b = self.pattern.junctions[0].tolist()
-            raise InputError(
-                f": more than two panels meet at edge ({a}, {b}), where explicit methods cannot "
-                f'integrate {self.massless}; take "generalized_alpha", or scheme = "n5b8"',
-                "method",
-            )
+        refuse_junctions(
+            self.pattern,
+            f"where explicit methods cannot integrate {self.massless}; take an implicit one, or "
+            'scheme = "n5b8"',
+            "method",
+        )
         other = replace(self, by_folds=True)
         return other.marked() if self.as_made else other
 

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
+from foldyn.patterns.topology import Lines
 
 PER_LOG = 3.0  # divisions/3 arcs per factor e of distance make triangles about as wide as long
 ROOM = 2.0  # least length of a ray, divided by the radius
@@ -121,11 +122,12 @@ def grading(pattern: Pattern, divisions: int, radius: float) -> Grading:
 def smooth_vertices(pattern: Pattern) -> NDArray[np.bool_]:
     """Mask (n,) of vertices of welds where no crease ends or turns: no forces concentrate there."""
     number, total = np.zeros(len(pattern.vertices), int), np.zeros_like(pattern.vertices)
-    ends = pattern.vertices[pattern.creases]
+    creases = pattern.creases[Lines.of(pattern.creases).first]
+    ends = pattern.vertices[creases]
     along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
     for k, sign in enumerate((1.0, -1.0)):
-        np.add.at(number, pattern.creases[:, k], 1)
-        np.add.at(total, pattern.creases[:, k], sign * along)
+        np.add.at(number, creases[:, k], 1)
+        np.add.at(total, creases[:, k], sign * along)
     on = (number == 2) & (np.linalg.norm(total, axis=1) < ON)
     return np.isin(np.arange(len(number)), pattern.welds) & ((number == 0) | on)
 

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import breadth_first_order
 from foldyn.errors import InputError
 from foldyn.mechanics.triangle import turned_axes
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import around, edge_of
+from foldyn.patterns.topology import around, at_junctions, edge_of
 from foldyn.structures.sheet import Sheet
 
 UPRIGHT = 0.02  # a vector with a smaller part along a panel counts as normal to it
@@ -118,8 +118,10 @@ def _carried(pattern: Pattern, edge: tuple[int, int], degrees: float, place: str
     start = [p for p, face in enumerate(pattern.faces) if edge_of(*edge) in _edges(face)]
     if not start:
         raise InputError(f"{place}.edge = {list(edge)}: the pattern has no such edge")
-    inner = np.concatenate([pattern.creases, pattern.welds]).tolist()
-    faces = np.concatenate([pattern.crease_faces, pattern.weld_faces])
+    inner = np.concatenate([pattern.creases, pattern.welds])
+    flat = ~at_junctions(inner)  # the others do not lie flat
+    inner = inner[flat].tolist()
+    faces = np.concatenate([pattern.crease_faces, pattern.weld_faces])[flat]
     count = len(pattern.faces)
     graph = sparse.coo_array((np.ones(len(faces)), tuple(faces.T)), (count, count))
     order, before = breadth_first_order(graph.tocsr(), start[0], directed=False)

@@ -38,7 +38,7 @@ from foldyn.mechanics.block_matrix import of_elements
 from foldyn.mechanics.following import Following, tensions
 from foldyn.mechanics.membranes import Membranes
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
+from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of, edge_rows
 from foldyn.structures.graded import smooth_vertices
 from foldyn.structures.mesh import Mesh, hinge_angles, too_narrow
 from foldyn.structures.panel_membrane import Kind, grading_of, membrane_stiffness
@@ -129,11 +129,11 @@ def _known(panel: Sides, sheet: Sheet, area: float, gives: bool, smooth: NDArray
 
 def _numbers(pattern: Pattern, gives: Sequence[bool]) -> dict[tuple[Edge, int], int]:
     """Indices of the gives of edges between two panels, by edge and vertex."""
-    beside: dict[Edge, int] = {}
+    beside: dict[Edge, list[bool]] = {}
     for face, own in zip(pattern.faces, gives, strict=True):
         for edge in (edge_of(a, b) for a, b in around(face)):
-            beside[edge] = beside.get(edge, 0) + own
-    edges = [edge for edge, count in beside.items() if count == 2]
+            beside.setdefault(edge, []).append(own)
+    edges = [edge for edge, own in beside.items() if len(own) > 1 and all(own)]
     return {(edge, end): 2 * k + j for k, edge in enumerate(edges) for j, end in enumerate(edge)}
 
 
@@ -142,7 +142,7 @@ def _sides(
     guided: Mapping[Edge, NDArray],
 ) -> list[Sides]:  # fmt: skip
     """Sides of each panel."""
-    bent = edge_lookup(pattern.creases)
+    bent = edge_rows(pattern.creases)
     welded, stiff = set(edge_lookup(pattern.welds)) | set(straight), set(rigid)
     turn = np.pi - hinge_angles(mesh.nodes, mesh.folds)
     modulus, nu, thickness, youngs = (
@@ -157,18 +157,24 @@ def _sides(
         for k, edge in enumerate(edges):
             if held[k] or (edge not in bent and edge not in guided):
                 continue
+            area = float(pattern.face_areas[p])
+            unit = youngs[p] * thickness[p] * 2.0 * area  # an outline's area is 1/2
             if edge in guided:
                 cosine = float(guided[edge] @ pattern.face_normals[p])
-                sine, other, both = np.sqrt(1.0 - cosine**2), p, cosine**2 * edge_modulus[p]
+                beside = [(p, np.sqrt(1.0 - cosine**2), cosine**2 * edge_modulus[p])]
             else:
-                crease = bent[edge]
-                other = int(pattern.crease_faces[crease].sum()) - p
-                sine, cosine = np.sin(turn[crease]), np.cos(turn[crease])
-                both = edge_modulus[other] + cosine**2 * edge_modulus[p]
-            area = float(pattern.face_areas[p])
-            both /= youngs[p] * thickness[p] * 2.0 * area  # an outline's area is 1/2
-            held[k] = both > STRAIGHT * sine**2 or not stiff.isdisjoint((p, other))
-            resistance[k] = 0.0 if held[k] else float(f"{both / sine**2:.10g}")
+                beside = []
+                for crease in bent[edge]:  # several at a junction
+                    if p in (both := pattern.crease_faces[crease]):
+                        other, cosine = int(both.sum()) - p, np.cos(turn[crease])
+                        own = edge_modulus[other] + cosine**2 * edge_modulus[p]
+                        beside.append((other, np.sin(turn[crease]), own))
+            for other, sine, both in beside:
+                held[k] |= bool(both / unit > STRAIGHT * sine**2)
+                held[k] |= not stiff.isdisjoint((p, other))
+            if not held[k]:
+                total = sum(both / unit / sine**2 for _, sine, both in beside)
+                resistance[k] = float(f"{total:.10g}")
         x = pattern.vertices[list(face)]
         center = x.mean(axis=0) if len(face) > 3 else None
         if mesh.centers[p] >= 0:

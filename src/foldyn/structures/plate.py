@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import around, edge_lookup, edge_of, edge_rows
+from foldyn.patterns.topology import Lines, around, edge_lookup, edge_of, edge_rows
 from foldyn.structures.condensed_panel import spoke_turns
 from foldyn.structures.edge_angles import straight_creases
 from foldyn.structures.mesh import Mesh, double_areas, lengths, quad_centers
@@ -98,18 +98,18 @@ def weld_stiffness(pattern: Pattern, sheet: Sheet) -> NDArray:
     between each two of them.
     """
     free = set(edge_lookup(pattern.boundary))
-    modulus = sheet.values("bending_modulus", len(pattern.faces))
-    edge = np.unique(pattern.welds, axis=0, return_inverse=True)[1].ravel()
-    beside: list[dict[int, float]] = [{} for _ in range(len(edge))]
-    for k, both in zip(edge.tolist(), pattern.weld_faces.tolist(), strict=True):
+    modulus = sheet.values("bending_modulus", len(pattern.faces)).tolist()
+    line = Lines.of(pattern.welds).number.tolist()
+    beside: list[dict[int, float]] = [{} for _ in line]
+    for k, both in zip(line, pattern.weld_faces.tolist(), strict=True):
         for p in both:
             edges = [edge_of(a, b) for a, b in around(pattern.faces[p])]
             alone = len(edges) == 4 and len(free.intersection(edges)) == 3
             c = WELDED_TRIANGLE if len(edges) == 3 else WELDED_ALONE if alone else COMPLIANCE
-            beside[k][p] = modulus[p] / (c * pattern.face_areas[p])
+            beside[k][p] = modulus[p] / (c * float(pattern.face_areas[p]))
     between = [
         beside[k][one] * beside[k][two] / sum(beside[k].values())
-        for k, (one, two) in zip(edge.tolist(), pattern.weld_faces.tolist(), strict=True)
+        for k, (one, two) in zip(line, pattern.weld_faces.tolist(), strict=True)
     ]
     return lengths(pattern.vertices, pattern.welds) ** 2 * np.array(between)
 

@@ -324,6 +324,7 @@ class Structure(Discretized):
         Also returns the moments (nq,), N m, of all angles of plates. All are linear in `curvature`,
         the free curvatures (np,), 1/m, of the panels.
         """
+        assert self.pattern is not None
         area = 0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
         area = np.bincount(self.triangle_panel, area)
         hinges, on_hinge = np.concatenate([self.folds, self.bends]), plates.angle >= 0

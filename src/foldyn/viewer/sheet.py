@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.patterns import Pattern
+from foldyn.patterns.topology import Lines
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.mesh import Mesh, n4b5
 from foldyn.viewer.arrays import Arrays
@@ -58,18 +59,22 @@ def _surface(
 def edge_pieces(
     pattern: Pattern, nodes: NDArray, edge_nodes: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Pieces (k, 2) of the pattern's edges; each with its kind, its edge and its ends along it.
+    """Pieces (k, 2) of the pattern's edges; each with its kind, its crease and its ends along it.
 
-    Welds are left out.
+    Welds are left out. Junctions count as unassigned, and as the first of their creases.
     """
-    letters = [*pattern.assignments, *"B" * len(pattern.boundary)]
+    lines, count = Lines.of(pattern.creases), len(pattern.boundary)
+    letters = np.where(lines.single, np.array(pattern.assignments, "U1")[lines.first], "U")
+    letters = [*letters.tolist(), *"B" * count]
+    crease = np.append(lines.first, len(pattern.creases) + np.arange(count))
     rows = np.asarray(edge_nodes)[: len(letters)]
     pairs = np.stack([rows[:, :-1], rows[:, 1:]], axis=2)
     length = np.linalg.norm(np.diff(nodes[pairs], axis=2)[:, :, 0], axis=2)
     end = np.cumsum(length, axis=1)
     edge = np.repeat(np.arange(len(rows)), pairs.shape[1])
     kind = np.array([KINDS.index(letter) for letter in letters])[edge]
-    return pairs.reshape(-1, 2), kind, edge, np.stack([end - length, end], axis=2).reshape(-1, 2)
+    along = np.stack([end - length, end], axis=2).reshape(-1, 2)
+    return pairs.reshape(-1, 2), kind, crease[edge], along
 
 
 def held(case: Case) -> list[list[Any]]:

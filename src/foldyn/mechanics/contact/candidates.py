@@ -89,10 +89,10 @@ class Tables(NamedTuple):
     edges: NDArray  # (e, 2)
     edge_nodes: NDArray  # (e, 2) mesh nodes at the ends; edges with a common node do not touch
     edge_square: NDArray  # (e,) squared lengths at rest, m2
-    shared_side: NDArray  # (t, 3) 1/2 for sides of two triangles, else 0
+    shared_side: NDArray  # (t, 3) 1/k for sides of k triangles, 0 for free sides
     shared_corner: NDArray  # (n,) 1/k for nodes enclosed by k triangles, else 0
     panel: NDArray  # (t,)
-    edge_panels: NDArray  # (e, 2) panels; -1 if there is no second one
+    edge_panels: NDArray  # (e, 2 or more) panels, in order; -1 for none
     node_thickness: NDArray  # (n,) m
     ranges: Ranges
     surface: NDArray  # (s,) nodes of triangles
@@ -121,7 +121,7 @@ def tables(sheets: Sheets, hinges: NDArray) -> Tables:
     uses = np.bincount(side.ravel(), minlength=len(edges))
     around = np.bincount(triangles.ravel(), minlength=len(nodes))
     rim = np.zeros(len(nodes), bool)
-    rim[edges[uses != 2].ravel()] = True
+    rim[edges[uses == 1].ravel()] = True
     closed = (around > 0) & ~rim
     members = panel_nodes(triangles, panel)
     own = _panels_of_nodes(members, len(nodes))
@@ -144,7 +144,7 @@ def tables(sheets: Sheets, hinges: NDArray) -> Tables:
         edges=edges,
         edge_nodes=edges,
         edge_square=square,
-        shared_side=np.where(uses[side] == 2, 0.5, 0.0),
+        shared_side=np.where(uses[side] > 1, 1.0 / uses[side], 0.0),
         shared_corner=np.where(closed, 1.0 / np.maximum(around, 1), 0.0),
         panel=panel,
         edge_panels=sides,
@@ -196,12 +196,11 @@ def _panels_of_nodes(members: list[NDArray], count: int) -> list[list[int]]:
 
 
 def _panels_of_edges(side: NDArray, panel: NDArray, count: int) -> NDArray:
-    """Panels (e, 2) of each edge; -1 if there is no second one."""
-    out = np.full((count, 2), -1, np.int64)
-    edge, of = side.ravel(), np.repeat(panel, 3)
-    out[edge[::-1], 0] = of[::-1]
-    other = of != out[edge, 0]
-    out[edge[other], 1] = of[other]
+    """Panels (e, 2 or more) of each edge, in order; -1 for none."""
+    edge, of = np.unique(np.stack([side.ravel(), np.repeat(panel, 3)]), axis=1)
+    place = np.arange(len(edge)) - np.searchsorted(edge, edge)
+    out = np.full((count, max(2, int(place.max(initial=0)) + 1)), -1, np.int64)
+    out[edge, place] = of
     return out
 
 
@@ -266,7 +265,7 @@ def crease_pieces(
     several = np.flatnonzero(count[which] > 1)
     height = np.empty(len(several))
     for at, k in enumerate(several.tolist()):
-        arms = [nodes[members[panel]] - start[k] for panel in pairs[which[k]]]
+        arms = [nodes[members[panel]] - start[k] for panel in pairs[which[k]] if panel >= 0]
         widths = [np.linalg.norm(np.cross(arm, along[k]), axis=1).max() for arm in arms]
         height[at] = 0.5 * min(widths) / length[k]
     return Pieces(edges[between[several]], height, share[several])

@@ -194,17 +194,17 @@ def panel_d0(ranges, v, panel):
 
 @inner
 def edge_d0(ranges, edges, nodes, panels, i, j):
-    """d0 (m) of two edges (e, 2) of panels (e, 2); 0 if they share a panel or a node."""
+    """d0 (m) of two edges (e, 2) of panels (e, k); 0 if they share a panel or a node."""
     a, b, c, d = nodes[i, 0], nodes[i, 1], nodes[j, 0], nodes[j, 1]
     if a in (c, d) or b in (c, d):
         return 0.0
-    if panels[i, 0] == panels[j, 0] or panels[i, 0] == panels[j, 1]:
-        return 0.0
-    if panels[i, 1] >= 0 and (panels[i, 1] == panels[j, 0] or panels[i, 1] == panels[j, 1]):
-        return 0.0
+    for p in panels[i]:
+        for q in panels[j]:
+            if p >= 0 and p == q:
+                return 0.0
     a, b, c, d = edges[i, 0], edges[i, 1], edges[j, 0], edges[j, 1]
     best = math.inf
-    for side in range(2):
+    for side in range(panels.shape[1]):
         p, q = panels[i, side], panels[j, side]
         if q >= 0:
             best = min(best, 0.5 * (panel_d0(ranges, a, q) + panel_d0(ranges, b, q)))

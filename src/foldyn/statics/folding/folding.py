@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from foldyn.errors import ComputationError, CrossingWarning, InputError, MotionInterrupted, warn
 from foldyn.mechanics.crossings import crossing_panels, pairs_text
 from foldyn.patterns import Pattern
-from foldyn.patterns.pattern import pattern_of
+from foldyn.patterns.pattern import pattern_of, refuse_junctions
 from foldyn.patterns.picture import picture
 from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.results import folding_dataset
@@ -272,6 +272,9 @@ def fold(
         )
     if not len(pattern.creases):
         raise InputError(": has no creases to fold", "pattern")
+    refuse_junctions(
+        pattern, "and fold turns single sheets only; give the case fd.Actuate, and trace it"
+    )
     steps = whole("steps", steps, least=1, most=1000)
     choice("initial", initial, INITIALS)
     choice("panels", panels, tuple(BENDING))
