@@ -310,11 +310,6 @@ STAR = [[np.cos(t), np.sin(t)] for t in 2 * np.pi * np.arange(5) * 2 / 5]
             [range(5)],
             r"faces\[0\].*two of its corners lie in the same place",
         ),
-        (
-            [[0, 0, 0], [0, 1, 0], [1, 0, 0], [-1, 0, 0], [0, 0, 1]],
-            [(0, 1, 2), (1, 0, 3), (0, 1, 4)],
-            r"edge \(0, 1\) is shared by 3 faces \[0, 1, 2\]",
-        ),
     ],
 )
 def test_bad_faces(vertices, faces, message):

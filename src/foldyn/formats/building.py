@@ -18,7 +18,7 @@ from foldyn.formats.panels import Panels, opened
 from foldyn.patterns import Pattern
 from foldyn.patterns.flat_foldability import flat_foldability
 from foldyn.patterns.geometry import CLOSED, LAYERS
-from foldyn.patterns.topology import Edge, Faces, edge_lookup, edge_of
+from foldyn.patterns.topology import Edge, Faces, at_junctions, edge_lookup, edge_of
 from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.values import LONGEST, SHORTEST, number
 
@@ -172,8 +172,9 @@ def _pattern(panels: Panels, drawing: Drawing, notes: Notes) -> Pattern:
     """Pattern of panels with open cuts."""
     with quietly():
         bare = Pattern(panels.points, panels.faces)
-    creases = {(a, b): k for k, (a, b) in enumerate(bare.creases.tolist())}
+    creases = [(a, b) for a, b in bare.creases.tolist()]
     given = np.array([panels.letters.get(edge, "") for edge in creases], dtype="<U1")
+    given[at_junctions(bare.creases)] = ""  # letters need a common front
     faces = _turned(bare, given, notes)
     given = _with_sides(bare, given, faces, panels, drawing, notes)
     letters: dict[Edge, str] = dict(zip(creases, given.tolist(), strict=True))

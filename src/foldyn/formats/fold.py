@@ -21,7 +21,7 @@ from foldyn.formats.writers import is_plane, letters
 from foldyn.input_files import from_json
 from foldyn.patterns import Pattern
 from foldyn.patterns.frames import Frame, fold_angles
-from foldyn.patterns.topology import at_junctions, edge_lookup
+from foldyn.patterns.topology import edge_rows
 from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.values import choice, show, single
 
@@ -341,7 +341,7 @@ def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:
     flat = is_plane(pattern)
     there = fold_angles(pattern)
     folded = not flat or bool(np.any(np.abs(there) > 1e-6))
-    row = edge_lookup(pattern.creases[~at_junctions(pattern.creases)])
+    row = {edge: rows[0] for edge, rows in edge_rows(pattern.creases).items() if len(rows) == 1}
     edges = letters(pattern)
     rows = [row.get(edge) for edge, *_ in edges]
     wanted = pattern.fold_angles

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError, quietly
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import around, edge_lookup, edge_of
+from foldyn.patterns.topology import around, edge_of
 
 RINGS = 2  # rings of panels around the panels at the nodes of the cell
 FLAT = 1e-6  # rad: a crease between cells whose dihedral is closer to pi counts as flat
@@ -137,13 +137,32 @@ class Lattice:
 
     # ------------------------------------------------------------------ a patch
     def around_cell(self) -> list[Panel]:
-        """Panels around cell 0, sorted: panels at its nodes, and rings of panels around these."""
+        """Panels around cell 0, sorted: panels at its nodes, and rings of panels around these.
+
+        Two panels alone would share a front: none are left alone at a junction of several.
+        """
         found = {
             (minus(self.zero, step), f) for f, face in enumerate(self.faces) for step, _ in face
         }
         for _ in range(RINGS):
             found |= {other for panel in found for other in self._across(*panel)}
+        while missing := self._beside_pairs(found) - found:
+            found |= missing
         return sorted(found)
+
+    def _beside_pairs(self, panels: set[Panel]) -> set[Panel]:
+        """All panels at junctions at which there are two of the given panels."""
+        at: dict[tuple[Kind, Step], int] = {}
+        for step, f in panels:
+            for edge in self._edges(f):
+                place = edge.kind, plus(step, edge.step)
+                at[place] = at.get(place, 0) + 1
+        return {
+            (minus(step, cell), f)
+            for (kind, step), count in at.items()
+            if count == 2
+            for f, cell in self.beside[kind]
+        }
 
     def _across(self, step: Step, f: int) -> Iterator[Panel]:
         """Panels across the edges of a panel."""
@@ -188,7 +207,7 @@ class Lattice:
             given = {
                 pair: letters.get(kind, letter)
                 for pair, kind, letter in zip(
-                    edge_lookup(bare.creases), of_crease, geometric.tolist(), strict=True
+                    map(tuple, bare.creases.tolist()), of_crease, geometric.tolist(), strict=True
                 )
             }
             families = {

@@ -17,8 +17,8 @@ from foldyn.patterns.generators.arguments import check_size
 from foldyn.patterns.screw import direction
 from foldyn.patterns.tiling import glue, half_edges
 from foldyn.patterns.tiling import periods as periods_of
-from foldyn.patterns.topology import around, edge_lookup, edge_of
-from foldyn.values import number, numbers, show, vector, whole
+from foldyn.patterns.topology import around, at_junctions, edge_lookup, edge_of
+from foldyn.values import flag, number, numbers, show, vector, whole
 
 FLAT = 1e-6  # rad: a crease between copies within this angle from pi gets no letter
 TURNED = {"M": "V", "V": "M"}
@@ -163,17 +163,20 @@ class Transforms:
             )
         return made
 
-    def joined(self, other: Self, tolerance: float = 1e-6) -> Self:
+    def joined(self, other: Self, tolerance: float = 1e-6, *, inner: bool = False) -> Self:
         """Return two patterns as one, glued along coincident boundary edges.
 
         The front is the front of this pattern. If the back of the other pattern is on this side,
-        its mountains and valleys swap.
+        its mountains and valleys swap. Edges that more than two panels then share are junctions,
+        see `Pattern`.
 
         Parameters
         ----------
         other : Pattern
         tolerance : float
             Distance, as a fraction of the larger size, within which edges coincide.
+        inner : bool
+            Whether to glue all edges, as those of layers that touch along creases.
 
         Returns
         -------
@@ -184,7 +187,7 @@ class Transforms:
         Raises
         ------
         InputError
-            Not a pattern, thick panels, or an edge that more than two panels would share.
+            Not a pattern, thick panels, or panels in the same place.
 
         Warns
         -----
@@ -197,7 +200,7 @@ class Transforms:
         _thin(other)
         near = number("tolerance", tolerance, above=0.0) * max(self.size, other.size)
         zero = np.zeros(3)
-        made, joined = _joined(self, [(self, zero), (other, zero)], near)
+        made, joined = _joined(self, [(self, zero), (other, zero)], near, flag("inner", inner))
         if not joined:
             warn(
                 "other: the patterns share no edge and are two parts of one; move one of them so "
@@ -274,11 +277,17 @@ def _still_at_the_rim(
 
 
 def _joined(
-    first: Transforms, sheets: Sequence[tuple[Transforms, NDArray]], near: float
-) -> tuple[Any, int]:
-    """Join sheets, each with a shift, into one pattern; also return the number of glued edges."""
+    first: Transforms, sheets: Sequence[tuple[Transforms, NDArray]], near: float,
+    inner: bool = False,
+) -> tuple[Any, int]:  # fmt: skip
+    """Join sheets, each with a shift, into one pattern; also return the number of glued edges.
+
+    inner : whether to glue edges inside the sheets, too.
+    """
     points = [sheet.vertices + shift for sheet, shift in sheets]
-    rims = [half_edges(sheet.faces, sheet.boundary) for sheet, _ in sheets]
+    rims = [
+        sheet.edges if inner else half_edges(sheet.faces, sheet.boundary) for sheet, _ in sheets
+    ]
     glued = glue(points, rims, near)
     faces: list[tuple[int, ...]] = []
     letters: dict[tuple[int, int], str] = {}
@@ -309,7 +318,7 @@ def _joined(
         for name, rows in sheet.families.items():
             families.setdefault(name, []).extend(pairs[k] for k in rows.tolist())
     custom.pop(FACE_ORDERS, None)
-    known = edge_lookup(bare.creases)
+    known = edge_lookup(bare.creases[~at_junctions(bare.creases)])
     return (
         bare.changed(
             assignments=letters,
