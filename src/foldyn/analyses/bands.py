@@ -40,7 +40,7 @@ from foldyn.results.quantities import BANDS, GAPS
 from foldyn.tables import Section, TableOf
 from foldyn.values import indices, number, number_or_list, one_or_each, show
 
-AROUND = {1: "G-X", 2: "G-X-M-Y-G"}
+AROUND = {1: "G-X", 2: "G-X-M-Y-G", 3: "G-X-M-Y-G-Z-U-R-T-Z"}
 """Default paths around the zone, by its number of dimensions."""
 MOST_ZONE = 200
 MOST_LEVELS = 10_000
@@ -271,7 +271,8 @@ class BandsSchema(VibrationSchema):
         """See `VibrationSchema`; each wave vector counts."""
         own = self.analysis
         states = 1 if own.vary is None else len(own.vary.values)
-        count = states * (own.points + (own.zone or 0) ** 2 // 2)
+        dimensions = 3 if np.shape(own.vectors) == (3, 3) else 2
+        count = states * (own.points + (own.zone or 0) ** dimensions // 2)
         return count, f" at {count} wave vectors"
 
     def agree(self) -> None:
@@ -405,7 +406,7 @@ def _attenuate(found: xarray.Dataset, cell: Any, count: int, own: Mapping[str, A
     for k, (a, b) in enumerate(pairwise(found["wave_vector"].values[corners])):
         along = np.flatnonzero(a != b)
         if len(along) == 1:
-            other = {"phase": float(a[1 - along[0]])} if len(a) > 1 else {}
+            other = {"phase": np.delete(a, along[0]).tolist()} if len(a) > 1 else {}
             spectrum = attenuation(cell, levels, along=int(along[0]), **other, **own)
             legs.setdefault(f"{names[k]}-{names[k + 1]}", spectrum["attenuation"].values)
     if not legs:

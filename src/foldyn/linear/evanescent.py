@@ -12,6 +12,7 @@ pairs (B. R. Mace, E. Manconi, J. Sound Vib. 318, 2008).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +28,7 @@ from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.results.dataset import result_dataset
 from foldyn.threads import in_threads
-from foldyn.values import number, numbers, whole
+from foldyn.values import number_or_list, numbers, one_or_each, whole
 
 TRAVELS = 1e-6  # Np per cell: below this attenuation a wave counts as traveling
 FASTEST = 40.0  # Np per cell: waves that decay faster are lost in round-off
@@ -46,7 +47,7 @@ def attenuation(
     frequencies: Any,
     *,
     along: int = 0,
-    phase: float = 0.0,
+    phase: float | Sequence[float] = 0.0,
     count: int = 6,
     state: State | None = None,
     secant: float | None = None,
@@ -61,9 +62,9 @@ def attenuation(
     frequencies : float or array_like, shape (n,)
         Frequencies (Hz), above 0.
     along : int
-        Number of the period: 0 or 1.
-    phase : float
-        Phase (rad) along the other period of a sheet.
+        Number of the period, from 0.
+    phase : float or sequence of float
+        Phase (rad) along the other period of a sheet, or those along the others of a solid.
     count : int
         Number of waves, beginning with the slowest-decaying wave.
     state, secant, load_factor
@@ -98,15 +99,16 @@ def attenuation(
     if wanted.ndim != 1 or not len(wanted) or (wanted <= 0.0).any():
         raise InputError(": give numbers above 0 (Hz)", "frequencies")
     warn_beyond(cell.case.structure, wanted)
-    count, phase = whole("count", count, least=1), number("phase", phase)
+    count, phase = whole("count", count, least=1), number_or_list("phase", phase, "period")
     along = cell.period("along", along)
-    if phase and cell.dimensions == 1:
+    others = one_or_each("phase", phase, cell.dimensions - 1, "other periods")
+    if np.any(phase) and cell.dimensions == 1:
         raise InputError(f" = {phase:g}: the cell has no other period", "phase")
     parts = [
-        _blocks(linear.bloch, part, along, phase)
+        _blocks(linear.bloch, part, along, others)
         for part in (linear.bloch.stiffness, linear.bloch.damping, linear.bloch.mass)
     ]
-    ties = _blocks(linear.bloch, linear.bloch.ties, along, phase)
+    ties = _blocks(linear.bloch, linear.bloch.ties, along, others)
     kept = np.flatnonzero(~linear.bloch.held)
 
     def waves(frequency: float) -> NDArray[np.complex128]:
@@ -116,7 +118,7 @@ def attenuation(
         dynamic = stiffness + 1j * omega * damping - omega**2 * mass
         blocks = _bordered(dynamic, ties.blocks[:, :, kept])
         found = phases_of(Reach(parts[0].steps, blocks), linear.bloch.ties.empty)
-        found = _forward(found, both=phase == 0.0)[:count]
+        found = _forward(found, both=not others.any())[:count]
         return np.pad(found, (0, count - len(found)), constant_values=np.nan)
 
     out = np.array(in_threads(waves, wanted))
@@ -134,13 +136,13 @@ def attenuation(
     return result_dataset("attenuation", cell.case, data | linear.variables, run, facts)
 
 
-def _blocks(bloch: Bloch, matrix: Any, along: int, phase: float) -> Reach:
-    """Blocks of a matrix by cells along a direction, summed with a phase along the other."""
+def _blocks(bloch: Bloch, matrix: Any, along: int, phases: NDArray) -> Reach:
+    """Blocks of a matrix by cells along a direction, summed with phases along the others."""
     steps = bloch.steps[:, along]
-    other = np.delete(bloch.steps, along, axis=1).sum(axis=1)
+    other = np.delete(bloch.steps, along, axis=1) @ phases
     reach = int(np.abs(steps).max(initial=0))
     every = np.arange(-reach, reach + 1)
-    factors = np.exp(1j * phase * other)
+    factors = np.exp(1j * other)
     blocks = np.array([matrix.at(np.where(steps == step, factors, 0.0)) for step in every])
     return Reach(every, blocks)
 

@@ -15,15 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError, quietly
-from foldyn.linear.unit_cell import UnitCell
+from foldyn.linear.unit_cell import Step, UnitCell, Vertex, minus
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import around, edge_of
 
 RINGS = 2  # rings of panels around the panels at the nodes of the cell
 FLAT = 1e-6  # rad: a crease between cells whose dihedral is closer to pi counts as flat
 
-Step = tuple[int, ...]  # R
-Vertex = tuple[Step, int]  # cell and kind
 Panel = tuple[Step, int]  # cell and number
 Site = tuple[Step, tuple[Any, ...]]  # cell, and representative of a node or hidden dof
 Kind = tuple[int, int, Step]  # kind of an edge: kinds of its vertices, R between them
@@ -32,11 +30,6 @@ Kind = tuple[int, int, Step]  # kind of an edge: kinds of its vertices, R betwee
 def plus(one: Step, two: Step) -> Step:
     """Sum of two R."""
     return tuple(a + b for a, b in zip(one, two, strict=True))
-
-
-def minus(one: Step, two: Step) -> Step:
-    """Difference of two R."""
-    return tuple(a - b for a, b in zip(one, two, strict=True))
 
 
 class Edge(NamedTuple):
@@ -75,34 +68,17 @@ class Lattice:
     beside : dict
         For each kind of edge, the panels at it, with the cell of the edge if the panel is in cell
         0.
-
-    Raises
-    ------
-    InputError
-        Panels that are copies of each other.
     """
 
     def __init__(self, cell: UnitCell) -> None:
         pattern: Pattern = cell.case.structure.pattern
         self.cell, self.pattern, self.zero = cell, pattern, (0,) * cell.dimensions
-        offsets = map(tuple, cell.copies.offset.tolist())
-        self.vertices: list[Vertex] = list(zip(offsets, cell.copies.kind.tolist(), strict=True))
+        self.vertices = cell.copies.named
         self.faces: list[list[Vertex]] = []
         self.steps: list[Step] = []
-        twins: dict[tuple[Vertex, ...], int] = {}
-        for f, face in enumerate(pattern.faces):
-            corners = [self.vertices[v] for v in face]
-            base = min(corners)[0]
-            moved = [(minus(step, base), kind) for step, kind in corners]
-            twin = twins.setdefault(tuple(sorted(moved)), f)
-            if twin != f:
-                raise InputError(
-                    f": panels {twin} and {f} are copies of each other under these motions, so "
-                    "that the pattern is more than one cell; give longer motions, or one cell",
-                    "case",
-                )
-            self.faces.append(moved)
-            self.steps.append(base)
+        for step, corners in cell.copies.panels(pattern):
+            self.faces.append(corners)
+            self.steps.append(step)
         self.beside: dict[Kind, list[tuple[int, Step]]] = {}
         for f in range(len(self.faces)):
             for edge in self._edges(f):

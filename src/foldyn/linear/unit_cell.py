@@ -1,6 +1,6 @@
 """`UnitCell`: a case that repeats under translations or a screw motion, and its Brillouin zone.
 
-The pattern repeats under one or two commuting motions g_1, g_2. Each vertex v is a copy of a
+The pattern repeats under one to three commuting motions g_1, g_2, g_3. Each vertex v is a copy of a
 representative u of its kind, v = g^R u with integers R: two vertices of the same kind are one
 vertex of the repeated sheet, and edges between them one edge. Wave vectors are phases k (rad) per
 period: a Bloch wave moves copy R of a vertex as Q^R a exp(i k . R), with Q the rotation of the
@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import combinations, pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +32,8 @@ from foldyn.ram_limit import check_memory
 from foldyn.values import number, numbers, of_kind, show, whole
 
 NEAR_MISS = 0.05  # a vertex this close to a partner, relative to the pattern's size, is reported
+Step = tuple[int, ...]  # R
+Vertex = tuple[Step, int]  # cell and kind
 COMMUTE = 10.0  # largest distance that the order of two motions may make, in tolerances
 SHOWN = 6  # most vertices named in a message
 HEXAGONAL = 1e-6  # tolerance for lengths and angle of a hexagonal lattice
@@ -54,6 +56,40 @@ class Copies(NamedTuple):
     offset: NDArray[np.int64]
     first: NDArray[np.int64]
 
+    @property
+    def named(self) -> list[Vertex]:
+        """R and kind of each vertex."""
+        return list(zip(map(tuple, self.offset.tolist()), self.kind.tolist(), strict=True))
+
+    def panels(self, pattern: Pattern) -> list[tuple[Step, list[Vertex]]]:
+        """R of each panel, and its corners, moved so that the lowest of them is in cell 0.
+
+        Raises
+        ------
+        InputError
+            Panels that are copies of each other.
+        """
+        vertices, found = self.named, []
+        twins: dict[tuple[Vertex, ...], int] = {}
+        for f, face in enumerate(pattern.faces):
+            corners = [vertices[v] for v in face]
+            base = min(corners)[0]
+            moved = [(minus(step, base), kind) for step, kind in corners]
+            twin = twins.setdefault(tuple(sorted(moved)), f)
+            if twin != f:
+                raise InputError(
+                    f": panels {twin} and {f} are copies of each other under these motions, so "
+                    "that the pattern is more than one cell; give longer motions, or one cell",
+                    "case",
+                )
+            found.append((base, moved))
+        return found
+
+
+def minus(one: Step, two: Step) -> Step:
+    """Difference of two R."""
+    return tuple(a - b for a, b in zip(one, two, strict=True))
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class UnitCell:
@@ -70,7 +106,7 @@ class UnitCell:
         Case whose structure is made by `discretize`, `shell` or `superelements`. Creases between
         cells have the stiffness and law of other creases, and letters from their dihedrals.
     vectors : sequence of sequences of float, shape (d, 3), optional
-        One or two translations (m) from a cell to the next: a chain or a sheet.
+        One to three translations (m) from a cell to the next: a chain, a sheet or a cellular solid.
     screw : Screw, optional
         Screw motion from a cell to the next, for tubes and rings: instead of `vectors`, or in
         addition to one vector.
@@ -80,7 +116,7 @@ class UnitCell:
     Attributes
     ----------
     motions : tuple of Screw
-        One or two motions from a cell to the next; without vectors or screw, the periods of the
+        Motions from a cell to the next; without vectors or screw, the periods of the
         pattern (`Pattern.periods`), or two translations found from its boundary.
     vectors : ndarray, shape (d, 3)
         Shifts of the motions (m).
@@ -129,6 +165,7 @@ class UnitCell:
         object.__setattr__(self, "motions", motions)
         object.__setattr__(self, "vectors", np.array([motion.vector for motion in motions]))
         object.__setattr__(self, "copies", _copies(len(pattern.vertices), len(motions), pairs))
+        self.copies.panels(pattern)  # refuses more than one cell
 
     def __repr__(self) -> str:
         """One line: size of the cell and its motions."""
@@ -150,7 +187,7 @@ class UnitCell:
             given = [] if self.vectors is None else list(map(translation, _steps(self.vectors)))
             if self.screw is not None:
                 given.append(of_kind("screw", self.screw, Screw))
-            if len(given) > 2:
+            if self.screw is not None and len(given) > 2:
                 raise InputError(": give at most two, or one with a screw", "vectors")
             return tuple(given), []
         if not pattern.periods:
@@ -210,8 +247,9 @@ class UnitCell:
         """Checked number of one of the motions, given as the argument `name`."""
         number_ = whole(name, value, least=0)
         if number_ >= self.dimensions:
-            known = "periods, 0 and 1" if self.dimensions > 1 else "period, 0"
-            raise InputError(f" = {number_}: the cell has {self.dimensions} {known}", name)
+            last = self.dimensions - 1
+            known = f"{last + 1} periods, 0 to {last}" if last else "1 period, 0"
+            raise InputError(f" = {number_}: the cell has {known}", name)
         return number_
 
     # ------------------------------------------------------------------ copies
@@ -233,7 +271,8 @@ class UnitCell:
         points : str
             Names of points joined by "-": "G" (no phase), "X" (pi along the first period), "Y" (pi
             along the second) and "M" (pi along both) of a sheet; "G" and "X" of a chain or tube. A
-            hexagonal lattice has "K" too, the corner of its zone.
+            hexagonal lattice has "K" too, the corner of its zone, and a cellular solid "Z" (pi
+            along the third period), "U" (X and Z), "T" (Y and Z) and "R" (all).
         count : int
             Total number of phases, including corners.
 
@@ -257,7 +296,7 @@ class UnitCell:
             what = f"{show(unknown[0])} is no point" if unknown else "give at least two points"
             raise InputError(
                 f" = {show(points)}: {what}; this cell has {', '.join(known)}, as in "
-                f'"{"G-X-M-G" if self.dimensions == 2 else "G-X"}"',
+                f'"{"G-X-M-G" if self.dimensions > 1 else "G-X"}"',
                 "points",
             )
         count = whole("count", count, least=len(names))
@@ -328,44 +367,45 @@ def rotation(
 
 
 def _steps(vectors: Any) -> NDArray[np.float64]:
-    """Checked translations (d, 3): one, or two that are not parallel."""
+    """Checked translations (d, 3), one to three that span as many directions."""
     array = numbers("vectors", vectors)
     array = array[None] if array.ndim == 1 else array
-    if array.ndim != 2 or array.shape[1] != 3 or len(array) > 2 or not len(array):
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) > 3 or not len(array):
         raise InputError(
-            f" = {show(vectors)}: give one or two translations, as in [(0.1, 0, 0), (0, 0.1, 0)]",
+            f" = {show(vectors)}: give one to three translations, as in [(0.1, 0, 0), (0, 0.1, 0)]",
             "vectors",
         )
     sizes = np.linalg.svd(array, compute_uv=False)
     if sizes[-1] <= 1e-9 * sizes[0] or sizes[0] == 0.0:
-        raise InputError(f" = {show(vectors)}: must not be zero or parallel", "vectors")
+        what = "parallel" if len(array) < 3 else "in one plane"
+        raise InputError(f" = {show(vectors)}: must not be zero or {what}", "vectors")
     return array
 
 
 def check_commuting(vertices: NDArray, motions: Sequence[Screw], near: float, field: str) -> None:
-    """Refuse two motions that do not commute."""
-    if len(motions) < 2:
-        return
-    one, two = motions
-    apart = one.images(two.images(vertices)) - two.images(one.images(vertices))
-    if np.abs(apart).max() > COMMUTE * near:
-        raise InputError(
-            ": the two motions lead to different places in the two orders, and a lattice needs "
-            "motions that commute: translations, or a screw and a translation along its axis",
-            field,
-        )
+    """Refuse motions that do not commute."""
+    for one, two in combinations(motions, 2):
+        apart = one.images(two.images(vertices)) - two.images(one.images(vertices))
+        if np.abs(apart).max() > COMMUTE * near:
+            raise InputError(
+                ": the two motions lead to different places in the two orders, and a lattice needs "
+                "motions that commute: translations, or a screw and a translation along its axis",
+                field,
+            )
 
 
 def _partners(
     pattern: Pattern, motions: Sequence[Screw], near: float, known: set[int]
 ) -> list[tuple[int, int, tuple[int, ...]]]:
-    """Pairs of vertices (v, w, R), w = g^R v, at boundary edges that meet edges of other cells.
+    """Pairs of vertices (v, w, R), w = g^R v, at edges that meet edges of other cells.
+
+    They are boundary edges of sheets, but layers and walls may meet along any edges.
 
     known : vertices with known partners.
     """
     from scipy.spatial import cKDTree
 
-    rim = half_edges(pattern.faces, pattern.boundary)
+    rim = np.concatenate([pattern.edges, pattern.edges[:, ::-1]])
     rim = rim[[not (a in known and b in known) for a, b in rim.tolist()]]
     if not len(rim):
         return []
@@ -416,9 +456,8 @@ def _check_all(
         a, b = rim[best], rim[nearest[best]]
         if distance[best] <= near:
             raise InputError(
-                f": motion {k} brings vertex {a} to {b}, but no boundary edge of the pattern to "
-                "another one: it has more than one cell, or copies touch at points alone; give "
-                "motions that put copies next to each other",
+                f": motion {k} brings vertex {a} to {b}, but no edge of the pattern to another one: "
+                "copies touch at points alone; give motions that put copies next to each other",
                 field,
             )
         raise InputError(
@@ -479,6 +518,10 @@ def special_points(vectors: NDArray) -> dict[str, NDArray]:
         return {"G": np.zeros(1), "X": np.full(1, pi)}
     corners = {"G": (0.0, 0.0), "X": (pi, 0.0), "Y": (0.0, pi), "M": (pi, pi)}
     found = {name: np.array(corner) for name, corner in corners.items()}
+    if len(vectors) == 3:
+        found = {name: np.append(corner, 0.0) for name, corner in found.items()}
+        above = {"G": "Z", "X": "U", "Y": "T", "M": "R"}
+        return found | {above[name]: found[name] + [0.0, 0.0, pi] for name in above}
     lengths = np.linalg.norm(vectors, axis=1)
     if lengths.all():
         cosine = vectors[0] @ vectors[1] / lengths.prod()
