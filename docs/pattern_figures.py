@@ -55,6 +55,29 @@ def compute() -> tuple[dict, dict]:
     return states, states
 
 
+def with_junctions() -> dict[str, fd.Pattern]:
+    """Patterns in which three and more panels meet, by caption."""
+    layer = P.miura(cells=(2, 2), dihedral=110)
+    top = layer.vertices[:, 2].max()
+    corners = [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1)]
+    walls = [(0, 1), (1, 2), (3, 4), (4, 5), (0, 3), (1, 4), (2, 5)]
+    periods = np.array([[1.5, np.sqrt(0.75), 0.0], [1.5, -np.sqrt(0.75), 0.0]])
+    foot = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
+    foot = np.concatenate([foot, periods])
+    cell = fd.Pattern(
+        np.concatenate([foot, np.add(foot, (0.0, 0.0, 0.8))]),
+        [(0, 1, 5, 4), (1, 2, 6, 5), (1, 3, 7, 5)],
+    )
+    return {
+        "box": fd.Pattern(
+            [(x, y, z) for z in (0, 2) for x, y in corners],
+            [(a, b, b + 6, a + 6) for a, b in walls],
+        ),
+        "honeycomb": cell.repeated((3, 3), periods),
+        "stack": layer.joined(layer.mirrored("z", about=(0, 0, top)), inner=True),
+    }
+
+
 def spans(pattern: fd.Pattern) -> np.ndarray:
     """Distances (m) of all corners of each panel."""
     corners = [pattern.vertices[list(face)] for face in pattern.faces]
@@ -76,6 +99,10 @@ def draw(results: dict, folder: Path) -> None:
         patterns = list(states.values())
         figure = fd.plots.draw_patterns(patterns, list(states), views=VIEWS.get(name, ()))
         figure.savefig(folder / f"pattern-{name.replace('_', '-')}.png", dpi=90)
+    joined = with_junctions()
+    views = [None, (50.0, -60.0), None]
+    figure = fd.plots.draw_patterns(list(joined.values()), list(joined), views=views)
+    figure.savefig(folder / "pattern-junctions.png", dpi=90)
 
 
 if __name__ == "__main__":

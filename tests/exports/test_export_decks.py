@@ -54,7 +54,21 @@ def welded():
     return fd.Case(structure, [fd.Fix([0, 4, 3])], [fd.Force(5, (0, 0, 1e-5))])
 
 
-CASES = {"fold": fold, "clamped": clamped, "tower": tower, "welded": welded}
+def junctions():
+    """Three panels that hinge at one line, and a fourth line at which they are welded to others."""
+    angles, out = np.radians([0.0, 100.0, 230.0]), [[0, 0, 0], [1, 0, 0]]
+    for angle in angles:
+        out += [[x, np.cos(angle), np.sin(angle)] for x in (0, 1)]
+    out += [[x, 1.7, z] for z in (0.6, -0.6) for x in (0, 1)]
+    faces = [(0, 1, 3, 2), (0, 1, 5, 4), (1, 0, 6, 7), (2, 3, 9, 8), (2, 3, 11, 10)]
+    pattern = fd.Pattern(out, faces, welds=[(2, 3)])
+    structure = fd.discretize(pattern, SHEET, preset="n5b8e", crease_stiffness=1e-4)
+    return fd.Case(structure, [fd.Fix([4, 5, 6])], [fd.Force(9, (0, 0, 1e-5))])
+
+
+CASES = {
+    "fold": fold, "clamped": clamped, "tower": tower, "welded": welded, "junctions": junctions,
+}  # fmt: skip
 
 
 @pytest.fixture(params=CASES)
@@ -223,7 +237,7 @@ def test_a_result_stands_for_its_case(tmp_path):
 
 
 # ------------------------------------------------------------------ what other programs find
-RUN = {name: CASES[name] for name in ("fold", "clamped", "welded")}
+RUN = {name: CASES[name] for name in ("fold", "clamped", "welded", "junctions")}
 
 
 def limits(find):

@@ -20,7 +20,7 @@ FACETS = "facets"
 """Key of [pattern] for the meaning of lines assigned "F"."""
 READING = ("scale", "unit", "frame", FACETS, "tolerance", "flat_foldable")
 """Keys of [pattern] in addition to `file`: arguments of `read_pattern`."""
-INLINE = ("vertices", "faces", "assignments", "fold_angles", "families")
+INLINE = ("vertices", "faces", "assignments", "fold_angles", "families", "welds")
 """Keys of [pattern] for a pattern that is written out in the case file."""
 
 

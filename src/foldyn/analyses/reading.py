@@ -264,7 +264,7 @@ def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
         pattern = Pattern(
             table["vertices"], table["faces"], table.get("assignments"),
             fold_angles=_radians(table.get("fold_angles")),
-            families=table.get("families"),
+            families=table.get("families"), welds=table.get("welds", ()),
         )  # fmt: skip
         return _facets(pattern, table)
 

@@ -456,7 +456,7 @@ def _check_all(
         a, b = rim[best], rim[nearest[best]]
         if distance[best] <= near:
             raise InputError(
-                f": motion {k} brings vertex {a} to {b}, but no edge of the pattern to another one: "
+                f": motion {k} brings vertex {a} to {b}, but no edge of the pattern to another: "
                 "copies touch at points alone; give motions that put copies next to each other",
                 field,
             )
