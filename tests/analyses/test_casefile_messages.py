@@ -121,8 +121,8 @@ pattern = { vertices = [[0, 0]] } | pattern.faces: missing
 pattern = { vertices = [[0, nan]], faces = [[0]] } | pattern.vertices[0][1] = nan: must be a finite
 pattern = { vertices = [[0, 0]], faces = [[0, 0.5]] } | pattern.faces[0] = [0, 0.5]: must be a list
     of vertex numbers
-pattern = { vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]], faces = [[0, 1,
-    2], [1, 0, 3], [0, 1, 4]] } | pattern: ... 3 faces
+pattern = { vertices = [[0, 0], [1, 0], [0, 1]], faces = [[0, 1, 2]], welds = [[0, 1]] } | pattern:
+    welds: (0, 1) is not an edge of two panels
 pattern.b = 4.0; pattern.panel_angle = 30; model.mass = "circumcenter" | model: mass =
     "circumcenter": panel ... use mass = "mixed_voronoi"
 pattern = { vertices = [[0, 0], [1, 0], [1, 1], [0, 1]], faces = [[0, 1, 2], [0, 2, 3]] };

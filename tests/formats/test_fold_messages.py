@@ -43,10 +43,6 @@ BAD_FIELDS = [
         r"faces_vertices\[0\] = \[0, 1, None\]: give",
     ),
     ({"faces_vertices": [[0, 1, 2]]}, r"faces\[0\].*has no area"),
-    (
-        {"faces_vertices": [[0, 1, 4], [1, 4, 2], [1, 4, 5]]},
-        r"faces: edge \(1, 4\).*3 fac",
-    ),
     ({"drop": ["edges_vertices"]}, "edges_vertices is missing"),
     ({"edges_assignment": ["V"]}, "edges_assignment has 1 entries for 3 in edges_vertices"),
     ({"edges_foldAngle": [0]}, "edges_foldAngle has 1 entries for 3 in edges_vertices"),

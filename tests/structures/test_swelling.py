@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.structures.swelling import chord_turns, panel_of_triangle
+from foldyn.structures.swelling import chord_turns, place_of
 
 STRIP = fd.Pattern(
     [[0, 0, 0], [0, 1, 0], [1.3, 0, 0], [1, 1, 0], [2, 0, 0], [2.2, 1.1, 0]],
@@ -56,7 +56,7 @@ def test_a_wing_over_the_middle_of_an_axis() -> None:
 def test_panels_of_triangles_in_any_order() -> None:
     triangles, panel = np.array([[0, 1, 2], [5, 2, 1], [3, 5, 2]]), np.array([4, 7, 9])
     wanted = np.array([[2, 3, 5], [1, 2, 0], [2, 1, 5], [5, 2, 3]])
-    assert panel_of_triangle(triangles, panel, wanted).tolist() == [9, 4, 7, 9]
-    assert panel_of_triangle(triangles, panel, wanted[:0]).tolist() == []
+    assert panel[place_of(triangles, wanted)].tolist() == [9, 4, 7, 9]
+    assert place_of(triangles, wanted[:0]).tolist() == []
     with pytest.raises(KeyError):
-        panel_of_triangle(triangles, panel, np.array([[0, 1, 5]]))
+        place_of(triangles, np.array([[0, 1, 5]]))

@@ -19,7 +19,6 @@ from scipy.spatial.transform import Rotation
 import foldyn as fd
 from foldyn.cases.directions import unit_vector
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
-from foldyn.patterns.topology import edge_lookup
 
 EARLIER = 1e-9  # s, between the histories of the halves of a load
 
@@ -89,10 +88,10 @@ class Copy:
     def __init__(self, case: fd.Case, symmetry: Symmetry) -> None:
         self.symmetry, self.old = symmetry, case.structure.pattern
         self.sign = -1.0 if symmetry.over else 1.0
+        # angles at a junction, the only creases of its pattern, are between panels, not fronts
+        self.folds_over = symmetry.over and not len(self.old.junctions)
         self.pattern = self._pattern()
-        rows = edge_lookup(self.pattern.creases)
-        pairs = symmetry.vertices[self.old.creases].reshape(-1, 2).tolist()
-        self.crease = np.array([rows[min(a, b), max(a, b)] for a, b in pairs], np.int64)
+        self.crease = self._creases()
         options = {name: self.of("", name, v) for name, v in vars(case.structure.options).items()}
         sheet = self.part(case.structure.sheet)
         self.structure = remade(case.structure, self.pattern, sheet, options)
@@ -107,7 +106,7 @@ class Copy:
             start = int(s.panels[panel] - panel) % len(new)  # another corner may come first
             new = new[start:] + new[:start]
             faces[s.panels[panel]] = tuple(new[::-1] if backwards else new)
-        letters = {"M": "V", "V": "M"} if s.over else {}
+        letters = {"M": "V", "V": "M"} if self.folds_over else {}
         pairs = [tuple(pair) for pair in s.vertices[old.creases].reshape(-1, 2).tolist()]
         given = zip(pairs, old.assignments, strict=True)
         vertices = np.empty_like(old.vertices)
@@ -117,6 +116,20 @@ class Copy:
             vertices, faces, {pair: letters.get(a, a) for pair, a in given}, families=families,
             welds=s.vertices[old.welds].reshape(-1, 2).tolist(),
         )  # fmt: skip
+
+    def _creases(self) -> np.ndarray:
+        """New number of each crease: that between the same panels at the same edge."""
+        new, s = self.pattern, self.symmetry
+        edges = [
+            new.creases.tolist(),
+            np.sort(s.vertices[self.old.creases].reshape(-1, 2)).tolist(),
+        ]
+        panels = [new.crease_faces, s.panels[self.old.crease_faces].reshape(-1, 2)]
+        found, wanted = (
+            [(*edge, *both) for edge, both in zip(one, np.sort(two).tolist(), strict=True)]
+            for one, two in zip(edges, panels, strict=True)
+        )
+        return np.array([found.index(key) for key in wanted], np.int64)
 
     def _nodes(self, old: np.ndarray, new: np.ndarray) -> np.ndarray:
         """New number of each node: of vertices the given one, of others that at its place."""
@@ -152,7 +165,7 @@ class Copy:
 
     def creases(self, value: Any) -> Any:
         if isinstance(value, str):
-            swapped = {"mountain": "valley", "valley": "mountain"} if self.symmetry.over else {}
+            swapped = {"mountain": "valley", "valley": "mountain"} if self.folds_over else {}
             return swapped.get(value, value)
         return self.crease[list(value)].tolist()
 
@@ -166,11 +179,15 @@ class Copy:
         return tuple((self.symmetry.matrix @ value + self.symmetry.shift).tolist())
 
     def to_front(self, value: Any) -> Any:
-        """What is positive towards the front, where a valley opens or folds."""
+        """What is positive towards the front."""
         return (self.sign * np.array(value)).tolist()
 
+    def of_fold(self, value: Any) -> Any:
+        """What is positive where a valley opens or folds."""
+        return (-np.array(value)).tolist() if self.folds_over else value
+
     def dihedral(self, value: Any) -> Any:
-        return (360.0 - np.array(value)).tolist() if self.symmetry.over else value
+        return (360.0 - np.array(value)).tolist() if self.folds_over else value
 
     def layers(self, value: Any) -> Any:
         return tuple(value[::-1]) if self.symmetry.over else value
@@ -245,7 +262,8 @@ FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     **dict.fromkeys(("normal", "motion", "velocity"), Copy.vector),
     "point": Copy.point,
     "direction": Copy.direction,
-    **dict.fromkeys(("pressure", "moment", "curvature", "fold_angle"), Copy.to_front),
+    **dict.fromkeys(("pressure", "curvature"), Copy.to_front),
+    **dict.fromkeys(("moment", "fold_angle"), Copy.of_fold),
     "angle": Copy.dihedral,
     "layers": Copy.layers,
     "crease_stiffness": Copy.per_crease,

@@ -203,8 +203,8 @@ def drawn(scene: Scene, kinds: Any) -> Any:
 
 # ------------------------------------------------------------------ patterns and models
 def pattern_of(rng) -> fd.Pattern:
-    """A fold, a Miura cell, triangles at random, a tower, or a pentagon beside a quad."""
-    kinds = (_fold, _miura, _torn, _tower, _pentagons)
+    """A fold, a Miura cell, random triangles, a tower, a pentagon beside a quad, or a star."""
+    kinds = (_fold, _miura, _torn, _tower, _pentagons, _star)
     return kinds[rng.integers(len(kinds))](rng)
 
 
@@ -248,6 +248,17 @@ def _pentagons(rng) -> fd.Pattern:
     angle = rng.uniform(-1.5, 1.5)
     points[5:, 1:] = points[5:, 1:2] * [np.cos(angle), np.sin(angle)]
     return fd.Pattern(points, [(0, 1, 2, 3, 4), (1, 0, 6, 5)])
+
+
+def _star(rng) -> fd.Pattern:
+    """Three or four quadrilaterals about one edge, whose fronts are anywhere."""
+    count, points, faces = int(rng.integers(3, 5)), [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], []
+    for k in range(count):
+        angle, width = 2.0 * np.pi * (k + rng.uniform(0.0, 0.5)) / count, rng.uniform(0.6, 1.0)
+        out = width * np.cos(angle), width * np.sin(angle)
+        points += [(rng.uniform(-0.2, 0.2), *out), (rng.uniform(0.8, 1.2), *out)]
+        faces.append((0, 1, 2 * k + 3, 2 * k + 2)[:: rng.choice([-1, 1])])
+    return fd.Pattern(points, faces)
 
 
 def structure_of(model: str, pattern: fd.Pattern, rng, extra: str) -> Any:

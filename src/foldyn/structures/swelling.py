@@ -48,14 +48,14 @@ def chord_turns(corners: NDArray) -> NDArray:
     return 0.5 * (reach - along * (length - along) / reach)
 
 
-def panel_of_triangle(triangles: NDArray, panel: NDArray, wanted: NDArray) -> NDArray:
-    """Panels (n,) of the triangles `wanted` (n, 3), whose corners may be in any order."""
+def place_of(triangles: NDArray, wanted: NDArray) -> NDArray:
+    """Rows (n,) of the triangles `wanted` (n, 3), whose corners may be in any order."""
     known, sought = np.split(_numbers(np.concatenate([triangles, wanted])), [len(triangles)])
     order = np.argsort(known, kind="stable")
     place = order[np.searchsorted(known[order], sought, "right") - 1]
     if not np.array_equal(known[place], sought):
         raise KeyError("a triangle that the structure does not have")
-    return panel[place]
+    return place
 
 
 def _numbers(triangles: NDArray) -> NDArray:
@@ -84,11 +84,16 @@ def chords(x: NDArray, triangles: NDArray, panel: NDArray, hinges: NDArray) -> C
 
     panel : (nt,) panel of each triangle.
     """
-    wings = [hinges[:, [0, 1, wing]] for wing in range(2, hinges.shape[1])]
-    return Chords(
-        np.array([panel_of_triangle(triangles, panel, corners) for corners in wings]),
-        np.array([chord_turns(x[corners]) for corners in wings]),
-    )
+    panels, turns = [], []
+    for wing in range(2, hinges.shape[1]):
+        corners = hinges[:, [0, 1, wing]]
+        place = place_of(triangles, corners)
+        own, start = triangles[place], corners[:, :1]
+        forward = np.roll(own, -1, axis=1)[own == start] == corners[:, 1]
+        # the front of a panel at a junction may be on the other side
+        turns.append(np.where(forward == (wing == 2), 1.0, -1.0) * chord_turns(x[corners]))
+        panels.append(panel[place])
+    return Chords(np.array(panels), np.array(turns))
 
 
 def mean_of_neighbors(pairs: NDArray, triangles: NDArray, value: NDArray) -> NDArray:
