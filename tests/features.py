@@ -74,6 +74,7 @@ FEATURES: Mapping[str, Make] = {
     "panels' membranes (`n5b8e`)": lambda s: s.case(s.sheet(preset="n5b8e", membrane="panel")),
     "shells": lambda s: s.case(s.shell()),
     "springs": lambda s: s.case(supports=[fd.Spring(1.0, nodes=[7])]),
+    "end stops": lambda s: s.case(supports=[fd.Stop([0], 150.0, stiffness=1e-3, side="below")]),
     "clamped edges": lambda s: s.case(s.sheet(clamped=[(0, 1)])),
     "clamped edges of `n5b8e`": lambda s: s.case(s.sheet(scheme="n5b8e", clamped=[(0, 1)])),
     "ties, rigid panels": lambda s: s.case(s.sheet(rigid=[3]), [fd.Link([5, 7], "z")]),

@@ -93,6 +93,7 @@ DATA: Calls = {
         "stiffness": 2.0, "between": [(0, 1)], "rest_length": 0.5,
     }),
     "Dashpot": (fd.Dashpot, {"coefficient": 2.0, "nodes": 0, "direction": (1.0, 0.0, 0.0)}),
+    "Stop": (fd.Stop, {"creases": [0], "angle": 30.0, "stiffness": 2.0, "side": "below"}),
     "Link": (fd.Link, {"nodes": [0, 1], "to": [2, 3, 4]}),
     "Force": (fd.Force, {"nodes": [0, 1], "vector": (1.0, 0.0, 0.5), "history": fd.Step(0.5)}),
     "Gravity": (fd.Gravity, {"acceleration": (0.0, 0.0, -9.5)}),

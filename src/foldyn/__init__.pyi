@@ -50,6 +50,7 @@ from foldyn.cases import (
     Ramp as Ramp,
     Rayleigh as Rayleigh,
     Spring as Spring,
+    Stop as Stop,
     State as State,
     StrainDamping as StrainDamping,
     Step as Step,

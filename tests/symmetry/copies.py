@@ -189,6 +189,10 @@ class Copy:
     def dihedral(self, value: Any) -> Any:
         return (360.0 - np.array(value)).tolist() if self.folds_over else value
 
+    def side(self, value: Any) -> Any:
+        swapped = {"below": "above", "above": "below"} if self.folds_over else {}
+        return swapped.get(value, value)
+
     def layers(self, value: Any) -> Any:
         return tuple(value[::-1]) if self.symmetry.over else value
 
@@ -266,6 +270,7 @@ FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     **dict.fromkeys(("moment", "fold_angle"), Copy.of_fold),
     "angle": Copy.dihedral,
     "layers": Copy.layers,
+    "side": Copy.side,
     "crease_stiffness": Copy.per_crease,
     "crease_rest": Copy.rest_per_crease,
     **dict.fromkeys(("law", "fold_law", "bend_law"), Copy.law),
@@ -303,7 +308,7 @@ def copied(case: fd.Case, symmetry: Symmetry) -> tuple[fd.Case, Copy]:
 # ------------------------------------------------------------------ halves
 HALVED = {
     "vector", "total", "force_per_length", "acceleration", "pressure", "moment", "change",
-    "mass", "Spring.stiffness", "coefficient", "BaseMotion.value",
+    "mass", "Spring.stiffness", "Stop.stiffness", "coefficient", "BaseMotion.value",
 }  # fmt: skip
 """Fields in proportion to which a part acts; a part that has none of them is not split."""
 

@@ -125,6 +125,8 @@ FIELDS: Mapping[str, Callable[[Scene, dict], Any]] = {
     "expansion": lambda s, _: s.about(2e-8),
     "curvature": lambda s, _: s.about(2e-3 / s.size),
     "layers": lambda s, _: [_layer(s), _layer(s)],
+    "Stop.side": lambda s, _: str(s.rng.choice(["below", "above"])),
+    "Stop.stiffness": lambda s, _: s.positive(s.moment),
     "Impose.value": lambda s, given: s.each(0.5 * SMALL * s.size, given["nodes"]),
     "BaseMotion.value": lambda s, _: s.about(0.5 * SMALL * s.size),
     "history": lambda s, _: drawn(s, HISTORIES.values()),

@@ -12,6 +12,7 @@ from foldyn.cases.loads import *  # noqa: F403
 from foldyn.cases.masses import PointMass
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.state import Continuation, Origin, State
+from foldyn.cases.stops import Stop
 from foldyn.cases.supports import SUPPORTS, BaseMotion, Fix, Impose, Link, Spring
 from foldyn.patterns.selection import select
 
@@ -35,6 +36,7 @@ __all__ = [
     "Rayleigh",
     "Spring",
     "State",
+    "Stop",
     "StrainDamping",
     "as_history",
     "resolve_nodes",

@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.arguments import Check, Choice, Key
+from foldyn.arguments import Check, Key
 from foldyn.cases.decode import Part
 from foldyn.cases.loads import PerCrease, check_angles
 from foldyn.cases.selection import Creases, resolve_creases
@@ -36,9 +36,10 @@ from foldyn.mechanics.term import (
     nodal,
 )
 from foldyn.structures.discretized import Discretized
-from foldyn.values import number, one_or_each, show
+from foldyn.values import choice, number, one_or_each, show
 
 ALIKE = 1e-9  # rad: turns below this have the moment of their middle
+DIGITS = 6  # of radians, to which a crease rests at its stop
 SIDES = {"below": -1.0, "above": 1.0}
 
 
@@ -52,9 +53,17 @@ class Stops(NamedTuple):
     stiffness: NDArray  # (h,) N m/rad
 
 
+class _Scratch(NamedTuple):
+    points: NDArray  # (4, 3), as all of these
+    mean: NDArray
+    change: NDArray
+    plain: NDArray
+    gradient: NDArray
+
+
 class _Context(NamedTuple):
     stops: Stops
-    points: NDArray  # (5, 4, 3) scratch
+    scratch: _Scratch
     group: int
     rows: int
 
@@ -80,7 +89,7 @@ def _angle(stops, moved, h, points):
 def _forces(own, u, v, t, force, powers):
     stops, moved, out = own.stops, rows_at(u, own.rows), rows_at(force, own.rows)
     for h in range(stops.limit.size):
-        found = _angle(stops, moved, h, own.points[0])
+        found = _angle(stops, moved, h, own.scratch.points)
         moment = stops.stiffness[h] * _beyond(stops, h, found[0])
         if moment != 0.0:
             for p in range(4):
@@ -92,7 +101,7 @@ def _forces(own, u, v, t, force, powers):
 def _energies(own, u, out):
     stops, moved, energy = own.stops, rows_at(u, own.rows), 0.0
     for h in range(stops.limit.size):
-        beyond = _beyond(stops, h, _angle(stops, moved, h, own.points[0])[0])
+        beyond = _beyond(stops, h, _angle(stops, moved, h, own.scratch.points)[0])
         energy += 0.5 * stops.stiffness[h] * beyond * beyond
     numbers_at(out, own.group + 1)[own.group] = energy
 
@@ -101,7 +110,7 @@ def _energies(own, u, out):
 def _mean_forces(own, u0, u1, before, h, t, force, powers):
     stops, out = own.stops, rows_at(force, own.rows)
     start, end = rows_at(u0, own.rows), rows_at(u1, own.rows)
-    x, dx, points, plain, gradient = own.points
+    room, points = own.scratch, own.scratch.points
     for e in range(stops.limit.size):
         first, last = _angle(stops, start, e, points)[0], _angle(stops, end, e, points)[0]
         one, two = _beyond(stops, e, first), _beyond(stops, e, last)
@@ -110,11 +119,11 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
         moment = 0.5 * (one + two)
         if abs(last - first) > ALIKE:
             moment = 0.5 * (two * two - one * one) / (last - first)
-        put_motion(stops.rest, stops.hinges, e, start, end, x, dx)
-        discrete_gradient(x, dx, last - first, points, plain, gradient)
+        put_motion(stops.rest, stops.hinges, e, start, end, room.mean, room.change)
+        discrete_gradient(room.mean, room.change, last - first, points, room.plain, room.gradient)
         for p in range(4):
             for c in range(3):
-                out[stops.hinges[e, p], c] += stops.stiffness[e] * moment * gradient[p, c]
+                out[stops.hinges[e, p], c] += stops.stiffness[e] * moment * room.gradient[p, c]
 
 
 @kernel
@@ -150,7 +159,8 @@ class StopsTerm(Term):
 
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """See `Term`."""
-        own = Context(_Context(self.stops, np.zeros((5, 4, 3)), group, int(part.own[1])))
+        scratch = _Scratch(*(np.zeros((4, 3)) for _ in _Scratch._fields))
+        own = Context(_Context(self.stops, scratch, group, int(part.own[1])))
         return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     @property
@@ -193,23 +203,23 @@ class Stop(Part):
 
     Parameters
     ----------
+    creases : int, sequence of int, or str
+        Numbers in the order of `pattern.creases`, or a name: "mountain", "valley", "all" (all
+        except flat creases), or a family of the pattern, such as "zigzag".
     angle : float or sequence of float
         Dihedral at which it begins to act (degrees, 0 to 360, flat 180): one for all creases, or
         one for each.
     stiffness : float
         k per length of the crease (N m/rad per m), above 0.
-    creases : int, sequence of int, or str
-        Numbers in the order of `pattern.creases`, or a name: "mountain", "valley", "all" (all
-        except flat creases), or a family of the pattern, such as "zigzag".
     side : {"below", "above"}, optional
         The side of the angle on which it acts; by default the side on which the crease is not at
         rest.
     """
 
+    creases: Creases
     angle: Annotated[PerCrease, Check(check_angles, unit="degrees"), Key("stop")]
     stiffness: Annotated[float, Check(number, above=0.0, unit="N m/rad per m")]
-    creases: Creases = "all"
-    side: Annotated[str | None, Choice(tuple(SIDES))] = None
+    side: Annotated[str | None, Check(choice, known=tuple(SIDES))] = None
 
     apart = "stops of creases are a support of their own"
 
@@ -231,9 +241,12 @@ class Stop(Part):
         """Hinges (h,), their limits and sides, and their stiffness, N m/rad."""
         creases = resolve_creases(structure, self.creases, f"{place}.creases")
         angles, rest = np.zeros((2, len(structure.folds)))
-        angles[creases] = np.radians(one_or_each(f"{place}.angle", self.angle, len(creases), "creases"))
+        given = one_or_each(f"{place}.angle", self.angle, len(creases), "creases")
+        angles[creases] = np.radians(given)
         rest[creases] = structure.pattern.dihedrals[creases]
-        side = np.sign(angles - rest) if self.side is None else np.full(len(rest), SIDES[self.side])
+        side = np.sign((angles - rest).round(DIGITS))
+        if self.side is not None:
+            side = np.full(len(rest), SIDES[self.side])
         same = creases[side[creases] == 0.0]
         if len(same):
             raise InputError(

@@ -14,6 +14,7 @@ from foldyn.cases.decode import Factor, Part, PartOf
 from foldyn.cases.directions import AXES, Axes, Axis, Direction
 from foldyn.cases.history import STEADY
 from foldyn.cases.selection import Nodes
+from foldyn.cases.stops import Stop
 from foldyn.errors import InputError
 from foldyn.values import indices, number, number_or_list, one_or_each, show
 
@@ -186,7 +187,7 @@ class Link(Part):
             )
 
 
-Support = Fix | Impose | BaseMotion | Spring | Dashpot | Link
+Support = Fix | Impose | BaseMotion | Spring | Stop | Dashpot | Link
 SUPPORTS: tuple[type[Support], ...] = get_args(Support)
 
 
@@ -195,6 +196,6 @@ SUPPORT = PartOf(
     "supports",
     "nodes and axes or direction (held), nodes, axis and displacement (moved), base and history (a "
     "base that moves), nodes and link or to (tied together), or nodes or between with stiffness "
-    "(springs) or dashpot (damped)",
+    "(springs) or dashpot (damped), or stop and stiffness (creases that push back)",
 )
 """A support in a case file."""

@@ -25,6 +25,7 @@ from foldyn.cases.directions import AXES, unit_vector
 from foldyn.cases.loads import Actuate
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import resolve_creases, resolve_nodes
+from foldyn.cases.stops import Stop
 from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
 from foldyn.condensation import Superelements
 from foldyn.condensation.panel import INNER
@@ -466,6 +467,8 @@ class Repeated:
             part = Fix(part.nodes, part.axis, part.direction, part.along)
         if isinstance(part, Link):
             return self._links(part, field)
+        if isinstance(part, Stop):
+            return [self._on_creases(part, field)]
         if getattr(part, "between", None) is not None:
             return self._between(part)
         nodes = self._resolved(part.nodes, f"{field}.nodes")

@@ -1,0 +1,150 @@
+"""End stops of creases: what they resist, and where they do nothing."""
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn import checks
+from foldyn.errors import InputError
+
+SHEET = fd.Sheet(2e9, 0.3, thickness=2e-3, density=900.0)
+PATTERN = fd.patterns.simple_fold(a=0.1, b=0.2, dihedral=100.0)
+REST, LENGTH = 260.0, 0.2  # a mountain
+MODELS = {
+    "herkal": lambda **more: fd.discretize(PATTERN, SHEET, preset="herkal", **more),
+    "plate": lambda **more: fd.discretize(PATTERN, SHEET, preset="plate", **more),
+    "n5b8e": lambda **more: fd.discretize(PATTERN, SHEET, preset="n5b8e", **more),
+    "shell": lambda **more: fd.shell(PATTERN, SHEET, divisions=3, **more),
+}
+FLAP = {"rigid": "all", "fold_law": "linear", "crease_stiffness": 0.5}
+
+
+def flap(model, stops, force=0.0, **more):
+    """A rigid panel hinged to one that is held, pushed across its middle."""
+    structure = MODELS[model](**{**FLAP, **more})
+    pattern = structure.pattern
+    held, moved = pattern.faces
+    edge = set(held) & set(moved)
+    tip = sorted(set(moved) - edge)
+    case = fd.Case(structure, [fd.Fix(list(held)), *stops])
+    if force:
+        along = force * pattern.face_normals[1] / len(tip)
+        case = case.altered(loads=[fd.Force(tip, tuple(along.tolist()))])
+    return case, tip
+
+
+def angle(case, u):
+    """Dihedral (degrees) between the two panels."""
+    x = case.structure.pattern.vertices + u[: len(case.structure.pattern.vertices)]
+    moved = fd.Pattern(x, case.structure.pattern.faces)
+    return float(np.degrees(moved.dihedrals[0]))
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_forces_are_the_gradient_and_the_tangent_that_of_forces(model):
+    stops = [fd.Stop("all", REST - 0.1, stiffness=30.0), fd.Stop("all", REST + 0.2, stiffness=20.0)]
+    case, _ = flap(model, stops, rigid=None)
+    body, random = case.body, np.random.default_rng(2)
+    for _ in range(3):
+        q = 1e-3 * random.standard_normal(body.size)
+        assert checks.gradient_error(lambda z: body.energies(z).sum(), body.internal, at=q) < 1e-6
+        assert checks.tangent_error(body.internal, body.tangent, at=q) < 1e-5
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(("limit", "sign"), [(220.0, -1.0), (310.0, 1.0)])
+def test_a_flap_comes_to_rest_at_its_stop(model, limit, sign):
+    """Springs in parallel from the stop on: k (theta - theta_0) + k_s (theta - theta_s) = M."""
+    case, _ = flap(model, [fd.Stop("all", limit, stiffness=40.0)])
+    away = np.radians(limit - REST)
+    beyond = sign * np.radians(3.0)
+    turn = away + beyond
+    moment = LENGTH * (0.5 * turn + 40.0 * beyond)
+    case = case.altered(loads=[fd.CreaseMoment([0], moment)])
+    found = angle(case, fd.trace(case, steps=20).displacement.values[-1])
+    assert found == pytest.approx(REST + np.degrees(turn), abs=1e-3)
+
+
+def test_before_the_stop_nothing_changes():
+    case, _ = flap("plate", [fd.Stop("all", REST - 40.0, stiffness=40.0)])
+    free, _ = flap("plate", [])
+    load = [fd.CreaseMoment([0], -0.02)]
+    one, other = (fd.trace(each.altered(loads=load)) for each in (case, free))
+    np.testing.assert_allclose(one.displacement, other.displacement, atol=1e-12)
+    one, other = (fd.modes(each, 3, check_model=False).frequency for each in (case, free))
+    np.testing.assert_array_equal(one, other)
+
+
+def test_a_pressed_flap_vibrates_as_on_both_springs():
+    """omega^2 = (k + k_s) L / I of a rigid panel, at the equilibrium in the stop."""
+    case, _ = flap("plate", [fd.Stop("all", REST - 1.0, stiffness=40.0)], mass="consistent")
+    case = case.altered(loads=[fd.CreaseMoment([0], -0.4)])
+    path = fd.trace(case)
+    state = fd.State(path.displacement.values[-1])
+    panel = case.structure.pattern.face_areas[1]
+    inertia = SHEET.density * SHEET.thickness * panel * 0.1**2 / 3.0
+    expected = np.sqrt(40.5 * LENGTH / inertia) / (2.0 * np.pi)
+    found = fd.modes(case, 1, state=state, check_model=False).frequency.values[0]
+    assert found == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        pytest.param(one, marks=pytest.mark.matrix)
+        for one in ("rk4", "dormand_prince", "generalized_alpha")
+    ]
+    + ["energy_momentum"],
+)
+def test_a_flap_that_hits_its_stop_keeps_its_energy(method):
+    case, _ = flap("plate", [fd.Stop("all", REST - 5.0, stiffness=3.0)], crease_stiffness=0.05)
+    start = fd.trace(case.altered(loads=[fd.CreaseMoment([0], -0.02)]))
+    result = fd.simulate(
+        case, duration=0.3, initial=fd.State(start.displacement.values[-1]), method=method
+    )
+    stored = sum(result[name] for name in ("kinetic", *case.energy_groups))
+    assert float(result["strain_stops"].max()) > 0.5 * float(stored[0])
+    assert np.abs(stored - stored[0]).max() < 2e-3 * float(stored[0])
+
+
+def test_stops_of_mountains_and_valleys():
+    sheet = fd.patterns.miura(dihedral=100.0)
+    letters = np.array(sheet.assignments)
+    structure = fd.discretize(sheet, SHEET, preset="plate")
+    stops = [fd.Stop("valley", 90.0, stiffness=5.0), fd.Stop("mountain", 270.0, stiffness=5.0)]
+    term = fd.Case(structure, stops).body.others[-1].stops
+    assert (
+        np.degrees(term.limit).round(9).tolist()
+        == [90.0] * (letters == "V").sum() + [270.0] * (letters == "M").sum()
+    )
+    length = np.linalg.norm(np.diff(sheet.vertices[sheet.creases], axis=1)[:, 0], axis=1)
+    order = [*np.flatnonzero(letters == "V"), *np.flatnonzero(letters == "M")]
+    np.testing.assert_allclose(term.stiffness, 5.0 * length[order])
+
+
+@pytest.mark.parametrize(
+    ("stop", "message"),
+    [
+        (
+            lambda: fd.Stop("all", REST, stiffness=5.0),
+            r"supports\[1\].angle: crease 0 rests at the stop",
+        ),
+        (
+            lambda: fd.Stop("all", 280.0, stiffness=5.0, side="below"),
+            "crease 0 is beyond the stop at rest, at 260",
+        ),
+        (lambda: fd.Stop("all", 120.0, stiffness=-5.0), "stiffness = -5.0: must be"),
+        (lambda: fd.Stop("all", 400.0, stiffness=5.0), "angle = 400: must lie between 0 and 360"),
+        (lambda: fd.Stop("all", 120.0, stiffness=5.0, side="left"), "choose one of below, above"),
+        (lambda: fd.Stop("ridges", 120.0, stiffness=5.0), r"supports\[1\].creases = \"ridges\""),
+    ],
+)
+def test_bad_stops_are_refused(stop, message):
+    with pytest.raises(InputError, match=message):
+        _ = flap("plate", [stop()])[0].body
+
+
+def test_superelements_refuse_stops():
+    made = fd.superelements(PATTERN, SHEET, divisions=8)
+    with pytest.raises(InputError, match="superelements are linear, and stops are not"):
+        fd.Case(made, [fd.Stop("all", 60.0, stiffness=4.0)])
