@@ -79,6 +79,7 @@ DATA: Calls = {
     "Ply": (fd.Ply, {
         "thickness": 0.5, "youngs_modulus": 1e6, "poissons_ratio": 0.25, "shear_modulus": None,
         "angle": 30.0, "density": 1000.0, "strength": [1e6, 2e6, 3e6, 4e6, 5e6],
+        "expansion": [0.5, 0.25],
     }),
     "Strip": (fd.Strip, {
         "width": 0.25, "thickness": 0.5, "youngs_modulus": 1e6, "poissons_ratio": 0.25,

@@ -40,11 +40,11 @@ def held_resultants(whole: Whole, load: Distributed) -> NDArray[np.float64]:
             push = whole.per_area(group, kept)[-len(inner) :]
             moved = np.linalg.solve(panel.stiffness[np.ix_(inner, inner)], push)
             held[..., :3] -= panel.resultants[..., inner] @ moved
-        amount = np.zeros((len(group.number), 5))
+        amount = np.zeros((len(group.number), 7))
         if load.panels is not None:
             amount[:, :3] = np.einsum("pad,pd->pa", group.frames, load.panels[group.number])
-        if load.swollen is not None:
-            amount[:, 3:] = load.swollen[group.number]
+        if load.strain is not None and load.curvature is not None:
+            amount[:, 3:] = group.swollen(load.strain, load.curvature)
         for k, (number, turned) in enumerate(in_own_axes(whole.pattern, group, held)):
             parts[number] = (turned @ amount[k]).ravel()
     return np.concatenate(parts)
