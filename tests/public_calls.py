@@ -275,6 +275,7 @@ def solved(folder: Path) -> Calls:
         }),
         "buckling": (fd.buckling, {
             "case": case(), "count": 2, "preload": [fd.Force([5], (0, 0, 1e-4))],
+            "iterations": 1,
         }),
         "frf": (fd.frf, {
             "case": case(), "drive": fd.Force([4], (0, 0, 1.0)), "frequencies": [1.0, 2.0],
