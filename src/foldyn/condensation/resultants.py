@@ -12,6 +12,7 @@ from scipy import sparse
 from foldyn.condensation.assembly import Whole
 from foldyn.condensation.library import Group
 from foldyn.condensation.panel import INNER
+from foldyn.mechanics.triangle import turned_strain
 from foldyn.patterns import Pattern
 from foldyn.structures.discretized import Distributed
 
@@ -61,10 +62,7 @@ def in_own_axes(
         own = pattern.faces[number]
         first, corners = own.index(int(face[0])), len(own)
         along = frame[:2] @ (pattern.vertices[own[1]] - pattern.vertices[own[0]])
-        c, s = along / np.linalg.norm(along)
-        turn = np.array(
-            [[c * c, s * s, 2 * c * s], [s * s, c * c, -2 * c * s], [-c * s, c * s, c * c - s * s]]
-        )
+        turn = turned_strain(-np.arctan2(along[1], along[0])).T  # forces, which work with strains
         order = np.roll(np.arange(corners), first)
         points = np.concatenate([[0], 1 + order, 1 + corners + order])
         yield int(number), np.einsum("ab,kpbc->pkac", turn, local[:, points])

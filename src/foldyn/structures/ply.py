@@ -167,10 +167,10 @@ def heights(plies: Sequence[Ply]) -> NDArray[np.float64]:
     return bounds - 0.5 * bounds[-1]
 
 
-def matrices(plies: Sequence[Ply]) -> tuple[NDArray, NDArray, NDArray]:
-    """A (N/m), B (N) and D (N m), each (3, 3), of plies: classical lamination theory."""
+def stiffness(plies: Sequence[Ply], power: int) -> NDArray[np.float64]:
+    """A (N/m), B (N) or D (N m), (3, 3), of plies, for the powers 1 to 3 of the height."""
     z, own = heights(plies), np.array([ply.elastic for ply in plies])
-    return tuple(np.einsum("k,kab->ab", np.diff(z**n) / n, own) for n in (1, 2, 3))  # type: ignore[return-value]
+    return np.einsum("k,kab->ab", np.diff(z**power) / power, own)
 
 
 def expansion(plies: Sequence[Ply]) -> NDArray[np.float64]:
@@ -180,7 +180,7 @@ def expansion(plies: Sequence[Ply]) -> NDArray[np.float64]:
         own = math.nan if ply.expansion is None else ply.expansion
         along = turned_strain(math.radians(ply.angle))
         push += ply.thickness * along.T @ (ply.fibers @ [*pair(own), 0.0])
-    return np.linalg.inv(matrices(plies)[0]) @ push
+    return np.linalg.inv(stiffness(plies, 1)) @ push
 
 
 def constants(name: str, plies: Sequence[Ply]) -> dict[str, Any]:
@@ -192,7 +192,7 @@ def constants(name: str, plies: Sequence[Ply]) -> dict[str, Any]:
         Plies that are not symmetric about the middle, so that stretching bends the sheet; plies
         with and without a density.
     """
-    stretching, coupling, _ = matrices(plies)
+    stretching, coupling = stiffness(plies, 1), stiffness(plies, 2)
     thickness = float(np.ptp(heights(plies)))
     if np.abs(coupling).max() > COUPLED * thickness * np.abs(stretching).max():
         raise InputError(
