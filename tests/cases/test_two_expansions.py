@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from case_texts import SHELL_MODES
 from foldyn.errors import InputError
 from foldyn.mechanics.triangle import turned_axes, turned_strain
 from foldyn.structures.ply import expansion
@@ -159,3 +160,34 @@ def test_margins_do_not_know_what_plies_do_to_each_other():
         else:
             with pytest.raises(InputError, match="plies that expand by different amounts"):
                 fd.margins(path)
+
+
+@pytest.mark.parametrize("given", ["[-1e-6, 3e-5]", '"plies"'])
+def test_case_files_have_expansions(tmp_path, given):
+    text = f"""{SHELL_MODES.replace('"modes"', '"statics"').replace("count", "steps")}
+        [sheet]
+        direction = 0
+        [[sheet.plies]]
+        thickness = 1e-3
+        youngs_modulus = [14e9, 1e9]
+        poissons_ratio = 0.3
+        shear_modulus = 6e8
+        expansion = [-1e-6, 3e-5]
+        [[supports]]
+        nodes = [0, 1]
+        axes = "z"
+        [[loads]]
+        temperature = -0.5
+        expansion = {given}
+        """
+    (tmp_path / "case.toml").write_text(text)
+    made = fd.read_case(tmp_path / "case.toml")
+    path = made.run()
+    again = fd.case_of(path)
+    assert again.loads == made.case().loads
+    assert again.structure.sheet.plies[0].expansion == (ALONG, ACROSS)
+    twice = fd.Temperature(CHANGE, expansion=(ALONG, ACROSS))
+    same = fd.trace(made.case().altered(loads=[twice]), steps=2)
+    a, b = same.displacement.values[-1], path.displacement.values[-1]
+    np.testing.assert_allclose(a, b, atol=1e-9 * np.abs(a).max())
+    assert np.abs(a).max() > 0.01 * SIZE

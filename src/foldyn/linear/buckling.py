@@ -155,17 +155,11 @@ def buckling(
 
 def _check(case: Case, preloaded: bool, iterations: int) -> None:
     """Refuse what has no tangent that changes linearly."""
-    if case.structure.linear and preloaded:
-        raise InputError(
-            f": {case.structure.linear} have load factors about rest alone; take fd.shell",
-            "preload",
-        )
-    if case.structure.linear and iterations:
-        raise InputError(
-            f" = {iterations}: {case.structure.linear} have load factors about rest alone; take "
-            "fd.shell",
-            "iterations",
-        )
+    for name, given in (("preload", preloaded), ("iterations", iterations)):
+        if case.structure.linear and given:
+            raise InputError(
+                f": {case.structure.linear} have load factors about rest alone; take fd.shell", name
+            )
     if case.contact is not None:
         raise InputError(
             ": closes and opens, so that the tangent jumps; take the case without contact, or "
