@@ -39,6 +39,7 @@ from foldyn.values import objects, of_kind, whole
 COPIES = 8  # copies of the shapes in memory, while they are found and stored
 DEPARTS = 0.05  # departure from which the lowest factor is doubtful
 SHARE = 0.9  # of the way to the first factor that an iteration takes
+RATES = 0.25, 2.0  # at which the distance to it may fall: beside limit points, and far from any
 CLOSE = 1e-4  # distance to the first factor, relative to it, at which iterations end
 TURNS = np.radians(10.0)  # turn of a hinge from which displacements are not small
 
@@ -183,8 +184,8 @@ def _approached(
     """The base state closest to the first factor, the factors from there, and the states tried.
 
     The distance f from a state to the first factor falls with the load factor, at the rate 1 before
-    a bifurcation and 2 before a limit point, where the stiffness falls like a root: f / rate is the
-    distance that is left.
+    a bifurcation, 2 before a limit point, where the stiffness falls like a root, and less where the
+    sheet stiffens: f / rate is the distance that is left.
     """
     found, taken, rate, share = base.nearest(count), 0, 1.0, SHARE
     while taken < most and len(found[0].values):
@@ -199,7 +200,7 @@ def _approached(
         there = closer.nearest(count)
         if len(there[0].values):
             fall = float(found[0].values[0] - there[0].values[0])
-            rate = float(np.clip(fall / (closer.factor - base.factor), 1.0, 2.0))
+            rate = float(np.clip(fall / (closer.factor - base.factor), *RATES))
         base, found, share = closer, there, SHARE
     return base, found, taken
 

@@ -19,7 +19,7 @@ from foldyn.errors import ComputationError, InputError, warn
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.statics import OrigamiProblem
 from foldyn.statics.newton import Solver
-from foldyn.statics.stepping import PathStoppedError, settle, walk
+from foldyn.statics.stepping import PathStoppedError, arrive, settle, step_to
 from foldyn.statics.tracing import refuse_mechanisms
 
 STEP = 1e-5  # largest strain or turn in the difference of tangents: errors of 1e-10 and rounding
@@ -62,11 +62,13 @@ class Base:
 
     def closer(self, factor: float) -> Base | None:
         """The state at another load factor of the path; None if it is lost or unstable there."""
-        other = copy(self)
+        other, attempt = copy(self), step_to(self._solver, self._station, factor)
+        if attempt.failure:
+            return None
+        other._station = arrive(self._solver, attempt)
         try:
-            (other._station,) = walk(self._solver, self._station, [factor], False)
             other._linearize()
-        except (PathStoppedError, InputError):
+        except InputError:
             return None
         return other
 
