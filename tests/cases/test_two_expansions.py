@@ -10,6 +10,7 @@ from case_texts import SHELL_MODES
 from foldyn.errors import InputError
 from foldyn.mechanics.triangle import turned_axes, turned_strain
 from foldyn.structures.ply import expansion
+from pairwise import beyond
 
 FIBERS = {"youngs_modulus": (14e9, 1e9), "poissons_ratio": 0.3, "shear_modulus": 6e8}
 ALONG, ACROSS, CHANGE = -1e-6, 3e-5, -0.5  # cold: warm sheets that are held buckle
@@ -49,7 +50,7 @@ def warmed(structure, load, supports=HELD):
     return fd.trace(fd.Case(structure, supports, [load]), "newton", load_factors=[0.0, 1.0])
 
 
-@pytest.mark.parametrize("direction", DIRECTIONS)
+@pytest.mark.parametrize("direction", [DIRECTIONS[1], *beyond((way,) for way in DIRECTIONS[::2])])
 @each_model
 def test_a_free_sheet_grows_without_stress(model, direction):
     structure = MODELS[model](woven(direction))
@@ -105,7 +106,7 @@ def test_laminates_expand_by_lamination_theory():
     np.testing.assert_allclose(found[45, -45], [cross, cross, 0.0], rtol=1e-12, atol=1e-19)
 
 
-@pytest.mark.parametrize("angles", [(0,), (20, 65), (0, 90)])
+@pytest.mark.parametrize("angles", [(20, 65), *beyond([((0,),), ((0, 90),)])])
 @each_model
 def test_laminates_grow_as_their_plies_want(model, angles):
     """As a sheet with the expansion of the whole along the axes where it has no shear."""
