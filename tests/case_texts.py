@@ -31,6 +31,22 @@ nodes = [4, 5]
 nodes = [0, 1]
 axes = "z"
 """
+SHELL_MODES = """[pattern]
+kind = "simple_fold"
+a = 0.1
+b = 0.1
+dihedral = 120
+[model]
+kind = "shell"
+divisions = 2
+[[supports]]
+nodes = [4, 5]
+axes = "xyz"
+along = true
+[analysis]
+kind = "modes"
+count = 2
+"""
 PLATE = '[model]\npreset = "plate"\n'  # what takes milliseconds, whatever the defaults
 MODES_TEXT = f"""{HELD_MIURA_TEXT}{PLATE}[analysis]
 kind = "modes"

@@ -79,6 +79,7 @@ DATA: Calls = {
     "Ply": (fd.Ply, {
         "thickness": 0.5, "youngs_modulus": 1e6, "poissons_ratio": 0.25, "shear_modulus": None,
         "angle": 30.0, "density": 1000.0, "strength": [1e6, 2e6, 3e6, 4e6, 5e6],
+        "expansion": [0.5, 0.25],
     }),
     "Strip": (fd.Strip, {
         "width": 0.25, "thickness": 0.5, "youngs_modulus": 1e6, "poissons_ratio": 0.25,
@@ -275,6 +276,7 @@ def solved(folder: Path) -> Calls:
         }),
         "buckling": (fd.buckling, {
             "case": case(), "count": 2, "preload": [fd.Force([5], (0, 0, 1e-4))],
+            "iterations": 1,
         }),
         "frf": (fd.frf, {
             "case": case(), "drive": fd.Force([4], (0, 0, 1.0)), "frequencies": [1.0, 2.0],

@@ -162,6 +162,8 @@ def test_the_result_has_the_mesh_of_the_panels():
 def test_refusals():
     with pytest.raises(InputError, match=r"preload: superelements .* take fd.shell"):
         fd.buckling(strip(superelements), preload=fd.Force([2], (1.0, 0.0, 0.0)))
+    with pytest.raises(InputError, match=r"iterations: superelements .* take fd.shell"):
+        fd.buckling(strip(superelements), iterations=2)
     with pytest.raises(InputError, match=r"rigid: .* take fd.shell"):
         fd.buckling(strip(superelements, rigid=[0]))
     with pytest.raises(InputError, match=r"crease_rest: .* take fd.shell"):

@@ -106,9 +106,8 @@ def test_a_sheet_that_swells_evenly_has_no_stress(structure) -> None:
     """The loads of a uniform strain are in balance where all lengths have grown alike."""
     growth = 1e-4
     force = structure.internal_force(growth * structure.nodes).ravel()
-    swollen = structure.swollen(
-        np.full(len(structure.pattern.faces), growth), np.zeros(len(structure.pattern.faces))
-    )
+    count = len(structure.pattern.faces)
+    swollen = structure.swollen(np.tile(growth * np.eye(3), (count, 1, 1)), np.zeros(count))
     load = following_force(swollen.forces, growth * structure.nodes.ravel(), np.ones((1, 1)))
     assert_allclose(load[: force.size], force, atol=1e-6 * np.abs(force).max())
 

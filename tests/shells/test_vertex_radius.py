@@ -44,6 +44,13 @@ def test_panels_keep_their_area(flat):
     assert np.bincount(mesh.panel, areas(mesh)) == pytest.approx(np.array(flat.face_areas))
 
 
+@pytest.mark.parametrize("radius", [1e-4, 1e-6])
+def test_triangles_about_vertices_may_be_tiny(radius):
+    mesh = mesh_of(SQUARE, 16, radius)
+    assert areas(mesh).sum() == pytest.approx(SQUARE.face_areas.sum())
+    assert 0.0 < areas(mesh).min() < 0.1 * radius**2
+
+
 def test_a_twisted_panel_keeps_its_surface():
     """All nodes of a quadrilateral lie where lines between opposite edges do."""
     quad = fd.Pattern([[0, 0, 0], [1, 0, 0.2], [1, 1, 0], [0, 1, 0.3]], [[0, 1, 2, 3]])

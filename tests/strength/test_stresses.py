@@ -152,6 +152,28 @@ def test_a_crease_carries_the_moment_that_opens_it(kind):
         assert found.von_mises.values.max() < 1e-3 * 6 * moment / length / THICKNESS**2
 
 
+@pytest.mark.matrix
+def test_moments_of_thin_panels():
+    """Those of the forces, down to 1/5000 of the edges; the thinnest are refused."""
+    pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=150)
+
+    def bent(t, force):
+        structure = fd.discretize(
+            pattern, fd.Sheet(1e9, 0.3, t), preset="n5b8e", fold_law="linear",
+            crease_stiffness=1e9 * t**3,
+        )  # fmt: skip
+        held, load = fd.Fix([0, 1, 2, 3]), fd.Force([4, 5], (0.0, 0.0, force))
+        return last(fd.Case(structure, [held], [load]))
+
+    force, arm = 1e4 * 2e-4**3, np.ptp(pattern.vertices[:, 0][2:])
+    found = bent(2e-4, force)
+    assert abs(found.crease_moment.item()) == pytest.approx(2.0 * force * arm, rel=1e-3)
+    center = np.flatnonzero(found.point_place == "center")[1]
+    assert abs(found.bending_moment[center, 0]) == pytest.approx(force * arm, rel=0.05)
+    with pytest.raises(InputError, match=r"thinner than 0\.0001 of their edges"):
+        bent(5e-5, 1e4 * 5e-5**3)
+
+
 @pytest.mark.parametrize("kind", ["shell", "superelements"])
 def test_warm_panels(kind):
     structure = (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from case_texts import changed
+from case_texts import SHELL_MODES, changed
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.errors import InputError
 from foldyn.linear import modes
@@ -18,30 +18,14 @@ T, RHO = 1e-3, 1600.0
 MIURA = fd.patterns.miura(cells=(1, 1), a=0.1, b=0.12, panel_angle=65, dihedral=110)
 QUAD = fd.Pattern([(0, 0, 0), (0.3, 0.02, 0), (0.27, 0.2, 0), (-0.04, 0.16, 0)], [(0, 1, 2, 3)])
 
-CASE = """
-[pattern]
-kind = "simple_fold"
-a = 0.1
-b = 0.1
-dihedral = 120
-[sheet]
+CASE = f"""{SHELL_MODES}[sheet]
 youngs_modulus = [140e9, 10e9]
 poissons_ratio = 0.3
 shear_modulus = 5e9
 thickness = 1e-3
 density = 1600
-direction = { edge = [0, 1], angle = 30 }
-panels = [{ panels = [1], direction = [0, 1, 0] }]
-[model]
-kind = "shell"
-divisions = 2
-[[supports]]
-nodes = [4, 5]
-axes = "xyz"
-along = true
-[analysis]
-kind = "modes"
-count = 2
+direction = {{ edge = [0, 1], angle = 30 }}
+panels = [{{ panels = [1], direction = [0, 1, 0] }}]
 """
 
 

@@ -7,10 +7,11 @@ import pytest
 from scipy.integrate import quad_vec
 
 import foldyn as fd
+from case_texts import SHELL_MODES
 from foldyn.errors import InputError
 from foldyn.linear import modes
 from foldyn.strength.plies import CRITERIA, ply_factors
-from foldyn.structures.ply import heights, matrices
+from foldyn.structures.ply import heights, stiffness
 
 CARBON = {"youngs_modulus": (140e9, 10e9), "poissons_ratio": 0.3, "shear_modulus": 5e9}
 STRENGTH = (1500e6, 1200e6, 50e6, 200e6, 70e6)
@@ -34,7 +35,8 @@ def strip(length, width):
 def test_stiffness_is_the_integral_over_the_thickness():
     layers = plies(20, -50, 75)
     bounds = heights(layers)
-    for power, found in enumerate(matrices(layers)):
+    for power in range(3):
+        found = stiffness(layers, power + 1)
         exact = sum(
             quad_vec(lambda z, own=own, n=power: z**n * own.elastic, low, high)[0]
             for own, low, high in zip(layers, bounds[:-1], bounds[1:], strict=True)
@@ -140,12 +142,7 @@ def test_margins_of_a_pulled_laminate(kind):
 
 
 def test_plies_are_stored_and_read(tmp_path):
-    text = """
-        [pattern]
-        kind = "simple_fold"
-        a = 0.1
-        b = 0.1
-        dihedral = 120
+    text = f"""{SHELL_MODES}
         [sheet]
         direction = 0
         [[sheet.plies]]
@@ -163,16 +160,6 @@ def test_plies_are_stored_and_read(tmp_path):
         youngs_modulus = 3e9
         poissons_ratio = 0.3
         density = 1000
-        [model]
-        kind = "shell"
-        divisions = 2
-        [[supports]]
-        nodes = [4, 5]
-        axes = "xyz"
-        along = true
-        [analysis]
-        kind = "modes"
-        count = 2
         """
     (tmp_path / "case.toml").write_text(text)
     made = fd.read_case(tmp_path / "case.toml")

@@ -8,6 +8,7 @@ import pytest
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.linear import modes
+from pairwise import beyond
 
 SHEET = fd.Sheet(3e9, 0.3, 1e-3, 1200.0)
 SIDE, WIDTH = 0.1, 4e-3
@@ -119,3 +120,29 @@ def test_strips_between_plies_need_a_modulus():
     sheet = fd.Sheet(plies=[ply], direction=0.0)
     with pytest.raises(InputError, match="youngs_modulus: missing; the panels have plies"):
         fd.shell(FOLD, sheet, divisions=2, crease_stiffness=fd.Strip(1e-3, 1e-4))
+
+
+@pytest.mark.parametrize("kind", ["shell", "n5b8e", *beyond(["superelements"])])
+def test_stiff_flaps_on_a_heavy_strip(kind):
+    """Two free flaps of mass m and length a fold about a strip with M more: a^2 w^2 is
+
+    2 k / (m / 3 - m^2 / (2 M + 4 m)), with the stiffness k of the crease.
+    """
+    pattern, film = flat(0.0), fd.Strip(WIDTH, thickness=5e-5)
+    structure = {
+        "shell": lambda: fd.shell(
+            pattern, SHEET, divisions=4, mass="consistent", crease_stiffness=film
+        ),
+        "superelements": lambda: fd.superelements(pattern, SHEET, crease_stiffness=film),
+        "n5b8e": lambda: fd.discretize(pattern, SHEET, preset="n5b8e", crease_stiffness=film),
+    }[kind]()
+    flap = SHEET.areal_density * SIDE**2
+    heavy = 2.0 * flap
+    ends = pattern.creases[0].tolist()
+    case = fd.Case(structure, masses=[fd.PointMass(ends, 0.5 * heavy)])
+    assert float(case.mass.sum()) == pytest.approx(2.0 * flap + heavy, rel=1e-9)
+    found = modes(case, count=8)
+    first = found.frequency.values[~found.rigid.values.astype(bool)][0]
+    inertia = SIDE**2 * (flap / 3.0 - flap**2 / (2.0 * heavy + 4.0 * flap))
+    exact = np.sqrt(2.0 * structure.fold_stiffness[0] / inertia) / (2.0 * np.pi)
+    assert first == pytest.approx(exact, rel=0.01)

@@ -25,7 +25,7 @@ def test_hinges_turn_as_on_a_paraboloid(scheme: str) -> None:
         u[:, 2] = 0.5 * curvature * (s.nodes[:, :2] ** 2).sum(axis=1)
         angles = np.concatenate(s.dihedrals(u))
         turned = angles - s.body.sheet.rest_angles[: len(angles)]
-        swelling = s.swollen(np.zeros(2), np.full(2, curvature))
+        swelling = s.swollen(np.zeros((2, 3, 3)), np.full(2, curvature))
         assert (swelling.turns[: len(s.folds)] < 0.0).all()  # as at a valley
         assert not swelling.forces.tension.any()
         return float(np.abs(swelling.turns - turned).max() / np.abs(turned).max())
@@ -37,7 +37,7 @@ def test_hinges_turn_as_on_a_paraboloid(scheme: str) -> None:
 
 def test_bars_between_panels_take_the_mean() -> None:
     s = fd.discretize(STRIP, SHEET, bar_law="linear", membrane="bars", preset="plate")
-    both = s.swollen(np.array([1e-3, 3e-3]), np.zeros(2))
+    both = s.swollen(np.multiply.outer([1e-3, 3e-3], np.eye(3)), np.zeros(2))
     for ends, tension, area, length in zip(
         both.forces.bars.tolist(), both.forces.tension, s.bar_area, s.bar_length, strict=True
     ):

@@ -12,7 +12,7 @@ from foldyn import plots
 from foldyn.analyses.bars import bar, bar_closed
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
 from foldyn.analyses.path import constant_loads
-from foldyn.analyses.sections import AnalysisSection, CaseSchema, Count, some_shapes
+from foldyn.analyses.sections import AnalysisSection, CaseSchema, Count, Seed, some_shapes
 from foldyn.arguments import Check
 from foldyn.cases.loads import LOAD
 from foldyn.cases.supports import SUPPORT
@@ -38,6 +38,7 @@ class BucklingSection(AnalysisSection):
     like = (buckling, trace)
     count: Count = 6
     constant: Annotated[str | Sequence[int], Check(constant_loads)] = ()
+    iterations: Seed = 0
 
 
 class BucklingOutput(Section):
@@ -69,7 +70,7 @@ class BucklingAnalysis(Analysis):
     kind = "buckling"
     schema = BucklingSchema
     needs_density = ""
-    takes = ("count", "constant")
+    takes = ("count", "constant", "iterations")
     files = ("buckling",)
     by_mass = False
 
@@ -140,6 +141,8 @@ def _table(result: xarray.Dataset) -> Table:
 def _notes(result: xarray.Dataset) -> str:
     departure, turn = result.attrs["departure"], np.degrees(result.attrs["turn"])
     base = "at rest" if result.attrs["state"] == "rest" else "in the equilibrium under the preloads"
+    if result.attrs["iterations"]:
+        base = f"on the path at the load factor {result.attrs['base_factor']:.6g}"
     notes = [
         f"Linear buckling about the state {base}: all other loads, moved supports, actuated "
         "creases and temperatures grow together with the factor."
@@ -147,8 +150,8 @@ def _notes(result: xarray.Dataset) -> str:
     if np.isfinite(departure):
         notes.append(
             f"At the first factor hinges or bars have turned by up to {turn:.2g} degrees, and "
-            f"{departure:.2g} of the stiffness of its shape is left where the displacement is "
-            "corrected to second order. Both are small where linear buckling holds; paths "
+            f"{departure:.2g} is its relative error if the displacement is corrected to second "
+            "order. Both are small where linear buckling holds; paths "
             '(analysis.kind = "statics") find the true critical points.'
         )
     return "\n\n".join(notes)

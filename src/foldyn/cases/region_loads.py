@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +26,15 @@ from foldyn.cases.selection import (
     resolve_panels,
     tributary_area,
 )
-from foldyn.errors import InputError
+from foldyn.errors import InputError, within
 from foldyn.mechanics.following import Following, joined, moments, pressures, pushes
 from foldyn.mechanics.sheet_term import NO_DOF
 from foldyn.patterns.topology import edge_lookup
 from foldyn.structures import Laminate
 from foldyn.structures.discretized import Discretized, Distributed
 from foldyn.structures.laminate import check_layers
+from foldyn.structures.material_axes import free_strains
+from foldyn.structures.ply import one_or_two
 from foldyn.structures.swelling import Swelling
 from foldyn.values import number, number_or_list, one_or_each, show, vector
 
@@ -337,7 +339,13 @@ class CreaseMoment(Load):
             )
 
 
+PLIES = "plies"
 MOST_STRAIN = 0.2  # largest free strain for which the laws of the sheet hold
+
+
+def _expansion(name: str, value: Any, unit: str) -> float | tuple[float, float] | str:
+    """Return an expansion, two of them, or `PLIES`."""
+    return PLIES if isinstance(value, str) and value == PLIES else one_or_two(name, value, unit)
 
 
 @dataclass(frozen=True)
@@ -356,8 +364,9 @@ class Temperature(Load):
     ----------
     change : float
         Temperature change, K, at factor 1.
-    expansion : float
-        Free strain per kelvin, 1/K.
+    expansion : float, (float, float) or "plies"
+        Free strain per kelvin, 1/K; two of an orthotropic sheet, along its direction and across;
+        or those that the plies of a laminate have.
     curvature : float
         Free curvature per kelvin, 1/(m K), positive if the sheet bends like a valley.
     panels : int, sequence of int, or "all"
@@ -372,7 +381,9 @@ class Temperature(Load):
     """
 
     change: Annotated[float, Check(number, unit="K"), Key("temperature")]
-    expansion: Annotated[float | None, Check(number, unit="1/K")] = None
+    expansion: Annotated[
+        float | Sequence[float] | str | None, Check(_expansion, unit="1/K", words=(PLIES,))
+    ] = None
     curvature: Annotated[float | None, Check(number, unit="1/(m K)")] = None
     panels: Panels = "all"
     layers: Annotated[Sequence[Sequence[float]] | None, Check(check_layers)] = None
@@ -389,36 +400,49 @@ class Temperature(Load):
             raise InputError(
                 ": give expansion (1/K), curvature (1/(m K)), or both, or the layers", "expansion"
             )
-        strain = self.change * self._per_kelvin[0]
-        if abs(strain) > MOST_STRAIN:
-            raise InputError(
-                f" = {self.change:g}: a free strain of {strain:.3g}; the laws of the sheet hold "
-                f"up to about {MOST_STRAIN:g}: check the units (K, 1/K)",
-                "change",
-            )
+        if self.expansion != PLIES:
+            self._stretched(np.array(self._per_kelvin[0]))
 
     @property
-    def _per_kelvin(self) -> tuple[float, float]:
-        """Expansion (1/K) and curvature (1/(m K))."""
+    def _per_kelvin(self) -> tuple[Any, float]:
+        """Expansion (1/K), one or two or `PLIES`, and curvature (1/(m K))."""
         if self.layers is not None:
             laminate = Laminate(self.layers)
             return laminate.expansion, laminate.curvature
         return self.expansion or 0.0, self.curvature or 0.0
 
+    def _stretched(self, expansion: NDArray) -> NDArray[np.float64]:
+        """Free strains, unless they are too large."""
+        strain = self.change * expansion
+        if np.abs(strain).max() > MOST_STRAIN:
+            raise InputError(
+                f" = {self.change:g}: a free strain of {np.abs(strain).max():.3g}; the laws of the "
+                f"sheet hold up to about {MOST_STRAIN:g}: check the units (K, 1/K)",
+                "change",
+            )
+        return strain
+
     def swelling(self, structure: Discretized, place: str) -> Swelling:
         """See `Load`."""
         if structure.pattern is None:
             raise InputError(f"{place}: this structure has no pattern with panels")
-        return structure.swollen(*self._free(structure, place).T)
+        return structure.swollen(*self._free(structure, place))
 
     def distributed(self, structure: Discretized, place: str) -> Distributed:
         """See `Load`."""
-        return Distributed(swollen=self._free(structure, place))
+        strain, curvature = self._free(structure, place)
+        return Distributed(strain=strain, curvature=curvature)
 
-    def _free(self, structure: Discretized, place: str) -> NDArray[np.float64]:
-        """Free strain, and curvature (1/m), of each panel (np, 2)."""
-        chosen = _chosen(structure, self.panels, place)
-        return np.outer(chosen, self.change * np.array(self._per_kelvin))
+    def _free(self, structure: Discretized, place: str) -> tuple[NDArray, NDArray]:
+        """Free strain (np, 3, 3) and curvature (np,), 1/m, of each panel."""
+        chosen, (expansion, curvature) = _chosen(structure, self.panels, place), self._per_kelvin
+        if isinstance(expansion, float):
+            each = expansion * chosen[:, None, None] * np.eye(3)
+        else:
+            with within(f"{place}."):
+                two = None if expansion == PLIES else expansion
+                each = free_strains(structure.pattern, structure.sheet, chosen, two)
+        return self._stretched(each), self.change * curvature * chosen
 
     def following(self, structure: Discretized, place: str) -> Following:
         """See `Load`."""

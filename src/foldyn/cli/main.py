@@ -112,6 +112,10 @@ def parser() -> argparse.ArgumentParser:
     )
     _add_common(buckling, "buckling", film=False)
     buckling.add_argument("--count", type=integer, help="load factors of each sign (default: 6)")
+    buckling.add_argument(
+        "--iterations", type=integer,
+        help="repeat it on the path, ever closer to the first factor, so often at most",
+    )  # fmt: skip
 
     random = commands.add_parser(
         "random",

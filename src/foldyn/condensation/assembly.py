@@ -301,9 +301,10 @@ class Whole:
                 )
                 first = own.bow(edge, 0)
                 out[first : first + 3 * own.functions] += np.outer(mean, force[edge]).ravel()
-        if load.swollen is not None:
+        if load.strain is not None and load.curvature is not None:
             for group, (kept, placed) in zip(self.groups, self.amplitudes, strict=True):
-                forces = load.swollen[group.number] @ group.panel.thermal[kept].T
+                free = group.swollen(load.strain, load.curvature)
+                forces = free @ group.panel.thermal[kept].T
                 out += placed.T @ forces.ravel()
         return out if load.panels is None else out + self._on_panels(load.panels)
 
@@ -326,12 +327,12 @@ class Whole:
         area = self.pattern.face_areas[group.number[0]]
         return inertia * area / (moved[:, 0] @ inertia[:, 0])
 
-    @property
-    def held_energies(self) -> NDArray[np.float64]:
-        """`CondensedPanel.held_energy` of each panel (np, 2)."""
-        out = np.zeros((self.unknowns.panels, 2))
+    def held(self, strain: NDArray, curvature: NDArray) -> NDArray[np.float64]:
+        """Free strains and curvatures of panels with held edges, and their forces (2, np, 4)."""
+        out = np.zeros((2, self.unknowns.panels, 4))
         for group in self.groups:
-            out[group.number] = group.panel.held_energy
+            free = group.swollen(strain, curvature)
+            out[:, group.number] = free, free @ group.panel.held_energy
         return out
 
     @property

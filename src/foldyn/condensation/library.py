@@ -37,6 +37,11 @@ class Group(NamedTuple):
     frames: NDArray  # (p, 3, 3) axes of the panels' frames, in rows
     number: NDArray  # (p,) indices in the pattern
 
+    def swollen(self, strain: NDArray, curvature: NDArray) -> NDArray[np.float64]:
+        """Free strains xx, yy and twice xy in the panels' frames, and curvatures 1/m, (p, 4)."""
+        own = np.einsum("pai,pij,pbj->abp", self.frames, strain[self.number], self.frames)
+        return np.stack([own[0, 0], own[1, 1], 2.0 * own[0, 1], curvature[self.number]], axis=1)
+
 
 @dataclass(frozen=True)
 class _Shape:

@@ -69,15 +69,15 @@ class CondensedPanel:
         Displacement of the mean of the corners, in the panel's frame.
     products : (3, 3, c, c)
         Integrals of mass times displacements along two axes of the panel's frame, kg.
-    thermal : (c, 2)
-        Forces of a panel with a unit free strain, or a unit free curvature.
-    held_energy : (2,)
-        Twice the energy of such a panel with its edges held.
+    thermal : (c, 4)
+        Forces of a panel with a unit free strain xx, yy or twice xy, or a unit free curvature.
+    held_energy : (4, 4)
+        Twice the energy of such a panel with its edges held, as a quadratic form.
     changes : (2, c, c)
         Changes of stiffness and mass if the panel comes from coarser meshes; 0 of a single mesh.
     resultants : (2, p, 3, c)
         Membrane forces, N/m, and moments, N, at the panel's `stress_points`: xx, yy, xy.
-    held_resultants : (2, p, 3, 5)
+    held_resultants : (2, p, 3, 7)
         The same of a panel with its edges held, under unit forces per area along the three axes of
         its frame, and with a unit free strain or curvature.
     """
@@ -108,7 +108,7 @@ class CondensedPanel:
             held_energy=modulus * self.held_energy,
             changes=self.changes * np.array([modulus, density])[:, None, None],
             resultants=modulus * self.resultants,
-            held_resultants=self.held_resultants * np.array([1.0, 1.0, 1.0, modulus, modulus]),
+            held_resultants=self.held_resultants * np.repeat([1.0, modulus], [3, 4]),
         )
 
     def lift(self, points: NDArray) -> NDArray[np.float64]:
@@ -203,8 +203,8 @@ def condense(
         full[on_nodes][2::3].astype(np.float32),
         full[3 * middle + np.arange(3)],
         np.array([[a.T @ (nodal @ b) for b in along] for a in along], np.float32),
-        np.concatenate([full[:, :-count].T @ warm, np.zeros((count, 2))]),
-        energy - np.einsum("mk,mk->k", warm[inside], held_motion[inside, 3:]),
+        np.concatenate([full[:, :-count].T @ warm, np.zeros((count, 4))]),
+        energy - warm[inside].T @ held_motion[inside, 3:],
         np.zeros((2, *reduced.shape)),
         mesh.resultants(full),
         mesh.resultants(held_motion, thermal=True),
@@ -262,7 +262,9 @@ class _Mesh:
         psi = (rows.ravel(), 3 * n + number.ravel(), -sign.ravel())
         self._rotations = _rows(self.size, 3 * nt, phi, psi)
         curled = [chord_turns(x[:, (k, k - 2, k - 1)]) for k in range(3)]
-        self._free = np.ones((nt, 3)), np.stack(curled, axis=1)  # see `structures.swelling`
+        tx, ty = np.moveaxis(side[..., :2], 2, 0) / np.sqrt(length2)
+        along = np.stack([tx * tx, 1.0 - tx * tx, tx * ty], axis=2)
+        self._free = along, np.stack(curled, axis=1)[..., None]  # see `structures.swelling`
         self._area = 0.5 * twice
 
     @property
@@ -281,12 +283,14 @@ class _Mesh:
 
     @property
     def thermal(self) -> tuple[NDArray, NDArray]:
-        """Forces (m, 2) of a unit free strain and a unit free curvature, and 2 energy (2,)."""
-        pairs = list(zip(self._elastic, self._free, strict=True))
-        held = [np.einsum("tkl,tl->tk", own, free) for own, free in pairs]
-        rows = self._strains, self._rotations
-        forces = [own.T @ each.ravel() for own, each in zip(rows, held, strict=True)]
-        return np.stack(forces, axis=1), np.einsum("ktl,ktl->k", self._free, held)
+        """Forces (m, 4) of unit free strains and a unit free curvature, and 2 energy (4, 4)."""
+        held = [own @ free for own, free in zip(self._elastic, self._free, strict=True)]
+        parts = zip((self._strains, self._rotations), held, strict=True)
+        forces = [rows.T @ own.reshape(rows.shape[0], -1) for rows, own in parts]
+        energy = np.zeros((4, 4))
+        for part, free, own in zip((slice(3), slice(3, 4)), self._free, held, strict=True):
+            energy[part, part] = np.einsum("tka,tkb->ab", free, own)
+        return np.concatenate(forces, axis=1), energy
 
     @property
     def pressed(self) -> NDArray:
@@ -297,11 +301,11 @@ class _Mesh:
     def resultants(self, shapes: NDArray, thermal: bool = False) -> NDArray:
         """Membrane forces and moments (2, p, 3, c) at the stress points, of shapes (m, c).
 
-        thermal : whether the last two shapes have a unit free strain and a unit free curvature.
+        thermal : whether the last four shapes have unit free strains and a unit free curvature.
         """
         strain, rotation = self._strains @ shapes, self._rotations @ shapes
         if thermal:
-            strain[:, -2] -= self._free[0].ravel()
+            strain[:, -4:-1] -= self._free[0].reshape(-1, 3)
             rotation[:, -1] -= self._free[1].ravel()
         moment = -self._recovery.moment @ (block_diagonal(self._elastic[1]) @ rotation)
         found = (self._recovery.strain @ strain).reshape(-1, 3, strain.shape[1])

@@ -12,6 +12,7 @@ from scipy import sparse
 from foldyn.condensation.assembly import Whole
 from foldyn.condensation.library import Group
 from foldyn.condensation.panel import INNER
+from foldyn.mechanics.triangle import turned_strain
 from foldyn.patterns import Pattern
 from foldyn.structures.discretized import Distributed
 
@@ -40,11 +41,11 @@ def held_resultants(whole: Whole, load: Distributed) -> NDArray[np.float64]:
             push = whole.per_area(group, kept)[-len(inner) :]
             moved = np.linalg.solve(panel.stiffness[np.ix_(inner, inner)], push)
             held[..., :3] -= panel.resultants[..., inner] @ moved
-        amount = np.zeros((len(group.number), 5))
+        amount = np.zeros((len(group.number), 7))
         if load.panels is not None:
             amount[:, :3] = np.einsum("pad,pd->pa", group.frames, load.panels[group.number])
-        if load.swollen is not None:
-            amount[:, 3:] = load.swollen[group.number]
+        if load.strain is not None and load.curvature is not None:
+            amount[:, 3:] = group.swollen(load.strain, load.curvature)
         for k, (number, turned) in enumerate(in_own_axes(whole.pattern, group, held)):
             parts[number] = (turned @ amount[k]).ravel()
     return np.concatenate(parts)
@@ -61,10 +62,7 @@ def in_own_axes(
         own = pattern.faces[number]
         first, corners = own.index(int(face[0])), len(own)
         along = frame[:2] @ (pattern.vertices[own[1]] - pattern.vertices[own[0]])
-        c, s = along / np.linalg.norm(along)
-        turn = np.array(
-            [[c * c, s * s, 2 * c * s], [s * s, c * c, -2 * c * s], [-c * s, c * s, c * c - s * s]]
-        )
+        turn = turned_strain(-np.arctan2(along[1], along[0])).T  # forces, which work with strains
         order = np.roll(np.arange(corners), first)
         points = np.concatenate([[0], 1 + order, 1 + corners + order])
         yield int(number), np.einsum("ab,kpbc->pkac", turn, local[:, points])

@@ -282,11 +282,8 @@ class Superelements(Discretized):
 
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """See `Discretized`; `spread` has the forces."""
-        free, energy = np.concatenate([strain, curvature]), self.whole.held_energies
-        return Swelling(
-            np.zeros(len(self.folds)), Following(), (free, np.zeros(0)),
-            (energy.T.ravel() * free, np.zeros(0)),
-        )  # fmt: skip
+        (free, push), none = self.whole.held(strain, curvature).reshape(2, -1), np.zeros(0)
+        return Swelling(np.zeros(len(self.folds)), Following(), (free, none), (push, none))
 
     def along_axes(
         self, edges: Mapping[int, NDArray], panels: NDArray

@@ -5,6 +5,7 @@ from foldyn.experiment.calibration.fitted import Descent as Descent, Fit as Fit,
 from foldyn.experiment.calibration.histories import Spectrum as Spectrum, TimeHistory as TimeHistory
 from foldyn.experiment.calibration.measured import (
     ForceDisplacement as ForceDisplacement,
+    Measured as Measured,
     Shapes as Shapes,
 )
 from foldyn.experiment.calibration.measurement import Measurement as Measurement

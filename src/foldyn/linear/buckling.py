@@ -38,11 +38,18 @@ from foldyn.values import objects, of_kind, whole
 
 COPIES = 8  # copies of the shapes in memory, while they are found and stored
 DEPARTS = 0.05  # departure from which the lowest factor is doubtful
+SHARE = 0.9  # of the way to the first factor that an iteration takes
+RATES = 0.25, 2.0  # at which the distance to it may fall: beside limit points, and far from any
+CLOSE = 1e-4  # distance to the first factor, relative to it, at which iterations end
 TURNS = np.radians(10.0)  # turn of a hinge from which displacements are not small
 
 
 def buckling(
-    case: Case, count: int = 6, *, preload: Load | Sequence[Load] | None = None
+    case: Case,
+    count: int = 6,
+    *,
+    preload: Load | Sequence[Load] | None = None,
+    iterations: int = 0,
 ) -> xarray.Dataset:
     """Load factors at which a case buckles, and the shapes, by linear buckling.
 
@@ -59,6 +66,10 @@ def buckling(
     preload : Load or sequence of Load, optional
         Loads that act in full at every factor, in addition to those of the case. The base state is
         the equilibrium under them; by default rest.
+    iterations : int
+        How often, at most, this is repeated about states of the equilibrium path that are ever
+        closer to the first positive factor, until it holds there: where the sheet turns long before
+        it buckles.
 
     Returns
     -------
@@ -71,7 +82,8 @@ def buckling(
         unit of the factor. The case of the result has the preloads first among its loads; that of
         superelements has the shell of their panels' mesh, whose nodes begin with the vertices.
         Attributes: `positive` and `negative` (numbers of factors), `complete` (number of factors
-        that counts prove to be complete), `constant` (numbers of the preloads), and for the first
+        that counts prove to be complete), `constant` (numbers of the preloads), `iterations` and
+        `base_factor` (that were taken, and the load factor of the base state), and for the first
         factor `departure`, an estimate of its relative error, and `turn` (rad), the largest turn of
         a hinge or bar up to it; facts about the computation.
 
@@ -109,10 +121,11 @@ def buckling(
     began = time.perf_counter()
     given = [] if preload is None else [preload] if isinstance(preload, LOADS) else preload
     steady = objects("preload", given, LOADS)
-    _check(case, bool(steady))
+    iterations = whole("iterations", iterations, least=0)
+    _check(case, bool(steady), iterations)
     base = PanelsBase(case) if case.structure.linear else Base(case, steady)
-    positive, negative = base.nearest(count)
-    values = np.concatenate([positive.values, negative.values])
+    base, (positive, negative), taken = _approached(base, count, iterations)
+    values = base.factor + np.concatenate([positive.values, negative.values])
     shapes = _nodal(base, np.hstack([positive.shapes, negative.shapes]))
     departure, turn = _departure(base, positive, negative)
     _warn(values, departure, turn)
@@ -127,6 +140,8 @@ def buckling(
         "state": "equilibrium" if found["displacement"].any() else "rest",
         "constant": list(range(len(steady))) or None,
         "free_dofs": base.softening.size,
+        "iterations": taken,
+        "base_factor": base.factor,
         "positive": len(positive.values),
         "negative": len(negative.values),
         "complete": positive.complete + negative.complete,
@@ -139,13 +154,13 @@ def buckling(
     return buckling_dataset(base.case, found, statistics)
 
 
-def _check(case: Case, preloaded: bool) -> None:
+def _check(case: Case, preloaded: bool, iterations: int) -> None:
     """Refuse what has no tangent that changes linearly."""
-    if case.structure.linear and preloaded:
-        raise InputError(
-            f": {case.structure.linear} have load factors about rest alone; take fd.shell",
-            "preload",
-        )
+    for name, given in (("preload", preloaded), ("iterations", iterations)):
+        if case.structure.linear and given:
+            raise InputError(
+                f": {case.structure.linear} have load factors about rest alone; take fd.shell", name
+            )
     if case.contact is not None:
         raise InputError(
             ": closes and opens, so that the tangent jumps; take the case without contact, or "
@@ -163,6 +178,33 @@ def _check(case: Case, preloaded: bool) -> None:
         )
 
 
+def _approached(
+    base: Base, count: int, most: int
+) -> tuple[Base, tuple[LoadFactors, LoadFactors], int]:
+    """The base state closest to the first factor, the factors from there, and the states tried.
+
+    The distance f from a state to the first factor falls with the load factor, at the rate 1 before
+    a bifurcation, 2 before a limit point, where the stiffness falls like a root, and less where the
+    sheet stiffens: f / rate is the distance that is left.
+    """
+    found, taken, rate, share = base.nearest(count), 0, 1.0, SHARE
+    while taken < most and len(found[0].values):
+        left = float(found[0].values[0]) / rate
+        if left < CLOSE * (base.factor + left):
+            break
+        taken += 1
+        closer = base.closer(base.factor + share * left)
+        if closer is None:  # past the critical point
+            share *= 0.5
+            continue
+        there = closer.nearest(count)
+        if len(there[0].values):
+            fall = float(found[0].values[0] - there[0].values[0])
+            rate = float(np.clip(fall / (closer.factor - base.factor), *RATES))
+        base, found, share = closer, there, SHARE
+    return base, found, taken
+
+
 def _nodal(base: Base, free: NDArray) -> NDArray:
     """Shapes (k, n, 3) of the nodes, the largest displacement 1, from motions of the free dofs."""
     case = base.case
@@ -178,6 +220,7 @@ def _departure(base: Base, positive: LoadFactors, negative: LoadFactors) -> tupl
     """Departure and turn (rad) at the first factor; nan without one.
 
     The state there is corrected to second order in the factor, with the tangent in the base state.
+    Errors of the distance from there count by its share in the factor.
     """
     first = positive if len(positive.values) else negative
     if not len(first.values):
@@ -185,11 +228,12 @@ def _departure(base: Base, positive: LoadFactors, negative: LoadFactors) -> tupl
     factor, shape, problem = float(first.values[0]), first.shapes[:, 0], base.problem
     linear = base.u + factor * base.slope
     turn = problem.turn(base.u, linear)
-    there = linear - base.moved(problem.residual(linear, factor))
+    there = linear - base.moved(problem.residual(linear, base.factor + factor))
     with np.errstate(all="ignore"):
-        tangent = base.tangent(there, factor)[problem.free][:, problem.free]
+        tangent = base.tangent(there, base.factor + factor)[problem.free][:, problem.free]
         left = float(shape @ (tangent @ shape))  # shape' K0 shape is 1
-    return left if np.isfinite(left) else float("inf"), turn
+    share = factor / (base.factor + factor)
+    return share * left if np.isfinite(left) else float("inf"), turn
 
 
 def _warn(values: NDArray, departure: float, turn: float) -> None:
@@ -204,6 +248,7 @@ def _warn(values: NDArray, departure: float, turn: float) -> None:
             f"at the load factor {values[0]:.4g} displacements are not small: hinges or bars turn "
             f"by up to {np.degrees(turn):.3g} degrees, and {departure:.2g} of the shape's "
             "stiffness is left where the linear path is corrected to second order: this factor may "
-            "be off by as much, or mean nothing. fd.trace finds the critical points of the path",
+            "be off by as much, or mean nothing. Repeat this closer to it (iterations), or find "
+            "the critical points of the path with fd.trace",
             "buckling.md#when-the-factors-hold",
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from foldyn.errors import ComputationError, InputError, warn
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.statics import OrigamiProblem
 from foldyn.statics.newton import Solver
-from foldyn.statics.stepping import PathStoppedError, settle
+from foldyn.statics.stepping import PathStoppedError, arrive, settle, step_to
 from foldyn.statics.tracing import refuse_mechanisms
 
 STEP = 1e-5  # largest strain or turn in the difference of tangents: errors of 1e-10 and rounding
@@ -34,6 +35,8 @@ class Base:
         The case, with its preloads constant.
     case : Case
         The case of results.
+    factor : float
+        Load factor of the base state.
     u, slope : (m,)
         The base state, and its derivative with respect to the load factor.
     step : float
@@ -42,32 +45,57 @@ class Base:
         Symmetric parts of the tangent and of its derivative, on the free dofs.
     """
 
+    factor = 0.0
+
     def __init__(self, case: Case, preloads: Sequence[Load]) -> None:
         whole = case.altered(loads=(*preloads, *case.loads)) if preloads else case
         problem = OrigamiProblem(whole, range(len(preloads)))
         refuse_mechanisms(problem)
+        self._solver, self._preloaded = Solver(problem), bool(preloads)
         try:
-            self.u = settle(Solver(problem), problem.start(), 0.0).point.u
+            self._station = settle(self._solver, problem.start(), 0.0)
         except PathStoppedError as stop:
             raise ComputationError(f"buckling: {stop}") from None
         self.problem, self.case, self._reduce = problem, problem.case, Reduction(problem.free)
-        self._refuse_soft()
         self.backend, self._factorize = factorizer("auto", len(problem.free))
-        matrix = self.tangent(self.u, 0.0)
+        self._linearize()
+
+    def closer(self, factor: float) -> Base | None:
+        """The state at another load factor of the path; None if it is lost or unstable there."""
+        other, attempt = copy(self), step_to(self._solver, self._station, factor)
+        if attempt.failure:
+            return None
+        other._station = arrive(self._solver, attempt)
+        try:
+            other._linearize()
+        except InputError:
+            return None
+        return other
+
+    def _linearize(self) -> None:
+        """Find the tangent and its change at the station."""
+        problem, self.u, self.factor = (
+            self.problem,
+            self._station.point.u,
+            self._station.point.factor,
+        )
+        self._refuse_soft()
+        matrix = self.tangent(self.u, self.factor)
         block = self._reduce(matrix)
         try:
             factors = self._factorize(block.symmetric)
             negative = factors.negative()
             exact = factors if block.is_symmetric else Unsymmetric(block.exact)
         except SingularTangentError:
-            raise unstable("is singular", bool(preloads)) from None
+            raise unstable("is singular", self._preloaded) from None
         if negative:
-            raise unstable(f"has {negative} negative eigenvalues", bool(preloads))
+            raise unstable(f"has {negative} negative eigenvalues", self._preloaded)
         self._exact: Solution = exact
         self.slope = self._slope(matrix)
         self.step = STEP / self.stretch()
         ahead, behind = (
-            self.tangent(self.u + way * self.slope, way) for way in (self.step, -self.step)
+            self.tangent(self.u + way * self.slope, self.factor + way)
+            for way in (self.step, -self.step)
         )
         change = self._reduce(sparse.csr_array((ahead - behind) / (2.0 * self.step)))
         if not change.is_symmetric:
@@ -107,7 +135,7 @@ class Base:
     def _slope(self, matrix: sparse.csr_array) -> NDArray:
         problem, given = self.problem, np.zeros(len(self.u))
         given[problem.held] = problem.prescribed(1.0) - problem.prescribed(0.0)
-        return given + self.moved(-problem.rate(self.u, 0.0) - matrix @ given)
+        return given + self.moved(-problem.rate(self.u, self.factor) - matrix @ given)
 
     def stretch(self) -> float:
         """Largest strain or turn per unit of the load factor, about.
@@ -116,7 +144,7 @@ class Base:
         strain count, too.
         """
         problem, structure = self.problem, self.problem.structure
-        body = problem.body(self.u, 0.0)
+        body = problem.body(self.u, self.factor)
         moved, q = problem.dofs(self.slope), problem.dofs(self.u)
         nodes = structure.nodes.size
         x, v = structure.nodes + q[:nodes].reshape(-1, 3), moved[:nodes].reshape(-1, 3)
@@ -124,7 +152,7 @@ class Base:
         apart = np.linalg.norm(v[b] - v[a], axis=1) / np.linalg.norm(x[b] - x[a], axis=1)
         turned = body.sheet.per_hidden * np.abs(moved[body.hidden])
         scale = body.scale()
-        held = np.abs(problem.rate(self.u, 0.0))[: len(scale)]
+        held = np.abs(problem.rate(self.u, self.factor))[: len(scale)]
         stressed = np.divide(held, scale, out=np.zeros_like(scale), where=scale > 0.0)
         most = max(float(each.max(initial=0.0)) for each in (apart, turned, stressed))
         if most == 0.0:  # springs alone resist the loads
@@ -139,7 +167,9 @@ class Base:
 
     def _refuse_soft(self) -> None:
         case, problem = self.problem.case, self.problem
-        soft = int(soft_at_rest(case, problem.body(self.u, 0.0), problem.dofs(self.u))[0].sum())
+        soft = int(
+            soft_at_rest(case, problem.body(self.u, self.factor), problem.dofs(self.u))[0].sum()
+        )
         if soft:
             raise InputError(
                 f": {soft} hinges of the superlinear law stand at their rest angle, where their "

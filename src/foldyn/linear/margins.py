@@ -9,6 +9,7 @@ import numpy as np
 import xarray
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.cases import Case, Temperature
 from foldyn.errors import InputError
 from foldyn.linear.stresses import ALONG, stresses
 from foldyn.patterns import Pattern
@@ -18,7 +19,6 @@ from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import MARGINS, variables
 from foldyn.strength.plies import CRITERIA, ply_factors
 from foldyn.structures.material_axes import material_axes
-from foldyn.structures.sheet import Sheet
 from foldyn.values import choice, number, numbers, show
 
 LARGEST = {"random": "rms", "spectrum": "peak"}  # results that hold one value for all times
@@ -96,7 +96,7 @@ def margins(
         bears = np.full(len(bears), number("strength", strength, above=0.0, unit="Pa"))
     values: dict[str, NDArray] = {}
     words: list[tuple[float, str]] = []
-    factor = _factors(found, bears, pattern, sheet if strength is None else None, criterion)
+    factor = _factors(found, bears, case if strength is None else None, criterion)
     if not np.isnan(factor).all():
         values |= _panels(found, factor / safety - 1.0, when)
         p = int(np.nan_to_num(values["panel_margin"], nan=np.inf).argmin())
@@ -156,19 +156,22 @@ def place_in(found: xarray.Dataset, point: Any) -> str:
 
 
 def _factors(
-    found: xarray.Dataset, bears: NDArray, pattern: Pattern, sheet: Sheet | None, criterion: str
+    found: xarray.Dataset, bears: NDArray, case: Case | None, criterion: str
 ) -> NDArray[np.float64]:
     """Factors (s, p) by which stresses at points may grow; nan where no strength is known.
 
     bears : (np,) von Mises stress that panels bear, Pa.
-    sheet : whose plies have strengths, or None.
+    case : whose plies have strengths, or None.
     """
     if "von_mises" not in found:
         return np.zeros(0)
     panel = found["point_panel"].values
     with np.errstate(divide="ignore"):
         factor = (bears[panel][:, None] / found["von_mises"].values).min(axis=2)
-    kinds, kind = sheet.kinds(len(bears)) if sheet else ([], np.zeros(0, np.int64))
+    if case is None:
+        return factor
+    sheet = case.structure.sheet
+    kinds, kind = sheet.kinds(len(bears))
     for number_of, own in enumerate(kinds):
         points = np.flatnonzero(kind[panel] == number_of)
         if not any(ply.strength for ply in own.plies or ()) or not len(points):
@@ -179,7 +182,15 @@ def _factors(
                 "strength, of von Mises stresses, instead",
                 "result",
             )
-        fibers = material_axes(pattern, sheet)[panel[points]]  # type: ignore[index]
+        if any(
+            not isinstance(own.expansion, float | None) for _, own in case.loads_of(Temperature)
+        ):
+            raise InputError(
+                ": plies that expand by different amounts press on each other, which margins leave "
+                "out; give strength, of von Mises stresses, instead",
+                "result",
+            )
+        fibers = material_axes(case.structure.pattern, sheet)[panel[points]]  # type: ignore[index]
         x, y = np.einsum("pai,pi->ap", found["panel_axes"].values[panel[points]], fibers)
         force, moment = (
             found[name].values[:, points] for name in ("membrane_force", "bending_moment")

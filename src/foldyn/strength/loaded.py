@@ -60,7 +60,7 @@ class LoadedSheet:
     def distributed(self, factors: NDArray) -> Distributed:
         """Loads on panels and creases, and the swelling of panels."""
         total = {}
-        for name in ("panels", "creases", "swollen"):
+        for name in ("panels", "creases", "strain", "curvature"):
             parts = [(i, getattr(own, name)) for i, own in self._distributed]
             there = [factors[i] * own for i, own in parts if own is not None]
             total[name] = np.sum(there, axis=0) if there else None

@@ -86,7 +86,8 @@ class Distributed(NamedTuple):
     panels: NDArray | None = None  # (np, 3) force per area, N/m2
     edges: NDArray | None = None  # (ne, 3) force per length, N/m, in the order of `pattern.lines`
     creases: NDArray | None = None  # (nf,) moment that opens each crease, N m
-    swollen: NDArray | None = None  # (np, 2) free strain, and curvature (1/m), of each panel
+    strain: NDArray | None = None  # (np, 3, 3) free strain of each panel
+    curvature: NDArray | None = None  # (np,) and its free curvature, 1/m
 
 
 def read_only(array: NDArray) -> NDArray:
@@ -282,8 +283,8 @@ class Discretized:
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """Additions to the structure if panels swell: if they would stretch and curl when free.
 
-        strain, curvature : (np,) free strain and curvature of each panel; curvature 1/m, positive
-            toward the front.
+        strain : (np, 3, 3) free strain of each panel, as a tensor.
+        curvature : (np,) 1/m, positive toward the front.
         """
         raise InputError("this structure has no panels that could swell")
 

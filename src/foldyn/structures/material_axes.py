@@ -14,6 +14,7 @@ from foldyn.errors import InputError
 from foldyn.mechanics.triangle import turned_axes
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import around, at_junctions, edge_of
+from foldyn.structures.ply import expansion as plies_expansion
 from foldyn.structures.sheet import Sheet
 
 UPRIGHT = 0.02  # a vector with a smaller part along a panel counts as normal to it
@@ -89,6 +90,36 @@ def bending_across(pattern: Pattern, sheet: Sheet) -> NDArray[np.float64]:
         axes = np.stack([np.cross(along, pattern.face_normals[face]), along], axis=1)
         out.append(_along(stiffness[face], fibers[face], axes)[:, 0, 0])
     return np.stack(out, axis=1)
+
+
+def free_strains(
+    pattern: Pattern, sheet: Sheet, chosen: NDArray, expansion: tuple[float, float] | None
+) -> NDArray[np.float64]:
+    """Tensors (np, 3, 3), 1/K, of panels that expand by two numbers, or as their plies (None).
+
+    Raises
+    ------
+    InputError
+        A chosen panel (np,) without a direction, or without plies whose expansion is known.
+    """
+    kinds, kind = sheet.kinds(len(pattern.faces))
+    given = [expansion and own.orthotropic and (*expansion, 0.0) for own in kinds]
+    if expansion is None:
+        given = [own.plies and plies_expansion(own.plies).tolist() for own in kinds]
+    strain = np.array([own or 3 * [np.nan] for own in given])[kind]
+    missed = np.flatnonzero(chosen & np.isnan(strain).any(axis=1))
+    if len(missed):
+        why = "has no plies with an expansion; give Ply(expansion=...)"
+        if expansion is not None:
+            why = "is isotropic, and has no direction; give one number"
+        raise InputError(f": panel {missed[0]} {why}, or name other panels", "expansion")
+    fibers = material_axes(pattern, sheet)
+    if fibers is None:
+        return np.zeros((len(strain), 3, 3))
+    axes = np.stack([fibers, np.cross(pattern.face_normals, fibers)], axis=1)
+    xx, yy, xy = np.where(chosen[:, None], strain, 0.0).T
+    tensor = np.moveaxis(np.array([[xx, 0.5 * xy], [0.5 * xy, yy]]), 2, 0)
+    return axes.swapaxes(1, 2) @ tensor @ axes
 
 
 def _along(stiffness: NDArray, fibers: NDArray | None, axes: NDArray) -> NDArray[np.float64]:

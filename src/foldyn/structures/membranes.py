@@ -278,15 +278,20 @@ def with_gives(kinds: Sequence[PanelKind], strains: Sequence[NDArray]) -> list[N
 def swelling(
     kinds: Sequence[PanelKind], x: NDArray, strain: NDArray
 ) -> tuple[list[Following], NDArray, NDArray]:
-    """Forces of panels that would stretch by `strain` (np,) if they were free.
+    """Forces of panels that would stretch by tensors `strain` (np, 3, 3) if they were free.
 
     Gives are measured from the swollen positions. Returns the free strains (k,) and the forces
     conjugate to them, J, for the bars of all panels in turn.
 
     x : (n, 3) rest positions of the nodes, m.
     """
-    free, parts, pushes = strain * (1.0 + 0.5 * strain), [], []
-    strains = [np.broadcast_to(free[which], own.per_length2.shape)[:, None] for which, own in kinds]
+    green, parts, pushes = strain + 0.5 * strain @ strain, [], []
+    strains = [
+        (np.einsum("bip,pij,bjp->bp", own.vector, green[which], own.vector) * own.per_length2)[
+            :, None
+        ]
+        for which, own in kinds
+    ]
     for (_, own), both in zip(kinds, with_gives(kinds, strains), strict=True):
         push = np.einsum("ijp,jp->ip", own.stiffness[: len(own.ends)], both[:, 0])
         pushes.append(push.ravel())

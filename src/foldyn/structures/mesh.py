@@ -187,7 +187,8 @@ def check_triangles(
     """Refuse degenerate and inside-out triangles, naming their panel."""
     normals = pattern.face_normals[panels]
     signed = 0.5 * np.einsum("ij,ij->i", double_areas(nodes, triangles), normals)
-    small = signed <= 1e-9 * pattern.face_areas[panels]
+    sides = nodes[np.roll(triangles, -1, axis=1)] - nodes[triangles]
+    small = signed <= 1e-9 * np.square(sides).sum(axis=2).max(axis=1)
     if small.any():
         panel = int(panels[small][0])
         raise InputError(

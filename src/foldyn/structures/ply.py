@@ -12,26 +12,28 @@ from numpy.typing import NDArray
 
 from foldyn.arguments import Check, Checked
 from foldyn.errors import InputError
-from foldyn.mechanics.triangle import isotropic, plane_stress, turned_axes
+from foldyn.mechanics.triangle import isotropic, plane_stress, turned_axes, turned_strain
 from foldyn.values import length, number, numbers, show, single
 
 COUPLED = 1e-9  # coupling of stretching and bending, relative to E t^2, that counts as none
 STRENGTHS = 5
 
 
-def _moduli(name: str, value: Any) -> float | tuple[float, float]:
-    """Return Young's modulus, or those along and across a direction."""
+def one_or_two(
+    name: str, value: Any, unit: str, above: float = -math.inf
+) -> float | tuple[float, float]:
+    """Return a number, or those along and across a direction."""
     value = single(value)
     if not isinstance(value, list | tuple | np.ndarray):
-        return number(name, value, above=0.0, unit="Pa")
+        return number(name, value, above=above, unit=unit)
     if len(value) != 2:
         raise InputError(
-            f" = {show(list(value))}: must be one number (Pa), or two: along the direction and "
+            f" = {show(list(value))}: must be one number ({unit}), or two: along the direction and "
             "across",
             name,
         )
     first, second = (
-        number(f"{name}[{k}]", each, above=0.0, unit="Pa") for k, each in enumerate(value)
+        number(f"{name}[{k}]", each, above=above, unit=unit) for k, each in enumerate(value)
     )
     return first, second
 
@@ -75,9 +77,10 @@ def _strengths(name: str, value: Any) -> tuple[float, ...]:
 
 
 Modulus = Annotated[float, Check(number, above=0.0, unit="Pa")]
-Moduli = Annotated[float | Sequence[float], Check(_moduli, unit="Pa")]
+Moduli = Annotated[float | Sequence[float], Check(one_or_two, unit="Pa", above=0.0)]
 Ratio = Annotated[float, Check(number, above=-1.0)]
 Length = Annotated[float, Check(length, unit="m")]
+Expansion = Annotated[float | Sequence[float], Check(one_or_two, unit="1/K")]
 Density = Annotated[float, Check(number, above=0.0, unit="kg/m3")]
 
 
@@ -103,6 +106,9 @@ class Ply(Checked):
     strength : sequence of 5 floats, optional
         Largest stresses, Pa, all positive: along the fibers in tension and in compression, across
         in tension and in compression, and in shear. `margins` needs them.
+    expansion : float or (float, float), optional
+        Free strain per kelvin along the fibers and across, 1/K; for ``Temperature(...,
+        expansion="plies")``.
 
     Examples
     --------
@@ -122,6 +128,7 @@ class Ply(Checked):
     angle: Annotated[float, Check(number, unit="degrees")] = 0.0
     density: Density | None = None
     strength: Annotated[Sequence[float] | None, Check(_strengths, unit="Pa")] = None
+    expansion: Expansion | None = None
 
     def agree(self) -> None:
         """Refuse constants that do not fit together."""
@@ -138,9 +145,9 @@ class Ply(Checked):
         return turned_axes(self.fibers, math.radians(self.angle))
 
 
-def pair(moduli: float | Sequence[float]) -> tuple[float, float]:
-    """E1 and E2, Pa; of an isotropic material E twice."""
-    first, second = np.broadcast_to(moduli, 2).tolist()
+def pair(values: float | Sequence[float]) -> tuple[float, float]:
+    """Values along and across the fibers, such as E1 and E2; of an isotropic material one twice."""
+    first, second = np.broadcast_to(values, 2).tolist()
     return first, second
 
 
@@ -160,10 +167,20 @@ def heights(plies: Sequence[Ply]) -> NDArray[np.float64]:
     return bounds - 0.5 * bounds[-1]
 
 
-def matrices(plies: Sequence[Ply]) -> tuple[NDArray, NDArray, NDArray]:
-    """A (N/m), B (N) and D (N m), each (3, 3), of plies: classical lamination theory."""
+def stiffness(plies: Sequence[Ply], power: int) -> NDArray[np.float64]:
+    """A (N/m), B (N) or D (N m), (3, 3), of plies, for the powers 1 to 3 of the height."""
     z, own = heights(plies), np.array([ply.elastic for ply in plies])
-    return tuple(np.einsum("k,kab->ab", np.diff(z**n) / n, own) for n in (1, 2, 3))  # type: ignore[return-value]
+    return np.einsum("k,kab->ab", np.diff(z**power) / power, own)
+
+
+def expansion(plies: Sequence[Ply]) -> NDArray[np.float64]:
+    """Free strains per kelvin (3,) of a sheet of plies: xx, yy, and twice xy; nan if unknown."""
+    push = np.zeros(3)
+    for ply in plies:
+        own = math.nan if ply.expansion is None else ply.expansion
+        along = turned_strain(math.radians(ply.angle))
+        push += ply.thickness * along.T @ (ply.fibers @ [*pair(own), 0.0])
+    return np.linalg.inv(stiffness(plies, 1)) @ push
 
 
 def constants(name: str, plies: Sequence[Ply]) -> dict[str, Any]:
@@ -175,7 +192,7 @@ def constants(name: str, plies: Sequence[Ply]) -> dict[str, Any]:
         Plies that are not symmetric about the middle, so that stretching bends the sheet; plies
         with and without a density.
     """
-    stretching, coupling, _ = matrices(plies)
+    stretching, coupling = stiffness(plies, 1), stiffness(plies, 2)
     thickness = float(np.ptp(heights(plies)))
     if np.abs(coupling).max() > COUPLED * thickness * np.abs(stretching).max():
         raise InputError(

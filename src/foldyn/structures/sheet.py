@@ -22,8 +22,8 @@ from foldyn.structures.ply import (
     check_material,
     constants,
     elastic,
-    matrices,
     pair,
+    stiffness,
 )
 from foldyn.tables import ListOf, TableOf
 from foldyn.values import indices, number, objects, show, single, vector
@@ -240,12 +240,12 @@ class Sheet(Checked):
     @property
     def stretching(self) -> NDArray[np.float64]:
         """Membrane stiffness A (3, 3) along direction 1 and across, N/m; see `plane_stress`."""
-        return matrices(self.plies)[0] if self.plies else self.thickness * self._elastic
+        return stiffness(self.plies, 1) if self.plies else self.thickness * self._elastic
 
     @property
     def bending(self) -> NDArray[np.float64]:
         """Bending stiffness D (3, 3) along direction 1 and across, N m."""
-        return matrices(self.plies)[2] if self.plies else self.thickness**3 / 12.0 * self._elastic
+        return stiffness(self.plies, 3) if self.plies else self.thickness**3 / 12.0 * self._elastic
 
     @property
     def _elastic(self) -> NDArray[np.float64]:

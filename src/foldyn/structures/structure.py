@@ -289,7 +289,7 @@ class Structure(Discretized):
         if self.membranes:
             parts, longer, push = swelling(self.membranes, self.nodes, strain)
         else:
-            free = mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
+            free = mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel, 0, 0])
             stress, longer, push = self.bar_law.stress(1.0 + free), none, none
             parts = [tensions(self.nodes, self.bars, -self.bar_stiffness * stress)]
         if self.edge_plates is not None:

@@ -52,7 +52,7 @@ class Measure:
         Dimensions of an array; their lengths may differ from point to point.
     takes : tuple of str
         Arguments, in their order: "node", "axis", "mode", "band", "model", "point", "leg",
-        "time", "displacement", "frequency".
+        "time", "displacement", "frequency", "panel", "crease".
     needs : int
         How many of these arguments must be given.
     through : callable, optional
@@ -167,9 +167,18 @@ class Asked:
                 f"{self.text}: is for analysis.kind = {' or '.join(show(one) for one in kinds)}, "
                 f"but {case_file.path} is of kind {show(kind)}"
             )
-        node, count = self.arguments.get(NODE), len(case_file.case().structure.nodes)
-        if node is not None and node >= count:
-            raise InputError(f"{self.text}: there is no node {node}; nodes are 0 to {count - 1}")
+        self.check_numbers(case_file.case())
+
+    def check_numbers(self, case: Case) -> None:
+        """Refuse numbers of nodes, panels and creases that a case does not have."""
+        structure = case.structure
+        own = {NODE: structure.nodes, "panel": structure.centers, "crease": structure.folds}
+        for word, rows in own.items():
+            if self.arguments.get(word, -1) >= len(rows):
+                raise InputError(
+                    f"{self.text}: there is no {word} {self.arguments[word]}; {word}s are 0 to "
+                    f"{len(rows) - 1}"
+                )
 
 
 def asked(text: str, known: Mapping[str, Measure]) -> Asked:

@@ -284,15 +284,17 @@ _ONCE = {"whole": True, "through": _stressed}
 
 
 @_measure(*MOVED, units="Pa", doc="largest von Mises stress of a panel", **_ONCE)
-def _von_mises(found: xr.Dataset, case: Case) -> float:
+def _von_mises(found: xr.Dataset, case: Case, panel: int | None = None) -> float:
     if "von_mises" not in found:
         raise InputError("needs panels with stresses, which this model has none of")
-    return float(found["von_mises"].max())
+    there = slice(None) if panel is None else found["point_panel"].values == panel
+    return float(found["von_mises"].isel(point=there).max())
 
 
 @_measure(*MOVED, units="N", doc="largest moment of a crease per length", **_ONCE)
-def _crease_moment(found: xr.Dataset, case: Case) -> float:
-    return float(np.abs(found["crease_moment"].values).max(initial=0.0))
+def _crease_moment(found: xr.Dataset, case: Case, crease: int | None = None) -> float:
+    there = slice(None) if crease is None else [crease]
+    return float(np.abs(found["crease_moment"].isel(crease=there).values).max(initial=0.0))
 
 
 @_measure(*MOVED, doc="least margin of safety of a panel", **_ONCE)

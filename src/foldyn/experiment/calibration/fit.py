@@ -130,7 +130,7 @@ def fit(
     case : path
         A case file of kind "statics", "dynamics", "modes" or "frf".
     data : sequence of Measurement
-        `ForceDisplacement`, `Shapes`, `TimeHistory`, `Spectrum`, `NaturalFrequencies`,
+        `ForceDisplacement`, `Shapes`, `Measured`, `TimeHistory`, `Spectrum`, `NaturalFrequencies`,
         `DampingRatios`, `ModeShapes`, `FrequencyResponse`.
     parameters : sequence of Parameter
     ties : mapping of str to str, optional

@@ -12,6 +12,7 @@ from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
 from foldyn.experiment.calibration.measured import (
     MOST,
     ForceDisplacement,
+    Measured,
     Shapes,
     dense_curve,
     picture_plane,
@@ -30,6 +31,11 @@ def charts_of(one: Measurement, result: xr.Dataset, case: Case) -> list[Chart]:
         model = Curve("model", curve.displacement, curve.predicted(result, case))
         seen = Curve(one.label, one.displacement, one.force, True, one.sigma)
         return [Chart(f"{one.axis} displacement (m)", f"{one.axis} force (N)", [model, seen])]
+    if isinstance(one, Measured):
+        model = Curve("model", one.load_factor, one.predicted(result, case))
+        seen = Curve(one.label, one.load_factor, one.values, True, one.sigma)
+        label = f"{one.measure} ({one.unit})" if one.unit else one.measure
+        return [Chart("load factor", label, [model, seen])]
     if isinstance(one, Shapes):
         return _shapes(one, result, case) if len(one.axes) > 1 else []
     if isinstance(one, ModeShapes):

@@ -12,12 +12,18 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.cases.directions import AXES, check_axes
-from foldyn.errors import InputError
-from foldyn.experiment.calibration.measurement import AtNodes, NodeValues, column
-from foldyn.values import choice
+from foldyn.errors import InputError, within
+from foldyn.experiment.calibration.measurement import AtNodes, Measurement, NodeValues, column
+from foldyn.sweeps.measure import Asked, asked
+from foldyn.sweeps.measures import MEASURES
+from foldyn.values import choice, show
 
 IMPOSED = "imposed"  # as `nodes`: all nodes that supports of the case move along the axis
 QUANTITIES = ("displacement", "position")
+OF_STATES = (
+    "von_mises", "crease_moment", "margin", "strain", "strain_energy", "reaction", "displacement",
+    "largest_displacement", "clearance",
+)  # fmt: skip
 MOST = 8  # largest number of nodes, and of shapes, in pages and figures
 POINTS = 25  # number of points of the curve drawn through measured forces
 
@@ -152,6 +158,71 @@ class Shapes(NodeValues):
     def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Predictions of the measured values, in the order of `observed`."""
         return self.shapes(result, case)[np.isfinite(self.values)]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Measured(Measurement):
+    """Values of a measure of sweeps in states of a path: stresses, moments of creases, energies.
+
+    Derivatives by parameters are quotients of whole runs.
+
+    Parameters
+    ----------
+    measure : str
+        As in sweeps, such as "crease_moment[3]", "von_mises[0]" or "reaction[z]".
+    load_factor : array_like, shape (s,)
+    values : array_like, shape (s,)
+        Value of the measure at each load factor, SI units.
+    """
+
+    measure: str = ""
+    load_factor: Any = ()
+    values: Any = ()
+    kind: ClassVar[str] = "measure"
+    analysis: ClassVar[str] = "statics"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        super().__post_init__()
+        with within(self._of("measure")):
+            found = asked(self.measure, MEASURES)
+        if found.measure.name not in OF_STATES:
+            raise InputError(
+                f" = {show(self.measure)}: a fit compares states, by {', '.join(OF_STATES)}",
+                self._of("measure"),
+            )
+        factors = column(self._of("load_factor"), self.load_factor)
+        values = column(self._of("values"), self.values, len(factors))
+        self._set(load_factor=factors, values=values)
+
+    @property
+    def asked(self) -> Asked:
+        """The measure with its arguments."""
+        return asked(self.measure, MEASURES)
+
+    @property
+    def unit(self) -> str:  # type: ignore[override]
+        """Unit of the values."""
+        return self.asked.measure.units.removesuffix("1")
+
+    def observed(self) -> NDArray[np.float64]:
+        """Measured values."""
+        return self.values
+
+    def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
+        """Refuse a case that cannot predict these values."""
+        self.asked.check_numbers(case)
+
+    def factors(self, case: Case) -> NDArray[np.float64]:
+        """Load factors at which the path is needed."""
+        return self.load_factor
+
+    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
+        """Predictions of the measured values, in the order of `observed`."""
+        own, through = self.asked, self.asked.measure.through
+        states = through(result, case) if through else result
+        each = (states.isel(step=[k]) for k in _steps(result, self.load_factor))
+        return np.array([own.measure.function(one, case, **own.arguments) for one in each])
 
 
 def _steps(result: xr.Dataset, factors: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -16,7 +16,12 @@ from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.experiment.calibration import modal_files
 from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
-from foldyn.experiment.calibration.measured import IMPOSED, ForceDisplacement, Shapes
+from foldyn.experiment.calibration.measured import (
+    IMPOSED,
+    ForceDisplacement,
+    Measured,
+    Shapes,
+)
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.modal import (
     DampingRatios,
@@ -28,6 +33,8 @@ from foldyn.experiment.calibration.tables import by_node, limits, listed_nodes, 
 from foldyn.experiment.camera import Sight
 from foldyn.experiment.tracking.tracks_dataset import load_tracks
 from foldyn.values import choice, show
+
+IN_FILE = "leave it out, the file has a column of that name"
 
 
 def force_displacement(
@@ -77,9 +84,20 @@ def shapes(
         moved = _table(file, names) if tracks is None else _moved(file, tracks, "photo")
         return _shapes_of_tracks(file, moved, nodes, load_factor, **known)
     if load_factor is not None:
-        raise InputError(f"{file}: load_factor: leave it out, the file has a column of that name")
+        raise InputError(f"{file}: load_factor: {IN_FILE}")
     steps, chosen, axes, values = by_node(file, "load_factor", nodes, "m")
     return made(Shapes, file, nodes=chosen, load_factor=steps, values=values, axes=axes, **known)
+
+
+def measured(file: Path, **known: Any) -> Measured:
+    """Values of a measure from a CSV file with the columns load_factor and value, SI units.
+
+    Other arguments as in `Measured`.
+    """
+    if "load_factor" in known:
+        raise InputError(f"{file}: load_factor: {IN_FILE}")
+    wanted = {"load_factor": ("load_factor", "-"), "values": ("value", "-")}
+    return made(Measured, file, **read_numbers(file, wanted), **known)
 
 
 def history(
@@ -280,6 +298,7 @@ def _texts(given: Any) -> bool:
 READERS: Mapping[type[Measurement], Any] = {
     ForceDisplacement: force_displacement,
     Shapes: shapes,
+    Measured: measured,
     TimeHistory: history,
     Spectrum: spectrum,
     NaturalFrequencies: modal_files.frequencies,

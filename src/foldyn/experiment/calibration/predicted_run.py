@@ -17,6 +17,7 @@ from foldyn.cases import Case, State
 from foldyn.dynamics.methods import method_of
 from foldyn.dynamics.motion import Motion
 from foldyn.errors import InputError, quietly
+from foldyn.experiment.calibration.measured import Measured
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.modal import FrequencyResponse, ModalParameters, ModeShapes
 from foldyn.gradients.neighbors import Asked, equilibria, modes, motions, responses
@@ -155,6 +156,8 @@ def with_neighbors(
     FoldynError
         The results of the other cases cannot be computed together with the first result.
     """
+    if any(isinstance(one, Measured) and not one.held_out for one in members):
+        raise InputError("neighbors of a path have displacements and reactions only")
     if run.kind != "dynamics" and run.start(case_file) is not None:
         raise InputError("a run that starts from a state has no neighbors")
     one, *beside = (
