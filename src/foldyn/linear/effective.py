@@ -73,7 +73,7 @@ def effective(
         (direction): minus the strain (curvature) across, divided by that along x, and along y;
         `shear_modulus` (N/m) and `twisting_modulus` (N m); `modulus_along` and
         `bending_modulus_along` (angle): moduli along directions at angles (degrees) from x;
-        `density` (kg/m2; nan if the sheet has none); `center` (m), a point of the reference plane.
+        `density` (kg/m2, if the sheet has one); `center` (m), a point of the reference plane.
         Of a chain: `stiffness` (load, strain) in the order stretch, twist, bend 1, bend 2: forces
         (N) and moments (N m) per stretch and per turn (rad/m) about the rows of `frame`: the axis,
         and two axes across it; `axial_stiffness` EA (N), `torsional_stiffness` GJ (N m2) with the
@@ -99,7 +99,7 @@ def effective(
     >>> pattern = fd.patterns.miura(a=0.03, b=0.03, panel_angle=60, dihedral=100)
     >>> sheet = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3)
     >>> cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet, crease_stiffness=0.1)))
-    >>> found = effective(cell)
+    >>> found = fd.effective(cell)
     >>> bool(found.poissons_ratio[0] < 0.0 < found.bending_poissons_ratio[0])
     True
     """
@@ -119,12 +119,11 @@ def effective(
     matrix = whole / size
     _warn_of(linear, matrix, loads / size, size)
     found = (plate_properties if plate else beam_properties)(matrix, loads / size)
-    density = energy.mass.sum() / size if weighed else np.nan
-    found |= {
-        "density": ((), density, {"units": "kg/m2" if plate else "kg/m"}),
-        "center": ("axis", energy.center, {"units": "m"}),
-        "frame": (("own_axis", "axis"), frame, {"units": "1"}),
-    }
+    if weighed:
+        unit = "kg/m2" if plate else "kg/m"
+        found["density"] = (), energy.mass.sum() / size, {"units": unit}
+    found["center"] = "axis", energy.center, {"units": "m"}
+    found["frame"] = ("own_axis", "axis"), frame, {"units": "1"}
     along: dict[str, Any] = {"load": list(STRAINS if plate else BEAM)}
     along["strain"] = along["load"]
     if plate:
@@ -266,10 +265,9 @@ def plate_properties(matrix: NDArray, loads: NDArray) -> dict[str, Any]:
         "mean_force": ("load", loads[:3], {"units": "N/m"}),
         "mean_moment": ("load", loads[3:], {"units": "N"}),
     }
-    soft = compliance(membrane)
-    free = bending - coupling.T @ (soft if np.isfinite(soft).all() else 0.0 * soft) @ coupling
+    free = bending - coupling.T @ np.linalg.pinv(membrane, SOFT, hermitian=True) @ coupling
     for name, shear, unit, eased in (
-        ("", "shear_modulus", "N/m", soft),
+        ("", "shear_modulus", "N/m", compliance(membrane)),
         ("bending_", "twisting_modulus", "N m", compliance(free)),
     ):
         found |= {

@@ -275,6 +275,12 @@ REASONS: Mapping[str, str] = {
     "swing": "the harmonic balance does not converge at the frequency",
     "mesh_error": "the meshes of the shell have not converged",
     "deflection_mesh_error": "the meshes of the shell have not converged",
+    **{
+        f"{of}{name}": "a mean strain costs no energy"
+        for of in ("", "bending_")
+        for name in ("modulus", "modulus_along", "poissons_ratio")
+    },
+    **dict.fromkeys(("shear_modulus", "twisting_modulus"), "a mean strain costs no energy"),
 }
 """Variables that may lack values, and the reasons."""
 UNEXPECTED = "the computation was no longer finite"
