@@ -91,7 +91,7 @@ class EffectiveAnalysis(Analysis):
             ]
             yield Table(["load", *strains], rows, f"{name} ({matrix.attrs['units']})")
         others = [
-            [name.replace("_", " "), _listed(one), one.units]
+            [str(name).replace("_", " "), _listed(one), one.units]
             for name, one in result.data_vars.items()
             if one.size <= 4 and name not in (*MATRICES, *STATE) and "units" in one.attrs
         ]

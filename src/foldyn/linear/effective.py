@@ -32,7 +32,7 @@ from foldyn.results.dataset import result_dataset
 from foldyn.values import of_kind
 
 STRAINS = ("xx", "yy", "xy")
-BEAM = ("stretch", "twist", "bend 1", "bend 2")
+BEAM = ("stretch", "twist", "bend_1", "bend_2")
 SOFT = 1e-12  # stiffness of a strain, relative to the stiffest, below which it counts as zero
 SAME = 1e-9  # sine of a screw's angle below which it counts as zero
 STRAINED = 1e-6  # mean strains below this, by which a state would relax, are round-off
@@ -74,7 +74,7 @@ def effective(
         `shear_modulus` (N/m) and `twisting_modulus` (N m); `modulus_along` and
         `bending_modulus_along` (angle): moduli along directions at angles (degrees) from x;
         `density` (kg/m2, if the sheet has one); `center` (m), a point of the reference plane.
-        Of a chain: `stiffness` (load, strain) in the order stretch, twist, bend 1, bend 2: forces
+        Of a chain: `stiffness` (load, strain) in the order stretch, twist, bend_1, bend_2: forces
         (N) and moments (N m) per stretch and per turn (rad/m) about the rows of `frame`: the axis,
         and two axes across it; `axial_stiffness` EA (N), `torsional_stiffness` GJ (N m2) with the
         other strains held, `stretch_twist` (N m); `bending_stiffness` EI (axis, N m2), the lesser
@@ -117,7 +117,7 @@ def effective(
     frame, size = _plate_frame(linear) if plate else _beam_frame(linear)
     whole, loads = (_plate if plate else _beam)(linear, energy, frame)
     matrix = whole / size
-    _warn_of(linear, matrix, loads / size, size)
+    _warn_of(linear, matrix, loads / size)
     found = (plate_properties if plate else beam_properties)(matrix, loads / size)
     if weighed:
         unit = "kg/m2" if plate else "kg/m"
@@ -216,14 +216,16 @@ def _beam(linear: LinearizedCell, energy: CellEnergy, frame: NDArray) -> tuple[N
     return out, np.where(each[:, :2].any(axis=1) | (len(parts) == 1), loads, 0.0)
 
 
-def _warn_of(linear: LinearizedCell, matrix: NDArray, loads: NDArray, size: float) -> None:
+def _warn_of(linear: LinearizedCell, matrix: NDArray, loads: NDArray) -> None:
     """Warn of an unstable state, of strains without stiffness, and of mean forces."""
-    half = len(matrix) // 2 if len(matrix) == 6 else 1
-    scale = np.sqrt(np.abs(np.diag(matrix)).reshape(-1, half).max(axis=1).repeat(half))
-    scale[scale == 0.0] = 1.0
+    plate, size = len(matrix) == 6, linear.cell.case.structure.pattern.size
+    names = [f"{of} {name}" for of in ("strain", "curvature") for name in STRAINS]
+    names, straight = (names, 3) if plate else (list(BEAM), 1)
+    unit = np.where(np.arange(len(names)) < straight, 1.0, size)  # of curvatures, and twists
+    stiff = np.abs(np.diag(matrix)) / unit**2
+    stiffest = stiff.reshape(2, 3).max(axis=1).repeat(3) if plate else stiff.max()
+    scale = unit * np.sqrt(stiffest)
     values, ways = np.linalg.eigh(matrix / np.outer(scale, scale))
-    names = [f"{kind}{name}" for kind in ("strain ", "curvature ") for name in STRAINS]
-    names = names if len(matrix) == 6 else list(BEAM)
     lowest = WaveSolver(linear.bloch, 1).waves(np.zeros(len(linear.motions))).values[0]
     if lowest < 0.0 or values[0] < -SOFT * values[-1]:
         warn(
@@ -237,18 +239,17 @@ def _warn_of(linear: LinearizedCell, matrix: NDArray, loads: NDArray, size: floa
         of = ", ".join(name for name, own in zip(names, share, strict=True) if own > 0.1)
         warn(
             f"a mean strain costs no energy: one of {of}. Poisson's ratios and moduli that need "
-            "its stiffness are not defined (nan), and forces may not resist it; give creases a "
-            "stiffness",
-            "effective.md#states",
+            "its stiffness are not defined (nan); give creases a stiffness",
+            "effective.md#how",
         )
-    kept = values > SOFT * values[-1]
-    back = ways[:, kept] @ ((ways[:, kept].T @ (loads / scale)) / values[kept]) / scale
-    back[half:] *= np.sqrt(size) if len(matrix) == 6 else size
-    if np.abs(back).max() > STRAINED:
-        worst = int(np.abs(back).argmax())
+    firm = ways[:, ~soft]
+    back = unit / scale * (firm @ (firm.T @ (loads / scale) / values[~soft]))
+    worst = int(np.abs(back).argmax())
+    if abs(back[worst]) > STRAINED:
         warn(
-            f"the state has mean forces: let go, the sheet would strain by {back[worst]:.2g} "
-            f"({names[worst]}, curvature times cell). The stiffness is that under these forces",
+            f"the state has mean forces or moments: let go, it would change by {back[worst]:.2g} "
+            f"({names[worst]}; curvature times the pattern's size). The stiffness is that under "
+            "these loads",
             "effective.md#states",
         )
 

@@ -165,8 +165,9 @@ def plot_effective(effective: xr.Dataset, *, title: str = "") -> Figure:
     figure = style.new_figure(7.2, 3.8, title)
     angle = np.radians(effective["angle"].values)
     for k, (name, text) in enumerate((("modulus", "stretching"), ("bending_modulus", "bending"))):
-        axes = figure.add_subplot(1, 2, k + 1, projection="polar")
+        axes: Any = figure.add_subplot(1, 2, k + 1, projection="polar")
         values = effective[f"{name}_along"]
         axes.plot(np.append(angle, angle + np.pi), np.tile(values, 2), color=style.BLUE, lw=1.4)
         axes.set_title(f"{text} ({values.attrs['units']})", fontsize="medium")
+        axes.set_rlabel_position(90.0)
     return figure

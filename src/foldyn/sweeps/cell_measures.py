@@ -80,18 +80,19 @@ def _unstable_bands(result: xr.Dataset, case: Case) -> int:
 
 def _property(name: str, result: xr.Dataset, case: Case, **labels: str) -> float:
     """A number of the equivalent plate or beam, by its labels."""
-    if name not in result:
-        raise InputError("is for sheets" if "stiffness" in result else "is for chains and tubes")
+    own = "stiffness" if name == "coupling" and "stiffness" in result else name
+    if own not in result:
+        raise InputError("is for sheets; a chain or tube has coupling")
     at = {"direction" if dim == AXIS else dim: label for dim, label in labels.items()}
+    if "load" in at:
+        at.setdefault("strain", at["load"])
     for dim, label in at.items():
         choice(dim, label, result[dim].values.tolist())
-    return float(result[name].sel(at))
+    return float(result[own].sel(at))
 
 
 OF_CELLS |= {
-    name: Measure(
-        name, (EFFECTIVE,), partial(_property, name), units, doc, takes=takes, needs=len(takes)
-    )
+    name: Measure(name, (EFFECTIVE,), partial(_property, name), units, doc, takes=takes, needs=1)
     for takes, rows in {
         (AXIS,): (
             ("poissons_ratio", "1", "Poisson's ratio under forces along an axis of the sheet"),
@@ -101,9 +102,8 @@ OF_CELLS |= {
         ),
         ("load", "strain"): (
             ("membrane", "N/m", "membrane stiffness of the sheet"),
-            ("coupling", "N", "forces per curvature of the sheet"),
             ("bending", "N m", "bending stiffness of the sheet"),
-            ("stiffness", "", "stiffness of the chain"),
+            ("coupling", "", "forces per curvature of the sheet, or stiffness of the chain"),
         ),
     }.items()
     for name, units, doc in rows
