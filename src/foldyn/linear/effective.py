@@ -155,8 +155,7 @@ def _beam_frame(linear: LinearizedCell) -> tuple[NDArray, float]:
     (shift,) = linear.vectors
     length = float(np.linalg.norm(shift))
     if length == 0.0:
-        raise InputError(": repeats about an axis without a shift along it; a ring is no beam",
-                         "cell")  # fmt: skip
+        raise InputError(": repeats about an axis without a shift; a ring is no beam", "cell")
     axis = shift / length
     first = np.eye(3)[np.abs(axis).argmin()]
     one = np.cross(axis, first)
@@ -187,33 +186,30 @@ def _beam(linear: LinearizedCell, energy: CellEnergy, frame: NDArray) -> tuple[N
     """Stiffness (4, 4) and loads (4,), J m, of a cell under stretch, twist and two curvatures."""
     (motion,), (shift,), axis = linear.motions, linear.vectors, frame[0]
     center = np.array(motion.point) if motion.turns else energy.center
-    length, none, each = float(shift @ axis), np.zeros((1, 3)), np.eye(4)
-    turn, move = length * np.vstack([none, frame]), length * each[:, :1] * axis
-    strains = _strains(linear, turn[None], move[None], center)
+    length, none, each = float(shift @ axis), np.zeros(3), np.eye(4)
+    turn = length * np.array([[none, *frame]])
+    move = length * np.array([[axis, none, none, none]])
+    strains = _strains(linear, turn, move, center)
     angle = np.radians(motion.angle) * (motion.unit @ axis)
-    still = np.hstack(
-        [energy.rigid(none, frame[:1]), energy.rigid(frame[:1], -np.cross(frame[:1], center))]
-    )
-
-    def across(ways: NDArray) -> NDArray:
-        """Translations (m, r) along combinations (2, r) of the axes across the beam."""
-        return energy.rigid(np.zeros((2, 3)), frame[1:]) @ ways
-
+    still = energy.rigid(np.array([none, axis]), np.array([axis, np.cross(center, axis)]))
+    sideways = energy.rigid(np.zeros((2, 3)), frame[1:])
     straight, bends = (each[:, :2], 0.0, still), each[:, 2:]
-    if abs(np.sin(angle)) > SAME:  # by both waves of this phase and its opposite
+    if abs(np.sin(angle)) > SAME:
         wave = np.array([[1.0], [1.0j]])
-        parts = [straight, (bends @ wave, angle, across(wave))]
+        parts = [straight, (bends @ wave, angle, sideways @ wave)]
     elif np.cos(angle) < 0.0:
-        parts = [straight, (bends, np.pi, across(np.eye(2)))]
+        parts = [straight, (bends, np.pi, sideways)]
     else:
-        parts = [(each, 0.0, np.hstack([still, across(np.eye(2))]))]
+        parts = [(each, 0.0, np.hstack([still, sideways]))]
     out = np.zeros((4, 4))
     for ways, phase, fixed in parts:
         own = energy.stiffness(strains @ ways, np.array([phase]), fixed)
-        half = 0.5 if np.iscomplexobj(ways) else 1.0
-        out += half * np.real(ways @ own @ ways.conj().T)
+        mean = 0.5 if np.iscomplexobj(ways) else 1.0  # of the square of a wave along the beam
+        out += mean * np.real(ways @ own @ ways.conj().T)
     loads = energy.loads(strains)
-    return out, np.where(each[:, :2].any(axis=1) | (len(parts) == 1), loads, 0.0)
+    if len(parts) > 1:  # moments across the beam turn with the screw
+        loads[2:] = 0.0
+    return out, loads
 
 
 def _warn_of(linear: LinearizedCell, matrix: NDArray, loads: NDArray) -> None:

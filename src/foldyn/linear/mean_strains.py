@@ -55,13 +55,9 @@ class MeanStrains(NamedTuple):
     def second(self, number: NDArray, points: NDArray, force: NDArray) -> NDArray:
         """Work (p, p), J, of forces (n, 3) in second derivatives of the displacements."""
         turn, move, shift = self.turn[number], self.move[number], self.shift[number][:, None]
-        arm = points[:, None] - shift
-
-        def halves(one: NDArray, other: NDArray) -> NDArray:
-            return np.einsum("npx,ncx->pc", np.cross(force[:, None], one), other)
-
+        moved = np.cross(turn, points[:, None] - shift * 2.0 / 3.0) + move
         # f . w x v = (f x w) . v
-        total = halves(turn.conj(), np.cross(turn, arm + shift / 3.0) + move)
+        total = np.einsum("npx,ncx->pc", np.cross(force[:, None], turn.conj()), moved)
         return 0.5 * (total + total.conj().T)
 
 
@@ -126,10 +122,11 @@ class CellEnergy:
         phase : phases (d,) of the displacements from cell to cell, in the axes of these.
         rigid : motions (m, r) of cell 0 that have these phases and strain nothing.
         """
-        copies = self._reach.copies(self._bloch.factors(phase) if phase.any() else self._ones)
+        factors = self._bloch.factors(phase)
+        copies = self._reach.copies(factors if phase.any() else factors.real)
         field = self.displacements(strains)
         pull = self._tangent @ field
-        turned = pull.copy()
+        turned = pull.copy()  # with the forces in the state, which turn with the cells
         turned[: self.points.size] += by_dof(
             np.cross(self._force[:, None], strains.turn[self._cell])
         )
@@ -139,10 +136,6 @@ class CellEnergy:
         second = strains.second(self._cell, self.points, self._force)
         whole = field.conj().T @ pull + second + push.conj().T @ eased
         return 0.5 * (whole + whole.conj().T)
-
-    @property
-    def _ones(self) -> NDArray[np.float64]:
-        return np.ones(len(self._reach.steps))
 
 
 def by_dof(vectors: NDArray) -> NDArray:
