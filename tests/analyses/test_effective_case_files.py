@@ -50,6 +50,7 @@ def test_a_case_file_gives_the_plate_of_its_cell(tmp_path):
     assert chain.stiffness.shape == (4, 4)
 
 
+@pytest.mark.matrix
 def test_the_stretched_sheet_is_the_relaxed_one(tmp_path):
     with pytest.warns(fd.errors.FoldynWarning, match="mean forces"):
         found = fd.read_case(written(tmp_path, SHEET + "stretch = 1.001\n")).run()
@@ -59,7 +60,7 @@ def test_the_stretched_sheet_is_the_relaxed_one(tmp_path):
     np.testing.assert_allclose(found.membrane, own.membrane, rtol=1e-6)
 
 
-@pytest.mark.parametrize("text", [SHEET, TOWER])
+@pytest.mark.parametrize("text", [SHEET, pytest.param(TOWER, marks=pytest.mark.matrix)])
 def test_pages_list_the_matrices(tmp_path, monkeypatch, text, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["effective", str(written(tmp_path, text)), "--figures", "png"]) == 0

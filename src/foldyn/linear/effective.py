@@ -84,8 +84,8 @@ def effective(
     Raises
     ------
     InputError
-        Supports; a screw beside a vector, or without a shift; parts of the cell that move without
-        any force.
+        Supports, rigid panels; a screw beside a vector, or without a shift; parts of the cell that
+        move without any force.
 
     Warns
     -----
@@ -113,6 +113,12 @@ def effective(
         sheet = replace(structure.sheet, density=1.0)
         case = replace(case, structure=replace(structure, sheet=sheet).marked())
     linear = linearize_cell(cell.with_case(case), state, secant, load_factor)
+    if not linear.bloch.ties.empty:
+        raise InputError(
+            ": has rigid panels, whose sheet can have an infinite stiffness; take panels much "
+            "stiffer than the creases",
+            "cell",
+        )
     energy, plate = CellEnergy(linear, amplitude_of(secant)), cell.dimensions == 2
     frame, size = _plate_frame(linear) if plate else _beam_frame(linear)
     whole, loads = (_plate if plate else _beam)(linear, energy, frame)
@@ -137,8 +143,8 @@ def _plate_frame(linear: LinearizedCell) -> tuple[NDArray, float]:
     """Axes x, y and normal (3, 3) of a sheet, and the area (m2) of a cell."""
     if any(motion.turns for motion in linear.motions):
         raise InputError(
-            ": repeats under a screw beside another motion; a sheet has two translations, and a "
-            "tube one motion: take a ring of cells as the cell",
+            ": turns from cell to cell along one of two motions, as a bent sheet does; a plate has "
+            "two translations, and a tube one motion: take a ring of cells as the cell",
             "cell",
         )
     across = np.cross(*linear.vectors)
