@@ -71,6 +71,16 @@ def test_a_flat_shell_is_a_plate(wood):
     assert "density" not in found
 
 
+def test_a_laminate_needs_no_density():
+    ply = {"youngs_modulus": [9e9, 5e8], "poissons_ratio": 0.3, "shear_modulus": 7e8}
+    plies = [fd.Ply(1e-4, angle=angle, **ply) for angle in (0.0, 90.0, 0.0)]
+    sheet = fd.Sheet(plies=plies, direction=(1.0, 0.0, 0.0))
+    shell = fd.shell(ONE, sheet, divisions=2, crease_stiffness=CREASE)
+    found = effective(fd.UnitCell(fd.Case(shell), vectors=STEPS))
+    np.testing.assert_allclose(found.membrane, sheet.stretching, atol=1e-4)
+    assert fd.linear.refinement(fd.Case(shell)) is not None
+
+
 @pytest.mark.parametrize("make", [fd.superelements, fd.discretize])
 def test_flat_panels_of_other_models_bend_alike(make):
     """They stretch by less than 1 % differently; single bars in a panel resist shear twofold."""

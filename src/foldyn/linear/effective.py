@@ -110,8 +110,8 @@ def effective(
         raise InputError(": has supports or clamped edges, and a free material has none", "cell")
     weighed = structure.sheet.density is not None
     if not weighed:
-        sheet = replace(structure.sheet, density=1.0)
-        case = replace(case, structure=replace(structure, sheet=sheet).marked())
+        light = replace(structure, sheet=structure.sheet.weighed).marked()
+        case = replace(case, structure=light)
     linear = linearize_cell(cell.with_case(case), state, secant, load_factor)
     if not linear.bloch.ties.empty:
         raise InputError(
