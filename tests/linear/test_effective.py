@@ -12,7 +12,7 @@ from scipy.sparse.linalg import splu
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear.effective import effective
+from foldyn.linear.effective import compliance, effective
 from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.mean_strains import _solved
 from foldyn.patterns.screw import of_twist, translation
@@ -222,6 +222,15 @@ def test_the_choice_of_the_cell_does_not_matter(model):
     np.testing.assert_allclose(change.T @ again @ change / scale, own / scale, atol=1e-9)
 
 
+@pytest.mark.parametrize("preset", ["n5b8e", "plate", "herkal"])
+def test_supercells_of_panels_with_four_corners_are_alike(preset):
+    own, whole = (
+        stiffness(effective(miura(cells, preset=preset), secant=1.0)) for cells in ((1, 1), (2, 1))
+    )
+    scale = np.sqrt(np.outer(np.diag(own), np.diag(own)))
+    np.testing.assert_allclose(whole / scale, own / scale, rtol=0.0, atol=1e-9)
+
+
 @pytest.mark.parametrize("model", ["n5b8e", slow("superelements")])
 def test_long_waves_have_the_predicted_speeds(model):
     """The fourth order of the bending wave has A, B and D, relaxed along the wave."""
@@ -393,13 +402,21 @@ def test_a_secant_amplitude_gives_superlinear_bends_a_stiffness():
     structure = fd.discretize(miura().case.structure.pattern, SHEET, preset="merlin2")
     cell = fd.UnitCell(fd.Case(structure))
     with pytest.warns(FoldynWarning, match="costs no energy: one of curvature xy"):
-        assert np.isnan(effective(cell).twisting_modulus)
+        found = effective(cell)
+    assert float(found.twisting_modulus) == found.bending_modulus_along[45] == 0.0
+    assert found.bending_modulus.values == pytest.approx(
+        effective(cell, secant=1e-9).bending_modulus.values, rel=1e-2
+    )
     twisting = [float(effective(cell, secant=each).twisting_modulus) for each in (1e-9, 8e-9)]
     assert twisting[1] / twisting[0] == pytest.approx(2.0, rel=1e-3)  # amplitude^(1/3)
 
 
-def test_folding_without_resistance_is_told():
-    structure = fd.discretize(miura().case.structure.pattern, SHEET, crease_stiffness=1e-14)
+def test_folding_without_resistance_has_the_ratio_of_the_mechanism():
+    pattern = fd.patterns.miura(a=A, b=B, panel_angle=ANGLE, dihedral=90.0)
+    structure = fd.discretize(pattern, SHEET, crease_stiffness=0.0)
     with pytest.warns(FoldynWarning, match="costs no energy: one of strain xx, strain yy"):
         found = effective(fd.UnitCell(fd.Case(structure)))
-    assert np.isnan(found.poissons_ratio).all()
+    assert found.modulus.values.tolist() == [0.0, 0.0]
+    assert found.poissons_ratio.values == pytest.approx([-1.5, -1 / 1.5], rel=1e-9)
+    assert float(found.shear_modulus) > 1e4
+    assert np.isnan(compliance(np.diag([0.0, 0.0, 1.0]))).all()

@@ -34,6 +34,8 @@ from foldyn.values import of_kind
 STRAINS = ("xx", "yy", "xy")
 BEAM = ("stretch", "twist", "bend_1", "bend_2")
 SOFT = 1e-12  # stiffness of a strain, relative to the stiffest, below which it counts as zero
+BOUNDLESS = 1e60  # stands for an infinite compliance, m/N or 1/(N m)
+NOISE = 1e-6  # shares of a strain below this are round-off
 SAME = 1e-9  # sine of a screw's angle below which it counts as zero
 STRAINED = 1e-6  # mean strains below this, by which a state would relax, are round-off
 ANGLES = np.linspace(0.0, 180.0, 181)  # degrees
@@ -91,7 +93,7 @@ def effective(
     -----
     FoldynWarning
         The state is unstable, is no equilibrium, or has mean forces; a mean strain costs no energy,
-        so that Poisson's ratios and moduli are not defined (nan).
+        so that moduli are 0 and Poisson's ratios its own, or nan if there are two.
 
     Examples
     --------
@@ -240,8 +242,8 @@ def _warn_of(linear: LinearizedCell, matrix: NDArray, loads: NDArray) -> None:
         share = np.abs(ways[:, soft]).max(axis=1)
         of = ", ".join(name for name, own in zip(names, share, strict=True) if own > 0.1)
         warn(
-            f"a mean strain costs no energy: one of {of}. Poisson's ratios and moduli that need "
-            "its stiffness are not defined (nan); give creases a stiffness",
+            f"a mean strain costs no energy: one of {of}, or a combination. Moduli along it are "
+            "0, and Poisson's ratios its own; give creases a stiffness if they have one",
             "effective.md#how",
         )
     firm = ways[:, ~soft]
@@ -274,12 +276,12 @@ def plate_properties(matrix: NDArray, loads: NDArray) -> dict[str, Any]:
         ("bending_", "twisting_modulus", "N m", compliance(free)),
     ):
         found |= {
-            f"{name}modulus": ("direction", 1.0 / np.diag(eased)[:2], {"units": unit}),
+            f"{name}modulus": ("direction", modulus(np.diag(eased)[:2]), {"units": unit}),
             f"{name}poissons_ratio": (
                 "direction", -eased[[1, 0], [0, 1]] / np.diag(eased)[:2], {"units": "1"},
             ),
-            shear: ((), 1.0 / eased[2, 2], {"units": unit}),
-            f"{name}modulus_along": ("angle", 1.0 / along_directions(eased), {"units": unit}),
+            shear: ((), modulus(eased[2, 2]), {"units": unit}),
+            f"{name}modulus_along": ("angle", modulus(along_directions(eased)), {"units": unit}),
         }  # fmt: skip
     return found
 
@@ -298,11 +300,19 @@ def beam_properties(matrix: NDArray, loads: NDArray) -> dict[str, Any]:
 
 
 def compliance(stiffness: NDArray) -> NDArray[np.float64]:
-    """Inverse (3, 3); nan if a strain costs no energy."""
-    values = np.linalg.eigvalsh(stiffness)
-    if values[0] <= SOFT * values[-1]:
+    """Inverse (3, 3), with `BOUNDLESS` for a strain that costs no energy; nan if several do not."""
+    values, ways = np.linalg.eigh(stiffness)
+    size = np.abs(values)
+    soft = size <= SOFT * size.max()
+    if soft.sum() > 1:
         return np.full((3, 3), np.nan)
-    return np.linalg.inv(stiffness)
+    ways[:, soft] *= np.abs(ways[:, soft]) > NOISE
+    return (ways / np.where(soft, 1.0 / BOUNDLESS, values)) @ ways.T
+
+
+def modulus(eased: NDArray) -> NDArray[np.float64]:
+    """Moduli of compliances; 0 for boundless ones."""
+    return np.where(eased > NOISE**2 * BOUNDLESS, 0.0, 1.0 / eased)
 
 
 def along_directions(eased: NDArray) -> NDArray[np.float64]:

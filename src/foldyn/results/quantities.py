@@ -276,11 +276,12 @@ REASONS: Mapping[str, str] = {
     "mesh_error": "the meshes of the shell have not converged",
     "deflection_mesh_error": "the meshes of the shell have not converged",
     **{
-        f"{of}{name}": "a mean strain costs no energy"
+        f"{of}{name}": "several mean strains cost no energy"
         for of in ("", "bending_")
         for name in ("modulus", "modulus_along", "poissons_ratio")
     },
-    **dict.fromkeys(("shear_modulus", "twisting_modulus"), "a mean strain costs no energy"),
+    "shear_modulus": "several mean strains cost no energy",
+    "twisting_modulus": "several mean strains cost no energy",
 }
 """Variables that may lack values, and the reasons."""
 UNEXPECTED = "the computation was no longer finite"
