@@ -309,6 +309,9 @@ def solved(folder: Path) -> Calls:
             "group_velocity": True, "shape": True, "polarization": True, "load_factor": 1.0,
             "track": False, "check_model": True,
         }),
+        "effective": (fd.effective, {
+            "cell": cell(), "state": fd.State(), "secant": 2.0, "load_factor": 1.0,
+        }),
         "swept_sine": (fd.swept_sine, {
             "case": swung(), "measure": LIFT, "frequencies": [5.0, 6.0], "duration": 2.0,
             "sweep": "up", "settle": 1, "resolution": 0.25, "initial": None, "method": "rk4",

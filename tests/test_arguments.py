@@ -52,9 +52,9 @@ def calls(tmp_path_factory):
 SOLVED = (
     "simulate", "simulate_many", "trace", "switch_branch", "landscape", "modes", "buckling", "frf",
     "random_response", "spectrum_response", "stresses", "margins", "imperfect", "bands",
-    "swept_sine", "bifurcation_diagram", "poincare_section", "lyapunov_exponent", "basins", "fold",
-    "critical_step", "initial_state", "mac", "case_of", "save", "load", "export", "view",
-    "read_case", "flat_foldable", "read_pattern", "diagnose", "write_pattern", "sweep",
+    "effective", "swept_sine", "bifurcation_diagram", "poincare_section", "lyapunov_exponent",
+    "basins", "fold", "critical_step", "initial_state", "mac", "case_of", "save", "load", "export",
+    "view", "read_case", "flat_foldable", "read_pattern", "diagnose", "write_pattern", "sweep",
     "sensitivity", "design", "fit", "fidelity", "periodic_motion", "response_curve", "backbone",
 )  # fmt: skip
 """Calls of `solved`, which computes."""

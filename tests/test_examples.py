@@ -221,6 +221,14 @@ def miura_bands(found):
     assert float(full["width"][0]) == pytest.approx(width[at], rel=0.02)
 
 
+def miura_plate(found):
+    """Ratios of rigid panels, opposite in bending; the sheet is stiff across its folded rows."""
+    assert found["ratio"][:, 0] == pytest.approx(found["published"], rel=1e-3)
+    assert found["bent"][:10, 0] == pytest.approx(-found["published"][:10], rel=2e-3)
+    assert found["bending"][0, 1] > 50.0 * found["bending"][0, 0]
+    assert found["bending"][-1, 1] < 0.2 * found["bending"][-1, 0]
+
+
 def point_mass(found):
     """f = sqrt(k / (M + c m)) / 2 pi: one k and one c for all weights, peaks at the frequencies."""
     line = 1.0 / np.sqrt(found["slope"] * found["added"] + found["start"])
@@ -292,8 +300,8 @@ def thick_panel(found):
 CHECKS = (
     air_deployment, air_fall, air_gust, bilayer, case_study_1, clamped, contact_tower, crane,
     deployment, design_frequencies, design_kresling, design_miura, fidelity, hardening_miura,
-    jumping_resonance, kresling_chain, kresling_chaos, miura_bands, point_mass, pressure,
-    shaken_miura, snap_through, solar_panel, sweep, thick_panel,
+    jumping_resonance, kresling_chain, kresling_chaos, miura_bands, miura_plate, point_mass,
+    pressure, shaken_miura, snap_through, solar_panel, sweep, thick_panel,
 )  # fmt: skip
 
 

@@ -80,6 +80,7 @@ from foldyn.linear import (
     UnitCell as UnitCell,
     bands as bands,
     buckling as buckling,
+    effective as effective,
     fidelity as fidelity,
     frf as frf,
     mac as mac,

@@ -165,5 +165,5 @@ def test_a_file_that_does_not_say_its_kind(read) -> None:
     with pytest.raises(InputError) as caught:
         read(changed(PATH, "analysis.kind =; analysis.load_factors = [1]; output.shapes = 3"))
     (line,) = str(caught.value).splitlines()  # what depends on the kind is not complained about
-    known = "dynamics, statics, modes, frf, response, bands, fidelity, buckling, random"
+    known = "dynamics, statics, modes, frf, response, bands, effective, fidelity, buckling, random"
     assert line.endswith(f"analysis.kind: missing; choose one of {known}")

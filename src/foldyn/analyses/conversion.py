@@ -46,7 +46,7 @@ def startless(path: Path, document: Document, kind: str) -> Document:
     return {**kept, "analysis": {"kind": kind}}
 
 
-def unbounded(path: Path, document: Document, state: str) -> Document:
+def unbounded(path: Path, document: Document, kind: str, state: str) -> Document:
     """The document as the cell of an infinite sheet.
 
     Supports, which would hold every cell, and loads are left out with a warning, except for folding
@@ -62,9 +62,9 @@ def unbounded(path: Path, document: Document, state: str) -> Document:
         "the pattern repeats without end, and what holds or loads one cell would be in all of them "
         '(a file of kind "bands" may have supports)'
     )
-    _tell(path, "bands", left, why)
+    _tell(path, kind, left, why)
     kept = _without(document, "contact", "air", "initial", "drive", "output", "supports", "loads")
-    return {**kept, "loads": kept_loads, "analysis": {"kind": "bands"}}
+    return {**kept, "loads": kept_loads, "analysis": {"kind": kind}}
 
 
 def _tables(document: Document, *names: str) -> list[str]:
@@ -92,8 +92,8 @@ def converted(path: Path, document: Document, kind: str, state: str) -> Document
     """The document as another kind of analysis; a warning names parts that are left out."""
     if kind in STARTLESS:
         return startless(path, document, kind)
-    if kind == "bands":
-        return unbounded(path, document, state)
+    if kind in ("bands", "effective"):
+        return unbounded(path, document, kind, state)
     left: list[str] = []
     atrest = state == "rest" and kind != "buckling"
     supports, bases = _supports(document.get("supports", []), atrest, left)

@@ -87,7 +87,8 @@ def read_as(
     Parameters
     ----------
     path : Path
-    kind : {"modes", "frf", "buckling", "random", "response", "bands", "fidelity"}
+    kind : {"modes", "frf", "buckling", "random", "response", "bands", "effective",
+        "fidelity"}
     flags : mapping
         Keys of [analysis] from the command line, which override the file; `state` may also be the
         file of a result.

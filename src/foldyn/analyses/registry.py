@@ -9,6 +9,7 @@ from foldyn import __version__, tables
 from foldyn.analyses.bands import BandsAnalysis
 from foldyn.analyses.buckling import BucklingAnalysis
 from foldyn.analyses.casefile import Analysis
+from foldyn.analyses.effective import EffectiveAnalysis
 from foldyn.analyses.fidelity import FidelityAnalysis
 from foldyn.analyses.frf import FrfAnalysis
 from foldyn.analyses.modes import ModesAnalysis
@@ -32,6 +33,7 @@ ANALYSES: Mapping[str, type[Analysis]] = {
         FrfAnalysis,
         ResponseAnalysis,
         BandsAnalysis,
+        EffectiveAnalysis,
         FidelityAnalysis,
         BucklingAnalysis,
         RandomAnalysis,

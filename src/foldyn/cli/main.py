@@ -184,6 +184,16 @@ def parser() -> argparse.ArgumentParser:
     )
     _add_state(bands)
 
+    effective = commands.add_parser(
+        "effective",
+        help="stiffness of the plate or beam that is equivalent to a repeated case file",
+        description="Membrane, bending and coupling stiffness of a sheet whose cell is the pattern "
+        "of a case file of any kind, or of a chain or tube; what its [analysis] says, if it is of "
+        "kind effective, holds unless given here.",
+    )
+    _add_common(effective, "effective", film=False)
+    _add_state(effective)
+
     fidelity = commands.add_parser(
         "fidelity",
         help="compare models of bars and hinges with superelements or the shell",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -219,6 +220,19 @@ class SuperelementsTerm(SheetTerm):
         other = copy(self)
         other._changed = self._changed + rest - self.rest_angles
         other._fold_hinges = self._fold_hinges._replace(rest=rest)
+        return other
+
+    def anchored(self, place: NDArray) -> SuperelementsTerm:
+        """See `Term`; only its tangent is that of these elements."""
+        parts, other = self.parts, copy(self)
+        shape = (len(parts.rows.indptr) - 1, self.size)
+        rows = sparse.csr_array((parts.rows.data, parts.rows.indices, parts.rows.indptr), shape)
+        blocks = []
+        for at, (a, b) in zip(parts.at, pairwise(parts.first), strict=True):
+            own = place[parts.rows.indices[parts.rows.indptr[a] : parts.rows.indptr[b]]].min() == 0
+            size = b - a
+            blocks.append(own * parts.stiffness[at : at + size**2].reshape(size, size))
+        other._stiffness = sparse.csr_array(rows.T @ sparse.block_diag(blocks) @ rows)
         return other
 
     def holds(self, q: NDArray) -> sparse.csr_array:

@@ -7,6 +7,7 @@ from foldyn.linear.cell_equilibrium import relaxed
 from foldyn.linear.cell_motions import space_time, transmission, wave_spectrum
 from foldyn.linear.character import character
 from foldyn.linear.compared import ComparedMode, Fidelity
+from foldyn.linear.effective import effective
 from foldyn.linear.evanescent import attenuation
 from foldyn.linear.fidelity import fidelity
 from foldyn.linear.frequency_domain import Modal
@@ -50,6 +51,7 @@ __all__ = [
     "character",
     "convert",
     "damped_bands",
+    "effective",
     "equivalent_slope",
     "fidelity",
     "frf",

@@ -110,6 +110,18 @@ class CellReach:
         """Forces (m,), N, of the sheet on the dofs of cell 0 for the patch at q."""
         return self.body.internal(q)[self.rows]
 
+    def copies(self, factors: NDArray) -> sparse.csr_array:
+        """Matrix from dofs of cell 0 to those of the patch, times a factor (s,) for each R."""
+        there = np.flatnonzero(self._unit >= 0)
+        entries = (factors[self._number[there]], (there, self._unit[there]))
+        shape = (len(self._unit), self.count)
+        return sparse.csr_array(self._frames @ sparse.csr_array(entries, shape=shape))
+
+    @property
+    def number(self) -> NDArray[np.int64]:
+        """Row in `steps` of the cell of each dof of the patch."""
+        return self._number
+
     @cached_property
     def _known(self) -> sparse.csr_array:
         """Matrix from hidden dofs of a cell to hidden dofs of the patch that copy them."""
@@ -190,6 +202,8 @@ class LinearizedCell:
         Displacement of the nodes of the cell's own structure in the state, m.
     residual : float
         Largest force on a free dof, as a fraction of the forces that act.
+    dofs : (k,)
+        All dofs of the patch in the state.
     """
 
     cell: UnitCell
@@ -199,6 +213,7 @@ class LinearizedCell:
     bloch: Bloch
     displacement: NDArray
     residual: float
+    dofs: NDArray
 
     @property
     def nodes(self) -> int:
@@ -314,7 +329,7 @@ def linearize_cell(
             "the forces at play, and motions about it are not free vibrations. Remedy: "
             "foldyn.linear.relaxed finds the equilibrium with given periods"
         )
-    return LinearizedCell(cell, patch, motions, reach, bloch, own, residual)
+    return LinearizedCell(cell, patch, motions, reach, bloch, own, residual, q)
 
 
 def check_state(cell: UnitCell) -> None:

@@ -362,6 +362,6 @@ def _meshes(divisions: int) -> tuple[int, ...]:
 def _modes(case: Case, structure: Discretized, count: int) -> MeshModes:
     """Elastic modes of a case on another mesh, without loads, contact and air."""
     if structure.sheet.density is None:
-        structure = replace(structure, sheet=replace(structure.sheet, density=1.0))
+        structure = replace(structure, sheet=structure.sheet.weighed)
     bare = replace(case, structure=structure, loads=(), contact=None, air=None)
     return mesh_modes(bare, count)

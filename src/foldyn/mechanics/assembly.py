@@ -320,6 +320,10 @@ class Assembly:
         """Assembly with other rest angles (nr,), rad."""
         return self.on(self.sheet.folded(rest))
 
+    def anchored(self, place: NDArray) -> Assembly:
+        """Assembly of the elements whose lowest place is 0; see `Term`."""
+        return Assembly(self.sheet.anchored(place), *(term.anchored(place) for term in self.others))
+
     def renumbered(self) -> tuple[Assembly, Numbering]:
         """Assembly with nodes in memory order for motions."""
         sheet, order = self.sheet.renumbered()

@@ -198,6 +198,12 @@ class MembranesTerm(Term):
         """See `Term`."""
         return others._replace(membranes=(*others.membranes, self.membranes))
 
+    def anchored(self, place: NDArray) -> MembranesTerm:
+        """See `Term`."""
+        here = place[::3][self.membranes.nodes].min(axis=1) == 0
+        stiffness = self.membranes.stiffness * here
+        return MembranesTerm(self.membranes._replace(stiffness=stiffness), self.rows)
+
     def placed(self, order: NDArray, before: Any) -> MembranesTerm:
         """See `Term`."""
         nodes = ranks(order)[self.membranes.nodes]

@@ -51,6 +51,7 @@ from numba import types
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.errors import InputError
 from foldyn.jit.compiled import Addressed, addressed, inner_scalar, kernel
 from foldyn.jit.context import Context, run_at, value_at
 from foldyn.jit.intrinsics import flat
@@ -291,6 +292,10 @@ class Term(ABC):
     def on(self, sheet: Any) -> Self:
         """The term on a sheet with other rest angles."""
         return self
+
+    def anchored(self, place: NDArray) -> Self:
+        """The term's elements alone whose lowest place, of places (m,) of all dofs, is 0."""
+        raise InputError(f": {type(self).__name__} does not belong to cells; leave it out", "case")
 
     def nominal(self, q: NDArray) -> Self | None:
         """The term at nominal stiffness, about its state at q; None if it has none."""

@@ -8,7 +8,11 @@ from foldyn.plots.attractors import (
     plot_lyapunov_exponent as plot_lyapunov_exponent,
     plot_poincare_section as plot_poincare_section,
 )
-from foldyn.plots.bands import plot_bands as plot_bands, plot_iso_frequency as plot_iso_frequency
+from foldyn.plots.bands import (
+    plot_bands as plot_bands,
+    plot_effective as plot_effective,
+    plot_iso_frequency as plot_iso_frequency,
+)
 from foldyn.plots.boards import draw_boards as draw_boards
 from foldyn.plots.designs import (
     draw_sensitivity as draw_sensitivity,

@@ -1,4 +1,4 @@
-"""Bands of repeated sheets: along a path of the Brillouin zone, and as contours of frequency."""
+"""Repeated sheets: bands along a path and as contours of frequency, and moduli by direction."""
 
 from __future__ import annotations
 
@@ -138,3 +138,36 @@ def _along(bands: xr.Dataset) -> tuple[np.ndarray, str]:
     if phases.shape[1] == 1:
         return phases[:, 0], "phase per period (rad)"
     raise InputError(": its phases lie on no path; use cell.path, or plot_iso_frequency", "bands")
+
+
+def plot_effective(effective: xr.Dataset, *, title: str = "") -> Figure:
+    """Draw moduli of stretching and bending along all directions in a sheet.
+
+    Parameters
+    ----------
+    effective : xarray.Dataset
+        A result of `foldyn.effective` for a sheet.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A polar diagram of each, with the angle from the axis x.
+
+    Raises
+    ------
+    InputError
+        Not such a result.
+    """
+    if "modulus_along" not in getattr(effective, "data_vars", ()):
+        raise InputError(": give what foldyn.effective returns for a sheet", "effective")
+    figure = style.new_figure(7.2, 3.8, title)
+    angle = np.radians(effective["angle"].values)
+    for k, (name, text) in enumerate((("modulus", "stretching"), ("bending_modulus", "bending"))):
+        axes: Any = figure.add_subplot(1, 2, k + 1, projection="polar")
+        values = effective[f"{name}_along"]
+        axes.plot(np.append(angle, angle + np.pi), np.tile(values, 2), color=style.BLUE, lw=1.4)
+        axes.set_title(f"{text} ({values.attrs['units']})", fontsize="medium")
+        axes.set_rlabel_position(90.0)
+    return figure

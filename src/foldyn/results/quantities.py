@@ -275,6 +275,13 @@ REASONS: Mapping[str, str] = {
     "swing": "the harmonic balance does not converge at the frequency",
     "mesh_error": "the meshes of the shell have not converged",
     "deflection_mesh_error": "the meshes of the shell have not converged",
+    **{
+        f"{of}{name}": "several mean strains cost no energy"
+        for of in ("", "bending_")
+        for name in ("modulus", "modulus_along", "poissons_ratio")
+    },
+    "shear_modulus": "several mean strains cost no energy",
+    "twisting_modulus": "several mean strains cost no energy",
 }
 """Variables that may lack values, and the reasons."""
 UNEXPECTED = "the computation was no longer finite"

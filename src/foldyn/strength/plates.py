@@ -9,7 +9,6 @@ these models.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -83,9 +82,7 @@ class PlateResultants:
         assert structure.pattern is not None
         self.case, self._sheet = case, LoadedSheet(case)
         self._structure, self._pattern = structure, structure.pattern
-        sheet = structure.sheet
-        if sheet.density is None:  # of panels that do not vibrate here
-            sheet = replace(sheet, density=1.0)
+        sheet = structure.sheet.weighed  # panels do not vibrate here
         panels = superelements(self._pattern, sheet, divisions=DIVISIONS)
         self.points, self._kinds = panels.stress_points, self._found(panels.whole)
         sides = panels.whole.sides

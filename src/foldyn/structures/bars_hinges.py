@@ -290,6 +290,17 @@ class BarsHingesTerm(SheetTerm):
         """The sheet with its hinges only; see `SheetTerm`."""
         return self._with(self.model._replace(bar_runs=self.model.bar_runs[:0]))
 
+    def anchored(self, place: NDArray) -> BarsHingesTerm:
+        """See `Term`."""
+        model = self.model
+        bars, hinges = (place[::3][nodes].min(axis=1) == 0 for nodes in (model.bars, model.hinges))
+        return self._with(
+            model._replace(
+                bar_stiffness=model.bar_stiffness * bars,
+                hinge_stiffness=model.hinge_stiffness * hinges,
+            )
+        )
+
     def nominal(self, q: NDArray) -> BarsHingesTerm:
         """The model at nominal stiffness, about its state at q; see `SheetTerm`."""
         runs = self.model.hinge_runs.copy()

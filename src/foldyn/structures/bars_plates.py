@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, partial
+from itertools import pairwise
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -312,6 +313,25 @@ class BarsPlatesTerm(SheetTerm):
         """See `SheetTerm`."""
         bars = self.model.bars._replace(bar_runs=self.model.bars.bar_runs[:0])
         return self._with(self.model._replace(bars=bars))
+
+    def anchored(self, place: NDArray) -> Self:
+        """See `Term`; a plate lies at the nodes of its bends and at the ends of its edges."""
+        model, place = self.model, place[: self._nodal]
+        edges = place[::3][model.hinges[model.rotation_hinge, :2]].min(axis=1)
+        lowest = np.append(
+            place[::3][model.hinges].min(axis=1), edges[::-1]
+        )  # number -1 comes last
+        plates = np.array(
+            [lowest[model.angle[a:b]].min(initial=1) for a, b in pairwise(model.start)]
+        )
+        entries = np.repeat(plates == 0, np.diff(model.entry))
+        return self._with(
+            model._replace(
+                bars=self._bars.anchored(place).model,
+                fold_stiffness=model.fold_stiffness * (lowest[: len(model.fold_rest)] == 0),
+                stiffness=model.stiffness * entries,
+            )
+        )
 
     def unstrained(self, q: NDArray) -> Unstrained | None:
         """See `SheetTerm`."""

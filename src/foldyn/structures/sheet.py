@@ -223,6 +223,14 @@ class Sheet(Checked):
         self._set(**made)
 
     @property
+    def weighed(self) -> Sheet:
+        """The sheet with 1 kg/m3 if it has no density, for what does not depend on it."""
+        if self.density is not None:
+            return self
+        plies = [replace(ply, density=1.0) for ply in self.plies or ()]
+        return replace(self, density=1.0, plies=plies or None)
+
+    @property
     def orthotropic(self) -> bool:
         """Whether the sheet has two moduli."""
         return isinstance(self.youngs_modulus, tuple)

@@ -23,7 +23,7 @@ from foldyn.values import choice, number, show, suggest
 
 F = TypeVar("F", bound=Callable[..., Any])
 NODE, AXIS, MODE, BAND = "node", "axis", "mode", "band"
-WORDS = ("model", "point", "leg")
+WORDS = ("model", "point", "leg", "load", "strain")
 """Arguments of measures that are names in the result."""
 REALS = {"time": "s", "displacement": "m", "frequency": "Hz"}
 """Arguments of measures that are numbers, with their units."""
@@ -52,7 +52,7 @@ class Measure:
         Dimensions of an array; their lengths may differ from point to point.
     takes : tuple of str
         Arguments, in their order: "node", "axis", "mode", "band", "model", "point", "leg",
-        "time", "displacement", "frequency", "panel", "crease".
+        "load", "strain", "time", "displacement", "frequency", "panel", "crease".
     needs : int
         How many of these arguments must be given.
     through : callable, optional

@@ -19,7 +19,7 @@ from foldyn.mechanics.contact.clearance import Clearance, clearance
 from foldyn.signals import Peaks, find_peaks, half_power, log_decrement, sampling_interval, spectrum
 from foldyn.statics import Landscape, landscape
 from foldyn.statics.energy_landscape import load_at
-from foldyn.sweeps.band_measures import OF_BANDS
+from foldyn.sweeps.cell_measures import OF_CELLS
 from foldyn.sweeps.measure import MODE, Measure, measure
 from foldyn.viewer.states import bar_strain
 
@@ -34,7 +34,7 @@ SPANS = {
     "frequency": "the response has frequencies from {:g} to {:g} Hz",
 }
 CURVES, MOVED = (FRF, MOTION), (MOTION, PATH)
-MEASURES: dict[str, Measure] = {**OF_BANDS}
+MEASURES: dict[str, Measure] = {**OF_CELLS}
 """Measures by name."""
 
 

@@ -1,4 +1,4 @@
-"""Measures of bands: frequencies, gaps and attenuation."""
+"""Measures of repeated cases: frequencies and gaps of bands, and effective properties."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.linear.band_structure import ALL, frequencies_of, legs
-from foldyn.sweeps.measure import BAND, Measure, measure
+from foldyn.sweeps.measure import AXIS, BAND, Measure, measure
+from foldyn.values import choice
 
-BANDS = "bands"
-OF_BANDS: dict[str, Measure] = {}
-"""Measures of bands by name."""
-_measure = partial(measure, OF_BANDS)
+BANDS, EFFECTIVE = "bands", "effective"
+OF_CELLS: dict[str, Measure] = {}
+"""Measures of repeated cases by name."""
+_measure = partial(measure, OF_CELLS)
 
 
 @_measure(BANDS, units="Hz", doc="frequency", dims=("phase", BAND))
@@ -75,6 +76,38 @@ def _attenuation(result: xr.Dataset, case: Case, leg: str, frequency: float) -> 
 def _unstable_bands(result: xr.Dataset, case: Case) -> int:
     _one_state(result)
     return int((result["eigenvalue"] < 0.0).any("phase").sum())
+
+
+def _property(name: str, result: xr.Dataset, case: Case, **labels: str) -> float:
+    """A number of the equivalent plate or beam, by its labels."""
+    own = "stiffness" if name == "coupling" and "stiffness" in result else name
+    if own not in result:
+        raise InputError("is for sheets; a chain or tube has coupling")
+    at = {"direction" if dim == AXIS else dim: label for dim, label in labels.items()}
+    if "load" in at:
+        at.setdefault("strain", at["load"])
+    for dim, label in at.items():
+        choice(dim, label, result[dim].values.tolist())
+    return float(result[own].sel(at))
+
+
+OF_CELLS |= {
+    name: Measure(name, (EFFECTIVE,), partial(_property, name), units, doc, takes=takes, needs=1)
+    for takes, rows in {
+        (AXIS,): (
+            ("poissons_ratio", "1", "Poisson's ratio under forces along an axis of the sheet"),
+            ("bending_poissons_ratio", "1", "Poisson's ratio of bending along an axis"),
+            ("modulus", "N/m", "modulus of stretching along an axis of the sheet"),
+            ("bending_modulus", "N m", "modulus of bending along an axis of the sheet"),
+        ),
+        ("load", "strain"): (
+            ("membrane", "N/m", "membrane stiffness of the sheet"),
+            ("bending", "N m", "bending stiffness of the sheet"),
+            ("coupling", "", "forces per curvature of the sheet, or stiffness of the chain"),
+        ),
+    }.items()
+    for name, units, doc in rows
+}
 
 
 def _gap_ends(result: xr.Dataset, band: int, leg: str) -> tuple[float, float]:

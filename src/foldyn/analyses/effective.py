@@ -1,0 +1,103 @@
+"""The equivalent plate or beam of a repeated case: [analysis] of kind "effective"."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import xarray
+
+from foldyn import plots
+from foldyn.analyses.bars import bar, bar_closed
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute
+from foldyn.analyses.cells import CellSchema, CellSection, cell_states
+from foldyn.linear import effective
+from foldyn.report.album import Album, ByRule
+from foldyn.report.sections import Heading, Section, Table, Text, cell
+from foldyn.tables import Section as FileSection
+
+MATRICES = ("membrane", "coupling", "bending", "stiffness")
+STATE = ("center", "frame", "vectors", "angles", "axes", "points", "displacement")
+MEANING = (
+    "Loads are forces and moments per length of the sheet, or of the whole chain; creases and "
+    "panels of the cell are relaxed under each mean strain and curvature. Poisson's ratios and "
+    "moduli of stretching are those of a sheet that stays flat, those of bending of one without "
+    "mean forces. Directions x and y are the first two axes of the frame."
+)
+
+
+class EffectiveOutput(FileSection):
+    """[output] of kind "effective"; it has no keys."""
+
+
+class EffectiveSection(CellSection):
+    """[analysis] of kind "effective"."""
+
+
+class EffectiveSchema(CellSchema):
+    """A case file of kind "effective"."""
+
+    analysis: EffectiveSection
+    output: EffectiveOutput = EffectiveOutput()
+
+
+class EffectiveAnalysis(Analysis):
+    """Stiffness of the equivalent plate of a sheet that repeats, or beam of a chain."""
+
+    kind = "effective"
+    schema = EffectiveSchema
+    needs_density = ""
+    takes = ("stretch", "turn", "secant")
+    files = ("effective",)
+    by_mass = False
+
+    def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
+        """See `Analysis`."""
+        (state,) = cell_states(case_file, mass, {**self.arguments, **changes, "vary": None})
+
+        def compute(progress: bool, begun: Begun) -> xarray.Dataset:
+            with state.placed(), bar_closed(bar(progress, bar_format="stiffness")):
+                result = effective(state.cell, **state.arguments())
+            begun()
+            return result
+
+        return compute
+
+    def line(self, name: str, result: xarray.Dataset) -> str:
+        """Main numbers."""
+        shown = ("modulus", "poissons_ratio", "axial_stiffness", "torsional_stiffness")
+        numbers = [
+            f"{name.replace('_', ' ')} {_listed(result[name])}" for name in shown if name in result
+        ]
+        return f"  {'; '.join(numbers)}, {result.attrs['wall_seconds']:.1f} s"
+
+    @staticmethod
+    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[Section]:
+        """See `Analysis`."""
+        (first, result), *_ = results.items()
+        yield from album.structure(case_file.case(first), "A cell with its nodes.")
+        if "angle" in result.coords:
+            yield Heading("Directions")
+            yield from album.figure(
+                "effective", "Moduli of stretching and bending along directions in the sheet.",
+                lambda: plots.plot_effective(result),
+            )  # fmt: skip
+        yield Heading("The numbers")
+        for name in (one for one in MATRICES if one in result):
+            matrix, strains = result[name], result["strain"].values.tolist()
+            rows = [
+                [load, *map(cell, row)]
+                for load, row in zip(strains, matrix.values.tolist(), strict=True)
+            ]
+            yield Table(["load", *strains], rows, f"{name} ({matrix.attrs['units']})")
+        others = [
+            [str(name).replace("_", " "), _listed(one), one.units]
+            for name, one in result.data_vars.items()
+            if one.size <= 4 and name not in (*MATRICES, *STATE) and "units" in one.attrs
+        ]
+        yield Table(["property", "value", "unit"], others, f"{case_file.path.name}: properties")
+        yield Text(MEANING)
+
+
+def _listed(values: xarray.DataArray) -> str:
+    return ", ".join(f"{each:.4g}" for each in values.values.ravel())

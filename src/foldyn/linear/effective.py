@@ -1,0 +1,322 @@
+"""`effective`: a repeated sheet as an equivalent plate, a chain or tube as an equivalent beam.
+
+The strain energy of a cell under mean strains e, relaxed, is 1/2 e . C e per area or length. For a
+plate e = (E_xx, E_yy, 2 E_xy, k_xx, k_yy, 2 k_xy), with the curvature k = -grad grad w about the
+plane through the center of mass, and C = [[A, B], [B', D]]. For a beam e is its stretch, its twist
+and its curvatures about two axes across it (rad/m). Bending a screw chain is a wave whose phase is
+the angle of the screw, in axes that turn with the cells: it couples with stretch and twist only if
+this angle vanishes, and is the same about all axes unless it is half a turn.
+
+M. Schenk, S. D. Guest, Proc. Natl. Acad. Sci. 110, 2013; Z. Y. Wei, Z. V. Guo, L. Dudte,
+H. Y. Liang, L. Mahadevan, Phys. Rev. Lett. 110, 2013.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+
+from foldyn.cases import State
+from foldyn.errors import InputError, warn
+from foldyn.linear.linearized import amplitude_of
+from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
+from foldyn.linear.mean_strains import CellEnergy, MeanStrains
+from foldyn.linear.unit_cell import UnitCell
+from foldyn.linear.wave_solver import WaveSolver
+from foldyn.results.dataset import result_dataset
+from foldyn.values import of_kind
+
+STRAINS = ("xx", "yy", "xy")
+BEAM = ("stretch", "twist", "bend_1", "bend_2")
+SOFT = 1e-12  # stiffness of a strain, relative to the stiffest, below which it counts as zero
+BOUNDLESS = 1e60  # stands for an infinite compliance, m/N or 1/(N m)
+NOISE = 1e-6  # shares of a strain below this are round-off
+SAME = 1e-9  # sine of a screw's angle below which it counts as zero
+STRAINED = 1e-6  # mean strains below this, by which a state would relax, are round-off
+ANGLES = np.linspace(0.0, 180.0, 181)  # degrees
+
+
+def effective(
+    cell: UnitCell,
+    state: State | None = None,
+    *,
+    secant: float | None = None,
+    load_factor: float = 1.0,
+) -> xarray.Dataset:
+    """Stiffness of the plate that is equivalent to a repeated sheet, or of the beam to a chain.
+
+    Creases and panels of a cell are relaxed under each mean strain and curvature. Poisson's ratios
+    and moduli of stretching are those of a sheet that stays flat, those of bending of one without
+    mean forces: neither depends on the reference plane.
+
+    Parameters
+    ----------
+    cell : UnitCell
+        Cell under two translations (a sheet), or under one translation or screw (a chain or tube),
+        without supports.
+    state : State, optional
+        Equilibrium of the repeated sheet, as `fd.linear.relaxed` finds it; by default rest.
+    secant, load_factor : float
+        As in `bands`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Of a sheet, along its axes x and y, the first two rows of `frame` (3, 3), which are those of
+        space for a sheet in its xy plane: `membrane` A (N/m), `coupling` B (N) and `bending` D
+        (N m), (load, strain) in the order xx, yy, xy, with N = A e + B k and M = B' e + D k, shear
+        and twist counted twice; `modulus` and `bending_modulus` (direction): N/m and N m per strain
+        or curvature along x and y, the other free; `poissons_ratio` and `bending_poissons_ratio`
+        (direction): minus the strain (curvature) across, divided by that along x, and along y;
+        `shear_modulus` (N/m) and `twisting_modulus` (N m); `modulus_along` and
+        `bending_modulus_along` (angle): moduli along directions at angles (degrees) from x;
+        `density` (kg/m2, if the sheet has one); `center` (m), a point of the reference plane.
+        Of a chain: `stiffness` (load, strain) in the order stretch, twist, bend_1, bend_2: forces
+        (N) and moments (N m) per stretch and per turn (rad/m) about the rows of `frame`: the axis,
+        and two axes across it; `axial_stiffness` EA (N), `torsional_stiffness` GJ (N m2) with the
+        other strains held, `stretch_twist` (N m); `bending_stiffness` EI (axis, N m2), the lesser
+        and the greater, about axes through the neutral point; `density` (kg/m). Of both
+        `mean_load`, forces and moments in the state, and its variables as in `bands`.
+
+    Raises
+    ------
+    InputError
+        Supports, rigid panels; a screw beside a vector, or without a shift; parts of the cell that
+        move without any force.
+
+    Warns
+    -----
+    FoldynWarning
+        The state is unstable, is no equilibrium, or has mean forces; a mean strain costs no energy,
+        so that moduli are 0 and Poisson's ratios its own, or nan if there are two.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> pattern = fd.patterns.miura(a=0.03, b=0.03, panel_angle=60, dihedral=100)
+    >>> sheet = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3)
+    >>> cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet, crease_stiffness=0.1)))
+    >>> found = fd.effective(cell)
+    >>> bool(found.poissons_ratio[0] < 0.0 < found.bending_poissons_ratio[0])
+    True
+    """
+    began = time.perf_counter()
+    case = of_kind("cell", cell, UnitCell).case
+    structure = case.structure
+    if case.supports or getattr(structure.options, "clamped", ()):
+        raise InputError(": has supports or clamped edges, and a free material has none", "cell")
+    weighed = structure.sheet.density is not None
+    if not weighed:
+        light = replace(structure, sheet=structure.sheet.weighed).marked()
+        case = replace(case, structure=light)
+    linear = linearize_cell(cell.with_case(case), state, secant, load_factor)
+    if not linear.bloch.ties.empty:
+        raise InputError(
+            ": has rigid panels, whose sheet can have an infinite stiffness; take panels much "
+            "stiffer than the creases",
+            "cell",
+        )
+    energy, plate = CellEnergy(linear, amplitude_of(secant)), cell.dimensions == 2
+    frame, size = _plate_frame(linear) if plate else _beam_frame(linear)
+    whole, loads = (_plate if plate else _beam)(linear, energy, frame)
+    matrix = whole / size
+    _warn_of(linear, matrix, loads / size)
+    found = (plate_properties if plate else beam_properties)(matrix, loads / size)
+    if weighed:
+        unit = "kg/m2" if plate else "kg/m"
+        found["density"] = (), energy.mass.sum() / size, {"units": unit}
+    found["center"] = "axis", energy.center, {"units": "m"}
+    found["frame"] = ("own_axis", "axis"), frame, {"units": "1"}
+    along: dict[str, Any] = {"load": list(STRAINS if plate else BEAM)}
+    along["strain"] = along["load"]
+    if plate:
+        along |= {"direction": ["x", "y"], "angle": ("angle", ANGLES, {"units": "degrees"})}
+    facts = {"residual": linear.residual, "wall_seconds": time.perf_counter() - began}
+    return result_dataset("effective", cell.case, found | linear.variables, along, facts)
+
+
+# ---------------------------------------------------------------------- mean strains of a cell
+def _plate_frame(linear: LinearizedCell) -> tuple[NDArray, float]:
+    """Axes x, y and normal (3, 3) of a sheet, and the area (m2) of a cell."""
+    if any(motion.turns for motion in linear.motions):
+        raise InputError(
+            ": turns from cell to cell along one of two motions, as a bent sheet does; a plate has "
+            "two translations, and a tube one motion: take a ring of cells as the cell",
+            "cell",
+        )
+    across = np.cross(*linear.vectors)
+    area = float(np.linalg.norm(across))
+    normal = across / area * np.sign(across[np.abs(across).argmax()])
+    first = np.eye(3)[0 if abs(normal[0]) < 0.9 else 1]
+    x = first - (first @ normal) * normal
+    x /= np.linalg.norm(x)
+    return np.array([x, np.cross(normal, x), normal]), area
+
+
+def _beam_frame(linear: LinearizedCell) -> tuple[NDArray, float]:
+    """Axis of a chain and two axes across it (3, 3), and the length (m) of a cell."""
+    (shift,) = linear.vectors
+    length = float(np.linalg.norm(shift))
+    if length == 0.0:
+        raise InputError(": repeats about an axis without a shift; a ring is no beam", "cell")
+    axis = shift / length
+    first = np.eye(3)[np.abs(axis).argmin()]
+    one = np.cross(axis, first)
+    one /= np.linalg.norm(one)
+    return np.array([axis, one, np.cross(axis, one)]), length
+
+
+def _strains(linear: LinearizedCell, turn: NDArray, move: NDArray, center: NDArray) -> MeanStrains:
+    """Mean strains from turns and moves (d, p, 3) per cell along each motion, about a center."""
+    steps = linear.reach.steps
+    turn, move = (np.tensordot(steps, each, 1) for each in (turn, move))
+    return MeanStrains(turn, move - np.cross(turn, center), steps @ linear.vectors)
+
+
+def _plate(linear: LinearizedCell, energy: CellEnergy, frame: NDArray) -> tuple[NDArray, NDArray]:
+    """Stiffness (6, 6) and loads (6,), J, of a cell under membrane strains and curvatures."""
+    x, y, normal = frame
+    tensors = [np.outer(x, x), np.outer(y, y), 0.5 * (np.outer(x, y) + np.outer(y, x))]
+    stretched = np.stack([linear.vectors @ each for each in tensors], axis=1)
+    turned, none = np.cross(normal, stretched), np.zeros_like(stretched)
+    turn, move = np.hstack([none, turned]), np.hstack([stretched, none])
+    strains = _strains(linear, turn, move, energy.center)
+    still = energy.rigid(np.zeros((3, 3)), np.eye(3))
+    return energy.stiffness(strains, np.zeros(2), still), energy.loads(strains)
+
+
+def _beam(linear: LinearizedCell, energy: CellEnergy, frame: NDArray) -> tuple[NDArray, NDArray]:
+    """Stiffness (4, 4) and loads (4,), J m, of a cell under stretch, twist and two curvatures."""
+    (motion,), (shift,), axis = linear.motions, linear.vectors, frame[0]
+    center = np.array(motion.point) if motion.turns else energy.center
+    length, none, each = float(shift @ axis), np.zeros(3), np.eye(4)
+    turn = length * np.array([[none, *frame]])
+    move = length * np.array([[axis, none, none, none]])
+    strains = _strains(linear, turn, move, center)
+    angle = np.radians(motion.angle) * (motion.unit @ axis)
+    still = energy.rigid(np.array([none, axis]), np.array([axis, np.cross(center, axis)]))
+    sideways = energy.rigid(np.zeros((2, 3)), frame[1:])
+    straight, bends = (each[:, :2], 0.0, still), each[:, 2:]
+    if abs(np.sin(angle)) > SAME:
+        wave = np.array([[1.0], [1.0j]])
+        parts = [straight, (bends @ wave, angle, sideways @ wave)]
+    elif np.cos(angle) < 0.0:
+        parts = [straight, (bends, np.pi, sideways)]
+    else:
+        parts = [(each, 0.0, np.hstack([still, sideways]))]
+    out = np.zeros((4, 4))
+    for ways, phase, fixed in parts:
+        own = energy.stiffness(strains @ ways, np.array([phase]), fixed)
+        mean = 0.5 if np.iscomplexobj(ways) else 1.0  # of the square of a wave along the beam
+        out += mean * np.real(ways @ own @ ways.conj().T)
+    loads = energy.loads(strains)
+    if len(parts) > 1:  # moments across the beam turn with the screw
+        loads[2:] = 0.0
+    return out, loads
+
+
+def _warn_of(linear: LinearizedCell, matrix: NDArray, loads: NDArray) -> None:
+    """Warn of an unstable state, of strains without stiffness, and of mean forces."""
+    plate, size = len(matrix) == 6, linear.cell.case.structure.pattern.size
+    names = [f"{of} {name}" for of in ("strain", "curvature") for name in STRAINS]
+    names, straight = (names, 3) if plate else (list(BEAM), 1)
+    unit = np.where(np.arange(len(names)) < straight, 1.0, size)  # of curvatures, and twists
+    stiff = np.abs(np.diag(matrix)) / unit**2
+    stiffest = stiff.reshape(2, 3).max(axis=1).repeat(3) if plate else stiff.max()
+    scale = unit * np.sqrt(stiffest)
+    values, ways = np.linalg.eigh(matrix / np.outer(scale, scale))
+    lowest = WaveSolver(linear.bloch, 1).waves(np.zeros(len(linear.motions))).values[0]
+    if lowest < 0.0 or values[0] < -SOFT * values[-1]:
+        warn(
+            "the state is unstable: the cell moves away from it by itself, and the stiffness is "
+            "that of small motions about it; give a stable state",
+            "effective.md#states",
+        )
+    soft = np.abs(values) <= SOFT * values[-1]
+    if soft.any():
+        share = np.abs(ways[:, soft]).max(axis=1)
+        of = ", ".join(name for name, own in zip(names, share, strict=True) if own > 0.1)
+        warn(
+            f"a mean strain costs no energy: one of {of}, or a combination. Moduli along it are "
+            "0, and Poisson's ratios its own; give creases a stiffness if they have one",
+            "effective.md#how",
+        )
+    firm = ways[:, ~soft]
+    back = unit / scale * (firm @ (firm.T @ (loads / scale) / values[~soft]))
+    worst = int(np.abs(back).argmax())
+    if abs(back[worst]) > STRAINED:
+        warn(
+            f"the state has mean forces or moments: let go, it would change by {back[worst]:.2g} "
+            f"({names[worst]}; curvature times the pattern's size). The stiffness is that under "
+            "these loads",
+            "effective.md#states",
+        )
+
+
+# ---------------------------------------------------------------------- properties
+def plate_properties(matrix: NDArray, loads: NDArray) -> dict[str, Any]:
+    """Variables of a plate, from its stiffness (6, 6) and mean loads (6,)."""
+    membrane, coupling, bending = matrix[:3, :3], matrix[:3, 3:], matrix[3:, 3:]
+    square = ("load", "strain")
+    found: dict[str, Any] = {
+        "membrane": (square, membrane, {"units": "N/m"}),
+        "coupling": (square, coupling, {"units": "N"}),
+        "bending": (square, bending, {"units": "N m"}),
+        "mean_force": ("load", loads[:3], {"units": "N/m"}),
+        "mean_moment": ("load", loads[3:], {"units": "N"}),
+    }
+    free = bending - coupling.T @ np.linalg.pinv(membrane, SOFT, hermitian=True) @ coupling
+    for name, shear, unit, eased in (
+        ("", "shear_modulus", "N/m", compliance(membrane)),
+        ("bending_", "twisting_modulus", "N m", compliance(free)),
+    ):
+        found |= {
+            f"{name}modulus": ("direction", modulus(np.diag(eased)[:2]), {"units": unit}),
+            f"{name}poissons_ratio": (
+                "direction", -eased[[1, 0], [0, 1]] / np.diag(eased)[:2], {"units": "1"},
+            ),
+            shear: ((), modulus(eased[2, 2]), {"units": unit}),
+            f"{name}modulus_along": ("angle", modulus(along_directions(eased)), {"units": unit}),
+        }  # fmt: skip
+    return found
+
+
+def beam_properties(matrix: NDArray, loads: NDArray) -> dict[str, Any]:
+    """Variables of a beam, from its stiffness (4, 4) and mean loads (4,)."""
+    across = matrix[2:, 2:] - np.outer(matrix[2:, 0], matrix[0, 2:]) / matrix[0, 0]
+    return {
+        "stiffness": (("load", "strain"), matrix, {"units": "N, N m, N m2"}),
+        "mean_load": ("load", loads, {"units": "N, N m"}),
+        "axial_stiffness": ((), matrix[0, 0], {"units": "N"}),
+        "torsional_stiffness": ((), matrix[1, 1], {"units": "N m2"}),
+        "stretch_twist": ((), matrix[0, 1], {"units": "N m"}),
+        "bending_stiffness": ("bend", np.linalg.eigvalsh(across), {"units": "N m2"}),
+    }
+
+
+def compliance(stiffness: NDArray) -> NDArray[np.float64]:
+    """Inverse (3, 3), with `BOUNDLESS` for a strain that costs no energy; nan if several do not."""
+    values, ways = np.linalg.eigh(stiffness)
+    size = np.abs(values)
+    soft = size <= SOFT * size.max()
+    if soft.sum() > 1:
+        return np.full((3, 3), np.nan)
+    ways[:, soft] *= np.abs(ways[:, soft]) > NOISE
+    return (ways / np.where(soft, 1.0 / BOUNDLESS, values)) @ ways.T
+
+
+def modulus(eased: NDArray) -> NDArray[np.float64]:
+    """Moduli of compliances; 0 for boundless ones."""
+    return np.where(eased > NOISE**2 * BOUNDLESS, 0.0, 1.0 / eased)
+
+
+def along_directions(eased: NDArray) -> NDArray[np.float64]:
+    """Compliance along directions at `ANGLES` from x, from a compliance (3, 3)."""
+    c, s = np.cos(np.radians(ANGLES)), np.sin(np.radians(ANGLES))
+    load = np.array([c * c, s * s, c * s])
+    return np.einsum("ia,ij,ja->a", load, eased, load)
