@@ -118,3 +118,36 @@ def test_points_of_the_zone_of_a_solid():
         fd.UnitCell(cell.case, [steps[0], steps[1], np.add(steps[0], steps[1])])
     with pytest.raises(InputError, match="3 values for 2 other periods"):
         attenuation(cell, [1.0], phase=(0.1, 0.2, 0.3))
+
+
+@pytest.mark.parametrize(
+    "model", ["n5b8e", pytest.param("superelements", marks=pytest.mark.matrix)]
+)
+def test_stiffness_of_a_honeycomb(model):
+    """Walls that bend: E* = 4/sqrt(3) (t/l)^3 E, Poisson's ratio 1, shear modulus E*/4.
+
+    Regular hexagons of thin walls without Poisson's ratio: L. J. Gibson, M. F. Ashby, Cellular
+    Solids, 2nd ed., 1997, section 4.3. Stretch of the walls takes 3 (t/l)^2 of it.
+    """
+    slender = 0.01
+    sheet = fd.Sheet(1e9, 0.0, thickness=slender * SIDE, density=1000.0)
+    open_ = honeycomb(ABOUT_B)
+    pattern = fd.Pattern(open_.vertices, open_.faces, welds=open_.creases[:1])
+    stiff = {"crease_stiffness": 1e6}  # between cells
+    made = {
+        "n5b8e": lambda: fd.discretize(pattern, sheet, preset="n5b8e", **stiff),
+        "superelements": lambda: fd.superelements(pattern, sheet, **stiff),
+    }[model]()
+    found = fd.effective(fd.UnitCell(fd.Case(made), PERIODS))
+    expected = 4.0 / np.sqrt(3.0) * slender**3 * 1e9 * HEIGHT
+    np.testing.assert_allclose(found.modulus, expected, rtol=1e-3)
+    np.testing.assert_allclose(found.poissons_ratio, 1.0, rtol=2e-3)
+    np.testing.assert_allclose(found.shear_modulus, 0.25 * expected, rtol=1e-3)
+    assert (found.bending_poissons_ratio < 1.0 + 1e-9).all()
+
+
+def test_solids_have_no_equivalent_plate():
+    above, _, steps = layers()
+    cell = fd.UnitCell(fd.Case(MODELS["plate"](above)), steps)
+    with pytest.raises(InputError, match="repeats in three directions"):
+        fd.effective(cell)

@@ -110,6 +110,10 @@ def effective(
     structure = case.structure
     if case.supports or getattr(structure.options, "clamped", ()):
         raise InputError(": has supports or clamped edges, and a free material has none", "cell")
+    if cell.dimensions == 3:
+        raise InputError(
+            ": repeats in three directions; `effective` takes sheets, chains and tubes", "cell"
+        )
     weighed = structure.sheet.density is not None
     if not weighed:
         light = replace(structure, sheet=structure.sheet.weighed).marked()
