@@ -63,7 +63,7 @@ def junctions():
     faces = [(0, 1, 3, 2), (0, 1, 5, 4), (1, 0, 6, 7), (2, 3, 9, 8), (2, 3, 11, 10)]
     pattern = fd.Pattern(out, faces, welds=[(2, 3)])
     structure = fd.discretize(pattern, SHEET, preset="n5b8e", crease_stiffness=1e-4)
-    return fd.Case(structure, [fd.Fix([4, 5, 6])], [fd.Force(9, (0, 0, 1e-5))])
+    return fd.Case(structure, [fd.Fix([4, 5, 6])], [fd.Force(9, (0, 0, 1e-6))])
 
 
 CASES = {
@@ -275,6 +275,43 @@ def test_opensees_finds_what_the_shell_does(name, tmp_path):
     found, true = limits(lambda n: run(free, n)[0]), limits(ours(free))
     assert np.abs(found / true - 1.0).max() < 0.01
     assert away(run(case, 8)[1], displaced(case, 8)) < 0.015
+
+
+def fibers(sheet=None):
+    """A fold of an orthotropic sheet, with fibers at 30 degrees to its first edge."""
+    own = {"shear_modulus": 6e5, "direction": {"edge": (0, 1), "angle": 30.0}}
+    pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
+    structure = fd.shell(
+        pattern, sheet or fd.Sheet((4e6, 1e6), 0.25, 0.01, 1.0, **own), divisions=4,
+        crease_stiffness=0.02,
+    )  # fmt: skip
+    supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
+    return fd.Case(structure, supports, [fd.Force([0, 1], (-1e-5, 0, 0))])
+
+
+@pytest.mark.skipif(not HAS_OPENSEES, reason="needs opensees")
+def test_opensees_finds_what_orthotropic_shells_do(tmp_path):
+    """1.0 % in the second frequency, 0.2 % in others and in displacements."""
+    case = fibers()
+
+    def at(divisions):
+        return case.altered(structure=case.structure.meshed(divisions))
+
+    runs = {n: by_opensees(*fd.export(at(n), tmp_path / "a.tcl", modes=4)) for n in (4, 8)}
+    found = extrapolated(runs[4][0], runs[8][0], 2.0)
+    true = limits(lambda n: fd.modes(at(n).altered(loads=()), 4).frequency.values)
+    assert np.abs(found / true - 1.0).max() < 0.015
+    assert away(runs[8][1], displaced(at(8), 8)) < 0.005
+
+
+def test_opensees_gets_directions_and_no_plies(tmp_path):
+    (deck,) = fd.export(fibers(), tmp_path / "a.tcl")
+    text = deck.read_text()
+    assert "nDMaterial ElasticOrthotropic 1 4000000.0 1000000.0 1000000.0 0.25" in text
+    assert text.count("-local") == text.count("ASDShellT3") > 0
+    ply = fd.Ply(0.005, (4e6, 1e6), 0.25, shear_modulus=6e5, density=1.0)
+    with pytest.raises(InputError, match="plies: OpenSees has no section"):
+        fd.export(fibers(fd.Sheet(plies=[ply, ply], direction=0.0)), tmp_path / "b.tcl")
 
 
 @pytest.mark.skipif(not HAS_CALCULIX, reason="needs CalculiX (ccx)")

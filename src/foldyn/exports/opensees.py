@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.exports.creased_shell import CreasedShell, Joint, creased_shell
+from foldyn.structures.ply import pair
+from foldyn.structures.sheet import Sheet
 from foldyn.values import whole
 from foldyn.writing import write_text
 
@@ -37,19 +39,14 @@ def model(shell: CreasedShell, tie: float = TIE) -> Iterator[Command]:
     for number, point in enumerate(shell.nodes.tolist(), 1):
         yield "node", number, *point
     for number, sheet in enumerate(shell.sheets, 1):
-        if sheet.orthotropic:
-            raise InputError(
-                ": triangles of OpenSees (ASDShellT3) are isotropic here; export to Abaqus or "
-                "CalculiX instead",
-                "sheet.youngs_modulus",
-            )
-        yield (
-            "section", "ElasticMembranePlateSection", number, sheet.youngs_modulus,
-            sheet.poissons_ratio, sheet.thickness, sheet.density or 0.0,
-        )  # fmt: skip
-    sections = (shell.kind + 1).tolist()
-    for number, nodes in enumerate((shell.triangles + 1).tolist(), 1):
-        yield "element", "ASDShellT3", number, *nodes, sections[number - 1], "-corotational"
+        yield from _section(number, sheet)
+    for number, (nodes, kind) in enumerate(
+        zip(shell.triangles.tolist(), shell.kind, strict=True), 1
+    ):
+        own = [node + 1 for node in nodes]
+        along = shell.axes[number - 1, 0].tolist() if shell.sheets[kind].orthotropic else []
+        axes = ("-local", *along) if along else ()
+        yield "element", "ASDShellT3", number, *own, int(kind) + 1, "-corotational", *axes
     yield "uniaxialMaterial", "Elastic", TIE_MATERIAL, tie * shell.membrane
     yield from _springs(shell)
     for node in np.flatnonzero(shell.held.any(axis=1) | shell.clamped).tolist():
@@ -57,6 +54,29 @@ def model(shell: CreasedShell, tie: float = TIE) -> Iterator[Command]:
         yield "fix", node + 1, *shell.held[node].astype(int).tolist(), *turns
     for node in np.flatnonzero(shell.masses).tolist():
         yield "mass", node + 1, *3 * [float(shell.masses[node])], 0.0, 0.0, 0.0
+
+
+def _section(number: int, sheet: Sheet) -> Iterator[Command]:
+    """Section of a sheet; an orthotropic one has stiffness 2 along its normal, too."""
+    density = sheet.density or 0.0
+    if sheet.plies:
+        raise InputError(
+            ": OpenSees has no section of turned plies; export to Abaqus or CalculiX", "sheet.plies"
+        )
+    if not sheet.orthotropic:
+        yield (
+            "section", "ElasticMembranePlateSection", number, sheet.youngs_modulus,
+            sheet.poissons_ratio, sheet.thickness, density,
+        )  # fmt: skip
+        return
+    first, second = pair(sheet.youngs_modulus)
+    shears = 3 * [sheet.shear_modulus]
+    yield (
+        "nDMaterial", "ElasticOrthotropic", 2 * number - 1, first, second, second,
+        sheet.poissons_ratio, 0.0, 0.0, *shears, density,
+    )  # fmt: skip
+    yield "nDMaterial", "PlateFiber", 2 * number, 2 * number - 1
+    yield "section", "PlateFiber", number, 2 * number, sheet.thickness
 
 
 def _springs(shell: CreasedShell) -> Iterator[Command]:
