@@ -218,7 +218,9 @@ class Stop(Part):
 
     creases: Creases
     angle: Annotated[PerCrease, Check(check_angles, unit="degrees"), Key("stop")]
-    stiffness: Annotated[float, Check(number, above=0.0, unit="N m/rad per m")]
+    stiffness: Annotated[
+        float, Check(number, above=0.0, unit="N m/rad per m"), Key("stop_stiffness")
+    ]
     side: Annotated[str | None, Check(choice, known=tuple(SIDES))] = None
 
     apart = "stops of creases are a support of their own"

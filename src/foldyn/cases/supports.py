@@ -196,6 +196,6 @@ SUPPORT = PartOf(
     "supports",
     "nodes and axes or direction (held), nodes, axis and displacement (moved), base and history (a "
     "base that moves), nodes and link or to (tied together), or nodes or between with stiffness "
-    "(springs) or dashpot (damped), or stop and stiffness (creases that push back)",
+    "(springs) or dashpot (damped), or stop and stop_stiffness (creases that push back)",
 )
 """A support in a case file."""
