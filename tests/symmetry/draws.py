@@ -33,6 +33,7 @@ MODELS = (*PRESETS, SHELL)
 STATIC = "trace"
 ANALYSES = (*METHODS, STATIC)
 EXTRAS = ("springs", "memory", "contact", "air", "all")  # the last: the others together
+MOST_NODES = 120  # of shells with a vertex radius, for time
 TRIES = 12  # of a part, until the library takes it
 SMALL = 0.02  # of the pattern's size: displacements
 ALWAYS = {"BaseMotion.value", "Air.density", "Air.resolution"}
@@ -307,8 +308,9 @@ def structure_of(model: str, pattern: fd.Pattern, rng, extra: str) -> Any:
             try:
                 tried = build(pattern, sheet, **more)
                 _ = tried.mass  # some rules refuse some shapes
-                s, make = tried, more
-                break
+                if len(tried.nodes) <= MOST_NODES:
+                    s, make = tried, more
+                    break
             except InputError:
                 pass
     return s
