@@ -89,10 +89,11 @@ def test_layers_are_joined_along_creases():
     assert len(pattern.creases) == 2 * len(layer.creases) + 2 * len(inner)
 
 
+@pytest.mark.parametrize("make", [lambda: double_box(welded=False), lambda: stack()[1]])
 @pytest.mark.parametrize("suffix", ["fold", "obj"])
-def test_files(tmp_path, suffix):
-    path = tmp_path / f"box.{suffix}"
-    pattern = double_box(welded=False)
+def test_files(tmp_path, suffix, make):
+    """Three, and four faces at an edge."""
+    path, pattern = tmp_path / f"box.{suffix}", make()
     fd.write_pattern(pattern, path)
     found = fd.read_pattern(path, facets="hinge")
     assert found.junctions.tolist() == pattern.junctions.tolist()
