@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
 import xarray
 
 from foldyn import plots
@@ -16,7 +17,12 @@ from foldyn.report.album import Album, ByRule
 from foldyn.report.sections import Heading, Section, Table, Text, cell
 from foldyn.tables import Section as FileSection
 
-MATRICES = ("membrane", "coupling", "bending", "stiffness")
+MATRICES = {
+    "membrane": ("membrane", "membrane"), "coupling": ("membrane", "bending"),
+    "bending": ("bending", "bending"), "stiffness": ("stiffness", "stiffness"),
+}  # fmt: skip
+"""Matrices of a page, and those whose diagonals are the scales of rows and columns."""
+NOUGHT = 1e-10  # of these scales: smaller numbers are round-off
 STATE = ("center", "frame", "vectors", "angles", "axes", "points", "displacement")
 MEANING = (
     "Loads are forces and moments per length of the sheet, or of the whole chain; creases and "
@@ -84,12 +90,11 @@ class EffectiveAnalysis(Analysis):
             )  # fmt: skip
         yield Heading("The numbers")
         for name in (one for one in MATRICES if one in result):
-            matrix, strains = result[name], result["strain"].values.tolist()
-            rows = [
-                [load, *map(cell, row)]
-                for load, row in zip(strains, matrix.values.tolist(), strict=True)
-            ]
-            yield Table(["load", *strains], rows, f"{name} ({matrix.attrs['units']})")
+            strains, values = result["strain"].values.tolist(), result[name].values
+            row, column = (np.sqrt(np.abs(np.diag(result[one].values))) for one in MATRICES[name])
+            shown = np.where(np.abs(values) < NOUGHT * np.outer(row, column), 0.0, values)
+            rows = [[load, *map(cell, own)] for load, own in zip(strains, shown, strict=True)]
+            yield Table(["load", *strains], rows, f"{name} ({result[name].units})")
         others = [
             [str(name).replace("_", " "), _listed(one), one.units]
             for name, one in result.data_vars.items()
@@ -100,4 +105,7 @@ class EffectiveAnalysis(Analysis):
 
 
 def _listed(values: xarray.DataArray) -> str:
-    return ", ".join(f"{each:.4g}" for each in values.values.ravel())
+    """Numbers of a variable, each after its direction, if it has one."""
+    names = [f"{one} " for one in values.coords.get("direction", xarray.DataArray([])).values]
+    numbers = [f"{each:.4g}" for each in values.values.ravel()]
+    return ", ".join(map("".join, zip(names or [""] * len(numbers), numbers, strict=True)))
