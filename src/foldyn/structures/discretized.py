@@ -250,7 +250,7 @@ class Discretized:
         refuse_junctions(
             self.pattern,
             f"where explicit methods cannot integrate {self.massless}; take an implicit one, or "
-            'scheme = "n5b8"',
+            'bars and hinges of scheme = "n5b8"',
             "method",
         )
         other = replace(self, by_folds=True)
