@@ -191,3 +191,28 @@ def test_explicit_methods():
     one = fd.simulate(plate, duration=2e-3, method="rk4").displacement.values[-1]
     other = fd.simulate(plate, duration=2e-3, method="dormand_prince").displacement.values[-1]
     np.testing.assert_allclose(one, other, atol=1e-3 * np.abs(one).max())
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize("model", ["n5b8e", "shell"])
+def test_gradients(model):
+    """Of a path, beside differences."""
+
+    def build(first, second, third, width):
+        pattern = star((0.0, 110.0, 230.0), width=width)
+        structure = MODELS[model](pattern, crease_stiffness=[first, second, third])
+        return fd.Case(structure, [fd.Fix([0, 1, 2])], [fd.Force([4], (0.0, 0.02, 0.01))])
+
+    values = {"first": 0.4, "second": 0.7, "third": 0.3, "width": 0.1}
+    found = fd.sensitivity(
+        build, values, measures=["displacement[6,y]"], analysis={"kind": "statics"}
+    )
+
+    def moved(**changed):
+        return fd.trace(build(**{**values, **changed})).displacement.values[-1][6, 1]
+
+    for name, value in values.items():
+        small = 1e-3 * value
+        change = moved(**{name: value + small}) - moved(**{name: value - small})
+        gradient = found[f"gradient_{name}"].values[0]
+        assert gradient == pytest.approx(change / (2.0 * small), rel=1e-5)
