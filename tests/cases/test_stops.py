@@ -110,7 +110,7 @@ def test_a_flap_that_hits_its_stop_keeps_its_energy(method):
 def test_stops_of_mountains_and_valleys():
     sheet = fd.patterns.miura(dihedral=100.0)
     letters = np.array(sheet.assignments)
-    structure = fd.discretize(sheet, SHEET, preset="plate")
+    structure = fd.discretize(sheet, SHEET, preset="herkal")
     stops = [fd.Stop("valley", 90.0, stiffness=5.0), fd.Stop("mountain", 270.0, stiffness=5.0)]
     term = fd.Case(structure, stops).body.others[-1].stops
     assert (
@@ -135,6 +135,7 @@ def test_stops_of_mountains_and_valleys():
         ),
         (lambda: fd.Stop("all", 120.0, stiffness=-5.0), "stiffness = -5.0: must be"),
         (lambda: fd.Stop("all", 400.0, stiffness=5.0), "angle = 400: must lie between 0 and 360"),
+        (lambda: fd.Stop("all", 360.0, stiffness=5.0), "panels cannot pass 0 or 360"),
         (lambda: fd.Stop("all", 120.0, stiffness=5.0, side="left"), "choose one of below, above"),
         (lambda: fd.Stop("ridges", 120.0, stiffness=5.0), r"supports\[1\].creases = \"ridges\""),
     ],
@@ -148,3 +149,52 @@ def test_superelements_refuse_stops():
     made = fd.superelements(PATTERN, SHEET, divisions=8)
     with pytest.raises(InputError, match="superelements are linear, and stops are not"):
         fd.Case(made, [fd.Stop("all", 60.0, stiffness=4.0)])
+
+
+@pytest.mark.parametrize("model", ["plate", "n5b8e", "shell"])
+@pytest.mark.parametrize("stiffness", [2.0, 20.0])
+def test_a_stop_at_rest_is_a_stiffer_crease(model, stiffness):
+    """The panels bend in series with both: law k and stop s beside a law of k + s."""
+    options = {"rigid": None, "fold_law": "linear"}
+    stops = [fd.Stop("all", REST, stiffness=stiffness, side="above")]
+    cases = []
+    for given, crease in ((stops, 0.5), ([], 0.5 + stiffness)):
+        case, tip = flap(model, given, **options, crease_stiffness=crease)
+        cases.append(case)
+    # one of both ways opens the crease onto its stop
+    for way in (1.0, -1.0):
+        one, other = (
+            fd.trace(
+                case.altered(loads=[fd.Force(tip, (1e-4 * way, 0.0, 1e-3 * way))])
+            ).displacement.values[-1]
+            for case in cases
+        )
+        if angle(cases[0], one) > REST:
+            break
+    assert np.abs(one - other).max() < 1e-5 * np.abs(other).max()
+
+
+def test_a_crease_at_its_stop_is_free_at_rest():
+    """Rounding does not decide which stops act."""
+    pattern = fd.patterns.miura((2, 2), dihedral=110.0)
+    structure = fd.discretize(pattern, SHEET, preset="plate")
+    held = [fd.Fix([0, 1, 2])]
+    rest = np.degrees(pattern.dihedrals).tolist()
+    numbers = list(range(len(rest)))
+    stops = [fd.Stop(numbers, rest, stiffness=5.0, side="above")]
+    one, other = (
+        fd.modes(fd.Case(structure, [*held, *more]), 4, check_model=False).frequency.values
+        for more in ([], stops)
+    )
+    np.testing.assert_allclose(one, other, rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["rk4", "energy_momentum"])
+@pytest.mark.parametrize("model", ["n5b8e", pytest.param("shell", marks=pytest.mark.matrix)])
+def test_panels_that_bend_keep_the_energy_of_a_stop(method, model):
+    case, tip = flap(model, [fd.Stop("all", REST + 2.0, stiffness=3.0)], rigid=None)
+    case = case.altered(loads=[fd.Force(tip, (0.0, 0.0, -0.02))])
+    result = fd.simulate(case, duration=0.05, method=method)
+    stored = sum(result[name] for name in ("kinetic", *case.energy_groups))
+    assert float(result["strain_stops"].max()) >= 0.0
+    assert np.abs(stored - result.work).max() < 1e-3 * np.abs(result.work).max()

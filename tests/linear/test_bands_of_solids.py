@@ -151,3 +151,10 @@ def test_solids_have_no_equivalent_plate():
     cell = fd.UnitCell(fd.Case(MODELS["plate"](above)), steps)
     with pytest.raises(InputError, match="repeats in three directions"):
         fd.effective(cell)
+
+
+def test_letters_of_creases_that_are_junctions_between_cells_are_refused():
+    pattern = honeycomb(IN_A_ROW)
+    made = fd.discretize(pattern, SHEET, preset="plate", crease_stiffness={"mountain": 0.2})
+    with pytest.raises(InputError, match="crease_stiffness: mountain: creases at which"):
+        fd.bands(fd.UnitCell(fd.Case(made), PERIODS), PHASES, check_model=False)

@@ -123,3 +123,33 @@ def test_facets_at_junctions_are_welded_by_name_only():
 def test_what_cannot_have_junctions_says_so(use):
     with pytest.raises(InputError, match=r"pattern: more than two panels meet at edge \(0, 1\)"):
         use(star())
+
+
+@pytest.mark.parametrize("close", [1e-5, 1e-7, 1e-10, 0.0, -1e-10, -1e-7])
+def test_panels_that_nearly_coincide(close):
+    """The second may lie slightly behind the first."""
+    pattern = star((0.0, np.degrees(close), 90.0, 143.0))
+    assert np.degrees(pattern.dihedrals).sum() == pytest.approx(360.0, abs=1e-9)
+    assert pattern.dihedrals.max() < np.pi * 1.3
+
+
+def test_a_welded_layer_is_joined_to_a_creased_one():
+    layer, _ = stack()
+    top = layer.vertices[:, 2].max()
+    other = layer.mirrored("z", about=(0.0, 0.0, top))
+    welded = other.changed(welds=other.creases, assignments=None, families=None, fold_angles=None)
+    made = layer.joined(welded, inner=True)
+    assert len(made.junctions) == 2
+    assert len(made.creases) < len(layer.creases)  # junctions are welded
+
+
+def test_mirror_images_have_the_angles_of_the_same_panels():
+    pattern = star((0.0, 40.0, 120.0, 200.0))
+    one, other = pattern, pattern.mirrored("z")
+    angles = (
+        {frozenset(pair): angle for pair, angle in zip(p.crease_faces.tolist(), a, strict=True)}
+        for p, a in ((one, one.dihedrals), (other, other.dihedrals))
+    )
+    first, second = angles
+    assert first.keys() == second.keys()
+    assert all(second[pair] == pytest.approx(angle) for pair, angle in first.items())

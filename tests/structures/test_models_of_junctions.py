@@ -216,3 +216,41 @@ def test_gradients(model):
         change = moved(**{name: value + small}) - moved(**{name: value - small})
         gradient = found[f"gradient_{name}"].values[0]
         assert gradient == pytest.approx(change / (2.0 * small), rel=1e-5)
+
+
+def test_masses_of_panels_are_those_at_creases():
+    """The rule of `n5b8e` depends on which edges are creases: at a junction all are."""
+    made = [MODELS["n5b8e"](star(angles)) for angles in ((0.0, 120.0), (0.0, 120.0, 240.0))]
+    two, three = (np.asarray(one.mass.todense()) for one in made)
+    tips = [2, 3]
+    np.testing.assert_allclose(two[np.ix_(tips, tips)], three[np.ix_(tips, tips)], rtol=1e-9)
+
+
+def test_water_takes_no_junctions():
+    """The flow has a jump for each panel; panels by themselves have theirs."""
+    case = fd.Case(MODELS["plate"](star()), [fd.Fix([0, 1, 2])])
+    water = fd.Air(density=1000.0)
+    with pytest.raises(InputError, match="several jumps; give added_mass"):
+        fd.modes(case.altered(air=water), 2, check_model=False)
+    local = fd.modes(
+        case.altered(air=fd.Air(density=1000.0, added_mass="local")), 2, check_model=False
+    )
+    assert local.frequency.values[1] < frequencies(case.structure, [fd.Fix([0, 1, 2])], 2)[1]
+
+
+def test_strips_at_junctions_are_told():
+    """Their panels bend too stiffly, as those of strips between two panels do."""
+    from foldyn.structures.beyond_range import _strips
+
+    def wall(count):
+        """Long panels, each with a crease in its middle, that meet at an edge."""
+        vertices, faces = [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0)], []
+        for k in range(count):
+            out = np.array([np.cos(2.0 * np.pi * k / 3.0), np.sin(2.0 * np.pi * k / 3.0)])
+            n = len(vertices)
+            vertices += [(x, *(width * out)) for width in (0.4, 0.8) for x in (0.0, 0.1)]
+            faces += [(0, 1, n + 1, n), (n, n + 1, n + 3, n + 2)]
+        return fd.Pattern(vertices, faces)
+
+    assert _strips(wall(2)).all()
+    assert _strips(wall(3)).all()

@@ -1,11 +1,15 @@
 """End stops of creases: kernels, term and support.
 
-A stop pushes back with the moment k L (theta - theta_s) where the dihedral theta between the panels
-is beyond theta_s, and does nothing before. On meshes each piece of a crease has its share.
+A stop pushes back with the moment k L (theta - theta_s) where the angle theta of the crease is
+beyond theta_s, and does nothing before. The angle is that between the ends of the panels, which
+bend: in shells and `n5b8e` the dihedral without the turns of the panels' edges; in `plate`, whose
+panels are springs c in series, stop and crease of stiffness K m'(theta_s) add to one spring, and
+the dihedral passes theta_s + c K m(theta_s). On meshes each piece of a crease has its share.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -18,12 +22,14 @@ from foldyn.cases.decode import Part
 from foldyn.cases.loads import PerCrease, check_angles
 from foldyn.cases.selection import Creases, resolve_creases
 from foldyn.errors import InputError
-from foldyn.jit.compiled import inner_scalar, kernel
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
-from foldyn.mechanics.block_matrix import pairs_within, places_of
+from foldyn.jit.intrinsics import flat
+from foldyn.materials.inelastic_law import memory_of
 from foldyn.mechanics.dihedral import add_hessian, dihedrals_and_gradients, gradient_at
 from foldyn.mechanics.discrete_gradient import discrete_gradient, put_motion
 from foldyn.mechanics.model import ranks
+from foldyn.mechanics.sheet_term import NO_DOF
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
@@ -38,6 +44,7 @@ from foldyn.mechanics.term import (
 from foldyn.structures.discretized import Discretized
 from foldyn.values import choice, number, one_or_each, show
 
+NOISE = 1e-9  # rad: turns beyond a stop below this are rounding
 ALIKE = 1e-9  # rad: turns below this have the moment of their middle
 DIGITS = 6  # of radians, to which a crease rests at its stop
 SIDES = {"below": -1.0, "above": 1.0}
@@ -51,6 +58,9 @@ class Stops(NamedTuple):
     limit: NDArray  # (h,) rad
     side: NDArray  # (h,) 1 if it acts above the limit, -1 below, 0 on both sides
     stiffness: NDArray  # (h,) N m/rad
+    hidden: NDArray  # (h, 2) dofs that turn the crease too, 0 for none
+    turn: NDArray  # (h, 2) turn by these dofs, rad/m, 0 for none
+    still: NDArray  # (h,) angle at rest, rad, if these dofs alone turn it, else nan
 
 
 class _Scratch(NamedTuple):
@@ -72,29 +82,42 @@ class _Context(NamedTuple):
 def _beyond(stops, h, angle):
     """How far (rad) a dihedral is beyond a stop, with the sign of the turn; 0 before it."""
     turn = angle - stops.limit[h]
-    return turn if stops.side[h] * turn >= 0.0 else 0.0
+    return turn if stops.side[h] == 0.0 or stops.side[h] * turn > NOISE else 0.0
 
 
 @inner_scalar
 def _angle(stops, moved, h, points):
-    """Dihedral of a hinge and its gradient (13 numbers)."""
+    """Angle of a hinge, and the dihedral and its gradient (13 numbers)."""
     for v in range(4):
         node = stops.hinges[h, v]
         for c in range(3):
             points[v, c] = stops.rest[node, c] + moved[node, c]
-    return gradient_at(points)
+    found = gradient_at(points)
+    angle = found[0] if math.isnan(stops.still[h]) else stops.still[h]
+    for side in range(2):
+        angle -= stops.turn[h, side] * flat(moved)[stops.hidden[h, side]]
+    return angle, found
+
+
+@inner
+def _push(stops, h, moment, gradient, force):
+    """Add a moment (N m) of hinge h to the forces, given the gradient (12,) of its dihedral."""
+    for side in range(2):
+        flat(force)[stops.hidden[h, side]] -= stops.turn[h, side] * moment
+    if math.isnan(stops.still[h]):
+        for v in range(4):
+            for c in range(3):
+                force[stops.hinges[h, v], c] += moment * gradient[3 * v + c]
 
 
 @forces
 def _forces(own, u, v, t, force, powers):
     stops, moved, out = own.stops, rows_at(u, own.rows), rows_at(force, own.rows)
     for h in range(stops.limit.size):
-        found = _angle(stops, moved, h, own.scratch.points)
-        moment = stops.stiffness[h] * _beyond(stops, h, found[0])
+        angle, found = _angle(stops, moved, h, own.scratch.points)
+        moment = stops.stiffness[h] * _beyond(stops, h, angle)
         if moment != 0.0:
-            for p in range(4):
-                for c in range(3):
-                    out[stops.hinges[h, p], c] += moment * found[1 + 3 * p + c]
+            _push(stops, h, moment, found[1:], out)
 
 
 @energies
@@ -112,7 +135,9 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
     start, end = rows_at(u0, own.rows), rows_at(u1, own.rows)
     room, points = own.scratch, own.scratch.points
     for e in range(stops.limit.size):
-        first, last = _angle(stops, start, e, points)[0], _angle(stops, end, e, points)[0]
+        (first, old), (last, new) = (
+            _angle(stops, start, e, points), _angle(stops, end, e, points)
+        )  # fmt: skip
         one, two = _beyond(stops, e, first), _beyond(stops, e, last)
         if one == 0.0 and two == 0.0:
             continue
@@ -120,31 +145,24 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
         if abs(last - first) > ALIKE:
             moment = 0.5 * (two * two - one * one) / (last - first)
         put_motion(stops.rest, stops.hinges, e, start, end, room.mean, room.change)
-        discrete_gradient(room.mean, room.change, last - first, points, room.plain, room.gradient)
-        for p in range(4):
-            for c in range(3):
-                out[stops.hinges[e, p], c] += stops.stiffness[e] * moment * room.gradient[p, c]
+        discrete_gradient(
+            room.mean, room.change, new[0] - old[0], points, room.plain, room.gradient
+        )
+        _push(stops, e, stops.stiffness[e] * moment, flat(room.gradient), out)
 
 
 @kernel
-def _blocks(stops, x, angle, gradient):
-    """Derivatives (h, 4, 3, 4, 3) of the forces at positions x (n, 3)."""
+def _curvatures(stops, x, gradient, moment):
+    """Moments times second derivatives (h, 4, 3, 4, 3) of dihedrals at positions x (n, 3)."""
     out, points = np.zeros((stops.limit.size, 4, 3, 4, 3)), np.empty((4, 3))
     slope = np.empty((4, 3))
     for h in range(stops.limit.size):
-        beyond = _beyond(stops, h, angle[h])
-        if beyond == 0.0 and stops.side[h] != 0.0:
-            continue
-        for v in range(4):
-            for c in range(3):
-                points[v, c] = x[stops.hinges[h, v], c]
-                slope[v, c] = gradient[h, 3 * v + c]
-        for v in range(4):
-            for c in range(3):
-                for w in range(4):
-                    for d in range(3):
-                        out[h, v, c, w, d] = stops.stiffness[h] * slope[v, c] * slope[w, d]
-        add_hessian(points, slope, stops.stiffness[h] * beyond, out[h])
+        if moment[h] != 0.0:
+            for v in range(4):
+                for c in range(3):
+                    points[v, c] = x[stops.hinges[h, v], c]
+                    slope[v, c] = gradient[h, 3 * v + c]
+            add_hessian(points, slope, moment[h], out[h])
     return out
 
 
@@ -154,34 +172,47 @@ class StopsTerm(Term):
     energy_groups: ClassVar[Mapping[str, str]] = {"strain_stops": "strain energy of end stops"}
     undifferentiated: ClassVar[str] = "end stops"
 
-    def __init__(self, stops: Stops) -> None:
-        self.stops = stops
+    def __init__(self, stops: Stops, rows: int) -> None:
+        self.stops, self.rows = stops, rows
 
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """See `Term`."""
         scratch = _Scratch(*(np.zeros((4, 3)) for _ in _Scratch._fields))
-        own = Context(_Context(self.stops, scratch, group, int(part.own[1])))
+        own = Context(_Context(self.stops, scratch, group, self.rows))
         return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     @property
     def places(self) -> tuple[NDArray, NDArray]:
         """See `Term`."""
-        return places_of(pairs_within(self.stops.hinges))
+        nodes = 3 * self.stops.hinges[:, :, None] + np.arange(3)
+        dofs = np.hstack([nodes.reshape(-1, 12), self.stops.hidden])
+        return np.repeat(dofs, 14, axis=1).ravel(), np.tile(dofs, (1, 14)).ravel()
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
         """See `Term`."""
-        x, hinges = self._at(q)
-        blocks = _blocks(self.stops, x, *dihedrals_and_gradients(x, hinges))
-        return blocks.transpose(0, 1, 3, 2, 4).ravel()
+        stops, (angle, gradient, x) = self.stops, self._angles(q)
+        beyond = angle - stops.limit
+        acts = (stops.side == 0.0) | (stops.side * beyond > NOISE)
+        moved = np.isnan(stops.still)[:, None] * gradient
+        rates = np.hstack([moved, -stops.turn])
+        stiffness = acts * stops.stiffness
+        out = np.einsum("h,ha,hb->hab", stiffness, rates, rates)
+        moment = np.where(np.isnan(stops.still), stiffness * beyond, 0.0)
+        out[:, :12, :12] += _curvatures(stops, x, gradient, moment).reshape(-1, 12, 12)
+        return out.ravel()
 
-    def _at(self, q: NDArray) -> tuple[NDArray, NDArray]:
-        rest = self.stops.rest
-        return np.ascontiguousarray(rest + nodal(q)[: len(rest)]), self.stops.hinges
+    def _angles(self, q: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Angles (h,), gradients (h, 12) of the dihedrals, and positions of the nodes."""
+        stops, flat_q = self.stops, np.ravel(q)
+        x = np.ascontiguousarray(stops.rest + nodal(q)[: len(stops.rest)])
+        dihedral, gradient = dihedrals_and_gradients(x, stops.hinges)
+        angle = np.where(np.isnan(stops.still), dihedral, stops.still)
+        return angle - (stops.turn * flat_q[stops.hidden]).sum(axis=1), gradient, x
 
     def nominal(self, q: NDArray) -> StopsTerm:
         """The stops as springs that always act; see `Term`."""
-        angle = dihedrals_and_gradients(*self._at(q))[0]
-        return StopsTerm(self.stops._replace(limit=angle, side=np.zeros(len(angle))))
+        angle = self._angles(q)[0]
+        return StopsTerm(self.stops._replace(limit=angle, side=np.zeros(len(angle))), self.rows)
 
     def turning_moments(self) -> float:
         """See `Term`."""
@@ -191,15 +222,23 @@ class StopsTerm(Term):
         """See `Term`."""
         own = self.stops
         rest = np.ascontiguousarray(own.rest[order])
-        return StopsTerm(own._replace(rest=rest, hinges=ranks(order)[own.hinges]))
+        return StopsTerm(own._replace(rest=rest, hinges=ranks(order)[own.hinges]), self.rows)
+
+
+def _open_angles(name: str, value: Any) -> Any:
+    """Angles (degrees) that a crease can pass, one or one for each."""
+    checked = check_angles(name, value)
+    if np.isin(checked, (0.0, 360.0)).any():
+        raise InputError(f" = {show(value)}: panels cannot pass 0 or 360 degrees", name)
+    return checked
 
 
 @dataclass(frozen=True)
 class Stop(Part):
     """An end stop of creases: beyond an angle, it pushes the panels back.
 
-    The moment is k L (theta - angle) with theta the dihedral between the panels and L the length of
-    the crease at rest, and 0 before the stop.
+    The moment is k L (theta - angle) with theta the dihedral between the panels' ends and L the
+    length of the crease at rest, and 0 before the stop.
 
     Parameters
     ----------
@@ -207,8 +246,8 @@ class Stop(Part):
         Numbers in the order of `pattern.creases`, or a name: "mountain", "valley", "all" (all
         except flat creases), or a family of the pattern, such as "zigzag".
     angle : float or sequence of float
-        Dihedral at which it begins to act (degrees, 0 to 360, flat 180): one for all creases, or
-        one for each.
+        Angle at which it begins to act (degrees, between 0 and 360, flat 180): one for all
+        creases, or one for each.
     stiffness : float
         k per length of the crease (N m/rad per m), above 0.
     side : {"below", "above"}, optional
@@ -217,7 +256,7 @@ class Stop(Part):
     """
 
     creases: Creases
-    angle: Annotated[PerCrease, Check(check_angles, unit="degrees"), Key("stop")]
+    angle: Annotated[PerCrease, Check(_open_angles, unit="degrees"), Key("stop")]
     stiffness: Annotated[
         float, Check(number, above=0.0, unit="N m/rad per m"), Key("stop_stiffness")
     ]
@@ -237,7 +276,12 @@ class Stop(Part):
         found = [one._on(structure, folds, place) for place, one in parts]
         row, limit, side, stiffness = (np.concatenate(each) for each in zip(*found, strict=True))
         rest = np.ascontiguousarray(structure.nodes, float)
-        return StopsTerm(Stops(rest, folds.nodes[row], limit, side, stiffness))
+        hidden = np.where(folds.hidden == NO_DOF, 0, folds.hidden)[row]
+        corners = np.arange(4 * len(row)).reshape(-1, 4)
+        still, _ = dihedrals_and_gradients(folds.corners[row].reshape(-1, 3), corners)
+        still = np.where(folds.alone[row], still, np.nan)
+        arrays = limit, side, stiffness, hidden, folds.hidden_turn[row], still
+        return StopsTerm(Stops(rest, folds.nodes[row], *arrays), structure.body.sheet.rows)
 
     def _on(self, structure: Discretized, folds: Any, place: str) -> tuple[NDArray, ...]:
         """Hinges (h,), their limits and sides, and their stiffness, N m/rad."""
@@ -263,5 +307,11 @@ class Stop(Part):
                 "angle"
             )
         row = np.flatnonzero(np.isin(folds.fold, creases))
-        fold, length = folds.fold[row], folds.length[row]
-        return row, angles[fold], side[fold], self.stiffness * length
+        fold, soft = folds.fold[row], folds.softness[row]
+        crease = folds.stiffness[row] / (1.0 - soft * folds.stiffness[row])  # without its panels
+        memory = memory_of(structure.fold_law)
+        law, at = structure.fold_law if memory is None else memory.elastic, angles[fold]
+        slope = crease * law.slope(at, folds.rest[row])
+        own = self.stiffness * folds.length[row]
+        own = own / ((1.0 + soft * slope) * (1.0 + soft * (slope + own)))
+        return row, at + soft * crease * law.moment(at, folds.rest[row]), side[fold], own

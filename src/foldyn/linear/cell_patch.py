@@ -240,6 +240,7 @@ def _per_crease(
         return given
     seams, families = lattice.seams(), lattice.families()
     if isinstance(given, Mapping):
+        lattice.refuse_letters(given, name)
         words = [word for word in given if word not in ASSIGNED]
         named = set().union(*(families[word] for word in words))
         lost = [pair for pair in seams if lattice.edge(*pair).kind not in named]
@@ -536,6 +537,7 @@ class Repeated:
         """The part for all copies of its creases; named as before if the patch has the name."""
         creases, pattern = part.creases, self.structure.pattern
         if isinstance(creases, str) and (creases in ASSIGNED or creases in pattern.families):
+            self.lattice.refuse_letters([creases], f"{field}.creases")
             return part
         rows = resolve_creases(self.case.structure, creases, f"{field}.creases")
         lattice = self.lattice

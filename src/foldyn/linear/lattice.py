@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError, quietly
 from foldyn.linear.unit_cell import Step, UnitCell, Vertex, minus
 from foldyn.patterns import Pattern
+from foldyn.patterns.crease_data import ASSIGNED
 from foldyn.patterns.topology import around, edge_of
 
 RINGS = 2  # rings of panels around the panels at the nodes of the cell
@@ -110,6 +111,17 @@ class Lattice:
             pairs = np.concatenate([own.creases[rows], rim])
             found[name] = set(kinds_of(pairs, self.vertices))
         return found
+
+    def refuse_letters(self, words: Iterable[str], field: str) -> None:
+        """Refuse letters if creases of the cell are junctions of it, whose letters are others."""
+        letters = sorted({*words} & (ASSIGNED.keys() - {"all"}))
+        own = kinds_of(self.pattern.creases, self.vertices)
+        if letters and any(len(self.beside[kind]) > 2 for kind in own):
+            raise InputError(
+                f": {', '.join(letters)}: creases at which more than two panels meet have no "
+                "letters of their own; name families, or all",
+                field,
+            )
 
     # ------------------------------------------------------------------ a patch
     def around_cell(self) -> list[Panel]:

@@ -193,6 +193,8 @@ class Pattern(Transforms):
         _warn_of_seams(seams(points, topology.faces, normals, topology.boundary), open_edges)
         letters = tuple(np.where(given == "", _letters(apart), given).tolist())
         words = crease_data.Named(letters, named)
+        folded = crease_data.fold_angles(fold_angles, topology.creases, words)
+        folded[at_junctions(topology.creases)] = np.nan  # `fold` takes single sheets
         values: dict[str, Any] = {
             **topology._asdict(),
             **geometry._asdict(),
@@ -201,7 +203,7 @@ class Pattern(Transforms):
             "unlettered": given == "",
             "name": name,
             "boards": boards,
-            "fold_angles": crease_data.fold_angles(fold_angles, topology.creases, words),
+            "fold_angles": folded,
             "families": named,
             "custom": dict(custom or {}),
             "rim_families": crease_data.families(

@@ -18,7 +18,8 @@ from foldyn.values import listed
 
 Faces = tuple[tuple[int, ...], ...]
 Edge = tuple[int, int]
-SAME_ANGLE = 1e-6  # rad: panels at a junction within this angle coincide
+SAME_DIRECTION = 1e-6  # rad: panels this little behind the first come before it
+SAME_ANGLE = 1e-11  # rad: panels within this angle coincide, but for rounding
 
 
 class Topology(NamedTuple):
@@ -213,7 +214,7 @@ def _ring(
     inward = np.where(forward, 1.0, -1.0)[:, None] * np.cross(normals, axis)
     sine, cosine = np.cross(inward[0], inward) @ axis, inward @ inward[0]
     angle = np.arctan2(sine, cosine) % (2.0 * np.pi)
-    angle[angle > 2.0 * np.pi - SAME_ANGLE] = 0.0
+    angle[angle > 2.0 * np.pi - SAME_DIRECTION] -= 2.0 * np.pi
     return np.lexsort((np.arange(len(faces)), (angle / SAME_ANGLE).round()))
 
 

@@ -17,7 +17,7 @@ from foldyn.patterns.generators.arguments import check_size
 from foldyn.patterns.screw import direction
 from foldyn.patterns.tiling import glue, half_edges
 from foldyn.patterns.tiling import periods as periods_of
-from foldyn.patterns.topology import around, at_junctions, edge_lookup, edge_of
+from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.values import flag, number, numbers, show, vector, whole
 
 FLAT = 1e-6  # rad: a crease between copies within this angle from pi gets no letter
@@ -318,12 +318,14 @@ def _joined(
         for name, rows in sheet.families.items():
             families.setdefault(name, []).extend(pairs[k] for k in rows.tolist())
     custom.pop(FACE_ORDERS, None)
-    known = edge_lookup(bare.creases[~at_junctions(bare.creases)])
+    known = edge_lookup(bare.creases)  # others are welds of one of the sheets
     return (
         bare.changed(
-            assignments=letters,
+            assignments={pair: letter for pair, letter in letters.items() if pair in known},
             fold_angles={pair: angle for pair, angle in angles.items() if pair in known},
-            families=families,
+            families={
+                name: [pair for pair in pairs if pair in known] for name, pairs in families.items()
+            },
             custom=custom,
         ),
         glued.joined,

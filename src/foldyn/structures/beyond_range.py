@@ -144,11 +144,15 @@ def _relative_stiffness(pattern: Pattern, sheet: Sheet, folds: NDArray) -> NDArr
 
 def _strips(pattern: Pattern) -> NDArray[np.bool_]:
     """Mask (nf,) of creases that meet no others, at non-square panels with two or more creases."""
-    count = np.bincount(pattern.creases.ravel(), minlength=len(pattern.vertices))
+    lines = Lines.of(pattern.creases)
+    once = pattern.creases[lines.first]
+    count = np.bincount(once.ravel(), minlength=len(pattern.vertices))
     alone = (count[pattern.creases] == 1).all(axis=1)
     length = lengths(pattern.vertices, pattern.creases)
     aspect = pattern.face_areas[pattern.crease_faces].max(axis=1) / length**2
-    between = (np.bincount(pattern.crease_faces.ravel())[pattern.crease_faces] > 1).any(axis=1)
+    sides = np.stack([pattern.crease_faces.ravel(), np.repeat(lines.number, 2)], axis=1)
+    creased = np.bincount(np.unique(sides, axis=0)[:, 0], minlength=len(pattern.faces))
+    between = (creased[pattern.crease_faces] > 1).any(axis=1)
     return alone & between & ((aspect > SQUARE) | (aspect < 1.0 / SQUARE))
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.errors import InputError
-from foldyn.patterns.pattern import Pattern
+from foldyn.patterns.pattern import Pattern, refuse_junctions
 from foldyn.patterns.topology import edge_lookup, edge_of
 from foldyn.structures.discretized import Discretized
 
@@ -84,7 +84,7 @@ def boundary_elements(
     ------
     InputError
         A structure without a pattern or with thick panels, a panel that is not convex, a sheet
-        without an open edge.
+        without an open edge, or with edges of more than two panels.
     """
     pattern = structure.pattern
     if pattern is None or pattern.boards is not None:
@@ -94,6 +94,10 @@ def boundary_elements(
             ": the sheet encloses a volume, from which the fluid cannot escape; open a panel, or "
             'give added_mass = "local"',
             "air",
+        )
+    if not alone:
+        refuse_junctions(
+            pattern, 'where the flow has several jumps; give added_mass = "local"', "air"
         )
     _check_convex(pattern)
     corners = _alone(_corners(pattern)) if alone else _corners(pattern)

@@ -231,7 +231,7 @@ def condensed_panels(surface: Surface) -> dict[int, NDArray]:
     Rows are the corners, then the center. Triangles with a clamped edge are included.
     """
     edges = [edge_of(a, b) for face in surface.faces for a, b in around(face)]
-    creases = {edge for edge, count in Counter(edges).items() if count == 2} - set(surface.welds)
+    creases = {edge for edge, count in Counter(edges).items() if count > 1} - set(surface.welds)
     found, total, level = {}, surface.panel_mass, set(surface.clamped)
     for p, face in enumerate(surface.faces):
         edges = [edge_of(a, b) for a, b in around(face)]
