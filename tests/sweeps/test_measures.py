@@ -20,7 +20,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 TEXTS = {"modes": MODES, "frf": FRF, "dynamics": MOTION, "statics": PATH, "bands": BANDS}
 GIVEN = {
     "node": "8", "axis": "z", "mode": "1", "model": "own", "frequency": "0.3", "time": "0.01",
-    "band": "1", "point": "X", "leg": "X-M",
+    "band": "1", "point": "X", "leg": "X-M", "panel": "0", "crease": "0",
 }  # fmt: skip
 
 
@@ -48,7 +48,7 @@ EVERY = [(one, kind) for one in MEASURES.values() for kind in one.kinds if kind 
 @pytest.mark.matrix
 @pytest.mark.parametrize(("one", "kind"), EVERY, ids=lambda one: getattr(one, "name", one))
 def test_every_measure_can_be_taken_of_all_its_kinds(results, one, kind):
-    given = GIVEN if kind != "statics" else {"node": "0", "axis": "x", "displacement": "0"}
+    given = GIVEN if kind != "statics" else {**GIVEN, "node": "0", "axis": "x", "displacement": "0"}
     words = [given[what] for what in one.takes]
     value = take(results, kind, f"{one.name}[{','.join(words)}]" if words else one.name)
     assert value.ndim == len(one.dims)

@@ -308,6 +308,8 @@ def check_settled(seed: int, model: str) -> None:
             case = case.altered(air=fd.Air(density=5.0, added_mass=False))
         case = grown(case, "loads", LOADS, 3, scene, lambda _: True)
         path = fd.trace(case, load_factors=[0.5, 1.0])
+        if not path.displacement.values.any():
+            raise InputError("all loads act on what is held")
         slowest = float(fd.modes(case, 1, state=fd.initial_state(path)).eigenvalue[0]) ** 0.5
         if not slowest > 1e-2 / scene.time:
             raise InputError("a mechanism, or unstable")
