@@ -38,7 +38,7 @@ from foldyn.condensation.term import Parts, matrix
 from foldyn.mechanics.block_matrix import of_elements
 from foldyn.mechanics.sheet_term import CreaseTurns
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import edge_lookup
+from foldyn.patterns.topology import Lines, edge_lookup
 from foldyn.structures.discretized import Distributed
 from foldyn.structures.graded import Grading
 
@@ -429,7 +429,7 @@ class Whole:
         bends, turned = self._panels(rigid)
         straight = {int(self.sides.edge[side]): np.eye(3) for side in np.flatnonzero(turned >= 0)}
         self._add_bows(columns, {**held, **straight})
-        welds = own.edges - len(np.unique(self.pattern.welds, axis=0))  # the first of them
+        welds = own.edges - len(Lines.of(self.pattern.welds).first)  # the first of them
         number, edge = np.arange(level.turns), self.sides.edge
         loose = np.flatnonzero(bends & ~np.isin(edge, clamped) & (edge < welds))
         columns.add(own.turn(loose[:, None], number).reshape(-1, 1))

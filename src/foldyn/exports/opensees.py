@@ -44,8 +44,8 @@ def model(shell: CreasedShell, tie: float = TIE) -> Iterator[Command]:
         zip(shell.triangles.tolist(), shell.kind, strict=True), 1
     ):
         own = [node + 1 for node in nodes]
-        along = shell.axes[number - 1, 0].tolist() if shell.sheets[kind].orthotropic else []
-        axes = ("-local", *along) if along else ()
+        turned = shell.sheets[kind].orthotropic
+        axes = ("-local", *shell.axes[number - 1, 0].tolist()) if turned else ()
         yield "element", "ASDShellT3", number, *own, int(kind) + 1, "-corotational", *axes
     yield "uniaxialMaterial", "Elastic", TIE_MATERIAL, tie * shell.membrane
     yield from _springs(shell)

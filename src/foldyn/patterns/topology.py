@@ -283,7 +283,7 @@ def edge_lookup(edges: NDArray) -> dict[Edge, int]:
 
 
 class Lines(NamedTuple):
-    """The distinct pairs among sorted vertex pairs, which repeat at junctions."""
+    """The distinct pairs among vertex pairs, which repeat side by side at junctions."""
 
     first: NDArray[np.int64]  # (n,) first row of each
     number: NDArray[np.int64]  # (k,) of each row
@@ -291,17 +291,21 @@ class Lines(NamedTuple):
 
     @classmethod
     def of(cls, pairs: NDArray) -> Lines:
-        """Lines of sorted pairs (k, 2)."""
+        """Lines of pairs (k, 2)."""
         rows = np.reshape(pairs, (-1, 2))
         new = np.append(True, (rows[1:] != rows[:-1]).any(axis=1))[: len(rows)]
         first = np.flatnonzero(new)
         return cls(first, np.cumsum(new) - 1, np.diff(np.append(first, len(rows))) == 1)
 
+    def letters(self, assignments: Sequence[str]) -> NDArray[np.str_]:
+        """Letter of each line (n,), given those of creases (k,): "U" at junctions."""
+        return np.where(self.single, np.array(assignments, dtype="U1")[self.first], "U")
+
 
 def at_junctions(pairs: NDArray) -> NDArray[np.bool_]:
-    """Mask (k,) of the vertex pairs (k, 2) that occur more than once."""
-    number = np.unique(pairs, axis=0, return_inverse=True)[1].ravel()
-    return np.bincount(number, minlength=1)[number] > 1
+    """Mask (k,) of the vertex pairs (k, 2) that occur more than once, side by side."""
+    lines = Lines.of(pairs)
+    return ~lines.single[lines.number]
 
 
 def edge_rows(edges: NDArray) -> dict[Edge, list[int]]:

@@ -155,8 +155,7 @@ class Sheet3D:
     def creases(self) -> dict[str, Indices]:
         """Creases (k, p), grouped by their assignment; junctions have none."""
         creases, lines = self.edges[: len(self.lines.first)], self.lines
-        kinds = np.array(self.pattern.assignments, dtype="U1")[lines.first]
-        kinds = np.where(lines.single, kinds, "U")
+        kinds = lines.letters(self.pattern.assignments)
         return {kind: creases[kinds == kind] for kind in style.CREASES if (kinds == kind).any()}
 
     @cached_property

@@ -34,7 +34,15 @@ from foldyn.algebra.superlu import SingularTangentError
 from foldyn.materials import BarLaw, HingeLaw, LinearBar, LinearHinge
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import Edge, around, at_junctions, edge_lookup, edge_of, edge_rows
+from foldyn.patterns.topology import (
+    Edge,
+    Lines,
+    around,
+    at_junctions,
+    edge_lookup,
+    edge_of,
+    edge_rows,
+)
 from foldyn.structures.clamps import clamp_points
 from foldyn.structures.condensed_panel import panel_moments, panel_stiffness
 from foldyn.structures.mesh import Mesh, hinge_angles, lengths, too_narrow
@@ -243,8 +251,8 @@ def straight_creases(nodes: NDArray, hinges: NDArray, pattern: Pattern, sheet: S
     thickness = sheet.values("thickness", len(pattern.faces))[faces].max(axis=1)
     slender = thickness / lengths(pattern.vertices, edges)
     straight = np.abs(np.sin(hinge_angles(nodes, hinges))) > STRAIGHT * slender
-    _, edge = np.unique(edges, axis=0, return_inverse=True)  # junctions are several creases
-    return np.bincount(edge.ravel(), straight, minlength=1)[edge.ravel()] > 0.0
+    line = Lines.of(edges).number  # junctions are several creases
+    return np.bincount(line, straight)[line] > 0.0
 
 
 def plates_model(

@@ -64,8 +64,7 @@ def edge_pieces(
     Welds are left out. Junctions count as unassigned, and as the first of their creases.
     """
     lines, count = Lines.of(pattern.creases), len(pattern.boundary)
-    letters = np.where(lines.single, np.array(pattern.assignments, "U1")[lines.first], "U")
-    letters = [*letters.tolist(), *"B" * count]
+    letters = [*lines.letters(pattern.assignments).tolist(), *"B" * count]
     crease = np.append(lines.first, len(pattern.creases) + np.arange(count))
     rows = np.asarray(edge_nodes)[: len(letters)]
     pairs = np.stack([rows[:, :-1], rows[:, 1:]], axis=2)
