@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.options import add_reading, add_switches, flag, integer, number, reading_of
+from foldyn.cli.options import add, add_reading, add_switches, flag, integer, number, reading
 from foldyn.cli.streams import speech
 from foldyn.errors import InputError
 from foldyn.studies import find_case, shipped_cases
@@ -43,18 +43,24 @@ def add_convert(commands: Any) -> None:
         "number or title of the frame, or number of the sample",
         "factor on all lengths, or displacements of a result",
     )
-    command.add_argument("--format", help="format of a result, where the ending does not name it")
-    command.add_argument("--every", type=integer, help="of a result, take every such sample")
-    command.add_argument("--frames", type=integer, help="of a result, take so many samples, evenly")
-    command.add_argument("--seconds", type=number, help="how long an animation (.glb) takes")
-    command.add_argument("--rows", help="of tables, what a row is for: time,node (default), time")
-    command.add_argument("--fields", help="of a result, these variables: displacement,velocity")
-    command.add_argument("--nodes", help="of a result, these nodes: 0,7,12, or a selection: xmax")
-    command.add_argument(
-        "--divisions", type=integer, help="of input decks, pieces of every edge (16)"
-    )
-    command.add_argument("--modes", type=integer, help="of input decks, how many frequencies (6)")
-    command.add_argument("--element", help="of Abaqus, kind of the triangles: STRI3 (default), S3")
+    ending = "format of a result, where the ending does not name it"
+    add(command, str, {"--format": ending})
+    add(command, integer, {
+        "--every": "of a result, take every such sample",
+        "--frames": "of a result, take so many samples, evenly",
+    })  # fmt: skip
+    add(command, number, {"--seconds": "how long an animation (.glb) takes"})
+    add(command, str, {
+        "--rows": "of tables, what a row is for: time,node (default), time",
+        "--fields": "of a result, these variables: displacement,velocity",
+        "--nodes": "of a result, these nodes: 0,7,12, or a selection: xmax",
+    })  # fmt: skip
+    add(command, integer, {
+        "--divisions": "of input decks, pieces of every edge (16)",
+        "--modes": "of input decks, how many frequencies (6)",
+    })  # fmt: skip
+    kinds = "of Abaqus, kind of the triangles: STRI3 (default), S3"
+    add(command, str, {"--element": kinds})
     add_switches(command, figures=False)
 
 
@@ -93,14 +99,15 @@ def _export(given: argparse.Namespace, what: Path | Case) -> None:
             raise InputError(
                 ": only for pattern files; leave it out", f"--{name.replace('_', '-')}"
             )
-    if given.frame is not None and not (given.frame.isascii() and given.frame.isdecimal()):
+    if isinstance(given.frame, str):
         raise InputError(f" = {given.frame}: give the number of a sample, from 0", "--frame")
-    options = {name: getattr(given, name) for name in (*RESULTS_ONLY, *DECKS_ONLY, "scale")}
-    frame = None if given.frame is None else int(given.frame)
+    options = {
+        name: getattr(given, name) for name in (*RESULTS_ONLY, *DECKS_ONLY, "scale", "frame")
+    }
     try:
-        files = export(what, given.out, frame=frame, **options)
+        files = export(what, given.out, **options)
     except InputError as error:
-        raise error.within("--" if error.key in (*options, "frame") else "") from None
+        raise error.within("--" if error.key in options else "") from None
     speech(given.quiet)(f"wrote {_listed(files)}")
 
 
@@ -122,11 +129,11 @@ def _convert_pattern(given: argparse.Namespace, source: Path) -> None:
             if getattr(given, name) is not None:
                 raise InputError(f": only for {kind}; leave it out", f"--{name}")
     if given.check:
-        pattern, diagnosis = diagnose(source, facets="line", **reading_of(given))
+        pattern, diagnosis = diagnose(source, facets="line", **reading(given))
         print(f"{source}: {pattern!r}")
         print(diagnosis)
     else:
-        pattern = read_pattern(source, facets="line", **reading_of(given))
+        pattern = read_pattern(source, facets="line", **reading(given))
     if given.out is not None:
         write_pattern(pattern, given.out)
         speech(given.quiet)(

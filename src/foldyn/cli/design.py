@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import Owner, Results, drawing, held
-from foldyn.cli.options import add_figures, add_results, integer
+from foldyn.cli.options import add, add_figures, add_results, integer
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.plots import FIGURES
 
@@ -36,14 +36,12 @@ def add_design(commands: Any) -> None:
         "an interrupted search can be resumed. The history, the case file with the best values, "
         "figures and report.html go to a folder.",
     )
-    design.add_argument("case", help="case file (TOML) with a table [design]")
-    design.add_argument(
-        "--method", metavar="slsqp|trust-constr|mma|cma", help="method (default: that of the file)"
-    )
-    design.add_argument(
-        "--searches", type=integer, metavar="N", help="from designs drawn within the bounds"
-    )
-    design.add_argument("--seed", type=integer, help="of the drawn designs (default: 0)")
+    method = {"--method slsqp|trust-constr|mma|cma": "method (default: that of the file)"}
+    add(design, str, {"case": "case file (TOML) with a table [design]", **method})
+    add(design, integer, {
+        "--searches N": "from designs drawn within the bounds",
+        "--seed": "of the drawn designs (default: 0)",
+    })  # fmt: skip
     add_results(design, "NAME-design")
     add_figures(design)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import Owner, Results, drawing, held
-from foldyn.cli.options import add_figures, add_results, halves, integer, number
+from foldyn.cli.options import add, add_figures, add_results, halves, integer, number
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import InputError
 from foldyn.plots import FIGURES
@@ -39,38 +39,23 @@ def add_fit(commands: Any) -> None:
         "values found, figures and report.html go to a folder; so does every evaluation of the "
         "model, so that an interrupted fit can be resumed.",
     )
-    fit.add_argument("file", help="fit file, or case file (TOML) or the name of a shipped case")
-    fit.add_argument(
-        "data",
-        nargs="*",
-        help="with a case file: measurements (CSV, tracks of a film, or a result of kind modes)",
-    )
-    fit.add_argument(
-        "--vary",
-        action="append",
-        default=[],
-        metavar="KEY[=START[:LOWER:UPPER]]",
-        help="with a case file: a key that is a parameter, such as sheet.thickness=2e-4:1e-4:4e-4",
-    )
-    fit.add_argument(
-        "--tie",
-        action="append",
-        default=[],
-        metavar="KEY=EXPRESSION",
-        help="with a case file: a key that depends on parameters",
-    )
-    fit.add_argument(
-        "--sigma",
-        action="append",
-        type=number,
-        default=[],
-        help="with a case file: standard error (SI units) of the data, for each of them once",
-    )
+    named = "fit file, or case file (TOML) or the name of a shipped case"
+    data = "with a case file: measurements (CSV, tracks of a film, or a result of kind modes)"
+    add(fit, str, {"file": named})
+    add(fit, str, {"data": data}, nargs="*")
+    many: dict[str, Any] = {"action": "append", "default": []}
+    add(fit, str, {
+        "--vary KEY[=START[:LOWER:UPPER]]": "with a case file: a key that is a parameter, such as "
+        "sheet.thickness=2e-4:1e-4:4e-4",
+        "--tie KEY=EXPRESSION": "with a case file: a key that depends on parameters",
+    }, **many)  # fmt: skip
+    error = "with a case file: standard error (SI units) of the data, for each of them once"
+    add(fit, number, {"--sigma": error}, **many)
     fit.add_argument("--axis", default="x", help="with a case file: axis of the data (default: x)")
-    fit.add_argument(
-        "--searches", type=integer, help="how many, from random guesses within the bounds"
-    )
-    fit.add_argument("--processes", type=integer, help="evaluations that run at a time")
+    add(fit, integer, {
+        "--searches": "how many, from random guesses within the bounds",
+        "--processes": "evaluations that run at a time",
+    })  # fmt: skip
     add_results(fit, "NAME-fit")
     add_figures(fit)
 

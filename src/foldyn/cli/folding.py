@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.convert import RESULT
 from foldyn.cli.folder import check_folder, drawing
-from foldyn.cli.options import add_film, add_reading, add_switches, frame_of, integer, reading_of
+from foldyn.cli.options import add, add_film, add_reading, add_switches, frame_of, integer, reading
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import InputError, MotionInterrupted, within
@@ -35,39 +35,27 @@ def add_fold(commands: Any) -> None:
         "as frames; a page in the same folder shows them.",
     )
     command.add_argument("pattern", metavar="PATTERN", help="pattern file: FOLD, SVG, CP, ...")
-    aim = command.add_mutually_exclusive_group()
-    aim.add_argument(
-        "--to",
-        metavar="80%",
-        help="how far, of the fold angles of the file and of 180 degrees where it has none",
+    aim: Any = command.add_mutually_exclusive_group()
+    add(aim, str, {
+        "--to 80%": "how far, of the fold angles of the file and of 180 degrees where it has none",
+        "--angles FILE": 'angles (degrees), one a line: "mountain 90", "zigzag 60" (a family), '
+        '"3 4 -120" (the crease between two vertices, valleys positive)',
+    })  # fmt: skip
+    frame = "number or title of the frame to fold to, of the file"
+    add(aim, frame_of, {"--to-frame FRAME": frame})
+    add(command, integer, {"--steps": "states on the way (20)"}, default=20)
+    starts = (
+        "pattern, folded (open from the folded state), or auto (default): folded where the pattern "
+        "does not fold its way"
     )
-    aim.add_argument(
-        "--angles",
-        metavar="FILE",
-        help='angles (degrees), one a line: "mountain 90", "zigzag 60" (a family), "3 4 -120" (the '
-        "crease between two vertices, valleys positive)",
-    )
-    aim.add_argument(
-        "--to-frame", metavar="FRAME", help="number or title of the frame to fold to, of the file"
-    )
-    command.add_argument("--steps", type=integer, default=20, help="states on the way (20)")
-    command.add_argument(
-        "--initial",
-        default="auto",
-        help="pattern, folded (open from the folded state), or auto (default): folded where the "
-        "pattern does not fold its way",
-    )
-    command.add_argument(
-        "--panels",
-        default="whole",
-        help="subdivided: cut from their middles, so that they bend as paper does (default: whole)",
-    )
+    cut = "subdivided: cut from their middles, so that they bend as paper does (default: whole)"
+    add(command, str, {"--initial": starts}, default="auto")
+    add(command, str, {"--panels": cut}, default="whole")
     add_reading(command, "number or title of the frame to begin with")
-    command.add_argument(
-        "--out",
-        help="file to write (default: NAME-folded.fold): the folded pattern, or as a result (.nc) "
-        "the states on the way",
-    )
+    add(command, str, {
+        "--out": "file to write (default: NAME-folded.fold): the folded pattern, or as a result "
+        "(.nc) the states on the way",
+    })  # fmt: skip
     add_film(command)
     add_switches(command)
 
@@ -81,7 +69,7 @@ def run_fold(given: Namespace) -> Path:
     clock = Clock.now()
     source = Path(given.pattern)
     with noted_warnings() as noted:
-        pattern = read_pattern(source, **reading_of(given))
+        pattern = read_pattern(source, **reading(given))
         out = Path(f"{source.stem}-folded.fold" if given.out is None else given.out)
         write = _writer(out)
         check_folder(out.parent, given.out, [out.name])
@@ -122,8 +110,7 @@ def _folded(pattern: Pattern, source: Path, given: Namespace) -> Folding:
         angles = read_angles(given.angles)
     elif given.to_frame is not None:
         angles = read_pattern(
-            source,
-            **{**reading_of(given), "frame": frame_of(given.to_frame), "flat_foldable": False},
+            source, **{**reading(given), "frame": given.to_frame, "flat_foldable": False}
         )
     with progress_bar(given.quiet, total=given.steps, unit="step") as bar:
 

@@ -16,7 +16,7 @@ import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from foldyn import __version__
 from foldyn.cli.convert import add_convert, convert
@@ -24,7 +24,7 @@ from foldyn.cli.design import add_design, run_design
 from foldyn.cli.fit import add_fit, run_fit
 from foldyn.cli.folder import reason
 from foldyn.cli.folding import add_fold, run_fold
-from foldyn.cli.options import add_figures, add_film, add_results, flag, integer, number
+from foldyn.cli.options import add, add_figures, add_film, add_results, flag, integer, number
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Outlet, noticed, steady_streams
 from foldyn.cli.study import add_study, study
@@ -63,135 +63,95 @@ def parser() -> argparse.ArgumentParser:
         help="run a case file",
         description="Run a case file: figures, report.html and result.nc go to a folder.",
     )
-    _add_common(run, "results")
+    _add_common(run, "results", film=True)
     flag(run, "--resume", "continue an interrupted motion from its last checkpoint")
-    run.add_argument(
-        "--checkpoint",
-        type=number,
-        metavar="SECONDS",
-        help="of a motion: computing time between checkpoints (default: 60)",
-    )
-    run.add_argument(
-        "--device", choices=("cpu", "gpu"), help="of a motion: where its steps are computed"
-    )
+    waits = "of a motion: computing time between checkpoints (default: 60)"
+    add(run, number, {"--checkpoint SECONDS": waits})
+    places = {"--device": "of a motion: where its steps are computed"}
+    add(run, str, places, choices=("cpu", "gpu"))
 
-    modes = commands.add_parser(
-        "modes",
-        help="natural frequencies and mode shapes of a case file of any kind",
-        description="Natural frequencies and mode shapes of the structure of a case file of any "
-        "kind; what its [analysis] says, if it is of kind modes, holds unless given here.",
-    )
-    _add_common(modes, "modes")
-    modes.add_argument("--count", type=integer, help="how many modes (default: 6)")
+    modes = _add_kind(
+        commands, "modes", "natural frequencies and mode shapes of a case file of any kind",
+        "Natural frequencies and mode shapes of the structure of a case file of any kind",
+        film=True,
+    )  # fmt: skip
+    add(modes, integer, {"--count": "how many modes (default: 6)"})
     _add_state(modes)
 
-    frf = commands.add_parser(
-        "frf",
-        help="frequency response of a case file of any kind",
-        description="Frequency response of the structure of a case file of any kind to its "
-        "[[drive]], or else to its forces or the motion of its base; what its [analysis] says, if "
-        "it is of kind frf, holds unless given here.",
-    )
-    _add_common(frf, "frf")
-    frf.add_argument(
-        "--frequencies",
-        type=number,
-        nargs=3,
-        metavar=("FIRST", "LAST", "COUNT"),
-        help="frequencies (Hz), spaced evenly",
-    )
-    frf.add_argument("--method", help="direct (default), modal, impulse, ...: see the case file")
+    frf = _add_kind(
+        commands, "frf", "frequency response of a case file of any kind",
+        "Frequency response of the structure of a case file of any kind to its [[drive]], or else "
+        "to its forces or the motion of its base", film=True,
+    )  # fmt: skip
+    add(frf, number, {"--frequencies FIRST LAST COUNT": "frequencies (Hz), spaced evenly"})
+    add(frf, str, {"--method": "direct (default), modal, impulse, ...: see the case file"})
     _add_state(frf)
 
-    buckling = commands.add_parser(
-        "buckling",
-        help="load factors at which a case file of any kind buckles, and the shapes",
-        description="Linear buckling of the structure of a case file of any kind: all its loads "
-        "grow together, without their histories; what its [analysis] says, if it is of kind "
-        "buckling, holds unless given here.",
-    )
-    _add_common(buckling, "buckling", film=False)
-    buckling.add_argument("--count", type=integer, help="load factors of each sign (default: 6)")
-    buckling.add_argument(
-        "--iterations", type=integer,
-        help="repeat it on the path, ever closer to the first factor, so often at most",
+    buckling = _add_kind(
+        commands, "buckling",
+        "load factors at which a case file of any kind buckles, and the shapes",
+        "Linear buckling of the structure of a case file of any kind: all its loads grow together, "
+        "without their histories",
     )  # fmt: skip
+    add(buckling, integer, {
+        "--count": "load factors of each sign (default: 6)",
+        "--iterations": "repeat it on the path, ever closer to the first factor, so often at most",
+    })  # fmt: skip
 
-    random = commands.add_parser(
-        "random",
-        help="random vibration of a case file of any kind",
-        description="Root mean square response of the structure of a case file of any kind to a "
-        "base that moves at random; what its [analysis] says, if it is of kind random, holds "
-        "unless given here.",
-    )
-    _add_common(random, "random", film=False)
+    random = _add_kind(
+        commands, "random", "random vibration of a case file of any kind",
+        "Root mean square response of the structure of a case file of any kind to a base that "
+        "moves at random",
+    )  # fmt: skip
     random.add_argument(
-        "--base",
-        nargs="+",
-        action="append",
-        metavar=("AXIS UNIT", "F:DENSITY"),
+        "--base", nargs="+", action="append", metavar=("AXIS UNIT", "F:DENSITY"),
         help="axis, unit (g2/Hz or m2/s3) and points of the density, frequency (Hz) and value, as "
         "in --base z g2/Hz 20:0.005 80:0.04 500:0.04; again for other axes",
-    )
-    random.add_argument("--count", type=integer, help="how many modes (default: by the density)")
+    )  # fmt: skip
+    add(random, integer, {"--count": "how many modes (default: by the density)"})
     for name, text in (("stresses", "stresses"), ("reactions", "forces of the supports")):
         flag(random, f"--{name}", f"with root mean squares of {text}")
     _add_state(random)
 
-    response = commands.add_parser(
-        "response",
-        help="response curve of a case file of any kind",
-        description="Periodic motions of the structure of a case file of any kind under its "
-        "harmonic histories, along their frequency, with stability and bifurcations; what its "
-        "[analysis] says, if it is of kind response, holds unless given here.",
-    )
-    _add_case(response, "response")
-    response.set_defaults(model=None)
-    for name, text in (("frequencies", "frequencies (Hz)"), ("amplitudes", "factor on the drive")):
-        response.add_argument(
-            f"--{name}", type=number, nargs=2, metavar=("FIRST", "LAST"), help=f"ends of the {text}"
-        )
-    response.add_argument("--harmonics", type=integer, help="of the drive's frequency (default: 9)")
-    response.add_argument(
-        "--modes", type=integer, help="compute in the span of so many modes, for big sheets"
-    )
-    response.add_argument(
-        "--branches", type=integer, help="how many times branches are followed (default: 1)"
-    )
+    response = _add_kind(
+        commands, "response", "response curve of a case file of any kind",
+        "Periodic motions of the structure of a case file of any kind under its harmonic "
+        "histories, along their frequency, with stability and bifurcations", models=False,
+    )  # fmt: skip
+    add(response, number, {
+        "--frequencies FIRST LAST": "ends of the frequencies (Hz)",
+        "--amplitudes FIRST LAST": "ends of the factor on the drive",
+    })  # fmt: skip
+    add(response, integer, {
+        "--harmonics": "of the drive's frequency (default: 9)",
+        "--modes": "compute in the span of so many modes, for big sheets",
+        "--branches": "how many times branches are followed (default: 1)",
+    })  # fmt: skip
 
-    bands = commands.add_parser(
-        "bands",
-        help="bands of the sheet, chain or tube that repeats the pattern of a case file",
-        description="Frequencies of Bloch waves in a sheet, chain or tube whose cell is the "
-        "pattern of a case file of any kind; what its [analysis] says, if it is of kind bands, "
-        "holds unless given here.",
-    )
-    _add_common(bands, "bands", film=False)
-    bands.add_argument("--count", type=integer, help="how many bands (default: 6)")
-    bands.add_argument(
-        "--path",
-        metavar="G-X-M-G",
-        help="points of the Brillouin zone (default: G-X-M-Y-G; of a chain or tube G-X)",
-    )
-    bands.add_argument(
-        "--points", type=integer, metavar="N", help="wave vectors along the path (default: 60)"
-    )
-    bands.add_argument(
-        "--zone", type=integer, metavar="N", help="wave vectors along each period of the whole zone"
-    )
-    bands.add_argument(
-        "--attenuation", type=integer, metavar="N", help="frequencies of an attenuation spectrum"
-    )
+    bands = _add_kind(
+        commands, "bands",
+        "bands of the sheet, chain or tube that repeats the pattern of a case file",
+        "Frequencies of Bloch waves in a sheet, chain or tube whose cell is the pattern of a case "
+        "file of any kind",
+    )  # fmt: skip
+    add(bands, integer, {"--count": "how many bands (default: 6)"})
+    add(bands, str, {
+        "--path G-X-M-G": "points of the Brillouin zone (default: G-X-M-Y-G; of a chain or tube "
+        "G-X)",
+    })  # fmt: skip
+    add(bands, integer, {
+        "--points N": "wave vectors along the path (default: 60)",
+        "--zone N": "wave vectors along each period of the whole zone",
+        "--attenuation N": "frequencies of an attenuation spectrum",
+    })  # fmt: skip
     _add_state(bands)
 
-    effective = commands.add_parser(
-        "effective",
-        help="stiffness of the plate or beam that is equivalent to a repeated case file",
-        description="Membrane, bending and coupling stiffness of a sheet whose cell is the pattern "
-        "of a case file of any kind, or of a chain or tube; what its [analysis] says, if it is of "
-        "kind effective, holds unless given here.",
-    )
-    _add_common(effective, "effective", film=False)
+    effective = _add_kind(
+        commands, "effective",
+        "stiffness of the plate or beam that is equivalent to a repeated case file",
+        "Membrane, bending and coupling stiffness of a sheet whose cell is the pattern of a case "
+        "file of any kind, or of a chain or tube",
+    )  # fmt: skip
     _add_state(effective)
 
     fidelity = commands.add_parser(
@@ -204,33 +164,21 @@ def parser() -> argparse.ArgumentParser:
     )
     _add_case(fidelity, "fidelity")
     fidelity.set_defaults(model=None)
-    fidelity.add_argument("--count", type=integer, help="how many modes (default: 6)")
-    fidelity.add_argument(
-        "--reference",
-        metavar="MODEL",
-        help="what to compare with: superelements (default), or shell, which takes longer",
-    )
-    fidelity.add_argument(
-        "--divisions",
-        type=integer,
-        nargs=2,
-        metavar=("COARSE", "FINE"),
-        help="pieces of every edge of the two shells, with --reference shell (default: 6 12, less "
-        "for large patterns; 8 12 with a vertex radius)",
-    )
-    fidelity.add_argument(
-        "--models",
-        nargs="+",
-        metavar="NAME",
-        help="further models to compare: standard, plate, n5b8e, bars (default: all but bars)",
-    )
-    fidelity.add_argument(
-        "--vertex-radius",
-        type=number,
-        metavar="M",
-        help="distance from vertices within which panels do not stretch (m, about the thickness); "
-        "shells are then graded toward vertices",
-    )
+    add(fidelity, integer, {"--count": "how many modes (default: 6)"})
+    add(fidelity, str, {
+        "--reference MODEL": "what to compare with: superelements (default), or shell, which takes "
+        "longer",
+    })  # fmt: skip
+    add(fidelity, integer, {
+        "--divisions COARSE FINE": "pieces of every edge of the two shells, with --reference shell "
+        "(default: 6 12, less for large patterns; 8 12 with a vertex radius)",
+    })  # fmt: skip
+    others = "further models to compare: standard, plate, n5b8e, bars (default: all but bars)"
+    add(fidelity, str, {"--models NAME": others}, nargs="+")
+    add(fidelity, number, {
+        "--vertex-radius M": "distance from vertices within which panels do not stretch (m, about "
+        "the thickness); shells are then graded toward vertices",
+    })  # fmt: skip
     _add_secant(fidelity)
 
     add_convert(commands)
@@ -264,43 +212,46 @@ def _add_case(command: argparse.ArgumentParser, results: str) -> None:
     add_figures(command)
 
 
-def _add_common(command: argparse.ArgumentParser, results: str, film: bool = True) -> None:
+def _add_kind(
+    commands: Any, kind: str, text: str, about: str, film: bool = False, models: bool = True
+) -> argparse.ArgumentParser:
+    """Add a command that computes a case file of any kind as one of its own kind."""
+    holds = f"what its [analysis] says, if it is of kind {kind}, holds unless given here."
+    command = commands.add_parser(kind, help=text, description=f"{about}; {holds}")
+    if models:
+        _add_common(command, kind, film)
+    else:
+        _add_case(command, kind)
+        command.set_defaults(model=None)
+    return command
+
+
+def _add_common(command: argparse.ArgumentParser, results: str, film: bool) -> None:
     """Add the arguments of commands on case files of any model."""
     _add_case(command, results)
     if film:
         add_film(command)
-    command.add_argument(
-        "--model",
-        metavar="bars_and_hinges|shell|superelements",
-        help="model instead of that of the file; results go to NAME-MODEL-" + results,
-    )
-    command.add_argument(
-        "--divisions",
-        type=integer,
-        metavar="N",
-        help="pieces of every edge of a shell (16), or of the panels of superelements",
-    )
+    add(command, str, {
+        "--model bars_and_hinges|shell|superelements": "model instead of that of the file; results "
+        f"go to NAME-MODEL-{results}",
+    })  # fmt: skip
+    pieces = "pieces of every edge of a shell (16), or of the panels of superelements"
+    add(command, integer, {"--divisions N": pieces})
 
 
 def _add_state(command: argparse.ArgumentParser) -> None:
     """Add the options for the state about which a structure vibrates."""
-    command.add_argument(
-        "--state",
-        metavar="rest|equilibrium|FILE",
-        help="about which state: rest (default), the equilibrium under the loads, or the last "
-        "state of a result (NetCDF)",
-    )
+    add(command, str, {
+        "--state rest|equilibrium|FILE": "about which state: rest (default), the equilibrium under "
+        "the loads, or the last state of a result (NetCDF)",
+    })  # fmt: skip
     _add_secant(command)
 
 
 def _add_secant(command: argparse.ArgumentParser) -> None:
     """Add the amplitude at which superlinear hinges are linearized."""
-    command.add_argument(
-        "--secant",
-        type=number,
-        metavar="DEGREES",
-        help="amplitude of the hinges' turns for which superlinear hinges are linearized",
-    )
+    text = "amplitude of the hinges' turns for which superlinear hinges are linearized"
+    add(command, number, {"--secant DEGREES": text})
 
 
 @contextmanager

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from foldyn.errors import InputError
 from foldyn.plots import ANIMATIONS, FIGURES
 from foldyn.values import parsed
+
+READING = ("scale", "unit", "frame", "tolerance", "flat_foldable")
+"""Options of `add_reading`, arguments of `read_pattern`."""
 
 
 def number(text: str) -> float:
@@ -28,6 +32,18 @@ def halves(text: str, option: str) -> tuple[str, str]:
     return key.strip(), rest.strip()
 
 
+def add(
+    command: argparse.ArgumentParser, kind: Callable[[str], Any], texts: Mapping[str, str],
+    **more: Any,
+) -> None:  # fmt: skip
+    """Add options with their help texts, each by its name and metavars: "--frequencies A B"."""
+    for name, text in texts.items():
+        option, *words = name.split()
+        metavar = tuple(words) if len(words) > 1 else "".join(words) or None
+        own = {"nargs": len(words)} if len(words) > 1 else {}
+        command.add_argument(option, type=kind, metavar=metavar, help=text, **own, **more)
+
+
 def flag(command: argparse.ArgumentParser, name: str, text: str) -> None:
     """Add a switch, an option without a value."""
     command.add_argument(name, action="store_true", help=text)
@@ -44,28 +60,23 @@ def add_reading(
     command: argparse.ArgumentParser, frame: str, scale: str = "factor on all lengths"
 ) -> None:
     """Add options for reading a pattern file; `frame` and `scale` are their help texts."""
-    command.add_argument("--scale", type=number, help=scale)
-    command.add_argument("--unit", help="unit of the coordinates of the file: mm, cm, m, in, ...")
-    command.add_argument("--frame", help=frame)
-    command.add_argument(
-        "--tolerance", type=number, help="distance (m) within which points of the file are one"
-    )
+    units = "unit of the coordinates of the file: mm, cm, m, in, ..."
+    add(command, number, {"--scale": scale})
+    add(command, str, {"--unit": units})
+    add(command, frame_of, {"--frame": frame})
+    alike = "distance (m) within which points of the file are one"
+    add(command, number, {"--tolerance": alike})
     flag(command, "--flat-foldable", "move vertices to the nearest places that fold flat")
 
 
-def reading_of(given: argparse.Namespace) -> dict[str, Any]:
+def reading(given: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments for `read_pattern` from the options of `add_reading`."""
-    return {
-        "scale": given.scale, "unit": given.unit, "frame": frame_of(given.frame),
-        "tolerance": given.tolerance, "flat_foldable": given.flat_foldable,
-    }  # fmt: skip
+    return {key: getattr(given, key) for key in READING}
 
 
-def frame_of(given: str | None) -> int | str | None:
+def frame_of(text: str) -> int | str:
     """Parse the number or title of a frame."""
-    if given is None or not (given.isascii() and given.isdecimal()):
-        return given
-    return int(given)
+    return int(text) if text.isascii() and text.isdecimal() else text
 
 
 def add_figures(command: argparse.ArgumentParser) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import Owner, Results, held
-from foldyn.cli.options import add_results, flag
+from foldyn.cli.options import add, add_results, flag
 from foldyn.cli.streams import Clock, progress_bar, speech
 from foldyn.errors import ComputationError, FoldynError, Told
 
@@ -31,19 +31,13 @@ def add_study(commands: Any) -> None:
         description="Compute the studies of a paper; results, figures and report.html go to a "
         "folder. Results that are in the folder already are not computed again.",
     )
-    study.add_argument(
-        "name",
-        choices=("herkal",),
-        help="which: herkal (Herkal, Nagarajaiah and Paulino)",
-    )
+    papers = {"name": "which: herkal (Herkal, Nagarajaiah and Paulino)"}
+    add(study, str, papers, choices=("herkal",))
     flag(study, "--quick", "coarser: a preview, no measure")
-    study.add_argument(
-        "--data",
-        nargs="+",
-        metavar="FILE",
-        help="measurements of the specimen instead of synthetic ones: a film of its release, "
-        "tracks (NetCDF), or tables (CSV)",
-    )
+    add(study, str, {
+        "--data FILE": "measurements of the specimen instead of synthetic ones: a film of its "
+        "release, tracks (NetCDF), or tables (CSV)",
+    }, nargs="+")  # fmt: skip
     add_results(study, "NAME-study or NAME-quick", figures=False)
 
 

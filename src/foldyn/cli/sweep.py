@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import Owner, Results, drawing, held
-from foldyn.cli.options import add_figures, add_results, halves, integer
+from foldyn.cli.options import add, add_figures, add_results, halves, integer
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import ComputationError, InputError
 from foldyn.plots import FIGURES
@@ -43,52 +43,30 @@ def add_sweep(commands: Any) -> None:
         "be resumed. One dataset, figures and report.html go to a folder. Options that are not "
         "given come from the table [sweep] of the file.",
     )
-    sweep.add_argument("case", help="case file (TOML), or the name of a shipped one")
-    sweep.add_argument(
-        "--vary",
-        action="append",
-        metavar="KEY=RANGE",
-        help="a key of the case file with A:B:N (N values from A to B), A:B:N:log, or values as in "
-        "1,2,5; with --samples A:B or A:B:log",
-    )
-    sweep.add_argument(
-        "--measure",
-        action="append",
-        metavar="NAME",
-        help="what is measured, such as frequencies or peak_frequency[8]; or your own function, "
-        "[NAME=]module:function or [NAME=]file.py:function",
-    )
-    sweep.add_argument(
-        "--samples", type=integer, metavar="N", help="draw N points instead of a grid"
-    )
-    sweep.add_argument(
-        "--method",
-        metavar="latin_hypercube|sobol|saltelli",
-        help="how points are drawn (default: latin_hypercube); saltelli is for Sobol indices, and "
-        "takes N times the number of keys and two",
-    )
-    sweep.add_argument("--seed", type=integer, help="of the samples (default: 0)")
-    sweep.add_argument(
-        "--tie",
-        action="append",
-        metavar="KEY=EXPRESSION",
-        help="a key that depends on others, such as b=360 - a",
-    )
-    sweep.add_argument(
-        "--processes",
-        type=integer,
-        metavar="N",
-        help="points at a time (default: one per processor)",
-    )
-    sweep.add_argument(
-        "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers compute instead"
-    )
-    sweep.add_argument(
-        "--device",
-        choices=("auto", "cpu", "gpu"),
-        help="where motions are computed (default: as the file says, else auto: on a GPU where "
-        "that pays)",
-    )
+    add(sweep, str, {"case": "case file (TOML), or the name of a shipped one"})
+    add(sweep, str, {
+        "--vary KEY=RANGE": "a key of the case file with A:B:N (N values from A to B), A:B:N:log, "
+        "or values as in 1,2,5; with --samples A:B or A:B:log",
+        "--measure NAME": "what is measured, such as frequencies or peak_frequency[8]; or your own "
+        "function, [NAME=]module:function or [NAME=]file.py:function",
+    }, action="append")  # fmt: skip
+    add(sweep, integer, {"--samples N": "draw N points instead of a grid"})
+    add(sweep, str, {
+        "--method latin_hypercube|sobol|saltelli": "how points are drawn (default: "
+        "latin_hypercube); saltelli is for Sobol indices, and takes N times the number of keys and "
+        "two",
+    })  # fmt: skip
+    add(sweep, integer, {"--seed": "of the samples (default: 0)"})
+    ties = {"--tie KEY=EXPRESSION": "a key that depends on others, such as b=360 - a"}
+    add(sweep, str, ties, action="append")
+    count = "points at a time (default: one per processor)"
+    add(sweep, integer, {"--processes N": count})
+    workers = "Dask scheduler whose workers compute instead"
+    add(sweep, str, {"--scheduler ADDRESS": workers})
+    add(sweep, str, {
+        "--device": "where motions are computed (default: as the file says, else auto: on a GPU "
+        "where that pays)",
+    }, choices=("auto", "cpu", "gpu"))  # fmt: skip
     add_results(sweep, "NAME-sweep")
     add_figures(sweep)
 

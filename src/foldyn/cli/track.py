@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import check_folder, drawing, rescued
-from foldyn.cli.options import add_figures, add_switches
+from foldyn.cli.options import add, add_figures, add_switches
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import ComputationError, InputError
@@ -43,35 +43,30 @@ def add_track(commands: Any) -> None:
         "in photographs. Histories go to OUT (NetCDF), a CSV file and figures to the same folder.",
     )
     track.add_argument("inputs", nargs="+", metavar="VIDEO|PHOTO", help="a film, or photographs")
-    track.add_argument("--roi", metavar="X,Y,W,H", help="region of interest (pixels)")
-    track.add_argument("--scale", metavar="METRES", help="metres per pixel, in the front plane")
-    track.add_argument(
-        "--reference",
-        action="append",
-        metavar="PX1,PY1,PX2,PY2,METRES",
-        help="a known length between two pixels, instead of --scale; may be given twice",
-    )
-    track.add_argument(
-        "--model",
-        metavar="CASE|RESULT",
-        help="case file, shipped case or path (NetCDF) whose nodes are recognized; the states of "
-        "a path, also that of a static case, are tried",
-    )
+    add(track, str, {
+        "--roi X,Y,W,H": "region of interest (pixels)",
+        "--scale METRES": "metres per pixel, in the front plane",
+    })  # fmt: skip
+    known = "a known length between two pixels, instead of --scale; may be given twice"
+    add(track, str, {"--reference PX1,PY1,PX2,PY2,METRES": known}, action="append")
+    add(track, str, {
+        "--model CASE|RESULT": "case file, shipped case or path (NetCDF) whose nodes are "
+        "recognized; the states of a path, also that of a static case, are tried",
+    })  # fmt: skip
     track.add_argument("--out", default="tracks.nc", help="file to write (default: tracks.nc)")
-    track.add_argument(
-        "--rate", metavar="HZ", help="frames per second, where the film says another"
-    )
-    track.add_argument("--distance", metavar="METRES", help="from the camera to the front plane")
+    add(track, str, {
+        "--rate HZ": "frames per second, where the film says another",
+        "--distance METRES": "from the camera to the front plane",
+    })  # fmt: skip
     track.add_argument("--up", default="-x", help="the model's axis that points up (--up=-x)")
     track.add_argument("--facing", default="z", help="the model's axis towards the camera (z)")
-    track.add_argument(
-        "--match",
-        default="first",
-        help="frame in which the model is recognized: first (default) or last",
-    )
-    track.add_argument("--nodes", metavar="N,N,...", help="nodes that must be found")
-    track.add_argument("--loads", metavar="N,N,...", help="load of each photograph (N)")
-    track.add_argument("--reach", metavar="PIXELS", help="length of the edges that make a corner")
+    frames = "frame in which the model is recognized: first (default) or last"
+    add(track, str, {"--match": frames}, default="first")
+    add(track, str, {
+        "--nodes N,N,...": "nodes that must be found",
+        "--loads N,N,...": "load of each photograph (N)",
+        "--reach PIXELS": "length of the edges that make a corner",
+    })  # fmt: skip
     add_switches(track)
     add_figures(track)
 
