@@ -33,7 +33,7 @@ from foldyn.cases import Case
 from foldyn.errors import InputError, renamed
 from foldyn.linear import UnitCell, attenuation, band_gaps, bands, damped_bands
 from foldyn.linear.band_structure import ALL
-from foldyn.report.album import Album, ByRule, by_mass_rule
+from foldyn.report.album import Album, ByRule, computation
 from foldyn.report.sections import Heading, Table
 from foldyn.report.sections import Section as PageSection
 from foldyn.report.sections import Text as PageText
@@ -159,12 +159,10 @@ class BandsAnalysis(Analysis):
             )
         yield Heading("The numbers")
         yield _gaps(results)
-        yield by_mass_rule(
-            results,
-            {"bands": lambda r: r.sizes["band"], "wave vectors": lambda r: r.sizes["phase"],
-             "states": lambda r: r.sizes.get("state", 1), "time (s)": "wall_seconds"},
-            f"{case_file.path.name}: the computation",
-        )  # fmt: skip
+        yield computation(case_file, results, {
+            "bands": lambda r: r.sizes["band"], "wave vectors": lambda r: r.sizes["phase"],
+            "states": lambda r: r.sizes.get("state", 1),
+        })  # fmt: skip
         yield PageText(_notes(result))
 
 

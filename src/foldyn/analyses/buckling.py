@@ -19,7 +19,7 @@ from foldyn.cases.supports import SUPPORT
 from foldyn.errors import renamed
 from foldyn.linear import buckling
 from foldyn.linear.buckling import DEPARTS
-from foldyn.report.album import Album, ByRule, by_mass_rule
+from foldyn.report.album import Album, ByRule, computation
 from foldyn.report.sections import Heading, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
 from foldyn.statics import trace
@@ -117,25 +117,20 @@ class BucklingAnalysis(Analysis):
             )
         yield Heading("The numbers")
         yield _table(result)
-        columns = {
-            "free dofs": "free_dofs",
-            "proven complete": "complete",
-            "time (s)": "wall_seconds",
-        }
-        yield by_mass_rule(results, columns, f"{case_file.path.name}: the computation")
+        columns = {"free dofs": "free_dofs", "proven complete": "complete"}
+        yield computation(case_file, results, columns)
         yield Text(_notes(result))
 
 
 def _table(result: xarray.Dataset) -> Table:
     shape = result["shape"].transpose("mode", "node", "axis").values
-    size = np.linalg.norm(shape, axis=2)
-    rows = []
-    for k, number in enumerate(result["mode"].values.tolist()):
-        node = int(size[k].argmax())
-        axis = "xyz"[int(np.abs(shape[k, node]).argmax())]
-        rows.append([number, cell(float(result["load_factor"][k])), node, axis])
-    header = ["mode", "load factor", "node that moves most", "mainly along"]
-    return Table(header, rows, "Load factors; negative ones belong to reversed loads.")
+    node = np.linalg.norm(shape, axis=2).argmax(axis=1)
+    axis = np.abs(shape[np.arange(len(node)), node]).argmax(axis=1)
+    columns = {
+        "mode": result["mode"].values, "load factor": map(cell, result["load_factor"].values),
+        "node that moves most": node, "mainly along": ["xyz"[k] for k in axis],
+    }  # fmt: skip
+    return Table.of(columns, "Load factors; negative ones belong to reversed loads.")
 
 
 def _notes(result: xarray.Dataset) -> str:

@@ -67,20 +67,18 @@ def _numbers(folding: Folding) -> Section:
     letters = np.array(pattern_of(way).assignments)
     turned = np.degrees(way["fold_angle"].values)
     kinds = {"mountains": letters == "M", "valleys": letters == "V"}
-    columns = {f"{name} (degrees)": turned[:, is_one].mean(axis=1) for name, is_one in kinds.items()
-               if is_one.any()}  # fmt: skip
+    columns = {"share of the way": way["share"].values}
+    for name, is_one in kinds.items():
+        if is_one.any():
+            columns[f"{name} (degrees)"] = turned[:, is_one].mean(axis=1)
     columns["strain"] = way["strain"].values
     columns["bend (degrees)"] = np.degrees(way["bend"].values)
-    header = ["state", "share of the way", *columns]
-    rows = [
-        [k, float(way["share"][k]), *(float(column[k]) for column in columns.values())]
-        for k in evenly(way, MOST_ROWS)
-    ]
-    return Table(
-        header, rows,
+    shown = evenly(way, MOST_ROWS)
+    return Table.of(
+        {"state": shown, **{name: column[shown] for name, column in columns.items()}},
         "States: mean angles of the creases, valleys positive; the largest strain, and the largest "
         "turn within a panel",
-    )  # fmt: skip
+    )
 
 
 def _computed(folding: Folding, call: Call) -> Section:

@@ -29,7 +29,7 @@ from foldyn.linear import Peak, frf, peaks_of
 from foldyn.linear.frf import METHODS, PER_FORCE, quantity_of
 from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.readings import along_drive, unit_of
-from foldyn.report.album import Album, ByRule, by_mass_rule, listed, rules, shown_nodes
+from foldyn.report.album import Album, ByRule, computation, listed, rules, shown_nodes
 from foldyn.report.sections import Charts, Heading, Section, Table, Text, cell
 from foldyn.tables import ListOf, check_keys
 from foldyn.values import increasing, number, show, whole
@@ -373,10 +373,8 @@ def _run(case_file: CaseFile, results: ByRule) -> Table:
     a = next(iter(results.values())).attrs
     if not METHODS[a["method"]].by_amplitude:
         del keys["amplitude"]
-    columns = {"method": "method", "state": "state"}
-    columns |= {title: key for key, title in keys.items() if key in a}
-    columns["time (s)"] = "wall_seconds"
-    return by_mass_rule(results, columns, f"{case_file.path.name}: the computation")
+    columns = {title: key for key, title in keys.items() if key in a}
+    return computation(case_file, results, {"method": "method", "state": "state", **columns})
 
 
 def _notes(

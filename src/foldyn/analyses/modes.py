@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from foldyn.cases import Case
 from foldyn.linear import character, mac, modes, pair_modes
 from foldyn.linear.compared import size
 from foldyn.plots.readings import chosen_modes
-from foldyn.report.album import Album, ByRule, by_mass_rule, listed
+from foldyn.report.album import Album, ByRule, computation, listed
 from foldyn.report.sections import Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
 
@@ -134,7 +134,12 @@ class ModesAnalysis(Vibration):
         yield _table(modes, names, f"{rule}, {_judged(case_file, names)}")
         if same:
             yield _compared(results, same)
-        yield _run(case_file, results)
+        columns = {
+            "free dofs": "free_dofs", "state": "state", "secant (degrees)": "secant",
+            "proven complete": lambda r: f"{int(r.attrs['complete'])} of {r.sizes['mode']}",
+            "solver": "solver",
+        }  # fmt: skip
+        yield computation(case_file, results, columns)
         yield Text(_notes(modes, case))
 
 
@@ -184,28 +189,24 @@ def _compared(results: ByRule, same: Mapping[str, NDArray]) -> Table:
 
 
 def _table(modes: xarray.Dataset, names: xarray.Dataset, remark: str) -> Table:
-    header = ["mode", "frequency (Hz)"]
-    estimated, compared = "frequency_error" in modes, "model_error" in modes
-    header += [*(["error (Hz)"] if estimated else []), *(["error (%)"] if compared else [])]
-    header += ["damping (%)", "what it does", "share (%)"]
-    header += [f"{'effective mass ' if axis == 'x' else ''}{axis} (%)" for axis in "xyz"]
+    numbers = modes["mode"].values
+    columns: dict[str, Iterable[Any]] = {"mode": numbers}
+    columns["frequency (Hz)"] = [_frequency(modes, k) for k in range(len(numbers))]
+    if "frequency_error" in modes:
+        columns["error (Hz)"] = map(cell, modes["frequency_error"].values)
+    if "model_error" in modes:
+        columns["error (%)"] = map(cell, 100.0 * modes["model_error"].values)
+    columns["damping (%)"] = map(cell, 100.0 * modes["damping_ratio"].values)
+    columns["what it does"] = map(str, names["name"].values)
+    columns["share (%)"] = (100.0 * names["share"].max("kind").values).round().astype(int)
     free = np.asarray(modes.attrs["free_mass"], dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
-        shares = 100.0 * modes["effective_mass"].transpose("mode", "axis").values / free
-    rows = []
-    for k, number in enumerate(modes["mode"].values.tolist()):
-        row: list[Any] = [
-            number,
-            _frequency(modes, k),
-            *([cell(modes["frequency_error"].values[k])] if estimated else []),
-            *([cell(100.0 * modes["model_error"].values[k])] if compared else []),
-            cell(100.0 * modes["damping_ratio"].values[k]),
-        ]
-        row += [str(names["name"].values[k]), round(100.0 * float(names["share"][k].max()))]
-        rows.append([*row, *(cell(round(share, 1)) for share in shares[k].tolist())])
-    return Table(
-        header,
-        rows,
+        shares = 100.0 * modes["effective_mass"].transpose("axis", "mode").values / free[:, None]
+    for axis, share in zip("xyz", shares, strict=True):
+        what = "effective mass " if axis == "x" else ""
+        columns[f"{what}{axis} (%)"] = [cell(round(one, 1)) for one in share.tolist()]
+    return Table.of(
+        columns,
         f"The modes{remark}. Effective masses: what a motion of the base along the axis excites, "
         "of the mass that is free to move along it.",
     )
@@ -216,18 +217,6 @@ def _frequency(modes: xarray.Dataset, k: int) -> float | str:
         return "rigid"
     value = float(modes["frequency"].values[k])
     return value if np.isfinite(value) else "unstable"
-
-
-def _run(case_file: CaseFile, results: ByRule) -> Table:
-    columns: dict[str, Any] = {
-        "free dofs": "free_dofs",
-        "state": "state",
-        "secant (degrees)": "secant",
-        "proven complete": lambda found: f"{int(found.attrs['complete'])} of {found.sizes['mode']}",
-        "solver": "solver",
-        "time (s)": "wall_seconds",
-    }
-    return by_mass_rule(results, columns, f"{case_file.path.name}: the computation")
 
 
 def _notes(modes: xarray.Dataset, case: Case) -> str:

@@ -382,18 +382,10 @@ def _points(
     columns |= {f"{name} (%)": 100.0 * share for name, share in shares.items()}
     negative = path["negative_eigenvalues"].values
     judged = ["" if n < 0 else "stable" if n == 0 else "unstable" for n in negative.tolist()]
-    table = [
-        [
-            k,
-            *(cell(column[k]) for column in columns.values()),
-            int(path["iterations"][k]),
-            judged[k],
-            critical_word(path, k),
-        ]
-        for k in rows
-    ]
-    header = ["point", *columns, "iterations", "stability", "kind"]
-    return Table(header, table, "Points of the path, with all limit points and bifurcations")
+    shown = {name: map(cell, column[rows]) for name, column in columns.items()}
+    words = {"stability": [judged[k] for k in rows], "kind": [critical_word(path, k) for k in rows]}
+    table = {"point": rows, **shown, "iterations": path["iterations"].values[rows], **words}
+    return Table.of(table, "Points of the path, with all limit points and bifurcations")
 
 
 def _run(case_file: CaseFile, path: xarray.Dataset) -> Table:

@@ -20,7 +20,7 @@ from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.linear import SpectralDensity, margins, random_response
 from foldyn.plots.charts import Chart, Curve
-from foldyn.report.album import Album, ByRule, by_mass_rule, shown_nodes
+from foldyn.report.album import Album, ByRule, computation, shown_nodes
 from foldyn.report.sections import Charts, Heading, Section, Table, Text, cell
 from foldyn.tables import check_table, read
 from foldyn.values import choice, show
@@ -121,9 +121,8 @@ class RandomAnalysis(Vibration):
             "modes": "modes",
             "largest displacement (m rms)": lambda one: cell(_largest(one, "displacement")),
             "largest acceleration (m/s2 rms)": lambda one: cell(_largest(one, "acceleration")),
-            "time (s)": "wall_seconds",
         }
-        yield by_mass_rule(results, columns, f"{case_file.path.name}: the computation")
+        yield computation(case_file, results, columns)
         yield Text(
             "Displacements are relative to the base, accelerations absolute. A normal process is "
             "within three times its root mean square 99.7 % of the time."

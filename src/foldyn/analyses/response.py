@@ -17,7 +17,7 @@ from foldyn.dynamics import Progress
 from foldyn.periodic import response_curve
 from foldyn.periodic.equation import Drive
 from foldyn.periodic.response import checked_range
-from foldyn.report.album import Album, ByRule, by_mass_rule
+from foldyn.report.album import Album, ByRule, computation
 from foldyn.report.sections import Heading, Table
 from foldyn.report.sections import Section as PageSection
 from foldyn.tables import ListOf, Section
@@ -106,14 +106,8 @@ class ResponseAnalysis(Analysis):
         )
         yield Heading("The numbers")
         yield _bifurcations(results)
-        yield by_mass_rule(
-            results,
-            {
-                "harmonics": "harmonics", "unknowns": "unknowns", "complete": "complete",
-                "time (s)": "wall_seconds",
-            },
-            f"{case_file.path.name}: the computation",
-        )  # fmt: skip
+        names = "harmonics", "unknowns", "complete"
+        yield computation(case_file, results, {name: name for name in names})
 
 
 def _bifurcations(results: ByRule) -> Table:

@@ -148,6 +148,14 @@ def by_mass_rule(
     return Table(["mass rule", *columns], rows, caption, digits=3)
 
 
+def computation(
+    case_file: Any, results: ByRule, columns: Mapping[str, str | Callable[[xarray.Dataset], Any]]
+) -> Table:
+    """Table of the computations of a `CaseFile`, as `by_mass_rule`, with their times."""
+    columns = {**columns, "time (s)": "wall_seconds"}
+    return by_mass_rule(results, columns, f"{case_file.path.name}: the computation")
+
+
 def crossing_panels(results: ByRule) -> list[Section]:
     """Table of panels that pass through each other in motions or paths; empty if none do."""
     rows, along = [], "time"

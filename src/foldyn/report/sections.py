@@ -6,7 +6,7 @@ import base64
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from io import BytesIO
@@ -78,6 +78,12 @@ class Table:
     caption: str = ""
     digits: int = 4
     sorts: bool = True
+
+    @classmethod
+    def of(cls, columns: Mapping[str, Iterable[Any]], caption: str = "", digits: int = 4) -> Table:
+        """Make a table of columns by their titles."""
+        rows = [[*row] for row in zip(*columns.values(), strict=True)]
+        return cls(list(columns), rows, caption, digits)
 
     def __post_init__(self) -> None:
         """Check that rows fit the header."""

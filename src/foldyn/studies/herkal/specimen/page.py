@@ -397,13 +397,10 @@ def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
 
 
 def _air_table(modes: xr.Dataset, in_air: xr.Dataset, names: Sequence[str]) -> Table:
-    columns = modes["frequency"].values, in_air["frequency"].values, in_air["air_share"].values
-    rows = [
-        [str(name), cell(dry), cell(wet), cell(100.0 * share)]
-        for name, dry, wet, share in zip(names, *columns, strict=True)
-    ]
-    return Table(
-        ["mode", "in vacuum (Hz)", "in air (Hz)", "share of the air (%)"], rows,
+    return Table.of(
+        {"mode": map(str, names), "in vacuum (Hz)": map(cell, modes["frequency"].values),
+         "in air (Hz)": map(cell, in_air["frequency"].values),
+         "share of the air (%)": map(cell, 100.0 * in_air["air_share"].values)},
         "Modes with the fitted folds in vacuum and in air, and the share of air in the modal mass.",
         digits=3,
     )  # fmt: skip
