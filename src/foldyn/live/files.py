@@ -17,7 +17,7 @@ from foldyn.live.embedded import View, check_results, results_stage
 from foldyn.live.server import Server
 from foldyn.patterns import Pattern
 from foldyn.patterns.frames import fold_angles
-from foldyn.report.page import CSS, document
+from foldyn.report.page import document
 from foldyn.results import load
 from foldyn.statics import fold
 from foldyn.viewer import Stage, rest_stage, scripts
@@ -76,8 +76,8 @@ def live_page(title: str, about: Mapping[str, Any], key: str) -> str:
         '<div class="live" id="live"><p>This page needs JavaScript.</p></div>\n'
         f'<script type="application/json" id="live.about">{told}</script>'
     )
-    css = scripts.style("live") + CSS
-    return document(title, main, css, scripts.script_of_live(), "; connect-src 'self'")
+    css, code = scripts.style("live"), scripts.script_of_live()
+    return document(title, main, css, code, "; connect-src 'self'")
 
 
 def _results(paths: Sequence[Path]) -> View:

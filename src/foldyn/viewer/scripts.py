@@ -67,10 +67,16 @@ def _with_charts(names: Iterable[str], begin: str) -> str:
 
 
 @cache
+def style_of_text() -> str:
+    """Style of a document without interactive parts."""
+    return _text("static/report.css")
+
+
+@cache
 def style(*more: str) -> str:
-    """Style, with further styles by name."""
+    """Style of a document with interactive parts, and further styles by name."""
     own = [_text(f"static/{name}.css") for name in ("page", *more)]
-    return "\n".join([_text("third_party/uplot/uPlot.min.css"), *own])
+    return "\n".join([_text("third_party/uplot/uPlot.min.css"), *own, style_of_text()])
 
 
 def in_page(value: Any) -> str:
