@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.patterns import Boards, Pattern
-from foldyn.plots.scene import Indices, Points, Sheet3D, View
+from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import rest_keys, side_by_side
 from foldyn.structures import Structure
 
@@ -93,14 +93,9 @@ def _solid(pattern: Pattern) -> Sheet3D:
             triangles += [(a, b, c), (a, c, d)]
         edges += list(zip(back, front, strict=True))
         first += 2 * size
-    drawn = SimpleNamespace(
-        creases=pattern.creases, boundary=_rows(edges), assignments=pattern.assignments
-    )
-    return Sheet3D(drawn, None, None, np.concatenate(nodes), _rows(triangles))
-
-
-def _rows(rows: list) -> Indices:
-    return np.array(rows, dtype=np.int64)
+    own = {"creases": pattern.creases, "assignments": pattern.assignments}
+    drawn = SimpleNamespace(boundary=np.array(edges), **own)
+    return Sheet3D(drawn, None, None, np.concatenate(nodes), np.array(triangles))
 
 
 def _placed(solid: Sheet3D, pattern: Pattern, moved: Points) -> Points:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from foldyn.cases import Case
@@ -68,22 +67,8 @@ def plot_laws(
             axes.set_xlim(0.0, 360.0)
             axes.set_xticks(np.arange(0, 361, 60))
         axes.get_lines()[len(curves)].set(color=style.BLACK, markerfacecolor=style.BLACK, zorder=4)
-        _legend_below(axes, len(curves), chart.note)
+        look = {"fontsize": style.NOTE, "handlelength": 2.2, **style.LEGEND}
+        below = {"loc": "upper left", "bbox_to_anchor": (-0.2, -0.19), "borderaxespad": 0.0}
+        note = {"title": chart.note or None, "title_fontsize": style.NOTE}
+        axes.legend(handles=axes.get_lines()[: len(curves)], **look, **below, **note)
     return style.finish(figure)
-
-
-def _legend_below(axes: Axes, count: int, note: str) -> None:
-    """Write a legend of the first curves."""
-    axes.legend(
-        handles=axes.get_lines()[:count],
-        loc="upper left",
-        bbox_to_anchor=(-0.2, -0.19),
-        borderaxespad=0.0,
-        frameon=False,
-        labelcolor=style.BLACK,
-        labelspacing=0.5,
-        fontsize=style.NOTE,
-        handlelength=2.2,
-        title=note or None,
-        title_fontsize=style.NOTE,
-    )

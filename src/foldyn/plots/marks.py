@@ -67,9 +67,9 @@ class Mark(NamedTuple):
 
 
 def billboard(tip: Points, along: Points, length: float, half: float, view: View) -> Points:
-    """Return a triangle (3, 3) that points along a unit vector and faces the viewer."""
+    """Return triangles (..., 3, 3) that point along unit vectors (..., 3) and face the viewer."""
     across, base = view.across(along), tip - length * along
-    return np.array([tip, base + half * across, base - half * across])
+    return np.stack([tip, base + half * across, base - half * across], axis=-2)
 
 
 def support_triangles(
@@ -95,16 +95,13 @@ def support_triangles(
         For example ``(4, "xz")``.
     """
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    triangles, held = [], []
-    for node in np.flatnonzero(fixed.any(axis=1)):
-        held.append((int(node), "".join("xyz"[k] for k in np.flatnonzero(fixed[node]))))
-        for k in np.flatnonzero(fixed[node]):
-            along = np.zeros(3)
-            # The triangle stands outside the sheet; for middle nodes, below or in front of it.
-            outside = -1.0 if points[node, k] > middle[k] + 0.05 * size and k != 2 else 1.0
-            along[k] = np.sign(moves[node, k]) or outside
-            triangles.append(billboard(points[node], along, size, 0.38 * size, view))
-    return np.array(triangles).reshape(-1, 3, 3), held
+    nodes, axes = np.nonzero(fixed)
+    # The triangle stands outside the sheet; for middle nodes, below or in front of it.
+    beyond = (points[fixed] > middle[axes] + 0.05 * size) & (axes != 2)
+    way = np.where(moves[fixed], np.sign(moves[fixed]), np.where(beyond, -1.0, 1.0))
+    along = way[:, None] * np.eye(3)[axes]
+    held = {int(node): "".join("xyz"[k] for k in axes[nodes == node]) for node in nodes}
+    return billboard(points[nodes], along, size, 0.38 * size, view), list(held.items())
 
 
 def load_arrows(
@@ -128,15 +125,13 @@ def load_arrows(
     shafts : ndarray, shape (count, 2, 3)
     heads : ndarray, shape (count, 3, 3)
     """
-    shafts, heads = [], []
-    size = np.linalg.norm(vectors, axis=1)
-    for node in np.flatnonzero(size > 0.0):
-        along = vectors[node] / size[node]
-        tip = points[node] + length * max(size[node] / longest, 1.0 / 3.0) * along
-        head = billboard(tip, along, 0.3 * length, 0.11 * length, view)
-        shafts.append([points[node], 0.5 * (head[1] + head[2])])
-        heads.append(head)
-    return np.array(shafts).reshape(-1, 2, 3), np.array(heads).reshape(-1, 3, 3)
+    size = np.linalg.norm(vectors, axis=1, keepdims=True)
+    loaded = size[:, 0] > 0.0
+    start, size = points[loaded], size[loaded]
+    along = vectors[loaded] / size
+    tip = start + length * np.maximum(size / longest, 1.0 / 3.0) * along
+    heads = billboard(tip, along, 0.3 * length, 0.11 * length, view)
+    return np.stack([start, heads[:, 1:].mean(axis=1)], axis=1), heads
 
 
 def thinned(points: Points, vectors: Points, length: float, always: int | None) -> Points:
@@ -161,13 +156,10 @@ def thinned(points: Points, vectors: Points, length: float, always: int | None) 
 
 def arc_arrows(arcs: Points, size: float, view: View) -> tuple[Points, Points]:
     """Return pieces (k, 2, 3) and heads (m, 3, 3) of arrows along arcs (m, p, 3)."""
-    heads = []
-    for arc in arcs:
-        along = arc[-1] - arc[-2]
-        along = along / np.linalg.norm(along)
-        heads.append(billboard(arc[-1] + 0.5 * size * along, along, size, 0.4 * size, view))
-    pieces = np.stack([arcs[:, :-1], arcs[:, 1:]], axis=2).reshape(-1, 2, 3)
-    return pieces, np.array(heads).reshape(-1, 3, 3)
+    along = arcs[:, -1] - arcs[:, -2]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    heads = billboard(arcs[:, -1] + 0.5 * size * along, along, size, 0.4 * size, view)
+    return np.stack([arcs[:, :-1], arcs[:, 1:]], axis=2).reshape(-1, 2, 3), heads
 
 
 def add_triangles(axes: Axes3D, triangles: Points, color: str, zorder: float) -> Poly3DCollection:

@@ -185,10 +185,11 @@ class View:
         return points @ self.basis[:2].T
 
     def across(self, line: Points) -> Points:
-        """Unit vector (3,) in the screen perpendicular to a line (3,); any for one seen end-on."""
+        """Unit vectors in the screen perpendicular to lines (..., 3); any for ones seen end-on."""
         across = np.cross(self.basis[2], line)
-        length = np.linalg.norm(across)
-        return across / length if length > 1e-6 * np.linalg.norm(line) else self.basis[0]
+        length = np.linalg.norm(across, axis=-1, keepdims=True)
+        seen = length > 1e-6 * np.linalg.norm(line, axis=-1, keepdims=True)
+        return np.where(seen, across / np.where(seen, length, 1.0), self.basis[0])
 
 
 class Seen(NamedTuple):
@@ -352,15 +353,9 @@ def add_panels(
     because neighboring triangles may overlap or separate by a pixel, which would leave visible
     seams inside every panel.
     """
-    panels = Poly3DCollection(
-        corners,
-        facecolors=1.0 - alpha * (1.0 - colors),
-        edgecolors="none",
-        linewidths=0.0,
-        antialiaseds=False,
-        zsort="average",
-        zorder=zorder,
-    )
+    plain = {"edgecolors": "none", "linewidths": 0.0, "antialiaseds": False, "zsort": "average"}
+    colors = 1.0 - alpha * (1.0 - colors)
+    panels = Poly3DCollection(corners, facecolors=colors, zorder=zorder, **plain)
     axes.add_collection3d(panels, autolim=False)
     return panels
 
@@ -375,14 +370,7 @@ def add_segments(
     alpha: float = 1.0,
 ) -> Line3DCollection:
     """Draw polylines (k, p, 3)."""
-    lines = Line3DCollection(
-        segments,
-        colors=color,
-        linewidths=width,
-        linestyles=[linestyle],
-        zorder=zorder,
-        alpha=alpha,
-        capstyle="butt",
-    )
+    look = {"colors": color, "linewidths": width, "linestyles": [linestyle], "capstyle": "butt"}
+    lines = Line3DCollection(segments, zorder=zorder, alpha=alpha, **look)
     axes.add_collection3d(lines, autolim=False)
     return lines

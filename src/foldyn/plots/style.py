@@ -59,6 +59,7 @@ TITLE, LABEL, TICK, NOTE = 10.5, 9.0, 8.0, 7.5
 TEXT: dict[str, Any] = {"fontsize": LABEL, "color": BLACK}
 # Look of labels, and of notes inside a frame.
 FINE: dict[str, Any] = {"fontsize": NOTE, "color": BLACK}
+LEGEND: dict[str, Any] = {"labelcolor": BLACK, "labelspacing": 0.5, "frameon": False}
 
 
 def new_figure(width: float, height: float, title: str = "", constrained: bool = True) -> Figure:
@@ -73,13 +74,9 @@ def new_figure(width: float, height: float, title: str = "", constrained: bool =
     constrained : bool
         Let matplotlib make room for labels and legends; False keeps axes in place.
     """
-    figure = Figure(
-        figsize=(width, height),
-        dpi=DPI,
-        layout="constrained" if constrained else None,
-        facecolor="white",
-        edgecolor="white",
-    )
+    layout = "constrained" if constrained else None
+    white: Any = {"facecolor": "white", "edgecolor": "white"}
+    figure = Figure(figsize=(width, height), dpi=DPI, layout=layout, **white)
     if not constrained:
         figure.set_layout_engine("none")  # overrides the caller's layout setting
     FigureCanvasAgg(figure)
@@ -163,13 +160,8 @@ def line_style(index: int) -> dict:
 
 def ring(color: str, size: float = 4.5) -> dict[str, Any]:
     """Return the look of a white dot with a colored outline."""
-    return {
-        "linestyle": "none",
-        "marker": "o",
-        "markersize": size,
-        "markerfacecolor": "white",
-        "markeredgecolor": color,
-    }
+    dot = {"linestyle": "none", "marker": "o", "markersize": size}
+    return {**dot, "markerfacecolor": "white", "markeredgecolor": color}
 
 
 def key(label: str, **look: Any) -> Line2D:
@@ -211,16 +203,10 @@ def legend_below(
     rows = max(1, -(-len(handles) // columns))
     # only the layout engine can make room "outside"
     outside = isinstance(figure.get_layout_engine(), ConstrainedLayoutEngine)
-    figure.legend(
-        handles=list(handles),
-        loc="outside lower center" if outside else "lower center",
-        ncols=max(1, -(-len(handles) // rows)),  # fills the rows evenly
-        fontsize=TICK,
-        labelcolor=BLACK,
-        labelspacing=0.5,
-        frameon=False,
-        handlelength=2.6,
-    )
+    where = "outside lower center" if outside else "lower center"
+    columns = max(1, -(-len(handles) // rows))  # fills the rows evenly
+    look = {"fontsize": TICK, "handlelength": 2.6, **LEGEND}
+    figure.legend(handles=list(handles), loc=where, ncols=columns, **look)
 
 
 def finish(
