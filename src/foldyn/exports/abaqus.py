@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -19,11 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.exports.creased_shell import CreasedShell, creased_shell
+from foldyn.exports.creased_shell import CreasedShell, write_deck
 from foldyn.structures import Ply, Sheet
 from foldyn.structures.ply import pair
-from foldyn.values import choice, whole
-from foldyn.writing import write_text
+from foldyn.values import choice
 
 ELEMENTS = ("STRI3", "S3")
 SHEET = "SHEET"
@@ -54,11 +54,8 @@ def write(
     element : {"STRI3", "S3"}, optional
         Kind of the triangles; STRI3 is a thin shell, as in Foldyn.
     """
-    count = 6 if modes is None else whole("modes", modes, least=1)
     kind = ELEMENTS[0] if element is None else choice("element", element, ELEMENTS)
-    shell = creased_shell(case, divisions)
-    write_text("\n".join(chain(_deck(shell, count, kind), [""])), path)
-    return [path]
+    return write_deck(case, path, divisions, modes, partial(_deck, kind=kind))
 
 
 def _deck(shell: CreasedShell, count: int, kind: str) -> Iterator[str]:

@@ -8,7 +8,9 @@ rotation.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,7 @@ from foldyn.structures import Sheet
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.material_axes import material_axes, panel_axes
 from foldyn.values import whole
+from foldyn.writing import write_text
 
 DIVISIONS = 16  # gives frequencies of the case studies within 1 %
 
@@ -155,6 +158,16 @@ def creased_shell(case: Case, divisions: int | None = None) -> CreasedShell:
         forces=tuple(force[split.origin] * share[:, None] for force, _ in held.load_terms),
         masses=held.point_masses[split.origin] * share,
     )
+
+
+def write_deck(
+    case: Case, path: Path, divisions: int | None, modes: int | None,
+    lines: Callable[[CreasedShell, int], Iterator[str]],
+) -> list[Path]:  # fmt: skip
+    """Write the lines that a function makes of the creased shell and a number of frequencies."""
+    count = 6 if modes is None else whole("modes", modes, least=1)
+    write_text("\n".join([*lines(creased_shell(case, divisions), count), ""]), path)
+    return [path]
 
 
 def shares(count: int) -> NDArray:

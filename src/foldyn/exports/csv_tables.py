@@ -128,7 +128,8 @@ def _blocks(table: list[xr.DataArray], samples: NDArray[np.int64]) -> Iterator[I
             values = array[sample if len(array) > 1 else 0]
             spread = np.broadcast_to(values, (*inner, values.shape[-1]))
             for column in spread.reshape(-1, values.shape[-1]).T:
-                columns += _parts(column)
+                parts = (np.real(column), np.imag(column)) if np.iscomplexobj(column) else (column,)
+                columns += [part.tolist() for part in parts]
         yield zip(*columns, strict=True)
 
 
@@ -136,9 +137,3 @@ def _over(column: xr.DataArray, rows: Rows) -> xr.DataArray:
     """A variable with all row dimensions and the axis; dimensions it lacks get the length 1."""
     missing = [dim for dim in (*rows, "axis") if dim not in column.dims]
     return column.expand_dims(missing).transpose(*rows, "axis")
-
-
-def _parts(column: NDArray) -> list[list]:
-    """A column as lists of plain values: one list, or two if it is complex."""
-    parts = (np.real(column), np.imag(column)) if np.iscomplexobj(column) else (column,)
-    return [part.tolist() for part in parts]

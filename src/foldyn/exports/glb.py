@@ -49,19 +49,14 @@ class Content:
     document: dict[str, Any] = field(default_factory=lambda: {"accessors": [], "bufferViews": []})
     binary: bytearray = field(default_factory=bytearray)
 
-    def positions(self, points: NDArray, name: str = "") -> int:
-        """Add points (n, 3) of vertices, or their displacements; return the accessor's number."""
-        return self._add(points, "f4", _VERTICES, True, name)
-
-    def indices(self, numbers: ArrayLike, name: str = "") -> int:
+    def indices(self, numbers: ArrayLike) -> int:
         """Add vertex numbers of any shape; return the accessor's number."""
-        return self._add(np.ravel(numbers), "u4", _INDICES, False, name)
+        return self.add(np.ravel(numbers), "", "u4", _INDICES)
 
-    def numbers(self, values: ArrayLike, name: str = "") -> int:
-        """Add numbers of an animation; return the accessor's number."""
-        return self._add(np.ravel(values), "f4", None, True, name)
-
-    def _add(self, values: NDArray, kind: str, target: int | None, bounds: bool, name: str) -> int:
+    def add(
+        self, values: NDArray, name: str = "", kind: str = "f4", target: int | None = _VERTICES
+    ) -> int:
+        """Add an array, by default of points (n, 3); return the accessor's number."""
         own = np.ascontiguousarray(values, f"<{kind}")
         rows = own.reshape(len(own), -1)
         view = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": own.nbytes}
@@ -73,7 +68,7 @@ class Content:
             "count": len(own),
             "type": _SHAPE[rows.shape[1]],
         }
-        if bounds:
+        if kind == "f4":
             about |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
         self.document["accessors"].append(about | ({"name": name} if name else {}))
         return len(self.document["accessors"]) - 1
@@ -189,9 +184,9 @@ def _content(case: Case, shapes: Shapes, animations: list[Animation]) -> Content
     content, name = Content(), case.structure.pattern.name or "sheet"
     primitives, materials = _primitives(content, case)
     shared = {
-        "attributes": {"POSITION": content.positions(shapes.nodes, "nodes")},
+        "attributes": {"POSITION": content.add(shapes.nodes, "nodes")},
         "targets": [
-            {"POSITION": content.positions(moved, title)}
+            {"POSITION": content.add(moved, title)}
             for moved, title in zip(shapes.displacement, shapes.titles, strict=True)
         ],
     }
@@ -243,7 +238,8 @@ def _primitives(content: Content, case: Case) -> tuple[list[dict[str, Any]], lis
 
 
 def _animation(content: Content, animation: Animation) -> dict[str, Any]:
-    times, weights = content.numbers(animation.times), content.numbers(animation.weights)
+    values = animation.times, animation.weights.ravel()
+    times, weights = (content.add(each, target=None) for each in values)
     return {
         "name": animation.name,
         "samplers": [{"input": times, "output": weights, "interpolation": "LINEAR"}],

@@ -85,7 +85,12 @@ def write(
         "case_file": sections_of(result),
         "units": _texts(result, names, "units"),
         "labels": _texts(result, names, "long_name"),
-        "attributes": _named({key: _attribute(value) for key, value in result.attrs.items()}),
+        "attributes": _named(
+            {
+                key: str(value) if isinstance(value, str) else np.asarray(value, float)
+                for key, value in result.attrs.items()
+            }
+        ),
     }
     with whole(path) as part:
         savemat(part, _named(content), appendmat=False, long_field_names=True, oned_as="column")
@@ -121,10 +126,6 @@ def _faces(faces: Sequence[Sequence[int]]) -> NDArray[np.float64]:
 
 def _texts(result: xr.Dataset, names: Iterable[str], key: str) -> dict[str, str]:
     return _named({name: str(result[name].attrs.get(key, "")) for name in names})
-
-
-def _attribute(value: Any) -> Any:
-    return str(value) if isinstance(value, str) else np.asarray(value, float)
 
 
 def _named(content: dict[str, Any]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ direction is the rotation about the crease, in the crease's position at rest.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import chain
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +17,9 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.exports.creased_shell import CreasedShell, Joint, creased_shell
+from foldyn.exports.creased_shell import CreasedShell, Joint, write_deck
 from foldyn.structures.ply import pair
 from foldyn.structures.sheet import Sheet
-from foldyn.values import whole
-from foldyn.writing import write_text
 
 Command = tuple[Any, ...]
 """Name of an OpenSees command, followed by its arguments."""
@@ -151,14 +149,11 @@ def write(
     modes : int, optional
         How many frequencies; 6 by default.
     """
-    count = 6 if modes is None else whole("modes", modes, least=1)
-    shell = creased_shell(case, divisions)
-    lines = _script(shell, len(case.structure.pattern.vertices), count)
-    write_text("\n".join(chain(lines, [""])), path)
-    return [path]
+    vertices = len(case.structure.pattern.vertices)
+    return write_deck(case, path, divisions, modes, partial(_script, vertices=vertices))
 
 
-def _script(shell: CreasedShell, vertices: int, count: int) -> Iterator[str]:
+def _script(shell: CreasedShell, count: int, vertices: int) -> Iterator[str]:
     yield "# A creased shell, in SI units. Node k + 1 is node k of Foldyn, vertices first; further"
     yield "# nodes are those of other panels at the same place. Damping and histories play no part."
     yield "model basic -ndm 3 -ndf 6"
