@@ -7,6 +7,7 @@ import time
 import warnings
 from collections.abc import Callable, Mapping
 from contextvars import copy_context
+from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -129,12 +130,9 @@ class CaseSession:
             record=True, action="always", category=FoldynWarning
         ) as caught:
             answer = told(self.path, lambda: self._stage(wish))
-        notes = [str(one.message) for one in caught if issubclass(one.category, FoldynWarning)]
-        return {
-            **answer,
-            "notes": list(dict.fromkeys(notes)),
-            "seconds": time.perf_counter() - began,
-        }
+        told_of = (str(one.message) for one in caught if issubclass(one.category, FoldynWarning))
+        notes = list(dict.fromkeys(told_of))
+        return {**answer, "notes": notes, "seconds": time.perf_counter() - began}
 
     def _stage(self, wish: Any) -> Message:
         case_file, result = computed(self.path, self._document(wish), wish.get("compute"))
@@ -250,8 +248,7 @@ def _as_kind(path: Path, document: Document, kind: str) -> Document:
         return make(path, document)
 
 
-def _modes(path: Path, document: Document) -> Document:
-    return converted(path, document, "modes", "rest")
+_modes = partial(converted, kind="modes", state="rest")
 
 
 def _response(path: Path, document: Document) -> Document:
@@ -286,12 +283,8 @@ def _motion(path: Path, document: Document) -> Document:
     sampled: Document = {"every_steps": STEPS_A_SAMPLE}
     if document.get("model", {}).get("kind") == "superelements":  # which take any step
         steps, sampled = {}, {"interval": duration / SAMPLES}
-    shown = _kept(document)
-    return {
-        **shown,
-        "output": {**shown["output"], **sampled},
-        "analysis": {"kind": "dynamics", "duration": duration, **steps},
-    }
+    shown, analysis = _kept(document), {"kind": "dynamics", "duration": duration, **steps}
+    return {**shown, "output": {**shown["output"], **sampled}, "analysis": analysis}
 
 
 def _kept(document: Document) -> Document:

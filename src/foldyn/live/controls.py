@@ -66,11 +66,9 @@ class Control:
 
     def described(self) -> dict[str, Any]:
         """Description for the page."""
-        return {
-            "name": self.name, "group": self.place[0], "label": dotted(self.place[1:]),
-            "value": self.value, "low": self.low, "high": self.high, "unit": self.unit,
-            "counts": self.counts, "relative": self.relative,
-        }  # fmt: skip
+        own = {key: each for key, each in vars(self).items() if key != "place"}
+        group, *label = self.place
+        return {"name": self.name, "group": group, "label": dotted(label), **own}
 
 
 def controls(document: Mapping[str, Any]) -> list[Control]:
