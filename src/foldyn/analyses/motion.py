@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -221,25 +222,25 @@ class MotionAnalysis(Analysis):
         )
 
 
+@dataclass(eq=False)
 class MotionComputation:
     """A checked motion, which may be stored while it runs.
 
     Attributes
     ----------
     motion : Motion or LinearMotion
+    kept : Keeping or None
+        How it is stored.
+    shown : bool
+        Whether its whole result is loaded for figures, and so must fit in memory.
     integrated : bool
         Whether it was integrated in a batch with others beforehand.
     """
 
-    def __init__(self, motion: Any) -> None:
-        self.motion = motion
-        self.kept: Keeping | None = None
-        self.shown = True  # whether the whole result is loaded for figures
-        self.integrated = False
-
-    def keep(self, keeping: Keeping, shown: bool) -> None:
-        """Set how it is stored, and whether its result will be shown and so must fit in memory."""
-        self.kept, self.shown = keeping, shown
+    motion: Any
+    kept: Keeping | None = None
+    shown: bool = True
+    integrated: bool = False
 
     def __call__(self, progress: bool, begun: Begun) -> xarray.Dataset:
         """The result, integrated, or as it was finished before."""

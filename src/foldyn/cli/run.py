@@ -119,8 +119,9 @@ def _keep(task: list[Computation], folder: Path, given: Namespace) -> None:
     for one in task:
         if isinstance(one.compute, MotionComputation):
             how = "--resume", "--replace"
-            keeping = Keeping(folder / one.file, seconds or SECONDS, resume, given.replace, how)
-            one.compute.keep(keeping, not given.no_figures)
+            file = folder / one.file
+            one.compute.kept = Keeping(file, seconds or SECONDS, resume, given.replace, how)
+            one.compute.shown = not given.no_figures
         elif resume or seconds is not None:
             option = "--resume" if resume else "--checkpoint"
             raise InputError(f"{option}: only motions have checkpoints; leave it out")
