@@ -20,7 +20,7 @@ from foldyn.analyses.keys import replaced
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.errors import InputError
 from foldyn.experiment import Fit, ForceDisplacement, Measurement, Shapes, TimeHistory
-from foldyn.linear import peaks_of
+from foldyn.linear import Peak, peaks_of
 from foldyn.signals import log_decrement, spectrum
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import BAND, FRONT, FULL, SUPPORTS, WATCHED
@@ -355,24 +355,7 @@ def content_misfit(film: NDArray[np.float64], model: NDArray[np.float64], step: 
     return float(deviation(said[1][:, None], measured[1][:, None])[0])
 
 
-@dataclass(frozen=True)
-class Response:
-    """Peaks of a frequency response at a corner of the top, along the axis.
-
-    Attributes
-    ----------
-    frequencies : tuple of float
-        Hz.
-    damping : tuple of float
-        Damping ratios from half-power points by the textbook formula; nan without such points.
-    """
-
-    frequencies: tuple[float, ...]
-    damping: tuple[float, ...]
-
-    @classmethod
-    def of(cls, found: xr.Dataset) -> Response:
-        """Peaks of a result of `foldyn.frf`."""
-        every = peaks_of(found, CORNER, axis="x", prominence=0.02)
-        peaks = [one for one in every if one.frequency < HIGHEST]
-        return cls(tuple(p.frequency for p in peaks), tuple(p.textbook for p in peaks))
+def corner_peaks(response: xr.Dataset) -> list[Peak]:
+    """Peaks of a result of `foldyn.frf` at a corner of the top, along the axis."""
+    every = peaks_of(response, CORNER, axis="x", prominence=0.02)
+    return [one for one in every if one.frequency < HIGHEST]

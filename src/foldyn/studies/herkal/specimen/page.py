@@ -23,7 +23,7 @@ from foldyn.results import case_of, load, netcdf
 from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import BAND, DAMPING, FOLDS, WATCHED
 from foldyn.studies.herkal.specimen import evaluation, synthetic, tasks
-from foldyn.studies.herkal.specimen.evaluation import CORNER, FILM_SUPPORT, Response
+from foldyn.studies.herkal.specimen.evaluation import CORNER, FILM_SUPPORT, corner_peaks
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.tasks import Part
 from foldyn.studies.herkal.targets import Target, read_targets
@@ -111,7 +111,7 @@ def plot_responses(
     for k, (name, found) in enumerate(responses.items()):
         size = 1e3 * np.abs(found["receptance"].sel(node=CORNER, axis="x").values)
         axes.plot(found["frequency"].values, size, **style.line_style(k), label=name)
-        spots = Response.of(found).frequencies
+        spots = [peak.frequency for peak in corner_peaks(found)]
         heights = np.interp(spots, found["frequency"].values, size)
         axes.plot(spots, heights, "o", color=style.CYCLE[k], markersize=4)
     for k, frequency in enumerate(peaks):
@@ -407,15 +407,15 @@ def _air_table(modes: xr.Dataset, in_air: xr.Dataset, names: Sequence[str]) -> T
 
 
 def _response_table(responses: Mapping[str, xr.Dataset], paper: Mapping[str, Target]) -> Table:
-    found = [Response.of(one) for one in responses.values()]
+    found = [corner_peaks(one) for one in responses.values()]
     rows: list[list[Any]] = []
     for k, which in enumerate(ORDINALS):
-        values = [_at(one.frequencies, k) for one in found]
+        values = [cell(one[k].frequency) if k < len(one) else None for one in found]
         target = paper[f"frf_{which}_peak"]
         rows.append([f"{target.what} (Hz)", target.value, *values])
     for k, which in enumerate(ORDINALS[1:], 1):
         target = paper[f"half_power_{which}"]
-        values = [_at(one.damping, k, 100.0) for one in found]
+        values = [cell(100.0 * one[k].textbook) if k < len(one) else None for one in found]
         rows.append([f"{target.what} (%)", target.value, *values])
     return Table(
         ["", "paper", "the paper's parameters, here", "the same in air", "fitted parameters"], rows,
@@ -423,7 +423,3 @@ def _response_table(responses: Mapping[str, xr.Dataset], paper: Mapping[str, Tar
         "in air.",
         digits=3,
     )  # fmt: skip
-
-
-def _at(values: Sequence[float], k: int, factor: float = 1.0) -> float | None:
-    return cell(factor * values[k]) if k < len(values) else None
