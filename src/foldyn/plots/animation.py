@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import scene, style
-from foldyn.plots.modes import ShownModes
+from foldyn.plots.modes import shown_modes
 from foldyn.plots.readings import case_from_result, check_path, displacements, stretches, way
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, between, edge_keys, side_by_side
@@ -238,11 +238,11 @@ def animate_modes(
         ffmpeg could not write the file.
     """
     path = checked_file(path, frames, fps)
-    shown = ShownModes.of(case_or_structure, modes, which, amplitude, names)
-    rest, swings = shown.sheet.nodes, shown.swings
+    sheet, swings, captions, notes = shown_modes(case_or_structure, modes, which, amplitude, names)
+    rest = sheet.nodes
     extent = np.concatenate([rest + swings, rest - swings]).reshape(-1, 3)
     figure, sheets = side_by_side(
-        shown.sheet, rest + swings, shown.captions, View(*view), shown.notes, title, extent,
+        sheet, rest + swings, captions, View(*view), notes, title, extent,
         width=_WIDTH, most_columns=_COLUMNS,
     )  # fmt: skip
     with filmed(figure, path, fps) as writer:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -74,17 +74,18 @@ def draw_modes(
     InputError
         The modes belong to another structure, or a mode does not exist.
     """
-    shown = ShownModes.of(case_or_structure, modes, which, amplitude, names)
-    positions = shown.sheet.nodes + shown.swings
-    return side_by_side(shown.sheet, positions, shown.captions, View(*view), shown.notes, title)[0]
+    sheet, swings, captions, notes = shown_modes(case_or_structure, modes, which, amplitude, names)
+    return side_by_side(sheet, sheet.nodes + swings, captions, View(*view), notes, title)[0]
 
 
-@dataclass(frozen=True)
-class ShownModes:
-    """Mode shapes as figures and films show them, with captions and legend.
+def shown_modes(
+    case_or_structure: Case | Structure, modes: xr.Dataset, which: Sequence[int] | None,
+    amplitude: float | None, names: Mapping[int, str] | xr.Dataset | None,
+) -> tuple[Sheet3D, Points, list[str], list[Line2D]]:  # fmt: skip
+    """Mode shapes as figures and films show them.
 
-    Attributes
-    ----------
+    Returns
+    -------
     sheet : Sheet3D
         The sheet in the state about which it oscillates.
     swings : ndarray, shape (k, n, 3)
@@ -93,28 +94,12 @@ class ShownModes:
     notes : list of Line2D
         Legend entries.
     """
-
-    sheet: Sheet3D
-    swings: Points
-    captions: list[str]
-    notes: list[Line2D]
-
-    @classmethod
-    def of(
-        cls,
-        case_or_structure: Case | Structure,
-        modes: xr.Dataset,
-        which: Sequence[int] | None,
-        amplitude: float | None,
-        names: Mapping[int, str] | xr.Dataset | None,
-    ) -> ShownModes:
-        """Choose and scale modes."""
-        drawn = Sheet3D.of(case_or_structure)
-        numbers = chosen_modes(modes, which)
-        sheet, swings, notes = about_state(drawn, modes, numbers, amplitude, "modes: they have")
-        named = mode_names(sheet, modes, names)
-        captions = [describe_mode(modes, number, named.get(number, "")) for number in numbers]
-        return cls(sheet, swings, captions, notes)
+    drawn = Sheet3D.of(case_or_structure)
+    numbers = chosen_modes(modes, which)
+    sheet, swings, notes = about_state(drawn, modes, numbers, amplitude, "modes: they have")
+    named = mode_names(sheet, modes, names)
+    captions = [describe_mode(modes, number, named.get(number, "")) for number in numbers]
+    return sheet, swings, captions, notes
 
 
 def about_state(
