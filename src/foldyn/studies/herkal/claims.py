@@ -20,10 +20,6 @@ BAND = (1.4, 2.4)  # Hz: band in which second peaks are sought
 PROMINENCE = 0.01  # smallest prominence of a peak, relative to the highest amplitude
 
 
-def _motion(study: Study, case: str, model: str) -> xarray.Dataset:
-    return study.motions(case)[model]
-
-
 def _edge(motion: xarray.Dataset) -> NDArray:
     """Displacement (time, nodes) of the reported nodes of case 1."""
     nodes, axis, _ = reported("case1")
@@ -32,7 +28,7 @@ def _edge(motion: xarray.Dataset) -> NDArray:
 
 def _asymmetry(study: Study, models: Iterable[str]) -> float:
     """Largest difference between the motions of the two nodes of case 1, among some models."""
-    moved = [_edge(_motion(study, "case1", model)) for model in models]
+    moved = [_edge(study.motions("case1")[model]) for model in models]
     return max(
         float(np.linalg.norm(x[:, 0] - x[:, 1]) / np.linalg.norm(x.mean(axis=1))) for x in moved
     )
@@ -40,7 +36,7 @@ def _asymmetry(study: Study, models: Iterable[str]) -> float:
 
 def second_peak_case1(study: Study) -> float:
     """Peak (Hz) of the spectrum of the difference between the two nodes (equi-inertial masses)."""
-    motion = _motion(study, "case1", "equi_inertial")
+    motion = study.motions("case1")["equi_inertial"]
     x = _edge(motion)
     found = content_of(motion["time"].values, x[:, 0] - x[:, 1])
     return strongest_peak(*found, (0.0, UP_TO), PROMINENCE)
@@ -48,7 +44,7 @@ def second_peak_case1(study: Study) -> float:
 
 def _second_peak(study: Study, case: str) -> float:
     """Second peak (Hz) of the shell, all reported nodes together."""
-    frequency, amplitude = content(_motion(study, case, REFERENCE), *reported(case))
+    frequency, amplitude = content(study.motions(case)[REFERENCE], *reported(case))
     return strongest_peak(frequency, np.linalg.norm(amplitude, axis=1), BAND, PROMINENCE)
 
 
