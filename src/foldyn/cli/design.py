@@ -8,10 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.folder import Owner, Results, drawing, held
+from foldyn.cli.folder import Results, add_page, held_by
 from foldyn.cli.options import add, add_figures, add_results, integer
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
-from foldyn.plots import FIGURES
 
 if TYPE_CHECKING:
     from foldyn.designs import Course, Design
@@ -19,11 +18,7 @@ if TYPE_CHECKING:
 
 WRITTEN = ("design.nc", "history.csv", "designed.toml")
 KEPT = "evaluations"
-DRAWN = [
-    "report.html",
-    *(f"{name}.{form}" for name in ("convergence", "before", "after") for form in FIGURES),
-    *(f"sensitivity-*.{form}" for form in FIGURES),
-]
+DRAWN = "convergence", "before", "after", "sensitivity-*"
 
 
 def add_design(commands: Any) -> None:
@@ -48,6 +43,7 @@ def add_design(commands: Any) -> None:
 
 def run_design(given: argparse.Namespace) -> Path:
     """Run `foldyn design`; return the results folder."""
+    from foldyn.designs.page import write_design
     from foldyn.designs.run_design import planned, write_case
     from foldyn.studies import find_case
 
@@ -56,15 +52,13 @@ def run_design(given: argparse.Namespace) -> Path:
     changes = {name: getattr(given, name) for name in ("method", "searches", "seed")}
     changes = {name: value for name, value in changes.items() if value is not None}
     case_file, plan = planned(path, changes)
-    folder = Path(f"{path.stem}-design" if given.out is None else given.out)
-    names = [*WRITTEN, *([] if given.no_figures else ["report.html"])]
-    owner = Owner.of("design", path, folder)
     say = speech(given.quiet)
     goal = "minimize" if plan.problem.sign > 0.0 else "maximize"
     count = len(plan.space.lower)
     say(f"{case_file.heading}: {goal} {plan.problem.objective.text} by {count} "
         f"number{'s' * (count > 1)} ({plan.method})")  # fmt: skip
-    with held(folder, given.out, names, owner, given.replace, DRAWN, [KEPT]) as results:
+    with held_by(given, "design", path, WRITTEN, DRAWN, KEPT) as results:
+        folder = results.folder
         with noted_warnings() as noted:
             found = _searched(plan, results, given.quiet)
         spent = clock.spent()
@@ -73,14 +67,8 @@ def run_design(given: argparse.Namespace) -> Path:
             results.keep(name, found.save)
         results.keep(WRITTEN[2], partial(write_case, case_file, found.parameters))
         say(f"wrote {folder / WRITTEN[0]}")
-        if not given.no_figures:
-            from foldyn.analyses.provenance import Call
-            from foldyn.designs.page import write_design
-
-            with drawing(folder):
-                call = Call(given.typed, tuple(noted), **spent)
-                page = write_design(found, plan, folder, case_file, call, given.figures)
-                say(f"wrote {page}")
+        page = partial(write_design, found, plan, folder, case_file)
+        add_page(given, folder, noted, spent, page)
     return folder
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import argparse
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.folder import Owner, Results, drawing, held
+from foldyn.cli.folder import Results, add_page, held_by
 from foldyn.cli.options import add, add_figures, add_results, halves, integer, number
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import InputError
-from foldyn.plots import FIGURES
 from foldyn.values import parsed
 
 if TYPE_CHECKING:
@@ -23,10 +23,7 @@ WRITTEN = ("fit.json", "fit.nc", "fitted.toml")
 KEPT = "evaluations"
 NOTED = 0.05
 """The part of an interval that is due to discretization is reported above this share."""
-DRAWN = [
-    "report.html",
-    *(f"{n}.{form}" for n in ("correlation", "data-[0-9]", "data-[0-9][0-9]") for form in FIGURES),
-]
+DRAWN = "correlation", "data-[0-9]", "data-[0-9][0-9]"
 
 
 def add_fit(commands: Any) -> None:
@@ -62,13 +59,13 @@ def add_fit(commands: Any) -> None:
 
 def run_fit(given: argparse.Namespace) -> Path:
     """Run `foldyn fit`; return the results folder."""
+    from foldyn.experiment.calibration.fit_page import write_fit
+
     clock = Clock.now()
     plan = plan_of(given)
-    folder = Path(f"{plan.path.stem}-fit" if given.out is None else given.out)
-    names = [*WRITTEN, *([] if given.no_figures else ["report.html"])]
-    owner = Owner.of("fit", plan.path, folder)
     say = speech(given.quiet)
-    with held(folder, given.out, names, owner, given.replace, DRAWN, [KEPT]) as results:
+    with held_by(given, "fit", plan.path, WRITTEN, DRAWN, KEPT) as results:
+        folder = results.folder
         with noted_warnings() as noted:
             found = _fit(plan, results, given.quiet)
         spent = clock.spent()
@@ -84,14 +81,8 @@ def run_fit(given: argparse.Namespace) -> Path:
         for name, write in zip(WRITTEN, (found.save, found.save, found.write_case), strict=True):
             results.keep(name, write)
         say(f"wrote {folder / WRITTEN[0]}")
-        if not given.no_figures:
-            from foldyn.analyses.provenance import Call
-            from foldyn.experiment.calibration.fit_page import write_fit
-
-            with drawing(folder):
-                call = Call(given.typed, tuple(noted), **spent)
-                page = write_fit(found, folder, plan.title, call=call, figures=given.figures)
-                say(f"wrote {page}")
+        page = partial(write_fit, found, folder, plan.title)
+        add_page(given, folder, noted, spent, page)
     return folder
 
 

@@ -7,21 +7,24 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from argparse import Namespace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from foldyn import __version__
 from foldyn.cli.signals import ENDINGS
-from foldyn.errors import ComputationError, FoldynError, InputError
+from foldyn.cli.streams import speech
+from foldyn.errors import ComputationError, FoldynError, InputError, Told
 from foldyn.input_files import file_digest
 from foldyn.lock import LockedError, locked
+from foldyn.plots import FIGURES
 from foldyn.studies import shipped_cases
 from foldyn.writing import remove_leftovers, write_bytes, write_text
 
-LOCK = ".foldyn.lock"
+LOCK, PAGE = ".foldyn.lock", "report.html"
 _RESULT = re.compile(r"result(-\w+)?\.nc")
 
 
@@ -315,6 +318,36 @@ def held(
             f"{_place(folder, out)}: another run writes to it ({error}); wait for its end, or name "
             "another folder"
         ) from None
+
+
+def held_by(
+    given: Namespace, command: str, path: Path, written: Sequence[str], drawn: Sequence[str],
+    kept: str,
+) -> AbstractContextManager[Results]:  # fmt: skip
+    """Lock the results folder of a command on a file; see `held`.
+
+    written : files that the command writes, without its page.
+    drawn : glob patterns for figures, without their suffixes.
+    kept : subfolder that the command writes to.
+    """
+    folder = Path(f"{path.stem}-{command}" if given.out is None else given.out)
+    names = [*written, *([] if given.no_figures else [PAGE])]
+    figures = [PAGE, *(f"{name}.{form}" for name in drawn for form in FIGURES)]
+    owner = Owner.of(command, path, folder)
+    return held(folder, given.out, names, owner, given.replace, figures, [kept])
+
+
+def add_page(
+    given: Namespace, folder: Path, noted: Told, spent: Mapping[str, float],
+    write: Callable[..., Path],
+) -> None:  # fmt: skip
+    """Write the page of results with the warnings noted and the time spent, if it is asked for."""
+    from foldyn.analyses.provenance import Call
+
+    if not given.no_figures:
+        with drawing(folder):
+            call = Call(given.typed, tuple(noted), **spent)
+            speech(given.quiet)(f"wrote {write(call=call, figures=given.figures)}")
 
 
 @contextmanager

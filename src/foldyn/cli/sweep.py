@@ -10,11 +10,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.folder import Owner, Results, drawing, held
+from foldyn.cli.folder import Results, add_page, held_by
 from foldyn.cli.options import add, add_figures, add_results, halves, integer
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import ComputationError, InputError
-from foldyn.plots import FIGURES
 
 if TYPE_CHECKING:
     import xarray
@@ -23,10 +22,7 @@ if TYPE_CHECKING:
     from foldyn.sweeps.run_sweep import Course
 
 RESULT, KEPT = "sweep.nc", "points"
-DRAWN = [
-    "report.html",
-    *(f"{name}-*.{form}" for name in ("map", "lines", "effects", "indices") for form in FIGURES),
-]
+DRAWN = "map-*", "lines-*", "effects-*", "indices-*"
 OFTEN = 30.0
 """Seconds between lines of progress when output is not a terminal."""
 MOST_NAMED = 5
@@ -84,16 +80,15 @@ def run_sweep(given: argparse.Namespace) -> Path:
     from foldyn.results import save
     from foldyn.results.sweep_dataset import has_values
     from foldyn.studies import find_case
+    from foldyn.sweeps.page import write_sweep
 
     clock = Clock.now()
     path = find_case(given.case)
     plan = _plan(path, given)
-    folder = Path(f"{path.stem}-sweep" if given.out is None else given.out)
-    names = [RESULT, *([] if given.no_figures else ["report.html"])]
-    owner = Owner.of("sweep", path, folder)
     say = speech(given.quiet)
     say(_introduction(plan))
-    with held(folder, given.out, names, owner, given.replace, DRAWN, [KEPT]) as results:
+    with held_by(given, "sweep", path, [RESULT], DRAWN, KEPT) as results:
+        folder = results.folder
         with noted_warnings(None if given.no_figures else path) as noted:
             found = _swept(plan, given, results, say)
         spent = clock.spent()
@@ -105,14 +100,8 @@ def run_sweep(given: argparse.Namespace) -> Path:
                 f"all {found.attrs['points']} points failed, the first with: "
                 f"{found['failure'].values.flat[0]}"
             )
-        if not given.no_figures:
-            from foldyn.analyses.provenance import Call
-            from foldyn.sweeps.page import write_sweep
-
-            with drawing(folder):
-                call = Call(given.typed, tuple(noted), **spent)
-                page = write_sweep(found, folder, plan.case_file, call, given.figures)
-                say(f"wrote {page}")
+        page = partial(write_sweep, found, folder, plan.case_file)
+        add_page(given, folder, noted, spent, page)
     return folder
 
 
