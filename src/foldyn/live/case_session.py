@@ -238,11 +238,9 @@ def _curve_of_motions(case_file: CaseFile) -> xr.Dataset:
 
 def _as_kind(path: Path, document: Document, kind: str) -> Document:
     """Convert the document to a kind; if it has another kind, use settings that compute quickly."""
-    if document["analysis"]["kind"] == kind == "bands":  # a single state: sliders vary it
+    if document["analysis"]["kind"] == kind:  # of bands a single state: sliders vary it
         analysis = {k: value for k, value in document["analysis"].items() if k != "vary"}
         return {**document, "analysis": analysis}
-    if document["analysis"]["kind"] == kind:
-        return document
     make = {"modes": _modes, "frf": _response, "statics": _curve, "dynamics": _motion}[kind]
     with quietly():  # settings without meaning for this kind are left out
         return make(path, document)

@@ -151,11 +151,8 @@ def color_bar(figure: Figure, drawn: ScalarMappable, label: str, **place: Any) -
 
 def line_style(index: int) -> dict:
     """Return color, dashes and width of the curve number `index`."""
-    return {
-        "color": CYCLE[index % len(CYCLE)],
-        "linestyle": DASHES[(index + index // len(CYCLE)) % len(DASHES)],
-        "linewidth": 1.1,
-    }
+    dashes = DASHES[(index + index // len(CYCLE)) % len(DASHES)]
+    return {"color": CYCLE[index % len(CYCLE)], "linestyle": dashes, "linewidth": 1.1}
 
 
 def ring(color: str, size: float = 4.5) -> dict[str, Any]:

@@ -115,12 +115,9 @@ def rest_stage(shown: Pattern | Case, title: str) -> Stage:
     bare = isinstance(shown, Pattern)
     drawn = bare_sheet(arrays, "s0", shown) if bare else sheet(arrays, "s0", shown)
     count = len(shown.vertices if bare else shown.structure.nodes)
-    result = {
-        "name": title,
-        "sheet": "s0",
-        "displacement": arrays.changing("u", np.zeros((1, count, 3)), 1.0),
-        "moments": arrays.exact("t", [0.0], "f4"),
-    }
+    result: dict[str, Any] = {"name": title, "sheet": "s0"}
+    result["displacement"] = arrays.changing("u", np.zeros((1, count, 3)), 1.0)
+    result["moments"] = arrays.exact("t", [0.0], "f4")
     about = {
         "title": title, "kind": "shape", "version": __version__, "node": None, "axis": 0,
         "sheets": {"s0": drawn}, "results": [result],

@@ -123,17 +123,13 @@ def released_case(
     save(pressed([press / FULL], changes), folder / "pressed.nc")
     document = replaced(read_document(find_case("herkal/specimen-release")), changes or {})
     del document["loads"]
+    motion = {"kind": "dynamics", "method": "generalized_alpha", "dt": step, "duration": duration}
     document |= {
         "title": "The paper specimen released",
         "supports": SUPPORTS[support],
         "initial": {"file": "pressed.nc"},
         "damping": {key.removeprefix("damping."): value for key, value in DAMPING.items()},
-        "analysis": {
-            "kind": "dynamics",
-            "method": "generalized_alpha",
-            "dt": step,
-            "duration": duration,
-        },
+        "analysis": motion,
         "output": {"nodes": [WATCHED], "axis": "x", "interval": step},
     }
     path = folder / "released.toml"

@@ -125,7 +125,7 @@ def ranks(values: Mapping[str, float]) -> dict[str, int]:
 def best(values: Mapping[str, float]) -> str:
     """Name of the model with the smallest error, or ""."""
     known = {name: value for name, value in values.items() if np.isfinite(value)}
-    return min(known, key=known.__getitem__) if known else ""
+    return min(known, key=known.__getitem__, default="")
 
 
 def rank_correlation(a: Mapping[str, float], b: Mapping[str, float]) -> float:

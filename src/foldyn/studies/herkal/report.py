@@ -143,12 +143,10 @@ def rank_table(study: Study) -> Table:
     """Table of the mean rank of each distribution, in the paper and in ours."""
     models, paper = study.plan.models, {c: paper_table()[c] for c in study.plan.cases}
     theirs, ours = mean_ranks(paper, RULES), mean_ranks(study.table(), models)
-    return Table(
-        ["model", "mean rank, paper", "mean rank, here"],
-        [[label, theirs.get(m), cell(ours[m])] for m, label in models.items()],
-        f"Mean rank over {len(study.plan.cases)} cases (1 is best).",
-        digits=3,
-    )
+    header = ["model", "mean rank, paper", "mean rank, here"]
+    rows = [[label, theirs.get(m), cell(ours[m])] for m, label in models.items()]
+    caption = f"Mean rank over {len(study.plan.cases)} cases (1 is best)."
+    return Table(header, rows, caption, digits=3)
 
 
 def _claims(study: Study) -> Table:
@@ -247,17 +245,14 @@ def _plot_statics(
 
 
 def _errors(study: Study, case: str, nodes: list[int]) -> Table:
-    errors = {m: study.node_errors(case, m) for m in study.plan.models}
-    return Table(
-        ["model", *[f"node {n}" for n in nodes], "mean"],
-        [
-            [study.plan.models[m], *e.tolist(), float(e.mean())]
-            for m, e in errors.items()
-            if e is not None
-        ],
-        "Error of the frequency content against the shell, per node.",
-        digits=3,
-    )
+    rows = [
+        [label, *errors.tolist(), float(errors.mean())]
+        for model, label in study.plan.models.items()
+        if (errors := study.node_errors(case, model)) is not None
+    ]
+    header = ["model", *[f"node {n}" for n in nodes], "mean"]
+    caption = "Error of the frequency content against the shell, per node."
+    return Table(header, rows, caption, digits=3)
 
 
 def _modes(study: Study, case: str) -> Table:
