@@ -23,15 +23,7 @@ from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of
 from foldyn.errors import ComputationError, InputError, warn
-from foldyn.linear.bloch import (
-    Bloch,
-    Hops,
-    collected,
-    hermitian,
-    hops,
-    null_space,
-    steps_of,
-)
+from foldyn.linear.bloch import Bloch, Hops, collected, hermitian, hops, null_space, steps_of
 from foldyn.linear.cell_patch import Patch, cell_patch
 from foldyn.linear.linearized import amplitude_of, damped_tangent, slope_change
 from foldyn.linear.unit_cell import UnitCell, check_commuting, images, rotation

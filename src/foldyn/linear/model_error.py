@@ -162,9 +162,7 @@ def warn_of(own: Judged, elastic: NDArray) -> None:
 def _warn(doubts: str) -> None:
     if doubts:
         warn(
-            f"{doubts}: {LINEAR}",
-            "superelements.md#bars-and-hinges-beside-them",
-            ModelRangeWarning,
+            f"{doubts}: {LINEAR}", "superelements.md#bars-and-hinges-beside-them", ModelRangeWarning
         )
 
 

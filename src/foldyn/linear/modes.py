@@ -25,12 +25,7 @@ from foldyn.condensation import Superelements
 from foldyn.dynamics.modal_damping import mass_of
 from foldyn.errors import StretchWarning, quietly, warn
 from foldyn.linear.hereditary import Branches, damped_mode
-from foldyn.linear.level_error import (
-    first_doubtful,
-    frequency_errors,
-    other_level,
-    warn_of_errors,
-)
+from foldyn.linear.level_error import first_doubtful, frequency_errors, other_level, warn_of_errors
 from foldyn.linear.linearized import Linearized, linearize, numbered, warn_beyond
 from foldyn.linear.model_error import ALONE, SPARE, Beside, Judged, beside, judged, warn_of
 from foldyn.ram_limit import check_memory

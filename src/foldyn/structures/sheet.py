@@ -174,9 +174,7 @@ class Sheet(Checked):
     density: Density | None = None
     length_scale_ratio: Annotated[float, Check(number, above=0.0)] = 1.0
     panels: Annotated[
-        Sequence[PanelSheet],
-        Check(objects, kinds=(PanelSheet,)),
-        Read(ListOf(TableOf(PanelSheet))),
+        Sequence[PanelSheet], Check(objects, kinds=(PanelSheet,)), Read(ListOf(TableOf(PanelSheet)))
     ] = ()
     strength: Modulus | None = None
     shear_modulus: Modulus | None = None
