@@ -12,7 +12,7 @@ from scipy import sparse
 from foldyn.algebra.load_factors import LoadFactors, Softening
 from foldyn.algebra.reduction import Reduction
 from foldyn.algebra.solvers import factorizer
-from foldyn.algebra.superlu import SingularTangentError, Solution, Unsymmetric
+from foldyn.algebra.superlu import SingularTangentError, Solution, unsymmetric
 from foldyn.cases import Case, Load
 from foldyn.dynamics.modal_damping import soft_at_rest
 from foldyn.errors import ComputationError, InputError, warn
@@ -74,18 +74,15 @@ class Base:
 
     def _linearize(self) -> None:
         """Find the tangent and its change at the station."""
-        problem, self.u, self.factor = (
-            self.problem,
-            self._station.point.u,
-            self._station.point.factor,
-        )
+        problem, point = self.problem, self._station.point
+        self.u, self.factor = point.u, point.factor
         self._refuse_soft()
         matrix = self.tangent(self.u, self.factor)
         block = self._reduce(matrix)
         try:
             factors = self._factorize(block.symmetric)
             negative = factors.negative()
-            exact = factors if block.is_symmetric else Unsymmetric(block.exact)
+            exact = factors if block.is_symmetric else unsymmetric(block.exact)
         except SingularTangentError:
             raise unstable("is singular", self._preloaded) from None
         if negative:
@@ -166,10 +163,8 @@ class Base:
         return most
 
     def _refuse_soft(self) -> None:
-        case, problem = self.problem.case, self.problem
-        soft = int(
-            soft_at_rest(case, problem.body(self.u, self.factor), problem.dofs(self.u))[0].sum()
-        )
+        problem, body = self.problem, self.problem.body(self.u, self.factor)
+        soft = int(soft_at_rest(problem.case, body, problem.dofs(self.u))[0].sum())
         if soft:
             raise InputError(
                 f": {soft} hinges of the superlinear law stand at their rest angle, where their "
