@@ -32,7 +32,6 @@ from foldyn.patterns.topology import Edge, edge_lookup
 from foldyn.shells.recovery import StressPoints
 from foldyn.shells.shell import LEAST, PER_DOUBLING
 from foldyn.structures import Sheet
-from foldyn.structures.beyond_range import doubt_units
 from foldyn.structures.calibration import (
     Folds,
     PerCrease,
@@ -43,7 +42,7 @@ from foldyn.structures.calibration import (
 )
 from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.discretize import checked_kinds
-from foldyn.structures.discretized import Discretized, Distributed, HingeKind, read_only
+from foldyn.structures.discretized import Discretized, Distributed, read_only
 from foldyn.structures.graded import grading
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.material_axes import material_axes
@@ -111,7 +110,6 @@ class Superelements(Discretized):
     kind: ClassVar[str] = "superelements"
     linear: ClassVar[str] = "superelements"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
-    bar_law: ClassVar[None] = None
     fill: ClassVar[Fill] = Fill(PER_DOUBLING, LEAST, "level", "take a lower one")
 
     def __repr__(self) -> str:
@@ -139,17 +137,6 @@ class Superelements(Discretized):
     def bars(self) -> NDArray:
         """Edges of the pattern."""
         return read_only(self.pattern.lines.copy())
-
-    @cached_property
-    def centers(self) -> NDArray:
-        """No panel has a center node."""
-        return np.full(len(self.pattern.faces), -1)
-
-    @property
-    def hinge_kinds(self) -> tuple[HingeKind, ...]:
-        """The folds, with their law."""
-        ends = self.pattern.creases
-        return (HingeKind("fold", self.fold_law, ends, self.fold_stiffness, self.fold_rest),)
 
     @cached_property
     def mass(self) -> sparse.csr_array:
@@ -409,7 +396,6 @@ def superelements(
     <Superelements: 2 panels, 1 folds, level 1, 114 dofs>
     """
     pattern, sheet = checked_kinds(pattern, sheet)
-    doubt_units(pattern, sheet)
     level = whole("level", level, least=1, most=len(LEVELS))
     if divisions is not None:
         divisions = whole("divisions", divisions, least=4)

@@ -34,7 +34,7 @@ from foldyn.shells.mesh import (
 from foldyn.shells.recovery import Recovery, StressPoints, forces, recovery
 from foldyn.shells.term import GROUPS, ShellTerm
 from foldyn.structures import Sheet
-from foldyn.structures.beyond_range import doubt_locking, doubt_units
+from foldyn.structures.beyond_range import doubt_locking
 from foldyn.structures.calibration import (
     Folds,
     PerCrease,
@@ -45,7 +45,7 @@ from foldyn.structures.calibration import (
 )
 from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.discretize import checked_kinds
-from foldyn.structures.discretized import Discretized, HingeKind, read_only
+from foldyn.structures.discretized import Discretized, read_only
 from foldyn.structures.edge_angles import EdgePlates, plates_model
 from foldyn.structures.graded import Grading, grading, smooth_vertices
 from foldyn.structures.mass import MASS_RULES
@@ -135,7 +135,6 @@ class Shell(Discretized):
 
     kind: ClassVar[str] = "shell"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
-    bar_law: ClassVar[None] = None
 
     @property
     def massless(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -146,17 +145,6 @@ class Shell(Discretized):
     def fill(self) -> Fill:
         """Memory needed for the factors of the tangent."""
         return Fill(PER_DOUBLING, LEAST, f"divisions = {self.options.divisions}", "take fewer")
-
-    @property
-    def hinge_kinds(self) -> tuple[HingeKind, ...]:
-        """The folds, with their law."""
-        ends = self.pattern.creases  # hinges are pieces of creases
-        return (HingeKind("fold", self.fold_law, ends, self.fold_stiffness, self.fold_rest),)
-
-    @cached_property
-    def centers(self) -> NDArray:
-        """No panel has a center node."""
-        return np.full(len(self.pattern.faces), -1)
 
     @cached_property
     def body(self) -> Assembly:
@@ -485,7 +473,6 @@ def shell(
     <Shell: 45 nodes, 64 triangles, 1 folds, mass lumped>
     """
     pattern, sheet = checked_kinds(pattern, sheet)
-    doubt_units(pattern, sheet)
     radius = None if vertex_radius is None else length("vertex_radius", vertex_radius)
     divisions = whole("divisions", divisions, least=1)
     mass = ShellOptions.mass if mass is None else choice("mass", mass, MASSES)

@@ -153,7 +153,6 @@ def discretize(
     [0.0639]
     """
     pattern, sheet = checked_kinds(pattern, sheet)
-    doubt_units(pattern, sheet)
     edges = boundary_edges(clamped, pattern, "clamped")
     options = resolved(
         preset, scheme=scheme, mass=mass, bar_law=bar_law, fold_law=fold_law, bend_law=bend_law,
@@ -247,8 +246,10 @@ def discretize(
 
 
 def checked_kinds(pattern: Any, sheet: Any) -> tuple[Pattern, Sheet]:
-    """Pattern and sheet; accepts objects with a pattern, and refuses anything else."""
-    return pattern_of(pattern), of_kind("sheet", sheet, Sheet)
+    """Pattern and sheet; accepts objects with a pattern, refuses anything else, doubts units."""
+    pattern, sheet = pattern_of(pattern), of_kind("sheet", sheet, Sheet)
+    doubt_units(pattern, sheet)
+    return pattern, sheet
 
 
 def _given_centers(
