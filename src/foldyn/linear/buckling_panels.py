@@ -10,6 +10,8 @@ otherwise moments along welds would couple the insides of panels.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -38,8 +40,7 @@ class PanelsBase(Base):
 
     def __init__(self, case: Case) -> None:
         _refuse(case)
-        structure = case.structure
-        assert isinstance(structure, Superelements)
+        structure: Any = case.structure
         own = OrigamiProblem(case.altered(structure=structure.for_buckling))
         refuse_mechanisms(own)
         meshes = structure.meshes

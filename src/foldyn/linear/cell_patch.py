@@ -47,7 +47,6 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.crease_data import ASSIGNED
 from foldyn.patterns.topology import around, edge_of
 from foldyn.shells import Shell
-from foldyn.structures import Structure
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.strip import Strip
@@ -312,7 +311,7 @@ def hidden_sites(case: Case, unit: NDArray, step: NDArray, panels: Sequence[Pane
 
     unit, step : for each node, the node of cell 0 of which it is a copy (n,), and R (n, d).
     """
-    structure = case.structure
+    structure: Any = case.structure
     place = list(zip(map(tuple, step.tolist()), unit.tolist(), strict=True))
 
     def site(ends: Iterable[int], what: tuple) -> Site:
@@ -342,8 +341,6 @@ def hidden_sites(case: Case, unit: NDArray, step: NDArray, panels: Sequence[Pane
             else site(lines[owner], (kind, *what))
             for kind, owner, *what in structure.owners(case.held_edges)
         ]
-    assert isinstance(structure, Structure)
-    assert structure.pattern is not None
     found: list[Site] = []
     if structure.edge_plates is not None:
         axes = np.concatenate([structure.folds, structure.bends])[:, :2]

@@ -13,6 +13,7 @@ over time x'' is in place of -w^2 x, and x' in place of i w x.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,6 @@ from scipy import sparse
 
 from foldyn.algebra.eigen import Pencil
 from foldyn.cases import Case, History
-from foldyn.condensation import Superelements
 from foldyn.dynamics.superposition import Superposition, matrices
 from foldyn.linear.excitation import Drive, drive_terms
 from foldyn.linear.frequency_domain import damped
@@ -59,11 +59,9 @@ class FinerShapes:
 
     def _embedded(self, motions: NDArray) -> NDArray:
         """Motions (nf, k) of the level on the free dofs of the finer shapes."""
-        own, finer = self._coarse.case.structure, self.case.structure
-        assert isinstance(own, Superelements)
-        assert isinstance(finer, Superelements)
-        whole = own.embedded(finer, self._coarse.whole(motions), edges=self.case.held_edges)
-        return whole[self._fine.free]
+        own: Any = self._coarse.case.structure
+        edges, whole = self.case.held_edges, self._coarse.whole(motions)
+        return own.embedded(self.case.structure, whole, edges=edges)[self._fine.free]
 
     def _solved(self, loads: NDArray) -> NDArray:
         if not np.iscomplexobj(loads):
@@ -76,11 +74,9 @@ class FinerMotion:
 
     def __init__(self, case: Case, equation: Superposition, varying: list[History]) -> None:
         self.case = for_stresses(case)
-        own, finer = case.structure, self.case.structure
-        assert isinstance(own, Superelements)
-        assert isinstance(finer, Superelements)
+        own: Any = case.structure
         fine, self._equation = matrices(self.case, varying), equation
-        both = own.embedded(finer, equation.both, edges=case.held_edges)
+        both = own.embedded(self.case.structure, equation.both, edges=case.held_edges)
         ties = fine.ties
         stiffness, mass = (
             sparse.csc_array(ties.T @ one @ ties) for one in (fine.stiffness, fine.mass)

@@ -9,7 +9,7 @@ these models.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,9 +77,7 @@ class PlateResultants:
     """Forces and moments of panels as plates; see `strength.resultants.Resultants`."""
 
     def __init__(self, case: Case) -> None:
-        structure = case.structure
-        assert isinstance(structure, Structure)
-        assert structure.pattern is not None
+        structure: Any = case.structure
         self.case, self._sheet = case, LoadedSheet(case)
         self._structure, self._pattern = structure, structure.pattern
         sheet = structure.sheet.weighed  # panels do not vibrate here

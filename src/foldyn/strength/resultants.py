@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,13 +55,12 @@ class ShellResultants:
 
     def __init__(self, case: Case) -> None:
         self.case, self._sheet = case, LoadedSheet(case)
-        assert isinstance(case.structure, Shell)
-        self.points = case.structure.stress_points
+        self._shell: Any = case.structure
+        self.points = self._shell.stress_points
 
     def at(self, q: NDArray, factors: NDArray) -> NDArray[np.float64]:
         """See `Resultants`."""
-        assert isinstance(self.case.structure, Shell)
-        return self.case.structure.resultants(q, self._sheet.free(factors))
+        return self._shell.resultants(q, self._sheet.free(factors))
 
 
 class SuperelementResultants:
@@ -69,8 +68,7 @@ class SuperelementResultants:
 
     def __init__(self, case: Case) -> None:
         self.case = for_stresses(case)
-        assert isinstance(self.case.structure, Superelements)
-        self.structure = self.case.structure
+        self.structure: Any = self.case.structure
         self.points = self.structure.stress_points
         self._sheet = LoadedSheet(self.case)
 
@@ -82,8 +80,7 @@ class SuperelementResultants:
     @cached_property
     def crease_rows(self) -> sparse.csr_array:
         """Moments of creases per length (nf, m), N, of the dofs in small motions."""
-        turns = self.case.elastic_body.sheet.crease_turns
-        assert turns is not None
+        turns: Any = self.case.elastic_body.sheet.crease_turns
         per_turn = self.structure.slope / crease_lengths(self.structure)
         return sparse.csr_array(-per_turn[:, None] * turns.mean)
 
