@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from foldyn.condensation.kept import Meshes, kept
 from foldyn.condensation.panel import CondensedPanel
 from foldyn.patterns import Pattern
+from foldyn.structures import Ply, Sheet
 from foldyn.structures.graded import smooth_vertices
 from foldyn.structures.material_axes import material_axes
-from foldyn.structures.ply import Ply
-from foldyn.structures.sheet import Sheet
 
 ROOM = 256  # condensed panels kept in memory, each about 3 MB
 ALIKE = 8  # decimals of coordinates, relative to the size of the pattern, for congruent panels

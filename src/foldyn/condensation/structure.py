@@ -31,20 +31,11 @@ from foldyn.patterns.pattern import Patterned
 from foldyn.patterns.topology import Edge, edge_lookup
 from foldyn.shells.recovery import StressPoints
 from foldyn.shells.shell import LEAST, PER_DOUBLING
-from foldyn.structures import Sheet
-from foldyn.structures.calibration import (
-    Folds,
-    PerCrease,
-    check_creases,
-    check_sheet,
-    fold_rest,
-    fold_stiffness,
-)
-from foldyn.structures.clamps import boundary_edges
+from foldyn.structures import MASS_RULES, Sheet, calibration
 from foldyn.structures.discretize import checked_kinds
 from foldyn.structures.discretized import Discretized, Distributed, read_only
 from foldyn.structures.graded import grading
-from foldyn.structures.mass import MASS_RULES
+from foldyn.structures.held_edges import boundary_edges
 from foldyn.structures.material_axes import material_axes
 from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
 from foldyn.structures.swelling import Swelling
@@ -63,13 +54,13 @@ class SuperelementsOptions:
     divisions: int | None = None
     mass: str = "consistent"
     fold_law: str | HingeLaw = EnhancedLinear()
-    crease_stiffness: Folds = None
-    crease_rest: PerCrease = None
+    crease_stiffness: calibration.Folds = None
+    crease_rest: calibration.PerCrease = None
     clamped: tuple[Edge, ...] = ()
     rigid: str | tuple[int, ...] | None = None
     vertex_radius: float | None = None
 
-    __post_init__ = check_creases
+    __post_init__ = calibration.check_creases
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -347,8 +338,8 @@ def superelements(
     divisions: int | None = None,
     mass: str = "consistent",
     fold_law: str | HingeLaw = EnhancedLinear(),
-    crease_stiffness: Folds = None,
-    crease_rest: PerCrease = None,
+    crease_stiffness: calibration.Folds = None,
+    crease_rest: calibration.PerCrease = None,
     clamped: str | Sequence[Sequence[int]] = (),
     rigid: str | Sequence[int] | None = None,
     vertex_radius: float | None = None,
@@ -400,7 +391,7 @@ def superelements(
     if divisions is not None:
         divisions = whole("divisions", divisions, least=4)
     _check_law(fold_law)
-    check_sheet(sheet, pattern)
+    calibration.check_sheet(sheet, pattern)
     if sheet.density is None:
         raise InputError("sheet: density is missing: give it (kg/m3), the panels' mass needs it")
     radius = (
@@ -423,8 +414,8 @@ def superelements(
         triangles=np.array(fans, np.int64),
         triangle_panel=np.array(panel),
         folds=folds,
-        fold_stiffness=fold_stiffness(options.crease_stiffness, pattern, sheet),
-        fold_rest=fold_rest(options.crease_rest, pattern.dihedrals, pattern),
+        fold_stiffness=calibration.fold_stiffness(options.crease_stiffness, pattern, sheet),
+        fold_rest=calibration.fold_rest(options.crease_rest, pattern.dihedrals, pattern),
         pattern=pattern,
         sheet=sheet,
         options=options,

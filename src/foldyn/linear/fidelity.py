@@ -20,8 +20,8 @@ from foldyn.cases.models import SHELL, SUPERELEMENTS
 from foldyn.condensation import Superelements
 from foldyn.errors import InputError, quietly, warn, within
 from foldyn.linear.compared import OWN, Fidelity
-from foldyn.linear.level_error import other_level
 from foldyn.linear.linearized import amplitude_of, linearize
+from foldyn.linear.model_error import other_level
 from foldyn.linear.operating_point import BALANCED
 from foldyn.linear.reference import (
     SPARE,
