@@ -18,15 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases import Case
+from foldyn.cases import Actuate, BaseMotion, Case, CreaseDamping, Fix, Impose, Link, Stop
 from foldyn.cases.air import refuse_air
-from foldyn.cases.damping import CreaseDamping
 from foldyn.cases.directions import AXES, unit_vector
-from foldyn.cases.loads import Actuate
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import resolve_creases, resolve_nodes
-from foldyn.cases.stops import Stop
-from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
 from foldyn.condensation import Superelements
 from foldyn.condensation.panel import INNER
 from foldyn.errors import InputError, quietly
@@ -47,9 +43,8 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.crease_data import ASSIGNED
 from foldyn.patterns.topology import around, edge_of
 from foldyn.shells import Shell
+from foldyn.structures import Sheet, Strip
 from foldyn.structures.discretized import Discretized
-from foldyn.structures.sheet import Sheet
-from foldyn.structures.strip import Strip
 
 SAME_AXES = 1e-9  # tolerance for axes that a screw preserves
 
