@@ -37,9 +37,8 @@ from foldyn.linear.linearized import Linearized, linearize
 from foldyn.linear.modes import rigid_space, spectrum_of, unresisted
 from foldyn.results import case_of
 from foldyn.statics.stability import oriented
-from foldyn.strength.creases import crease_moments
 from foldyn.strength.dataset import stress_dataset
-from foldyn.strength.loaded import LoadedSheet
+from foldyn.strength.loaded import LoadedSheet, crease_moments
 from foldyn.strength.resultants import (
     Resultants,
     SuperelementResultants,

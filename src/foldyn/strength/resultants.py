@@ -26,8 +26,7 @@ from foldyn.errors import InputError
 from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.shells import Shell
 from foldyn.shells.recovery import StressPoints
-from foldyn.strength.creases import crease_lengths, crease_moments
-from foldyn.strength.loaded import LoadedSheet
+from foldyn.strength.loaded import LoadedSheet, crease_lengths, crease_moments
 from foldyn.structures import Structure
 from foldyn.structures.discretized import Discretized, Distributed
 from foldyn.structures.edge_angles import straight_creases
