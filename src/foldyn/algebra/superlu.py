@@ -39,7 +39,7 @@ class Factorization(Solution, Protocol):
 
     def pivots(self) -> NDArray | None:
         """Pivots, which have the signs of the eigenvalues; None if only their count is known."""
-        ...
+        return None
 
     def negative(self) -> int:
         """Number of negative eigenvalues."""
