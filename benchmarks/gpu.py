@@ -38,7 +38,7 @@ from problem import SHAKE, case_of
 import foldyn as fd
 from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.gpu import card
-from foldyn.dynamics.gpu.launch import Launches, Places
+from foldyn.dynamics.gpu.engine import Launches, Places
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.motion_state import StepPlan
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.condensation import kept as module
-from foldyn.condensation.kept import kept
-from foldyn.condensation.library import _condensed
+from foldyn.condensation import library as module
+from foldyn.condensation.library import _condensed, kept
 
 PATTERN = fd.patterns.simple_fold(a=1.0, b=1.3, dihedral=70)
 SHEET = fd.Sheet(2e9, 0.3, 0.02, 900.0)

@@ -129,7 +129,7 @@ def test_samples_do_not_depend_on_the_pieces(monkeypatch, method):
     each = case(1)
     given = {"initial": shaken(each), "device": "gpu", **STEPS}
     whole = fd.simulate(each, END, method=method, **given)
-    monkeypatch.setattr("foldyn.dynamics.gpu.launch.Launches.fits", lambda *_: np.array([3]))
+    monkeypatch.setattr("foldyn.dynamics.gpu.engine.Launches.fits", lambda *_: np.array([3]))
     agree(fd.simulate(each, END, method=method, **given), whole, 0.0)
     agree(fd.simulate_many([each], END, method=method, **given).isel(model=0), whole, 1e-12)
 
@@ -138,7 +138,7 @@ def test_samples_do_not_depend_on_the_pieces(monkeypatch, method):
 def test_motions_side_by_side_have_steps_of_their_own(monkeypatch, method):
     from foldyn.dynamics.gpu.many import integrate_prepared  # no import where there is no GPU
 
-    monkeypatch.setattr("foldyn.dynamics.gpu.launch.Launches.fits", lambda self: 2 * self._every)
+    monkeypatch.setattr("foldyn.dynamics.gpu.engine.Launches.fits", lambda self: 2 * self._every)
     motions, alone = [], []
     for k, (dt, every) in enumerate(((1e-5, 2), (2.5e-5, 1), (5e-6, 3))):
         given = {"method": method, "dt": dt, "every_steps": every, "initial": shaken(case(k), k)}

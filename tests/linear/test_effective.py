@@ -12,9 +12,8 @@ from scipy.sparse.linalg import splu
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear.effective import compliance, effective
+from foldyn.linear.effective import _solved, compliance, effective
 from foldyn.linear.linearized_cell import linearize_cell
-from foldyn.linear.mean_strains import _solved
 from foldyn.patterns.screw import of_twist, translation
 
 BLOCKS = ("membrane", "coupling", "bending")

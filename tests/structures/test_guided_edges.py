@@ -8,7 +8,7 @@ import pytest
 import foldyn as fd
 from foldyn.cases.clamped_edges import straightened
 from foldyn.errors import InputError
-from foldyn.structures.guided_edges import directions, guided_edges, straight_in_bending
+from foldyn.structures.held_edges import directions, guided_edges, straight_in_bending
 
 SIDES, WAY = 6, 1e-7
 LOW, HIGH = list(range(SIDES)), list(range(SIDES, 2 * SIDES))

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.algebra.superlu import SingularTangentError
+from foldyn.algebra.superlu import Factorization, SingularTangentError
 from foldyn.errors import ComputationError
 
 LIBRARY = re.compile(r"(lib)?mkl_rt(\.\d+)*\.(so|dll)(\.\d+)*")
@@ -133,7 +133,7 @@ class Pardiso:
         return factors
 
 
-class PardisoFactors:
+class PardisoFactors(Factorization):
     """Factors by PARDISO; when they are released, their memory is reused."""
 
     def __init__(self, memory: _Memory, values: NDArray) -> None:
@@ -146,10 +146,6 @@ class PardisoFactors:
         x = np.empty_like(b)
         self._memory.call(SOLVE, self._values, b, x)
         return x
-
-    def pivots(self) -> None:
-        """None, as 2x2 pivots are not available."""
-        return
 
     def negative(self) -> int:
         """Number of negative eigenvalues."""

@@ -11,6 +11,7 @@ package; `solvers` chooses among the installed ones.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -38,7 +39,7 @@ class Factorization(Solution, Protocol):
 
     def pivots(self) -> NDArray | None:
         """Pivots, which have the signs of the eigenvalues; None if only their count is known."""
-        ...
+        return None
 
     def negative(self) -> int:
         """Number of negative eigenvalues."""
@@ -75,20 +76,19 @@ class SuperLU:
             self._lu, self._matrix = factorize(matrix), matrix
         except SingularTangentError as error:
             raise SingularTangentError("the tangent is singular") from error
-        self._pivots: NDArray | None = None
 
     def solve(self, b: NDArray) -> NDArray:
         """Solution x of A x = b."""
         return self._lu.solve(b)
 
+    @cached_property
+    def _pivots(self) -> NDArray:
+        straight = np.array_equal(self._lu.perm_r, self._lu.perm_c)
+        return self._lu.U.diagonal() if straight else _eigenvalues(self._matrix)
+
     def pivots(self) -> NDArray:
         """Pivots; the eigenvalues instead if a pivot had to leave the diagonal."""
-        if self._pivots is not None:
-            return self._pivots
-        straight = np.array_equal(self._lu.perm_r, self._lu.perm_c)
-        pivots = self._lu.U.diagonal() if straight else _eigenvalues(self._matrix)
-        self._pivots = pivots
-        return pivots
+        return self._pivots
 
     def negative(self) -> int:
         """Number of negative eigenvalues."""
@@ -98,17 +98,11 @@ class SuperLU:
 PIVOT = 0.01  # least pivot on the diagonal, relative to the largest entry in the column
 
 
-class Unsymmetric:
-    """Factorization of a nearly symmetric matrix, which only gives solutions."""
-
-    def __init__(self, matrix: sparse.csc_array) -> None:
-        if not np.isfinite(matrix.data).all():
-            raise SingularTangentError("the tangent is not finite")
-        self._lu = factorize(matrix, pivot=PIVOT)
-
-    def solve(self, b: NDArray) -> NDArray:
-        """Solution x of A x = b."""
-        return self._lu.solve(b)
+def unsymmetric(matrix: sparse.csc_array) -> Solution:
+    """Factorize a nearly symmetric matrix."""
+    if not np.isfinite(matrix.data).all():
+        raise SingularTangentError("the tangent is not finite")
+    return factorize(matrix, pivot=PIVOT)
 
 
 MOST_DENSE = 3000  # number of dofs up to which all eigenvalues are affordable

@@ -68,7 +68,7 @@ class Squared:
         return self.matrix.diagonal() + np.einsum("ri,ri->i", self.rows, self.rows)
 
 
-class Counted(Updated):
+class Counted(Updated, Factorization):
     """`Updated` for symmetric matrices, which also counts negative eigenvalues of the sum.
 
     The count follows from both Schur complements of the block matrix [[A, G'], [G, -1/w]]
@@ -80,10 +80,6 @@ class Counted(Updated):
         values = np.linalg.eigvalsh(np.eye(len(rows)) / weight + rows @ self._moved)
         given = len(rows) if weight > 0.0 else 0
         self._negative = factors.negative() + int((values > 0.0).sum()) - given
-
-    def pivots(self) -> None:
-        """None, as only the number of negative eigenvalues is known."""
-        return
 
     def negative(self) -> int:
         """Number of negative eigenvalues."""

@@ -18,9 +18,8 @@ from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.patterns.selection import select
 from foldyn.patterns.topology import Edge, edge_lookup, edge_of
-from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.discretized import Discretized
-from foldyn.structures.guided_edges import guided_edges, perpendicular
+from foldyn.structures.held_edges import boundary_edges, guided_edges, perpendicular
 from foldyn.values import show
 
 

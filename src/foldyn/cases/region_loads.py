@@ -32,9 +32,9 @@ from foldyn.mechanics.sheet_term import NO_DOF
 from foldyn.patterns.topology import edge_lookup
 from foldyn.structures import Laminate
 from foldyn.structures.discretized import Discretized, Distributed
-from foldyn.structures.laminate import check_layers
 from foldyn.structures.material_axes import free_strains
 from foldyn.structures.ply import one_or_two
+from foldyn.structures.sheet import check_layers
 from foldyn.structures.swelling import Swelling
 from foldyn.values import number, number_or_list, one_or_each, show, vector
 

@@ -31,21 +31,11 @@ from foldyn.patterns.pattern import Patterned
 from foldyn.patterns.topology import Edge, edge_lookup
 from foldyn.shells.recovery import StressPoints
 from foldyn.shells.shell import LEAST, PER_DOUBLING
-from foldyn.structures import Sheet
-from foldyn.structures.beyond_range import doubt_units
-from foldyn.structures.calibration import (
-    Folds,
-    PerCrease,
-    check_creases,
-    check_sheet,
-    fold_rest,
-    fold_stiffness,
-)
-from foldyn.structures.clamps import boundary_edges
+from foldyn.structures import MASS_RULES, Sheet, calibration
 from foldyn.structures.discretize import checked_kinds
-from foldyn.structures.discretized import Discretized, Distributed, HingeKind, read_only
+from foldyn.structures.discretized import Discretized, Distributed, read_only
 from foldyn.structures.graded import grading
-from foldyn.structures.mass import MASS_RULES
+from foldyn.structures.held_edges import boundary_edges
 from foldyn.structures.material_axes import material_axes
 from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
 from foldyn.structures.swelling import Swelling
@@ -64,13 +54,13 @@ class SuperelementsOptions:
     divisions: int | None = None
     mass: str = "consistent"
     fold_law: str | HingeLaw = EnhancedLinear()
-    crease_stiffness: Folds = None
-    crease_rest: PerCrease = None
+    crease_stiffness: calibration.Folds = None
+    crease_rest: calibration.PerCrease = None
     clamped: tuple[Edge, ...] = ()
     rigid: str | tuple[int, ...] | None = None
     vertex_radius: float | None = None
 
-    __post_init__ = check_creases
+    __post_init__ = calibration.check_creases
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,7 +101,6 @@ class Superelements(Discretized):
     kind: ClassVar[str] = "superelements"
     linear: ClassVar[str] = "superelements"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
-    bar_law: ClassVar[None] = None
     fill: ClassVar[Fill] = Fill(PER_DOUBLING, LEAST, "level", "take a lower one")
 
     def __repr__(self) -> str:
@@ -139,17 +128,6 @@ class Superelements(Discretized):
     def bars(self) -> NDArray:
         """Edges of the pattern."""
         return read_only(self.pattern.lines.copy())
-
-    @cached_property
-    def centers(self) -> NDArray:
-        """No panel has a center node."""
-        return np.full(len(self.pattern.faces), -1)
-
-    @property
-    def hinge_kinds(self) -> tuple[HingeKind, ...]:
-        """The folds, with their law."""
-        ends = self.pattern.creases
-        return (HingeKind("fold", self.fold_law, ends, self.fold_stiffness, self.fold_rest),)
 
     @cached_property
     def mass(self) -> sparse.csr_array:
@@ -360,8 +338,8 @@ def superelements(
     divisions: int | None = None,
     mass: str = "consistent",
     fold_law: str | HingeLaw = EnhancedLinear(),
-    crease_stiffness: Folds = None,
-    crease_rest: PerCrease = None,
+    crease_stiffness: calibration.Folds = None,
+    crease_rest: calibration.PerCrease = None,
     clamped: str | Sequence[Sequence[int]] = (),
     rigid: str | Sequence[int] | None = None,
     vertex_radius: float | None = None,
@@ -409,12 +387,11 @@ def superelements(
     <Superelements: 2 panels, 1 folds, level 1, 114 dofs>
     """
     pattern, sheet = checked_kinds(pattern, sheet)
-    doubt_units(pattern, sheet)
     level = whole("level", level, least=1, most=len(LEVELS))
     if divisions is not None:
         divisions = whole("divisions", divisions, least=4)
     _check_law(fold_law)
-    check_sheet(sheet, pattern)
+    calibration.check_sheet(sheet, pattern)
     if sheet.density is None:
         raise InputError("sheet: density is missing: give it (kg/m3), the panels' mass needs it")
     radius = (
@@ -437,8 +414,8 @@ def superelements(
         triangles=np.array(fans, np.int64),
         triangle_panel=np.array(panel),
         folds=folds,
-        fold_stiffness=fold_stiffness(options.crease_stiffness, pattern, sheet),
-        fold_rest=fold_rest(options.crease_rest, pattern.dihedrals, pattern),
+        fold_stiffness=calibration.fold_stiffness(options.crease_stiffness, pattern, sheet),
+        fold_rest=calibration.fold_rest(options.crease_rest, pattern.dihedrals, pattern),
         pattern=pattern,
         sheet=sheet,
         options=options,

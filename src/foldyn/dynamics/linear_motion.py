@@ -22,14 +22,7 @@ from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.motion_state import Samples, StepPlan, samples
 from foldyn.dynamics.progress import Progress, Reporter, reported
 from foldyn.dynamics.sampling import Sampler, SamplingError
-from foldyn.dynamics.superposition import (
-    Bases,
-    Matrices,
-    Steps,
-    Superposition,
-    matrices,
-    steps_of,
-)
+from foldyn.dynamics.superposition import Bases, Matrices, Steps, Superposition, matrices, steps_of
 from foldyn.errors import ComputationError, InputError, ModelRangeWarning, warn
 from foldyn.results import Quantity, trajectory_dataset
 from foldyn.structures.beyond_range import TURN, far_turn, panel_turns

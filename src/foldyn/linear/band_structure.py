@@ -21,11 +21,10 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from foldyn.cases import State
 from foldyn.condensation import Superelements
 from foldyn.errors import InputError, ModelRangeWarning, quietly, warn
+from foldyn.linear import model_error
 from foldyn.linear.bloch import Bloch, null_space
-from foldyn.linear.level_error import DOUBTFUL, band_errors, first_doubtful
 from foldyn.linear.linearized import warn_beyond
 from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
-from foldyn.linear.model_error import beside, errors_of_bands, warn_of_bands
 from foldyn.linear.unit_cell import UnitCell, checked_phases
 from foldyn.linear.wave_solver import Waves, WaveSolver, check_count, slopes_of, tracked
 from foldyn.results.dataset import result_dataset
@@ -160,15 +159,15 @@ def bands(
         "eigenvalue": (("phase", "band"), values, {"units": "rad2/s2"}),
     }
     holds_to = None
-    compared = beside(cell.case, check_model, state, secant)
+    compared = model_error.beside(cell.case, check_model, state, secant)
     if compared.case is not None:
         errors = _model_errors(cell.with_case(compared.case), given, frequency)
         data["model_error"] = (("phase", "band"), errors, {"units": "1"})
-        warn_of_bands(errors)
+        model_error.warn_of_bands(errors)
     else:
         warn_beyond(cell.case.structure, np.nan_to_num(frequency).max(axis=0), "band")
     if isinstance(cell.case.structure, Superelements):
-        errors = band_errors(linear, given, found)
+        errors = model_error.band_errors(linear, given, found)
         data["frequency_error"] = (("phase", "band"), errors, {"units": "Hz"})
         holds_to = _range(frequency, errors)
     each = list(zip(given, found, strict=True))
@@ -203,17 +202,17 @@ def _model_errors(reference: UnitCell, phases: NDArray, frequency: NDArray) -> N
         found = WaveSolver(linear.bloch, frequency.shape[1]).at(phases[chosen])
     true = np.sqrt(np.array([each.values for each in found]).clip(min=0.0)) / TURN
     out = np.full(frequency.shape, np.nan)
-    out[chosen] = errors_of_bands(frequency[chosen], true)
+    out[chosen] = model_error.errors_of_bands(frequency[chosen], true)
     return out
 
 
 def _range(frequency: NDArray, errors: NDArray) -> float:
     """Frequency (Hz) up to which bands hold; warns if it is below the highest of theirs."""
-    holds, top = first_doubtful(frequency, errors), float(frequency.max())
+    holds, top = model_error.first_doubtful(frequency, errors), float(frequency.max())
     if holds <= top:
         warn(
             f"the bands are estimated to hold up to {holds:.4g} Hz: frequencies from there on are "
-            f"doubtful by more than {DOUBTFUL:.0%}; take a higher level or fewer bands",
+            f"doubtful by more than {model_error.DOUBTFUL:.0%}; take a higher level or fewer bands",
             "superelements.md#errors",
             ModelRangeWarning,
         )

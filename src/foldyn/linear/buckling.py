@@ -28,8 +28,7 @@ from foldyn.algebra.solvers import check_fill
 from foldyn.cases import LOADS, Case, Load
 from foldyn.cases.air import refuse_air
 from foldyn.errors import InputError, warn
-from foldyn.linear.buckling_base import Base
-from foldyn.linear.buckling_panels import PanelsBase
+from foldyn.linear.buckling_base import Base, PanelsBase
 from foldyn.ram_limit import check_memory
 from foldyn.results.dataset import buckling_dataset
 from foldyn.statics.equilibrium import drives

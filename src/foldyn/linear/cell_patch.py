@@ -18,15 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases import Case
+from foldyn.cases import Actuate, BaseMotion, Case, CreaseDamping, Fix, Impose, Link, Stop
 from foldyn.cases.air import refuse_air
-from foldyn.cases.damping import CreaseDamping
 from foldyn.cases.directions import AXES, unit_vector
-from foldyn.cases.loads import Actuate
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import resolve_creases, resolve_nodes
-from foldyn.cases.stops import Stop
-from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
 from foldyn.condensation import Superelements
 from foldyn.condensation.panel import INNER
 from foldyn.errors import InputError, quietly
@@ -47,10 +43,8 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.crease_data import ASSIGNED
 from foldyn.patterns.topology import around, edge_of
 from foldyn.shells import Shell
-from foldyn.structures import Structure
+from foldyn.structures import Sheet, Strip
 from foldyn.structures.discretized import Discretized
-from foldyn.structures.sheet import Sheet
-from foldyn.structures.strip import Strip
 
 SAME_AXES = 1e-9  # tolerance for axes that a screw preserves
 
@@ -312,7 +306,7 @@ def hidden_sites(case: Case, unit: NDArray, step: NDArray, panels: Sequence[Pane
 
     unit, step : for each node, the node of cell 0 of which it is a copy (n,), and R (n, d).
     """
-    structure = case.structure
+    structure: Any = case.structure
     place = list(zip(map(tuple, step.tolist()), unit.tolist(), strict=True))
 
     def site(ends: Iterable[int], what: tuple) -> Site:
@@ -342,8 +336,6 @@ def hidden_sites(case: Case, unit: NDArray, step: NDArray, panels: Sequence[Pane
             else site(lines[owner], (kind, *what))
             for kind, owner, *what in structure.owners(case.held_edges)
         ]
-    assert isinstance(structure, Structure)
-    assert structure.pattern is not None
     found: list[Site] = []
     if structure.edge_plates is not None:
         axes = np.concatenate([structure.folds, structure.bends])[:, :2]

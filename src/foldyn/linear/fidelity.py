@@ -20,8 +20,8 @@ from foldyn.cases.models import SHELL, SUPERELEMENTS
 from foldyn.condensation import Superelements
 from foldyn.errors import InputError, quietly, warn, within
 from foldyn.linear.compared import OWN, Fidelity
-from foldyn.linear.level_error import other_level
 from foldyn.linear.linearized import amplitude_of, linearize
+from foldyn.linear.model_error import other_level
 from foldyn.linear.operating_point import BALANCED
 from foldyn.linear.reference import (
     SPARE,
@@ -248,7 +248,6 @@ class Comparison:
         works = np.array([small_loads(case).work for case in self.references])
         if len(works) == 1:
             (case,) = self.references
-            assert isinstance(case.structure, Superelements)
             lower = small_loads(case.altered(structure=other_level(case.structure))).work
             true, mesh_error = works.item(), lower / works.item() - 1.0
         else:

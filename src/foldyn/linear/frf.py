@@ -19,9 +19,8 @@ from foldyn.errors import InputError, ModelRangeWarning, quietly, warn
 from foldyn.linear.excitation import NAMED, Answer, absolute, drive_of
 from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
-from foldyn.linear.level_error import DOUBTFUL
 from foldyn.linear.linearized import Linearized, linearize, warn_beyond
-from foldyn.linear.model_error import ALONE, Beside, beside
+from foldyn.linear.model_error import ALONE, DOUBTFUL, Beside, beside
 from foldyn.linear.modes import trusted, warn_of_stretch
 from foldyn.linear.time_domain import Rig, SteppedSine, stepped_sine
 from foldyn.linear.transients import BurstRandom, Impulse, burst_random, impulse

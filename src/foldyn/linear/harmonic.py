@@ -97,9 +97,9 @@ def harmonic(
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
         load = np.sum([term.shape * (drive.value * term.factor(omega)) for term in terms], axis=0)
-        iteration = _Balance(hinges, system, omega, load, options)
-        motion, slope = iteration.balanced(_ahead(done, float(f), hinges.reference))
-        spent += iteration.iterations
+        start = _ahead(done, float(f), hinges.reference)
+        motion, slope, more = _balanced(hinges, system, omega, load, options, start)
+        spent += more
         if motion is None:
             converged[k] = False
         else:
@@ -182,54 +182,40 @@ class Hinges:
         )
 
 
-class _Balance:
-    """Iteration for the slopes at one frequency."""
+def _balanced(
+    hinges: Hinges, system: Linearized, omega: float, load: NDArray, options: HarmonicBalance,
+    start: NDArray,
+) -> tuple[NDArray | None, NDArray, int]:  # fmt: skip
+    """Motion (nf,), None without convergence, slopes of the hinges in it, and iterations.
 
-    def __init__(
-        self, hinges: Hinges, system: Linearized, omega: float, load: NDArray,
-        options: HarmonicBalance,
-    ) -> None:  # fmt: skip
-        self.hinges, self.stiffness = hinges, dynamic_stiffness(system, omega)
-        self.gram, self.omega, self.load = system.gram, omega, load
-        self.options, self.iterations = options, 0
-
-    def balanced(self, start: NDArray) -> tuple[NDArray | None, NDArray]:
-        """Motion (nf,), None without convergence, and slopes of the hinges in it.
-
-        The accelerated iteration (Anderson) comes first; it may cycle near the end of a branch, or
-        find the unstable branch between two stable branches. The slow iteration follows, which
-        converges only to stable branches.
-        """
-        for accelerated in (True, False):
-            motion, slope = self._iterate(start, accelerated)
-            if motion is not None:
-                return motion, slope
-        return None, start
-
-    def _iterate(self, slope: NDArray, accelerated: bool) -> tuple[NDArray | None, NDArray]:
-        """Iterate slopes to a motion, accelerated or slowly; None without convergence."""
-        most = PATIENCE if accelerated else self.options.iterations
+    The accelerated iteration (Anderson) comes first; it may cycle near the end of a branch, or
+    find the unstable branch between two stable branches. The slow iteration follows, which
+    converges only to stable branches.
+    """
+    stiffness, spent = dynamic_stiffness(system, omega), 0
+    for accelerated in (True, False):
+        most, slope, before = PATIENCE if accelerated else options.iterations, start, None
         slopes: list[NDArray] = []
         misses: list[NDArray] = []
-        before = None
         # in a slow step the change is less than the remaining error
-        tolerance = self.options.tolerance * (1.0 if accelerated else RELAXED)
-        while len(slopes) < most and self.iterations < self.options.iterations:
-            self.iterations += 1
-            matrix = sparse.csc_array(self.stiffness + self.hinges.change(slope))
-            motion = solve(matrix, self.load, self.gram, 1j * self.omega)
+        tolerance = options.tolerance * (1.0 if accelerated else RELAXED)
+        while len(slopes) < most and spent < options.iterations:
+            spent += 1
+            matrix = sparse.csc_array(stiffness + hinges.change(slope))
+            motion = solve(matrix, load, system.gram, 1j * omega)
             if np.isnan(motion).any() or not len(slope):
-                return motion, slope
+                return motion, slope, spent
             if before is not None:
                 change = np.abs(motion - before).max()
                 if change <= tolerance * np.abs(motion).max():
-                    between = accelerated and _repels(slopes, misses)
-                    return (None if between else motion), slope
+                    if accelerated and _repels(slopes, misses):
+                        break
+                    return motion, slope, spent
             before = motion
             slopes.append(slope)
-            misses.append(self.hinges.slope(motion) - slope)
+            misses.append(hinges.slope(motion) - slope)
             slope = _anderson(slopes, misses) if accelerated else slope + RELAXED * misses[-1]
-        return None, slope
+    return None, start, spent
 
 
 def _anderson(slopes: list[NDArray], misses: list[NDArray]) -> NDArray:

@@ -23,15 +23,7 @@ from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of
 from foldyn.errors import ComputationError, InputError, warn
-from foldyn.linear.bloch import (
-    Bloch,
-    Hops,
-    collected,
-    hermitian,
-    hops,
-    null_space,
-    steps_of,
-)
+from foldyn.linear.bloch import Bloch, Hops, collected, hermitian, hops, null_space, steps_of
 from foldyn.linear.cell_patch import Patch, cell_patch
 from foldyn.linear.linearized import amplitude_of, damped_tangent, slope_change
 from foldyn.linear.unit_cell import UnitCell, check_commuting, images, rotation
@@ -80,18 +72,16 @@ class CellReach:
         behind = np.where(patch.hidden_unit < 0, -1, 3 * units + patch.hidden_unit)
         self._unit = np.concatenate([nodal, behind])
         offset = np.concatenate([np.repeat(patch.step, 3, axis=0), patch.hidden_step])
-        self.steps, self._number = steps_of(offset)
+        self.steps, self.number = steps_of(offset)
         own = np.flatnonzero((offset == 0).all(axis=1))
         self.rows = own[np.argsort(self._unit[own], kind="stable")]
         self.hidden = (np.arange(self.count) >= 3 * units) & (body.sheet.mass is None)
         self.held = np.zeros(self.count, bool)
         self.held[: 3 * units] = patch.case.constraints.held[self.rows[: 3 * units]]
         turned = [rotation(motions, step) for step in self.steps]
-        blocks = sparse.block_diag([turned[k] for k in self._number[: 3 * len(patch.unit) : 3]])
-        more = sparse.eye_array(len(behind)) if len(behind) else None
-        self._frames = sparse.csr_array(
-            blocks if more is None else sparse.block_diag([blocks, more])
-        )
+        blocks = sparse.block_diag([turned[k] for k in self.number[: 3 * len(patch.unit) : 3]])
+        more = [sparse.eye_array(len(behind))] if len(behind) else []
+        self._frames = sparse.csr_array(sparse.block_diag([blocks, *more]))
 
     def hops(self, matrix: sparse.sparray) -> Hops:
         """A matrix of the patch's dofs as `Hops`, in the axes of the cells."""
@@ -104,7 +94,7 @@ class CellReach:
     def _hops(self, matrix: sparse.sparray, rows: NDArray) -> Hops:
         """Rows of a matrix on the patch's dofs, with these in the axes of the cells."""
         own, steps = sparse.csr_array(matrix @ self._frames), len(self.steps)
-        return hops(own, rows, self._unit, self._number, self.count, steps)
+        return hops(own, rows, self._unit, self.number, self.count, steps)
 
     def forces(self, q: NDArray) -> NDArray[np.float64]:
         """Forces (m,), N, of the sheet on the dofs of cell 0 for the patch at q."""
@@ -113,14 +103,9 @@ class CellReach:
     def copies(self, factors: NDArray) -> sparse.csr_array:
         """Matrix from dofs of cell 0 to those of the patch, times a factor (s,) for each R."""
         there = np.flatnonzero(self._unit >= 0)
-        entries = (factors[self._number[there]], (there, self._unit[there]))
+        entries = (factors[self.number[there]], (there, self._unit[there]))
         shape = (len(self._unit), self.count)
         return sparse.csr_array(self._frames @ sparse.csr_array(entries, shape=shape))
-
-    @property
-    def number(self) -> NDArray[np.int64]:
-        """Row in `steps` of the cell of each dof of the patch."""
-        return self._number
 
     @cached_property
     def _known(self) -> sparse.csr_array:
@@ -160,7 +145,7 @@ class CellReach:
         """Constraints (k, m) of one cell: constraints whose first cell is cell 0."""
         rows = self.patch.case.constraints.rows
         first = [
-            min(map(tuple, self.steps[self._number[rows.indices[a:b]]].tolist()))
+            min(map(tuple, self.steps[self.number[rows.indices[a:b]]].tolist()))
             for a, b in zip(rows.indptr[:-1], rows.indptr[1:], strict=True)
         ]
         kept = [k for k, step in enumerate(first) if not any(step)]
@@ -168,7 +153,7 @@ class CellReach:
         own = sparse.coo_array(rows[kept] @ self._frames[:size, :size])
         value = np.where(np.abs(own.data) > TURNED, own.data, 0.0)
         return collected(
-            own.row, self._unit[own.col], self._number[own.col], value, (len(kept), self.count),
+            own.row, self._unit[own.col], self.number[own.col], value, (len(kept), self.count),
             len(self.steps),
         )  # fmt: skip
 
@@ -283,11 +268,8 @@ def linearize_cell(
     patch = cell_patch(cell)
     case, own = patch.case, np.zeros_like(cell.case.structure.nodes)
     check_mass(case.mass[patch.own_nodes][:, patch.own_nodes], patch.determined)
-    motions, displacement, body = (
-        cell.motions,
-        np.zeros_like(case.structure.nodes),
-        case.elastic_body,
-    )
+    motions, body = cell.motions, case.elastic_body
+    displacement = np.zeros_like(case.structure.nodes)
     if state is not None:
         check_state(cell)
         if not isinstance(state, State):

@@ -186,15 +186,9 @@ def likeness(fa: NDArray, a: NDArray, fb: NDArray, b: NDArray, mass: NDArray) ->
     """MAC (ka, kb) of shapes (ka, n, 3) and (kb, n, 3), averaged over clusters."""
     # shapes that do not move these nodes have no similar shape
     values = np.nan_to_num(mac(a, b, mass=mass))
-    found = values.copy()
-    left, right = clusters(fa), clusters(fb)
-    for i in np.unique(left):
-        for j in np.unique(right):
-            rows, columns = np.flatnonzero(left == i), np.flatnonzero(right == j)
-            if len(rows) > 1 or len(columns) > 1:
-                block = np.ix_(rows, columns)
-                found[block] = values[block].sum() / min(len(rows), len(columns))
-    return np.minimum(found, 1.0)
+    left, right = (own == np.unique(own)[:, None] for own in (clusters(fa), clusters(fb)))
+    fewest = np.minimum.outer(left.sum(axis=1), right.sum(axis=1))
+    return np.minimum(left.T @ (left @ values @ right.T / fewest) @ right, 1.0)
 
 
 def pairs(fa: NDArray, a: NDArray, fb: NDArray, b: NDArray, mass: NDArray) -> Pairs:

@@ -105,7 +105,8 @@ def margins(
         words.append((values["panel_margin"][p], where))
     creases = _crease_strengths(crease_strength, pattern)
     if creases is not None and len(creases):
-        margin = _margin(creases / safety, np.abs(found["crease_moment"].values))
+        with np.errstate(divide="ignore"):
+            margin = creases / safety / np.abs(found["crease_moment"].values) - 1.0
         at = np.nan_to_num(margin, nan=np.inf).argmin(axis=0)
         values["crease_margin"], values["crease_state"] = margin.min(axis=0), when[at]
         k = int(np.nan_to_num(values["crease_margin"], nan=np.inf).argmin())
@@ -207,11 +208,6 @@ def _panels(found: xarray.Dataset, margin: NDArray, when: NDArray) -> dict[str, 
     order = np.lexsort((np.nan_to_num(least, nan=np.inf), panel))
     point = order[np.searchsorted(panel[order], np.arange(panel.max() + 1))]
     return {"panel_margin": least[point], "panel_point": point, "panel_state": when[at[point]]}
-
-
-def _margin(strength: NDArray, stress: NDArray) -> NDArray[np.float64]:
-    with np.errstate(divide="ignore"):
-        return strength / stress - 1.0
 
 
 def _crease_strengths(given: Any, pattern: Pattern) -> NDArray[np.float64] | None:

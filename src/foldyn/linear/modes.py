@@ -24,15 +24,9 @@ from foldyn.cases import Case, State
 from foldyn.condensation import Superelements
 from foldyn.dynamics.modal_damping import mass_of
 from foldyn.errors import StretchWarning, quietly, warn
+from foldyn.linear import model_error
 from foldyn.linear.hereditary import Branches, damped_mode
-from foldyn.linear.level_error import (
-    first_doubtful,
-    frequency_errors,
-    other_level,
-    warn_of_errors,
-)
 from foldyn.linear.linearized import Linearized, linearize, numbered, warn_beyond
-from foldyn.linear.model_error import ALONE, SPARE, Beside, Judged, beside, judged, warn_of
 from foldyn.ram_limit import check_memory
 from foldyn.results import modes_dataset
 from foldyn.statics.rigid import free_rigid_motions, of_all_dofs, rigid_motions
@@ -129,10 +123,12 @@ def modes(
     check_model = flag("check_model", check_model)
     found = spectrum_of(
         case, count, state, secant, load_factor=load_factor, verify=verify,
-        solver=solver, compared=beside(case, check_model, state, secant),
+        solver=solver, compared=model_error.beside(case, check_model, state, secant),
     ).result  # fmt: skip
     if check_model and isinstance(case.structure, Superelements):
-        warn_of_errors(case.structure, found["frequency"].values, found["frequency_error"].values)
+        model_error.warn_of_errors(
+            case.structure, found["frequency"].values, found["frequency_error"].values
+        )
     return found
 
 
@@ -147,7 +143,7 @@ class Found(NamedTuple):
 def spectrum_of(
     case: Case, count: int = 6, state: State | str | None = None, secant: float | None = None, *,
     load_factor: float = 1.0, verify: bool = True, solver: str = "auto",
-    errors: bool = True, compared: Beside = ALONE,
+    errors: bool = True, compared: model_error.Beside = model_error.ALONE,
 ) -> Found:  # fmt: skip
     """Modes, with the linearized system and its spectrum; other arguments as in `modes`.
 
@@ -192,14 +188,14 @@ def spectrum_of(
         variables["model_error"] = found.error
         statistics["missing_frequencies"] = found.lost if len(found.lost) else None
     if errors and isinstance(case.structure, Superelements):
-        leveled = linearize(case.altered(structure=other_level(case.structure)))
+        leveled = linearize(case.altered(structure=model_error.other_level(case.structure)))
         most = min(count, Pencil(leveled.stiffness, leveled.mass).finite)
         other = np.full(len(spectrum.values), np.nan)  # a lower level may have fewer modes
         other[:most] = _lowest(leveled, most, solver, verify=False)[-1].values[: len(other)]
         motion = linear.whole(spectrum.shapes)
         parts = case.structure.changes(case.held_edges)
         changes = (motion.T @ (part @ motion) for part in parts)
-        estimate = frequency_errors(case, spectrum.values, other, changes)
+        estimate = model_error.frequency_errors(case, spectrum.values, other, changes)
         variables["frequency_error"] = np.where(variables["rigid"], 0.0, estimate)
     result = modes_dataset(case, variables, statistics)
     return Found(linear, spectrum, result)
@@ -219,7 +215,7 @@ def of_spectrum(arguments: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def trusted(
-    case: Case, top: float, compared: Beside
+    case: Case, top: float, compared: model_error.Beside
 ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
     """Frequency (Hz), at most `top`, up to which modes are within `DOUBTFUL`.
 
@@ -238,7 +234,9 @@ def trusted(
         else:
             error = found["model_error"].values[elastic]
         missing = np.ravel(found.attrs.get("missing_frequencies", ()))
-        wrong = first_doubtful(frequency, np.abs(np.nan_to_num(error, nan=np.inf)) * frequency)
+        wrong = model_error.first_doubtful(
+            frequency, np.abs(np.nan_to_num(error, nan=np.inf)) * frequency
+        )
         holds = min(wrong, float(missing.min(initial=np.inf)), top)
         if holds < top or many < count or not frequency.size or frequency[-1] >= top:
             break
@@ -283,14 +281,14 @@ def _variables(
     }
 
 
-def _judged(case: Case, found: dict[str, Any], other: Case) -> Judged:
+def _judged(case: Case, found: dict[str, Any], other: Case) -> model_error.Judged:
     """Modes of bars and hinges beside those of superelements; warns of large errors."""
     with quietly():
-        most = min(len(found["frequency"]) + SPARE, most_modes(other))
+        most = min(len(found["frequency"]) + model_error.SPARE, most_modes(other))
         true = spectrum_of(other, most, verify=False, errors=False).result
     points = points_of(other, true)
-    out = judged(case, found["frequency"], found["shape"], points, *elastic(true, None))
-    warn_of(out, found["frequency"] > 0.0)
+    out = model_error.judged(case, found["frequency"], found["shape"], points, *elastic(true, None))
+    model_error.warn_of(out.doubts(found["frequency"] > 0.0))
     return out
 
 

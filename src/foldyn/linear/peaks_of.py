@@ -9,18 +9,10 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from foldyn import signals
 from foldyn.cases.directions import AXES, signed
 from foldyn.errors import ComputationError, InputError, quietly
 from foldyn.linear.frf import PER_FORCE, convert, quantity_of
-from foldyn.signals import (
-    CircleFit,
-    Peaks,
-    circle_fit,
-    circle_fits,
-    find_peaks,
-    half_power,
-    without_window,
-)
 from foldyn.values import choice
 
 PROMINENT = 0.05
@@ -137,7 +129,7 @@ def peaks_of(
 def resonances(
     f: NDArray, curve: NDArray, shown: str, prominence: float | None, count: int | None,
     scatters: bool,
-) -> Peaks:  # fmt: skip
+) -> signals.Peaks:  # fmt: skip
     """Peaks of a finite curve, as marked in figures and listed in tables; see `peaks_of`.
 
     shown : quantity of the curve; a transmissibility is treated like a receptance.
@@ -146,7 +138,7 @@ def resonances(
     kind, size = kind_of(shown), np.abs(curve)  # an undamped response is real, of either sign
     rise = None if scatters or prominence is not None else HALF_POWER
     least = PROMINENT if prominence is None else prominence
-    return find_peaks(f, size, prominence=least, count=count, quantity=kind, rise=rise)
+    return signals.find_peaks(f, size, prominence=least, count=count, quantity=kind, rise=rise)
 
 
 def kind_of(shown: str) -> str:
@@ -160,12 +152,12 @@ def _with_half_power(
     """The peak with its half-power damping, and the distance (Hz) of the half-power points."""
     with quietly():  # the asymmetry is in the result
         try:
-            points = half_power(f, np.abs(curve), near=peak.frequency, quantity=kind)
+            points = signals.half_power(f, np.abs(curve), near=peak.frequency, quantity=kind)
         except InputError as error:
             return replace(peak, note=f"half power: {error}"), math.inf
     ratio = points.damping_ratio
     if rate > 0.0:
-        ratio = float(without_window(points.natural_frequency, ratio, rate=rate)[1])
+        ratio = float(signals.without_window(points.natural_frequency, ratio, rate=rate)[1])
     textbook, asymmetry = points.textbook_damping_ratio, points.asymmetry
     damped = replace(peak, half_power=ratio, textbook=textbook, asymmetry=asymmetry)
     return damped, points.upper - points.lower
@@ -209,23 +201,27 @@ def _with_circles(
 ) -> list[Peak]:  # fmt: skip
     """The peaks with circle fits: of all peaks together, or else of each alone."""
     try:
-        fits = circle_fits(f, curve, bands=bands, quantity=kind)
+        fits = signals.circle_fits(f, curve, bands=bands, quantity=kind)
         return [_with_circle(peak, fit, rate) for peak, fit in zip(peaks, fits, strict=True)]
     except (InputError, ComputationError):
         alone = []
     for peak, band in zip(peaks, bands, strict=True):
         try:
-            alone.append(_with_circle(peak, circle_fit(f, curve, band=band, quantity=kind), rate))
+            alone.append(
+                _with_circle(peak, signals.circle_fit(f, curve, band=band, quantity=kind), rate)
+            )
         except (InputError, ComputationError) as error:
             alone.append(replace(peak, note="; ".join(filter(None, (peak.note, str(error))))))
     return alone
 
 
-def _with_circle(peak: Peak, fit: CircleFit, rate: float) -> Peak:
+def _with_circle(peak: Peak, fit: signals.CircleFit, rate: float) -> Peak:
     """The peak with its circle fit, excluding the damping of the window."""
     natural, ratio = fit.natural_frequency, fit.damping_ratio
     if rate > 0.0:
-        natural, ratio = (float(value) for value in without_window(natural, ratio, rate=rate))
+        natural, ratio = (
+            float(value) for value in signals.without_window(natural, ratio, rate=rate)
+        )
     return replace(
         peak, natural_frequency=natural, damping_ratio=ratio, misfit=fit.misfit,
         frequency_error=fit.frequency_error, damping_error=fit.damping_error,

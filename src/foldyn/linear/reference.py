@@ -185,19 +185,13 @@ def touched_clamp(structure: Discretized) -> int | None:
     pattern, clamped = structure.pattern, [set(edge) for edge in structure.options.clamped]
     for vertex in sorted(set().union(*clamped)):
         edges = [edge for edge in clamped if vertex in edge]
-        about = [face for face in pattern.faces if vertex in face]
-        held = np.array([any(edge <= set(face) for edge in edges) for face in about])
-        normals = np.array([_normal(pattern.vertices[list(face)]) for face in about])
+        about = [p for p, face in enumerate(pattern.faces) if vertex in face]
+        held = np.array([any(edge <= set(pattern.faces[p]) for edge in edges) for p in about])
+        normals = pattern.face_normals[about]
         along = np.abs(normals @ normals[held].T)
         if (along.max(axis=1) < FLAT).any():
             return int(vertex)
     return None
-
-
-def _normal(corners: NDArray) -> NDArray:
-    """Unit normal (3,) of a panel with corners (k, 3)."""
-    twice = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
-    return twice / np.linalg.norm(twice)
 
 
 class Shown(Protocol):

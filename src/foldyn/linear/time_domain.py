@@ -13,20 +13,8 @@ from typing import Annotated, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn import cases
 from foldyn.arguments import Check, Checked
-from foldyn.cases import (
-    Actuate,
-    BaseMotion,
-    Case,
-    Force,
-    Harmonic,
-    History,
-    Impose,
-    Load,
-    State,
-    Table,
-    resolve_nodes,
-)
 from foldyn.cases.directions import unit_vector
 from foldyn.cases.supports import Support
 from foldyn.dynamics import METHODS, Progress, prepare
@@ -71,7 +59,7 @@ class Rig:
     """
 
     def __init__(
-        self, case: Case, state: State | str | None, load_factor: float, drive: Drive,
+        self, case: cases.Case, state: cases.State | str | None, load_factor: float, drive: Drive,
         integration: Integration,
     ) -> None:  # fmt: skip
         point = operating_point(case, state, load_factor)
@@ -79,7 +67,7 @@ class Rig:
         self.drive, self.integration = drive, integration
         massless = case.structure.massless
         self.integrator = integration.integrator or ("generalized_alpha" if massless else "rk4")
-        history = Table([0.0, 1.0], [point.factor, point.factor])
+        history = cases.Table([0.0, 1.0], [point.factor, point.factor])
         self.case = case
         if case.contact is not None:  # planes keep their places in the state
             planes = [
@@ -93,7 +81,7 @@ class Rig:
         holding = holding[: self.state.size]
         holding[case.supported_dofs] = 0.0
         holding[np.abs(holding) <= point.problem.force_rounding] = 0.0
-        self._loads: list[Load] = [
+        self._loads: list[cases.Load] = [
             *(replace(cast(Any, load), history=history) for load in kept if point.factor != 0.0),
             *forces(holding.reshape(-1, 3)),
         ]
@@ -101,51 +89,51 @@ class Rig:
 
     def _held(self) -> list[Support]:
         """Supports that hold nodes at their places in the state; bases of the case stand still."""
-        moving = (Impose, BaseMotion)
+        moving = (cases.Impose, cases.BaseMotion)
         held: list[Support] = [s for s in self.case.supports if not isinstance(s, moving)]
         for support in self.case.supports:
-            if isinstance(support, Impose):
-                nodes = resolve_nodes(self.case.structure, support.nodes, "nodes")
+            if isinstance(support, cases.Impose):
+                nodes = cases.resolve_nodes(self.case.structure, support.nodes, "nodes")
                 where = self.state[nodes] @ unit_vector(support.axis or support.direction)
                 still = replace(support, nodes=nodes.tolist(), value=where.tolist(), history=None)
                 held.append(still)
         return held
 
-    def driven(self, history: History) -> Case:
+    def driven(self, history: cases.History) -> cases.Case:
         """The case under the drive."""
         loads, supports = list(self._loads), list(self._supports)
         if self.drive.axis is None:
             loads += forces(self.drive.vector, history)
         else:
-            supports.append(BaseMotion(self.drive.axis, history, self.drive.value))
+            supports.append(cases.BaseMotion(self.drive.axis, history, self.drive.value))
         return replace(self.case, supports=supports, loads=loads)
 
     def run(
-        self, history: History, duration: float, interval: float, progress: Reporter,
-        start: float = 0.0, initial: State | None = None,
-    ) -> tuple[NDArray, NDArray, State]:  # fmt: skip
+        self, history: cases.History, duration: float, interval: float, progress: Reporter,
+        start: float = 0.0, initial: cases.State | None = None,
+    ) -> tuple[NDArray, NDArray, cases.State]:  # fmt: skip
         """Times, response (nt, n, 3) relative to the state, and the final state of a motion."""
         dt, tolerance = self.integration.dt, self.integration.tolerance
         if dt is not None:
             dt = interval / math.ceil(interval / dt * (1.0 - 1e-12))
         motion = prepare(
             self.driven(history), duration, self.integrator, dt, interval=interval,
-            initial=initial or State(self.state), tolerance=tolerance, start=start,
+            initial=initial or cases.State(self.state), tolerance=tolerance, start=start,
         )  # fmt: skip
         found = motion.samples(progress)
         return found.time, found.displacement - self.state, motion.end
 
 
-def _moves_along(load: Load, case: Case) -> bool:
+def _moves_along(load: cases.Load, case: cases.Case) -> bool:
     """Whether a load folds creases or depends on the displacement."""
-    return isinstance(load, Actuate) or load.following(case.structure, "loads") is not None
+    return isinstance(load, cases.Actuate) or load.following(case.structure, "loads") is not None
 
 
-def forces(vectors: NDArray, history: History | None = None) -> list[Force]:
+def forces(vectors: NDArray, history: cases.History | None = None) -> list[cases.Force]:
     """Loads for forces (n, 3) on nodes; equal forces are one load."""
     distinct, which = np.unique(vectors, axis=0, return_inverse=True)
     return [
-        Force(np.flatnonzero(which.ravel() == k).tolist(), vector.tolist(), history)
+        cases.Force(np.flatnonzero(which.ravel() == k).tolist(), vector.tolist(), history)
         for k, vector in enumerate(distinct)
         if vector.any()
     ]
@@ -194,16 +182,13 @@ def stepped_sine(rig: Rig, frequency: NDArray, options: SteppedSine, report: Rep
     response = np.empty((len(frequency), *rig.state.shape), complex)
     unsteady, spent = np.empty(len(frequency)), np.zeros(len(frequency))
     order = np.arange(len(frequency))
-    state: State | None = None
+    state: cases.State | None = None
     done = 0.0
     for place, k in enumerate(order if options.sweep == "up" else order[::-1]):
-        motion = _Motion(rig, float(frequency[k]), options, state)
-        while not motion.settled:
-            before, ahead = done + motion.time, (len(frequency) - place) * 3 * motion.block
-            motion.advance(overall(report, before, before + ahead))
-        response[k], unsteady[k] = motion.response, motion.unsteady
-        spent[k] = motion.time * frequency[k]
-        state, done = motion.state, done + motion.time
+        response[k], unsteady[k], lasted, state = _settled(
+            rig, float(frequency[k]), options, state, report, done, 3 * (len(frequency) - place)
+        )
+        spent[k], done = lasted * frequency[k], done + lasted
     warn_at(
         frequency[unsteady > options.settled],
         f"the motion has not settled after {options.most_cycles} cycles at {{}} (see "
@@ -218,47 +203,32 @@ def stepped_sine(rig: Rig, frequency: NDArray, options: SteppedSine, report: Rep
     return Answer(response, {"unsteadiness": unsteady}, facts)
 
 
-class _Motion:
-    """Motion at one frequency, in blocks of cycles."""
+def _settled(
+    rig: Rig, frequency: float, options: SteppedSine, state: cases.State | None, report: Reporter,
+    done: float, left: int,
+) -> tuple[NDArray, float, float, cases.State | None]:  # fmt: skip
+    """Response to a sine in blocks of cycles, its unsteadiness, its time (s), and its final state.
 
-    def __init__(
-        self, rig: Rig, frequency: float, options: SteppedSine, state: State | None
-    ) -> None:
-        self.rig, self.frequency, self.options = rig, frequency, options
-        self.state, self.history = state, Harmonic(frequency)
-        self.block = options.cycles / frequency
-        self.blocks = 0
-        self.response = np.zeros(0)
-        self.unsteady = np.inf
-        self._change = np.inf
-
-    @property
-    def time(self) -> float:
-        """Simulated time so far (s)."""
-        return self.blocks * self.block
-
-    @property
-    def settled(self) -> bool:
-        """Whether to continue with the next frequency."""
-        long = (self.blocks + 1) * self.options.cycles > self.options.most_cycles
-        return self.unsteady <= self.options.settled or long
-
-    def advance(self, report: Reporter) -> None:
-        """Simulate one more block."""
-        interval = 1.0 / (PER_CYCLE * self.frequency)
-        time, motion, self.state = self.rig.run(
-            self.history, self.block, interval, report, self.time, self.state
-        )
-        drive = self.rig.drive.value * self.history(time)
+    done, left : time (s) simulated before, and the number of blocks that are expected.
+    """
+    history, block = cases.Harmonic(frequency), options.cycles / frequency
+    interval = 1.0 / (PER_CYCLE * frequency)
+    response, unsteady, change, blocks = np.zeros(0), np.inf, np.inf, 0
+    while not (unsteady <= options.settled or (blocks + 1) * options.cycles > options.most_cycles):
+        start, before = blocks * block, response
+        told = overall(report, done + start, done + start + left * block)
+        time, motion, state = rig.run(history, block, interval, told, start, state)
+        drive = rig.drive.value * history(time)
         # the last sample is the first of the next block
         response = response_per_drive(
-            time[:-1], drive[:-1], response=motion[:-1], frequency=self.frequency
+            time[:-1], drive[:-1], response=motion[:-1], frequency=frequency
         )
-        if self.blocks:
-            largest = max(np.abs(response).max(), 1e-300)
-            change = float(np.abs(response - self.response).max() / largest)
-            self.unsteady, self._change = _remaining(change, self._change), change
-        self.response, self.blocks = response, self.blocks + 1
+        if blocks:
+            largest, last = max(np.abs(response).max(), 1e-300), change
+            change = float(np.abs(response - before).max() / largest)
+            unsteady = _remaining(change, last)
+        blocks += 1
+    return response, unsteady, blocks * block, state
 
 
 def _remaining(change: float, before: float) -> float:

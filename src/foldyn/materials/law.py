@@ -143,14 +143,6 @@ class HingeLaw(Law):
         """Slope of the moment / k at dihedral `theta`."""
         return self._rows(self.slopes, theta, rest)[0]
 
-    def rest_slope(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
-        """Derivative of energy / k (rad) with respect to the rest dihedral."""
-        return self._table(theta, rest)[2]
-
-    def moment_by(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
-        """Derivatives (4, ...) of moment / k with respect to rest and to `parameters` a, b, c."""
-        return self._table(theta, rest)[3:]
-
     def _table(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
         return self._rows(self.compiled, theta, rest)
 

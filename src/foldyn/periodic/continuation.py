@@ -11,11 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
+
+from foldyn.periodic.families import Family
 
 ITERATIONS = 8  # most iterations of Newton's method per step
 EASY = 4  # iterations up to which the next step is longer
@@ -26,40 +27,6 @@ SMALLEST = 1e-5  # the branch is lost if steps become shorter than this fraction
 LOCATED = 1e-11  # accuracy of located points, as a fraction of the step
 MISSES = 8  # a search for a special point ends after more failures than this
 NEAR = 0.2  # a step passes points up to this distance from it, as a fraction of its length
-
-
-class Family(Protocol):
-    """Motions along a parameter.
-
-    Attributes
-    ----------
-    span : float
-        Range of the parameter.
-    rounding : float
-        Norm of the residual's rounding errors.
-    tolerance : float
-        Largest last step of Newton's method, as a fraction of the motion.
-    """
-
-    span: float
-    rounding: float
-    tolerance: float
-
-    def residual(self, z: NDArray, p: float) -> NDArray:
-        """R (n,)."""
-        ...
-
-    def jacobian(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n, n) with respect to z."""
-        ...
-
-    def slope(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n,) with respect to p."""
-        ...
-
-    def size(self, z: NDArray) -> float:
-        """Norm of the varying part of the motion."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,7 +229,7 @@ def _turns(family: Family, one: Point, other: Point) -> bool:
     return bool((weights * one.tangent) @ other.tangent < STRAIGHT * lengths)
 
 
-def branch_point(family: Family, z: NDArray, p: float, across: NDArray, far: float) -> Any:
+def branch_point(family: Family, z: NDArray, p: float, across: NDArray, far: float) -> Point | None:
     """First point of a branch that leaves (z, p) along a direction across (n,), or None.
 
     far : length of the step, as a fraction of the motion (in units of z if nothing moves).

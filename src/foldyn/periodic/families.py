@@ -98,8 +98,18 @@ class AboutRest(Instants):
         return float(sum(value - summed.get(name, 0.0) for name, value in every))
 
 
-class _OfBalance:
-    """Common base of the families of a balance."""
+class Family:
+    """Motions of a balance along a parameter p, with n unknowns z: R(z, p) = 0.
+
+    Attributes
+    ----------
+    span : float
+        Range of the parameter.
+    rounding : float
+        Norm of the residual's rounding errors.
+    tolerance : float
+        Largest last step of Newton's method, as a fraction of the motion.
+    """
 
     def __init__(self, balance: Balance, span: float, tolerance: float) -> None:
         self.balance, self.span, self.tolerance = balance, span, tolerance
@@ -131,12 +141,16 @@ class _OfBalance:
         return x, omega, self.instants(level)
 
     def residual(self, z: NDArray, p: float) -> NDArray:
-        """Residual R (n,); see `Family`."""
+        """Residual R (n,)."""
         return self.balance.residual(*self.at(z, p)).ravel()
 
     def jacobian(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n, n) of R with respect to z; see `Family`."""
+        """Derivative (n, n) of R with respect to z."""
         return self.balance.jacobian(*self.at(z, p))
+
+    def slope(self, z: NDArray, p: float) -> NDArray:
+        """Derivative (n,) of R with respect to p: differences, exact for loads linear in p."""
+        return self.by_level(z, p)
 
     def by_level(self, z: NDArray, p: float) -> NDArray:
         """Derivative (c k,) of the balance with respect to p through the level, by differences."""
@@ -151,21 +165,21 @@ class _OfBalance:
         return Orbit.of(self.balance, *self.own(z, p))
 
 
-class ByFrequency(_OfBalance):
+class ByFrequency(Family):
     """Forced motions along the frequency (Hz) of the drive."""
 
     level = 1.0
 
     def own(self, z: NDArray, p: float) -> tuple[NDArray, float, float]:
-        """Coefficients, frequency and level; see `_OfBalance`."""
+        """Coefficients, frequency and level; see `Family`."""
         return self.coefficients(z), TURN * p, self.level
 
     def slope(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n,) of R with respect to p; see `Family`."""
+        """Derivative (n,) of R with respect to p."""
         return TURN * self.balance.frequency_slope(*self.at(z, p)).ravel()
 
 
-class ByLevel(_OfBalance):
+class ByLevel(Family):
     """Forced motions of one frequency along the level of the drive."""
 
     def __init__(self, balance: Balance, span: float, tolerance: float, frequency: float) -> None:
@@ -173,12 +187,8 @@ class ByLevel(_OfBalance):
         self.omega = TURN * frequency
 
     def own(self, z: NDArray, p: float) -> tuple[NDArray, float, float]:
-        """Coefficients, frequency and level; see `_OfBalance`."""
+        """Coefficients, frequency and level; see `Family`."""
         return self.coefficients(z), self.omega, p
-
-    def slope(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n,) of R with respect to p: differences, exact for loads linear in p."""
-        return self.by_level(z, p)
 
 
 class Free(ByFrequency):
@@ -205,7 +215,7 @@ class Free(ByFrequency):
         return self._about
 
 
-class InResonance(_OfBalance):
+class InResonance(Family):
     """Forced motions in phase resonance, along the logarithm of the level of the drive.
 
     At the frequency of these motions the drive does no reactive work: the mean of force times
@@ -247,15 +257,15 @@ class InResonance(_OfBalance):
         return float((force * self.coefficients(z)).sum()), force
 
     def own(self, z: NDArray, p: float) -> tuple[NDArray, float, float]:
-        """Coefficients, frequency and level; see `_OfBalance`."""
+        """Coefficients, frequency and level; see `Family`."""
         return self.coefficients(z), TURN * self.frequency(z), float(np.exp(p))
 
     def residual(self, z: NDArray, p: float) -> NDArray:
-        """Residual R (n,); see `Family`."""
+        """Residual R (n,)."""
         return np.append(super().residual(z, p), self._heavy * self._reactive(z)[0])
 
     def jacobian(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n, n) of R with respect to z; see `Family`."""
+        """Derivative (n, n) of R with respect to z."""
         at, n = self.at(z, p), len(z) - 1
         out = np.empty((n + 1, n + 1))
         out[:n, :n] = self.balance.jacobian(*at)
@@ -268,5 +278,5 @@ class InResonance(_OfBalance):
         return out
 
     def slope(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n,) of R with respect to p; see `Family`."""
+        """Derivative (n,) of R with respect to p."""
         return np.append(self.by_level(z, p), 0.0)

@@ -61,7 +61,7 @@ def reduced(equation: Equation, modes: int, displacement: NDArray) -> Equation:
     vectors = [*shapes.T, *_derivatives(equation, still, place, shapes, factors)]
     vectors += _static(equation, place, factors)
     basis = _independent(equation.mass, np.array(vectors).T)
-    return _projected(equation, place, basis, stiffness, factors)
+    return _projected(equation, place, basis, factors)
 
 
 def _derivatives(
@@ -94,9 +94,7 @@ def _independent(mass: NDArray, vectors: NDArray) -> NDArray:
     return vectors @ (turned[:, kept] / np.sqrt(value[kept]))
 
 
-def _projected(
-    equation: Equation, place: NDArray, basis: NDArray, stiffness: NDArray, factors
-) -> Equation:
+def _projected(equation: Equation, place: NDArray, basis: NDArray, factors) -> Equation:
     """The equation projected on a basis (k, r) about a place (k,)."""
     out = copy.copy(equation)
     for name in ("rounding", "length"):  # cached for the whole equation

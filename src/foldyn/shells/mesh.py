@@ -36,9 +36,9 @@ from foldyn.mechanics.triangle import triangle_stiffness
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, at_junctions, edge_lookup, edge_of
 from foldyn.structures import Sheet
-from foldyn.structures.clamps import opposite
 from foldyn.structures.edge_angles import EdgePlates, weld_turns
 from foldyn.structures.graded import Grading
+from foldyn.structures.held_edges import opposite
 from foldyn.structures.material_axes import material_axes
 from foldyn.structures.mesh import CUT, Triangle, check_triangles
 

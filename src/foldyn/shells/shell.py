@@ -33,22 +33,13 @@ from foldyn.shells.mesh import (
 )
 from foldyn.shells.recovery import Recovery, StressPoints, forces, recovery
 from foldyn.shells.term import GROUPS, ShellTerm
-from foldyn.structures import Sheet
-from foldyn.structures.beyond_range import doubt_locking, doubt_units
-from foldyn.structures.calibration import (
-    Folds,
-    PerCrease,
-    check_creases,
-    check_sheet,
-    fold_rest,
-    fold_stiffness,
-)
-from foldyn.structures.clamps import boundary_edges
+from foldyn.structures import MASS_RULES, Sheet, calibration
+from foldyn.structures.beyond_range import doubt_locking
 from foldyn.structures.discretize import checked_kinds
-from foldyn.structures.discretized import Discretized, HingeKind, read_only
+from foldyn.structures.discretized import Discretized, read_only
 from foldyn.structures.edge_angles import EdgePlates, plates_model
 from foldyn.structures.graded import Grading, grading, smooth_vertices
-from foldyn.structures.mass import MASS_RULES
+from foldyn.structures.held_edges import boundary_edges
 from foldyn.structures.material_axes import own_stretching
 from foldyn.structures.membranes import PanelKind, swelling
 from foldyn.structures.mesh import double_areas, hinge_angles, lengths
@@ -72,13 +63,13 @@ class ShellOptions:
     divisions: int = 16
     mass: str = "lumped"
     fold_law: str | HingeLaw = EnhancedLinear()
-    crease_stiffness: Folds = None
-    crease_rest: PerCrease = None
+    crease_stiffness: calibration.Folds = None
+    crease_rest: calibration.PerCrease = None
     clamped: tuple[Edge, ...] = ()
     rigid: str | tuple[int, ...] | None = None
     vertex_radius: float | None = None
 
-    __post_init__ = check_creases
+    __post_init__ = calibration.check_creases
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -135,7 +126,6 @@ class Shell(Discretized):
 
     kind: ClassVar[str] = "shell"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
-    bar_law: ClassVar[None] = None
 
     @property
     def massless(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -146,17 +136,6 @@ class Shell(Discretized):
     def fill(self) -> Fill:
         """Memory needed for the factors of the tangent."""
         return Fill(PER_DOUBLING, LEAST, f"divisions = {self.options.divisions}", "take fewer")
-
-    @property
-    def hinge_kinds(self) -> tuple[HingeKind, ...]:
-        """The folds, with their law."""
-        ends = self.pattern.creases  # hinges are pieces of creases
-        return (HingeKind("fold", self.fold_law, ends, self.fold_stiffness, self.fold_rest),)
-
-    @cached_property
-    def centers(self) -> NDArray:
-        """No panel has a center node."""
-        return np.full(len(self.pattern.faces), -1)
 
     @cached_property
     def body(self) -> Assembly:
@@ -430,8 +409,8 @@ def shell(
     divisions: int = 16,
     mass: str | None = None,
     fold_law: str | HingeLaw | None = None,
-    crease_stiffness: Folds = None,
-    crease_rest: PerCrease = None,
+    crease_stiffness: calibration.Folds = None,
+    crease_rest: calibration.PerCrease = None,
     clamped: str | Sequence[Sequence[int]] = (),
     rigid: str | Sequence[int] | None = None,
     vertex_radius: float | None = None,
@@ -485,7 +464,6 @@ def shell(
     <Shell: 45 nodes, 64 triangles, 1 folds, mass lumped>
     """
     pattern, sheet = checked_kinds(pattern, sheet)
-    doubt_units(pattern, sheet)
     radius = None if vertex_radius is None else length("vertex_radius", vertex_radius)
     divisions = whole("divisions", divisions, least=1)
     mass = ShellOptions.mass if mass is None else choice("mass", mass, MASSES)
@@ -506,7 +484,7 @@ def shell(
         f"divisions = {show(divisions)}", f"a shell of about {float(nodes):.3g} nodes",
         PER_NODE * nodes, "take fewer",
     )  # fmt: skip
-    check_sheet(sheet, pattern)
+    calibration.check_sheet(sheet, pattern)
     mesh = shell_mesh(pattern, divisions, graded)
     ends = sides(mesh, pattern, edges, rigid_panels(plates, len(pattern.faces)))
     pieces = ends.hinges[: len(ends.piece_crease)]
@@ -515,8 +493,8 @@ def shell(
         triangles=mesh.triangles,
         triangle_panel=mesh.panel,
         sides=ends,
-        fold_stiffness=fold_stiffness(options.crease_stiffness, pattern, sheet),
-        piece_rest=fold_rest(
+        fold_stiffness=calibration.fold_stiffness(options.crease_stiffness, pattern, sheet),
+        piece_rest=calibration.fold_rest(
             options.crease_rest, hinge_angles(mesh.nodes, pieces), pattern, ends.piece_crease
         ),
         pattern=pattern,

@@ -42,7 +42,7 @@ from scipy import sparse
 
 from foldyn.algebra.reduction import Reduction
 from foldyn.algebra.solvers import factorizer
-from foldyn.algebra.superlu import Factorization, SingularTangentError, Solution, Unsymmetric
+from foldyn.algebra.superlu import Factorization, SingularTangentError, Solution, unsymmetric
 from foldyn.arguments import Check, Checked, Flag
 from foldyn.errors import InputError
 from foldyn.values import choice, number, whole
@@ -311,7 +311,7 @@ class Solver:
         if block.is_symmetric:
             own = _factorized(block.exact, self._factorize)
             return Stiffness(self.problem, matrix, own, lambda: own)
-        factors = _factorized(block.exact, Unsymmetric)
+        factors = _factorized(block.exact, unsymmetric)
 
         def symmetric() -> Factorization:
             self.tally.factorizations += 1

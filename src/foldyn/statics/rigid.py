@@ -101,10 +101,8 @@ def _tidy(directions: NDArray) -> list[NDArray]:
     if not directions.size:
         return []
     basis, _ = np.linalg.qr(directions)
-    chosen: list[NDArray] = []
-    for axis in np.eye(3):
-        if np.linalg.norm(basis @ (basis.T @ axis)) > 1.0 - 1e-6:
-            chosen.append(axis)
+    inside = np.linalg.norm(basis @ basis.T, axis=0) > 1.0 - 1e-6
+    chosen = list(np.eye(3)[inside])
     rest = basis - sum((np.outer(a, a @ basis) for a in chosen), np.zeros_like(basis))
     left, values, _ = np.linalg.svd(rest)
     chosen += [left[:, k] for k in range(int((values > 1e-6).sum()))]

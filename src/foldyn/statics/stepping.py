@@ -22,14 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.arguments import brief
-from foldyn.statics.newton import (
-    COLLIDES,
-    Attempt,
-    Problem,
-    Solver,
-    Stiffness,
-    balance,
-)
+from foldyn.statics.newton import COLLIDES, Attempt, Problem, Solver, Stiffness, balance
 
 NEGLIGIBLE = 1e-6  # motions below this fraction of the structure's size are never a snap
 SNAPS = "the structure snaps to a state off its path"

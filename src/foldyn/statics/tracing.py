@@ -26,12 +26,11 @@ from scipy import sparse
 from foldyn.algebra.solvers import check_fill, factorized
 from foldyn.algebra.superlu import Factorization
 from foldyn.arguments import Check
-from foldyn.cases import Case, Gravity, State
+from foldyn.cases import Case, Gravity, State, resolve_nodes
 from foldyn.cases.constraints import check_tied
 from foldyn.cases.contact_checks import check_contact, check_driven
 from foldyn.cases.decode import Part, PartOf
 from foldyn.cases.directions import AXES, Axis
-from foldyn.cases.selection import resolve_nodes
 from foldyn.errors import InputError
 from foldyn.mechanics.term import Unstrained
 from foldyn.ram_limit import check_memory

@@ -1,12 +1,11 @@
 """Structures: a pattern as bars and hinges with stiffness and mass."""
 
 from foldyn.structures.discretize import discretize
-from foldyn.structures.laminate import Laminate
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import hinge_angles
 from foldyn.structures.ply import Ply
 from foldyn.structures.presets import PRESETS
-from foldyn.structures.sheet import PanelSheet, Sheet
+from foldyn.structures.sheet import Laminate, PanelSheet, Sheet
 from foldyn.structures.strip import Strip
 from foldyn.structures.structure import ModelOptions, Structure
 

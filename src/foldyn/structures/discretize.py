@@ -14,6 +14,7 @@ from foldyn.materials.plate_superlinear import plate_onset
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned, pattern_of
 from foldyn.ram_limit import check_memory
+from foldyn.structures import held_edges
 from foldyn.structures.beyond_range import doubt_locking, doubt_range, doubt_units
 from foldyn.structures.calibration import (
     Folds,
@@ -24,15 +25,7 @@ from foldyn.structures.calibration import (
     fold_rest,
     fold_stiffness,
 )
-from foldyn.structures.clamps import boundary_edges, clamp_rows, clamp_stiffness
 from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
-from foldyn.structures.guided_edges import (
-    Guided,
-    directions,
-    guided_edges,
-    straight_in_bending,
-    straight_in_plane,
-)
 from foldyn.structures.membranes import membranes
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
 from foldyn.structures.plate import panel_plates, weld_stiffness
@@ -62,7 +55,7 @@ def discretize(
     clamped: str | Sequence[Sequence[int]] = (),
     rigid: str | Sequence[int] | None = None,
     straight: str | Sequence[Sequence[int]] = (),
-    guided: Mapping[str, str | Sequence[Sequence[int]]] | Sequence[Guided] = (),
+    guided: Mapping[str, str | Sequence[Sequence[int]]] | Sequence[held_edges.Guided] = (),
     membrane: Literal["bars", "panel"] | None = None,
     preset: Literal["n5b8e", "plate", "herkal", "merlin2"] | None = None,
 ) -> Structure:
@@ -104,7 +97,7 @@ def discretize(
     clamped : sequence of (vertex, vertex), or str
         Boundary edges along which panels keep the direction of their rest tangent in space; their
         nodes still need supports. A selection ("xmin") means the boundary edges with both ends in
-        it. See `foldyn.structures.clamps`, and `edge_angles` for "n5b8e".
+        it. See `foldyn.structures.held_edges`, and `edge_angles` for "n5b8e".
     rigid : "all" or sequence of int, optional
         Panels that cannot bend at all: three of their corners determine the positions of all their
         nodes. They must be flat. Their bars still stretch.
@@ -115,7 +108,7 @@ def discretize(
     guided : mapping of {"x", "y", "z"}, optional
         Boundary edges held along one axis along their length and free otherwise, by axis, for
         example {"z": "zmax"} for a rim on a smooth plate, which bows in its plane. A rim glued to a
-        stiff plate is `straight`. See `foldyn.structures.guided_edges`.
+        stiff plate is `straight`. See `foldyn.structures.held_edges`.
     membrane : {"bars", "panel"}
         In-plane stiffness of panels: independent bars, which are exact in uniform strain at best;
         or bars coupled so that the corners have the panel's membrane stiffness, which is accurate
@@ -153,14 +146,13 @@ def discretize(
     [0.0639]
     """
     pattern, sheet = checked_kinds(pattern, sheet)
-    doubt_units(pattern, sheet)
-    edges = boundary_edges(clamped, pattern, "clamped")
+    edges = held_edges.boundary_edges(clamped, pattern, "clamped")
     options = resolved(
         preset, scheme=scheme, mass=mass, bar_law=bar_law, fold_law=fold_law, bend_law=bend_law,
         calibration=calibration, crease_stiffness=crease_stiffness, crease_rest=crease_rest,
         clamped=edges, rigid=checked_panels(rigid, len(pattern.faces)),
-        straight=boundary_edges(straight, pattern, "straight"),
-        guided=guided_edges(guided, pattern), membrane=membrane,
+        straight=held_edges.boundary_edges(straight, pattern, "straight"),
+        guided=held_edges.guided_edges(guided, pattern), membrane=membrane,
     )  # fmt: skip
     check_welds(options.rigid, pattern)
     if len(pattern.welds) and options.scheme != "n5b8e":
@@ -192,14 +184,14 @@ def discretize(
     bends = np.concatenate([bend_stiffness(mesh, pattern, sheet, merlin2), welds])
     plates, softness = None, np.zeros(len(folds))
     x, hinges = mesh.nodes, np.concatenate([mesh.bends, mesh.welds])
-    clamps, clamped_triangle = clamp_rows(edges, mesh.triangles)
+    clamps, clamped_triangle = held_edges.clamp_rows(edges, mesh.triangles)
     clamped_panel = mesh.triangle_panel[clamped_triangle]
     modulus = sheet.values("bending_modulus", len(pattern.faces))[clamped_panel]
-    turning = clamp_stiffness(x, clamps, modulus)
+    turning = held_edges.clamp_stiffness(x, clamps, modulus)
     if options.scheme == "n5b8e":
         stiff = rigid_panels(options.rigid, len(pattern.faces))
         springs = dict(zip(edges, turning.tolist(), strict=True))
-        held = straight_in_bending(options.straight, options.guided, pattern, sheet)
+        held = held_edges.straight_in_bending(options.straight, options.guided, pattern, sheet)
         plates = edge_plates(mesh, pattern, sheet, held, stiff, springs)
         stiffness = spoke_stiffness(plates, len(mesh.folds), len(bends) + len(edges))
         bends, turning = np.split(stiffness, [len(bends)])
@@ -212,10 +204,10 @@ def discretize(
     coupled, gives = (), np.zeros((0, 2), np.int64)
     if options.membrane == "panel":
         stiff = rigid_panels(options.rigid, len(pattern.faces))
-        held = [*straight_in_plane(options.straight, options.guided, pattern), *edges]
+        held = [*held_edges.straight_in_plane(options.straight, options.guided, pattern), *edges]
         coupled, gives = membranes(
             mesh, pattern, sheet, held, stiff, options.scheme == "n5b8e",
-            directions(options.guided, pattern),
+            held_edges.directions(options.guided, pattern),
         )  # fmt: skip
     structure = Structure(
         nodes=x,
@@ -247,8 +239,10 @@ def discretize(
 
 
 def checked_kinds(pattern: Any, sheet: Any) -> tuple[Pattern, Sheet]:
-    """Pattern and sheet; accepts objects with a pattern, and refuses anything else."""
-    return pattern_of(pattern), of_kind("sheet", sheet, Sheet)
+    """Pattern and sheet; accepts objects with a pattern, refuses anything else, doubts units."""
+    pattern, sheet = pattern_of(pattern), of_kind("sheet", sheet, Sheet)
+    doubt_units(pattern, sheet)
+    return pattern, sheet
 
 
 def _given_centers(

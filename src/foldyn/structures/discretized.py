@@ -144,19 +144,18 @@ class Discretized:
     bars: NDArray
     triangles: NDArray
     triangle_panel: NDArray
-    centers: NDArray
     pattern: Any
     sheet: Sheet
     options: Any
     mass: sparse.csr_array
     folds: NDArray
+    fold_stiffness: NDArray
     fold_rest: NDArray
     body: Assembly
     fill: Fill
     energy_groups: ClassVar[Mapping[str, str]]
     kind: ClassVar[str]
-    hinge_kinds: Any  # tuple of HingeKind, each model's own property
-    bar_law: Any  # BarLaw or None
+    bar_law: Any = None  # BarLaw
     membranes: Sequence[Any]
     linear: ClassVar[str] = ""
     massless: ClassVar[str] = ""
@@ -181,6 +180,17 @@ class Discretized:
     def fold_law(self) -> HingeLaw:
         """Law of the folds."""
         return hinge_law(self.options.fold_law, "fold_law")
+
+    @cached_property
+    def centers(self) -> NDArray:
+        """Center node (np,) of each panel; -1 for none."""
+        return np.full(len(self.pattern.faces), -1)
+
+    @property
+    def hinge_kinds(self) -> tuple[HingeKind, ...]:
+        """The folds, with their law: whole creases."""
+        ends = self.pattern.creases
+        return (HingeKind("fold", self.fold_law, ends, self.fold_stiffness, self.fold_rest),)
 
     @cached_property
     def bar_length(self) -> NDArray:

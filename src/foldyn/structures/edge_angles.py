@@ -33,18 +33,9 @@ from foldyn import mechanics
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.materials import BarLaw, HingeLaw, LinearBar, LinearHinge
 from foldyn.mechanics.plates import BarsPlates
-from foldyn.patterns import Pattern
-from foldyn.patterns.topology import (
-    Edge,
-    Lines,
-    around,
-    at_junctions,
-    edge_lookup,
-    edge_of,
-    edge_rows,
-)
-from foldyn.structures.clamps import clamp_points
+from foldyn.patterns import Pattern, topology
 from foldyn.structures.condensed_panel import panel_moments, panel_stiffness
+from foldyn.structures.held_edges import clamp_points
 from foldyn.structures.mesh import Mesh, hinge_angles, lengths, too_narrow
 from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
@@ -66,8 +57,8 @@ class EdgePlates(NamedTuple):
 
 def edge_plates(
     mesh: Mesh, pattern: Pattern, sheet: Sheet,
-    straight_edges: Collection[Edge] = (), rigid: Collection[int] = (),
-    clamped: Mapping[Edge, float] = MappingProxyType({}),
+    straight_edges: Collection[topology.Edge] = (), rigid: Collection[int] = (),
+    clamped: Mapping[topology.Edge, float] = MappingProxyType({}),
 ) -> EdgePlates:  # fmt: skip
     """Panels of a mesh with center nodes as plates.
 
@@ -78,8 +69,8 @@ def edge_plates(
     """
     kinds, kind = sheet.kinds(len(pattern.faces))
     folds, bends = len(mesh.folds), len(mesh.bends)
-    creases, welds = edge_rows(pattern.creases), weld_turns(pattern)
-    hinge = {edge: folds + bends + k for edge, k in edge_lookup(pattern.welds).items()}
+    creases, welds = topology.edge_rows(pattern.creases), weld_turns(pattern)
+    hinge = {edge: folds + bends + k for edge, k in topology.edge_lookup(pattern.welds).items()}
     hinges = np.concatenate([mesh.folds, mesh.welds])
     hinge |= {edge: bends + len(hinges) + k for k, edge in enumerate(clamped)}
     panels = outlines(
@@ -106,7 +97,7 @@ def edge_plates(
     angles: list[list[int]] = []
     matrices: list[NDArray] = []
     for p, face in enumerate(pattern.faces):
-        panel, edges = panels[p], [edge_of(a, b) for a, b in around(face)]
+        panel, edges = panels[p], [topology.edge_of(a, b) for a, b in topology.around(face)]
         if panel is None:
             held = [edge for edge in edges if edge in clamped]
             angles.append([hinge[edge] for edge in held])
@@ -153,13 +144,13 @@ def edge_plates(
     )
 
 
-def weld_turns(pattern: Pattern) -> dict[tuple[int, Edge], tuple[int, float, float]]:
+def weld_turns(pattern: Pattern) -> dict[tuple[int, topology.Edge], tuple[int, float, float]]:
     """Row of the weld, and factors of its dihedral and of the shared rotation, by panel and edge.
 
     The sheet turns by their sum relative to the panel, see the top of this module.
     """
-    found: dict[tuple[int, Edge], tuple[int, float, float]] = {}
-    at_junction = at_junctions(pattern.welds)
+    found: dict[tuple[int, topology.Edge], tuple[int, float, float]] = {}
+    at_junction = topology.at_junctions(pattern.welds)
     for row, (a, b) in enumerate(pattern.welds.tolist()):
         (one, two), (way, other) = pattern.weld_faces[row].tolist(), pattern.weld_ways[row].tolist()
         if at_junction[row]:  # the rows of the first panel come first
@@ -189,7 +180,7 @@ def curl_moments(
         own, size = kinds[kind[p]], np.sqrt(2.0 * area[p])  # an outline's size is 1
         scale, place = own.bending_modulus * curvature[p] * size, plates.start[p]
         spokes = len(panel.corners) if panel.center else 0
-        edges = ((p, edge_of(a, b)) for a, b in around(pattern.faces[p]))
+        edges = ((p, topology.edge_of(a, b)) for a, b in topology.around(pattern.faces[p]))
         by_weld = iter([turns[edge][1:] for edge in edges if edge in turns and turns[edge][1]])
         for k, moment in enumerate(scale * panel_moments(panel, own.poissons_ratio)):
             if k < spokes or not 0 <= plates.angle[place] < clamps:
@@ -214,23 +205,23 @@ def free_angles(plates: EdgePlates, moment: NDArray) -> NDArray:
 
 def outlines(
     nodes: NDArray, centers: NDArray, hinges: NDArray, pattern: Pattern, sheet: Sheet,
-    straight_edges: Collection[Edge] = (), rigid: Collection[int] = (),
-    clamped: Collection[Edge] = (),
+    straight_edges: Collection[topology.Edge] = (), rigid: Collection[int] = (),
+    clamped: Collection[topology.Edge] = (),
 ) -> list[Outline | None]:  # fmt: skip
     """Outline of each panel; None for rigid panels. Welds count as creases that may bow.
 
     See `straight_creases` and `edge_plates` for the arguments.
     """
     bent = np.concatenate([pattern.creases, pattern.welds])
-    straight = set(edge_lookup(bent[straight_creases(nodes, hinges, pattern, sheet)]))
+    straight = set(topology.edge_lookup(bent[straight_creases(nodes, hinges, pattern, sheet)]))
     straight |= {*straight_edges, *clamped}
-    hinged, welds = edge_lookup(bent), edge_lookup(pattern.welds)
+    hinged, welds = topology.edge_lookup(bent), topology.edge_lookup(pattern.welds)
     found: list[Outline | None] = []
     for p, face in enumerate(pattern.faces):
         if p in rigid:
             found.append(None)
             continue
-        edges = [edge_of(a, b) for a, b in around(face)]
+        edges = [topology.edge_of(a, b) for a, b in topology.around(face)]
         found.append(
             outline(
                 pattern.vertices[list(face)],
@@ -251,7 +242,7 @@ def straight_creases(nodes: NDArray, hinges: NDArray, pattern: Pattern, sheet: S
     thickness = sheet.values("thickness", len(pattern.faces))[faces].max(axis=1)
     slender = thickness / lengths(pattern.vertices, edges)
     straight = np.abs(np.sin(hinge_angles(nodes, hinges))) > STRAIGHT * slender
-    line = Lines.of(edges).number  # junctions are several creases
+    line = topology.Lines.of(edges).number  # junctions are several creases
     return np.bincount(line, straight)[line] > 0.0
 
 

@@ -78,7 +78,7 @@ def membranes(
     bow.
     rigid : panels that do not bend.
     giving : whether other edges give way; never for panels that do not bend or are not convex.
-    guided : directions in which boundary edges can bow; see `structures.guided_edges`.
+    guided : directions in which boundary edges can bow; see `structures.held_edges`.
     """
     kinds: dict[tuple, list[tuple[int, NDArray, NDArray, NDArray]]] = {}
     sides, stiff = _sides(mesh, pattern, sheet, straight, rigid, guided), set(rigid)

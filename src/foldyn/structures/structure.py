@@ -11,38 +11,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from foldyn import mechanics
+from foldyn import materials, mechanics
 from foldyn.algebra.solvers import Fill
 from foldyn.arguments import Check, Checked
-from foldyn.materials import (
-    BarLaw,
-    EnhancedLinear,
-    HingeLaw,
-    LinearHinge,
-    PlateSuperlinear,
-    bar_law,
-    hinge_law,
-)
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import Following, joined, moments, pushes, tensions
 from foldyn.mechanics.membranes_term import MembranesTerm
 from foldyn.mechanics.plates import RIDES, handed_over
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
+from foldyn.structures import edge_angles
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm
 from foldyn.structures.bars_plates import BarsPlatesTerm, ClampsTerm, balanced
 from foldyn.structures.calibration import Folds, PerCrease, folds_given, per_crease
-from foldyn.structures.clamps import clamp_points
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
-from foldyn.structures.edge_angles import (
-    EdgePlates,
-    clamps_model,
-    curl_moments,
-    free_angles,
-    outlines,
-    plates_model,
-)
-from foldyn.structures.guided_edges import Guided, straight_in_bending
+from foldyn.structures.held_edges import Guided, clamp_points, straight_in_bending
 from foldyn.structures.mass import MASS_RULES, Surface, lumped
 from foldyn.structures.membranes import PanelKind, swelling
 from foldyn.structures.mesh import double_areas, hinge_angles
@@ -66,9 +49,9 @@ class ModelOptions(Checked):
 
     scheme: Annotated[str, Check(choice, known=SCHEMES)] = "n5b8"
     mass: str = "consistent"
-    bar_law: str | BarLaw = "ogden"
-    fold_law: str | HingeLaw = EnhancedLinear()
-    bend_law: str | HingeLaw = "linear"
+    bar_law: str | materials.BarLaw = "ogden"
+    fold_law: str | materials.HingeLaw = materials.EnhancedLinear()
+    bend_law: str | materials.HingeLaw = "linear"
     calibration: Annotated[str, Check(choice, known=CALIBRATIONS)] = "plate"
     crease_stiffness: Annotated[Folds, Check(folds_given, unit="N m/rad per m")] = None
     crease_rest: Annotated[PerCrease, Check(per_crease, unit="degrees")] = None
@@ -148,7 +131,7 @@ class Structure(Discretized):
     node_mass: NDArray | None = None
     clamps: NDArray = field(default_factory=lambda: _none(3))
     clamp_stiffness: NDArray = field(default_factory=lambda: _none(1, float))
-    edge_plates: EdgePlates | None = None
+    edge_plates: edge_angles.EdgePlates | None = None
     membranes: tuple[PanelKind, ...] = ()
     edge_gives: NDArray = field(default_factory=lambda: _none(2))
     by_folds: bool = False
@@ -186,14 +169,14 @@ class Structure(Discretized):
         return self.sheet.youngs_modulus * self.bar_area / self.bar_length
 
     @cached_property
-    def bar_law(self) -> BarLaw:
+    def bar_law(self) -> materials.BarLaw:
         """Law of the bars."""
-        return bar_law(self.options.bar_law)
+        return materials.bar_law(self.options.bar_law)
 
     @cached_property
-    def bend_law(self) -> HingeLaw:
+    def bend_law(self) -> materials.HingeLaw:
         """Law of the bends."""
-        return hinge_law(self.options.bend_law, "bend_law")
+        return materials.hinge_law(self.options.bend_law, "bend_law")
 
     @cached_property
     def model(self) -> mechanics.BarsHinges:
@@ -211,8 +194,10 @@ class Structure(Discretized):
         body = self._coupled(BarsHingesTerm(self.model, np.concatenate(rows), laws, self._softness))
         if not len(self.clamps):
             return body
-        clamps = clamps_model(self.nodes, self.clamps, self.clamp_stiffness)
-        return body.with_terms(ClampsTerm(clamps, (LinearHinge(), LinearHinge())))
+        clamps = edge_angles.clamps_model(self.nodes, self.clamps, self.clamp_stiffness)
+        return body.with_terms(
+            ClampsTerm(clamps, (materials.LinearHinge(), materials.LinearHinge()))
+        )
 
     def _coupled(self, sheet: BarsHingesTerm | BarsPlatesTerm) -> Assembly:
         """A body: the sheet, with the membranes of the panels in place of independent bars."""
@@ -234,12 +219,12 @@ class Structure(Discretized):
         """Nodes on the axes of the hinges, folds first."""
         return np.concatenate([self.folds, self.bends])[:, :2].tolist()
 
-    def _plates_term(self, plates: EdgePlates) -> BarsPlatesTerm:
+    def _plates_term(self, plates: edge_angles.EdgePlates) -> BarsPlatesTerm:
         if len(self.edge_gives):  # unlike dofs of plates
             hinge = {frozenset(axis): k for k, axis in enumerate(self._axes)}
             gives = [hinge[frozenset(edge)] for edge in self.edge_gives.tolist()]
             plates = plates._replace(rotation_hinge=np.append(plates.rotation_hinge, gives))
-        model = plates_model(
+        model = edge_angles.plates_model(
             self.nodes, self.bars, self.bar_stiffness, self.bar_law, self.folds,
             self.fold_stiffness, self.fold_rest, self.fold_law, self.bends, self.bend_rest, plates,
             self.clamps, self.by_folds,
@@ -257,7 +242,7 @@ class Structure(Discretized):
     def hinge_kinds(self) -> tuple[HingeKind, ...]:
         """The folds and the bends, with their laws."""
         law = self.bend_law
-        own = isinstance(law, PlateSuperlinear) and law.onset is None
+        own = isinstance(law, materials.PlateSuperlinear) and law.onset is None
         onset = self.bend_onset if own else None
         folds = self.folds, self.fold_stiffness, self.fold_rest
         bends = self.bends, self.bend_stiffness, self.bend_rest
@@ -300,7 +285,7 @@ class Structure(Discretized):
                 parts += [moment, pushes(sheet.hidden[: len(on_edges)], on_edges)]
                 if turning.any():
                     parts.append(moments(self.nodes[self.folds], self.folds, turning))
-            free = free_angles(self.edge_plates, own)
+            free = edge_angles.free_angles(self.edge_plates, own)
             forces = joined((part, 0) for part in parts)
             turns = np.zeros(len(sheet.rest_angles))
             return Swelling(turns, forces, (longer, free), (push, own), stress)
@@ -318,7 +303,9 @@ class Structure(Discretized):
         points = clamp_points(self.nodes - self.nodes.mean(axis=0), self.clamps)
         return moments(points, np.column_stack([self.clamps, np.full(len(moment), RIDES)]), moment)
 
-    def _curled(self, plates: EdgePlates, curvature: NDArray) -> tuple[Following, NDArray, NDArray]:
+    def _curled(
+        self, plates: edge_angles.EdgePlates, curvature: NDArray
+    ) -> tuple[Following, NDArray, NDArray]:
         """Moments on the hinges of plates, and forces (r,), N, on the dofs of their edge angles.
 
         Also returns the moments (nq,), N m, of all angles of plates. All are linear in `curvature`,
@@ -329,7 +316,7 @@ class Structure(Discretized):
         area = np.bincount(self.triangle_panel, area)
         hinges, on_hinge = np.concatenate([self.folds, self.bends]), plates.angle >= 0
         count = len(hinges)
-        moment = curl_moments(
+        moment = edge_angles.curl_moments(
             plates, self.outlines, curvature, self.pattern, self.sheet, area, count
         )
         turning = np.bincount(plates.angle[on_hinge], moment[on_hinge], count + len(self.clamps))
@@ -360,7 +347,7 @@ class Structure(Discretized):
         assert pattern is not None
         hinges = np.concatenate([self.folds, self.bends[len(self.bends) - len(pattern.welds) :]])
         straight = straight_in_bending(options.straight, options.guided, pattern, self.sheet)
-        return outlines(
+        return edge_angles.outlines(
             self.nodes, self.centers, hinges, pattern, self.sheet, straight,
             rigid_panels(options.rigid, len(pattern.faces)), options.clamped,
         )  # fmt: skip

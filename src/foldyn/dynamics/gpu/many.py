@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.gpu.arrays import topology
 from foldyn.dynamics.gpu.checks import METHODS, lacking
-from foldyn.dynamics.gpu.engine import BlockEngine
-from foldyn.dynamics.gpu.launch import Launches, Places, take
+from foldyn.dynamics.gpu.engine import BlockEngine, Launches, Places, take
 from foldyn.dynamics.motion import Motion
 from foldyn.errors import InputError
 

@@ -18,23 +18,10 @@ from foldyn.patterns.pattern import pattern_of, refuse_junctions
 from foldyn.patterns.picture import picture
 from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.results import folding_dataset
+from foldyn.statics.folding import ways
 from foldyn.statics.folding.energy import FoldEnergy, Shape
 from foldyn.statics.folding.subdivision import are_slivers, subdivided
 from foldyn.statics.folding.targets import fold_targets, full_angles
-from foldyn.statics.folding.ways import (
-    BENDING,
-    ISOMETRIC,
-    PLANE,
-    SLIGHT,
-    Bending,
-    Way,
-    WayInterrupted,
-    from_folded,
-    from_pattern,
-    largest_strain,
-    unopened,
-    wrong_ways,
-)
 from foldyn.values import choice, function, whole
 
 MOST_SHOWN = 8  # creases listed in a message
@@ -99,9 +86,9 @@ class Folding:
     @property
     def kind(self) -> Literal["rigid", "bent", "stretched"]:
         """Whether the panels stay plane, bend without strain, or are stretched."""
-        if self.strain > ISOMETRIC:
+        if self.strain > ways.ISOMETRIC:
             return "stretched"
-        return "bent" if self.bend > PLANE else "rigid"
+        return "bent" if self.bend > ways.PLANE else "rigid"
 
     @property
     def error(self) -> float:
@@ -112,8 +99,8 @@ class Folding:
     @property
     def rigid_path(self) -> bool:
         """Whether panels stay plane and unstrained at every step."""
-        strained = self.path["strain"].values > ISOMETRIC
-        return not (strained | (self.path["bend"].values > PLANE)).any()
+        strained = self.path["strain"].values > ways.ISOMETRIC
+        return not (strained | (self.path["bend"].values > ways.PLANE)).any()
 
     @property
     def closed(self) -> NDArray[np.int64]:
@@ -277,7 +264,7 @@ def fold(
     )
     steps = whole("steps", steps, least=1, most=1000)
     choice("initial", initial, INITIALS)
-    choice("panels", panels, tuple(BENDING))
+    choice("panels", panels, tuple(ways.BENDING))
     targets = fold_targets(pattern, angles, fraction)
     if panels == "subdivided":
         pattern, rows = subdivided(pattern)
@@ -290,8 +277,8 @@ def fold(
             progress(step, steps)
 
     try:
-        way = _best_way(pattern, energy, BENDING[panels], targets, steps, initial, tell)
-    except WayInterrupted as stop:
+        way = _best_way(pattern, energy, ways.BENDING[panels], targets, steps, initial, tell)
+    except ways.WayInterrupted as stop:
         done = len(stop.way.shapes) - 1
         partial = _result(pattern, energy, stop.way, targets) if done else None
         text = f"interrupted after {done} of {steps} steps"
@@ -302,28 +289,34 @@ def fold(
 
 
 def _best_way(
-    pattern: Pattern, energy: FoldEnergy, bending: Bending, targets: NDArray,
+    pattern: Pattern, energy: FoldEnergy, bending: ways.Bending, targets: NDArray,
     steps: int, initial: str, tell: Callable[[int], None],
-) -> Way:  # fmt: skip
+) -> ways.Way:  # fmt: skip
     """The best way: fewest creases turned wrong, then no strain, then closest to the targets.
 
     The folded state is used only if all its creases open and end closer to the targets.
     """
 
-    def cost(way: Way) -> tuple[bool, int, bool, float]:
-        strain, wrong = _strain(way), len(_wrong(energy, way, targets))
-        return strain > CRUMPLED, wrong, strain > ISOMETRIC, _off(energy, way, targets)
+    def cost(way: ways.Way) -> tuple[bool, int, bool, float]:
+        last = way.shapes[-1]
+        strain, wrong = ways.largest_strain(last), len(ways.wrong_ways(energy, last.turns, targets))
+        return strain > CRUMPLED, wrong, strain > ways.ISOMETRIC, _off(energy, way, targets)
 
     best = None
     if initial != "folded":
         stiffest, *others = bending.folding
-        best = from_pattern(energy, stiffest, targets, steps, tell)
+        best = ways.from_pattern(energy, stiffest, targets, steps, tell)
         for softer in others:
-            if any(cost(best)[:3]) or _bend(energy, best) > SLIGHT:
-                best = min(best, from_pattern(energy, softer, targets, steps, tell), key=cost)
+            if (
+                any(cost(best)[:3])
+                or energy.bent(best.shapes[-1].turns).max(initial=0.0) > ways.SLIGHT
+            ):
+                best = min(best, ways.from_pattern(energy, softer, targets, steps, tell), key=cost)
         if initial == "pattern" or not any(cost(best)[:3]):
             return best
-    way = from_folded(energy, bending.opening, pattern, full_angles(pattern), targets, steps, tell)
+    way = ways.from_folded(
+        energy, bending.opening, pattern, full_angles(pattern), targets, steps, tell
+    )
     if best is not None:
         if way is None or len(_unopened(energy, way, targets)):
             return best
@@ -339,31 +332,19 @@ def _best_way(
     return way
 
 
-def _off(energy: FoldEnergy, way: Way, targets: NDArray) -> float:
+def _off(energy: FoldEnergy, way: ways.Way, targets: NDArray) -> float:
     """Mean difference (rad) between creases and their targets; 0 without targets."""
     off = np.abs(energy.creases(way.shapes[-1].turns) - targets)
     return float(np.nansum(off) / max(1, np.isfinite(off).sum()))
 
 
-def _unopened(energy: FoldEnergy, way: Way, targets: NDArray) -> NDArray[np.int64]:
+def _unopened(energy: FoldEnergy, way: ways.Way, targets: NDArray) -> NDArray[np.int64]:
     """Creases that should open on the way and have hardly done so."""
     first, last = (energy.creases(way.shapes[k].turns) for k in (0, -1))
-    return unopened(first, last, targets)
+    return ways.unopened(first, last, targets)
 
 
-def _bend(energy: FoldEnergy, way: Way) -> float:
-    return float(energy.bent(way.shapes[-1].turns).max(initial=0.0))
-
-
-def _wrong(energy: FoldEnergy, way: Way, targets: NDArray) -> NDArray[np.int64]:
-    return wrong_ways(energy, way.shapes[-1].turns, targets)
-
-
-def _strain(way: Way) -> float:
-    return largest_strain(way.shapes[-1])
-
-
-def _result(pattern: Pattern, energy: FoldEnergy, way: Way, targets: NDArray) -> Folding:
+def _result(pattern: Pattern, energy: FoldEnergy, way: ways.Way, targets: NDArray) -> Folding:
     """Make the `Folding` of a way: crossings, angles, layers."""
     from foldyn.statics.folding.layer_order import with_layers  # loads a library
 
@@ -385,9 +366,9 @@ def _result(pattern: Pattern, energy: FoldEnergy, way: Way, targets: NDArray) ->
         path=path,
         targets=targets,
         angles=angles,
-        wrong=tuple(_wrong(energy, way, targets).tolist()),
-        strain=_strain(way),
-        bend=_bend(energy, way),
+        wrong=tuple(ways.wrong_ways(energy, last.turns, targets).tolist()),
+        strain=ways.largest_strain(last),
+        bend=float(energy.bent(last.turns).max(initial=0.0)),
         crossings=crossed[-1],
         first_crossings=first,
         started_from=way.origin,
@@ -396,7 +377,7 @@ def _result(pattern: Pattern, energy: FoldEnergy, way: Way, targets: NDArray) ->
 
 def _crossed(pattern: Pattern, energy: FoldEnergy, x: NDArray, turns: NDArray) -> NDArray[np.int64]:
     """Pairs of panels that cross in a state, or whose crease has passed 180 degrees."""
-    beyond = pattern.crease_faces[np.abs(turns) > math.pi + PLANE]
+    beyond = pattern.crease_faces[np.abs(turns) > math.pi + ways.PLANE]
     pairs = crossing_panels(x, energy.triangles, energy.triangle_panel)
     return np.unique(np.concatenate([pairs, np.sort(beyond, axis=1)]), axis=0)
 
@@ -407,7 +388,7 @@ def _warn(folding: Folding) -> None:
         said = f"{len(folding.wrong)} mountains or valleys do not turn their way: creases"
         warn(f"{said} {_named(folding, folding.wrong)}", "folding.md#what-the-report-means")
     first = folding.path["fold_angle"].values[0]
-    shut = unopened(first, folding.angles, folding.targets).tolist()
+    shut = ways.unopened(first, folding.angles, folding.targets).tolist()
     if folding.started_from == "folded" and shut:
         said = f"{len(shut)} creases stay closed that were to open: creases"
         warn(f"{said} {_named(folding, shut)}", "folding.md#what-the-report-means")
@@ -426,13 +407,13 @@ def _listed(items: Sequence[str]) -> str:
     return ", ".join(items[:MOST_SHOWN]) + (f" and {more} more" if more > 0 else "")
 
 
-def path_of(pattern: Pattern, energy: FoldEnergy, way: Way) -> xarray.Dataset:
+def path_of(pattern: Pattern, energy: FoldEnergy, way: ways.Way) -> xarray.Dataset:
     """States of a way, each placed as close as possible to the previous one."""
     place, positions = pattern.vertices, []
     for shape in way.shapes:
         place = placed(energy.place(shape.x), place)
         positions.append(place)
-    strain = [largest_strain(shape) for shape in way.shapes]
+    strain = [ways.largest_strain(shape) for shape in way.shapes]
     bend = [energy.bent(shape.turns).max(initial=0.0) for shape in way.shapes]
     turns = [energy.creases(shape.turns) for shape in way.shapes]
     values = {
@@ -458,7 +439,7 @@ def folded_pattern(pattern: Pattern, energy: FoldEnergy, shape: Shape, x: NDArra
 
     Panels that would leave slivers, such as with three corners on a line, stay whole.
     """
-    bent = np.abs(shape.turns - energy.rest)[: len(energy.diagonals)] > PLANE
+    bent = np.abs(shape.turns - energy.rest)[: len(energy.diagonals)] > ways.PLANE
     slivers = energy.triangle_panel[are_slivers(x[energy.triangles])]
     cut = np.setdiff1d(energy.diagonal_panel[bent], slivers)
     whole = np.ones(len(pattern.faces), bool)
