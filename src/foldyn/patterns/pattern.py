@@ -142,20 +142,10 @@ class Pattern(Transforms):
         self,
         vertices: ArrayLike,
         faces: Sequence[Sequence[int]] | NDArray[np.integer],
-        assignments: (
-            Mapping[tuple[int, int], str]
-            | Mapping[tuple[int, int] | str, str]
-            | Sequence[str]
-            | None
-        ) = None,
+        assignments: Mapping[Edge, str] | Mapping[Edge | str, str] | Sequence[str] | None = None,
         name: str = "",
         boards: Boards | None = None,
-        fold_angles: (
-            Mapping[tuple[int, int], float]
-            | Mapping[tuple[int, int] | str, float]
-            | ArrayLike
-            | None
-        ) = None,
+        fold_angles: Mapping[Edge, float] | Mapping[Edge | str, float] | ArrayLike | None = None,
         families: Mapping[str, Sequence[tuple[int, int]]] | None = None,
         custom: Mapping[str, Any] | None = None,
         welds: Sequence[tuple[int, int]] | NDArray[np.integer] = (),
