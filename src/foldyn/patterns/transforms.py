@@ -240,20 +240,15 @@ class Transforms:
 
     def _placed(self, place: Any, factor: float = 1.0, turned: bool = False) -> Self:
         """The pattern with all points mapped by `place`, and the winding reversed if `turned`."""
-        boards = self.boards
-        order = [
-            np.array([0, *range(len(face) - 1, 0, -1)]) if turned else np.arange(len(face))
-            for face in self.faces
-        ]
-        faces = [
-            tuple(face[k] for k in ranks.tolist())
-            for face, ranks in zip(self.faces, order, strict=True)
-        ]
+        boards, faces = self.boards, self.faces
+        if turned:
+            faces = [(face[0], *face[:0:-1]) for face in faces]
         if boards is not None:
-            corners = [boards.of(panel)[ranks] for panel, ranks in enumerate(order)]
-            boards = Boards(
-                boards.offsets, place(np.concatenate(corners)), factor * boards.thickness
-            )
+            corners = [boards.of(panel) for panel in range(len(faces))]
+            if turned:
+                corners = [np.roll(own[::-1], 1, axis=0) for own in corners]
+            points = place(np.concatenate(corners))
+            boards = Boards(boards.offsets, points, factor * boards.thickness)
         return self.changed(
             vertices=place(self.vertices), faces=faces, boards=boards, custom=self.custom,
             rim_families=self._rim(),
