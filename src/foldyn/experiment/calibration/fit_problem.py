@@ -187,7 +187,9 @@ class Problem:
     ) -> Any:
         """Result of a run at given values, for the measurements of the run or for `members`."""
         case_file = self.case_file(run, values)
-        return predicted_run.result_of(run, case_file, members or run.those_of(self.measurements))
+        with quietly():
+            own = members or run.those_of(self.measurements)
+            return predicted_run.computed(run, case_file, own)
 
     def observed(self) -> list[NDArray[np.float64]]:
         """Measured values of each measurement."""
