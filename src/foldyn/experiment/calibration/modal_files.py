@@ -31,8 +31,6 @@ from foldyn.results.netcdf import read
 from foldyn.results.quantities import RESPONSES
 from foldyn.values import choice, indices, show
 
-# Unit to which each kind of modal value is converted.
-UNIT: Mapping[str, str] = {"frequency": "Hz", "damping_ratio": "-"}
 # Units of each quantity of a response in a CSV file.
 UNITS_OF: Mapping[str, Sequence[str]] = {
     **{name: tuple(UNITS[name]) for name in PER_FORCE},
@@ -58,20 +56,14 @@ def frequencies(
     **known
         Other arguments of `NaturalFrequencies`.
     """
-    return _of_modes(NaturalFrequencies, file, known, _numbers(file, "frequency", modes, shapes))
+    return _of_modes(NaturalFrequencies, file, modes, shapes, known)
 
 
 def damping_ratios(
     file: Path, modes: Any = None, shapes: Path | None = None, **known: Any
 ) -> DampingRatios:
     """Damping ratios, as in `frequencies`: columns mode, damping_ratio, damping_ratio_sigma."""
-    return _of_modes(DampingRatios, file, known, _numbers(file, "damping_ratio", modes, shapes))
-
-
-def _of_modes(kind: Any, file: Path, known: dict[str, Any], given: dict[str, Any]) -> Any:
-    if "sigma" in given:
-        known = _with_sigma(file, known, given.pop("sigma"))
-    return made(kind, file, **known, **given)
+    return _of_modes(DampingRatios, file, modes, shapes, known)
 
 
 def _with_sigma(file: Path, known: dict[str, Any], errors: NDArray) -> dict[str, Any]:
@@ -81,23 +73,26 @@ def _with_sigma(file: Path, known: dict[str, Any], errors: NDArray) -> dict[str,
     return {**known, "sigma": errors}
 
 
-def _numbers(file: Path, name: str, modes: Any, shapes: Path | None) -> dict[str, Any]:
-    """Arguments read from a file with one number for each mode."""
+def _of_modes(kind: Any, file: Path, modes: Any, shapes: Path | None, known: dict[str, Any]) -> Any:
+    """Measurement of a kind from a file with one number for each mode."""
+    name, unit = kind.quantity, kind.unit or "-"
     if _is_result(file):
         found = _result(file, "modes")
         values = found[name].values[resisted(found)]
         table = {"mode": np.arange(1.0, len(values) + 1.0), name: values}
     else:
-        wanted = {"mode": ("mode", "-"), name: (name, UNIT[name])}
+        wanted = {"mode": ("mode", "-"), name: (name, unit)}
         sigma = f"{name}_sigma"
         if sigma in dict(read_headings(file)):
-            wanted["sigma"] = sigma, UNIT[name]
+            wanted["sigma"] = sigma, unit
         table = read_numbers(file, wanted)
     chosen = _chosen(file, table["mode"], modes)
     given: dict[str, Any] = {key: column[chosen] for key, column in table.items()}
     if shapes is not None:
         given["shapes"] = mode_shapes(shapes, modes=given["mode"].astype(int).tolist())
-    return given
+    if "sigma" in given:
+        known = _with_sigma(file, known, given.pop("sigma"))
+    return made(kind, file, **known, **given)
 
 
 def mode_shapes(
