@@ -269,14 +269,19 @@ def what_was_cut(before: Pattern, after: Pattern) -> str:
     return f"cut {which} not convex, or with a vertex within an edge, along welds ({parts})"
 
 
+def flattened(corners: NDArray, normal: NDArray) -> NDArray[np.float64]:
+    """Coordinates (k, 2) in the plane normal to `normal`, from the first corner to the second."""
+    first = corners[1] - corners[0]
+    first = first - (first @ normal) * normal
+    axes = np.stack([first, np.cross(normal, first)]) / np.linalg.norm(first)
+    return (corners - corners[0]) @ axes.T
+
+
 def triangles_of(face: Face, corners: NDArray, normal: NDArray) -> list[Face]:
     """Triangles of a polygon with corners (k, 3), cut in the plane normal to `normal`."""
     import shapely
 
-    first = corners[1] - corners[0]
-    first = first - (first @ normal) * normal
-    axes = np.stack([first, np.cross(normal, first)]) / np.linalg.norm(first)
-    flat = (corners - corners[0]) @ axes.T
+    flat = flattened(corners, normal)
     number = {tuple(point): v for point, v in zip(flat.tolist(), face, strict=True)}
     pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(shapely.Polygon(flat)))
     rings = [shapely.orient_polygons(piece).exterior.coords[:3] for piece in pieces]

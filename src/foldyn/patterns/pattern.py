@@ -186,8 +186,8 @@ class Pattern(Transforms):
         folded = crease_data.fold_angles(fold_angles, topology.creases, words)
         folded[at_junctions(topology.creases)] = np.nan  # `fold` takes single sheets
         values: dict[str, Any] = {
-            **topology._asdict(),
-            **geometry._asdict(),
+            **vars(topology),
+            **vars(geometry),
             "vertices": points,
             "assignments": letters,
             "unlettered": given == "",

@@ -14,10 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import InputError, quietly, warn
 from foldyn.patterns.boards import Boards
 from foldyn.patterns.generators.arguments import check_size
+from foldyn.patterns.geometry import FaceGeometry
 from foldyn.patterns.screw import direction
 from foldyn.patterns.tiling import glue, half_edges
 from foldyn.patterns.tiling import periods as periods_of
-from foldyn.patterns.topology import around, edge_lookup, edge_of
+from foldyn.patterns.topology import Topology, around, edge_lookup, edge_of
 from foldyn.values import flag, number, numbers, show, vector, whole
 
 FLAT = 1e-6  # rad: a crease between copies within this angle from pi gets no letter
@@ -27,35 +28,22 @@ FACE_ORDERS = "faceOrders"
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class Transforms:
+class Transforms(Topology, FaceGeometry):
     """Fields of a `Pattern`, and transformations, which return a new pattern."""
 
     vertices: NDArray[np.float64]
-    faces: tuple[tuple[int, ...], ...]
     assignments: tuple[str, ...]
     name: str
     boards: Boards | None
     fold_angles: NDArray[np.float64]
     families: Mapping[str, NDArray[np.int64]]
     custom: Mapping[str, Any]
-    welds: NDArray[np.int64]
     periods: tuple[NDArray[np.int64], ...]
     rim_families: Mapping[str, NDArray[np.int64]]
     unlettered: NDArray[np.bool_]
-    flipped: tuple[bool, ...]
-    edges: NDArray[np.int64]
-    creases: NDArray[np.int64]
-    boundary: NDArray[np.int64]
-    crease_faces: NDArray[np.int64]
-    crease_ways: NDArray[np.int64]
-    weld_faces: NDArray[np.int64]
-    weld_ways: NDArray[np.int64]
     dihedrals: NDArray[np.float64]
     weld_dihedrals: NDArray[np.float64]
     flat_dihedrals: NDArray[np.float64]
-    face_areas: NDArray[np.float64]
-    face_normals: NDArray[np.float64]
-    face_planarity: NDArray[np.float64]
     size: float
 
     def scaled(self, factor: float) -> Self:
