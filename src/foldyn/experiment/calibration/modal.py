@@ -14,12 +14,7 @@ from numpy.typing import NDArray
 from foldyn.cases import BaseMotion, Case
 from foldyn.cases.directions import AXES, check_axes
 from foldyn.errors import ComputationError, InputError
-from foldyn.experiment.calibration.measurement import (
-    Measurement,
-    NodeValues,
-    column,
-    plain_array,
-)
+from foldyn.experiment.calibration.measurement import Measurement, NodeValues, column, plain_array
 from foldyn.linear import convert, mac, pair_modes
 from foldyn.linear.frf import METHODS
 from foldyn.results.quantities import RESPONSES
