@@ -20,14 +20,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError, warn
 from foldyn.patterns.crease_data import crease_rows
 from foldyn.patterns.pattern import Pattern, pattern_of
-from foldyn.patterns.topology import (
-    Edge,
-    around,
-    at_junctions,
-    edge_of,
-    edge_rows,
-    vertex_pair,
-)
+from foldyn.patterns.topology import Edge, around, at_junctions, edge_of, edge_rows, vertex_pair
 from foldyn.values import flag, listed
 
 # What facets become: "weld", removed if panels can be joined, else welds; "line", welds; "hinge",
