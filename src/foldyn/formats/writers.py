@@ -50,10 +50,8 @@ def letters(pattern: Pattern) -> list[tuple[Edge, str, float]]:
     angles = pattern.fold_angles.tolist()
     told = dict.fromkeys(edge_lookup(pattern.edges), ("B", np.nan))
     told |= {edge: ("C", np.nan) for pair in pairs for edge in pair}
-    told |= {
-        edge: (pattern.assignments[k], angles[k])
-        for edge, k in edge_lookup(pattern.creases).items()
-    }
+    rows = edge_lookup(pattern.creases).items()
+    told |= {edge: (pattern.assignments[k], angles[k]) for edge, k in rows}
     told |= dict.fromkeys(edge_lookup(pattern.junctions), ("U", np.nan))
     told |= dict.fromkeys(edge_lookup(pattern.welds), ("F", np.nan))
     return [(edge, letter, angle) for edge, (letter, angle) in told.items()]

@@ -379,10 +379,9 @@ def _checked_letter(letter: Any, pair: Edge) -> str:
 
 
 def _warn_of_contradictions(given: NDArray, creases: NDArray, dihedrals: NDArray) -> None:
-    wrong = np.flatnonzero(
-        ((given == "M") & (dihedrals < np.pi - _CONTRADICTION))
-        | ((given == "V") & (dihedrals > np.pi + _CONTRADICTION))
-    )
+    off = dihedrals - np.pi
+    wrong = (given == "M") & (off < -_CONTRADICTION) | (given == "V") & (off > _CONTRADICTION)
+    wrong = np.flatnonzero(wrong)
     if len(wrong):
         k = int(wrong[0])
         a, b = creases[k].tolist()

@@ -302,17 +302,11 @@ def _joined(
             families.setdefault(name, []).extend(pairs[k] for k in rows.tolist())
     custom.pop(FACE_ORDERS, None)
     known = edge_lookup(bare.creases)  # others are welds of one of the sheets
-    return (
-        bare.changed(
-            assignments={pair: letter for pair, letter in letters.items() if pair in known},
-            fold_angles={pair: angle for pair, angle in angles.items() if pair in known},
-            families={
-                name: [pair for pair in pairs if pair in known] for name, pairs in families.items()
-            },
-            custom=custom,
-        ),
-        glued.joined,
-    )
+    letters = {pair: letter for pair, letter in letters.items() if pair in known}
+    angles = {pair: angle for pair, angle in angles.items() if pair in known}
+    families = {name: [pair for pair in own if pair in known] for name, own in families.items()}
+    made = bare.changed(assignments=letters, fold_angles=angles, families=families, custom=custom)
+    return made, glued.joined
 
 
 def _given(steps: Any) -> NDArray[np.float64]:

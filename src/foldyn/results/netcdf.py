@@ -336,12 +336,10 @@ def _write_pieces(ds: xr.Dataset, sink: Any, engine: Literal["h5netcdf"]) -> Non
         ds.to_netcdf(sink, engine=engine)
         return
     count = ds.sizes[ALONG]
-    chunks = {
-        str(name): {
-            "chunksizes": (min(count, max(1, CHUNK // max(1, v.nbytes // count))), *v.shape[1:])
-        }
-        for name, v in along.items()
-    }
+    chunks = {}
+    for name, v in along.items():
+        rows = min(count, max(1, CHUNK // max(1, v.nbytes // count)))
+        chunks[str(name)] = {"chunksizes": (rows, *v.shape[1:])}
     first = ds.isel({ALONG: slice(0, 1)})
     first.to_netcdf(sink, engine=engine, unlimited_dims=[ALONG], encoding=chunks)
     with h5netcdf.File(sink, "r+") as file:

@@ -79,11 +79,9 @@ def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]
             caption = f"{text}, against both parameters."
             draw = partial(plots.plot_sweep_map, sweep, name, at=at)
             yield from album.figure(f"map-{name}", caption, draw)
-        caption = (
-            f"{text}: mean over all other parameters, at values of one."
-            if is_grid(sweep)
-            else f"{text}: the points against each parameter, and their means."
-        )
+        caption = f"{text}: the points against each parameter, and their means."
+        if is_grid(sweep):
+            caption = f"{text}: mean over all other parameters, at values of one."
         draw = partial(plots.plot_main_effects, sweep, name, at=at)
         charts = Charts(effect_charts(sweep, name, at, not is_grid(sweep)), caption)
         yield from album.figure(f"effects-{name}", caption, draw, charts)

@@ -136,10 +136,9 @@ class Problem:
             points.pop(tuple(values), None)
         with quietly():
             one = self.case_file(run, values)
+            like = Like(values, one)
             others = [
-                one
-                if np.array_equal(each, values)
-                else self.case_file(run, each, Like(values, one))
+                one if np.array_equal(each, values) else self.case_file(run, each, like)
                 for each in points.values()
             ]
             members = run.those_of(self.measurements)

@@ -157,10 +157,8 @@ def frf(
         quantity = held if quantity is None else quantity
         found = convert(found, quantity) if quantity != held else found
         whole = found[quantity].transpose("frequency", "node", "axis").values[..., AXES.index(axis)]
-        frequency, values = (
-            found["frequency"].values,
-            whole[:, _nodes_of(file, chosen, len(whole.T))],
-        )
+        frequency = found["frequency"].values
+        values = whole[:, _nodes_of(file, chosen, len(whole.T))]
     else:
         if quantity is not None:
             choice(f"{file}: quantity", quantity, RESPONSES)
