@@ -222,9 +222,7 @@ def _mend_letters(fields: dict[str, Any]) -> list[str]:
     missing = sum(each is None for each in given)
     small = sum(one != other for one, other in zip(given, letters, strict=True)) - missing
     found = (missing, "null", "U, unassigned"), (small, "small letter", "large")
-    told = [
-        f"{count(number, what)} taken as {as_what}" for number, what, as_what in found if number
-    ]
+    told = [f"{count(times, what)} taken as {meant}" for times, what, meant in found if times]
     return [f"edges_assignment: {each}" for each in told]
 
 
