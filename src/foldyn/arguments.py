@@ -12,22 +12,13 @@ key differs from the name:
 from __future__ import annotations
 
 import inspect
+import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cache
 from html import escape
 from types import MappingProxyType, UnionType
-from typing import (
-    Annotated,
-    Any,
-    ClassVar,
-    NamedTuple,
-    TypeVar,
-    Union,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -149,7 +140,7 @@ class Argument(NamedTuple):
 @cache
 def arguments(kind: type) -> Mapping[str, Argument]:
     """Arguments of a data class by name, in the order of its fields."""
-    hints, found = get_type_hints(kind, include_extras=True), {}
+    hints, found = typing.get_type_hints(kind, include_extras=True), {}
     for item in fields(kind):
         notes = list(_notes(hints[item.name]))
         checks = tuple(note for note in notes if isinstance(note, Check))
@@ -167,8 +158,8 @@ def _notes(hint: Any) -> Iterator[Any]:
         hint = hint.__origin__
     if isinstance(own := getattr(hint, "in_files", None), Check):
         yield own
-    if get_origin(hint) in (Union, UnionType):
-        for part in get_args(hint):
+    if typing.get_origin(hint) in (typing.Union, UnionType):
+        for part in typing.get_args(hint):
             yield from _notes(part)
 
 

@@ -173,7 +173,7 @@ def test_an_unknown_start_is_found(motion, swung, late) -> None:
     case = fd.read_case(swung).case()
     time = np.arange(0.4, 1.2, 0.02)
     exact = history(time=time, values=np.ones((40, 1)) * np.arange(40)[:, None])
-    values = exact.curves(motion, case)
+    values = exact.modelled(motion, case)
     shifted = history(time=time - late, values=values, align=0.05)
     assert shifted.shift(motion, case) == pytest.approx(late, abs=1e-9)
     np.testing.assert_allclose(shifted.predicted(motion, case), values.ravel(), atol=1e-9)
@@ -208,7 +208,7 @@ def test_a_motion_is_compared_as_its_camera_sees_it(motion, swung) -> None:
     seen = (moved[:, 0] - 0.01) / (1.0 - moved[:, 2] / depth) + 0.01
     known = {"nodes": [2], "time": motion["time"].values, "values": moved[:, 0]}
     plain, looked = history(**known), history(**known, sight=camera)
-    assert plain.curves(motion, case)[:, 0] == pytest.approx(moved[:, 0], abs=1e-15)
-    assert looked.curves(motion, case)[:, 0] == pytest.approx(seen, abs=1e-15)
+    assert plain.modelled(motion, case)[:, 0] == pytest.approx(moved[:, 0], abs=1e-15)
+    assert looked.modelled(motion, case)[:, 0] == pytest.approx(seen, abs=1e-15)
     digests = [problem(swung, [one], ALPHA, {}).digest() for one in (plain, looked)]
     assert digests[0] != digests[1]

@@ -11,8 +11,8 @@ import pytest
 
 import foldyn as fd
 from foldyn.errors import ComputationError, InputError
+from foldyn.patterns.frames import composed
 from foldyn.statics.folding.layer_order import flat_state, layer_constraints, layer_order
-from foldyn.statics.folding.ways import composed
 
 CLOSED = math.pi - 1e-3
 

@@ -14,6 +14,7 @@ import foldyn as fd
 from foldyn.analyses import ANALYSES
 from foldyn.errors import InputError
 from foldyn.sweeps import MEASURES
+from foldyn.sweeps.job import code_of
 from foldyn.sweeps.measure import asked, own_measure
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -254,3 +255,8 @@ def test_the_first_loss_of_stability_is_the_first_critical_point():
     assert taken(path, None) == 2.0
     assert taken(path.isel(step=[0, 2]), None) == 1.5
     assert np.isnan(taken(path.isel(step=[0]), None))
+
+
+def test_registered_measures_are_stamped_by_the_program_alone():
+    """A stamp of theirs that changed from process to process would find no stored point again."""
+    assert {code_of(one.function) for one in MEASURES.values()} == {""}

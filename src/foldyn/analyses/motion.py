@@ -43,7 +43,7 @@ from foldyn.report.album import (
 )
 from foldyn.report.sections import Charts, Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
-from foldyn.signals.spectrum import MINIMUM_SAMPLES
+from foldyn.signals.spectra import MINIMUM_SAMPLES
 from foldyn.strength.resultants import check_stresses
 from foldyn.values import number
 

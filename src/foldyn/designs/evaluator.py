@@ -150,12 +150,10 @@ def _check_keys(path: Path, document: Mapping[str, Any], space: Space) -> None:
 
 
 def _single(one: Asked, result: xr.Dataset, case: Case, shared: dict[Any, Any]) -> float:
-    value = one.of(result, case, shared)
-    if value.ndim:
-        raise InputError(f"{one.text}: is an array; ask for one of its numbers")
+    value = one.number(result, case, shared)
     if not np.isfinite(value):
         raise ComputationError(f"{one.text}: has no value")
-    return float(value)
+    return value
 
 
 @dataclass(frozen=True, eq=False)

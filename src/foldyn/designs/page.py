@@ -68,19 +68,16 @@ def write_design(
     sections += album.figure("convergence", caption, draw, charts)
     sections += [_ends(found), *_failures(found)]
     if found.gradient:
-        sections += [
-            Heading("What matters"),
-            *_slopes(found, plan, cases["after"], Path(folder), figures),
-        ]
+        sections.append(Heading("What matters"))
+        sections += _slopes(found, plan, cases["after"], Path(folder), figures)
     for name, case in cases.items():
         caption = f"The design {name} the search."
         sections += album.figure(name, caption, partial(plots.draw_structure, case))
     sections += [Heading("How it was computed"), inputs_table(_rows(found, plan, case_file, call))]
     if text := (case_file.text or case_file.path.read_text("utf-8")):
         sections.append(Listing(f"The case file {case_file.path.name}", text))
-    return write_report(
-        sections, Path(folder) / "report.html", title=f"{case_file.heading}: a design"
-    )
+    title = f"{case_file.heading}: a design"
+    return write_report(sections, Path(folder) / "report.html", title=title)
 
 
 def _stages(
@@ -167,9 +164,8 @@ def _slopes(
     for name, one in slopes.items():
         if np.ndim(one) and len(found.gradient[name]) in counts:
             on = "crease" if len(found.gradient[name]) == counts[0] else "panel"
-            drawn = plots.draw_sensitivity(
-                case, found.gradient[name], label=f"d({text}) / d {name}"
-            )
+            label = f"d({text}) / d {name}"
+            drawn = plots.draw_sensitivity(case, found.gradient[name], label=label)
             if figures is not None:
                 with whole(folder / f"sensitivity-{name}.{figures}") as part:
                     drawn.savefig(part)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -72,12 +72,8 @@ class Problem:
 
     def sizes(self, values: Mapping[str, float]) -> NDArray:
         """Scales of the objective and of the violations, from the measures of one design."""
-        return np.array(
-            [
-                abs(self.objective.value(values)) or 1.0,
-                *(one.size(values) for one in self.constraints),
-            ]
-        )
+        sizes = [one.size(values) for one in self.constraints]
+        return np.array([abs(self.objective.value(values)) or 1.0, *sizes])
 
 
 def problem_of(minimize: Any, maximize: Any, subject_to: Any) -> Problem:
@@ -101,15 +97,11 @@ def problem_of(minimize: Any, maximize: Any, subject_to: Any) -> Problem:
     texts = (
         [subject_to] if isinstance(subject_to, str) else listed("subject_to", subject_to, "texts")
     )
-    return Problem(objective, 1.0 if name == "minimize" else -1.0, _constraints(texts))
-
-
-def _constraints(texts: Sequence[Any]) -> tuple[Constraint, ...]:
-    found = []
+    constraints = []
     for k, text in enumerate(texts):
         with within(f"subject_to[{k}]"):
-            found.append(constraint(text))
-    return tuple(found)
+            constraints.append(constraint(text))
+    return Problem(objective, 1.0 if name == "minimize" else -1.0, tuple(constraints))
 
 
 Values = Mapping[str, float | NDArray]

@@ -177,9 +177,8 @@ def history_of(
         array = bool(space.shapes[name])
         dims = (along, f"{name}_entry") if array else (along,)
         one = lower.size == 1 or (np.ptp(lower) == np.ptp(upper) == 0.0)
-        bounds = {"lower": float(lower[0]), "upper": float(upper[0])} if one else {
-            "lower": lower, "upper": upper,
-        }  # fmt: skip
+        bounds: dict[str, Any] = {"lower": lower, "upper": upper}
+        bounds = {word: float(end[0]) for word, end in bounds.items()} if one else bounds
         data[f"{PARAMETER}{name}"] = (dims, values if array else values[:, 0], bounds)
         if array:
             coordinates[f"{name}_entry"] = np.arange(lower.size)

@@ -170,11 +170,11 @@ class Search:
 
     def _new(self, point: Point) -> Trial | None:
         (found,) = self.evaluations.at([point])
-        failure, numbers, slopes = found.failure, None, None
-        values: dict[str, float] = {}
+        failure, values, trial, slopes = found.failure, dict[str, float](), None, None
+        numbers = np.full(1 + len(self.problem.constraints), np.nan)
         if not failure:
-            measured = zip(self.problem.measures, found.values[VALUES].tolist(), strict=True)
-            values = dict(measured)
+            measured = found.values[VALUES].tolist()
+            values = dict(zip(self.problem.measures, measured, strict=True))
             try:
                 if self.gradient:
                     rows = zip(self.problem.measures, found.values[JACOBIAN], strict=True)
@@ -183,17 +183,13 @@ class Search:
                     numbers = self.problem.numbers(values)
                 if self.sizes is None:
                     self.sizes = self.problem.sizes(values)
+                trial = self._trial(point, numbers, slopes)
             except FoldynError as error:
                 failure = str(error)
-        trial = None
-        if numbers is not None and self.sizes is not None and not failure:
-            trial = self._trial(point, numbers, slopes)
         violation = np.nan if trial is None else trial.violation
-        nothing = np.full(1 + len(self.problem.constraints), np.nan)
         row = Row(
-            self.number, self.iteration, point, nothing if trial is None else np.asarray(numbers),
-            violation, violation <= self.slack, found.seconds, failure, found.warnings, values,
-            slopes,
+            self.number, self.iteration, point, numbers, violation, violation <= self.slack,
+            found.seconds, failure, found.warnings, values, slopes,
         )  # fmt: skip
         self.rows.append(row)
         if trial is not None and (self.best is None or self.key(row) < self.key(self.best)):

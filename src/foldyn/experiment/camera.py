@@ -156,24 +156,6 @@ class Camera:
         r2 = np.sum(slope**2, axis=-1, keepdims=True)
         return self.center + self.focal * (1.0 + self.k1 * r2 + self.k2 * r2**2) * slope
 
-    def rays(self, uv: ArrayLike) -> NDArray[np.float64]:
-        """Slopes (x, y)/z of the rays through pixels (..., 2), by inverting the distortion."""
-        seen = (np.asarray(uv, dtype=np.float64) - self.center) / self.focal
-        r2 = np.sum(seen**2, axis=-1, keepdims=True)
-        slope = seen * np.polynomial.polynomial.polyval(r2, self.inverse)
-        for _ in range(4):  # Newton's method for the radius, started from a close polynomial
-            s2 = np.sum(slope**2, axis=-1, keepdims=True)
-            factor = 1.0 + self.k1 * s2 + self.k2 * s2**2
-            stretch = 1.0 + 3.0 * self.k1 * s2 + 5.0 * self.k2 * s2**2
-            slope = slope - (slope * factor - seen) / stretch
-        return slope
-
-    def on_plane(self, uv: ArrayLike, depth: ArrayLike) -> NDArray[np.float64]:
-        """Points (..., 3) in m seen at pixels (..., 2), at depths (m) in front of the camera."""
-        slope = self.rays(uv)
-        z = np.broadcast_to(np.asarray(depth, dtype=np.float64), slope.shape[:-1])[..., np.newaxis]
-        return self.position + np.concatenate([slope * z, z], axis=-1) @ self.rotation
-
     @property
     def _outermost(self) -> float:
         """Slope of the ray to a corner, ignoring distortion."""
@@ -246,14 +228,6 @@ class Scale:
 
     def __post_init__(self) -> None:
         number("--scale", self.metres_per_pixel, above=0.0, unit="m per pixel")
-
-    def at_depth(self, behind: ArrayLike, distance: float) -> NDArray[np.float64]:
-        """Metres per pixel at a depth `behind` (m) the plane, which is at `distance` (m).
-
-        A pinhole image shrinks in inverse proportion to distance.
-        """
-        number("--distance", distance, above=0.0, unit="m")
-        return self.metres_per_pixel * (1.0 + np.asarray(behind, dtype=np.float64) / distance)
 
 
 def scale_of_lengths(references: Sequence[Sequence[float]]) -> Scale:

@@ -101,18 +101,10 @@ def built(
     if cut:
         notes.repairs.append(f"opened {count(cut, 'cut edge')}: each is two boundary edges")
     pattern = _pattern(panels, drawing, notes)
-    size = np.ptp(pattern.vertices, axis=0).tolist()
-    return Built(
-        pattern,
-        Diagnosis(
-            (size[0], size[1], size[2]),
-            tuple(assumptions),
-            tuple(notes.repairs),
-            tuple(notes.doubts),
-            flat_foldability(pattern),
-            _facets(pattern, panels),
-        ),
-    )
+    x, y, z = np.ptp(pattern.vertices, axis=0).tolist()
+    told = tuple(assumptions), tuple(notes.repairs), tuple(notes.doubts)
+    diagnosis = Diagnosis((x, y, z), *told, flat_foldability(pattern), _facets(pattern, panels))
+    return Built(pattern, diagnosis)
 
 
 def _facets(pattern: Pattern, panels: Panels) -> tuple[Edge, ...]:

@@ -14,6 +14,7 @@ ROUNDING = np.radians(0.1)
 """Error of angles (rad) due to the digits of a file."""
 MOST_ROWS = 30
 MOST_MOVED = 10
+CONDITIONS = ("Maekawa", "Kawasaki", "not developable")
 LISTED = 1e-9
 """Smallest move of a vertex (m) that is reported."""
 
@@ -83,15 +84,8 @@ class Diagnosis:
             return lines
         lines.append("  vertex creases     M     V     U  Kawasaki   deficit  (sums, degrees)")
         for k in np.argsort(good, kind="stable")[:MOST_ROWS].tolist():
-            faults = [
-                name
-                for name, holds in (
-                    ("Maekawa", maekawa[k]),
-                    ("Kawasaki", kawasaki[k]),
-                    ("not developable", developable[k]),
-                )
-                if not holds
-            ]
+            holds = zip(CONDITIONS, (maekawa[k], kawasaki[k], developable[k]), strict=True)
+            faults = [name for name, held in holds if not held]
             deficit = round(float(np.degrees(v.deficits[k])), 3) + 0.0  # avoid -0
             alternating = "odd" if v.degrees[k] % 2 else f"{np.degrees(v.alternating[k]):.3f}"
             lines.append(

@@ -220,14 +220,12 @@ def _color(entity: Any, document: Any, layer: str) -> RGB:
         holders.append(document.layers.get(layer))
     for holder in holders:
         if holder.rgb is not None:
-            red, green, blue = holder.rgb
-            return red, green, blue
+            return holder.rgb
         index = abs(int(holder.dxf.get("color", 256)))
         if index in (0, 7):
             return 0, 0, 0
         if index < 256:
-            red, green, blue = aci2rgb(index)
-            return red, green, blue
+            return aci2rgb(index)
     return 0, 0, 0
 
 

@@ -240,10 +240,8 @@ def write_pattern(
     if fmt.write is None:
         raise InputError(f"{file}: {fmt.name} files can be read but not written.")
     pattern = pattern_of(pattern)
-    frames = [
-        of_kind(f"frames[{k}]", one, Frame)
-        for k, one in enumerate(listed("frames", frames, "frames"))
-    ]
+    given = enumerate(listed("frames", frames, "frames"))
+    frames = [of_kind(f"frames[{k}]", one, Frame) for k, one in given]
     if frames and not fmt.frames:
         able = ", ".join(end for end, each in FORMATS.items() if each.frames)
         raise InputError(f": {fmt.name} files hold one state; write {able}", "frames", file)

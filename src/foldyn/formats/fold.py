@@ -221,14 +221,9 @@ def _mend_letters(fields: dict[str, Any]) -> list[str]:
     fields["edges_assignment"] = letters
     missing = sum(each is None for each in given)
     small = sum(one != other for one, other in zip(given, letters, strict=True)) - missing
-    return [
-        f"edges_assignment: {count(number, what, plural)} taken as {as_what}"
-        for number, what, plural, as_what in (
-            (missing, "null", "nulls", "U, unassigned"),
-            (small, "small letter", "", "large"),
-        )
-        if number
-    ]
+    found = (missing, "null", "U, unassigned"), (small, "small letter", "large")
+    told = [f"{count(times, what)} taken as {meant}" for times, what, meant in found if times]
+    return [f"edges_assignment: {each}" for each in told]
 
 
 def _angle_doubts(angles: NDArray[np.float64]) -> tuple[str, ...]:

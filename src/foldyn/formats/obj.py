@@ -100,16 +100,10 @@ def read(text: str) -> Drawing:
     if oripa:
         points[:, 1] *= -1.0
         faces = [face if _area(points[list(face)]) > 0.0 else face[::-1] for face in faces]
-    return Drawing(
-        points,
-        np.array([each.edge for each in every], dtype=np.int64).reshape(-1, 2),
-        tuple(each.letter for each in every),
-        _angles(every),
-        tuple(faces) or None,
-        meters,
-        name=name,
-        places=tuple(each.place for each in every),
-    )
+    edges = np.array([each.edge for each in every], dtype=np.int64).reshape(-1, 2)
+    told, places = tuple(each.letter for each in every), tuple(each.place for each in every)
+    panels = tuple(faces) or None
+    return Drawing(points, edges, told, _angles(every), panels, meters, name=name, places=places)
 
 
 def _lines(text: str) -> list[str]:
@@ -169,10 +163,7 @@ def _crease(
     if a == b:
         raise InputError(f": #e joins vertex {words[0]} with itself", place)
     kind = words[2] if len(words) > 2 else "4"
-    known_kinds = {
-        **{str(k): letter for k, letter in enumerate(kinds)},
-        **{k: k for k in "BMVFUCJ"},
-    }
+    known_kinds = {str(k): letter for k, letter in enumerate(kinds)} | {k: k for k in "BMVFUCJ"}
     if kind not in known_kinds:
         raise InputError(f": {show(kind)} is no kind of edge: give 0 to {len(kinds) - 1}", place)
     try:

@@ -76,10 +76,5 @@ def _properties(element: Element) -> dict[str, str]:
 
 
 def _title(root: Element) -> str:
-    titles = [
-        (value.text or "").strip()
-        for element in root.iter()
-        if element.get("property") == "title"
-        for value in list(element)[:1]
-    ]
-    return " ".join("".join(titles[:1]).split())[:200]
+    titles = (own["title"] for element in root.iter() if "title" in (own := _properties(element)))
+    return " ".join(next(titles, "").split())[:200]

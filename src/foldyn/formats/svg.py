@@ -21,21 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.formats import svg_shapes
 from foldyn.formats.chords import Chords
 from foldyn.formats.drawing import Drawing, count
 from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
 from foldyn.formats.lines import MOST_LINES, too_many
-from foldyn.formats.svg_shapes import (
-    PIXEL,
-    SHAPES,
-    Curve,
-    Placing,
-    after,
-    curves,
-    length,
-    numbers,
-    placed_by,
-)
+from foldyn.formats.svg_shapes import Curve, Placing, after, length, numbers
 from foldyn.formats.svg_styles import Rules, Style, declared, rules_of, styled
 from foldyn.formats.writers import flat_points, letters
 from foldyn.formats.xml_text import DEEPEST, from_xml, local
@@ -104,9 +95,8 @@ def read(text: str) -> Drawing:
     with np.errstate(over="ignore", invalid="ignore"):  # all positions are checked at the end
         _walk(root, upward, Style(), lines, 0)
         boxes = [placed(curve.frame, here) for curve, here, _, _ in lines.curves]
-    doubts = []
-    if left:
-        doubts.append(f"{count(left, 'style rule')} with selectors other than tag, class and id")
+    told = f"{count(left, 'style rule')} with selectors other than tag, class and id"
+    doubts = [told] if left else []
     titles = [e.text or "" for e in root if local(e) == "title"]
     return _drawing(lines, boxes, frame, doubts, " ".join("".join(titles[:1]).split())[:200])
 
@@ -140,7 +130,7 @@ def _walk(element: Element, outer: Placing, inherited: Style, lines: _Lines, dep
         raise InputError(f": elements are used within each other more than {DEEPEST} deep", "use")
     name = local(element)
     identity = element.get("id", "")[:40]
-    if identity == "legend" or name not in (*_GROUPS, *SHAPES, *_NOT_DRAWN, "use"):
+    if identity == "legend" or name not in (*_GROUPS, *svg_shapes.SHAPES, *_NOT_DRAWN, "use"):
         return
     lines.counts[name] += 1
     if name in _NOT_DRAWN:
@@ -152,10 +142,10 @@ def _walk(element: Element, outer: Placing, inherited: Style, lines: _Lines, dep
         return
     here = outer
     if "transform" in given:
-        here = after(outer, placed_by(given, place))
-    if name in SHAPES:
+        here = after(outer, svg_shapes.placed_by(given, place))
+    if name in svg_shapes.SHAPES:
         if style.shown:
-            found = curves(element, lines.view, place)
+            found = svg_shapes.curves(element, lines.view, place)
             lines.curves += [(curve, here, style, place) for curve in found]
             if len(lines.curves) > MOST_LINES:
                 raise too_many("the lines")
@@ -221,8 +211,8 @@ def _drawing(
         sum(not curve.straight for curve, *_ in lines.curves),
         angles,
         _skipped(lines.counts),
-        meters=frame.pixels * PIXEL if frame.physical else None,
-        assumed=frame.pixels * PIXEL,
+        meters=frame.pixels * svg_shapes.PIXEL if frame.physical else None,
+        assumed=frame.pixels * svg_shapes.PIXEL,
         unit="px" if frame.pixels == 1.0 else "unit",
         name=title,
         assumptions=said,

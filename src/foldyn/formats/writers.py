@@ -46,22 +46,15 @@ def letters(pattern: Pattern) -> list[tuple[Edge, str, float]]:
 
     The angle (rad) is NaN if not given, and on the boundary.
     """
-    row, welds = edge_lookup(pattern.creases), edge_lookup(pattern.welds)
-    junctions = edge_lookup(pattern.junctions)
     pairs = seams(pattern.vertices, pattern.faces, pattern.face_normals, pattern.boundary)
-    cuts = {edge for pair in pairs for edge in pair}
-    told = []
-    for a, b in pattern.edges.tolist():
-        k = row.get((a, b))
-        if (a, b) in welds:
-            told.append(((a, b), "F", np.nan))
-        elif (a, b) in junctions:
-            told.append(((a, b), "U", np.nan))
-        elif k is None:
-            told.append(((a, b), "C" if (a, b) in cuts else "B", np.nan))
-        else:
-            told.append(((a, b), pattern.assignments[k], float(pattern.fold_angles[k])))
-    return told
+    angles = pattern.fold_angles.tolist()
+    told = dict.fromkeys(edge_lookup(pattern.edges), ("B", np.nan))
+    told |= {edge: ("C", np.nan) for pair in pairs for edge in pair}
+    rows = edge_lookup(pattern.creases).items()
+    told |= {edge: (pattern.assignments[k], angles[k]) for edge, k in rows}
+    told |= dict.fromkeys(edge_lookup(pattern.junctions), ("U", np.nan))
+    told |= dict.fromkeys(edge_lookup(pattern.welds), ("F", np.nan))
+    return [(edge, letter, angle) for edge, (letter, angle) in told.items()]
 
 
 def warn_of_angles(pattern: Pattern, kind: str) -> None:

@@ -68,12 +68,10 @@ class Chain(NamedTuple):
 
     def of(self, one: Wanted) -> tuple[float, dict[str, NDArray]]:
         """Value of a quantity, and derivatives with respect to all entries of each parameter."""
-        values = {}
-        for name, (measure, _) in one.measures.items():
-            value = measure.of(self.found.result, self.case, self.shared)
-            if value.ndim:
-                raise InputError(f"{measure.text}: is an array; ask for one of its numbers")
-            values[name] = float(value)
+        values = {
+            name: measure.number(self.found.result, self.case, self.shared)
+            for name, (measure, _) in one.measures.items()
+        }
         value, parts = one.expression.value_and_slopes(values)
         total = _Changes({}, {}, {})
         for name, (measure, derivative) in one.measures.items():

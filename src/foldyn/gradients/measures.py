@@ -17,15 +17,8 @@ from foldyn.gradients.parameters import Gradient
 from foldyn.linear.frf import quantity_of
 from foldyn.signals.peaks import magnitude_curve
 from foldyn.statics import Equilibrium, Landscape
+from foldyn.sweeps import measures
 from foldyn.sweeps.measure import Asked, asked
-from foldyn.sweeps.measures import (
-    MEASURES,
-    closest_panels,
-    curve_of,
-    intervals,
-    nearest_of,
-    sampled,
-)
 from foldyn.viewer.states import bar_strain
 
 Seeds = dict[str, NDArray]
@@ -97,7 +90,7 @@ def _of_samples(weights: Callable[..., NDArray], variable: str = "displacement")
 
 def _all_moved(result: xr.Dataset) -> NDArray:
     """Displacements (samples, n, 3)."""
-    return sampled(result, "displacement").transpose(..., "node", "axis").values
+    return measures.sampled(result, "displacement").transpose(..., "node", "axis").values
 
 
 def _one(count: int, k: int) -> NDArray:
@@ -217,7 +210,7 @@ class _Apart(NamedTuple):
 
 def _closest(result: xr.Dataset, case: Case) -> list[_Apart]:
     """All closest pairs of points of panels."""
-    found = closest_panels(result, case)
+    found = measures.closest_panels(result, case)
     distance = np.array([one.distance for one in found])
     if not distance.min() > 0.0:
         raise InputError("is 0, where panels touch or cross, and a distance has no derivative")
@@ -291,7 +284,7 @@ def _limit_load(result: xr.Dataset, case: Case) -> Seeds:
     at = np.flatnonzero(result["point"].values == "limit")
     if not len(at):
         raise InputError("the path has no limit point; trace it farther, by arc_length")
-    low, high = intervals(result, "limit")[0]
+    low, high = measures.intervals(result, "limit")[0]
     if high > low:
         raise InputError(
             f"the limit point is only known to lie between the load factors {low:.6g} and "
@@ -339,7 +332,7 @@ def _climb(start: int, end: int) -> Derivative:
 
 # ------------------------------------------------------------------ frequency responses
 def _response(result: xr.Dataset, case: Case, node: int, axis: str, frequency: float) -> Seeds:
-    k = nearest_of(result, "frequency", frequency)
+    k = measures.nearest_of(result, "frequency", frequency)
     return _sizes(result, node, [AXES.index(axis)], {k: 1.0})
 
 
@@ -367,12 +360,12 @@ def _peak(what: str) -> Derivative:
             raise InputError(
                 "has no derivative for the spectrum of a motion; take a frequency response"
             )
-        return _largest(curve_of(result, node, axis)[2].height)
+        return _largest(measures.curve_of(result, node, axis)[2].height)
 
     def seeds(
         result: xr.Dataset, case: Case, at: tuple[int], node: int, axis: str | None = None
     ) -> Seeds:  # fmt: skip
-        f, size, peaks, kind = curve_of(result, node, axis)
+        f, size, peaks, kind = measures.curve_of(result, node, axis)
         near = int(peaks.index[at]) + np.arange(-1, 2)
         slopes = magnitude_curve(f, size, kind).peak_slopes(int(near[1]))
         if slopes is None:
@@ -395,7 +388,7 @@ DERIVATIVES: Mapping[str, Derivative] = {
     "effective_mass": _of_mode("effective_mass"),
     "displacement": _of_samples(lambda result, motion: _one(len(motion), -1)),
     "displacement_at": _of_samples(
-        lambda result, motion, time: _one(len(motion), nearest_of(result, "time", time))
+        lambda result, motion, time: _one(len(motion), measures.nearest_of(result, "time", time))
     ),
     "velocity": _of_samples(lambda result, motion: _one(len(motion), -1), "velocity"),
     "maximum": _extreme(1.0),
@@ -426,7 +419,7 @@ def one_number(text: str, kind: Any) -> Asked:
     InputError
         There is no such measure, or it is not a single number.
     """
-    one = asked(text, MEASURES)
+    one = asked(text, measures.MEASURES)
     kinds = one.measure.kinds
     if kinds and kind not in kinds:
         raise InputError(f": {text} needs a result of kind {' or '.join(kinds)}, not {kind}")

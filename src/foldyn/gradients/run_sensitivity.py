@@ -246,11 +246,9 @@ def _by_lengths(areas: Slope, numbers: Gradient) -> Slope:
 
 def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, NDArray]]:
     """A function that returns the case with other arrays of its structure, and their values."""
-    given = (
-        names
-        if isinstance(names, Mapping)
-        else dict.fromkeys(listed("parameters", names, "names of arrays"))
-    )
+    given = names
+    if not isinstance(names, Mapping):
+        given = dict.fromkeys(listed("parameters", names, "names of arrays"))
     values = {}
     for name, value in given.items():
         choice("parameters", name, ARRAYS)
@@ -329,11 +327,11 @@ def _of_file(
             place,
         )
     analysis = own.analysis
-    return (
-        lambda **values: case_file_at(place, document, values).case(),
-        checked(parameters),
-        {"kind": analysis.kind, **analysis.arguments},
-    )
+
+    def build(**values: Any) -> Case:
+        return case_file_at(place, document, values).case()
+
+    return build, checked(parameters), {"kind": analysis.kind, **analysis.arguments}
 
 
 # ------------------------------------------------------------------ measures

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
+from foldyn.patterns.geometry import FaceGeometry, face_geometry
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,15 +55,15 @@ class Boards:
         """Corners (k, 3) of one board's middle surface, m."""
         return self.corners[self.offsets[panel] : self.offsets[panel + 1]]
 
-    @cached_property
+    @property
     def areas(self) -> NDArray[np.float64]:
         """Areas of the middle surfaces (np,), m2."""
-        return np.linalg.norm(self._vectors, axis=1)
+        return self._geometry.face_areas
 
-    @cached_property
+    @property
     def normals(self) -> NDArray[np.float64]:
         """Unit normals of the boards (np, 3) towards the front."""
-        return self._vectors / self.areas[:, None]
+        return self._geometry.face_normals
 
     @cached_property
     def centers(self) -> NDArray[np.float64]:
@@ -69,14 +71,10 @@ class Boards:
         return np.array([self.of(panel).mean(axis=0) for panel in range(len(self.thickness))])
 
     @cached_property
-    def _vectors(self) -> NDArray[np.float64]:
-        """Newell's normals (np, 3) of the boards; the length of a normal is the area."""
-        vectors = np.empty((len(self.thickness), 3))
-        for panel in range(len(vectors)):
-            x = self.of(panel)
-            x = x - x.mean(axis=0)
-            vectors[panel] = 0.5 * np.cross(x, np.roll(x, -1, axis=0)).sum(axis=0)
-        return vectors
+    def _geometry(self) -> FaceGeometry:
+        """Geometry of the middle surfaces."""
+        faces = tuple(tuple(range(*ends)) for ends in pairwise(self.offsets.tolist()))
+        return face_geometry(self.corners, faces)
 
     def check(self, faces: tuple[tuple[int, ...], ...]) -> None:
         """Check that the boards match the faces of a pattern."""

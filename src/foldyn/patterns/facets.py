@@ -20,14 +20,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError, warn
 from foldyn.patterns.crease_data import crease_rows
 from foldyn.patterns.pattern import Pattern, pattern_of
-from foldyn.patterns.topology import (
-    Edge,
-    around,
-    at_junctions,
-    edge_of,
-    edge_rows,
-    vertex_pair,
-)
+from foldyn.patterns.topology import Edge, around, at_junctions, edge_of, edge_rows, vertex_pair
 from foldyn.values import flag, listed
 
 # What facets become: "weld", removed if panels can be joined, else welds; "line", welds; "hinge",
@@ -269,14 +262,19 @@ def what_was_cut(before: Pattern, after: Pattern) -> str:
     return f"cut {which} not convex, or with a vertex within an edge, along welds ({parts})"
 
 
+def flattened(corners: NDArray, normal: NDArray) -> NDArray[np.float64]:
+    """Coordinates (k, 2) in the plane normal to `normal`, from the first corner to the second."""
+    first = corners[1] - corners[0]
+    first = first - (first @ normal) * normal
+    axes = np.stack([first, np.cross(normal, first)]) / np.linalg.norm(first)
+    return (corners - corners[0]) @ axes.T
+
+
 def triangles_of(face: Face, corners: NDArray, normal: NDArray) -> list[Face]:
     """Triangles of a polygon with corners (k, 3), cut in the plane normal to `normal`."""
     import shapely
 
-    first = corners[1] - corners[0]
-    first = first - (first @ normal) * normal
-    axes = np.stack([first, np.cross(normal, first)]) / np.linalg.norm(first)
-    flat = (corners - corners[0]) @ axes.T
+    flat = flattened(corners, normal)
     number = {tuple(point): v for point, v in zip(flat.tolist(), face, strict=True)}
     pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(shapely.Polygon(flat)))
     rings = [shapely.orient_polygons(piece).exterior.coords[:3] for piece in pieces]

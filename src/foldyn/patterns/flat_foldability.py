@@ -109,16 +109,8 @@ def flat_foldability(pattern: Pattern) -> FlatFoldability:
         angles = np.array([corners[after][1] for after in around])
         kinds = [letter[min(vertex, after), max(vertex, after)] for after in around]
         folds = np.array([kind != "F" for kind in kinds])
-        rows.append(
-            (
-                vertex,
-                kinds.count("M"),
-                kinds.count("V"),
-                kinds.count("U"),
-                2 * np.pi - angles.sum(),
-                _alternating(angles, folds),
-            )
-        )
+        counts = [kinds.count(kind) for kind in "MVU"]
+        rows.append((vertex, *counts, 2 * np.pi - angles.sum(), _alternating(angles, folds)))
     columns = np.array(sorted(rows), dtype=np.float64).reshape(-1, 6).T
     return FlatFoldability(*columns[:4].astype(np.int64), *columns[4:])
 

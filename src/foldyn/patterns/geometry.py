@@ -8,7 +8,7 @@ coincide where their edges do, as in a flat-folded state, are layers, not a seam
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,8 @@ _ASKANCE = 10.0  # the same angle, divided by the relative distance within which
 CLOSED = 1e-3  # rad: within this angle from closed, the letter decides the side
 
 
-class FaceGeometry(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class FaceGeometry:
     """Shape data of each face.
 
     Attributes
@@ -87,27 +88,25 @@ def face_geometry(vertices: NDArray, faces: Faces) -> FaceGeometry:
         height = np.einsum("fvc,fc->fv", corners, normals[which])
         planarity[which] = np.abs(height).max(axis=1)
         crossed[which] = _crosses_itself(corners, normals[which], diameter[which])
-    for bad, text in (
+    for bad, text, sizes in (
         (
             ~(shortest > _DEGENERATE * diameter),
-            lambda f: (
-                f"two of its corners lie in the same place ({shortest[f]:.3g} m apart in a "
-                f"face of {diameter[f]:.3g} m); merge them into one vertex or move one."
-            ),
+            "two of its corners lie in the same place ({:.3g} m apart in a face of {:.3g} m); "
+            "merge them into one vertex or move one.",
+            shortest,
         ),
         (
             ~(areas > _DEGENERATE * diameter**2),
-            lambda f: (
-                f"has no area ({areas[f]:.3g} m2 in a face of {diameter[f]:.3g} m): its "
-                "corners lie on a line or are not listed in order around it; reorder them or leave "
-                "the face out."
-            ),
+            "has no area ({:.3g} m2 in a face of {:.3g} m): its corners lie on a line or are not "
+            "listed in order around it; reorder them or leave the face out.",
+            areas,
         ),
-        (crossed, lambda f: "its outline crosses itself; list its corners in order around it."),
+        (crossed, "its outline crosses itself; list its corners in order around it.", areas),
     ):
         if bad.any():
             f = int(bad.argmax())
-            raise InputError(f"faces[{f}] = {list(faces[f])}: {text(f)}")
+            told = text.format(sizes[f], diameter[f])
+            raise InputError(f"faces[{f}] = {list(faces[f])}: {told}")
     return FaceGeometry(areas, normals, planarity / diameter)
 
 

@@ -142,20 +142,10 @@ class Pattern(Transforms):
         self,
         vertices: ArrayLike,
         faces: Sequence[Sequence[int]] | NDArray[np.integer],
-        assignments: (
-            Mapping[tuple[int, int], str]
-            | Mapping[tuple[int, int] | str, str]
-            | Sequence[str]
-            | None
-        ) = None,
+        assignments: Mapping[Edge, str] | Mapping[Edge | str, str] | Sequence[str] | None = None,
         name: str = "",
         boards: Boards | None = None,
-        fold_angles: (
-            Mapping[tuple[int, int], float]
-            | Mapping[tuple[int, int] | str, float]
-            | ArrayLike
-            | None
-        ) = None,
+        fold_angles: Mapping[Edge, float] | Mapping[Edge | str, float] | ArrayLike | None = None,
         families: Mapping[str, Sequence[tuple[int, int]]] | None = None,
         custom: Mapping[str, Any] | None = None,
         welds: Sequence[tuple[int, int]] | NDArray[np.integer] = (),
@@ -196,8 +186,8 @@ class Pattern(Transforms):
         folded = crease_data.fold_angles(fold_angles, topology.creases, words)
         folded[at_junctions(topology.creases)] = np.nan  # `fold` takes single sheets
         values: dict[str, Any] = {
-            **topology._asdict(),
-            **geometry._asdict(),
+            **vars(topology),
+            **vars(geometry),
             "vertices": points,
             "assignments": letters,
             "unlettered": given == "",
@@ -389,10 +379,9 @@ def _checked_letter(letter: Any, pair: Edge) -> str:
 
 
 def _warn_of_contradictions(given: NDArray, creases: NDArray, dihedrals: NDArray) -> None:
-    wrong = np.flatnonzero(
-        ((given == "M") & (dihedrals < np.pi - _CONTRADICTION))
-        | ((given == "V") & (dihedrals > np.pi + _CONTRADICTION))
-    )
+    off = dihedrals - np.pi
+    wrong = (given == "M") & (off < -_CONTRADICTION) | (given == "V") & (off > _CONTRADICTION)
+    wrong = np.flatnonzero(wrong)
     if len(wrong):
         k = int(wrong[0])
         a, b = creases[k].tolist()

@@ -52,10 +52,7 @@ def picture(pattern: Any, words: str = "") -> str | None:
 
 def _panels(pattern: Any, places: NDArray, depth: NDArray, toward: NDArray) -> list[str]:
     """Panels and edges from back to front."""
-    letters = {
-        tuple(pair): letter
-        for pair, letter in zip(pattern.creases.tolist(), pattern.assignments, strict=True)
-    }
+    letters = dict(zip(map(tuple, pattern.creases.tolist()), pattern.assignments, strict=True))
     letters |= {tuple(pair): "B" for pair in pattern.boundary.tolist()}
     order = np.argsort([depth[list(face)].mean() for face in pattern.faces], kind="stable")
     edges_of = [[edge_of(a, b) for a, b in around(face)] for face in pattern.faces]

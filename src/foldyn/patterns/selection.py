@@ -122,11 +122,8 @@ class _Selector:
             return self._extreme(node.id)
         if isinstance(node, ast.Compare):
             sides = [node.left, *node.comparators]
-            parts = [
-                self._comparison(left, operator, right)
-                for left, operator, right in zip(sides, node.ops, sides[1:], strict=False)
-            ]
-            return np.logical_and.reduce(parts)
+            parts = zip(sides, node.ops, sides[1:], strict=False)
+            return np.logical_and.reduce([self._comparison(*part) for part in parts])
         raise self._error(f"{written(node)} is not a condition")
 
     def _extreme(self, name: str) -> NDArray[np.bool_]:

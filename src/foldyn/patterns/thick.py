@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.patterns.boards import Boards
 from foldyn.patterns.crease_data import crease_values
+from foldyn.patterns.facets import flattened
 from foldyn.patterns.pattern import Pattern, pattern_of, refuse_junctions
 from foldyn.patterns.topology import around, edge_lookup, edge_of, walk
 from foldyn.values import SHORTEST, number, number_or_list, show
@@ -204,11 +205,7 @@ def _plane(
     """
     if not known:
         return np.zeros(len(face))
-    normal = pattern.face_normals[panel]
-    x = pattern.vertices[list(face)]
-    first = x[1] - x[0]
-    axes = np.stack([first, np.cross(normal, first)]) / np.linalg.norm(first)
-    flat = (x - x[0]) @ axes.T
+    flat = flattened(pattern.vertices[list(face)], pattern.face_normals[panel])
     span = float(np.ptp(flat, axis=0).max())
     points = np.array([flat[face.index(v)] for v in known])
     heights = np.array([*known.values()])

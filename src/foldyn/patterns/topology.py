@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 from collections import deque
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import chain, combinations, pairwise
 from typing import Any, NamedTuple
 
@@ -22,7 +23,8 @@ SAME_DIRECTION = 1e-6  # rad: panels this little behind the first come before it
 SAME_ANGLE = 1e-11  # rad: panels within this angle coincide, but for rounding
 
 
-class Topology(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class Topology:
     """How the faces of a pattern are connected.
 
     Attributes

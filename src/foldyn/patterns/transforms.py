@@ -14,10 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import InputError, quietly, warn
 from foldyn.patterns.boards import Boards
 from foldyn.patterns.generators.arguments import check_size
+from foldyn.patterns.geometry import FaceGeometry
 from foldyn.patterns.screw import direction
 from foldyn.patterns.tiling import glue, half_edges
 from foldyn.patterns.tiling import periods as periods_of
-from foldyn.patterns.topology import around, edge_lookup, edge_of
+from foldyn.patterns.topology import Topology, around, edge_lookup, edge_of
 from foldyn.values import flag, number, numbers, show, vector, whole
 
 FLAT = 1e-6  # rad: a crease between copies within this angle from pi gets no letter
@@ -27,35 +28,22 @@ FACE_ORDERS = "faceOrders"
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class Transforms:
+class Transforms(Topology, FaceGeometry):
     """Fields of a `Pattern`, and transformations, which return a new pattern."""
 
     vertices: NDArray[np.float64]
-    faces: tuple[tuple[int, ...], ...]
     assignments: tuple[str, ...]
     name: str
     boards: Boards | None
     fold_angles: NDArray[np.float64]
     families: Mapping[str, NDArray[np.int64]]
     custom: Mapping[str, Any]
-    welds: NDArray[np.int64]
     periods: tuple[NDArray[np.int64], ...]
     rim_families: Mapping[str, NDArray[np.int64]]
     unlettered: NDArray[np.bool_]
-    flipped: tuple[bool, ...]
-    edges: NDArray[np.int64]
-    creases: NDArray[np.int64]
-    boundary: NDArray[np.int64]
-    crease_faces: NDArray[np.int64]
-    crease_ways: NDArray[np.int64]
-    weld_faces: NDArray[np.int64]
-    weld_ways: NDArray[np.int64]
     dihedrals: NDArray[np.float64]
     weld_dihedrals: NDArray[np.float64]
     flat_dihedrals: NDArray[np.float64]
-    face_areas: NDArray[np.float64]
-    face_normals: NDArray[np.float64]
-    face_planarity: NDArray[np.float64]
     size: float
 
     def scaled(self, factor: float) -> Self:
@@ -240,20 +228,15 @@ class Transforms:
 
     def _placed(self, place: Any, factor: float = 1.0, turned: bool = False) -> Self:
         """The pattern with all points mapped by `place`, and the winding reversed if `turned`."""
-        boards = self.boards
-        order = [
-            np.array([0, *range(len(face) - 1, 0, -1)]) if turned else np.arange(len(face))
-            for face in self.faces
-        ]
-        faces = [
-            tuple(face[k] for k in ranks.tolist())
-            for face, ranks in zip(self.faces, order, strict=True)
-        ]
+        boards, faces = self.boards, self.faces
+        if turned:
+            faces = [(face[0], *face[:0:-1]) for face in faces]
         if boards is not None:
-            corners = [boards.of(panel)[ranks] for panel, ranks in enumerate(order)]
-            boards = Boards(
-                boards.offsets, place(np.concatenate(corners)), factor * boards.thickness
-            )
+            corners = [boards.of(panel) for panel in range(len(faces))]
+            if turned:
+                corners = [np.roll(own[::-1], 1, axis=0) for own in corners]
+            points = place(np.concatenate(corners))
+            boards = Boards(boards.offsets, points, factor * boards.thickness)
         return self.changed(
             vertices=place(self.vertices), faces=faces, boards=boards, custom=self.custom,
             rim_families=self._rim(),
@@ -319,17 +302,11 @@ def _joined(
             families.setdefault(name, []).extend(pairs[k] for k in rows.tolist())
     custom.pop(FACE_ORDERS, None)
     known = edge_lookup(bare.creases)  # others are welds of one of the sheets
-    return (
-        bare.changed(
-            assignments={pair: letter for pair, letter in letters.items() if pair in known},
-            fold_angles={pair: angle for pair, angle in angles.items() if pair in known},
-            families={
-                name: [pair for pair in pairs if pair in known] for name, pairs in families.items()
-            },
-            custom=custom,
-        ),
-        glued.joined,
-    )
+    letters = {pair: letter for pair, letter in letters.items() if pair in known}
+    angles = {pair: angle for pair, angle in angles.items() if pair in known}
+    families = {name: [pair for pair in own if pair in known] for name, own in families.items()}
+    made = bare.changed(assignments=letters, fold_angles=angles, families=families, custom=custom)
+    return made, glued.joined
 
 
 def _given(steps: Any) -> NDArray[np.float64]:

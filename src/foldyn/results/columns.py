@@ -74,9 +74,8 @@ class _Lazy(BackendArray):
         )
 
     def _basic(self, key: tuple[int | slice, ...]) -> Any:
-        return self.column[key[0]][(..., *key[1:]) if isinstance(key[0], int) else (
-            slice(None), *key[1:]
-        )]  # fmt: skip
+        first: Any = ... if isinstance(key[0], int) else slice(None)
+        return self.column[key[0]][(first, *key[1:])]
 
 
 class Columns:

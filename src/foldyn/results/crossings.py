@@ -100,13 +100,9 @@ def crossings_of(case: Case, displacement: NDArray | Column, stride: int = 1) ->
 def _found(seen: dict[int, NDArray[np.int64]], many: int) -> Crossings:
     """Collect crossings from the keys of the pairs that cross at each sample."""
     looked = sorted(seen)
-    crossed = [k for k in looked if len(seen[k])]
-    keys = np.concatenate([np.zeros(0, np.int64), *(seen[k] for k in crossed)])
-    samples = np.repeat(np.array(crossed, np.int64), [len(seen[k]) for k in crossed])
+    crossed = np.array([k for k in looked if len(seen[k])], np.int64)
+    keys = np.concatenate([np.zeros(0, np.int64), *(seen[k] for k in crossed.tolist())])
+    samples = np.repeat(crossed, [len(seen[k]) for k in crossed.tolist()])
     first = np.sort(np.unique(keys, return_index=True)[1])
-    return Crossings(
-        np.array(looked, np.int64),
-        np.array(crossed, np.int64),
-        np.stack(np.divmod(keys[first], many), axis=1),
-        samples[first],
-    )
+    pairs = np.stack(np.divmod(keys[first], many), axis=1)
+    return Crossings(np.array(looked, np.int64), crossed, pairs, samples[first])

@@ -13,39 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.cases import HISTORIES, Case, Continuation, Origin
 from foldyn.cases.document import pattern_document, to_document
 from foldyn.patterns import Pattern
+from foldyn.results import quantities
 from foldyn.results.attributes import facts, own_attributes
-from foldyn.results.quantities import (
-    BANDS,
-    BUCKLING,
-    CONTINUATIONS,
-    CROSSINGS,
-    ESTIMATES,
-    FIDELITY,
-    FOLDING,
-    GAPS,
-    INTERNAL,
-    MODES,
-    MOTION,
-    ORIGIN,
-    PATH,
-    PLACE,
-    POINTS,
-    RANDOM,
-    RESPONSES,
-    STATISTICS,
-    Quantity,
-    energies_of,
-    variable,
-    variables,
-    with_reason,
-)
+from foldyn.results.quantities import PLACE, Quantity, energies_of, variable, variables, with_reason
 from foldyn.results.stored_case import CASE_VARIABLES, case_variables
 
 AXIS = np.array(["x", "y", "z"])
 
 TAKEN = frozenset(
-    {*MOTION, *CROSSINGS, *CASE_VARIABLES, "time", "node", "axis", *CONTINUATIONS, *ORIGIN}
-    | {"support", "support_node", "support_axis"}
+    {*quantities.MOTION, *quantities.CROSSINGS, *quantities.CONTINUATIONS, *quantities.ORIGIN}
+    | {*CASE_VARIABLES, "time", "node", "axis", "support", "support_node", "support_axis"}
 )
 """Variable names that are taken in every motion."""
 
@@ -101,15 +78,16 @@ def trajectory_dataset(
     """
     time = np.array(time, dtype=np.float64)
     added = sampled or {}
-    known = {**MOTION, **energies_of(case), **{name: own for name, (own, _) in added.items()}}
+    known = {**quantities.MOTION, **energies_of(case)}
+    known |= {name: own for name, (own, _) in added.items()}
     values = {"displacement": displacement, "reaction": reaction, "velocity": velocity, **energies}
     if memory is not None:
         values["memory"] = memory
     data = variables(known, "time", values | {name: array for name, (_, array) in added.items()})
     for name, (at, one) in (continuations or {}).items():
-        own = {"method": one.method, "time": at}
-        along, numbers, text = variable(("continued",), one.values, "", CONTINUATIONS[name])
-        data[name] = along, numbers, text | own
+        told = quantities.CONTINUATIONS[name]
+        along, numbers, text = variable(("continued",), one.values, "", told)
+        data[name] = along, numbers, text | {"method": one.method, "time": at}
     data |= {} if origin is None else origin_variables(origin[1], origin[0])
     histories = (getattr(part, "history", None) for part in (*case.supports, *case.loads, case.air))
     called = any(type(one) not in HISTORIES.values() for one in histories if one is not None)
@@ -124,7 +102,7 @@ def origin_variables(origin: Origin, time: float = math.nan) -> dict[str, Any]:
     values: dict[str, Any] = {"origin": origin.displacement, "origin_time": begun}
     if origin.flow is not None:
         values |= {"flow": origin.flow, "flow_time": time, "flow_looked": origin.looked}
-    return variables(ORIGIN, (), values)
+    return variables(quantities.ORIGIN, (), values)
 
 
 def path_dataset(
@@ -167,7 +145,7 @@ def path_dataset(
     factor = np.array(load_factor, dtype=np.float64)
     kinds = np.array(solution["point"], dtype="<U11")  # the longest value is "bifurcation"
     values = {"displacement": displacement, "reaction": reaction, **energies, **solution}
-    data = variables({**PATH, **energies_of(case)}, "step", values | {"point": kinds})
+    data = variables({**quantities.PATH, **energies_of(case)}, "step", values | {"point": kinds})
     along = {"load_factor": ("step", factor, {"long_name": "load factor"})}
     return result_dataset("path", case, data, along, statistics, None, obstacles)
 
@@ -193,7 +171,8 @@ def modes_dataset(
         The variables, with the coordinate `mode` = 1, 2, ..., and the case as from
         `trajectory_dataset`.
     """
-    known = {**MODES, **{name: own for name, own in INTERNAL.items() if name in values}}
+    internal = {name: own for name, own in quantities.INTERNAL.items() if name in values}
+    known = {**quantities.MODES, **internal}
     data = variables(known, "mode", {name: values[name] for name in known})
     text = "displacement of the state from the rest position"
     data["displacement"] = variable(PLACE, values["displacement"], "m", text)
@@ -225,7 +204,8 @@ def buckling_dataset(
     xarray.Dataset
         As from `modes_dataset`.
     """
-    data = variables(BUCKLING, "mode", {name: values[name] for name in BUCKLING})
+    own = {name: values[name] for name in quantities.BUCKLING}
+    data = variables(quantities.BUCKLING, "mode", own)
     text = "displacement of the base state from the rest position"
     data["displacement"] = variable(PLACE, values["displacement"], "m", text)
     text = "displacement per unit of the load factor from the base state"
@@ -273,7 +253,7 @@ def frf_dataset(
         `drive` (node, axis), and the variables that every result has.
     """
     values = {quantity: np.asarray(response, np.complex128), **(more or {})}
-    data = variables({**RESPONSES, **ESTIMATES}, "frequency", values)
+    data = variables({**quantities.RESPONSES, **quantities.ESTIMATES}, "frequency", values)
     driven = "N" if quantity == "receptance" else "m"
     data["displacement"] = variable(PLACE, displacement, "m", "displacement of the state")
     data["drive"] = variable(PLACE, drive, driven, "amplitude of the drive")
@@ -312,10 +292,10 @@ def random_dataset(
         "component": 3, "face": 2, "crease": len(case.structure.pattern.creases), "point": -1,
     }  # fmt: skip
     for name, parts in found.items():
-        own = RANDOM[name]
+        own = quantities.RANDOM[name]
         shape = [sizes[dim] for dim in own.dims]
         for kind, value in parts.items():
-            unit, text, along = STATISTICS[kind]
+            unit, text, along = quantities.STATISTICS[kind]
             data[f"{name}_{kind}"] = variable(
                 (*along, *own.dims), value.reshape(*value.shape[:-1], *shape),
                 unit.format(f"({own.units})" if "/" in own.units else own.units),
@@ -351,7 +331,7 @@ def bands_dataset(
         Facts about the computation, each stored as an attribute.
     """
     first = ("state",) if "state" in along else ()
-    data = variables(BANDS, first, values) | variables(GAPS, "gap", gaps)
+    data = variables(quantities.BANDS, first, values) | variables(quantities.GAPS, "gap", gaps)
     return result_dataset("bands", case, data, along, statistics)
 
 
@@ -374,7 +354,7 @@ def fidelity_dataset(
     statistics : mapping
         Facts about the comparison, each stored as an attribute.
     """
-    data = variables(FIDELITY, (), values)
+    data = variables(quantities.FIDELITY, (), values)
     numbers = 1 + np.arange(len(np.asarray(values["frequency"])))
     along = {
         "mode": ("mode", numbers, {"long_name": "elastic mode of the reference"}),
@@ -416,7 +396,7 @@ def folding_dataset(
         "axis": AXIS,
         "crease_vertices": (("crease", "end"), pattern.creases),
     }
-    data = variables(FOLDING, "step", values)
+    data = variables(quantities.FOLDING, "step", values)
     attributes = own_attributes("folding", document.obstacles) | facts(statistics)
     return xr.Dataset({**data, **case_variables(document)}, coordinates, attributes)
 
@@ -497,10 +477,10 @@ def periodic_dataset(
     origin : Origin, optional
         Reference state of damping.
     """
-    data = variables(MOTION, "time", motion)
+    data = variables(quantities.MOTION, "time", motion)
     data |= {} if origin is None else origin_variables(origin)
     single = {"coefficient": coefficient, "stable": stable, "periods": periods, "floquet": floquet}
-    data |= variables(POINTS, (), single)
+    data |= variables(quantities.POINTS, (), single)
     along = {
         "time": ("time", np.asarray(time, float), {"units": "s"}),
         "harmonic": ("harmonic", np.arange(len(coefficient)), {"long_name": "harmonic"}),
@@ -527,13 +507,13 @@ def points_dataset(
     origin : Origin, optional
         See `periodic_dataset`.
     """
-    size = POINTS["amplitude"]._replace(units=units)
+    size = quantities.POINTS["amplitude"]._replace(units=units)
     if kind == "backbone":
         size = size._replace(text="largest displacement of any node from the equilibrium")
-    known = {**POINTS, "amplitude": size}
+    known = {**quantities.POINTS, "amplitude": size}
     data = variables(known, "point", {k: v for k, v in values.items() if k != "frequency"})
     data |= {} if origin is None else origin_variables(origin)
-    text = "frequency of the motion" if kind == "backbone" else POINTS["frequency"].text
+    text = "frequency of the motion" if kind == "backbone" else quantities.POINTS["frequency"].text
     frequency = np.asarray(values["frequency"], float)
     along: dict[str, Any] = {
         "frequency": ("point", frequency, {"units": "Hz", "long_name": text}),

@@ -18,6 +18,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -192,11 +193,11 @@ def read(path: str | os.PathLike[str], unreadable: str, into_memory: bool = True
                 "copy, or compute it again"
             )
         if sealed:
-            return _load(path) if into_memory else _opened(path)
+            return _opened(path, into_memory)
         size = path.stat().st_size  # as HDF5 may crash on a damaged file
         list_engines()  # done here so that no forked process needs to
         seconds, memory = LEAST_SECONDS + size // PER_SECOND, LEAST_MEMORY + 3 * MOST_PACKED * size
-        return apart(lambda: _load(path), seconds, memory)
+        return apart(lambda: _opened(path), seconds, memory)
     except InputError:
         raise
     except PermissionError:
@@ -208,22 +209,11 @@ def read(path: str | os.PathLike[str], unreadable: str, into_memory: bool = True
         ) from error
 
 
-def _load(path: Path) -> xr.Dataset:
+def _opened(path: Path, into_memory: bool = True) -> xr.Dataset:
     _check_header(path)
+    opened: Any = xr.load_dataset if into_memory else partial(xr.open_dataset, cache=False)
     with warnings.catch_warnings(action="ignore"):  # xarray's warnings about odd content
-        ds = xr.load_dataset(path, engine=ENGINE, decode_times=False, decode_timedelta=False)
-    return _fitting(ds)
-
-
-def _opened(path: Path) -> xr.Dataset:
-    _check_header(path)
-    ds = xr.open_dataset(
-        path, engine=ENGINE, decode_times=False, decode_timedelta=False, cache=False
-    )
-    return _fitting(ds)
-
-
-def _fitting(ds: xr.Dataset) -> xr.Dataset:
+        ds = opened(path, engine=ENGINE, decode_times=False, decode_timedelta=False)
     for name, variable in ds.variables.items():
         if variable.shape != tuple(ds.sizes[dim] for dim in variable.dims):
             raise ValueError(f"{name}: {variable.shape} does not fit its dimensions")
@@ -346,12 +336,10 @@ def _write_pieces(ds: xr.Dataset, sink: Any, engine: Literal["h5netcdf"]) -> Non
         ds.to_netcdf(sink, engine=engine)
         return
     count = ds.sizes[ALONG]
-    chunks = {
-        str(name): {
-            "chunksizes": (min(count, max(1, CHUNK // max(1, v.nbytes // count))), *v.shape[1:])
-        }
-        for name, v in along.items()
-    }
+    chunks = {}
+    for name, v in along.items():
+        rows = min(count, max(1, CHUNK // max(1, v.nbytes // count)))
+        chunks[str(name)] = {"chunksizes": (rows, *v.shape[1:])}
     first = ds.isel({ALONG: slice(0, 1)})
     first.to_netcdf(sink, engine=engine, unlimited_dims=[ALONG], encoding=chunks)
     with h5netcdf.File(sink, "r+") as file:

@@ -303,14 +303,10 @@ def _missing(values: Any) -> int:
 
 def missing_values(ds: xr.Dataset) -> dict[str, str]:
     """For each incomplete variable, by name, say how many values are missing and why."""
-    missing = {
-        name: sum(map(_missing, pieces_of(ds[name].variable)))
-        for name in ds.data_vars
-        if ds[name].dtype.kind in "fc"
-    }
-    return {
-        str(name): f"{count} of {ds[name].size} values are missing (nan): "
-        f"{ds[name].attrs.get('missing', UNEXPECTED)}"
-        for name, count in missing.items()
-        if count
-    }
+    found = {}
+    for name, one in ds.data_vars.items():
+        count = sum(map(_missing, pieces_of(one.variable))) if one.dtype.kind in "fc" else 0
+        if count:
+            why = one.attrs.get("missing", UNEXPECTED)
+            found[str(name)] = f"{count} of {one.size} values are missing (nan): {why}"
+    return found

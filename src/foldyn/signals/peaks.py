@@ -108,17 +108,12 @@ def find_peaks(
         step = np.log(number("rise", rise, above=1.0))
         decibel = np.log(np.maximum(curve.size, LOWEST * curve.size.max()))
         index = np.union1d(index, search(decibel, prominence=step)[0])
-    height = peak_prominences(curve.size, index)[0]
+    rises = peak_prominences(curve.size, index)[0]
     if count is not None:
-        keep = np.sort(np.argsort(height, kind="stable")[::-1][: whole("count", count, least=1)])
-        index, height = index[keep], height[keep]
-    refined = np.array([curve.peak(i) for i in index]).reshape(-1, 2)
-    return Peaks(
-        frequency=refined[:, 0],
-        height=refined[:, 1],
-        prominence=height,
-        index=index.astype(np.int64),
-    )
+        keep = np.sort(np.argsort(rises, kind="stable")[::-1][: whole("count", count, least=1)])
+        index, rises = index[keep], rises[keep]
+    place, height = np.array([curve.peak(i) for i in index]).reshape(-1, 2).T
+    return Peaks(frequency=place, height=height, prominence=rises, index=index.astype(np.int64))
 
 
 class Curve(NamedTuple):

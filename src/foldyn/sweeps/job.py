@@ -184,7 +184,8 @@ def _digest(file: str) -> str:
 def code_of(function: Callable[..., Any]) -> str:
     """Digest of the source of a user's function; "" for registered measures."""
     found = function.load() if isinstance(function, Loaded) else function
-    if getattr(found, "__module__", "").startswith("foldyn."):
+    inner = getattr(found, "func", found)  # registered measures may be partial functions
+    if getattr(inner, "__module__", "").startswith("foldyn."):
         return ""
     try:
         file = inspect.getsourcefile(found)

@@ -159,6 +159,13 @@ class Asked:
             )
         return value
 
+    def number(self, result: xr.Dataset, case: Case, shared: dict[Any, Any]) -> float:
+        """Value of a measure that must be a number; see `of`."""
+        value = self.of(result, case, shared)
+        if value.ndim:
+            raise InputError(f"{self.text}: is an array; ask for one of its numbers")
+        return float(value)
+
     def check(self, case_file: CaseFile) -> None:
         """Refuse a measure that does not apply to results of a case file."""
         kind, kinds = case_file.analysis.kind, self.measure.kinds

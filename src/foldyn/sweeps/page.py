@@ -18,16 +18,8 @@ from foldyn.plots.sweep_charts import effect_charts, line_chart
 from foldyn.report.album import Album
 from foldyn.report.page import write_report
 from foldyn.report.sections import Charts, Heading, Listing, Section, Table, Text, cell
-from foldyn.results.sweep_dataset import (
-    POINT,
-    SALTELLI,
-    is_grid,
-    keys_of,
-    label,
-    measures_of,
-    parameters_of,
-    sobol_indices,
-)
+from foldyn.results import sweep_dataset
+from foldyn.results.sweep_dataset import POINT, is_grid, keys_of, label, measures_of
 
 MOST_CURVES = 8
 """Most curves in a chart."""
@@ -77,7 +69,7 @@ def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]
     if not np.isfinite(one.values).any():
         yield Text("Has no value at any point.")
         return
-    names = parameters_of(sweep)
+    names = sweep_dataset.parameters_of(sweep)
     own = [str(dim) for dim in one.dims if dim not in (*keys_of(sweep), POINT)]
     at = {dim: sweep[dim].values[0].item() for dim in own}
     where = "".join(f", {dim} {value}" for dim, value in at.items())
@@ -87,11 +79,9 @@ def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]
             caption = f"{text}, against both parameters."
             draw = partial(plots.plot_sweep_map, sweep, name, at=at)
             yield from album.figure(f"map-{name}", caption, draw)
-        caption = (
-            f"{text}: mean over all other parameters, at values of one."
-            if is_grid(sweep)
-            else f"{text}: the points against each parameter, and their means."
-        )
+        caption = f"{text}: the points against each parameter, and their means."
+        if is_grid(sweep):
+            caption = f"{text}: mean over all other parameters, at values of one."
         draw = partial(plots.plot_main_effects, sweep, name, at=at)
         charts = Charts(effect_charts(sweep, name, at, not is_grid(sweep)), caption)
         yield from album.figure(f"effects-{name}", caption, draw, charts)
@@ -108,7 +98,7 @@ def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]
         draw = partial(plots.plot_sweep_lines, sweep, name, x=names[0], at=at)
         charts = Charts(effect_charts(sweep, name, at, True), caption)
         yield from album.figure(f"lines-{name}", caption, draw, charts)
-    if sweep.attrs["method"] == SALTELLI:
+    if sweep.attrs["method"] == sweep_dataset.SALTELLI:
         yield from _indices(sweep, name, at, album, text)
 
 
@@ -116,7 +106,7 @@ def _indices(
     sweep: xr.Dataset, name: str, at: dict[str, Any], album: Album, text: str
 ) -> Iterator[Section]:  # fmt: skip
     try:
-        found = sobol_indices(sweep, name, at=at)
+        found = sweep_dataset.sobol_indices(sweep, name, at=at)
     except InputError as error:
         yield Text(f"No Sobol indices: {error}")
         return

@@ -123,8 +123,7 @@ def dataset(plan: Plan, found: Sequence[Evaluation], facts: Mapping[str, Any]) -
         inner = one.measure.dims or tuple(f"{one.name}_{k}" for k in range(array.ndim - 1))
         where = [f"{what} {value}" for what, value in one.arguments.items()]
         text = ", ".join([one.measure.doc or one.name, *where])
-        about = {"units": one.measure.units, "long_name": text}
-        about |= {"measure": one.text}
+        about = {"units": one.measure.units, "long_name": text, "measure": one.text}
         about = {key: text for key, text in about.items() if text}
         along = {dim: 1 + np.arange(n) for dim, n in zip(inner, array.shape[1:], strict=True)}
         values = array.reshape(*shape, *array.shape[1:])

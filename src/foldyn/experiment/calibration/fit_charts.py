@@ -43,11 +43,11 @@ def charts_of(one: Measurement, result: xr.Dataset, case: Case) -> list[Chart]:
     if isinstance(one, FrequencyResponse):
         return _responses(one, result, case)
     if isinstance(one, TimeHistory):
-        said, seen = one.curves(result, case), one.values - one.trend(one.values)
+        said, seen = one.modelled(result, case), one.values - one.trend(one.values)
         said = said - one.trend(said)
         return _beside(one, one.time, "time (s)", f"{one.axis} displacement (m)", said, seen, case)
     if isinstance(one, Spectrum):
-        said, label = one.spectra(result, case), f"{one.axis} amplitude (m)"
+        said, label = one.modelled(result, case), f"{one.axis} amplitude (m)"
         return _beside(one, one.frequency, "frequency (Hz)", label, said, one.values, case)
     return []
 
@@ -68,7 +68,7 @@ def _beside(
 
 def _shapes(one: Shapes, result: xr.Dataset, case: Case) -> list[Chart]:
     """Charts of measured and computed shapes, one for each load factor."""
-    model, (across, up) = one.shapes(result, case), picture_plane(one, case)
+    model, (across, up) = one.modelled(result, case), picture_plane(one, case)
     letters = [AXES.index(axis) for axis in one.axes]
     rest = case.structure.nodes[one.where(case)][:, letters]
     origin = rest if one.quantity == "displacement" else 0.0
@@ -84,7 +84,7 @@ def _shapes(one: Shapes, result: xr.Dataset, case: Case) -> list[Chart]:
 
 def _mode_shapes(one: ModeShapes, result: xr.Dataset, case: Case) -> list[Chart]:
     """Measured against predicted components of mode shapes, a chart for each mode."""
-    model = one.shapes(result, case)
+    model = one.modelled(result, case)
     charts = []
     for mode, seen, said in zip(one.mode[:MOST].tolist(), one.values, model, strict=False):
         known = np.isfinite(seen)
@@ -97,7 +97,7 @@ def _mode_shapes(one: ModeShapes, result: xr.Dataset, case: Case) -> list[Chart]
 
 def _responses(one: FrequencyResponse, result: xr.Dataset, case: Case) -> list[Chart]:
     """Magnitude of responses for each node and, if measured, phase."""
-    model = one.curves(result, case)
+    model = one.modelled(result, case)
     labels = [f"{one.axis} (dB{f' re 1 {one.unit}' if one.unit else ''})", "phase (degrees)"]
     parts = [(_decibels(model), _decibels(one.values))]
     if not one.magnitude:

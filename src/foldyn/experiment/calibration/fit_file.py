@@ -52,9 +52,9 @@ class DataSection(Section):
 
 
 def _measurement(name: str, value: Any, folder: Path, find: Any) -> Measurement:
-    own = {key: one for key, one in check_table(name, value).items() if key in keys(DataSection)}
-    section = read(DataSection, name, own, folder, find)
-    given = {key: one for key, one in value.items() if key not in own}
+    common = {key: one for key, one in check_table(name, value).items() if key in keys(DataSection)}
+    section = read(DataSection, name, common, folder, find)
+    given = {key: one for key, one in value.items() if key not in common}
     check_keys(given, [*keys(DataSection), *_known(section.kind)], name)
     if "nodes" not in given and section.kind in NAMED:
         raise InputError(": missing; name the nodes that were measured", f"{name}.nodes")
@@ -64,14 +64,10 @@ def _measurement(name: str, value: Any, folder: Path, find: Any) -> Measurement:
         if not isinstance(shapes, str):
             raise InputError(f" = {show(shapes)}: must be the name of a file", f"{name}.shapes")
         given = {**given, "shapes": folder / shapes}
+    named = {"name": Path(section.file).stem, **given}
+    own = {"case": section.case, "changes": section.set or {}, "held_out": section.held_out}
     with within(f"{name}: "):
-        return READERS[kind](
-            folder / section.file,
-            **{"name": Path(section.file).stem, **given},
-            case=section.case,
-            changes=section.set or {},
-            held_out=section.held_out,
-        )
+        return READERS[kind](folder / section.file, **named, **own)
 
 
 def _known(kind: str) -> list[str]:

@@ -15,17 +15,13 @@ import xarray as xr
 from foldyn.analyses import CaseFile
 from foldyn.analyses.provenance import Call, computed, inputs, inputs_table
 from foldyn.cases import Case
+from foldyn.experiment.calibration import modal
 from foldyn.experiment.calibration.fit_charts import charts_of
 from foldyn.experiment.calibration.fitted import Fit
 from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
 from foldyn.experiment.calibration.measured import MOST, ForceDisplacement, dense_curve
 from foldyn.experiment.calibration.measurement import AtNodes, Measurement
-from foldyn.experiment.calibration.modal import (
-    FrequencyResponse,
-    ModalParameters,
-    ModeShapes,
-    resisted,
-)
+from foldyn.experiment.calibration.modal import FrequencyResponse
 from foldyn.report.album import Album
 from foldyn.report.page import write_report
 from foldyn.report.sections import Charts, Heading, Listing, Section, Table, Text, cell
@@ -84,9 +80,9 @@ def write_fit(
             shown = Charts(charts, _caption(one))
             draw = partial(_draw, "plot_measured", one, *model, note)
             sections += album.figure(f"data-{i}", _caption(one), draw, shown)
-        if isinstance(one, ModalParameters):
+        if isinstance(one, modal.ModalParameters):
             sections.append(modes_table(one, *model))
-        elif isinstance(one, ModeShapes):
+        elif isinstance(one, modal.ModeShapes):
             sections.append(shapes_table(one, *model))
     sections += [Heading("The search"), _searches(fit), *_provenance(fit, runs, call or Call())]
     return write_report(sections, folder / "report.html", title=title)
@@ -229,7 +225,7 @@ def _draw(name: str, *arguments: Any) -> Any:
     return getattr(fit_figures, name)(*arguments)
 
 
-def modes_table(one: ModalParameters, result: xr.Dataset, case: Case) -> Table:
+def modes_table(one: modal.ModalParameters, result: xr.Dataset, case: Case) -> Table:
     """Table of measured values per mode and the model's values."""
     places, measured = one.places(result, case), one.observed()
     model = result[one.quantity].values[places]
@@ -253,10 +249,10 @@ def modes_table(one: ModalParameters, result: xr.Dataset, case: Case) -> Table:
     return Table([*header, "MAC"], rows, f"{one.name}: paired by their shapes (MAC)")
 
 
-def shapes_table(one: ModeShapes, result: xr.Dataset, case: Case) -> Table:
+def shapes_table(one: modal.ModeShapes, result: xr.Dataset, case: Case) -> Table:
     """Table of the similarity of measured shapes and the model's shapes."""
     place, alike = one.pairing(result, case)
-    kept = resisted(result)[place]
+    kept = modal.resisted(result)[place]
     names, hertz = result["mode"].values[kept].tolist(), result["frequency"].values[kept].tolist()
     rows: list[list[Any]] = []
     for k, (mode, name, f) in enumerate(zip(one.mode.tolist(), names, hertz, strict=True)):

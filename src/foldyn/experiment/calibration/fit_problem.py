@@ -136,10 +136,9 @@ class Problem:
             points.pop(tuple(values), None)
         with quietly():
             one = self.case_file(run, values)
+            like = Like(values, one)
             others = [
-                one
-                if np.array_equal(each, values)
-                else self.case_file(run, each, Like(values, one))
+                one if np.array_equal(each, values) else self.case_file(run, each, like)
                 for each in points.values()
             ]
             members = run.those_of(self.measurements)
@@ -187,7 +186,9 @@ class Problem:
     ) -> Any:
         """Result of a run at given values, for the measurements of the run or for `members`."""
         case_file = self.case_file(run, values)
-        return predicted_run.result_of(run, case_file, members or run.those_of(self.measurements))
+        with quietly():
+            own = members or run.those_of(self.measurements)
+            return predicted_run.computed(run, case_file, own)
 
     def observed(self) -> list[NDArray[np.float64]]:
         """Measured values of each measurement."""

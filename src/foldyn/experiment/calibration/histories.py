@@ -100,17 +100,13 @@ class TimeHistory(NodeValues):
         """Degrees of freedom that predictions take from the data."""
         return (self.align > 0.0) + DETRENDS.index(self.detrend) * self.values.shape[1]
 
-    def observed(self) -> NDArray[np.float64]:
-        """Measured values, flattened."""
-        return self._reduced(self.values)
-
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
         """Refuse a case that cannot predict these values."""
         super().check(case, arguments)
         early, late = self.time[0] + self.delay, self.time[-1] + self.delay
         _within(self._of("time"), np.array([early - self.align, late + self.align]), arguments)
 
-    def curves(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
+    def modelled(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Displacements in a motion at the measured times, shape (t, m), trend included."""
         along = _spline(result, self.where(case), self.axis, self.sight)
         return along(self.time + self.delay + self.shift(result, case))
@@ -123,19 +119,15 @@ class TimeHistory(NodeValues):
         there, observed, speed = self.time + self.delay, self.observed(), along.derivative()
 
         def misfit(by: float) -> NDArray[np.float64]:
-            return self._reduced(along(there + by)) - observed
+            return self.flat(along(there + by)) - observed
 
         step = 0.25 * float(np.diff(self.time).min())
         tried = np.linspace(-self.align, self.align, 2 * math.ceil(self.align / step) + 1)
         by = float(tried[np.argmin([float(r @ r) for r in map(misfit, tried)])])
         for _ in range(REFINED):  # Gauss-Newton steps from a start close to the solution
-            slope = self._reduced(speed(there + by))
+            slope = self.flat(speed(there + by))
             by = float(np.clip(by - slope @ misfit(by) / (slope @ slope), *tried[[0, -1]]))
         return by
-
-    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
-        """Predictions of the measured values, in the order of `observed`."""
-        return self._reduced(self.curves(result, case))
 
     def trend(self, curves: NDArray[np.float64]) -> NDArray[np.float64]:
         """Trend of curves (t, m) that `detrend` subtracts, fitted where nodes were seen."""
@@ -149,9 +141,9 @@ class TimeHistory(NodeValues):
             lines.append(line(self.time))
         return np.stack(lines, axis=1)
 
-    def _reduced(self, curves: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Curves where the nodes were seen, without their trend, flattened node by node."""
-        return (curves - self.trend(curves)).T[np.isfinite(self.values).T]
+    def flat(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values where the nodes were seen, without their trend, node by node."""
+        return (values - self.trend(values)).T[np.isfinite(self.values).T]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -232,25 +224,21 @@ class Spectrum(NodeValues):
             time=history.time + history.delay, detrend=detrend, taper=taper, sight=history.sight,
         )  # fmt: skip
 
-    def observed(self) -> NDArray[np.float64]:
-        """Measured values, flattened."""
-        return self.values.T.ravel()
+    def flat(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values node by node."""
+        return values.T.ravel()
 
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
         """Refuse a case that cannot predict these values."""
         super().check(case, arguments)
         _within(self._of("time"), self.time, arguments)
 
-    def spectra(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
+    def modelled(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Amplitudes of the model at the measured frequencies, shape (f, m)."""
         along = _spline(result, self.where(case), self.axis, self.sight)(self.time)
         step = sampling_interval(self.time)
         frequency, amplitude = spectrum(along, step, window=self.taper, detrend=self.detrend)
         return np.stack([np.interp(self.frequency, frequency, one) for one in amplitude.T], axis=1)
-
-    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
-        """Predictions of the measured values, in the order of `observed`."""
-        return self.spectra(result, case).T.ravel()
 
 
 def _spline(

@@ -147,17 +147,13 @@ class Shapes(NodeValues):
         """Load factors at which the path is needed."""
         return self.load_factor
 
-    def shapes(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
+    def modelled(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Values of a result at all nodes, seen or not, shape (s, m, a)."""
         nodes, axes = self.where(case), [AXES.index(axis) for axis in self.axes]
         moved = result["displacement"].values[_steps(result, self.load_factor)][:, nodes][..., axes]
         if self.quantity == "displacement":
             return moved
         return moved + case.structure.nodes[nodes][:, axes]
-
-    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
-        """Predictions of the measured values, in the order of `observed`."""
-        return self.shapes(result, case)[np.isfinite(self.values)]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

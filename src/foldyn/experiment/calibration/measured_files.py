@@ -14,21 +14,10 @@ from numpy.typing import NDArray
 from foldyn.cases.csv_table import read_headings, read_numbers, some
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
-from foldyn.experiment.calibration import modal_files
+from foldyn.experiment.calibration import modal, modal_files
 from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
-from foldyn.experiment.calibration.measured import (
-    IMPOSED,
-    ForceDisplacement,
-    Measured,
-    Shapes,
-)
+from foldyn.experiment.calibration.measured import IMPOSED, ForceDisplacement, Measured, Shapes
 from foldyn.experiment.calibration.measurement import Measurement
-from foldyn.experiment.calibration.modal import (
-    DampingRatios,
-    FrequencyResponse,
-    ModeShapes,
-    NaturalFrequencies,
-)
 from foldyn.experiment.calibration.tables import by_node, limits, listed_nodes, made
 from foldyn.experiment.camera import Sight
 from foldyn.experiment.tracking.tracks_dataset import load_tracks
@@ -301,8 +290,8 @@ READERS: Mapping[type[Measurement], Any] = {
     Measured: measured,
     TimeHistory: history,
     Spectrum: spectrum,
-    NaturalFrequencies: modal_files.frequencies,
-    DampingRatios: modal_files.damping_ratios,
-    ModeShapes: modal_files.mode_shapes,
-    FrequencyResponse: modal_files.frf,
+    modal.NaturalFrequencies: modal_files.frequencies,
+    modal.DampingRatios: modal_files.damping_ratios,
+    modal.ModeShapes: modal_files.mode_shapes,
+    modal.FrequencyResponse: modal_files.frf,
 }

@@ -78,6 +78,8 @@ class Measurement(ABC):
 
     def errors(self) -> NDArray[np.float64]:
         """Standard error of each measured value; the spread of all values if unknown."""
+        if isinstance(self.sigma, np.ndarray):
+            return self.sigma
         observed = self.observed()
         return np.full(len(observed), self.sigma or spread(observed))
 
@@ -127,9 +129,21 @@ class NodeValues(AtNodes):
 
     values: Any = ()
 
+    @abstractmethod
+    def modelled(self, result: xr.Dataset, case: Case) -> NDArray:
+        """Values of a result in the place of the measured `values`, also where these are NaN."""
+
+    def flat(self, values: NDArray) -> NDArray[np.float64]:
+        """Those of the values that were measured, in one row."""
+        return values[np.isfinite(self.values)]
+
     def observed(self) -> NDArray[np.float64]:
-        """Measured values, flattened."""
-        return self.values[np.isfinite(self.values)]
+        """Measured values, flat."""
+        return self.flat(self.values)
+
+    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
+        """Predictions of the measured values, in the order of `observed`."""
+        return self.flat(self.modelled(result, case))
 
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
         """Refuse a case that cannot predict these values."""

@@ -14,12 +14,7 @@ from numpy.typing import NDArray
 from foldyn.cases import BaseMotion, Case
 from foldyn.cases.directions import AXES, check_axes
 from foldyn.errors import ComputationError, InputError
-from foldyn.experiment.calibration.measurement import (
-    Measurement,
-    NodeValues,
-    column,
-    plain_array,
-)
+from foldyn.experiment.calibration.measurement import Measurement, NodeValues, column, plain_array
 from foldyn.linear import convert, mac, pair_modes
 from foldyn.linear.frf import METHODS
 from foldyn.results.quantities import RESPONSES
@@ -153,7 +148,7 @@ class ModeShapes(NodeValues):
                     "lower analysis.count if one of them is too high"
                 )
 
-    def shapes(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
+    def modelled(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Shapes of the partners, scaled to fit best at measured components, shape (k, m, a)."""
         shapes = self._of_model(result, case)[self.pairing(result, case).place]
         seen = np.isfinite(self.values)
@@ -161,10 +156,6 @@ class ModeShapes(NodeValues):
         size = (own**2).sum(axis=(1, 2))
         scale = (own * other).sum(axis=(1, 2)) / np.where(size > 0.0, size, 1.0)
         return shapes * scale[:, None, None]
-
-    def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
-        """Predictions of the measured values, in the order of `observed`."""
-        return self.shapes(result, case)[np.isfinite(self.values)]
 
     def places(self, result: xr.Dataset, case: Case) -> NDArray[np.int64]:
         """Indices (k,) of the measured modes in a result."""
@@ -243,12 +234,6 @@ class ModalParameters(Measurement):
     def observed(self) -> NDArray[np.float64]:
         """Measured values, flattened."""
         return getattr(self, self.quantity)
-
-    def errors(self) -> NDArray[np.float64]:
-        """Standard error of each measured value."""
-        if isinstance(self.sigma, np.ndarray):
-            return self.sigma
-        return super().errors()
 
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
         """Refuse a case that cannot predict these values."""
@@ -432,15 +417,11 @@ class FrequencyResponse(NodeValues):
         unit = RESPONSES[self.quantity].units
         return "" if unit == "1" else unit
 
-    def observed(self) -> NDArray[np.float64]:
-        """Measured values, flattened."""
-        return self._flat(self.values)
-
     def errors(self) -> NDArray[np.float64]:
         """Standard error of each measured value."""
         if not isinstance(self.sigma, np.ndarray):
             return super().errors()
-        return self._flat(self.sigma if self.magnitude else self.sigma * (1.0 + 1.0j))
+        return self.flat(self.sigma if self.magnitude else self.sigma * (1.0 + 1.0j))
 
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
         """Refuse a case that cannot predict these values."""
@@ -470,7 +451,7 @@ class FrequencyResponse(NodeValues):
         """Refuse a result without finite predictions."""
         self.predicted(result, case)
 
-    def curves(self, result: xr.Dataset, case: Case) -> NDArray[np.complex128]:
+    def modelled(self, result: xr.Dataset, case: Case) -> NDArray[np.complex128]:
         """Response of the model at the measured frequencies, shape (f, m)."""
         held = result if self.quantity == MOTION else convert(result, self.quantity)
         lines = np.searchsorted(result["frequency"].values, self.frequency)
@@ -479,7 +460,7 @@ class FrequencyResponse(NodeValues):
 
     def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Predictions of the measured values, in the order of `observed`."""
-        curves = self.curves(result, case)
+        curves = self.modelled(result, case)
         lost = ~np.isfinite(curves).all(axis=1)
         if lost.any():
             raise ComputationError(
@@ -487,9 +468,9 @@ class FrequencyResponse(NodeValues):
                 "resonance without damping, a body free to move at 0 Hz, or no convergence; give "
                 "the case damping, or leave this frequency out"
             )
-        return self._flat(np.abs(curves) if self.magnitude else curves)
+        return self.flat(np.abs(curves) if self.magnitude else curves)
 
-    def _flat(self, curves: NDArray) -> NDArray[np.float64]:
+    def flat(self, values: NDArray) -> NDArray[np.float64]:
         """Measured values, node by node: first all real parts, then all imaginary parts."""
-        seen: NDArray[Any] = curves.T[np.isfinite(self.values).T]
+        seen: NDArray[Any] = values.T[np.isfinite(self.values).T]
         return np.concatenate([np.real(seen), np.imag(seen)]) if np.iscomplexobj(seen) else seen

@@ -14,15 +14,8 @@ from numpy.typing import NDArray
 from foldyn.cases.csv_table import UNITS, read_headings, read_numbers, some
 from foldyn.cases.directions import AXES, check_axes
 from foldyn.errors import InputError
+from foldyn.experiment.calibration import modal
 from foldyn.experiment.calibration.measurement import Measurement
-from foldyn.experiment.calibration.modal import (
-    MOTION,
-    DampingRatios,
-    FrequencyResponse,
-    ModeShapes,
-    NaturalFrequencies,
-    resisted,
-)
 from foldyn.experiment.calibration.tables import by_node, limits, listed_nodes, made
 from foldyn.linear import convert
 from foldyn.linear.frf import PER_FORCE, quantity_of
@@ -31,12 +24,10 @@ from foldyn.results.netcdf import read
 from foldyn.results.quantities import RESPONSES
 from foldyn.values import choice, indices, show
 
-# Unit to which each kind of modal value is converted.
-UNIT: Mapping[str, str] = {"frequency": "Hz", "damping_ratio": "-"}
 # Units of each quantity of a response in a CSV file.
 UNITS_OF: Mapping[str, Sequence[str]] = {
     **{name: tuple(UNITS[name]) for name in PER_FORCE},
-    MOTION: tuple(UNITS["number without unit"]),
+    modal.MOTION: tuple(UNITS["number without unit"]),
 }
 # Parts of a response in columns such as "node 8 x real".
 PARTS = ("real", "imag", "magnitude", "sigma")
@@ -44,7 +35,7 @@ PARTS = ("real", "imag", "magnitude", "sigma")
 
 def frequencies(
     file: Path, modes: Any = None, shapes: Path | None = None, **known: Any
-) -> NaturalFrequencies:
+) -> modal.NaturalFrequencies:
     """Natural frequencies from a CSV file with the columns mode and frequency, or from a result.
 
     Parameters
@@ -58,20 +49,14 @@ def frequencies(
     **known
         Other arguments of `NaturalFrequencies`.
     """
-    return _of_modes(NaturalFrequencies, file, known, _numbers(file, "frequency", modes, shapes))
+    return _of_modes(modal.NaturalFrequencies, file, modes, shapes, known)
 
 
 def damping_ratios(
     file: Path, modes: Any = None, shapes: Path | None = None, **known: Any
-) -> DampingRatios:
+) -> modal.DampingRatios:
     """Damping ratios, as in `frequencies`: columns mode, damping_ratio, damping_ratio_sigma."""
-    return _of_modes(DampingRatios, file, known, _numbers(file, "damping_ratio", modes, shapes))
-
-
-def _of_modes(kind: Any, file: Path, known: dict[str, Any], given: dict[str, Any]) -> Any:
-    if "sigma" in given:
-        known = _with_sigma(file, known, given.pop("sigma"))
-    return made(kind, file, **known, **given)
+    return _of_modes(modal.DampingRatios, file, modes, shapes, known)
 
 
 def _with_sigma(file: Path, known: dict[str, Any], errors: NDArray) -> dict[str, Any]:
@@ -81,28 +66,31 @@ def _with_sigma(file: Path, known: dict[str, Any], errors: NDArray) -> dict[str,
     return {**known, "sigma": errors}
 
 
-def _numbers(file: Path, name: str, modes: Any, shapes: Path | None) -> dict[str, Any]:
-    """Arguments read from a file with one number for each mode."""
+def _of_modes(kind: Any, file: Path, modes: Any, shapes: Path | None, known: dict[str, Any]) -> Any:
+    """Measurement of a kind from a file with one number for each mode."""
+    name, unit = kind.quantity, kind.unit or "-"
     if _is_result(file):
         found = _result(file, "modes")
-        values = found[name].values[resisted(found)]
+        values = found[name].values[modal.resisted(found)]
         table = {"mode": np.arange(1.0, len(values) + 1.0), name: values}
     else:
-        wanted = {"mode": ("mode", "-"), name: (name, UNIT[name])}
+        wanted = {"mode": ("mode", "-"), name: (name, unit)}
         sigma = f"{name}_sigma"
         if sigma in dict(read_headings(file)):
-            wanted["sigma"] = sigma, UNIT[name]
+            wanted["sigma"] = sigma, unit
         table = read_numbers(file, wanted)
     chosen = _chosen(file, table["mode"], modes)
     given: dict[str, Any] = {key: column[chosen] for key, column in table.items()}
     if shapes is not None:
         given["shapes"] = mode_shapes(shapes, modes=given["mode"].astype(int).tolist())
-    return given
+    if "sigma" in given:
+        known = _with_sigma(file, known, given.pop("sigma"))
+    return made(kind, file, **known, **given)
 
 
 def mode_shapes(
     file: Path, nodes: Any = None, axes: Any = None, modes: Any = None, **known: Any
-) -> ModeShapes:
+) -> modal.ModeShapes:
     """Mode shapes from a CSV file with a line for each mode and node, or from a result.
 
     Parameters
@@ -121,7 +109,7 @@ def mode_shapes(
     """
     if _is_result(file):
         found = _result(file, "modes")
-        whole = found["shape"].transpose("mode", "node", "axis").values[resisted(found)]
+        whole = found["shape"].transpose("mode", "node", "axis").values[modal.resisted(found)]
         numbers, there = np.arange(1.0, len(whole) + 1.0), AXES
         listed = list(range(whole.shape[1])) if nodes is None else listed_nodes(file, nodes)
         values = whole[:, _nodes_of(file, listed, whole.shape[1])]
@@ -134,15 +122,14 @@ def mode_shapes(
         raise InputError(f'{file}: axes = "{taken}": has no column "{missing[0]}"')
     chosen = _chosen(file, numbers, modes)
     values = values[chosen][..., [there.index(axis) for axis in taken]]
-    return made(
-        ModeShapes, file, nodes=listed, values=values, axes=taken, mode=numbers[chosen], **known
-    )
+    given = {"nodes": listed, "values": values, "axes": taken, "mode": numbers[chosen]}
+    return made(modal.ModeShapes, file, **given, **known)
 
 
 def frf(
     file: Path, nodes: Any, axis: str = "x", quantity: str | None = None,
     magnitude: bool | None = None, band: Sequence[float] | None = None, **known: Any,
-) -> FrequencyResponse:  # fmt: skip
+) -> modal.FrequencyResponse:  # fmt: skip
     """Frequency responses from a CSV file or from a result of `fd.frf`.
 
     Parameters
@@ -170,10 +157,8 @@ def frf(
         quantity = held if quantity is None else quantity
         found = convert(found, quantity) if quantity != held else found
         whole = found[quantity].transpose("frequency", "node", "axis").values[..., AXES.index(axis)]
-        frequency, values = (
-            found["frequency"].values,
-            whole[:, _nodes_of(file, chosen, len(whole.T))],
-        )
+        frequency = found["frequency"].values
+        values = whole[:, _nodes_of(file, chosen, len(whole.T))]
     else:
         if quantity is not None:
             choice(f"{file}: quantity", quantity, RESPONSES)
@@ -194,7 +179,7 @@ def frf(
         known = _with_sigma(file, known, errors)
     real = not np.iscomplexobj(values)
     return made(
-        FrequencyResponse, file, nodes=chosen, frequency=frequency, values=values, axis=axis,
+        modal.FrequencyResponse, file, nodes=chosen, frequency=frequency, values=values, axis=axis,
         quantity=quantity, magnitude=real if magnitude is None else magnitude, **known,
     )  # fmt: skip
 

@@ -11,12 +11,11 @@ import numpy as np
 from xarray import Variable
 
 from foldyn.analyses import CaseFile
-from foldyn.analyses.casefile import Computation
 from foldyn.analyses.sections import Choice
 from foldyn.cases import Case, State
 from foldyn.dynamics.methods import method_of
 from foldyn.dynamics.motion import Motion
-from foldyn.errors import InputError, quietly
+from foldyn.errors import InputError
 from foldyn.experiment.calibration.measured import Measured
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.modal import FrequencyResponse, ModalParameters, ModeShapes
@@ -80,23 +79,16 @@ class PredictedRun:
         return self.starts[0]
 
 
-def result_of(run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]) -> Any:
-    """Result of a case file, without warnings."""
-    with quietly():
-        return computed(run, case_file, members)
-
-
 def computed(run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]) -> Any:
     """Result of a case file at the measured load factors, modes or frequencies."""
-    return _computation(run, case_file, members).result()
+    return case_file.computation(**_changes(run, case_file, members)).result()
 
 
 def seen(run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]) -> Any:
     """The part of the result with which measurements are compared."""
-    computation = _computation(run, case_file, members)
     if run.kind != "dynamics":
-        return computation.result()
-    motion = computation.compute.motion  # type: ignore[attr-defined]
+        return computed(run, case_file, members)
+    motion = motion_of(run, case_file)
     with case_file.placing():
         motion.integrate()
     return _moved(motion)
@@ -104,7 +96,8 @@ def seen(run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement])
 
 def motion_of(run: PredictedRun, case_file: CaseFile) -> Motion:
     """The motion of a case file, before it begins."""
-    return _computation(run, case_file, ()).compute.motion  # type: ignore[attr-defined]
+    compute: Any = case_file.computation(**_changes(run, case_file, ())).compute
+    return compute.motion
 
 
 def _moved(motion: Motion) -> dict[str, Variable]:
@@ -115,12 +108,6 @@ def _moved(motion: Motion) -> dict[str, Variable]:
         "displacement": Variable(("time", "node", "axis"), out.displacement),
         "rest_position": Variable(("node", "axis"), motion.case.structure.nodes),
     }
-
-
-def _computation(
-    run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]
-) -> Computation:  # fmt: skip
-    return case_file.computation(**_changes(run, case_file, members))
 
 
 def _changes(

@@ -157,24 +157,22 @@ class Sensor(Checked):
     @cached_property
     def places(self) -> NDArray[np.float64]:
         """Places in the pixel, from -1/2 to 1/2, shape (samples, 2)."""
-        k = np.arange(self.samples)
-        return np.stack([(k + 0.5) / self.samples, _halton(k, 2)], axis=1) - 0.5
+        even = (np.arange(self.samples) + 0.5) / self.samples
+        return np.stack([even, _halton(self.samples)[:, 0]], axis=1) - 0.5
 
     @cached_property
     def moments(self) -> NDArray[np.float64]:
         """Times of the rays, from -1/2 to 1/2 of the exposure, shape (samples,)."""
-        rank = np.argsort(np.argsort(_halton(np.arange(self.samples), 3)))
+        rank = np.argsort(np.argsort(_halton(self.samples)[:, 1]))
         return (rank + 0.5) / self.samples - 0.5
 
 
-def _halton(k: NDArray[np.int64], base: int) -> NDArray[np.float64]:
-    """Van der Corput sequence: the digits of k reversed behind the point, minus the mean."""
-    value, scale, rest = np.zeros(len(k)), 1.0, k.copy()
-    while rest.any():
-        scale /= base
-        value += scale * (rest % base)
-        rest //= base
-    return value + 0.5 - value.mean()
+def _halton(count: int) -> NDArray[np.float64]:
+    """Halton's sequence (count, 2), about 1/2."""
+    from scipy.stats import qmc  # loads slowly
+
+    value = qmc.Halton(2, scramble=False).random(count)
+    return value + 0.5 - value.mean(axis=0)
 
 
 @dataclass(frozen=True, eq=False)

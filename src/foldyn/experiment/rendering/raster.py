@@ -78,26 +78,18 @@ def draw(
         # linear functions of the pixel: barycentric coordinates, 1/z, and (s, q)/z of the paper
         share_a = _plane(bx * cy - by * cx, by - cy, cx - bx, area)
         share_b = _plane(cx * ay - cy * ax, cy - ay, ax - cx, area)
-        share_c = (
-            1.0 - share_a[0] - share_b[0],
-            -share_a[1] - share_b[1],
-            -share_a[2] - share_b[2],
-        )
+        share_c = 1.0 - share_a[0] - share_b[0], -share_a[1] - share_b[1], -share_a[2] - share_b[2]
         na, nb, nc = nearness[a], nearness[b], nearness[c]
         near0, near1, near2 = _mix(share_a, share_b, share_c, na, nb, nc)
         fa, fb, fc = flat[t, 0], flat[t, 1], flat[t, 2]
         s0, s1, s2 = _mix(share_a, share_b, share_c, na * fa[0], nb * fb[0], nc * fc[0])
         q0, q1, q2 = _mix(share_a, share_b, share_c, na * fa[1], nb * fb[1], nc * fc[1])
-        low_u = min(pixels[a, 0], pixels[b, 0], pixels[c, 0]) - box[0]
-        high_u = max(pixels[a, 0], pixels[b, 0], pixels[c, 0]) - box[0]
-        low_v = min(pixels[a, 1], pixels[b, 1], pixels[c, 1]) - box[1]
-        high_v = max(pixels[a, 1], pixels[b, 1], pixels[c, 1]) - box[1]
-        top = max(0, int(np.floor(low_v)) - _MARGIN)
-        bottom = min(height - 1, int(np.ceil(high_v)) + _MARGIN)
-        before = max(0, int(np.floor(low_u)) - _MARGIN)
-        after = min(width - 1, int(np.ceil(high_u)) + _MARGIN)
         pu = np.array([pixels[a, 0], pixels[b, 0], pixels[c, 0]]) - box[0]
         pv = np.array([pixels[a, 1], pixels[b, 1], pixels[c, 1]]) - box[1]
+        top = max(0, int(np.floor(pv.min())) - _MARGIN)
+        bottom = min(height - 1, int(np.ceil(pv.max())) + _MARGIN)
+        before = max(0, int(np.floor(pu.min())) - _MARGIN)
+        after = min(width - 1, int(np.ceil(pu.max())) + _MARGIN)
         for row in range(top, bottom + 1):
             first, last = _span(pu, pv, row, before, after)
             y_row = (row + box[1] + shift[1] - cv) * scale

@@ -85,20 +85,15 @@ class SyntheticFilm:
         for k, one in self._seen.items():
             seen[k] = one
         dropped = np.isin(np.arange(len(self.time)), self.dropped)
-        return xr.Dataset(
-            {
-                "position": (("time", "node", "axis"), positions, {"units": "m"}),
-                "position_px": (("time", "node", "uv"), self.studio.camera.project(positions)),
-                "seen": (("time", "node"), seen),
-                "dropped": (("time",), dropped),
-            },
-            {
-                "time": ("time", self.time, {"units": "s"}),
-                "node": np.arange(count),
-                "axis": ["x", "y", "z"],
-                "uv": ["u", "v"],
-            },
-        )
+        data = {
+            "position": (("time", "node", "axis"), positions, {"units": "m"}),
+            "position_px": (("time", "node", "uv"), self.studio.camera.project(positions)),
+            "seen": (("time", "node"), seen),
+            "dropped": (("time",), dropped),
+        }
+        time = ("time", self.time, {"units": "s"})
+        names = {"node": np.arange(count), "axis": ["x", "y", "z"], "uv": ["u", "v"]}
+        return xr.Dataset(data, {"time": time, **names})
 
 
 def film_of(

@@ -69,11 +69,8 @@ def write_tracks_page(
         nodes = most_moved(tracks)
         shown = _stage(tracks, footage.case, nodes, title, footage.pictures)
         sections += [shown, Heading("What was measured")]
-        sections += [
-            Charts(track_charts(tracks, nodes, AXES)),
-            Text(FILLED.format(axis=_hidden(tracks))),
-        ]
-        sections.append(_nodes(tracks))
+        sections.append(Charts(track_charts(tracks, nodes, AXES)))
+        sections += [Text(FILLED.format(axis=_hidden(tracks))), _nodes(tracks)]
     sections += [Heading("What the camera saw"), *footage.figures] if footage.figures else []
     rows = [("seen", ", ".join(map(str, footage.files))), *footage.settings.items()]
     sections += [Heading("How it was computed"), inputs_table([*rows, *_found(tracks)])]
@@ -203,11 +200,7 @@ def _found(tracks: xr.Dataset) -> list[tuple[str, str]]:
     if "displacement" in tracks:
         rms = ", ".join(f"{value:.2g}" for value in np.atleast_1d(a["match_rms_px"]))
         nodes = ", ".join(f"{value}" for value in np.atleast_1d(a["matched_nodes"]))
-        rows += [
-            (
-                "camera",
-                f"{a['camera_distance']:.4g} m away; up {a['up']}, towards it {a['facing']}",
-            ),
-            ("recognized", f"{nodes} nodes, {rms} pixels rms from the model"),
-        ]
+        away = f"{a['camera_distance']:.4g} m away; up {a['up']}, towards it {a['facing']}"
+        rows.append(("camera", away))
+        rows.append(("recognized", f"{nodes} nodes, {rms} pixels rms from the model"))
     return rows

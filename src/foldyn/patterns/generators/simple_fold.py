@@ -50,11 +50,5 @@ def simple_fold(a: float = 1.0, b: float = 1.0, *, dihedral: float = 60.0) -> Pa
     h = a * math.cos(math.radians(dihedral) / 2) if dihedral < 180 else 0.0
     vertices = np.array([[x, y, z] for x, z in ((0, 0), (w, h), (2 * w, 0)) for y in (0, b)])
     faces = ((0, 2, 3, 1), (2, 4, 5, 3))
-    return Pattern(
-        vertices,
-        faces,
-        "M",
-        "simple fold",
-        families={"ridge": [(2, 3)]},
-        periods=[[(0, 4), (1, 5)]],
-    )
+    families, periods = {"ridge": [(2, 3)]}, [[(0, 4), (1, 5)]]
+    return Pattern(vertices, faces, "M", "simple fold", families=families, periods=periods)

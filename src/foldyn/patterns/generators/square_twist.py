@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from foldyn.errors import InputError, within
+from foldyn.patterns.frames import composed
 from foldyn.patterns.generators.arguments import acute, fold_dihedral, sizes
 from foldyn.patterns.pattern import Pattern
-from foldyn.patterns.topology import Edge, around, edge_of
+from foldyn.patterns.topology import Edge, edge_of
 from foldyn.values import flag
 
 
@@ -92,7 +90,8 @@ def square_twist(
     angles = _angles(math.radians(180.0 - dihedral), gamma, center, first, second)
     some = angles if dihedral < 180.0 else _angles(1.0, gamma, center, first, second)
     letters = {pair: "V" if angle > 0.0 else "M" for pair, angle in some.items()}
-    vertices = folded(flat, faces, angles)
+    sheet = Pattern(flat, faces)
+    vertices, _ = composed(sheet, np.array([angles[a, b] for a, b in sheet.creases.tolist()]))
     return Pattern(vertices, faces, letters, "square twist", families=families)
 
 
@@ -123,50 +122,3 @@ def _angles(
     angles |= {first[i]: (sides[i - 1] if i % 2 else -sides[i - 1]) for i in range(4)}
     nexts = [sides[(i + 1) % 4] for i in range(4)]
     return angles | {second[i]: (nexts[i] if i % 2 else -nexts[i]) for i in range(4)}
-
-
-def folded(
-    flat: NDArray[np.float64], faces: Sequence[Sequence[int]], angles: Mapping[Edge, float]
-) -> NDArray[np.float64]:
-    """Positions of the vertices when each crease is folded by its angle.
-
-    The first panel stays fixed; each other panel follows the neighbor nearest to the first. The
-    angles must close the panels around every vertex.
-
-    Parameters
-    ----------
-    flat : ndarray, shape (n, 2)
-        Coordinates (m).
-    faces : sequence of sequences of int
-        Connected, counter-clockwise.
-    angles : mapping from (low, high)
-        Fold angles (rad), valleys positive.
-
-    Returns
-    -------
-    ndarray, shape (n, 3)
-    """
-    from scipy.spatial.transform import Rotation
-
-    points = np.column_stack([flat, np.zeros(len(flat))])
-    beside: dict[Edge, list[tuple[int, Edge]]] = {}
-    for number, face in enumerate(faces):
-        for a, b in around(face):
-            beside.setdefault(edge_of(a, b), []).append((number, (a, b)))
-    places = np.full(points.shape, np.nan)
-    turns: dict[int, tuple[NDArray, NDArray]] = {0: (np.eye(3), np.zeros(3))}
-    queue = deque([0])
-    while queue:
-        panel = queue.popleft()
-        turn, shift = turns[panel]
-        for vertex in faces[panel]:
-            if np.isnan(places[vertex, 0]):
-                places[vertex] = turn @ points[vertex] + shift
-        for a, b in around(faces[panel]):
-            for other, _ in beside[edge_of(a, b)]:
-                if other not in turns:
-                    axis = (points[b] - points[a]) / np.linalg.norm(points[b] - points[a])
-                    own = Rotation.from_rotvec(-angles[edge_of(a, b)] * axis).as_matrix()
-                    turns[other] = turn @ own, turn @ (points[a] - own @ points[a]) + shift
-                    queue.append(other)
-    return places

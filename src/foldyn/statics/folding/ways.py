@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.patterns import Pattern
+from foldyn.patterns.frames import composed
 from foldyn.statics.folding.energy import Aim, FoldEnergy, Shape, Stiffness
 from foldyn.statics.folding.minimum import lowest, minimum, settled
 
@@ -254,46 +255,3 @@ def ajar(energy: FoldEnergy, folded: Shape) -> Shape:
     none, most = np.zeros_like(turns), np.full(len(turns), math.pi)
     aim = Aim(turns - FIRST_TURN * np.sign(turns), none, most)
     return minimum(energy, folded, aim, PERTURBED, iterations=3)
-
-
-def composed(pattern: Pattern, angles: NDArray) -> tuple[NDArray, float]:
-    """Vertices (n, 3) of a flat pattern folded by angles (nc,), rad, and the closing error, m.
-
-    The error is the largest deviation of a vertex, as one of its panels has it, from the mean.
-    """
-    from scipy.spatial.transform import Rotation  # loads slowly
-
-    axes = pattern.vertices[np.concatenate([pattern.creases, pattern.welds]).astype(np.int64)]
-    turns = np.concatenate([angles, np.zeros(len(pattern.welds))])
-    neighbors: list[list[tuple[int, int, float]]] = [[] for _ in pattern.faces]
-    sides = [*pattern.crease_faces.tolist(), *pattern.weld_faces.tolist()]
-    for k, (front, back) in enumerate(sides):
-        neighbors[front].append((back, k, -1.0))
-        neighbors[back].append((front, k, 1.0))
-    placed: dict[int, tuple[NDArray, NDArray]] = {}
-    for first in range(len(pattern.faces)):
-        if first in placed:
-            continue
-        placed[first] = np.eye(3), np.zeros(3)
-        queue = [first]
-        for face in queue:  # grows
-            rotation, shift = placed[face]
-            for other, k, way in neighbors[face]:
-                if other not in placed:
-                    a, b = axes[k]
-                    axis = (b - a) / np.linalg.norm(b - a)
-                    own = Rotation.from_rotvec(way * turns[k] * axis).as_matrix()
-                    placed[other] = rotation @ own, rotation @ (a - own @ a) + shift
-                    queue.append(other)
-    total, count = np.zeros_like(pattern.vertices), np.zeros(len(pattern.vertices))
-    images = []
-    for number, face in enumerate(pattern.faces):
-        rotation, shift = placed[number]
-        corners = list(face)
-        image = pattern.vertices[corners] @ rotation.T + shift
-        images.append((corners, image))
-        total[corners] += image
-        count[corners] += 1.0
-    mean = np.where(count[:, None] > 0.0, total / np.maximum(count, 1.0)[:, None], pattern.vertices)
-    gap = max(float(np.abs(image - mean[corners]).max()) for corners, image in images)
-    return mean, gap

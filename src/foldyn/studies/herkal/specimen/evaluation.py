@@ -281,7 +281,7 @@ def compared(
     curves = []
     for support, motion in motions.items():
         case = read_case(released.cases[support]).case()
-        curve = one.curves(motion, case)
+        curve = one.modelled(motion, case)
         curves.append(curve - one.trend(curve))
     places = [released.free.nodes.index(node) for node in front]
     whole, line = released.free.whole[:, places], one.trend(one.values)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.arguments import Unit, brief
 from foldyn.errors import InputError
 from foldyn.signals.records import checked_interval, checked_record
-from foldyn.signals.spectrum import spectrum
+from foldyn.signals.spectra import spectrum
 from foldyn.values import number
 
 _FEWEST = 16

@@ -305,10 +305,8 @@ def convert_response(
     >>> print(found.round(3))
     [0. +6.283j 0.+12.566j]
     """
-    order = (
-        DERIVATIVES[choice("target", target, DERIVATIVES)]
-        - DERIVATIVES[choice("source", source, DERIVATIVES)]
-    )
+    order = DERIVATIVES[choice("target", target, DERIVATIVES)]
+    order -= DERIVATIVES[choice("source", source, DERIVATIVES)]
     f, H = _over_frequency(frequency, response)
     if order == 0:
         return H

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import ComputationError, InputError
 from foldyn.signals import records
-from foldyn.signals.frequency_response import convert_response
+from foldyn.signals.responses import convert_response
 from foldyn.values import choice
 
 _FEWEST = 5  # least points in a band: ten real numbers for six real unknowns
